@@ -1,0 +1,89 @@
+//! How a daemon runs: mode, budget, heartbeat, limits. Read from a scene file, overridden by flags.
+
+use serde::{Deserialize, Serialize};
+
+use crate::limits;
+use crate::time::Budget;
+
+/// What makes a tick.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Mode {
+    /// Lockstep: one tick for each frame of this source, in order, none skipped in silence.
+    OnFrame(String),
+    /// A round: the newest frame of each live source.
+    OnAll,
+    /// So many ticks a second on the newest state, hertz.
+    Rate(f64),
+}
+
+/// What happens to a body that is too old.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OnStale {
+    /// Its pairs become `possible` within its reach.
+    #[default]
+    Unknown,
+    /// It stays at its last pose, shown as unsafe.
+    Hold,
+    /// It is taken out, shown as unsafe.
+    Remove,
+}
+
+/// How a daemon runs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// What makes a tick.
+    pub mode: Mode,
+    /// What a tick may spend.
+    pub budget: Budget,
+    /// A tick goes out at least this often, nanoseconds.
+    pub heartbeat_ns: u64,
+    /// `on_all`: how long after its first frame a round waits for the others, nanoseconds.
+    pub late_ns: u64,
+    /// Beyond this reach a stale body makes no new pairs, metres.
+    pub stale_reach_m: f64,
+    /// Sizes of messages and sets.
+    pub limits: Limits,
+}
+
+/// Sizes of messages and sets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Limits {
+    /// Bodies.
+    pub bodies: usize,
+    /// Pairs kept.
+    pub pairs: usize,
+    /// Rows of `pairs`.
+    pub pair_rows: usize,
+    /// Rows of `contacts`.
+    pub contact_rows: usize,
+    /// Contacts of one pair, at most 16.
+    pub contacts_per_pair: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            bodies: limits::BODIES_MAX,
+            pairs: limits::PAIRS_DEFAULT,
+            pair_rows: limits::PAIR_ROWS_DEFAULT,
+            contact_rows: limits::CONTACT_ROWS_DEFAULT,
+            contacts_per_pair: limits::MANIFOLD_POINTS_MAX,
+        }
+    }
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            mode: Mode::OnAll,
+            budget: Budget::UNLIMITED,
+            heartbeat_ns: limits::HEARTBEAT_MS_DEFAULT * 1_000_000,
+            late_ns: 5_000_000,
+            stale_reach_m: 1.0,
+            limits: Limits::default(),
+        }
+    }
+}

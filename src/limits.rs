@@ -1,0 +1,52 @@
+//! Limits of every queue, buffer and loop: unit, reason, and what happens at the limit.
+//!
+//! Scene files can lower (some: raise) these in `[limits]`; the values here are the defaults and the hard ends.
+
+/// Sources a daemon can have, and so the source rows of a tick. iceoryx2 reserves a connection for each.
+pub const SOURCES_MAX: usize = 16;
+/// Bodies a scene may hold. Slots are u32 and a pair key is two of them; beyond a million the floor of a tick
+/// leaves no time for the narrow phase on the machines this was built for.
+pub const BODIES_MAX: usize = 1 << 20;
+/// Shapes in one body; contact rows name them by place.
+pub const SHAPES_PER_BODY_MAX: usize = 1 << 16;
+/// Triangles of one mesh. 10 million take about a gigabyte with their tree; refused, never loaded in part.
+pub const TRIANGLES_MAX: usize = 8_000_000;
+/// Vertices of a convex hull after building; support functions walk all of them.
+pub const HULL_VERTICES_MAX: usize = 4096;
+/// Default for pairs kept; beyond it the state is `unknown` and so is each body concerned.
+pub const PAIRS_DEFAULT: usize = 1 << 22;
+/// Default for rows of `pairs`; beyond it rows are left out by rank and counted.
+pub const PAIR_ROWS_DEFAULT: usize = 1 << 16;
+/// Default for rows of `contacts`.
+pub const CONTACT_ROWS_DEFAULT: usize = 1 << 16;
+/// Contacts of one shape pair.
+pub const MANIFOLD_POINTS_MAX: usize = 4;
+/// Contacts of one body pair, deepest first.
+pub const CONTACTS_PER_PAIR_MAX: usize = 16;
+/// Transforms in one frame; more are refused as `over_limit`.
+pub const FRAME_ROWS_MAX: usize = BODIES_MAX;
+/// Frames taken from one source in one drain; the rest waits in its queue, newest kept.
+pub const FRAMES_PER_DRAIN_MAX: usize = 64;
+/// Largest coordinate of a pose, metres: beyond it f64 has a spacing of 0.1 mm and no contact means anything.
+pub const COORDINATE_MAX_M: f64 = 1e12;
+/// Largest extent of a shape, metres.
+pub const EXTENT_MAX_M: f64 = 1e9;
+/// Smallest extent of a shape, metres; a capsule's half height may be 0.
+pub const EXTENT_MIN_M: f64 = 1e-9;
+/// Largest deviation of a frame quaternion's length from 1; beyond it the sender means something else.
+pub const QUATERNION_NORM_TOLERANCE: f64 = 1e-2;
+/// Default heartbeat, milliseconds.
+pub const HEARTBEAT_MS_DEFAULT: u64 = 100;
+/// Default time-out of a source, milliseconds.
+pub const TIMEOUT_MS_DEFAULT: u64 = 500;
+/// Bytes of one scene edit request.
+pub const REQUEST_BYTES_MAX: usize = 1 << 29;
+/// Remembered sessions that are over, per daemon; the oldest is forgotten, and then refused as an old frame anyway.
+pub const SESSIONS_OVER_MAX: usize = 1024;
+
+const _: () = {
+    assert!(BODIES_MAX < u32::MAX as usize);
+    assert!(PAIRS_DEFAULT < u32::MAX as usize);
+    assert!(CONTACTS_PER_PAIR_MAX >= MANIFOLD_POINTS_MAX);
+    assert!(SOURCES_MAX <= 255);
+};

@@ -1,0 +1,314 @@
+//! Numbers of the house: poses, boxes, intervals, outward rounding, and the one place that speaks glamx.
+//!
+//! f64 everywhere, metres and radians, right-handed, z up.
+
+use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+
+/// A vector or a direction, metres unless said otherwise.
+pub type Vec3 = Vector3<f64>;
+/// A point in the frame that its name or doc gives, metres.
+pub type Point = Point3<f64>;
+/// A rotation.
+pub type Quat = UnitQuaternion<f64>;
+/// A rigid transform. `pos12` is the pose of 2 seen from 1.
+pub type Pose = Isometry3<f64>;
+
+/// Unit roundoff of f64, 2^-53.
+pub const ROUND: f64 = f64::EPSILON / 2.0;
+
+/// The largest f32 not above `x`.
+#[must_use]
+pub fn f32_down(x: f64) -> f32 {
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "this is the one cast, corrected below"
+    )]
+    let nearest = x as f32;
+    if f64::from(nearest) > x {
+        nearest.next_down()
+    } else {
+        nearest
+    }
+}
+
+/// The smallest f32 not below `x`.
+#[must_use]
+pub fn f32_up(x: f64) -> f32 {
+    -f32_down(-x)
+}
+
+/// The pose of 2 seen from 1, from two world poses.
+///
+/// The translations are subtracted first: far from the origin a product of world matrices loses what they share.
+#[must_use]
+pub fn relative(pose1: &Pose, pose2: &Pose) -> Pose {
+    let inverse = pose1.rotation.inverse();
+    let translation = inverse * (pose2.translation.vector - pose1.translation.vector);
+    Pose::from_parts(Translation3::from(translation), inverse * pose2.rotation)
+}
+
+/// A pose from a position and a quaternion x, y, z, w, which is normalised; `None` when not finite or zero.
+#[must_use]
+pub fn pose_from(position: [f64; 3], xyzw: [f64; 4]) -> Option<Pose> {
+    let finite = position.iter().chain(&xyzw).all(|v| v.is_finite());
+    let quaternion = Quaternion::new(xyzw[3], xyzw[0], xyzw[1], xyzw[2]);
+    // Scaled by its largest part first, so that neither 1e-200 nor 1e200 loses the direction.
+    let largest = quaternion.coords.amax();
+    if !finite || largest == 0.0 {
+        return None;
+    }
+    let rotation = UnitQuaternion::new_normalize(quaternion / largest);
+    Some(Pose::from_parts(
+        Translation3::from(Vec3::from(position)),
+        rotation,
+    ))
+}
+
+/// An upper bound on how far any point within `radius` of `centre` (frame of the body) moves between two poses.
+///
+/// Displacement of the centre, plus the chord `2 r sin(theta / 2)` of the rotation, rounded up.
+#[must_use]
+pub fn displacement(from: &Pose, to: &Pose, centre: &Point, radius: f64) -> f64 {
+    let moved = (to * centre) - (from * centre);
+    let turn = chord(&from.rotation, &to.rotation);
+    // A few roundings of coordinates as large as the positions themselves stand behind each difference.
+    let magnitude = from
+        .translation
+        .vector
+        .amax()
+        .max(to.translation.vector.amax())
+        + centre.coords.amax()
+        + radius;
+    let exact_zero = from == to;
+    if exact_zero {
+        0.0
+    } else {
+        (moved.norm() + turn * radius) * (1.0 + 8.0 * ROUND) + 16.0 * ROUND * magnitude
+    }
+}
+
+/// `2 sin(theta / 2)` of the rotation between two orientations: how far a point at radius 1 moves at most.
+#[must_use]
+pub fn chord(from: &Quat, to: &Quat) -> f64 {
+    let (a, b) = (from.as_vector(), to.as_vector());
+    // |a - b| = 2 sin(theta / 4) for unit quaternions on the same side: stable near zero, where acos is not.
+    let quarter = (a - b).norm().min((a + b).norm()) / 2.0;
+    let cosine = (1.0 - quarter * quarter).max(0.0).sqrt();
+    4.0 * quarter * cosine
+}
+
+/// A closed interval of metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// Lower end; may be minus infinity.
+    pub min: f64,
+    /// Upper end; may be infinity.
+    pub max: f64,
+}
+
+impl Interval {
+    /// Nothing is known.
+    pub const UNKNOWN: Self = Self {
+        min: f64::NEG_INFINITY,
+        max: f64::INFINITY,
+    };
+
+    /// The interval between two ends.
+    #[must_use]
+    pub fn new(min: f64, max: f64) -> Self {
+        debug_assert!(min <= max, "interval ends in order: {min} {max}");
+        Self { min, max }
+    }
+
+    /// Both ends moved out by `margin`, rounded outward.
+    #[must_use]
+    pub fn widened(self, margin: f64) -> Self {
+        Self {
+            min: (self.min - margin).next_down(),
+            max: (self.max + margin).next_up(),
+        }
+    }
+
+    /// What both intervals allow. Two sound intervals of one number always meet; should rounding part them, `self` wins.
+    #[must_use]
+    pub fn meet(self, other: Self) -> Self {
+        let both = Self {
+            min: self.min.max(other.min),
+            max: self.max.min(other.max),
+        };
+        if both.min <= both.max { both } else { self }
+    }
+
+    /// The interval of the lesser of two numbers.
+    #[must_use]
+    pub fn least(self, other: Self) -> Self {
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.min(other.max),
+        }
+    }
+
+    /// Upper end minus lower end.
+    #[must_use]
+    pub fn width(self) -> f64 {
+        self.max - self.min
+    }
+
+    /// Whether `x` lies inside, ends included.
+    #[must_use]
+    pub fn contains(self, x: f64) -> bool {
+        self.min <= x && x <= self.max
+    }
+}
+
+/// An axis-aligned box, closed: touching counts as overlap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Lower corner, metres.
+    pub min: Point,
+    /// Upper corner, metres.
+    pub max: Point,
+}
+
+impl Aabb {
+    /// The box that holds nothing: the neutral element of [`Aabb::merged`].
+    #[must_use]
+    pub fn empty() -> Self {
+        let (low, high) = (f64::INFINITY, f64::NEG_INFINITY);
+        Self {
+            min: Point::new(low, low, low),
+            max: Point::new(high, high, high),
+        }
+    }
+
+    /// The least box around points.
+    pub fn of<'a>(points: impl IntoIterator<Item = &'a Point>) -> Self {
+        points.into_iter().fold(Self::empty(), |all, p| Self {
+            min: all.min.inf(p),
+            max: all.max.sup(p),
+        })
+    }
+
+    /// The least box around both.
+    #[must_use]
+    pub fn merged(&self, other: &Self) -> Self {
+        Self {
+            min: self.min.inf(&other.min),
+            max: self.max.sup(&other.max),
+        }
+    }
+
+    /// Each face moved out by `margin_m`, rounded outward.
+    #[must_use]
+    pub fn widened(&self, margin_m: f64) -> Self {
+        Self {
+            min: self.min.map(|v| (v - margin_m).next_down()),
+            max: self.max.map(|v| (v + margin_m).next_up()),
+        }
+    }
+
+    /// Whether the two closed boxes share a point.
+    #[must_use]
+    pub fn overlaps(&self, other: &Self) -> bool {
+        (0..3).all(|k| self.min[k] <= other.max[k] && other.min[k] <= self.max[k])
+    }
+
+    /// Whether `other` lies wholly inside.
+    #[must_use]
+    pub fn holds(&self, other: &Self) -> bool {
+        (0..3).all(|k| self.min[k] <= other.min[k] && other.max[k] <= self.max[k])
+    }
+
+    /// A lower bound on the distance between anything in the one and anything in the other; 0 when they overlap.
+    #[must_use]
+    pub fn distance(&self, other: &Self) -> f64 {
+        let apart = |k: usize| {
+            (other.min[k] - self.max[k])
+                .max(self.min[k] - other.max[k])
+                .max(0.0)
+        };
+        let square = apart(0) * apart(0) + apart(1) * apart(1) + apart(2) * apart(2);
+        square.sqrt() * (1.0 - 4.0 * f64::EPSILON)
+    }
+
+    /// Centre, metres.
+    #[must_use]
+    pub fn centre(&self) -> Point {
+        nalgebra::center(&self.min, &self.max)
+    }
+
+    /// Half of each side, metres.
+    #[must_use]
+    pub fn half_extents(&self) -> Vec3 {
+        (self.max - self.min) / 2.0
+    }
+}
+
+/// To parry's pose.
+#[must_use]
+pub(crate) fn to_glam(pose: &Pose) -> glamx::DPose3 {
+    let (t, q) = (&pose.translation.vector, pose.rotation.as_vector());
+    glamx::DPose3 {
+        rotation: glamx::DQuat::from_xyzw(q.x, q.y, q.z, q.w),
+        translation: to_glam_vec(t),
+    }
+}
+
+/// To parry's vector.
+#[must_use]
+pub(crate) fn to_glam_vec(v: &Vec3) -> glamx::DVec3 {
+    glamx::DVec3::new(v.x, v.y, v.z)
+}
+
+/// From parry's vector.
+#[must_use]
+pub(crate) fn from_glam_vec(v: glamx::DVec3) -> Vec3 {
+    Vec3::new(v.x, v.y, v.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn casts_to_f32_never_cross_the_number() {
+        for x in [0.1, -0.1, 1e7 + 0.3, -1e-40, 16_777_217.0, 3.5e38, -3.5e38] {
+            assert!(f64::from(f32_down(x)) <= x, "{x}");
+            assert!(f64::from(f32_up(x)) >= x, "{x}");
+        }
+    }
+
+    #[test]
+    fn a_chord_is_twice_the_sine_of_half_the_angle() {
+        for angle in [0.0_f64, 1e-9, 0.01, 1.0, 3.0, std::f64::consts::PI] {
+            let turned = Quat::from_axis_angle(&Vec3::z_axis(), angle);
+            let wanted = 2.0 * (angle / 2.0).sin();
+            assert!(
+                (chord(&Quat::identity(), &turned) - wanted).abs() < 1e-14,
+                "{angle}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_quaternion_of_any_length_is_normalised_and_a_zero_one_is_refused() {
+        assert!(pose_from([0.0; 3], [0.0; 4]).is_none());
+        assert!(pose_from([f64::NAN, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]).is_none());
+        let tiny = pose_from([0.0; 3], [0.0, 0.0, 3e-200, 4e-200]).unwrap();
+        assert!((tiny.rotation.k - 0.6).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_relative_pose_keeps_its_digits_far_from_the_origin() {
+        let far = Vec3::new(1e7, -1e7, 1e7);
+        let (a, b) = (
+            Pose::translation(far.x, far.y, far.z),
+            Vec3::new(0.25, 0.5, 0.125),
+        );
+        let b = Pose::from_parts((far + b).into(), Quat::identity());
+        assert_eq!(
+            relative(&a, &b).translation.vector,
+            Vec3::new(0.25, 0.5, 0.125)
+        );
+    }
+}

@@ -1,0 +1,1 @@
+//! Mesh pairs as walks over leaves that can stop.

@@ -1,0 +1,3 @@
+//! Narrow phase.
+pub mod exact;
+pub mod mesh;

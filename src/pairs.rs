@@ -1,0 +1,1 @@
+//! The pair set: overlapping pairs only.

@@ -1,0 +1,2 @@
+//! Offline queries.
+pub mod batch;

@@ -1,0 +1,100 @@
+//! The checked scene.
+
+use crate::config::{Config, OnStale};
+use crate::ids::BodyId;
+use crate::math::Pose;
+use crate::shape::ShapeSpec;
+
+/// A checked scene: names are unique, numbers finite, references resolve.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// Name of the one frame all poses are in.
+    pub frame_id: String,
+    /// Mode, budget, heartbeat, limits.
+    pub config: Config,
+    /// Sources, at most 16.
+    pub sources: Vec<SourceSpec>,
+    /// Bodies, in the file's order.
+    pub bodies: Vec<BodySpec>,
+    /// Pair rules; the last that matches wins.
+    pub rules: Vec<PairRule>,
+}
+
+/// A source: a client that sends frames.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SourceSpec {
+    /// Unique, 1 to 31 bytes.
+    pub name: String,
+    /// Without a frame for this long it is no longer alive and its bodies are stale, nanoseconds.
+    pub timeout_ns: u64,
+}
+
+/// A body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodySpec {
+    /// Unique, 1 to 104 bytes.
+    pub name: String,
+    /// Unique, never 0: as given, or the least free one in the file's order.
+    pub id: BodyId,
+    /// At least one.
+    pub shapes: Vec<PlacedSpec>,
+    /// Start pose in the scene's frame; relative to the body it is attached to, where it is.
+    pub pose: Pose,
+    /// Whether frames may move it. A body that moves is not known before its first pose.
+    pub moves: bool,
+    /// Whether it is swept between its last two poses.
+    pub continuous: bool,
+    /// Place of its source in `Scene::sources`; `None` when it cannot move.
+    pub source: Option<usize>,
+    /// Groups it belongs to, one bit each.
+    pub group: u32,
+    /// Groups it collides with.
+    pub mask: u32,
+    /// Its neighbour, by name: ignored by default.
+    pub parent: Option<String>,
+    /// The body it takes pose, age and unknown from, by name.
+    pub attached_to: Option<String>,
+    /// Bodies of one rigid group never move relative to each other and are ignored.
+    pub rigid_group: Option<String>,
+    /// Pairs nearer than this are reported, metres.
+    pub report_within_m: f64,
+    /// Greatest speed of any of its surface points, metres a second.
+    pub max_speed_mps: Option<f64>,
+    /// What happens when it is too old.
+    pub on_stale: OnStale,
+    /// Whether it takes part.
+    pub enabled: bool,
+}
+
+/// A shape at its place in a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlacedSpec {
+    /// The shape.
+    pub shape: ShapeSpec,
+    /// Its pose in the body's frame.
+    pub pose: Pose,
+}
+
+/// What a pair rule says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PairAction {
+    /// Check the pair, whatever masks and neighbours say.
+    Check,
+    /// Never check it.
+    Ignore,
+}
+
+/// A rule for pairs of bodies, by name or pattern (`*` any run, `?` one character).
+#[derive(Clone, Debug, PartialEq)]
+pub struct PairRule {
+    /// Check or ignore.
+    pub action: PairAction,
+    /// The one side.
+    pub a: String,
+    /// The other side.
+    pub b: String,
+    /// Why; shown by `check`.
+    pub reason: String,
+    /// Overrides the bodies' `report_within_m` for these pairs.
+    pub report_within_m: Option<f64>,
+}

@@ -1,0 +1,54 @@
+//! Shapes: what a user says (`ShapeSpec`), what the engine queries (`Shape`), and the loaders between them.
+//!
+//! In: a spec and the folder its files are relative to. Out: an immutable, shared `Shape` with its bounds.
+
+mod convex;
+mod mesh;
+mod spec;
+
+pub use convex::Convex;
+pub use mesh::Mesh;
+pub use spec::ShapeSpec;
+
+use crate::math::{Aabb, Point, Pose, Vec3};
+
+/// A built shape, immutable and shared between bodies.
+#[derive(Debug)]
+pub struct Shape {
+    /// What it is.
+    pub geometry: Geometry,
+    /// Tight box in the shape's own frame; infinite for a half-space.
+    pub aabb: Aabb,
+    /// Centre of its geometry, own frame: the reference point of motion bounds.
+    pub centre: Point,
+    /// Greatest distance of any of its points from `centre`, metres, rounded up; infinite for a half-space.
+    pub radius: f64,
+}
+
+/// The kinds of geometry that the narrow phase tells apart.
+#[derive(Debug)]
+pub enum Geometry {
+    /// A convex solid, or a triangle.
+    Convex(Convex),
+    /// Triangles, as a solid or as a surface; height fields too.
+    Mesh(Mesh),
+    /// `normal . x <= offset`.
+    HalfSpace {
+        /// Unit, outward, own frame.
+        normal: Vec3,
+        /// Metres along `normal`.
+        offset: f64,
+    },
+}
+
+impl Shape {
+    /// Its tight box at `pose`, rounded outward; infinite for a half-space.
+    #[must_use]
+    pub fn aabb_at(&self, pose: &Pose) -> Aabb {
+        match &self.geometry {
+            Geometry::Convex(convex) => convex.aabb_at(pose),
+            Geometry::Mesh(mesh) => mesh.aabb_at(pose),
+            Geometry::HalfSpace { .. } => self.aabb,
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! A decoded frame, and the inbox that carries a tick's frames. Both keep their memory from tick to tick.
+
+use super::rows::{FrameHeader, SOURCE_NAME_LEN, TransformRow, TransformVelRow};
+
+/// One batch of transforms from one source, copied out of the transport, not yet checked.
+#[derive(Clone, Debug, Default)]
+pub struct Frame {
+    /// As the client wrote it.
+    pub header: FrameHeader,
+    /// Receipt, nanoseconds of `CLOCK_BOOTTIME`.
+    pub received_ns: u64,
+    /// `[n]` poses.
+    pub transforms: Vec<TransformRow>,
+    /// `[n]` linear and angular velocity, or empty.
+    pub velocities: Vec<[f64; 6]>,
+    /// Whether it waited while the daemon was silent for longer than a heartbeat.
+    pub waited: bool,
+}
+
+impl Frame {
+    /// Takes poses without velocities.
+    pub fn set_transforms(&mut self, rows: &[TransformRow]) {
+        self.transforms.clear();
+        self.velocities.clear();
+        self.transforms.extend_from_slice(rows);
+    }
+
+    /// Takes poses with velocities.
+    pub fn set_transforms_vel(&mut self, rows: &[TransformVelRow]) {
+        self.transforms.clear();
+        self.velocities.clear();
+        for row in rows {
+            self.transforms.push(row.transform);
+            let ([lx, ly, lz], [ax, ay, az]) = (row.linear, row.angular);
+            self.velocities.push([lx, ly, lz, ax, ay, az]);
+        }
+    }
+}
+
+/// The frames of one tick, in order of receipt. Cleared frames are kept and reused.
+#[derive(Clone, Debug, Default)]
+pub struct Inbox {
+    frames: Vec<Frame>,
+    len: usize,
+}
+
+impl Inbox {
+    /// An emptied frame at the end, to be filled.
+    pub fn push(&mut self) -> &mut Frame {
+        if self.len == self.frames.len() {
+            self.frames.push(Frame::default());
+        }
+        let frame = &mut self.frames[self.len];
+        self.len += 1;
+        frame.header = FrameHeader::default();
+        frame.received_ns = 0;
+        frame.waited = false;
+        frame.transforms.clear();
+        frame.velocities.clear();
+        frame
+    }
+
+    /// The frames, oldest first.
+    #[must_use]
+    pub fn frames(&self) -> &[Frame] {
+        &self.frames[..self.len]
+    }
+
+    /// Forgets the frames, keeps their memory.
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// Whether there is no frame.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+}
+
+/// A name as NUL-padded bytes; cut at `SOURCE_NAME_LEN`.
+#[must_use]
+pub fn name_bytes(name: &str) -> [u8; SOURCE_NAME_LEN] {
+    let mut bytes = [0; SOURCE_NAME_LEN];
+    for (to, from) in bytes.iter_mut().zip(name.bytes()) {
+        *to = from;
+    }
+    bytes
+}
+
+/// The name in NUL-padded bytes; `None` when it is not UTF-8.
+#[must_use]
+pub fn name_str(bytes: &[u8]) -> Option<&str> {
+    let len = bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len());
+    std::str::from_utf8(&bytes[..len]).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_inbox_reuses_its_frames_and_hands_them_out_empty() {
+        let mut inbox = Inbox::default();
+        inbox.push().set_transforms(&[TransformRow::default(); 5]);
+        inbox.clear();
+        assert!(inbox.is_empty());
+        assert!(inbox.push().transforms.is_empty());
+        assert_eq!(inbox.frames().len(), 1);
+    }
+
+    #[test]
+    fn names_survive_their_padding() {
+        assert_eq!(name_str(&name_bytes("arm")), Some("arm"));
+        assert_eq!(name_str(&[0xff, 0]), None);
+    }
+}

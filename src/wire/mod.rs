@@ -1,0 +1,27 @@
+//! What crosses a wall: the rows of every message, their codes, and the two boxes (`Inbox`, `Outbox`) that the
+//! engine is handed and hands back. `msgs/` holds the same layouts for other languages; `tests/wire_layout.rs`
+//! compares them.
+
+mod codes;
+mod frame;
+mod outbox;
+mod request;
+mod rows;
+
+pub use codes::{
+    BodyStatus, ContactKind, EndCause, Event, Level, Reason, RejectReason, Stage, State, TickCause,
+    Verdict, contact_flags, frame_flags, pair_flags,
+};
+pub use frame::{Frame, Inbox, name_bytes, name_str};
+pub use outbox::{Demand, Outbox};
+pub use request::{Answer, AnswerHeader, RequestHeader};
+pub use rows::{
+    BODY_NAME_LEN, BodyRow, ContactRow, FrameHeader, Hello, MessageHeader, NameRow, PairRow,
+    REJECTS_LEN, SOURCE_NAME_LEN, SOURCES_MAX, STAGES_LEN, SourceRow, TickRow, TransformRow,
+    TransformVelRow,
+};
+
+/// Version of every layout here; it stands in service names and type names, and in each header.
+pub const WIRE_VERSION: u32 = 1;
+/// No sub-shape: a contact of a shape that has no triangles.
+pub const NO_INDEX: u32 = u32::MAX;

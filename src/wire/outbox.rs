@@ -1,0 +1,59 @@
+//! The outbox of a tick, and the demand that says which parts of it anybody reads.
+
+use super::rows::{BodyRow, ContactRow, MessageHeader, NameRow, PairRow, TickRow};
+
+/// What is listened to; what nobody listens to is not computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "one independent switch a message"
+)]
+pub struct Demand {
+    /// Somebody reads `pairs`.
+    pub pairs: bool,
+    /// Somebody reads `contacts`: manifolds are computed.
+    pub contacts: bool,
+    /// Somebody reads `bodies`.
+    pub bodies: bool,
+    /// Somebody reads `body_verdicts`.
+    pub body_verdicts: bool,
+}
+
+impl Demand {
+    /// Everything.
+    pub const ALL: Self = Self {
+        pairs: true,
+        contacts: true,
+        bodies: true,
+        body_verdicts: true,
+    };
+}
+
+/// What one tick publishes. Kept and refilled from tick to tick.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Outbox {
+    /// The tick, to be sent last.
+    pub tick: TickRow,
+    /// Header of `pairs`.
+    pub pairs_header: MessageHeader,
+    /// Pairs that are not plainly apart and last events, by `(body_a, body_b)`.
+    pub pairs: Vec<PairRow>,
+    /// Header of `contacts`.
+    pub contacts_header: MessageHeader,
+    /// Contacts, by `(body_a, body_b)`, then by shapes, triangles and id.
+    pub contacts: Vec<ContactRow>,
+    /// Header of `bodies`.
+    pub bodies_header: MessageHeader,
+    /// Bodies, by id.
+    pub bodies: Vec<BodyRow>,
+    /// Worst `Verdict` of each body, in the order of `names`; never truncated.
+    pub body_verdicts: Vec<u8>,
+    /// Names, by body id; filled when the scene changed.
+    pub names: Vec<NameRow>,
+    /// The plan as JSON; filled when it changed.
+    pub plan: String,
+    /// Whether `names` is new in this tick.
+    pub names_changed: bool,
+    /// Whether `plan` is new in this tick.
+    pub plan_changed: bool,
+}

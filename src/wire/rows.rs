@@ -1,0 +1,389 @@
+//! The rows: `repr(C)`, widest fields first, reserved bytes explicit, no bool, enum, usize or pointer.
+//!
+//! SI units, right-handed, z up, the scene's one `frame_id`. Quaternions are x, y, z, w. `Default` is all zeros.
+
+use iceoryx2::prelude::ZeroCopySend;
+
+pub use crate::limits::SOURCES_MAX;
+/// Bytes of a source's name, NUL-padded UTF-8.
+pub const SOURCE_NAME_LEN: usize = 32;
+/// Bytes of a body's name, NUL-padded UTF-8.
+pub const BODY_NAME_LEN: usize = 104;
+/// Places for reject counters, by `RejectReason`.
+pub const REJECTS_LEN: usize = 16;
+/// Places for stage times, by `Stage`.
+pub const STAGES_LEN: usize = 8;
+
+/// User header of `transforms` and `transforms_vel`: whose frame, which one, how old, how urgent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
+#[repr(C)]
+#[type_name("sweepd.v1.FrameHeader")]
+pub struct FrameHeader {
+    /// Random number drawn at each client start; never 0.
+    pub session: u64,
+    /// Raised by the client when its world resets.
+    pub epoch: u64,
+    /// Counts the frames of a session; order within a session is `(epoch, seq)`.
+    pub seq: u64,
+    /// When the client sent it, nanoseconds of `CLOCK_BOOTTIME`; 0: not said, then age counts from receipt.
+    pub sent_ns: u64,
+    /// The sender's own stamp of the poses, nanoseconds of the clock `clock_id`; echoed, never trusted.
+    pub stamp_ns: u64,
+    /// Least scene revision these poses need; 0: any.
+    pub scene_rev: u64,
+    /// Deadline of the tick on `CLOCK_MONOTONIC`, nanoseconds; 0: none. Can shorten the budget, never lengthen it.
+    pub deadline_ns: u64,
+    /// Time left for the tick from receipt, nanoseconds; 0: not said.
+    pub time_left_ns: u64,
+    /// Name of the source, NUL-padded UTF-8.
+    pub source: [u8; SOURCE_NAME_LEN],
+    /// `frame_flags`: full, partial or paused.
+    pub flags: u32,
+    /// The sender's number for the clock of `stamp_ns`; echoed.
+    pub clock_id: u32,
+    /// `WIRE_VERSION` of the sender.
+    pub schema: u32,
+    /// Zero.
+    pub reserved: u32,
+}
+
+/// One body's pose.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[repr(C)]
+#[type_name("sweepd.v1.Transform")]
+pub struct TransformRow {
+    /// Body id.
+    pub body: u64,
+    /// Zero.
+    pub flags: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// Origin of the body's frame in the scene's frame, metres.
+    pub position: [f64; 3],
+    /// Orientation x, y, z, w, unit length within 1e-2.
+    pub orientation: [f64; 4],
+}
+
+/// One body's pose and velocity.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[repr(C)]
+#[type_name("sweepd.v1.TransformVel")]
+pub struct TransformVelRow {
+    /// Pose, as [`TransformRow`].
+    pub transform: TransformRow,
+    /// Velocity of the body frame's origin in the scene's frame, metres a second.
+    pub linear: [f64; 3],
+    /// Angular velocity in the scene's frame, radians a second.
+    pub angular: [f64; 3],
+}
+
+/// User header of every message the daemon publishes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
+#[repr(C)]
+#[type_name("sweepd.v1.MessageHeader")]
+pub struct MessageHeader {
+    /// Random number of this start of the daemon.
+    pub boot_id: u64,
+    /// Tick, from 1.
+    pub tick: u64,
+    /// Scene revision the tick used.
+    pub scene_rev: u64,
+    /// Oldest sender's stamp among the poses used, nanoseconds.
+    pub oldest_stamp_ns: u64,
+    /// Newest sender's stamp among the poses used, nanoseconds.
+    pub newest_stamp_ns: u64,
+    /// Rows that did not fit into this message.
+    pub truncated: u64,
+    /// `State` of the tick.
+    pub state: u8,
+    /// Zero.
+    pub reserved: [u8; 3],
+    /// `WIRE_VERSION`.
+    pub schema: u32,
+}
+
+/// One pair that is not plainly apart, or one last event of a pair.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[repr(C)]
+#[type_name("sweepd.v1.Pair")]
+pub struct PairRow {
+    /// Smaller body id.
+    pub body_a: u64,
+    /// Larger body id.
+    pub body_b: u64,
+    /// Lower end of the proved gap, metres, signed; minus infinity: nothing known.
+    pub gap_min_m: f64,
+    /// Upper end of the proved gap, metres, signed; infinity: nothing known.
+    pub gap_max_m: f64,
+    /// Best estimate of the gap, metres, signed; NaN: none.
+    pub gap_best_m: f64,
+    /// How fast the gap shrinks along the normal, metres a second; negative: it grows; NaN: velocities unknown.
+    pub closing_mps: f64,
+    /// Begin: the earliest tick in which it may have happened.
+    pub begin_first_tick: u64,
+    /// Begin: the tick in which it was certified.
+    pub begin_last_tick: u64,
+    /// End: the earliest tick in which it may have happened.
+    pub end_first_tick: u64,
+    /// End: the tick in which it was certified or caused.
+    pub end_last_tick: u64,
+    /// Tick of the last certified verdict; 0: never.
+    pub certified_tick: u64,
+    /// Ticks since the interval was computed at the poses of its tick.
+    pub bound_age_ticks: u32,
+    /// `Verdict` at this tick's poses.
+    pub verdict: u8,
+    /// Last certified `Verdict`: apart, near or colliding.
+    pub certified_verdict: u8,
+    /// Bits of `Event`.
+    pub events: u8,
+    /// `EndCause` of the end in this row.
+    pub end_cause: u8,
+    /// `Level` reached.
+    pub level: u8,
+    /// `pair_flags`.
+    pub flags: u8,
+    /// Zero.
+    pub reserved: [u8; 6],
+}
+
+/// One point of contact, or the closest points of a near pair.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[repr(C)]
+#[type_name("sweepd.v1.Contact")]
+pub struct ContactRow {
+    /// Stays while the contact does.
+    pub id: u64,
+    /// Smaller body id.
+    pub body_a: u64,
+    /// Larger body id.
+    pub body_b: u64,
+    /// Point on A's surface, scene frame, metres.
+    pub point_a: [f64; 3],
+    /// Point on B's surface, scene frame, metres.
+    pub point_b: [f64; 3],
+    /// Point on A's surface, A's body frame, metres.
+    pub point_a_body: [f64; 3],
+    /// Point on B's surface, B's body frame, metres.
+    pub point_b_body: [f64; 3],
+    /// Unit, scene frame, from A to B.
+    pub normal: [f64; 3],
+    /// Gap at this contact, metres; negative: depth.
+    pub gap_m: f64,
+    /// Lower end of the shape pair's proved gap, metres.
+    pub gap_min_m: f64,
+    /// Upper end of the shape pair's proved gap, metres.
+    pub gap_max_m: f64,
+    /// Shape of A, by its place in the body.
+    pub shape_a: u32,
+    /// Shape of B, by its place in the body.
+    pub shape_b: u32,
+    /// Triangle of A's shape; `u32::MAX`: none.
+    pub triangle_a: u32,
+    /// Triangle of B's shape; `u32::MAX`: none.
+    pub triangle_b: u32,
+    /// `contact_flags`.
+    pub flags: u32,
+    /// `ContactKind`.
+    pub kind: u8,
+    /// Zero.
+    pub reserved: [u8; 3],
+}
+
+/// One body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[repr(C)]
+#[type_name("sweepd.v1.Body")]
+pub struct BodyRow {
+    /// Body id.
+    pub body: u64,
+    /// Last admitted position of the body's frame, scene frame, metres.
+    pub position: [f64; 3],
+    /// Last admitted orientation x, y, z, w.
+    pub orientation: [f64; 4],
+    /// The sender's stamp of that pose, nanoseconds.
+    pub stamp_ns: u64,
+    /// Receipt of that pose, nanoseconds of `CLOCK_BOOTTIME`.
+    pub received_ns: u64,
+    /// Age at this tick, nanoseconds; `u64::MAX`: never received.
+    pub age_ns: u64,
+    /// Generation: raised when a body of this name is put again.
+    pub generation: u32,
+    /// Place of its source in `TickRow::sources`; `u32::MAX`: none.
+    pub source: u32,
+    /// `BodyStatus`.
+    pub status: u8,
+    /// Worst `Verdict` over all its pairs.
+    pub verdict: u8,
+    /// Last `RejectReason`, when the status is `rejected`.
+    pub reject: u8,
+    /// Zero.
+    pub reserved: [u8; 5],
+}
+
+/// A body's name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ZeroCopySend)]
+#[repr(C)]
+#[type_name("sweepd.v1.Name")]
+pub struct NameRow {
+    /// Body id.
+    pub body: u64,
+    /// Place of its source in `TickRow::sources`; `u32::MAX`: none.
+    pub source: u32,
+    /// Generation of the body.
+    pub generation: u32,
+    /// Bytes of the name in use.
+    pub len: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// UTF-8, NUL-padded.
+    pub name: [u8; BODY_NAME_LEN],
+}
+
+/// One source as the tick saw it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
+#[repr(C)]
+#[type_name("sweepd.v1.Source")]
+pub struct SourceRow {
+    /// Name, NUL-padded UTF-8; empty: no source in this place.
+    pub name: [u8; SOURCE_NAME_LEN],
+    /// Session in force; 0: none yet.
+    pub session: u64,
+    /// Epoch of its newest frame.
+    pub epoch: u64,
+    /// Number of its newest frame.
+    pub seq: u64,
+    /// Sender's stamp of its newest frame, nanoseconds.
+    pub stamp_ns: u64,
+    /// Age of its newest frame, nanoseconds; `u64::MAX`: none yet.
+    pub age_ns: u64,
+    /// Frames admitted in this boot.
+    pub frames: u64,
+    /// Frames passed over because a newer one was there.
+    pub skipped: u64,
+    /// Frames refused.
+    pub refused: u64,
+    /// Sender's number for the clock of `stamp_ns`.
+    pub clock_id: u32,
+    /// 1: alive (a frame within its time-out).
+    pub alive: u8,
+    /// 1: its newest frame was `paused`.
+    pub paused: u8,
+    /// Zero.
+    pub reserved: [u8; 2],
+}
+
+/// The tick: published last, at least each heartbeat, never truncated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
+#[repr(C)]
+#[type_name("sweepd.v1.Tick")]
+pub struct TickRow {
+    /// As in every message; `truncated` here is the sum over all messages.
+    pub header: MessageHeader,
+    /// When the tick ended, nanoseconds of `CLOCK_BOOTTIME`.
+    pub sent_ns: u64,
+    /// From wake-up to the outbox filled, nanoseconds.
+    pub elapsed_ns: u64,
+    /// Work budget in time, nanoseconds; `u64::MAX`: none.
+    pub budget_ns: u64,
+    /// Work budget in units; `u64::MAX`: none.
+    pub budget_units: u64,
+    /// What this tick could not cut (admission, broad phase, widening, publishing), nanoseconds.
+    pub floor_ns: u64,
+    /// Work units spent.
+    pub units: u64,
+    /// Nanoseconds by `Stage`; sending: of the tick before.
+    pub stage_ns: [u64; STAGES_LEN],
+    /// Refusals in this boot by `RejectReason`.
+    pub rejects: [u64; REJECTS_LEN],
+    /// Bodies in the scene.
+    pub bodies: u64,
+    /// Bodies whose place is not known.
+    pub unknown: u64,
+    /// Pairs of overlapping boxes.
+    pub candidates: u64,
+    /// Pairs certified colliding.
+    pub colliding: u64,
+    /// Pairs not decided.
+    pub possible: u64,
+    /// Pairs apart, but nearer than their `report_within_m`.
+    pub near: u64,
+    /// Pairs of bodies that a rule, neighbour or rigid group ignores.
+    pub ignored: u64,
+    /// Ticks of this boot that ended after their budget.
+    pub missed: u64,
+    /// Begins and their ends that were never sent, because rows did not fit.
+    pub cancelled_events: u64,
+    /// Body ids of the worst pair (smaller first); 0: none.
+    pub worst_a: u64,
+    /// See `worst_a`.
+    pub worst_b: u64,
+    /// Widest interval among the pairs published, metres.
+    pub widest_m: f64,
+    /// Ticks for which the oldest undecided pair has been so.
+    pub oldest_undecided_ticks: u64,
+    /// Bits of `Reason`.
+    pub reasons: u32,
+    /// `TickCause`.
+    pub cause: u8,
+    /// 1: ended after its budget.
+    pub overrun: u8,
+    /// Sources in use in `sources`.
+    pub sources_len: u8,
+    /// Place in `sources` whose frame caused the tick; 255: none.
+    pub cause_source: u8,
+    /// Where `validate` failed and a structure was rebuilt, times in this boot.
+    pub rebuilds: u64,
+    /// The sources, in the scene's order.
+    pub sources: [SourceRow; SOURCES_MAX],
+}
+
+/// What a client reads before anything else. This layout is frozen for ever.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
+#[repr(C)]
+#[type_name("sweepd.Hello")]
+pub struct Hello {
+    /// `b"sweepd\0\0"`.
+    pub magic: [u8; 8],
+    /// Random number of this start of the daemon.
+    pub boot_id: u64,
+    /// Process id of the daemon.
+    pub pid: u32,
+    /// User id of the daemon.
+    pub uid: u32,
+    /// `WIRE_VERSION` of the daemon.
+    pub wire_version: u32,
+    /// Zero.
+    pub reserved: u32,
+    /// sweepd's version, NUL-padded ASCII.
+    pub sweepd_version: [u8; 16],
+    /// iceoryx2's version, NUL-padded ASCII.
+    pub iceoryx2_version: [u8; 16],
+}
+
+impl Default for NameRow {
+    fn default() -> Self {
+        Self {
+            body: 0,
+            source: 0,
+            generation: 0,
+            len: 0,
+            reserved: 0,
+            name: [0; BODY_NAME_LEN],
+        }
+    }
+}
+
+// The layouts are a promise: a change here is a new wire version.
+const _: () = {
+    assert!(size_of::<FrameHeader>() == 112);
+    assert!(size_of::<TransformRow>() == 72);
+    assert!(size_of::<TransformVelRow>() == 120);
+    assert!(size_of::<MessageHeader>() == 56);
+    assert!(size_of::<PairRow>() == 104);
+    assert!(size_of::<ContactRow>() == 192);
+    assert!(size_of::<BodyRow>() == 104);
+    assert!(size_of::<NameRow>() == 128);
+    assert!(size_of::<SourceRow>() == 104);
+    assert!(size_of::<Hello>() == 64);
+};
