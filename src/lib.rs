@@ -14,7 +14,7 @@ pub mod time;
 pub mod config;
 pub mod transport;
 pub mod wire;
-// corridor, in the order data flows
+// corridor; data flows shape, scene, world, pairs, broad, narrow, publish
 pub mod broad;
 pub mod narrow;
 pub mod pairs;
