@@ -3,10 +3,12 @@
 //! In: a spec and the folder its files are relative to. Out: an immutable, shared `Shape` with its bounds.
 
 mod convex;
+mod error;
 mod mesh;
 mod spec;
 
 pub use convex::Convex;
+pub use error::ShapeError;
 pub use mesh::Mesh;
 pub use spec::ShapeSpec;
 
