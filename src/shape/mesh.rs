@@ -1,15 +1,341 @@
-//! Mesh geometry.
+//! Mesh geometry: triangles, and whether they bound a solid.
+//!
+//! In: vertices and faces as read or generated. Out: an immutable mesh with its tree, its shells, its bounds and the
+//! warnings that `check` shows.
 
-use crate::math::{Aabb, Pose};
+mod inside;
+mod predicates;
+mod topology;
+mod tree;
 
-/// Mesh.
+pub(crate) use inside::Inside;
+pub(crate) use predicates::side;
+pub(crate) use tree::{Below, Node, Tree};
+
+use topology::{Shell, Topology};
+
+use crate::limits::{EXTENT_MAX_M, EXTENT_MIN_M, TRIANGLES_MAX};
+use crate::math::{Aabb, Point, Pose, ROUND};
+use crate::shape::ShapeError;
+
+/// Triangles in their own frame: a solid when they are closed and face consistently, else a surface.
 #[derive(Debug)]
-pub struct Mesh;
+pub struct Mesh {
+    vertices: Vec<Point>,
+    faces: Vec<[u32; 3]>,
+    solid: bool,
+    shells: Vec<u32>,
+    warnings: Vec<String>,
+    tree: Tree,
+    bounds: Aabb,
+    centre: Point,
+    radius: f64,
+}
 
 impl Mesh {
-    /// Its tight box at `pose`, rounded outward.
+    /// Builds a mesh.
+    ///
+    /// * `vertices` - own frame, metres.
+    /// * `faces` - places in `vertices`, counter-clockwise seen from outside.
+    /// * `solid` - whether the inside belongs to it; `None`: when it is closed and consistently oriented.
+    ///
+    /// A solid's shell of negative volume that is not wholly within another is turned round with all it holds, and a
+    /// warning says so. Faces keep their places; turned ones swap their last two corners.
+    ///
+    /// Cost: O(n log n); inside tests for shells of negative volume.
+    ///
+    /// # Errors
+    /// Numbers that are not finite, indices out of range, no face with an area, an extent out of range, too many
+    /// triangles, or `solid` said of a mesh that cannot bound a solid.
+    pub fn new(
+        vertices: Vec<Point>,
+        mut faces: Vec<[u32; 3]>,
+        solid: Option<bool>,
+    ) -> Result<Self, ShapeError> {
+        let bounds = check(&vertices, &faces)?;
+        let mut topology = Topology::new(&vertices, &faces);
+        if topology.defects.flat == faces.len() {
+            return Err(ShapeError::EmptyMesh);
+        }
+        let mut warnings = Vec::new();
+        let solid = settle(&mut topology, &vertices, &mut faces, solid, &mut warnings)?;
+
+        let centre = bounds.centre();
+        let tree = Tree::new(&vertices, &faces, centre);
+        let mut mesh = Self {
+            radius: radius(&vertices, &faces, &centre),
+            shells: topology.shells.iter().map(|s| s.vertex).collect(),
+            vertices,
+            faces,
+            solid,
+            warnings,
+            tree,
+            bounds,
+            centre,
+        };
+        if solid {
+            mesh.turn_shells(&topology);
+        }
+        Ok(mesh)
+    }
+
+    /// Its vertices, own frame, metres; some may belong to no face.
     #[must_use]
-    pub fn aabb_at(&self, _pose: &Pose) -> Aabb {
-        Aabb::empty()
+    pub fn vertices(&self) -> &[Point] {
+        &self.vertices
+    }
+
+    /// Its faces as places in [`Mesh::vertices`], counter-clockwise seen from outside.
+    #[must_use]
+    pub fn faces(&self) -> &[[u32; 3]] {
+        &self.faces
+    }
+
+    /// The corners of a face that exists.
+    #[must_use]
+    pub fn triangle(&self, face: u32) -> [Point; 3] {
+        debug_assert!((face as usize) < self.faces.len(), "face {face} exists");
+        self.faces[face as usize].map(|v| self.vertices[v as usize])
+    }
+
+    /// Whether its inside belongs to it.
+    #[must_use]
+    pub fn is_solid(&self) -> bool {
+        self.solid
+    }
+
+    /// What `check` says of it: whether it is a solid and why, and what is odd about it.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    /// One vertex, by its place, of every set of faces that hang together.
+    #[must_use]
+    pub fn shells(&self) -> &[u32] {
+        &self.shells
+    }
+
+    /// Centre of its box, own frame, metres.
+    #[must_use]
+    pub fn centre(&self) -> Point {
+        self.centre
+    }
+
+    /// Greatest distance of its surface from [`Mesh::centre`], metres, rounded up.
+    #[must_use]
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Its box in its own frame, exact.
+    #[must_use]
+    pub fn aabb(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// Its tight box at `pose`, rounded outward.
+    ///
+    /// Cost: six walks down the tree, each of at most a fixed number of nodes.
+    #[must_use]
+    pub fn aabb_at(&self, pose: &Pose) -> Aabb {
+        let rotation = pose.rotation.to_rotation_matrix();
+        let centre = pose * self.centre;
+        // Roundings of the rotation, the products and the sum, each a few units of what they work on.
+        let slop = 16.0 * ROUND * (centre.coords.amax() + self.centre.coords.amax() + self.radius);
+        let mut bounds = Aabb::empty();
+        for k in 0..3 {
+            let axis = rotation.matrix().row(k).transpose();
+            let reach = |d| self.tree.reach(&self.vertices, &self.faces, &d);
+            bounds.max[k] = centre[k] + reach(axis);
+            bounds.min[k] = centre[k] - reach(-axis);
+        }
+        bounds.widened(slop)
+    }
+
+    /// The tree over its triangles.
+    pub(crate) fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    /// Law 3.3: a shell of negative volume that is not wholly within another is turned round with all it holds.
+    fn turn_shells(&mut self, topology: &Topology) {
+        let shells = &topology.shells;
+        let mut sign = vec![1.0; shells.len()];
+        // The largest first, so that what a turned shell holds is judged as turned.
+        let mut order: Vec<usize> = (0..shells.len()).collect();
+        order.sort_by(|&a, &b| {
+            let size = |i: usize| shells[i].volume.abs();
+            size(b).total_cmp(&size(a)).then(a.cmp(&b))
+        });
+        let mut turned = 0;
+        for &i in &order {
+            let negative = shells[i].volume * sign[i] < 0.0;
+            if !negative || (0..shells.len()).any(|j| self.holds(topology, j, i)) {
+                continue;
+            }
+            turned += 1;
+            for (j, sign) in sign.iter_mut().enumerate() {
+                if j == i || self.holds(topology, i, j) {
+                    *sign = -*sign;
+                }
+            }
+        }
+        for (face, &shell) in self.faces.iter_mut().zip(&topology.shell_of) {
+            if sign[shell as usize] < 0.0 {
+                face.swap(1, 2);
+            }
+        }
+        if turned > 0 {
+            self.warnings.push(format!(
+                "{turned} of {} shells faced inwards and stood in no other: turned round with all they hold",
+                shells.len()
+            ));
+        }
+    }
+
+    /// Whether shell `inner` lies wholly within shell `outer`: every vertex inside, and no vertex the other way.
+    ///
+    /// Shells that pass through each other with edges alone are taken for held; no reading of them is right.
+    fn holds(&self, topology: &Topology, outer: usize, inner: usize) -> bool {
+        let (a, b): (&Shell, &Shell) = (&topology.shells[outer], &topology.shells[inner]);
+        if outer == inner || !(0..3).all(|k| a.low[k] <= b.low[k] && b.high[k] <= a.high[k]) {
+            return false;
+        }
+        let mut test = Inside::default();
+        let mut winds = |point: Point, shell: usize| {
+            test.run(self, point, |face| {
+                topology.shell_of[face as usize] as usize == shell
+            }) != 0
+        };
+        let corners = |shell: usize| {
+            let of = topology.shell_of.iter().zip(&self.faces);
+            of.filter(move |(s, _)| **s as usize == shell)
+                .flat_map(|(_, face)| face.map(|v| self.vertices[v as usize]))
+        };
+        // One corner decides most cases.
+        winds(self.vertices[b.vertex as usize], outer)
+            && corners(inner).all(|p| winds(p, outer))
+            && !corners(outer).any(|p| winds(p, inner))
     }
 }
+
+/// Refuses what cannot be computed with, and yields the box of all that faces name.
+fn check(vertices: &[Point], faces: &[[u32; 3]]) -> Result<Aabb, ShapeError> {
+    if faces.len() > TRIANGLES_MAX {
+        return Err(ShapeError::TooManyTriangles {
+            given: faces.len() as u64,
+        });
+    }
+    for (i, vertex) in vertices.iter().enumerate() {
+        if let Some(&value) = vertex.iter().find(|x| !x.is_finite()) {
+            return Err(ShapeError::NotFinite {
+                what: format!("vertex {i}"),
+                value,
+            });
+        }
+    }
+    let mut bounds = Aabb::empty();
+    for (i, face) in faces.iter().enumerate() {
+        for &index in face {
+            let Some(vertex) = vertices.get(index as usize) else {
+                return Err(ShapeError::IndexOutOfRange {
+                    face: i,
+                    index,
+                    vertices: vertices.len(),
+                });
+            };
+            bounds.min = bounds.min.inf(vertex);
+            bounds.max = bounds.max.sup(vertex);
+        }
+    }
+    if faces.is_empty() {
+        return Err(ShapeError::EmptyMesh);
+    }
+    let extent = (bounds.max - bounds.min).amax();
+    if !(EXTENT_MIN_M..=EXTENT_MAX_M).contains(&extent) {
+        return Err(ShapeError::Extent {
+            what: "the extent of the mesh".to_owned(),
+            value_m: extent,
+        });
+    }
+    let furthest = bounds.min.coords.amax().max(bounds.max.coords.amax());
+    if furthest > EXTENT_MAX_M {
+        return Err(ShapeError::Extent {
+            what: "the largest coordinate of the mesh".to_owned(),
+            value_m: furthest,
+        });
+    }
+    Ok(bounds)
+}
+
+/// Decides whether the mesh is a solid, and says why; turns faces of a solid that do not agree.
+fn settle(
+    topology: &mut Topology,
+    vertices: &[Point],
+    faces: &mut [[u32; 3]],
+    said: Option<bool>,
+    warnings: &mut Vec<String>,
+) -> Result<bool, ShapeError> {
+    let defects = topology.defects.clone();
+    let why = format!(
+        "{} open edges and {} edges whose faces disagree",
+        defects.open, defects.inconsistent
+    );
+    let solid = match (said, defects.closed()) {
+        (None, true) => {
+            warnings.push("solid, because it is closed and consistently oriented".to_owned());
+            true
+        }
+        (None, false) => {
+            warnings.push(format!("surface, because it has {why}"));
+            false
+        }
+        (Some(false), _) => {
+            warnings.push("surface, because the scene says so".to_owned());
+            false
+        }
+        (Some(true), true) => true,
+        (Some(true), false) => {
+            let Some(turned) = topology.orient(vertices, faces) else {
+                return Err(ShapeError::Setting(format!(
+                    "solid = true, but the mesh has {why}: close it, or say solid = false"
+                )));
+            };
+            topology.measure(vertices, faces);
+            warnings.push(format!("{turned} faces turned so that neighbours agree"));
+            true
+        }
+    };
+    let counts = [
+        (defects.flat, "faces without an area"),
+        (
+            defects.needles,
+            "needles (faces a million times as long as high)",
+        ),
+        (
+            defects.duplicates,
+            "faces on the same corners as another face",
+        ),
+        (defects.unreferenced, "vertices that no face names"),
+    ];
+    for (count, what) in counts {
+        if count > 0 {
+            warnings.push(format!("{count} {what}"));
+        }
+    }
+    Ok(solid)
+}
+
+/// Greatest distance of a named vertex from the centre, rounded up.
+fn radius(vertices: &[Point], faces: &[[u32; 3]], centre: &Point) -> f64 {
+    let square = faces
+        .iter()
+        .flatten()
+        .map(|&v| (vertices[v as usize] - centre).norm_squared())
+        .fold(0.0, f64::max);
+    square.sqrt() * (1.0 + 8.0 * ROUND)
+}
+
+#[cfg(test)]
+mod tests;

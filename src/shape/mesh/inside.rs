@@ -1,0 +1,104 @@
+//! The inside test: how often the surface of a closed mesh winds round a point, as a walk that can stop.
+//!
+//! In: a closed, consistently oriented mesh and a point in its frame. Out: the winding number, 0 outside.
+//!
+//! A ray along +x is followed through the tree. What counts is decided by exact signs: whether the ray passes a
+//! triangle is the winding number of its outline round the ray in the plane of y and z, with the half-open rule of
+//! polygon tests, so a ray through an edge or a corner counts for exactly one of the triangles that share it. Solid
+//! angles over all triangles were refused: no tree prunes them exactly.
+
+use std::cmp::Ordering;
+
+use super::Mesh;
+use super::predicates::{side, turn_yz};
+use super::tree::Below;
+use crate::math::Point;
+
+/// One inside test under way; keeps its memory from test to test.
+#[derive(Debug, Default)]
+pub(crate) struct Inside {
+    point: Point,
+    stack: Vec<u32>,
+    winding: i64,
+    on_surface: bool,
+}
+
+impl Inside {
+    /// Starts the test of `point`, given in the mesh's frame.
+    pub(crate) fn start(&mut self, point: Point) {
+        self.point = point;
+        self.stack.clear();
+        self.stack.push(0);
+        self.winding = 0;
+        self.on_surface = false;
+    }
+
+    /// Whether the walk is over.
+    pub(crate) fn finished(&self) -> bool {
+        self.stack.is_empty()
+    }
+
+    /// How often the surface winds round the point; meaningful when finished.
+    pub(crate) fn winding(&self) -> i64 {
+        self.winding
+    }
+
+    /// Whether a triangle was met that holds the point itself.
+    pub(crate) fn on_surface(&self) -> bool {
+        self.on_surface
+    }
+
+    /// Tests one node. `counts` says which triangles take part (all of them, or those of one shell).
+    pub(crate) fn step(&mut self, mesh: &Mesh, counts: impl Fn(u32) -> bool) {
+        let Some(place) = self.stack.pop() else {
+            return;
+        };
+        let nodes = mesh.tree().nodes();
+        let node = &nodes[place as usize];
+        // Rounding of a difference is monotonic, so a vertex inside the box stays inside after it.
+        let p = self.point - mesh.tree().origin();
+        let beside = |k: usize, x: f64| x < f64::from(node.min[k]) || x > f64::from(node.max[k]);
+        if p.x > f64::from(node.max[0]) || beside(1, p.y) || beside(2, p.z) {
+            return;
+        }
+        match node.below(place) {
+            Below::Nodes(left, right) => {
+                self.stack.push(right);
+                self.stack.push(left);
+            }
+            Below::Triangle(face) if counts(face) => self.count(&mesh.triangle(face)),
+            Below::Triangle(_) => {}
+        }
+    }
+
+    /// The whole test at once, without a budget.
+    pub(crate) fn run(&mut self, mesh: &Mesh, point: Point, counts: impl Fn(u32) -> bool) -> i64 {
+        self.start(point);
+        while !self.finished() {
+            self.step(mesh, &counts);
+        }
+        self.winding
+    }
+
+    fn count(&mut self, triangle: &[Point; 3]) {
+        let p = &self.point;
+        let mut outline = 0i64;
+        for k in 0..3 {
+            let (a, b) = (&triangle[k], &triangle[(k + 1) % 3]);
+            if a.z <= p.z && p.z < b.z && turn_yz(a, b, p) == Ordering::Greater {
+                outline += 1;
+            } else if b.z <= p.z && p.z < a.z && turn_yz(a, b, p) == Ordering::Less {
+                outline -= 1;
+            }
+        }
+        if outline == 0 {
+            return;
+        }
+        // The normal has the sign of `outline` along x: the triangle is ahead when the point is behind it.
+        match (side(&triangle[0], &triangle[1], &triangle[2], p), outline) {
+            (Ordering::Less, 1..) | (Ordering::Greater, ..=-1) => self.winding += outline,
+            (Ordering::Equal, _) => self.on_surface = true,
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,160 @@
+use super::*;
+use crate::math::Vec3;
+
+fn cuboid(centre: [f64; 3], half: f64, inward: bool) -> (Vec<Point>, Vec<[u32; 3]>) {
+    let vertices = (0..8u32)
+        .map(|i| {
+            let at = |k: u32| if i >> k & 1 == 1 { half } else { -half };
+            Point::from(Vec3::from(centre) + Vec3::new(at(0), at(1), at(2)))
+        })
+        .collect();
+    let quads = [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ];
+    let mut faces: Vec<[u32; 3]> = quads
+        .iter()
+        .flat_map(|&[a, b, c, d]: &[u32; 4]| [[a, b, c], [a, c, d]])
+        .collect();
+    if inward {
+        for face in &mut faces {
+            face.swap(1, 2);
+        }
+    }
+    (vertices, faces)
+}
+
+fn joined(parts: &[(Vec<Point>, Vec<[u32; 3]>)]) -> (Vec<Point>, Vec<[u32; 3]>) {
+    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+    for (v, f) in parts {
+        let first = u32::try_from(vertices.len()).unwrap();
+        vertices.extend_from_slice(v);
+        faces.extend(f.iter().map(|face| face.map(|i| i + first)));
+    }
+    (vertices, faces)
+}
+
+fn winding(mesh: &Mesh, x: f64, y: f64, z: f64) -> i64 {
+    Inside::default().run(mesh, Point::new(x, y, z), |_| true)
+}
+
+fn says(mesh: &Mesh, text: &str) -> bool {
+    mesh.warnings().iter().any(|w| w.contains(text))
+}
+
+#[test]
+fn a_closed_box_is_a_solid_and_an_open_one_a_surface() {
+    let (vertices, mut faces) = cuboid([0.0; 3], 1.0, false);
+    let solid = Mesh::new(vertices.clone(), faces.clone(), None).unwrap();
+    assert!(solid.is_solid() && says(&solid, "solid, because it is closed"));
+    assert_eq!(winding(&solid, 0.0, 0.0, 0.0), 1);
+    assert_eq!(winding(&solid, 3.0, 0.0, 0.0), 0);
+    assert_eq!(winding(&solid, -3.0, 1.0, 1.0), 0, "along an edge");
+    assert_eq!(winding(&solid, -3.0, 0.0, 0.0), 0, "through diagonals");
+    faces.pop();
+    let open = Mesh::new(vertices.clone(), faces.clone(), None).unwrap();
+    assert!(!open.is_solid() && says(&open, "surface, because it has 3 open edges"));
+    let refused = Mesh::new(vertices, faces, Some(true)).unwrap_err();
+    assert!(refused.to_string().contains("3 open edges"), "{refused}");
+}
+
+#[test]
+fn law_3_3_an_inverted_shell_is_turned_round_with_all_it_holds() {
+    // Outer shell and cavity both inverted: the outer is in no other, so both are turned.
+    let parts = [
+        cuboid([5.0, 0.0, 0.0], 2.0, true),
+        cuboid([5.0, 0.0, 0.0], 1.0, false),
+    ];
+    let (vertices, faces) = joined(&parts);
+    let mesh = Mesh::new(vertices, faces, None).unwrap();
+    assert!(says(&mesh, "1 of 2 shells faced inwards"));
+    assert_eq!(winding(&mesh, 5.0, 0.1, 0.2), 0, "in the cavity");
+    assert_eq!(winding(&mesh, 6.5, 0.1, 0.2), 1, "in the wall");
+}
+
+#[test]
+fn law_3_3_a_cavity_within_a_shell_is_kept() {
+    let parts = [cuboid([0.0; 3], 2.0, false), cuboid([0.0; 3], 1.0, true)];
+    let (vertices, faces) = joined(&parts);
+    let mesh = Mesh::new(vertices, faces, None).unwrap();
+    assert!(!says(&mesh, "faced inwards"));
+    assert_eq!(mesh.shells().len(), 2);
+    assert_eq!(winding(&mesh, 0.1, 0.2, 0.3), 0);
+    assert_eq!(winding(&mesh, 1.5, 0.2, 0.3), 1);
+}
+
+#[test]
+fn an_inverted_shell_beside_another_is_turned_alone() {
+    let parts = [
+        cuboid([0.0; 3], 1.0, false),
+        cuboid([9.0, 0.0, 0.0], 0.5, true),
+    ];
+    let (vertices, faces) = joined(&parts);
+    let mesh = Mesh::new(vertices, faces, None).unwrap();
+    assert_eq!(winding(&mesh, 9.0, 0.1, 0.2), 1);
+    assert_eq!(winding(&mesh, 0.0, 0.1, 0.2), 1);
+}
+
+#[test]
+fn faces_that_disagree_are_turned_when_the_scene_says_solid() {
+    let (vertices, mut faces) = cuboid([0.0; 3], 1.0, true);
+    faces[3].swap(1, 2);
+    faces[7].swap(1, 2);
+    let surface = Mesh::new(vertices.clone(), faces.clone(), None).unwrap();
+    assert!(!surface.is_solid());
+    let solid = Mesh::new(vertices, faces, Some(true)).unwrap();
+    assert!(solid.is_solid() && says(&solid, "faces turned"));
+    assert_eq!(winding(&solid, 0.3, 0.2, 0.1), 1);
+}
+
+#[test]
+fn repeated_vertices_of_stl_files_are_one_place() {
+    let (vertices, faces) = cuboid([0.0; 3], 1.0, false);
+    let soup: Vec<Point> = faces
+        .iter()
+        .flatten()
+        .map(|&v| vertices[v as usize])
+        .collect();
+    let triples = (0u32..12).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let mesh = Mesh::new(soup, triples, None).unwrap();
+    assert!(mesh.is_solid());
+    assert_eq!(mesh.shells().len(), 1);
+}
+
+#[test]
+fn odd_faces_are_counted_and_bad_input_is_refused() {
+    let (mut vertices, mut faces) = cuboid([0.0; 3], 1.0, false);
+    vertices.push(Point::new(40.0, 0.0, 0.0));
+    faces.push([0, 1, 1]);
+    faces.push([0, 2, 3]);
+    let mesh = Mesh::new(vertices.clone(), faces.clone(), None).unwrap();
+    assert!(says(&mesh, "1 faces without an area"));
+    assert!(says(&mesh, "1 faces on the same corners"));
+    assert!(says(&mesh, "1 vertices that no face names"));
+    assert!(mesh.aabb().max.x < 2.0, "an unnamed vertex is no geometry");
+
+    let bad = |v: Vec<Point>, f: Vec<[u32; 3]>| Mesh::new(v, f, None).unwrap_err().to_string();
+    assert!(bad(vertices.clone(), vec![[0, 1, 99]]).contains("names vertex 99"));
+    assert!(bad(vertices.clone(), vec![]).contains("no triangle"));
+    assert!(bad(vertices.clone(), vec![[0, 1, 1]]).contains("no triangle"));
+    vertices[2].y = f64::NAN;
+    assert!(bad(vertices, faces).contains("vertex 2 is NaN"));
+}
+
+#[test]
+fn the_box_at_a_pose_holds_every_vertex_and_touches_the_outermost() {
+    let (vertices, faces) = cuboid([7.0, 1.0, -2.0], 0.5, false);
+    let mesh = Mesh::new(vertices, faces, None).unwrap();
+    for step in 0..50 {
+        let turn = Vec3::new(0.3, 0.7, -0.2) * f64::from(step);
+        let pose = Pose::new(Vec3::new(1e7, -3.0, 2.0), turn);
+        let tight = Aabb::of(&mesh.vertices().iter().map(|v| pose * v).collect::<Vec<_>>());
+        let got = mesh.aabb_at(&pose);
+        assert!(got.holds(&tight), "{got:?} {tight:?}");
+        assert!(tight.widened(1e-7).holds(&got), "{got:?} {tight:?}");
+    }
+}
