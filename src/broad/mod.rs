@@ -1,1 +1,241 @@
-//! Broad phase.
+//! Broad phase: which pairs of boxes overlap, kept across ticks.
+//!
+//! In: a [`ChangeSet`] (who left, came, moved, must be asked again), the boxes ([`Proxies`]), the filters
+//! ([`PairPolicy`]). Out: the [`PairSet`], of which this room is the only writer, and a [`PairDelta`].
+//!
+//! [`Method::BruteForce`] looks at every pair: the twin, for ever. A method only suggests pairs; what is stored is
+//! decided in one place (`commit`), so all methods give the same pairs in the same slots, and the same delta.
+//!
+//! Boxes are f64 here, where other structures round out to f32: the sort compares ends and never computes with them,
+//! so f64 costs memory alone, and a scene at 1e7 m, or bodies of 1 cm spread over 1e7 m, has exactly the candidates
+//! of its f64 boxes (an f32 has a spacing of 1 m there: all neighbours would overlap).
+
+use crate::ids::{BodyId, BodySlot, PairKey};
+use crate::math::Aabb;
+use crate::pairs::{PairDelta, PairPolicy, PairSet};
+use crate::wire::EndCause;
+use crate::world::ChangeSet;
+
+mod brute;
+mod commit;
+mod forced;
+mod members;
+
+use commit::{Found, Judge};
+use forced::Forced;
+use members::{ASKED, IN, Members, REFILTERED};
+
+/// The boxes, as the world has them.
+pub trait Proxies {
+    /// Box of a body, world frame, metres; each end finite or infinite, never NaN. Not asked of unbounded bodies.
+    fn aabb(&self, slot: BodySlot) -> &Aabb;
+    /// Whether the body has no box (a half-space). Fixed while it is in the broad phase.
+    fn unbounded(&self, slot: BodySlot) -> bool;
+    /// Its id: the order of results.
+    fn id(&self, slot: BodySlot) -> BodyId;
+}
+
+/// Which broad phase.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Every pair of bodies, every tick.
+    BruteForce,
+}
+
+impl Method {
+    /// Every method.
+    pub const ALL: &'static [Self] = &[Self::BruteForce];
+}
+
+/// What the last update did; all counted, nothing timed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Ends of boxes that passed one another.
+    pub swaps: u64,
+    /// Boxes compared with one another.
+    pub tests: u64,
+    /// Times the lists were sorted anew instead of repaired.
+    pub rebuilds: u64,
+    /// Pairs of boxes that overlap on the sorted axes but were not asked on the one left out.
+    pub partial: u64,
+    /// Axes kept sorted: x, y, z.
+    pub axes: [bool; 3],
+}
+
+/// The method at work.
+#[derive(Clone, Debug)]
+enum Engine {
+    Brute,
+}
+
+/// The broad phase.
+#[derive(Clone, Debug)]
+pub struct BroadPhase {
+    engine: Engine,
+    members: Members,
+    forced: Forced,
+    found: Found,
+    /// By body: cause of its removal in this update.
+    causes: Vec<EndCause>,
+    work: Work,
+}
+
+impl BroadPhase {
+    /// A broad phase without bodies.
+    #[must_use]
+    pub fn new(method: Method) -> Self {
+        let engine = match method {
+            Method::BruteForce => Engine::Brute,
+        };
+        Self {
+            engine,
+            members: Members::default(),
+            forced: Forced::default(),
+            found: Found::default(),
+            causes: Vec::new(),
+            work: Work::default(),
+        }
+    }
+
+    /// Bodies in the broad phase.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.members.bounded().len() + self.members.unbounded().len()
+    }
+
+    /// Whether there is no body.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// What the last update did.
+    #[must_use]
+    pub fn work(&self) -> Work {
+        self.work
+    }
+
+    /// Replaces the pairs that are candidates whatever the boxes say, while both bodies are in; applied by the next
+    /// update. A pair that is no longer forced and does not overlap ends as `Separated`.
+    ///
+    /// * `keys` - the whole list, in any order. To be given again when a rule changes or a slot changes hands.
+    pub fn force(&mut self, keys: &[PairKey]) {
+        self.forced.replace(keys);
+    }
+
+    /// Brings the pair set up to date with one tick's changes.
+    ///
+    /// Order: bodies that left (their pairs end with the cause given), bodies that came, boxes that moved, bodies to
+    /// ask again (`requery`: their pairs end as `Filtered` or `Separated`, or begin). A stored pair ends as
+    /// `Separated` when the boxes part, unless it is forced, a body is unbounded, or the policy keeps one of the two.
+    /// Slots in the lists that do not fit (a move of a body that is not in) are passed over.
+    pub fn update(
+        &mut self,
+        changes: &ChangeSet,
+        proxies: &impl Proxies,
+        policy: &impl PairPolicy,
+        pairs: &mut PairSet,
+        delta: &mut PairDelta,
+    ) {
+        pairs.open_tick();
+        delta.clear();
+        self.members.open_tick();
+        self.found.open_tick();
+        self.leave(changes, pairs);
+        self.enter(changes, proxies);
+        self.mark(changes, proxies, pairs);
+        let judge = Judge {
+            members: &self.members,
+            forced: &self.forced,
+            policy,
+        };
+        match &mut self.engine {
+            Engine::Brute => brute::update(&judge, proxies, pairs, &mut self.found),
+        }
+        self.found.commit(&judge, pairs, delta);
+        self.forced.settle();
+    }
+
+    /// Takes out the bodies that left; their pairs end. Of two bodies that left, the cause with the lower code wins,
+    /// so that no order of slots shows.
+    fn leave(&mut self, changes: &ChangeSet, pairs: &mut PairSet) {
+        for removed in &changes.removed {
+            if self.members.leave(removed.slot) {
+                let at = removed.slot.index();
+                if self.causes.len() <= at {
+                    self.causes.resize(at + 1, EndCause::None);
+                }
+                self.causes[at] = removed.cause;
+            }
+        }
+        for removed in &changes.removed {
+            while let Some(slot) = pairs.first_of(removed.slot) {
+                let other = pairs.partners(removed.slot).next().map(|(_, b)| b);
+                let theirs = other
+                    .and_then(|b| self.causes.get(b.index()).copied())
+                    .filter(|cause| *cause != EndCause::None);
+                let cause = theirs.map_or(removed.cause, |c| c.min(removed.cause));
+                self.found.end(slot, cause, &self.members, pairs);
+            }
+        }
+        for removed in &changes.removed {
+            if let Some(cause) = self.causes.get_mut(removed.slot.index()) {
+                *cause = EndCause::None;
+            }
+        }
+    }
+
+    /// Takes in the bodies that came.
+    fn enter(&mut self, changes: &ChangeSet, proxies: &impl Proxies) {
+        for slot in &changes.inserted {
+            self.members.enter(*slot, proxies);
+        }
+    }
+
+    /// Takes the new boxes and notes whom to ask again.
+    fn mark(&mut self, changes: &ChangeSet, proxies: &impl Proxies, pairs: &PairSet) {
+        for slot in &changes.moved {
+            self.members.moved(*slot, proxies);
+        }
+        for slot in &changes.requery {
+            if self.members.has(*slot, IN) {
+                self.members.touch(*slot, ASKED | REFILTERED);
+            }
+        }
+        // What did not fit is looked for again, so that it is counted exactly, and stored when there is room.
+        for slot in pairs.truncated() {
+            if self.members.has(*slot, IN) {
+                self.members.touch(*slot, ASKED);
+            }
+        }
+    }
+
+    /// Checks the whole structure, the boxes against the caller's, and each stored pair against filters and boxes.
+    ///
+    /// # Errors
+    /// One sentence on the first thing that does not hold.
+    pub fn validate(
+        &self,
+        proxies: &impl Proxies,
+        policy: &impl PairPolicy,
+        pairs: &PairSet,
+    ) -> Result<(), String> {
+        pairs.validate()?;
+        self.members.validate(proxies)?;
+        let judge = Judge {
+            members: &self.members,
+            forced: &self.forced,
+            policy,
+        };
+        for (slot, key) in pairs.iter() {
+            let (low, high) = key.slots();
+            if !self.members.has(low, IN) || !self.members.has(high, IN) {
+                return Err(format!("{slot:?} holds a body that is not in: {key:?}"));
+            }
+            if let Some(cause) = judge.ends(key, true) {
+                return Err(format!("{slot:?} should have ended, {cause}: {key:?}"));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,170 @@
+//! From suggestions to the pair set: one place decides, for every method, which pairs end, begin or do not fit.
+//!
+//! In: keys that a method found (in any order, doubled, already stored, not allowed: all the same) and pairs whose
+//! end has a cause. Out: the pair set changed and the delta filled, both in the order of body ids. Slots of pairs
+//! therefore depend neither on the method nor on the slots of bodies.
+
+use super::forced::Forced;
+use super::members::{IN, Members, UNBOUNDED};
+use crate::ids::{BodyId, BodySlot, PairKey, PairSlot};
+use crate::pairs::{Ended, PairDelta, PairPolicy, PairSet};
+use crate::wire::EndCause;
+
+/// What an update has found so far; memory is kept over updates.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Found {
+    /// Pairs that may have begun.
+    pub(super) began: Vec<PairKey>,
+    /// Pairs taken out of the set, with the order of the delta.
+    ended: Vec<((BodyId, BodyId), Ended)>,
+    /// Pairs to be stored, in the order of the delta.
+    fresh: Vec<((BodyId, BodyId), PairKey)>,
+    /// By body: the last group whose lower body is paired with it.
+    stamp: Vec<u32>,
+    /// Pairs of a body, while they are taken out.
+    pub(super) slots: Vec<PairSlot>,
+    /// Bodies that were truncated before this update.
+    truncated: Vec<BodySlot>,
+}
+
+/// What decides on a pair.
+#[derive(Debug)]
+pub(super) struct Judge<'a, P> {
+    /// Boxes and kinds.
+    pub(super) members: &'a Members,
+    /// Pairs that need no overlap.
+    pub(super) forced: &'a Forced,
+    /// Filters.
+    pub(super) policy: &'a P,
+}
+
+impl<P: PairPolicy> Judge<'_, P> {
+    /// Whether something else than the boxes keeps the pair a candidate: a rule, or a body without a box.
+    fn is_unconditional(&self, key: PairKey) -> bool {
+        let (low, high) = key.slots();
+        let one = self.members.has(low, UNBOUNDED);
+        let other = self.members.has(high, UNBOUNDED);
+        if one || other {
+            !(one && other)
+        } else {
+            self.forced.has(key)
+        }
+    }
+
+    /// Whether two bodies with boxes meet.
+    fn overlaps(&self, key: PairKey) -> bool {
+        let (low, high) = key.slots();
+        self.members.is_bounded(low)
+            && self.members.is_bounded(high)
+            && self.members.bounds(low).overlaps(self.members.bounds(high))
+    }
+
+    /// Whether a pair that is not stored must be.
+    pub(super) fn begins(&self, key: PairKey) -> bool {
+        let (low, high) = key.slots();
+        let inside = self.members.has(low, IN) && self.members.has(high, IN);
+        inside
+            && (self.is_unconditional(key)
+                || (self.overlaps(key) && !self.policy.keeps(low) && !self.policy.keeps(high)))
+            && self.policy.allows(low, high)
+    }
+
+    /// Why a stored pair ends; `None` when it stays. Filters are asked only if `refiltered`.
+    pub(super) fn ends(&self, key: PairKey, refiltered: bool) -> Option<EndCause> {
+        let (low, high) = key.slots();
+        if refiltered && !self.policy.allows(low, high) {
+            return Some(EndCause::Filtered);
+        }
+        let stays = self.overlaps(key)
+            || self.is_unconditional(key)
+            || self.policy.keeps(low)
+            || self.policy.keeps(high);
+        (!stays).then_some(EndCause::Separated)
+    }
+}
+
+impl Found {
+    /// Begins an update.
+    pub(super) fn open_tick(&mut self) {
+        self.began.clear();
+        self.ended.clear();
+    }
+
+    /// Takes a stored pair out.
+    pub(super) fn end(
+        &mut self,
+        slot: PairSlot,
+        cause: EndCause,
+        members: &Members,
+        pairs: &mut PairSet,
+    ) {
+        if let Some(key) = pairs.remove(slot) {
+            let ended = Ended { slot, key, cause };
+            self.ended.push((members.rank(key), ended));
+        }
+    }
+
+    /// Stores what begins and fills the delta.
+    pub(super) fn commit(
+        &mut self,
+        judge: &Judge<'_, impl PairPolicy>,
+        pairs: &mut PairSet,
+        delta: &mut PairDelta,
+    ) {
+        self.ended.sort_unstable_by_key(|(rank, _)| *rank);
+        delta.ended.extend(self.ended.iter().map(|(_, e)| *e));
+        self.select(judge, pairs);
+        self.truncated.clear();
+        self.truncated.extend_from_slice(pairs.truncated());
+        pairs.forget_missing();
+        for (_, key) in &self.fresh {
+            match pairs.insert(*key) {
+                Some(slot) => delta.began.push(slot),
+                None => pairs.miss(*key),
+            }
+        }
+        // What a body of unknown place misses cannot be found again by its box, so it stays marked.
+        for slot in self.truncated.drain(..) {
+            if judge.members.has(slot, IN) && judge.policy.keeps(slot) {
+                pairs.mark_truncated(slot);
+            }
+        }
+    }
+
+    /// Of the suggestions those that must be stored and are not, in the order of ids.
+    fn select(&mut self, judge: &Judge<'_, impl PairPolicy>, pairs: &PairSet) {
+        self.fresh.clear();
+        self.began.sort_unstable();
+        self.began.dedup();
+        for group in self.began.chunk_by(|a, b| a.slots().0 == b.slots().0) {
+            let (low, _) = group[0].slots();
+            // A lookup walks the shorter list. For many lookups with one body it is cheaper to walk its list once.
+            let at_once = group.len() > 2 && !pairs.is_empty();
+            if at_once {
+                for (_, other) in pairs.partners(low) {
+                    if self.stamp.len() <= other.index() {
+                        self.stamp.resize(other.index() + 1, 0);
+                    }
+                    self.stamp[other.index()] = low.0 + 1;
+                }
+            }
+            for key in group {
+                let (_, high) = key.slots();
+                let stored = if at_once {
+                    self.stamp.get(high.index()) == Some(&(low.0 + 1))
+                } else {
+                    pairs.find(*key).is_some()
+                };
+                if !stored && judge.begins(*key) {
+                    self.fresh.push((judge.members.rank(*key), *key));
+                }
+            }
+            if at_once {
+                for (_, other) in pairs.partners(low) {
+                    self.stamp[other.index()] = 0;
+                }
+            }
+        }
+        self.fresh.sort_unstable_by_key(|(rank, _)| *rank);
+    }
+}

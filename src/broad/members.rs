@@ -1,0 +1,234 @@
+//! What the broad phase knows of its bodies: a copy of each box, the id, and what this tick did to it.
+//!
+//! In: slots and the caller's [`Proxies`]. Out: boxes in an array by slot. They are copied because a body is some
+//! hundred bytes and a box is 48, and because the boxes of the tick before decide nothing once the new ones are in.
+
+use super::Proxies;
+use crate::ids::{BodyId, BodySlot, PairKey};
+use crate::math::Aabb;
+
+/// It is in the broad phase.
+pub(super) const IN: u8 = 1;
+/// It has no box: it is paired with every bounded body that the filters allow.
+pub(super) const UNBOUNDED: u8 = 2;
+/// Its box may have changed in this tick.
+pub(super) const MOVED: u8 = 4;
+/// All of its pairs must be looked for, whatever moved.
+pub(super) const ASKED: u8 = 8;
+/// Its stored pairs must be asked of the filters again.
+pub(super) const REFILTERED: u8 = 16;
+/// It left in this tick (and may have come back since).
+pub(super) const LEFT: u8 = 32;
+
+/// A box as plain arrays: lower corner, upper corner, metres. Closed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Bounds {
+    /// Lower corner.
+    pub(super) min: [f64; 3],
+    /// Upper corner.
+    pub(super) max: [f64; 3],
+}
+
+impl Bounds {
+    /// Holds nothing.
+    const EMPTY: Self = Self {
+        min: [f64::INFINITY; 3],
+        max: [f64::NEG_INFINITY; 3],
+    };
+
+    /// From a box. NaN is stopped at the door of the world; should one come, it overlaps nothing.
+    fn of(aabb: &Aabb) -> Self {
+        debug_assert!(
+            (0..3).all(|k| aabb.min[k] <= aabb.max[k]),
+            "a proxy is a box of numbers in order: {aabb:?}"
+        );
+        Self {
+            min: aabb.min.coords.into(),
+            max: aabb.max.coords.into(),
+        }
+    }
+
+    /// Whether the closed intervals on one axis meet.
+    #[inline]
+    pub(super) fn meets(&self, other: &Self, axis: usize) -> bool {
+        // `&`, not `&&`: two loads that wait for each other cost more than a compare too many.
+        (self.min[axis] <= other.max[axis]) & (other.min[axis] <= self.max[axis])
+    }
+
+    /// Whether the closed boxes meet.
+    #[inline]
+    pub(super) fn overlaps(&self, other: &Self) -> bool {
+        self.meets(other, 0) & self.meets(other, 1) & self.meets(other, 2)
+    }
+}
+
+/// The bodies in the broad phase.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Members {
+    bounds: Vec<Bounds>,
+    ids: Vec<BodyId>,
+    flags: Vec<u8>,
+    /// Index of a body in `bounded` or `unbounded`.
+    place: Vec<u32>,
+    bounded: Vec<BodySlot>,
+    unbounded: Vec<BodySlot>,
+    /// Bodies with a flag of this tick, each once.
+    touched: Vec<BodySlot>,
+}
+
+impl Members {
+    /// Begins a tick: no body is touched.
+    pub(super) fn open_tick(&mut self) {
+        for slot in self.touched.drain(..) {
+            self.flags[slot.index()] &= IN | UNBOUNDED;
+        }
+    }
+
+    /// Takes a body out; `false` when it is not in.
+    pub(super) fn leave(&mut self, slot: BodySlot) -> bool {
+        if !self.has(slot, IN) {
+            return false;
+        }
+        let list = if self.has(slot, UNBOUNDED) {
+            &mut self.unbounded
+        } else {
+            &mut self.bounded
+        };
+        let place = self.place[slot.index()] as usize;
+        list.swap_remove(place);
+        if let Some(shifted) = list.get(place) {
+            self.place[shifted.index()] = small(place);
+        }
+        self.flags[slot.index()] &= !(IN | UNBOUNDED);
+        self.touch(slot, LEFT);
+        true
+    }
+
+    /// Takes a body in; `false` when it is in already.
+    pub(super) fn enter(&mut self, slot: BodySlot, proxies: &impl Proxies) -> bool {
+        if self.has(slot, IN) {
+            return false;
+        }
+        let at = slot.index();
+        if self.flags.len() <= at {
+            self.bounds.resize(at + 1, Bounds::EMPTY);
+            self.ids.resize(at + 1, BodyId(0));
+            self.flags.resize(at + 1, 0);
+            self.place.resize(at + 1, 0);
+        }
+        self.ids[at] = proxies.id(slot);
+        let list = if proxies.unbounded(slot) {
+            self.flags[at] |= IN | UNBOUNDED;
+            self.bounds[at] = Bounds::EMPTY;
+            &mut self.unbounded
+        } else {
+            self.flags[at] |= IN;
+            self.bounds[at] = Bounds::of(proxies.aabb(slot));
+            &mut self.bounded
+        };
+        self.place[at] = small(list.len());
+        list.push(slot);
+        self.touch(slot, ASKED);
+        true
+    }
+
+    /// Takes the new box of a body that is in and has one.
+    pub(super) fn moved(&mut self, slot: BodySlot, proxies: &impl Proxies) {
+        if self.is_bounded(slot) {
+            self.bounds[slot.index()] = Bounds::of(proxies.aabb(slot));
+            self.touch(slot, MOVED);
+        }
+    }
+
+    /// Sets flags of this tick.
+    pub(super) fn touch(&mut self, slot: BodySlot, flags: u8) {
+        let all = &mut self.flags[slot.index()];
+        if *all & !(IN | UNBOUNDED) == 0 {
+            self.touched.push(slot);
+        }
+        *all |= flags;
+    }
+
+    /// Whether any of these flags is set.
+    #[inline]
+    pub(super) fn has(&self, slot: BodySlot, flags: u8) -> bool {
+        self.flags
+            .get(slot.index())
+            .is_some_and(|all| all & flags != 0)
+    }
+
+    /// Whether it is in and has a box.
+    #[inline]
+    pub(super) fn is_bounded(&self, slot: BodySlot) -> bool {
+        self.flags
+            .get(slot.index())
+            .is_some_and(|all| all & (IN | UNBOUNDED) == IN)
+    }
+
+    /// The box of a body that is, or was, in.
+    #[inline]
+    pub(super) fn bounds(&self, slot: BodySlot) -> &Bounds {
+        &self.bounds[slot.index()]
+    }
+
+    /// The boxes by slot.
+    pub(super) fn all_bounds(&self) -> &[Bounds] {
+        &self.bounds
+    }
+
+    /// Flags by slot.
+    pub(super) fn all_flags(&self) -> &[u8] {
+        &self.flags
+    }
+
+    /// Bodies with a box, in no order that means anything.
+    pub(super) fn bounded(&self) -> &[BodySlot] {
+        &self.bounded
+    }
+
+    /// Bodies without one.
+    pub(super) fn unbounded(&self) -> &[BodySlot] {
+        &self.unbounded
+    }
+
+    /// Bodies that this tick touched, each once.
+    pub(super) fn touched(&self) -> &[BodySlot] {
+        &self.touched
+    }
+
+    /// The ids of a pair, the smaller first: the order of every result.
+    pub(super) fn rank(&self, key: PairKey) -> (BodyId, BodyId) {
+        let (low, high) = key.slots();
+        let (a, b) = (self.ids[low.index()], self.ids[high.index()]);
+        (a.min(b), a.max(b))
+    }
+
+    /// Checks lists, flags and boxes against the caller's.
+    pub(super) fn validate(&self, proxies: &impl Proxies) -> Result<(), String> {
+        let inside = self.flags.iter().filter(|f| **f & IN != 0).count();
+        if inside != self.bounded.len() + self.unbounded.len() {
+            return Err(format!("{inside} bodies are in, the lists hold others"));
+        }
+        for (list, flags) in [(&self.bounded, IN), (&self.unbounded, IN | UNBOUNDED)] {
+            for (place, slot) in list.iter().enumerate() {
+                let at = slot.index();
+                if self.flags[at] & (IN | UNBOUNDED) != flags || self.place[at] as usize != place {
+                    return Err(format!("{slot:?} stands in a list it does not belong to"));
+                }
+                if self.ids[at] != proxies.id(*slot) {
+                    return Err(format!("{slot:?} has another id than its body"));
+                }
+                if flags == IN && self.bounds[at] != Bounds::of(proxies.aabb(*slot)) {
+                    return Err(format!("the box of {slot:?} is not that of its body"));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// An index as the 32 bits it is stored in; there are never more bodies than `limits::BODIES_MAX`.
+pub(super) fn small(index: usize) -> u32 {
+    debug_assert!(u32::try_from(index).is_ok());
+    u32::try_from(index).unwrap_or(u32::MAX)
+}

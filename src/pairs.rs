@@ -1,1 +1,0 @@
-//! The pair set: overlapping pairs only.
