@@ -1,1 +1,76 @@
-//! Transports.
+//! Transports: how frames and requests come in and results go out. In: samples of other processes, copied once and
+//! unchecked. Out: an [`Inbox`](crate::wire::Inbox) for the engine, and the engine's [`Outbox`] for readers.
+//!
+//! One door with one surface so far: [`iceoryx`], for other processes.
+//! [`client`] is its other side. A door belongs to the thread that opened it.
+
+pub mod client;
+pub mod iceoryx;
+mod request;
+
+use crate::error::Result;
+use crate::time::Clock;
+use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow};
+
+/// Why [`Door::wait`] came back. Nothing set: the time was up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wake {
+    /// A client said that it sent a frame or a request. May be said once more than there is something to receive.
+    pub notified: bool,
+    /// A client came, left or died.
+    pub peers_changed: bool,
+    /// A signal cut the wait.
+    pub interrupted: bool,
+}
+
+/// A request that waits for its answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct RequestToken(pub u64);
+
+/// The daemon's side of a transport.
+///
+/// One round: `wait`, `receive`, `requests`, then `demand`, the engine's tick, `publish`. A round without a tick ends
+/// in `housekeeping` instead of `publish`.
+pub trait Door {
+    /// Waits until a client has sent something, a signal came, or `timeout_ns` have passed; then drains the notices.
+    ///
+    /// # Errors
+    /// `Error::Io` when the wake-up port itself is broken; the daemon must then restart.
+    fn wait(&mut self, timeout_ns: u64, clock: &dyn Clock) -> Result<Wake>;
+
+    /// Copies what came since into the inbox, per source at most its queue (4 frames), so that no flooder starves
+    /// the others; what is beyond limits comes as a frame without rows that says why.
+    fn receive(&mut self, inbox: &mut Inbox, clock: &dyn Clock);
+
+    /// What is listened to now. `publish` sends what was in demand at the last call, nothing else, so an outbox
+    /// that was not filled is never sent as "nothing touches".
+    fn demand(&mut self) -> Demand;
+
+    /// Sends contacts, pairs, bodies, body verdicts, names and plan (where new), then the tick, then one `ready`
+    /// event; never waits for a reader.
+    ///
+    /// * returns - messages that could not be handed over.
+    ///
+    /// # Errors
+    /// `Error::Io` when the tick itself could not be sent: readers would hear nothing.
+    fn publish(&mut self, outbox: &Outbox) -> Result<u64>;
+
+    /// Sends a tick alone, between the slices of a long one.
+    ///
+    /// # Errors
+    /// As [`Door::publish`].
+    fn publish_tick(&mut self, tick: &TickRow) -> Result<()>;
+
+    /// Hands over each new request: its token, header and payload (`json_len` bytes of JSON, then blobs; checked to
+    /// fit). It stays open until it is answered. A request that cannot be read is answered here.
+    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, &[u8]));
+
+    /// Answers a request with JSON; a client that has left is no error.
+    ///
+    /// # Errors
+    /// `Error::Io` when the answer could not be handed over.
+    fn answer(&mut self, token: RequestToken, ok: bool, json: &str) -> Result<()>;
+
+    /// Lets late joiners have the newest state, forgets requests of clients that left. Cheap; each idle round.
+    fn housekeeping(&mut self);
+}

@@ -1,5 +1,6 @@
 //! A decoded frame, and the inbox that carries a tick's frames. Both keep their memory from tick to tick.
 
+use super::codes::RejectReason;
 use super::rows::{FrameHeader, SOURCE_NAME_LEN, TransformRow, TransformVelRow};
 
 /// One batch of transforms from one source, copied out of the transport, not yet checked.
@@ -15,6 +16,8 @@ pub struct Frame {
     pub velocities: Vec<[f64; 6]>,
     /// Whether it waited while the daemon was silent for longer than a heartbeat.
     pub waited: bool,
+    /// Why the transport left its rows behind (too many to copy); the frame is refused as a whole.
+    pub refused: Option<RejectReason>,
 }
 
 impl Frame {
@@ -42,6 +45,7 @@ impl Frame {
 pub struct Inbox {
     frames: Vec<Frame>,
     len: usize,
+    ended: Vec<u64>,
 }
 
 impl Inbox {
@@ -55,6 +59,7 @@ impl Inbox {
         frame.header = FrameHeader::default();
         frame.received_ns = 0;
         frame.waited = false;
+        frame.refused = None;
         frame.transforms.clear();
         frame.velocities.clear();
         frame
@@ -66,15 +71,27 @@ impl Inbox {
         &self.frames[..self.len]
     }
 
-    /// Forgets the frames, keeps their memory.
-    pub fn clear(&mut self) {
-        self.len = 0;
+    /// Notes that the node behind a session is gone; the session is over after this inbox's frames.
+    pub fn end_session(&mut self, session: u64) {
+        self.ended.push(session);
     }
 
-    /// Whether there is no frame.
+    /// Sessions whose node is gone, dead or closed; all they sent is in the frames of this inbox or earlier ones.
+    #[must_use]
+    pub fn ended(&self) -> &[u64] {
+        &self.ended
+    }
+
+    /// Forgets the frames and ended sessions, keeps their memory.
+    pub fn clear(&mut self) {
+        self.len = 0;
+        self.ended.clear();
+    }
+
+    /// Whether there is neither a frame nor an ended session.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.len == 0
+        self.len == 0 && self.ended.is_empty()
     }
 }
 

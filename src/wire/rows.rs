@@ -385,5 +385,6 @@ const _: () = {
     assert!(size_of::<BodyRow>() == 104);
     assert!(size_of::<NameRow>() == 128);
     assert!(size_of::<SourceRow>() == 104);
+    assert!(size_of::<TickRow>() == 2080);
     assert!(size_of::<Hello>() == 64);
 };

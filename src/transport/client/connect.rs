@@ -1,0 +1,97 @@
+//! Finding a daemon and making sure that both sides speak the same.
+
+use std::io::Read;
+
+use super::{Client, LOOK_AGAIN_NS, system_clock};
+use crate::error::{Error, Result};
+use crate::transport::iceoryx::{ICEORYX2_VERSION, IoxLink, Place};
+use crate::wire::{Hello, WIRE_VERSION, name_str};
+
+/// How a client connects over shared memory.
+#[derive(Clone, Debug)]
+pub struct ClientOptions {
+    /// Instance and files.
+    pub place: Place,
+    /// The source it sends frames as; `None`: a reader.
+    pub source: Option<String>,
+    /// How long to look for a daemon, nanoseconds.
+    pub timeout_ns: u64,
+}
+
+impl ClientOptions {
+    /// Opens the daemon's services, again and again until it is there, and waits for its hello.
+    ///
+    /// # Errors
+    /// `Error::TimedOut` without a daemon in time; `Error::Refused` when its files are another user's, its version
+    /// does not fit, or no port is free.
+    pub fn connect(&self) -> Result<Client> {
+        let clock = system_clock();
+        let until_ns = clock.monotonic_ns().saturating_add(self.timeout_ns);
+        let link = IoxLink::open(&self.place, clock.as_ref(), until_ns)?;
+        let left_ns = until_ns.saturating_sub(clock.monotonic_ns());
+        Client::over(Box::new(link), clock, self.source.as_deref(), left_ns)
+    }
+}
+
+impl Client {
+    /// Connects to an instance under the default root: [`ClientOptions::connect`] in one line.
+    ///
+    /// # Errors
+    /// As [`ClientOptions::connect`].
+    pub fn connect(instance: &str, source: Option<&str>, timeout_ns: u64) -> Result<Self> {
+        ClientOptions {
+            place: Place::new(instance)?,
+            source: source.map(ToOwned::to_owned),
+            timeout_ns,
+        }
+        .connect()
+    }
+
+    /// Waits for the hello and checks it.
+    pub(super) fn greet(&mut self, timeout_ns: u64) -> Result<()> {
+        let until_ns = self.clock.monotonic_ns().saturating_add(timeout_ns);
+        loop {
+            if let Some(hello) = self.link.hello()? {
+                check(&hello)?;
+                self.hello = hello;
+                return Ok(());
+            }
+            let now_ns = self.clock.monotonic_ns();
+            if now_ns >= until_ns {
+                return Err(Error::TimedOut(
+                    "the instance's services are there, but no daemon says hello; is it running?"
+                        .to_owned(),
+                ));
+            }
+            self.link
+                .wait((until_ns - now_ns).min(LOOK_AGAIN_NS / 10))?;
+        }
+    }
+}
+
+/// Both versions, when they differ in a way that matters.
+fn check(hello: &Hello) -> Result<()> {
+    let text = |bytes: &[u8]| name_str(bytes).unwrap_or("?").to_owned();
+    let (theirs, iceoryx2) = (text(&hello.sweepd_version), text(&hello.iceoryx2_version));
+    if hello.magic != *b"sweepd\0\0"
+        || hello.wire_version != WIRE_VERSION
+        || iceoryx2 != ICEORYX2_VERSION
+    {
+        return Err(Error::Refused(format!(
+            "the daemon is sweepd {theirs} (wire version {}, iceoryx2 {iceoryx2}), this client sweepd {} (wire version \
+             {WIRE_VERSION}, iceoryx2 {ICEORYX2_VERSION}); use the same version on both sides",
+            hello.wire_version,
+            env!("CARGO_PKG_VERSION")
+        )));
+    }
+    Ok(())
+}
+
+/// A random number that is not 0, from the kernel.
+pub(super) fn random_u64() -> Result<u64> {
+    let mut bytes = [0; 8];
+    std::fs::File::open("/dev/urandom")
+        .and_then(|mut file| file.read_exact(&mut bytes))
+        .map_err(|e| Error::io("/dev/urandom cannot be read", e))?;
+    Ok(u64::from_le_bytes(bytes).max(1))
+}

@@ -1,0 +1,196 @@
+//! Following the ticks: each message is put with the tick it belongs to; what is older than the newest is dropped.
+
+use super::link::Link;
+use super::{BOOTS_OVER_MAX, Heard, Restarted, ends_of};
+use crate::error::Result;
+use crate::wire::{BodyRow, ContactRow, MessageHeader, NameRow, PairRow, TickRow};
+
+/// A message as it was received.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Message<T> {
+    /// Its header; boot id 0: none yet.
+    pub header: MessageHeader,
+    /// `[n]` rows.
+    pub rows: Vec<T>,
+}
+
+impl<T> Message<T> {
+    fn is_of(&self, tick: &MessageHeader) -> bool {
+        self.header.boot_id == tick.boot_id && self.header.tick == tick.tick
+    }
+}
+
+/// The newest tick and what belongs to it.
+#[derive(Clone, Debug, Default)]
+pub struct View {
+    tick: TickRow,
+    pairs: Stream<PairRow>,
+    contacts: Stream<ContactRow>,
+    bodies: Stream<BodyRow>,
+    body_verdicts: Stream<u8>,
+    names: Stream<NameRow>,
+    plan: Stream<u8>,
+}
+
+impl View {
+    /// The newest tick; tick 0: none yet.
+    #[must_use]
+    pub fn tick(&self) -> &TickRow {
+        &self.tick
+    }
+
+    /// The pairs of this very tick; `None`: not listened to when it began, or overtaken in the queue.
+    #[must_use]
+    pub fn pairs(&self) -> Option<&Message<PairRow>> {
+        self.pairs.of(&self.tick.header)
+    }
+
+    /// The contacts of this very tick; `None` as for [`View::pairs`].
+    #[must_use]
+    pub fn contacts(&self) -> Option<&Message<ContactRow>> {
+        self.contacts.of(&self.tick.header)
+    }
+
+    /// The bodies of this very tick; `None` as for [`View::pairs`].
+    #[must_use]
+    pub fn bodies(&self) -> Option<&Message<BodyRow>> {
+        self.bodies.of(&self.tick.header)
+    }
+
+    /// One `Verdict` a body of this very tick, in the order of the names; `None` as for [`View::pairs`].
+    #[must_use]
+    pub fn body_verdicts(&self) -> Option<&Message<u8>> {
+        self.body_verdicts.of(&self.tick.header)
+    }
+
+    /// The newest names of this boot, by body id.
+    #[must_use]
+    pub fn names(&self) -> Option<&Message<NameRow>> {
+        self.names.newest(&self.tick.header)
+    }
+
+    /// The newest plan of this boot, JSON.
+    #[must_use]
+    pub fn plan(&self) -> Option<&Message<u8>> {
+        self.plan.newest(&self.tick.header)
+    }
+}
+
+/// The message in force, and one that came early.
+#[derive(Clone, Debug, Default)]
+struct Stream<T> {
+    now: Message<T>,
+    ahead: Message<T>,
+    has_ahead: bool,
+}
+
+impl<T> Stream<T> {
+    fn of(&self, tick: &MessageHeader) -> Option<&Message<T>> {
+        self.now.is_of(tick).then_some(&self.now)
+    }
+
+    fn newest(&self, tick: &MessageHeader) -> Option<&Message<T>> {
+        (tick.boot_id != 0 && self.now.header.boot_id == tick.boot_id).then_some(&self.now)
+    }
+
+    /// Takes messages up to the tick; one of a later tick or boot is kept for then.
+    fn advance(
+        &mut self,
+        tick: &MessageHeader,
+        boots_over: &[u64],
+        mut read: impl FnMut(&mut Message<T>) -> Result<bool>,
+    ) -> Result<()> {
+        loop {
+            if !self.has_ahead {
+                if !read(&mut self.ahead)? {
+                    return Ok(());
+                }
+                self.has_ahead = true;
+            }
+            let header = &self.ahead.header;
+            let same_boot = header.boot_id == tick.boot_id;
+            if boots_over.contains(&header.boot_id) {
+                self.has_ahead = false;
+            } else if same_boot && header.tick <= tick.tick {
+                let newer =
+                    self.now.header.boot_id != header.boot_id || self.now.header.tick < header.tick;
+                if newer {
+                    std::mem::swap(&mut self.now, &mut self.ahead);
+                }
+                self.has_ahead = false;
+            } else {
+                return Ok(());
+            }
+        }
+    }
+}
+
+/// The state of following.
+#[derive(Debug, Default)]
+pub(super) struct Follow {
+    pub(super) view: View,
+    boots_over: Vec<u64>,
+    /// First tick of a new boot, held back until the restart was told.
+    held: Option<TickRow>,
+}
+
+impl Follow {
+    /// The next newer tick with all that belongs to it, or the news of a restart.
+    pub(super) fn next(&mut self, link: &mut dyn Link) -> Result<Heard> {
+        loop {
+            let tick = match self.held.take() {
+                Some(tick) => tick,
+                None => match link.tick()? {
+                    Some(tick) => tick,
+                    None => return Ok(Heard::Silence),
+                },
+            };
+            let (old, new) = (self.view.tick.header, tick.header);
+            // queues of an old and a new daemon are read in no certain order
+            if self.boots_over.contains(&new.boot_id) {
+                continue;
+            }
+            if old.boot_id != 0 && old.boot_id != new.boot_id {
+                return Ok(Heard::Restarted(self.restart(tick)));
+            }
+            if new.tick <= old.tick {
+                continue;
+            }
+            self.view.tick = tick;
+            self.gather(link, &new)?;
+            return Ok(Heard::Tick);
+        }
+    }
+
+    fn restart(&mut self, tick: TickRow) -> Restarted {
+        let old_boot = self.view.tick.header.boot_id;
+        if self.boots_over.len() == BOOTS_OVER_MAX {
+            self.boots_over.remove(0);
+        }
+        self.boots_over.push(old_boot);
+        let ends = if self.view.pairs.now.header.boot_id == old_boot {
+            ends_of(&self.view.pairs.now)
+        } else {
+            Vec::new()
+        };
+        self.view.tick = TickRow::default();
+        self.held = Some(tick);
+        Restarted {
+            old_boot,
+            new_boot: tick.header.boot_id,
+            ends,
+        }
+    }
+
+    /// What belongs to the tick was sent before it, so it is already there.
+    fn gather(&mut self, link: &mut dyn Link, tick: &MessageHeader) -> Result<()> {
+        let (view, over) = (&mut self.view, &self.boots_over);
+        view.contacts.advance(tick, over, |m| link.contacts(m))?;
+        view.pairs.advance(tick, over, |m| link.pairs(m))?;
+        view.bodies.advance(tick, over, |m| link.bodies(m))?;
+        view.body_verdicts
+            .advance(tick, over, |m| link.body_verdicts(m))?;
+        view.names.advance(tick, over, |m| link.names(m))?;
+        view.plan.advance(tick, over, |m| link.plan(m))
+    }
+}

@@ -1,0 +1,123 @@
+//! What a client needs of a transport: one implementation for shared memory, one for memory of this process.
+
+use std::fmt::Debug;
+
+use super::follow::Message;
+use crate::error::Result;
+use crate::wire::{
+    AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, NameRow, PairRow, RequestHeader,
+    TickRow, TransformRow, TransformVelRow,
+};
+
+/// What to listen to beside ticks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "one independent switch a message"
+)]
+pub struct Topics {
+    /// `pairs`.
+    pub pairs: bool,
+    /// `contacts`.
+    pub contacts: bool,
+    /// `bodies`.
+    pub bodies: bool,
+    /// `body_verdicts`.
+    pub body_verdicts: bool,
+    /// `names`.
+    pub names: bool,
+    /// `plan`.
+    pub plan: bool,
+}
+
+impl Topics {
+    /// Everything.
+    pub const ALL: Self = Self {
+        pairs: true,
+        contacts: true,
+        bodies: true,
+        body_verdicts: true,
+        names: true,
+        plan: true,
+    };
+}
+
+/// The rows of a frame.
+#[derive(Clone, Copy, Debug)]
+pub enum Rows<'a> {
+    /// Poses.
+    Poses(&'a [TransformRow]),
+    /// Poses with velocities.
+    Moving(&'a [TransformVelRow]),
+}
+
+/// A client's ports. Reads never wait: `None` or `false` means that nothing newer is there.
+///
+/// Every method fails with `Error::Io` when its port does.
+pub trait Link: Debug {
+    /// Opens the ports of these messages; open ones stay open.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn subscribe(&mut self, topics: Topics) -> Result<()>;
+    /// Hands a frame over and wakes the daemon.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn send(&mut self, header: &FrameHeader, rows: Rows<'_>) -> Result<()>;
+    /// Sleeps until the daemon has sent something, a signal came, or `timeout_ns` have passed.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn wait(&mut self, timeout_ns: u64) -> Result<()>;
+    /// The next tick.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn tick(&mut self) -> Result<Option<TickRow>>;
+    /// The next `pairs`.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn pairs(&mut self, into: &mut Message<PairRow>) -> Result<bool>;
+    /// The next `contacts`.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn contacts(&mut self, into: &mut Message<ContactRow>) -> Result<bool>;
+    /// The next `bodies`.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn bodies(&mut self, into: &mut Message<BodyRow>) -> Result<bool>;
+    /// The next `body_verdicts`.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn body_verdicts(&mut self, into: &mut Message<u8>) -> Result<bool>;
+    /// The next `names`.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn names(&mut self, into: &mut Message<NameRow>) -> Result<bool>;
+    /// The next `plan`, JSON.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn plan(&mut self, into: &mut Message<u8>) -> Result<bool>;
+    /// The newest `hello`.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn hello(&mut self) -> Result<Option<Hello>>;
+    /// Sends a request: JSON, then blobs.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn request(&mut self, header: &RequestHeader, json: &[u8], blobs: &[&[u8]]) -> Result<()>;
+    /// The next answer to any request, its JSON in `into`.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn answer(&mut self, into: &mut Vec<u8>) -> Result<Option<AnswerHeader>>;
+}

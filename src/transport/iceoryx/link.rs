@@ -1,0 +1,354 @@
+//! A client's ports over shared memory. It only opens what a daemon has made.
+
+use std::time::Duration;
+
+use iceoryx2::pending_response::PendingResponse;
+use iceoryx2::port::client::Client as RequestClient;
+use iceoryx2::port::listener::{Listener, ListenerWaitError};
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::{AllocationStrategy, EventId, Node, PayloadHeader, ZeroCopySend};
+
+use super::lock;
+use super::place::Place;
+use super::qos::{self, Ipc, Open, events, failed};
+use crate::error::{Error, Result};
+use crate::limits;
+use crate::time::Clock;
+use crate::transport::client::{Link, Message, Rows, Topics};
+use crate::wire::{
+    AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, MessageHeader, NameRow, PairRow,
+    RequestHeader, TickRow, TransformRow, TransformVelRow,
+};
+
+/// Between two looks for a daemon.
+const RETRY: Duration = Duration::from_millis(50);
+/// A plan longer than this is no plan.
+const PLAN_BYTES_MAX: usize = 1 << 24;
+
+type Reader<T> = Option<Subscriber<Ipc, [T], MessageHeader>>;
+type Sender<T> = Option<Publisher<Ipc, [T], FrameHeader>>;
+type Pending = PendingResponse<Ipc, [u8], RequestHeader, [u8], AnswerHeader>;
+
+/// A client's ports over shared memory. Not `Send`.
+///
+/// Ports keep their services open; all go before the node (field order).
+pub struct IoxLink {
+    pending: Vec<Pending>,
+    requests: Option<RequestClient<Ipc, [u8], RequestHeader, [u8], AnswerHeader>>,
+    transforms: Sender<TransformRow>,
+    transforms_vel: Sender<TransformVelRow>,
+    wake: Notifier<Ipc>,
+    ready: Listener<Ipc>,
+    tick: Subscriber<Ipc, TickRow, ()>,
+    hello: Subscriber<Ipc, Hello, ()>,
+    pairs: Reader<PairRow>,
+    contacts: Reader<ContactRow>,
+    bodies: Reader<BodyRow>,
+    body_verdicts: Reader<u8>,
+    names: Reader<NameRow>,
+    plan: Reader<u8>,
+    node: Node<Ipc>,
+    place: Place,
+}
+
+impl std::fmt::Debug for IoxLink {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("IoxLink")
+            .field("place", &self.place)
+            .finish_non_exhaustive()
+    }
+}
+
+impl IoxLink {
+    /// Opens the instance's services, again and again until they are there or `until_ns` (monotonic) is reached.
+    ///
+    /// # Errors
+    /// `Error::Refused` when the files are another user's or of another iceoryx2; `Error::TimedOut` otherwise.
+    pub fn open(place: &Place, clock: &dyn Clock, until_ns: u64) -> Result<Self> {
+        loop {
+            // a node of ours would make a missing root, which is the daemon's to make
+            let tried = if place.check_owner()? {
+                Self::try_open(place)
+            } else {
+                Err(Error::TimedOut(format!(
+                    "{} is missing",
+                    place.root().display()
+                )))
+            };
+            let why = match tried {
+                Ok(link) => return Ok(link),
+                Err(why) => why,
+            };
+            if clock.monotonic_ns() >= until_ns {
+                return Err(not_found(place, &why));
+            }
+            std::thread::park_timeout(RETRY);
+        }
+    }
+
+    fn try_open(place: &Place) -> Result<Self> {
+        let node = qos::node(place, "client")?;
+        let hello = qos::hellos(&node, place, Open::Existing)?
+            .subscriber_builder()
+            .create()
+            .map_err(|e| failed("hello", e))?;
+        let tick = qos::ticks(&node, place, Open::Existing)?
+            .subscriber_builder()
+            .create()
+            .map_err(|e| failed("tick", e))?;
+        let ready = qos::event(&node, place, "ready", Open::Existing)?
+            .listener_builder()
+            .create()
+            .map_err(|e| failed("ready", e))?;
+        // last: its coming wakes the daemon, which then sends us the newest hello and tick
+        let wake = qos::event(&node, place, "wake", Open::Existing)?
+            .notifier_builder()
+            .default_event_id(EventId::new(events::SENT))
+            .create()
+            .map_err(|e| failed("wake", e))?;
+        Ok(Self {
+            pending: Vec::new(),
+            requests: None,
+            transforms: None,
+            transforms_vel: None,
+            wake,
+            ready,
+            tick,
+            hello,
+            pairs: None,
+            contacts: None,
+            bodies: None,
+            body_verdicts: None,
+            names: None,
+            plan: None,
+            node,
+            place: place.clone(),
+        })
+    }
+
+    fn wake(&self, event: usize) {
+        // a daemon that is away is no error: it finds what was sent when it is back
+        let _nobody_there = self.wake.notify_with_custom_event_id(EventId::new(event));
+    }
+
+    fn reader<T: std::fmt::Debug + ZeroCopySend>(
+        &self,
+        topic: &str,
+    ) -> Result<Subscriber<Ipc, [T], MessageHeader>> {
+        qos::results::<T>(&self.node, &self.place, topic, Open::Existing)?
+            .subscriber_builder()
+            .create()
+            .map_err(|e| failed(topic, e))
+    }
+
+    fn sender<T: std::fmt::Debug + ZeroCopySend>(
+        &self,
+        topic: &str,
+        rows: usize,
+    ) -> Result<Publisher<Ipc, [T], FrameHeader>> {
+        let service = qos::frames::<T>(&self.node, &self.place, topic, Open::Existing)?;
+        // room for the first frame: a sample sent right after a growth is lost if its sender ends before it is mapped
+        qos::slice_publisher(&service, rows.max(qos::SLICE_LEN_START))
+    }
+}
+
+/// Why there is no daemon to talk to, with both versions where the holder of the instance says another one.
+fn not_found(place: &Place, why: &Error) -> Error {
+    let Some(holder) = lock::holder(place) else {
+        return Error::TimedOut(format!(
+            "no daemon runs as instance `{}` ({why}); start one with `sweepd run`, `sweepd list` shows who is there",
+            place.instance()
+        ));
+    };
+    Error::Refused(format!(
+        "instance `{}` is process {}, sweepd {} with iceoryx2 {}, this client is sweepd {} with iceoryx2 {}: {why}",
+        place.instance(),
+        holder.pid,
+        holder.sweepd_version,
+        holder.iceoryx2_version,
+        env!("CARGO_PKG_VERSION"),
+        super::ICEORYX2_VERSION
+    ))
+}
+
+fn send_frame<T>(
+    publisher: &Publisher<Ipc, [T], FrameHeader>,
+    header: &FrameHeader,
+    rows: &[T],
+) -> Result<()>
+where
+    T: std::fmt::Debug + ZeroCopySend + Copy,
+{
+    let mut sample = publisher
+        .loan_slice_uninit(rows.len())
+        .map_err(|e| failed("frame", e))?;
+    *sample.user_header_mut() = *header;
+    sample
+        .write_from_slice(rows)
+        .send()
+        .map(|_| ())
+        .map_err(|e| failed("frame", e))
+}
+
+fn read<T>(reader: &Reader<T>, rows_max: usize, into: &mut Message<T>) -> Result<bool>
+where
+    T: std::fmt::Debug + ZeroCopySend + Copy,
+{
+    let Some(reader) = reader else {
+        return Ok(false);
+    };
+    while let Some(sample) = reader.receive().map_err(|e| failed("result", e))? {
+        // the count is the sender's word: checked before it makes a slice
+        let rows = usize::try_from(sample.header().number_of_elements());
+        if rows.is_ok_and(|rows| rows <= rows_max) {
+            into.header = *sample.user_header();
+            into.rows.clear();
+            into.rows.extend_from_slice(sample.payload());
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+impl Link for IoxLink {
+    fn subscribe(&mut self, topics: Topics) -> Result<()> {
+        if topics.pairs && self.pairs.is_none() {
+            self.pairs = Some(self.reader("pairs")?);
+        }
+        if topics.contacts && self.contacts.is_none() {
+            self.contacts = Some(self.reader("contacts")?);
+        }
+        if topics.bodies && self.bodies.is_none() {
+            self.bodies = Some(self.reader("bodies")?);
+        }
+        if topics.body_verdicts && self.body_verdicts.is_none() {
+            self.body_verdicts = Some(self.reader("body_verdicts")?);
+        }
+        if topics.names && self.names.is_none() {
+            self.names = Some(self.reader("names")?);
+        }
+        if topics.plan && self.plan.is_none() {
+            self.plan = Some(self.reader("plan")?);
+        }
+        // the daemon then gives us the newest names and plan
+        self.wake(events::CREATED);
+        Ok(())
+    }
+
+    fn send(&mut self, header: &FrameHeader, rows: Rows<'_>) -> Result<()> {
+        match rows {
+            Rows::Poses(rows) => {
+                if self.transforms.is_none() {
+                    self.transforms = Some(self.sender("transforms", rows.len())?);
+                }
+                if let Some(port) = &self.transforms {
+                    send_frame(port, header, rows)?;
+                }
+            }
+            Rows::Moving(rows) => {
+                if self.transforms_vel.is_none() {
+                    self.transforms_vel = Some(self.sender("transforms_vel", rows.len())?);
+                }
+                if let Some(port) = &self.transforms_vel {
+                    send_frame(port, header, rows)?;
+                }
+            }
+        }
+        self.wake(events::SENT);
+        Ok(())
+    }
+
+    fn wait(&mut self, timeout_ns: u64) -> Result<()> {
+        match self
+            .ready
+            .timed_wait(|_| {}, Duration::from_nanos(timeout_ns))
+        {
+            Ok(_) | Err(ListenerWaitError::InterruptSignal) => Ok(()),
+            Err(e) => Err(failed("ready", e)),
+        }
+    }
+
+    fn tick(&mut self) -> Result<Option<TickRow>> {
+        let sample = self.tick.receive().map_err(|e| failed("tick", e))?;
+        Ok(sample.map(|sample| *sample.payload()))
+    }
+
+    fn pairs(&mut self, into: &mut Message<PairRow>) -> Result<bool> {
+        read(&self.pairs, limits::PAIRS_DEFAULT, into)
+    }
+
+    fn contacts(&mut self, into: &mut Message<ContactRow>) -> Result<bool> {
+        read(&self.contacts, limits::PAIRS_DEFAULT, into)
+    }
+
+    fn bodies(&mut self, into: &mut Message<BodyRow>) -> Result<bool> {
+        read(&self.bodies, limits::BODIES_MAX, into)
+    }
+
+    fn body_verdicts(&mut self, into: &mut Message<u8>) -> Result<bool> {
+        read(&self.body_verdicts, limits::BODIES_MAX, into)
+    }
+
+    fn names(&mut self, into: &mut Message<NameRow>) -> Result<bool> {
+        read(&self.names, limits::BODIES_MAX, into)
+    }
+
+    fn plan(&mut self, into: &mut Message<u8>) -> Result<bool> {
+        read(&self.plan, PLAN_BYTES_MAX, into)
+    }
+
+    fn hello(&mut self) -> Result<Option<Hello>> {
+        let mut newest = None;
+        while let Some(sample) = self.hello.receive().map_err(|e| failed("hello", e))? {
+            newest = Some(*sample.payload());
+        }
+        Ok(newest)
+    }
+
+    fn request(&mut self, header: &RequestHeader, json: &[u8], blobs: &[&[u8]]) -> Result<()> {
+        let len = json.len() + blobs.iter().map(|b| b.len()).sum::<usize>();
+        if self.requests.is_none() {
+            let port = qos::requests(&self.node, &self.place, Open::Existing)?
+                .client_builder()
+                .initial_max_slice_len(len.max(qos::REQUEST_LEN_START))
+                .allocation_strategy(AllocationStrategy::PowerOfTwo)
+                .create()
+                .map_err(|e| failed("requests", e))?;
+            self.requests = Some(port);
+        }
+        let Some(port) = &self.requests else {
+            return Ok(());
+        };
+        // answers nobody waits for any more give their place free
+        self.pending.retain(Pending::is_connected);
+        let mut request = port
+            .loan_slice_uninit(len)
+            .map_err(|e| failed("request", e))?;
+        *request.user_header_mut() = *header;
+        let mut bytes = json.iter().chain(blobs.iter().flat_map(|blob| blob.iter()));
+        let request = request.write_from_fn(|_| bytes.next().copied().unwrap_or(0));
+        self.pending
+            .push(request.send().map_err(|e| failed("request", e))?);
+        self.wake(events::ASKED);
+        Ok(())
+    }
+
+    fn answer(&mut self, into: &mut Vec<u8>) -> Result<Option<AnswerHeader>> {
+        for at in 0..self.pending.len() {
+            let Some(pending) = self.pending.get(at) else {
+                break;
+            };
+            let received = pending.receive().map_err(|e| failed("answer", e))?;
+            let Some(response) = received else { continue };
+            let header = *response.user_header();
+            into.clear();
+            into.extend_from_slice(response.payload());
+            drop(response);
+            drop(self.pending.swap_remove(at));
+            return Ok(Some(header));
+        }
+        Ok(None)
+    }
+}

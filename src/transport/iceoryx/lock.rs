@@ -1,0 +1,188 @@
+//! Two file locks. One beside the shared memory makes the instance single; one on iceoryx2's root keeps cleaners of
+//! temporary files out of it. The kernel drops both when the process dies, however it dies.
+
+use std::fs::{DirBuilder, File, OpenOptions};
+use std::io::{Read, Seek, Write};
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+
+use rustix::fs::{FlockOperation, flock};
+use serde::{Deserialize, Serialize};
+
+use super::place::Place;
+use crate::error::{Error, Result};
+
+/// Shared memory lives here; a lock beside it survives the removal of iceoryx2's root, which would let a second
+/// daemon make a second, silent set of services.
+const LOCK_DIR: &str = "/dev/shm";
+/// Times to try again when the file was removed between opening and locking.
+const TRIES_MAX: usize = 16;
+
+/// What the holder of an instance writes into its lock, for people and for clients of another iceoryx2 version.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Holder {
+    pub(super) pid: u32,
+    pub(super) boot_id: u64,
+    pub(super) wire_version: u32,
+    pub(super) sweepd_version: String,
+    pub(super) iceoryx2_version: String,
+}
+
+/// The one holder of an instance. The file goes when it is dropped.
+#[derive(Debug)]
+pub(super) struct InstanceLock {
+    file: File,
+    path: PathBuf,
+}
+
+/// Fowler, Noll, Vo (FNV-1a), 64 bit: tells roots and prefixes apart in the lock's name.
+fn fnv(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &b| {
+        (hash ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3)
+    })
+}
+
+fn lock_path(place: &Place) -> PathBuf {
+    let uid = rustix::process::geteuid().as_raw();
+    let files = format!("{}|{}", place.root().display(), place.prefix());
+    let name = format!(
+        "sweepd_{uid}_{}_{:016x}.lock",
+        place.instance(),
+        fnv(files.as_bytes())
+    );
+    Path::new(LOCK_DIR).join(name)
+}
+
+/// Who holds the instance now; `None`: nobody. Text that cannot be read counts as a holder of nothing known.
+pub(super) fn holder(place: &Place) -> Option<Holder> {
+    let mut file = File::open(lock_path(place)).ok()?;
+    // free to take: left behind by a killed daemon
+    if flock(&file, FlockOperation::NonBlockingLockShared).is_ok() {
+        return None;
+    }
+    let mut text = String::new();
+    let _unreadable = file.read_to_string(&mut text);
+    Some(serde_json::from_str(&text).unwrap_or_default())
+}
+
+impl InstanceLock {
+    /// Takes the instance.
+    ///
+    /// # Errors
+    /// `Error::Refused` when another process has it, or the file is another user's.
+    pub(super) fn take(place: &Place, us: &Holder) -> Result<Self> {
+        let path = lock_path(place);
+        let refuse =
+            |why: String| Error::Refused(format!("instance `{}`: {why}", place.instance()));
+        for _ in 0..TRIES_MAX {
+            let mut file = OpenOptions::new()
+                .read(true)
+                .write(true)
+                .create(true)
+                .truncate(false)
+                .mode(0o600)
+                .open(&path)
+                .map_err(|e| refuse(format!("{}: {e}", path.display())))?;
+            if flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
+                let other = holder(place).unwrap_or_default();
+                return Err(refuse(format!(
+                    "taken by process {} (sweepd {}); end it, or choose another name with --instance",
+                    other.pid, other.sweepd_version
+                )));
+            }
+            // the former holder may have removed the file after we opened it: a lock on nothing
+            if !same_file(&file, &path) {
+                continue;
+            }
+            let text = serde_json::to_string(us).unwrap_or_default();
+            file.rewind()
+                .and_then(|()| file.set_len(0))
+                .and_then(|()| file.write_all(text.as_bytes()))
+                .map_err(|e| Error::io(format!("{}: cannot be written", path.display()), e))?;
+            return Ok(Self { file, path });
+        }
+        Err(refuse(format!(
+            "{} changes hands again and again",
+            path.display()
+        )))
+    }
+}
+
+impl Drop for InstanceLock {
+    fn drop(&mut self) {
+        // removed while still locked, and only if it is still ours: another's lock must never go
+        if same_file(&self.file, &self.path) {
+            let _gone_already = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+fn same_file(file: &File, path: &Path) -> bool {
+    match (file.metadata(), std::fs::metadata(path)) {
+        (Ok(a), Ok(b)) => a.ino() == b.ino() && a.dev() == b.dev(),
+        _ => false,
+    }
+}
+
+/// A shared lock on iceoryx2's root: `systemd-tmpfiles` leaves locked directories alone.
+#[derive(Debug)]
+pub(super) struct RootLock {
+    _dir: File,
+}
+
+impl RootLock {
+    /// Makes the root where it is missing, and holds it.
+    ///
+    /// # Errors
+    /// `Error::Refused` when it cannot be made or opened.
+    pub(super) fn hold(place: &Place) -> Result<Self> {
+        let root = place.root();
+        let refuse = |e: std::io::Error| {
+            Error::Refused(format!(
+                "{}: {e}; iceoryx2 keeps its files there",
+                root.display()
+            ))
+        };
+        // as iceoryx2 would make it: nobody else may write
+        DirBuilder::new()
+            .recursive(true)
+            .mode(0o750)
+            .create(&root)
+            .map_err(refuse)?;
+        let dir = File::open(&root).map_err(refuse)?;
+        // a cleaner may hold it for a moment; then it is just not protected from that one run
+        let _best_effort = flock(&dir, FlockOperation::NonBlockingLockShared);
+        Ok(Self { _dir: dir })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_instance_has_one_holder_and_the_lock_file_goes_with_it() {
+        let name = format!("lock_{}", std::process::id());
+        let place = Place::new(&name).unwrap();
+        let us = Holder {
+            pid: 7,
+            ..Holder::default()
+        };
+        let lock = InstanceLock::take(&place, &us).unwrap();
+        let text = InstanceLock::take(&place, &us).unwrap_err().to_string();
+        assert!(text.contains("taken by process 7"), "{text}");
+        assert_eq!(holder(&place).unwrap().pid, 7);
+        drop(lock);
+        assert!(!lock_path(&place).exists());
+        assert_eq!(holder(&place), None);
+        InstanceLock::take(&place, &us).unwrap();
+    }
+
+    #[test]
+    fn a_lock_file_left_by_a_killed_daemon_does_not_block() {
+        let place = Place::new(&format!("stale_{}", std::process::id())).unwrap();
+        std::fs::write(lock_path(&place), "rubbish").unwrap();
+        assert_eq!(holder(&place), None);
+        InstanceLock::take(&place, &Holder::default()).unwrap();
+    }
+}

@@ -1,0 +1,27 @@
+//! Shared memory between processes: the one door to iceoryx2. In: samples of untrusted layout but trusted origin
+//! (files are 0600: same user only). Out: copies, checked for what would hurt memory; all else `world` checks.
+//!
+//! What iceoryx2 does not check and this room or `world` does: field layout (version in type names, `schema` in
+//! headers), counts beyond limits, values changing after the send (copied once, then checked).
+//!
+//! Leaves nothing behind: ports go before services, services before the node, the node before the locks (field
+//! order of [`Server`]); after a kill the next daemon, or any node, cleans up.
+
+mod cleaner;
+mod link;
+mod list;
+mod lock;
+mod place;
+mod qos;
+mod server;
+mod waker;
+
+pub use cleaner::{Cleaner, spawn_cleaner};
+pub use link::IoxLink;
+pub use list::{InstanceInfo, list_instances};
+pub use place::Place;
+pub use server::{Server, ServerOptions};
+pub use waker::Waker;
+
+/// The iceoryx2 this was built with; clients of another one cannot talk to it.
+pub const ICEORYX2_VERSION: &str = "0.10.0";

@@ -1,0 +1,166 @@
+//! Where an instance lives: its name, the root directory and prefix of iceoryx2's files, whose they are.
+
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+use iceoryx2::prelude::{
+    Config, FileName, LogLevel, Path as IoxPath, SemanticString, set_log_level_from_env_or,
+};
+
+use crate::error::{Error, Result};
+
+/// Longest instance name, bytes.
+const INSTANCE_LEN_MAX: usize = 32;
+
+/// An instance's name and the files it lives in.
+///
+/// The configuration of iceoryx2 is made from this alone: a configuration file in the current directory would put
+/// the daemon and its clients on different files.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    instance: String,
+    root: Option<PathBuf>,
+    prefix: Option<String>,
+}
+
+impl Place {
+    /// The place of `instance` in iceoryx2's default root.
+    ///
+    /// # Errors
+    /// `Error::Usage` when the name is not 1 to 32 of `a-z`, `0-9` and `_`.
+    pub fn new(instance: &str) -> Result<Self> {
+        let fits = (1..=INSTANCE_LEN_MAX).contains(&instance.len())
+            && instance
+                .bytes()
+                .all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_');
+        if !fits {
+            return Err(Error::Usage(format!(
+                "instance name `{instance}`: use 1 to 32 of a-z, 0-9 and _"
+            )));
+        }
+        Ok(Self {
+            instance: instance.to_owned(),
+            root: None,
+            prefix: None,
+        })
+    }
+
+    /// The same instance under another root directory and file prefix; daemon and clients must agree.
+    #[must_use]
+    pub fn under(mut self, root: impl Into<PathBuf>, prefix: impl Into<String>) -> Self {
+        self.root = Some(root.into());
+        self.prefix = Some(prefix.into());
+        self
+    }
+
+    /// The instance's name.
+    #[must_use]
+    pub fn instance(&self) -> &str {
+        &self.instance
+    }
+
+    /// The same files, another instance.
+    pub(super) fn with_instance(&self, instance: &str) -> Result<Self> {
+        let mut other = Self::new(instance)?;
+        other.root.clone_from(&self.root);
+        other.prefix.clone_from(&self.prefix);
+        Ok(other)
+    }
+
+    /// Name of one of the instance's services of this wire version.
+    pub(super) fn service(&self, topic: &str) -> String {
+        format!("{}/v{}/{topic}", self.instance, crate::wire::WIRE_VERSION)
+    }
+
+    /// The root directory of iceoryx2's files.
+    pub(super) fn root(&self) -> PathBuf {
+        self.root
+            .clone()
+            .unwrap_or_else(|| PathBuf::from(Config::default().global.root_path().to_string()))
+    }
+
+    /// The prefix of iceoryx2's files.
+    pub(super) fn prefix(&self) -> String {
+        self.prefix
+            .clone()
+            .unwrap_or_else(|| Config::default().global.prefix.to_string())
+    }
+
+    /// The configuration of iceoryx2, made from nothing but this place.
+    pub(super) fn config(&self) -> Result<Config> {
+        set_log_level_from_env_or(LogLevel::Fatal);
+        let mut config = Config::default();
+        let bad = |what: &str| Error::Usage(format!("{what} cannot be used as a path of iceoryx2"));
+        if let Some(root) = &self.root {
+            let text = root
+                .to_str()
+                .ok_or_else(|| bad(&root.display().to_string()))?;
+            let path = IoxPath::new(text.as_bytes()).map_err(|_| bad(text))?;
+            config.global.set_root_path(&path);
+        }
+        if let Some(prefix) = &self.prefix {
+            config.global.prefix = FileName::new(prefix.as_bytes()).map_err(|_| bad(prefix))?;
+        }
+        Ok(config)
+    }
+
+    /// Whether the root is there; refused when it is another user's: iceoryx2 would drop samples in silence
+    /// where root meets another user.
+    pub(super) fn check_owner(&self) -> Result<bool> {
+        check_owner(&self.root())
+    }
+}
+
+fn check_owner(root: &Path) -> Result<bool> {
+    let meta = match std::fs::metadata(root) {
+        Ok(meta) => meta,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(false),
+        Err(e) => {
+            return Err(Error::Refused(format!(
+                "{}: {e}; shared memory belongs to one user, run as that user",
+                root.display()
+            )));
+        }
+    };
+    let us = rustix::process::geteuid().as_raw();
+    if meta.uid() != us {
+        return Err(Error::Refused(format!(
+            "{} belongs to user id {}, this process runs as {us}; run both as one user, or give both another root",
+            root.display(),
+            meta.uid()
+        )));
+    }
+    Ok(true)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn instance_names_outside_the_alphabet_are_refused() {
+        for bad in ["", "A", "a-b", "a/b", "ü", &"x".repeat(33)] {
+            assert!(Place::new(bad).is_err(), "{bad}");
+        }
+        assert!(Place::new("cell_7").is_ok());
+    }
+
+    #[test]
+    fn a_root_of_another_user_is_refused_with_both_ids() {
+        // /proc/1 belongs to root; as root, /tmp gets a directory of somebody else
+        let theirs = if rustix::process::geteuid().is_root() {
+            let dir = std::env::temp_dir().join(format!("sweepd_owner_{}", std::process::id()));
+            std::fs::create_dir_all(&dir).unwrap();
+            std::os::unix::fs::chown(&dir, Some(12345), None).unwrap();
+            dir
+        } else {
+            PathBuf::from("/etc")
+        };
+        let place = Place::new("x").unwrap().under(&theirs, "p_");
+        let text = place.check_owner().unwrap_err().to_string();
+        assert!(text.contains("belongs to user id"), "{text}");
+        if rustix::process::geteuid().is_root() {
+            std::fs::remove_dir(&theirs).unwrap();
+        }
+    }
+}

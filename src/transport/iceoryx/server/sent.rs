@@ -1,0 +1,114 @@
+//! What goes out: hello, the messages of a tick in their order, connections of late joiners.
+
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::update_connections::UpdateConnections;
+use iceoryx2::prelude::ZeroCopySend;
+
+use super::{ICEORYX2_VERSION, Ipc, Server, failed};
+use crate::error::Result;
+use crate::wire::{Hello, MessageHeader, Outbox, TickRow, WIRE_VERSION};
+
+impl Server {
+    pub(super) fn say_hello(&mut self) -> Result<()> {
+        let hello = Hello {
+            magic: *b"sweepd\0\0",
+            boot_id: self.options.boot_id,
+            pid: std::process::id(),
+            uid: rustix::process::geteuid().as_raw(),
+            wire_version: WIRE_VERSION,
+            reserved: 0,
+            sweepd_version: padded(env!("CARGO_PKG_VERSION")),
+            iceoryx2_version: padded(ICEORYX2_VERSION),
+        };
+        self.hello
+            .send_copy(hello)
+            .map(|_| ())
+            .map_err(|e| failed("hello", e))
+    }
+
+    /// Order is a promise: whoever has the tick has all that belongs to it.
+    pub(super) fn send_all(&mut self, outbox: &Outbox) -> Result<u64> {
+        let (demand, mut failures) = (self.demand, 0);
+        if demand.contacts {
+            failures += send(
+                &self.contacts.publisher,
+                &outbox.contacts_header,
+                &outbox.contacts,
+            );
+        }
+        if demand.pairs {
+            failures += send(&self.pairs.publisher, &outbox.pairs_header, &outbox.pairs);
+        }
+        if demand.bodies {
+            failures += send(
+                &self.bodies.publisher,
+                &outbox.bodies_header,
+                &outbox.bodies,
+            );
+        }
+        let header = &outbox.tick.header;
+        if demand.body_verdicts {
+            // never truncated, whatever was left out elsewhere
+            let whole = MessageHeader {
+                truncated: 0,
+                ..*header
+            };
+            failures += send(&self.body_verdicts.publisher, &whole, &outbox.body_verdicts);
+        }
+        let whole = MessageHeader {
+            truncated: 0,
+            ..*header
+        };
+        if outbox.names_changed {
+            failures += send(&self.names.publisher, &whole, &outbox.names);
+        }
+        if outbox.plan_changed {
+            failures += send(&self.plan.publisher, &whole, outbox.plan.as_bytes());
+        }
+        self.update_connections();
+        self.send_tick(&outbox.tick)?;
+        Ok(failures)
+    }
+
+    pub(super) fn send_tick(&mut self, tick: &TickRow) -> Result<()> {
+        self.tick.send_copy(*tick).map_err(|e| failed("tick", e))?;
+        // a reader that cannot be notified still finds the tick when it looks
+        let _unheard = self.ready.notify();
+        Ok(())
+    }
+
+    /// Late joiners get the newest of what is not sent now.
+    pub(super) fn update_connections(&mut self) {
+        // one broken reader is no reason to stop; the next round tries again
+        let _later = self.hello.update_connections();
+        let _later = self.names.publisher.update_connections();
+        let _later = self.plan.publisher.update_connections();
+        let _later = self.tick.update_connections();
+    }
+}
+
+/// One message.
+///
+/// * returns - 1 when it could not be handed over.
+fn send<T>(
+    publisher: &Publisher<Ipc, [T], MessageHeader>,
+    header: &MessageHeader,
+    rows: &[T],
+) -> u64
+where
+    T: std::fmt::Debug + ZeroCopySend + Copy + 'static,
+{
+    let Ok(mut sample) = publisher.loan_slice_uninit(rows.len()) else {
+        return 1;
+    };
+    *sample.user_header_mut() = *header;
+    u64::from(sample.write_from_slice(rows).send().is_err())
+}
+
+fn padded(text: &str) -> [u8; 16] {
+    let mut bytes = [0; 16];
+    for (to, from) in bytes.iter_mut().zip(text.bytes()) {
+        *to = from;
+    }
+    bytes
+}
