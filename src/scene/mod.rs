@@ -1,7 +1,18 @@
 //! Scenes: which bodies, sources and pair rules there are, and how the daemon runs them.
 //!
-//! In: a TOML file (strict). Out: a checked [`Scene`]; every error names file, line, body and the mend.
+//! In: a TOML file (strict). Out: a checked [`Scene`]; every error names file, line, body and the mend. Requests to
+//! edit a running scene come in as JSON of the same words, and change a scene as a whole or not at all.
 
 mod model;
+mod node;
+mod pattern;
+mod read_body;
+mod read_rule;
+mod read_scene;
+mod read_shape;
+mod resolve;
+mod table;
 
-pub use model::{BodySpec, PairAction, PairRule, PlacedSpec, Scene, SourceSpec};
+pub use model::{BodySpec, Origin, PairAction, PairRule, PlacedSpec, Scene, SourceSpec};
+pub use pattern::{is_pattern, pattern_matches};
+pub use read_body::{BODY_NAME_BYTES_MAX, BodyDraft, SOURCE_NAME_BYTES_MAX};

@@ -1,12 +1,14 @@
 //! The checked scene.
 
+use std::path::PathBuf;
+
 use crate::config::{Config, OnStale};
 use crate::ids::BodyId;
 use crate::math::Pose;
 use crate::shape::ShapeSpec;
 
 /// A checked scene: names are unique, numbers finite, references resolve.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
     /// Name of the one frame all poses are in.
     pub frame_id: String,
@@ -18,6 +20,19 @@ pub struct Scene {
     pub bodies: Vec<BodySpec>,
     /// Pair rules; the last that matches wins.
     pub rules: Vec<PairRule>,
+    /// Where it was read from, for paths and messages.
+    pub origin: Origin,
+}
+
+/// Where a scene was read from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Origin {
+    /// The file's path, as messages name it; empty for a scene that was not read from a file.
+    pub file: String,
+    /// The folder that mesh files are relative to.
+    pub base: PathBuf,
+    /// `[body][shape]`, beside `Scene::bodies`: the line of each shape, from 1; shorter where bodies were put later.
+    pub shape_lines: Vec<Vec<u32>>,
 }
 
 /// A source: a client that sends frames.
@@ -44,7 +59,8 @@ pub struct BodySpec {
     pub moves: bool,
     /// Whether it is swept between its last two poses.
     pub continuous: bool,
-    /// Place of its source in `Scene::sources`; `None` when it cannot move.
+    /// Place of its source in `Scene::sources`. `None` when it cannot move; an attached body may have none too, and
+    /// then no frame moves it after it is detached.
     pub source: Option<usize>,
     /// Groups it belongs to, one bit each.
     pub group: u32,

@@ -2,13 +2,18 @@
 //!
 //! In: a spec and the folder its files are relative to. Out: an immutable, shared `Shape` with its bounds.
 
+mod build;
+mod check;
 mod convex;
 mod error;
+mod height_field;
+mod load;
 mod mesh;
 mod spec;
 
 pub use convex::Convex;
 pub use error::ShapeError;
+pub(crate) use load::find_mesh;
 pub use mesh::Mesh;
 pub use spec::ShapeSpec;
 

@@ -1,0 +1,181 @@
+//! Reads one body as a user writes it: in a scene file's `[[body]]`, or in the `put` of a request.
+
+use crate::config::OnStale;
+use crate::ids::BodyId;
+use crate::limits::{EXTENT_MAX_M, SHAPES_PER_BODY_MAX};
+use crate::scene::node::{Fault, Node, Value};
+use crate::scene::read_shape::{read_pose, read_shape};
+use crate::scene::table::{Table, shortened};
+use crate::scene::{BodySpec, PlacedSpec};
+
+/// Longest name of a body, bytes: what a row of `names` holds.
+pub const BODY_NAME_BYTES_MAX: usize = 104;
+/// Longest name of a source, bytes.
+pub const SOURCE_NAME_BYTES_MAX: usize = 31;
+
+/// A body as written: checked by itself, its references not yet resolved.
+#[derive(Debug)]
+pub struct BodyDraft {
+    /// What is said of it. `source` is `None` and `id` is 0 until they are settled.
+    pub(crate) spec: BodySpec,
+    /// Its source, by name.
+    pub(crate) source: Option<String>,
+    /// Places of its keys in the file.
+    pub(crate) places: Places,
+}
+
+/// Byte offsets of what messages point at; all `None` in a request.
+#[derive(Debug, Default)]
+pub(crate) struct Places {
+    pub(crate) name: Option<usize>,
+    pub(crate) id: Option<usize>,
+    pub(crate) source: Option<usize>,
+    pub(crate) parent: Option<usize>,
+    pub(crate) attached_to: Option<usize>,
+    pub(crate) shapes: Vec<Option<usize>>,
+}
+
+const KEYS: &[&str] = &[
+    "name",
+    "id",
+    "position",
+    "orientation",
+    "moves",
+    "continuous",
+    "source",
+    "group",
+    "mask",
+    "parent",
+    "attached_to",
+    "rigid_group",
+    "report_within_m",
+    "max_speed_mps",
+    "on_stale",
+    "enabled",
+    "shape",
+];
+
+/// What a body is called in messages: by name, or by its place in the list, from 1.
+pub(crate) fn title(node: &Node, nth: usize) -> String {
+    match node.peek_text("name") {
+        Some(name) => format!("body \"{}\"", shortened(name)),
+        None => format!("body number {nth}"),
+    }
+}
+
+/// Reads a body.
+///
+/// * `blobs` - the bytes behind the JSON of a request; `None` for a scene file.
+pub(crate) fn read_body(node: Node, blobs: Option<&[u8]>) -> Result<BodyDraft, Fault> {
+    let at = node.at;
+    let mut table = Table::open(node, "a body", KEYS)?;
+    let mut places = Places {
+        name: table.at("name"),
+        id: table.at("id"),
+        source: table.at("source"),
+        parent: table.at("parent"),
+        attached_to: table.at("attached_to"),
+        shapes: Vec::new(),
+    };
+    let Some(name) = table.name("name", BODY_NAME_BYTES_MAX)? else {
+        return Err(Fault::new(at, "a body needs `name`: add it"));
+    };
+    // TOML has no whole numbers beyond i64; requests have.
+    let id = table.whole("id", 1, u64::MAX)?.unwrap_or(0);
+    let pose = read_pose(&mut table)?;
+    let moves = table.flag("moves")?.unwrap_or(true);
+    let source = table.name("source", SOURCE_NAME_BYTES_MAX)?;
+    let parent = table.name("parent", BODY_NAME_BYTES_MAX)?;
+    let attached_to = table.name("attached_to", BODY_NAME_BYTES_MAX)?;
+    if !moves && source.is_some() {
+        let text =
+            "a body with moves = false takes no source: remove `source`, or write moves = true";
+        return Err(Fault::new(places.source, text));
+    }
+    let spec = BodySpec {
+        name,
+        id: BodyId(id),
+        pose,
+        moves,
+        continuous: table.flag("continuous")?.unwrap_or(false),
+        source: None,
+        group: table.bits("group")?.unwrap_or(1),
+        mask: table.bits("mask")?.unwrap_or(u32::MAX),
+        parent,
+        attached_to,
+        rigid_group: table.name("rigid_group", BODY_NAME_BYTES_MAX)?,
+        report_within_m: table
+            .number_within("report_within_m", 0.0, EXTENT_MAX_M)?
+            .unwrap_or(0.0),
+        max_speed_mps: table.number_within("max_speed_mps", 0.0, EXTENT_MAX_M)?,
+        on_stale: read_on_stale(&mut table)?.unwrap_or_default(),
+        enabled: table.flag("enabled")?.unwrap_or(true),
+        shapes: read_shapes(&mut table, at, blobs, &mut places)?,
+    };
+    Ok(BodyDraft {
+        spec,
+        source,
+        places,
+    })
+}
+
+fn read_on_stale(table: &mut Table) -> Result<Option<OnStale>, Fault> {
+    let at = table.at("on_stale");
+    let Some(word) = table.text("on_stale")? else {
+        return Ok(None);
+    };
+    match word.as_str() {
+        "unknown" => Ok(Some(OnStale::Unknown)),
+        "hold" => Ok(Some(OnStale::Hold)),
+        "remove" => Ok(Some(OnStale::Remove)),
+        _ => {
+            let text = format!(
+                "on_stale is \"{}\": write \"unknown\", \"hold\" or \"remove\"",
+                shortened(&word)
+            );
+            Err(Fault::new(at, text))
+        }
+    }
+}
+
+/// One shape, or a list of them.
+fn read_shapes(
+    table: &mut Table,
+    body_at: Option<usize>,
+    blobs: Option<&[u8]>,
+    places: &mut Places,
+) -> Result<Vec<PlacedSpec>, Fault> {
+    let missing = "a body needs at least one shape: add shape = { type = \"sphere\", radius = 0.1 }, or [[body.shape]]";
+    let Some(node) = table.take("shape") else {
+        return Err(Fault::new(body_at, missing));
+    };
+    let at = node.at;
+    let nodes = match node.value {
+        Value::List(nodes) => nodes,
+        value => vec![Node { at, value }],
+    };
+    if nodes.is_empty() {
+        return Err(Fault::new(at, missing));
+    }
+    if nodes.len() > SHAPES_PER_BODY_MAX {
+        let text = format!(
+            "{} shapes, more than {SHAPES_PER_BODY_MAX}: split the body",
+            nodes.len()
+        );
+        return Err(Fault::new(at, text));
+    }
+    let several = nodes.len() > 1;
+    let mut shapes = Vec::with_capacity(nodes.len());
+    for (place, node) in nodes.into_iter().enumerate() {
+        places.shapes.push(node.at);
+        let shape = read_shape(node, blobs).map_err(|fault| {
+            if several {
+                fault.within(&format!("shape {}", place + 1))
+            } else {
+                fault
+            }
+        })?;
+        shapes.push(shape);
+    }
+    Ok(shapes)
+}

@@ -1,0 +1,328 @@
+//! Reads one table strictly: unknown keys first (with the nearest known one), then each value with its kind and range.
+
+use crate::scene::node::{Entry, Fault, Node, Value};
+
+/// A table being read. Values are taken out by key.
+#[derive(Debug)]
+pub(crate) struct Table {
+    at: Option<usize>,
+    what: &'static str,
+    entries: Vec<(String, Option<usize>, Option<Node>)>,
+}
+
+impl Table {
+    /// Opens a table; refuses every key that is not known.
+    ///
+    /// * `what` - what the table describes, with its article: `a body`.
+    pub(crate) fn open(node: Node, what: &'static str, known: &[&str]) -> Result<Self, Fault> {
+        let (at, kind) = (node.at, node.kind());
+        let Value::Table(entries) = node.value else {
+            let text =
+                format!("{what} is a table, but here stands {kind}: write {{ key = value }}");
+            return Err(Fault::new(at, text));
+        };
+        for entry in &entries {
+            if !known.contains(&entry.key.as_str()) {
+                return Err(unknown_key(entry, what, known));
+            }
+        }
+        let entries = entries
+            .into_iter()
+            .map(|entry| (entry.key, entry.at, Some(entry.node)))
+            .collect();
+        Ok(Self { at, what, entries })
+    }
+
+    /// The place of a key, or of the table where the key is missing.
+    pub(crate) fn at(&self, key: &str) -> Option<usize> {
+        let entry = self.entries.iter().find(|(known, _, _)| known == key);
+        entry.map_or(self.at, |(_, at, _)| *at)
+    }
+
+    /// Whether the key is there.
+    pub(crate) fn has(&self, key: &str) -> bool {
+        self.entries.iter().any(|(known, _, _)| known == key)
+    }
+
+    /// The keys and their places.
+    pub(crate) fn places(&self) -> impl Iterator<Item = (&str, Option<usize>)> {
+        self.entries.iter().map(|(key, at, _)| (key.as_str(), *at))
+    }
+
+    /// Takes a value out.
+    pub(crate) fn take(&mut self, key: &str) -> Option<Node> {
+        let entry = self.entries.iter_mut().find(|(known, _, _)| known == key)?;
+        entry.2.take()
+    }
+
+    /// Takes a value that must be there.
+    pub(crate) fn need(&mut self, key: &str) -> Result<Node, Fault> {
+        let (at, what) = (self.at, self.what);
+        self.take(key)
+            .ok_or_else(|| Fault::new(at, format!("{what} needs `{key}`: add it")))
+    }
+
+    /// A finite number.
+    pub(crate) fn number(&mut self, key: &str) -> Result<f64, Fault> {
+        real(self.need(key)?, key)
+    }
+
+    /// A finite number from `min` to `max`, if it is there.
+    pub(crate) fn number_within(
+        &mut self,
+        key: &str,
+        min: f64,
+        max: f64,
+    ) -> Result<Option<f64>, Fault> {
+        let Some(node) = self.take(key) else {
+            return Ok(None);
+        };
+        let at = node.at;
+        let value = real(node, key)?;
+        if !(min..=max).contains(&value) {
+            let text = format!("{key} is {value}: write a number from {min} to {max}");
+            return Err(Fault::new(at, text));
+        }
+        Ok(Some(value))
+    }
+
+    /// A whole number from `min` to `max`, if it is there.
+    pub(crate) fn whole(&mut self, key: &str, min: u64, max: u64) -> Result<Option<u64>, Fault> {
+        let Some(node) = self.take(key) else {
+            return Ok(None);
+        };
+        let (at, kind) = (node.at, node.kind());
+        let whole = match node.value {
+            Value::Whole(whole) => u64::try_from(whole).ok(),
+            Value::Large(large) => Some(large),
+            Value::Real(_) => None,
+            _ => {
+                let text = format!("{key} is {kind}: write a whole number from {min} to {max}");
+                return Err(Fault::new(at, text));
+            }
+        };
+        match whole {
+            Some(whole) if (min..=max).contains(&whole) => Ok(Some(whole)),
+            _ => {
+                let text =
+                    format!("{key} is out of range: write a whole number from {min} to {max}");
+                Err(Fault::new(at, text))
+            }
+        }
+    }
+
+    /// A set of 32 bits, if it is there.
+    pub(crate) fn bits(&mut self, key: &str) -> Result<Option<u32>, Fault> {
+        let whole = self.whole(key, 0, u64::from(u32::MAX))?;
+        Ok(whole.and_then(|bits| u32::try_from(bits).ok()))
+    }
+
+    /// True or false, if it is there.
+    pub(crate) fn flag(&mut self, key: &str) -> Result<Option<bool>, Fault> {
+        let Some(node) = self.take(key) else {
+            return Ok(None);
+        };
+        match node.value {
+            Value::Flag(flag) => Ok(Some(flag)),
+            _ => {
+                let text = format!("{key} is {}: write true or false", node.kind());
+                Err(Fault::new(node.at, text))
+            }
+        }
+    }
+
+    /// A text, if it is there.
+    pub(crate) fn text(&mut self, key: &str) -> Result<Option<String>, Fault> {
+        let Some(node) = self.take(key) else {
+            return Ok(None);
+        };
+        let (at, kind) = (node.at, node.kind());
+        match node.value {
+            Value::Text(text) => Ok(Some(text)),
+            _ => {
+                let text = format!("{key} is {kind}: write a text in quotes");
+                Err(Fault::new(at, text))
+            }
+        }
+    }
+
+    /// A name that others refer to: 1 to `bytes_max` bytes, no control characters.
+    pub(crate) fn name(&mut self, key: &str, bytes_max: usize) -> Result<Option<String>, Fault> {
+        let at = self.at(key);
+        let Some(name) = self.text(key)? else {
+            return Ok(None);
+        };
+        if name.is_empty() || name.len() > bytes_max {
+            let text = format!(
+                "{key} \"{}\" has {} bytes: write 1 to {bytes_max}",
+                shortened(&name),
+                name.len()
+            );
+            return Err(Fault::new(at, text));
+        }
+        if name.chars().any(char::is_control) {
+            let text = format!(
+                "{key} \"{}\" has a control character: leave it out",
+                name.escape_default()
+            );
+            return Err(Fault::new(at, text));
+        }
+        Ok(Some(name))
+    }
+
+    /// Three finite numbers, if they are there.
+    pub(crate) fn triple(&mut self, key: &str) -> Result<Option<[f64; 3]>, Fault> {
+        self.take(key).map(|node| reals(node, key)).transpose()
+    }
+}
+
+/// A finite number.
+pub(crate) fn real(node: Node, what: &str) -> Result<f64, Fault> {
+    let real = match node.value {
+        Value::Real(real) => real,
+        #[allow(
+            clippy::cast_precision_loss,
+            reason = "a whole number stands for the nearest number"
+        )]
+        Value::Whole(whole) => whole as f64,
+        #[allow(
+            clippy::cast_precision_loss,
+            reason = "a whole number stands for the nearest number"
+        )]
+        Value::Large(large) => large as f64,
+        _ => {
+            let text = format!("{what} is {}: write a number", node.kind());
+            return Err(Fault::new(node.at, text));
+        }
+    };
+    if real.is_finite() {
+        Ok(real)
+    } else {
+        let text = format!("{what} is {real}: write a finite number");
+        Err(Fault::new(node.at, text))
+    }
+}
+
+/// `N` finite numbers.
+pub(crate) fn reals<const N: usize>(node: Node, what: &str) -> Result<[f64; N], Fault> {
+    let at = node.at;
+    let nodes = list(node, what)?;
+    let count = nodes.len();
+    let mut all = [0.0; N];
+    if count != N {
+        let text = format!("{what} has {count} numbers: write {N}");
+        return Err(Fault::new(at, text));
+    }
+    for (slot, node) in all.iter_mut().zip(nodes) {
+        *slot = real(node, what)?;
+    }
+    Ok(all)
+}
+
+/// A list.
+pub(crate) fn list(node: Node, what: &str) -> Result<Vec<Node>, Fault> {
+    let (at, kind) = (node.at, node.kind());
+    match node.value {
+        Value::List(nodes) => Ok(nodes),
+        _ => Err(Fault::new(at, format!("{what} is {kind}: write a list"))),
+    }
+}
+
+/// The head of a long text.
+pub(crate) fn shortened(text: &str) -> String {
+    let head: String = text.chars().take(40).collect();
+    if head.len() < text.len() {
+        format!("{}..", head.escape_default())
+    } else {
+        head.escape_default().to_string()
+    }
+}
+
+fn unknown_key(entry: &Entry, what: &str, known: &[&str]) -> Fault {
+    let key = shortened(&entry.key);
+    let mend = match nearest(&entry.key, known) {
+        Some(nearest) => format!("did you mean `{nearest}`?"),
+        None => format!("known keys are {}", known.join(", ")),
+    };
+    Fault::new(entry.at, format!("{what} has no key `{key}`: {mend}"))
+}
+
+/// The known word that differs least from `word`, if it is near enough to be meant.
+pub(crate) fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
+    let (distance, found) = known
+        .iter()
+        .map(|candidate| (edits(word, candidate), *candidate))
+        .min_by_key(|(distance, _)| *distance)?;
+    let near = distance <= 1 + found.len() / 4;
+    // A word cut short or run on ("pos", "half_extents_m") is meant too.
+    let is_part = |candidate: &&&str| {
+        word.len() >= 3 && (candidate.starts_with(word) || word.starts_with(**candidate))
+    };
+    if near {
+        Some(found)
+    } else {
+        known.iter().find(is_part).copied()
+    }
+}
+
+/// What to do about a name that refers to nothing.
+pub(crate) fn mend_name(name: &str, known: &[&str], header: &str) -> String {
+    match nearest(name, known) {
+        Some(nearest) => format!("did you mean \"{}\"?", shortened(nearest)),
+        None => format!("add a {header} of that name, or name one that is there"),
+    }
+}
+
+/// How many letters have to be put in, taken out, changed or swapped with their neighbour.
+fn edits(a: &str, b: &str) -> usize {
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(64).collect(), b.chars().collect());
+    let mut before_last = vec![0; b.len() + 1];
+    let mut last: Vec<usize> = (0..=b.len()).collect();
+    for i in 1..=a.len() {
+        let mut row = vec![i; b.len() + 1];
+        for j in 1..=b.len() {
+            let same = usize::from(a[i - 1] != b[j - 1]);
+            row[j] = (last[j - 1] + same).min(last[j] + 1).min(row[j - 1] + 1);
+            if i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1] {
+                row[j] = row[j].min(before_last[j - 2] + 1);
+            }
+        }
+        before_last = std::mem::replace(&mut last, row);
+    }
+    last[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_key_is_the_one_that_was_meant() {
+        let known = &["position", "orientation", "mask", "moves"];
+        assert_eq!(nearest("postion", known), Some("position"));
+        assert_eq!(nearest("msak", known), Some("mask"));
+        assert_eq!(nearest("pos", known), Some("position"));
+        assert_eq!(nearest("moves_m", known), Some("moves"));
+        assert_eq!(nearest("colour", known), None);
+        assert_eq!(nearest("", known), None);
+    }
+
+    #[test]
+    fn whole_numbers_keep_their_range() {
+        let open =
+            |text: &str| Table::open(Node::from_toml(text).unwrap(), "a thing", &["mask"]).unwrap();
+        assert_eq!(
+            open("mask = 0xffffffff").bits("mask").unwrap(),
+            Some(u32::MAX)
+        );
+        for text in ["mask = -1", "mask = 4294967296", "mask = 1.5", "mask = 'x'"] {
+            let fault = open(text).bits("mask").unwrap_err();
+            assert!(
+                fault.text.contains("from 0 to 4294967295"),
+                "{}",
+                fault.text
+            );
+            assert_eq!(fault.at, Some(7));
+        }
+    }
+}
