@@ -21,8 +21,10 @@ pub(super) struct Found {
     fresh: Vec<((BodyId, BodyId), PairKey)>,
     /// By body: the last group whose lower body is paired with it.
     stamp: Vec<u32>,
-    /// Pairs of a body, while they are taken out.
+    /// Stored pairs to look at, while some are taken out.
     pub(super) slots: Vec<PairSlot>,
+    /// Stored pairs that end, and why.
+    pub(super) doomed: Vec<(PairSlot, EndCause)>,
     /// Bodies that were truncated before this update.
     truncated: Vec<BodySlot>,
 }

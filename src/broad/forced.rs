@@ -36,11 +36,6 @@ impl Forced {
         self.keys.binary_search(&key).is_ok()
     }
 
-    /// All forced pairs, sorted.
-    pub(super) fn keys(&self) -> &[PairKey] {
-        &self.keys
-    }
-
     /// The forced pairs of one body.
     pub(super) fn of(&self, slot: BodySlot) -> impl Iterator<Item = PairKey> + '_ {
         let from = self.sides.partition_point(|(body, _)| *body < slot);

@@ -19,6 +19,8 @@ pub(super) const ASKED: u8 = 8;
 pub(super) const REFILTERED: u8 = 16;
 /// It left in this tick (and may have come back since).
 pub(super) const LEFT: u8 = 32;
+/// It came in this tick: no structure knows it yet.
+pub(super) const CAME: u8 = 64;
 
 /// A box as plain arrays: lower corner, upper corner, metres. Closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -128,7 +130,7 @@ impl Members {
         };
         self.place[at] = small(list.len());
         list.push(slot);
-        self.touch(slot, ASKED);
+        self.touch(slot, ASKED | CAME);
         true
     }
 

@@ -3,8 +3,9 @@
 //! In: a [`ChangeSet`] (who left, came, moved, must be asked again), the boxes ([`Proxies`]), the filters
 //! ([`PairPolicy`]). Out: the [`PairSet`], of which this room is the only writer, and a [`PairDelta`].
 //!
-//! [`Method::BruteForce`] looks at every pair: the twin, for ever. A method only suggests pairs; what is stored is
-//! decided in one place (`commit`), so all methods give the same pairs in the same slots, and the same delta.
+//! Two methods behind one door. [`Method::BruteForce`] looks at every pair: the twin, for ever.
+//! [`Method::SweepAndPrune`] keeps sorted lists of box ends (see `sap`). A method only suggests pairs; what is stored
+//! is decided in one place (`commit`), so both give the same pairs in the same slots, and the same delta.
 //!
 //! Boxes are f64 here, where other structures round out to f32: the sort compares ends and never computes with them,
 //! so f64 costs memory alone, and a scene at 1e7 m, or bodies of 1 cm spread over 1e7 m, has exactly the candidates
@@ -20,10 +21,13 @@ mod brute;
 mod commit;
 mod forced;
 mod members;
+mod sap;
+mod touched;
 
 use commit::{Found, Judge};
 use forced::Forced;
 use members::{ASKED, IN, Members, REFILTERED};
+use sap::Sap;
 
 /// The boxes, as the world has them.
 pub trait Proxies {
@@ -40,11 +44,13 @@ pub trait Proxies {
 pub enum Method {
     /// Every pair of bodies, every tick.
     BruteForce,
+    /// Sorted ends of boxes on the axes, kept across ticks.
+    SweepAndPrune,
 }
 
 impl Method {
     /// Every method.
-    pub const ALL: &'static [Self] = &[Self::BruteForce];
+    pub const ALL: &'static [Self] = &[Self::BruteForce, Self::SweepAndPrune];
 }
 
 /// What the last update did; all counted, nothing timed.
@@ -66,6 +72,7 @@ pub struct Work {
 #[derive(Clone, Debug)]
 enum Engine {
     Brute,
+    Sap(Box<Sap>),
 }
 
 /// The broad phase.
@@ -77,6 +84,8 @@ pub struct BroadPhase {
     found: Found,
     /// By body: cause of its removal in this update.
     causes: Vec<EndCause>,
+    /// Bodies with a box that left in this update.
+    left: Vec<BodySlot>,
     work: Work,
 }
 
@@ -86,6 +95,7 @@ impl BroadPhase {
     pub fn new(method: Method) -> Self {
         let engine = match method {
             Method::BruteForce => Engine::Brute,
+            Method::SweepAndPrune => Engine::Sap(Box::default()),
         };
         Self {
             engine,
@@ -93,6 +103,7 @@ impl BroadPhase {
             forced: Forced::default(),
             found: Found::default(),
             causes: Vec::new(),
+            left: Vec::new(),
             work: Work::default(),
         }
     }
@@ -141,6 +152,7 @@ impl BroadPhase {
         delta.clear();
         self.members.open_tick();
         self.found.open_tick();
+        self.work = Work::default();
         self.leave(changes, pairs);
         self.enter(changes, proxies);
         self.mark(changes, proxies, pairs);
@@ -151,6 +163,11 @@ impl BroadPhase {
         };
         match &mut self.engine {
             Engine::Brute => brute::update(&judge, proxies, pairs, &mut self.found),
+            Engine::Sap(sap) => {
+                touched::end(&judge, pairs, &mut self.found);
+                sap.update(&self.members, &mut self.found.began, &mut self.work);
+                touched::begin(&judge, &mut self.found);
+            }
         }
         self.found.commit(&judge, pairs, delta);
         self.forced.settle();
@@ -159,8 +176,11 @@ impl BroadPhase {
     /// Takes out the bodies that left; their pairs end. Of two bodies that left, the cause with the lower code wins,
     /// so that no order of slots shows.
     fn leave(&mut self, changes: &ChangeSet, pairs: &mut PairSet) {
+        self.left.clear();
         for removed in &changes.removed {
+            let bounded = self.members.is_bounded(removed.slot);
             if self.members.leave(removed.slot) {
+                self.left.extend(bounded.then_some(removed.slot));
                 let at = removed.slot.index();
                 if self.causes.len() <= at {
                     self.causes.resize(at + 1, EndCause::None);
@@ -182,6 +202,9 @@ impl BroadPhase {
             if let Some(cause) = self.causes.get_mut(removed.slot.index()) {
                 *cause = EndCause::None;
             }
+        }
+        if let Engine::Sap(sap) = &mut self.engine {
+            sap.leave(&self.left, &self.members);
         }
     }
 
@@ -222,6 +245,9 @@ impl BroadPhase {
     ) -> Result<(), String> {
         pairs.validate()?;
         self.members.validate(proxies)?;
+        if let Engine::Sap(sap) = &self.engine {
+            sap.validate(&self.members)?;
+        }
         let judge = Judge {
             members: &self.members,
             forced: &self.forced,

@@ -253,6 +253,16 @@ impl PairSet {
         (first != NONE).then_some(PairSlot(first))
     }
 
+    /// Empties the set, keeps the memory; every slot may be used again at once.
+    pub(crate) fn clear(&mut self) {
+        self.nodes.clear();
+        self.heads.clear();
+        self.free.clear();
+        self.resting.clear();
+        self.len = 0;
+        self.forget_missing();
+    }
+
     /// Nothing is missing.
     pub(crate) fn forget_missing(&mut self) {
         self.missing = 0;

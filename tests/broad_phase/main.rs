@@ -18,7 +18,7 @@ mod common;
 mod world;
 
 use sweepd::wire::EndCause;
-use world::{Bench, World, at};
+use world::{Bench, Summary, World, at};
 
 const NO_LIMIT: usize = 1 << 20;
 
@@ -29,8 +29,8 @@ fn run(
     limit: usize,
     mut setup: impl FnMut(&mut World),
     mut step: impl FnMut(&mut World, usize),
-) {
-    let mut pairs = 0;
+) -> Summary {
+    let mut all = Summary::default();
     for seed in 0..3 {
         let mut world = World::new(seed, bodies);
         let mut bench = Bench::new(limit);
@@ -39,12 +39,11 @@ fn run(
             step(&mut world, tick);
             bench.tick(&mut world, &format!("seed {seed} tick {tick}"));
         }
-        pairs += bench.pairs_seen;
+        all.add(&bench.seen);
     }
-    assert!(
-        pairs > ticks,
-        "a scene without pairs shows nothing: {pairs}"
-    );
+    let pairs = all.pairs;
+    assert!(pairs > ticks, "few pairs show nothing: {pairs}");
+    all
 }
 
 /// All bodies in, boxes at random in a cube.
@@ -69,8 +68,14 @@ fn shift_some(world: &mut World, once_in: usize, by: f64) {
 #[test]
 fn boxes_that_wander_give_equal_pairs() {
     let gas = |w: &mut World| scatter(w, 4.0, 0.8);
-    run(900, 60, NO_LIMIT, gas, |w, _| shift_some(w, 1, 0.05));
-    run(900, 60, NO_LIMIT, gas, |w, _| shift_some(w, 20, 0.3));
+    let all = run(900, 60, NO_LIMIT, gas, |w, _| shift_some(w, 1, 0.05));
+    assert!(all.swaps > 900 && all.rebuilds < 90, "repaired: {all:?}");
+    let few = run(900, 60, NO_LIMIT, gas, |w, _| shift_some(w, 20, 0.3));
+    assert!(few.swaps > 900 && few.rebuilds < 90, "repaired: {few:?}");
+    let crowd = |w: &mut World| scatter(w, 8.0, 1.0);
+    run(150, 300, NO_LIMIT, crowd, |w, tick| {
+        shift_some(w, [1, 30][tick / 10 % 2], 0.1);
+    });
 }
 
 #[test]
@@ -112,6 +117,41 @@ fn a_clump_on_a_floor_gives_equal_pairs() {
             w.shift(i, [jitter[0] * 5.0, jitter[1] * 5.0, jitter[2]]);
         }
     });
+}
+
+#[test]
+fn an_axis_is_skipped_while_all_stand_on_a_floor_and_kept_again_after() {
+    let setup = |w: &mut World| {
+        for i in 0..100 {
+            let (x, y) = ((i % 10) as f64, (i / 10) as f64);
+            w.place(i, at([x * 1.5, y * 1.5, 0.5], [0.5; 3]));
+            w.insert(i);
+        }
+    };
+    let summary = run(1200, 100, NO_LIMIT, setup, |w, tick| {
+        for i in 0..100 {
+            let jitter = w.random_vec(0.05);
+            w.shift(i, [jitter[0] * 0.1, jitter[1] * 0.1, jitter[2]]);
+            if w.rng.once_in(200) {
+                w.requery(i);
+            }
+            if w.rng.once_in(400) {
+                w.remove(i, EndCause::Removed);
+            }
+            if w.rng.once_in(50) {
+                w.insert(i);
+            }
+            // Later all gather in a tower, where the two other axes are the clumped ones.
+            if tick > 150 && w.rng.once_in(20) {
+                let centre = w.bodies[i].aabb.centre().coords;
+                let up = (i as f64) * 0.9;
+                let by = [7.0 - centre.x, 7.0 - centre.y, up - centre.z];
+                w.shift(i, by.map(|v| v * 0.6));
+            }
+        }
+    });
+    let (skipped, ticks) = (summary.skipped, summary.ticks);
+    assert!(skipped > 100 && skipped < ticks - 300, "{summary:?}");
 }
 
 #[test]
@@ -181,7 +221,7 @@ fn huge_tiny_flat_and_infinite_boxes_give_equal_pairs() {
 #[test]
 fn teleports_of_few_and_of_all_give_equal_pairs() {
     let setup = |w: &mut World| scatter(w, 3.0, 0.8);
-    run(900, 60, NO_LIMIT, setup, |w, tick| {
+    let summary = run(900, 60, NO_LIMIT, setup, |w, tick| {
         let once_in = if tick % 7 == 0 { 1 } else { 20 };
         for i in 0..60 {
             if w.rng.once_in(once_in) {
@@ -190,6 +230,7 @@ fn teleports_of_few_and_of_all_give_equal_pairs() {
             }
         }
     });
+    assert!(summary.rebuilds > 90, "sorted anew: {summary:?}");
 }
 
 #[test]

@@ -242,12 +242,33 @@ struct Rig {
     delta: PairDelta,
 }
 
+/// What a run went through, so that a test can say which paths it took.
+#[derive(Debug, Default)]
+pub struct Summary {
+    pub ticks: u64,
+    pub pairs: usize,
+    pub swaps: u64,
+    pub rebuilds: u64,
+    /// Ticks with an axis skipped.
+    pub skipped: u64,
+}
+
+impl Summary {
+    pub fn add(&mut self, other: &Self) {
+        self.ticks += other.ticks;
+        self.pairs += other.pairs;
+        self.swaps += other.swaps;
+        self.rebuilds += other.rebuilds;
+        self.skipped += other.skipped;
+    }
+}
+
 /// All methods and the oracle, side by side.
 pub struct Bench {
     rigs: Vec<Rig>,
     oracle: Oracle,
     limit: usize,
-    pub pairs_seen: usize,
+    pub seen: Summary,
 }
 
 impl Bench {
@@ -262,14 +283,15 @@ impl Bench {
             rigs: Method::ALL.iter().copied().map(rig).collect(),
             oracle: Oracle::default(),
             limit,
-            pairs_seen: 0,
+            seen: Summary::default(),
         }
     }
 
     /// Runs one tick in every method and compares everything; then empties the changes.
     pub fn tick(&mut self, world: &mut World, what: &str) {
         let expected = self.oracle.tick(world, self.limit);
-        self.pairs_seen += expected.stored.len();
+        self.seen.ticks += 1;
+        self.seen.pairs += expected.stored.len();
         let mut slots: Option<Vec<(_, PairKey)>> = None;
         for rig in &mut self.rigs {
             if world.forced_changed {
@@ -287,13 +309,12 @@ impl Bench {
             let here: Vec<_> = rig.pairs.iter().collect();
             assert_eq!(slots.get_or_insert(here.clone()), &here, "{name}: slots");
         }
+        let work = self.rigs.last().unwrap().broad.work();
+        self.seen.swaps += work.swaps;
+        self.seen.rebuilds += work.rebuilds;
+        self.seen.skipped += u64::from(work.axes.contains(&false));
         world.changes.clear();
         world.forced_changed = false;
-    }
-
-    /// The work of the last sweep-and-prune update.
-    pub fn work(&self) -> sweepd::broad::Work {
-        self.rigs.last().unwrap().broad.work()
     }
 }
 

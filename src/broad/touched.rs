@@ -1,0 +1,58 @@
+//! What a change of a body tells without any list: which of its stored pairs end, and which pairs of rules and of
+//! unbounded bodies it gets. Used by every method that looks only at what changed.
+
+use super::commit::{Found, Judge};
+use super::members::{ASKED, IN, MOVED, REFILTERED, UNBOUNDED};
+use crate::ids::PairKey;
+use crate::pairs::{PairPolicy, PairSet};
+
+/// Ends the pairs of moved and asked bodies whose boxes parted or whose filters changed.
+///
+/// Cost: the stored pairs of those bodies.
+pub(super) fn end(judge: &Judge<'_, impl PairPolicy>, pairs: &mut PairSet, found: &mut Found) {
+    let members = judge.members;
+    let mut doomed = std::mem::take(&mut found.doomed);
+    for slot in members.touched() {
+        if !members.has(*slot, MOVED | REFILTERED) {
+            continue;
+        }
+        let mine = members.has(*slot, REFILTERED);
+        for (pair, other) in pairs.partners(*slot) {
+            // Of two such bodies the lower looks.
+            if other < *slot && members.has(other, MOVED | REFILTERED) {
+                continue;
+            }
+            let refiltered = mine || members.has(other, REFILTERED);
+            if let Some(cause) = judge.ends(PairKey::new(*slot, other), refiltered) {
+                doomed.push((pair, cause));
+            }
+        }
+    }
+    for key in judge.forced.changed() {
+        let stored = pairs.find(*key);
+        doomed.extend(stored.and_then(|pair| Some((pair, judge.ends(*key, false)?))));
+    }
+    for (pair, cause) in doomed.drain(..) {
+        found.end(pair, cause, members, pairs);
+    }
+    found.doomed = doomed;
+}
+
+/// Suggests the pairs that no box decides: forced ones and those of unbounded bodies.
+pub(super) fn begin(judge: &Judge<'_, impl PairPolicy>, found: &mut Found) {
+    let members = judge.members;
+    found.began.extend_from_slice(judge.forced.changed());
+    for slot in members.touched() {
+        if !members.has(*slot, ASKED) || !members.has(*slot, IN) {
+            continue;
+        }
+        found.began.extend(judge.forced.of(*slot));
+        let others = if members.has(*slot, UNBOUNDED) {
+            members.bounded()
+        } else {
+            members.unbounded()
+        };
+        let keys = others.iter().map(|other| PairKey::new(*slot, *other));
+        found.began.extend(keys);
+    }
+}
