@@ -12,6 +12,7 @@ mod mesh;
 mod spec;
 
 pub use convex::Convex;
+pub(crate) use convex::Core;
 pub use error::ShapeError;
 pub(crate) use load::find_mesh;
 pub use mesh::Mesh;

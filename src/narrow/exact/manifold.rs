@@ -1,0 +1,325 @@
+//! Manifolds: up to four contact points that span what two shapes share, with ids that stay while the features do.
+//!
+//! In: a pair and its exact answer. Out: points in A's frame, none deeper than the answer but for rounding.
+//!
+//! Each core shows a feature along the normal: a polygon (box face, hull face, cap, base), a segment (side line,
+//! capsule axis) or a point. The one is clipped by planes that stand along the normal on the edges of the other;
+//! gaps are measured along the normal. The deepest point is always among those that come out.
+
+use super::feature::{CORNERS_MAX, Feature};
+use super::pair::Pair;
+use super::{Closest, Convex};
+use crate::limits::MANIFOLD_POINTS_MAX;
+use crate::math::{Point, Pose, Vec3};
+
+/// Faces that lean further from the normal than this (cosine) share no patch worth clipping.
+const FACING: f64 = 0.7;
+/// Id of the closest points themselves, where no clipped point stands for them.
+const WITNESS: u32 = 0x7fff_ffff;
+
+/// One contact point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ManifoldPoint {
+    /// On the surface of A, A's frame.
+    pub point_a: Point,
+    /// On the surface of B, A's frame; `point_b - point_a = gap_m * normal`.
+    pub point_b: Point,
+    /// Along the answer's normal, metres.
+    pub gap_m: f64,
+    /// Which corners and edges meet here: equal from tick to tick while the contact persists.
+    pub feature: u32,
+}
+
+/// Up to [`MANIFOLD_POINTS_MAX`] contact points, by feature id.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Manifold {
+    points: [Option<ManifoldPoint>; MANIFOLD_POINTS_MAX],
+}
+
+impl Manifold {
+    /// The points, by feature id.
+    pub fn points(&self) -> impl Iterator<Item = &ManifoldPoint> {
+        self.points.iter().flatten()
+    }
+
+    /// How many points there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.points().count()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// A point of one feature that lies over the other, with the gap there and where it comes from.
+#[derive(Clone, Copy, Default)]
+struct Clip {
+    /// On the core of the clipped feature, A's frame.
+    at: Vec3,
+    feature: u32,
+}
+
+/// A polygon being clipped.
+struct Clipped {
+    points: [Clip; 2 * CORNERS_MAX],
+    count: usize,
+}
+
+/// Fills `out` with the contact points of a pair.
+///
+/// * `closest` - the answer of `convex_gap` for the same shapes and pose.
+/// * `prediction_m` - points with a larger gap are left out.
+///
+/// Cost: below a microsecond; no allocation.
+pub fn manifold(
+    a: &Convex,
+    b: &Convex,
+    pos12: &Pose,
+    closest: &Closest,
+    prediction_m: f64,
+    out: &mut Manifold,
+) {
+    *out = Manifold::default();
+    let pair = Pair::new(a, b, pos12);
+    if !(pair.scale.is_finite() && closest.best_m <= prediction_m) {
+        return;
+    }
+    let normal = closest.normal;
+    let of_a = Feature::of_a(&pair, &normal);
+    let of_b = Feature::of_b(&pair, &normal);
+    let mut found = Found::new(&pair, closest, prediction_m);
+    let (side_a, side_b) = (of_a.facing(&normal), of_b.facing(&normal));
+    if side_a >= FACING && side_a >= side_b {
+        clip_onto(&of_a, &of_b, &normal, false, &mut found);
+    } else if side_b >= FACING {
+        clip_onto(&of_b, &of_a, &normal, true, &mut found);
+    } else if of_a.count == 2 && of_b.count == 2 {
+        overlap_lines(&of_a, &of_b, &normal, &mut found);
+    }
+    found.write(out);
+}
+
+/// Points found so far, on the shapes' surfaces.
+struct Found {
+    points: [ManifoldPoint; 2 * CORNERS_MAX],
+    count: usize,
+    normal: Vec3,
+    margin_a: f64,
+    margin_b: f64,
+    prediction_m: f64,
+    witness: ManifoldPoint,
+    same: f64,
+}
+
+impl Found {
+    fn new(pair: &Pair<'_>, closest: &Closest, prediction_m: f64) -> Self {
+        let witness = ManifoldPoint {
+            point_a: closest.point_a,
+            point_b: closest.point_b,
+            gap_m: closest.best_m,
+            feature: WITNESS,
+        };
+        Self {
+            points: [witness; 2 * CORNERS_MAX],
+            count: 0,
+            normal: closest.normal,
+            margin_a: pair.a.margin(),
+            margin_b: pair.b.margin(),
+            prediction_m,
+            witness,
+            same: 1e-6 * (pair.scale + pair.a.margin() + pair.b.margin()),
+        }
+    }
+
+    /// Takes a pair of points on the cores.
+    fn take(&mut self, a: &Vec3, b: &Vec3, feature: u32) {
+        let gap_m = self.normal.dot(&(b - a)) - self.margin_a - self.margin_b;
+        if gap_m > self.prediction_m || self.count == self.points.len() {
+            return;
+        }
+        let point_a = Point::from(a + self.normal * self.margin_a);
+        let doubled = self.points[..self.count]
+            .iter()
+            .any(|p| (p.point_a - point_a).norm() <= self.same);
+        if !doubled {
+            self.points[self.count] = ManifoldPoint {
+                point_a,
+                point_b: Point::from(b - self.normal * self.margin_b),
+                gap_m,
+                feature,
+            };
+            self.count += 1;
+        }
+    }
+
+    /// At most four: the deepest, the farthest from it, and the two that span the most area.
+    fn write(mut self, out: &mut Manifold) {
+        let deepest = self.points[..self.count]
+            .iter()
+            .map(|p| p.gap_m)
+            .fold(f64::INFINITY, f64::min);
+        if deepest > self.witness.gap_m + self.same && self.count < self.points.len() {
+            self.points[self.count] = self.witness;
+            self.count += 1;
+        }
+        let points = &self.points[..self.count];
+        let mut chosen = [0; MANIFOLD_POINTS_MAX];
+        let count = if points.len() <= MANIFOLD_POINTS_MAX {
+            chosen = [0, 1, 2, 3];
+            points.len()
+        } else {
+            spread(points, &self.normal, &mut chosen);
+            MANIFOLD_POINTS_MAX
+        };
+        let mut picked = chosen.map(|k| points.get(k).copied());
+        picked[count..].fill(None);
+        picked.sort_by_key(|p| p.map_or(u32::MAX, |p| p.feature));
+        out.points = picked;
+    }
+}
+
+fn spread(points: &[ManifoldPoint], normal: &Vec3, chosen: &mut [usize; MANIFOLD_POINTS_MAX]) {
+    let best = |score: &dyn Fn(usize) -> f64| {
+        let mut best = (0, f64::NEG_INFINITY);
+        for k in 0..points.len() {
+            let value = score(k);
+            if value > best.1 {
+                best = (k, value);
+            }
+        }
+        best.0
+    };
+    let at = |k: usize| points[k].point_a.coords;
+    chosen[0] = best(&|k| -points[k].gap_m);
+    let first = at(chosen[0]);
+    chosen[1] = best(&|k| (at(k) - first).norm_squared());
+    let along = at(chosen[1]) - first;
+    let side = normal.cross(&along);
+    chosen[2] = best(&|k| side.dot(&(at(k) - first)));
+    chosen[3] = best(&|k| -side.dot(&(at(k) - first)));
+    // All on one line: what is doubled is replaced by whatever is left.
+    for k in 2..MANIFOLD_POINTS_MAX {
+        if chosen[..k].contains(&chosen[k]) {
+            let free = (0..points.len()).find(|j| !chosen[..k].contains(j));
+            chosen[k] = free.unwrap_or(chosen[k]);
+        }
+    }
+}
+
+/// Clips `incident` by the planes along the normal on the edges of `base`, and casts what is left onto `base`'s plane.
+fn clip_onto(
+    base: &Feature,
+    incident: &Feature,
+    normal: &Vec3,
+    base_is_b: bool,
+    found: &mut Found,
+) {
+    let mut clipped = Clipped::of(incident);
+    let corners = base.used();
+    let centre: Vec3 = corners.iter().sum::<Vec3>() / corners.len() as f64;
+    for (k, corner) in corners.iter().enumerate() {
+        let next = corners[(k + 1) % corners.len()];
+        let mut outward = (next - corner).cross(normal);
+        if outward.dot(&(corner - centre)) < 0.0 {
+            outward = -outward;
+        }
+        clipped.cut(corner, &outward, base.id(k));
+    }
+    let steep = base.normal.dot(normal);
+    let side = if base_is_b { 1 << 31 } else { 0 };
+    for clip in &clipped.points[..clipped.count] {
+        // Along the normal onto the base's plane.
+        let lift = base.normal.dot(&(clip.at - corners[0])) / steep;
+        let cast = clip.at - normal * lift;
+        if base_is_b {
+            found.take(&clip.at, &cast, side | clip.feature);
+        } else {
+            found.take(&cast, &clip.at, side | clip.feature);
+        }
+    }
+}
+
+/// Two lines that run side by side: the ends of what they share.
+fn overlap_lines(of_a: &Feature, of_b: &Feature, normal: &Vec3, found: &mut Found) {
+    let (a, b) = (of_a.used(), of_b.used());
+    let along = a[1] - a[0];
+    let other = b[1] - b[0];
+    let flat = |v: Vec3| v - normal * v.dot(normal);
+    let (along_flat, other_flat) = (flat(along), flat(other));
+    let (square, size) = (along_flat.norm_squared(), other_flat.norm());
+    // Lines that cross at a real angle meet in one point, which the witness is.
+    if along_flat.cross(&other_flat).norm() > 0.1 * square.sqrt() * size
+        || square == 0.0
+        || size == 0.0
+    {
+        return;
+    }
+    let mut place = [0.0; 2];
+    for (t, p) in place.iter_mut().zip(b) {
+        *t = flat(p - a[0]).dot(&along_flat) / square;
+    }
+    let span = place[1] - place[0];
+    for (k, s) in [0.0_f64, 1.0].into_iter().enumerate() {
+        // Ends of A over B, ends of B over A.
+        let on_b = (s - place[0]) / span;
+        #[allow(clippy::cast_possible_truncation, reason = "0 or 1")]
+        let k32 = k as u32;
+        if (0.0..=1.0).contains(&on_b) {
+            found.take(&(a[0] + along * s), &(b[0] + other * on_b), 0x100 | k32);
+        }
+        if (0.0..=1.0).contains(&place[k]) {
+            found.take(&(a[0] + along * place[k]), &b[k], 0x200 | k32);
+        }
+    }
+}
+
+impl Clipped {
+    fn of(feature: &Feature) -> Self {
+        let mut points = [Clip::default(); 2 * CORNERS_MAX];
+        for (k, corner) in feature.used().iter().enumerate() {
+            points[k] = Clip {
+                at: *corner,
+                feature: feature.id(k) & 0x7fff,
+            };
+        }
+        Self {
+            points,
+            count: feature.count,
+        }
+    }
+
+    /// Cuts off what lies beyond the plane. Source: Sutherland and Hodgman 1974, Reentrant polygon clipping.
+    fn cut(&mut self, on: &Vec3, outward: &Vec3, edge: u32) {
+        let old = self.points;
+        let count = self.count;
+        let mut kept = 0;
+        let mut put = |clip: Clip| {
+            if kept < self.points.len() {
+                self.points[kept] = clip;
+                kept += 1;
+            }
+        };
+        let over = |k: usize| outward.dot(&(old[k].at - on));
+        for k in 0..count {
+            let next = (k + 1) % count;
+            let (here, there) = (over(k), over(next));
+            if here <= 0.0 {
+                put(old[k]);
+            }
+            // A segment is not a ring: its way back adds nothing.
+            let crosses = (here < 0.0 && there > 0.0) || (here > 0.0 && there < 0.0);
+            if crosses && !(count == 2 && k == 1) && count > 1 {
+                let t = here / (here - there);
+                put(Clip {
+                    at: old[k].at + (old[next].at - old[k].at) * t,
+                    feature: (old[k].feature & 0x7fff) | ((edge & 0x7fff) + 1) << 15,
+                });
+            }
+        }
+        self.count = kept;
+    }
+}

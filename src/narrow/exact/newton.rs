@@ -1,0 +1,314 @@
+//! Newton on the features: the normal that makes `f` greatest, once it is known which vertices and circles take part.
+//!
+//! In: the vertices of the last simplex or face, their weights, a normal near the best one. Out: a better normal and
+//! witnesses, to ten and more digits after two or three steps, apart and overlapping alike.
+//!
+//! Each pair of elements `i` (a vertex or circle of A and one of B) has `f_i(n) = n . w_i(n)`, smooth, with the
+//! support point `w_i` as gradient, and `f = min f_i`. At the best unit `n` the active ones are equal and
+//! `sum(l_i w_i) = f n` with weights `l_i >= 0` of sum 1. That is a system in the two tangent coordinates of `n` and
+//! the weights; its matrix is the Lagrangian's: minus the circles' curvatures, minus `f`.
+
+use super::pair::{CoreGap, Pair, Vertex, across, unit};
+use super::simplex::Simplex;
+use crate::math::Vec3;
+use crate::shape::Core;
+
+/// Newton steps of one active set; convergence is quadratic, so more means that it does not converge.
+const STEPS_MAX: usize = 10;
+/// Changes of the active set.
+const SETS_MAX: usize = 4;
+/// A tangent step longer than this leaves the region in which the model is meant.
+const STEP_LENGTH_MAX: f64 = 0.5;
+
+/// A pair of elements that takes part, with its weight.
+#[derive(Clone, Copy, Default)]
+struct Active {
+    of_a: u32,
+    of_b: u32,
+    weight: f64,
+    /// `f_i` at the current normal.
+    value: f64,
+    a: Vec3,
+    b: Vec3,
+    /// Gradient along the two tangents.
+    slope: [f64; 2],
+    /// Curvature along the two tangents: xx, xy, yy.
+    bend: [f64; 3],
+}
+
+/// The elements that take part.
+#[derive(Clone, Copy, Default)]
+struct Set {
+    actives: [Active; 3],
+    count: usize,
+}
+
+/// What the method ended at.
+#[derive(Clone, Copy)]
+pub(super) struct Refined {
+    /// Unit, A to B.
+    pub(super) normal: Vec3,
+    /// `f(normal)`, over all elements.
+    pub(super) value: f64,
+    /// Convex combination of points of A.
+    pub(super) point_a: Vec3,
+    /// Convex combination of points of B.
+    pub(super) point_b: Vec3,
+}
+
+/// A better gap of two cores that are apart.
+pub(super) fn refine(pair: &Pair<'_>, simplex: &Simplex, normal: &Vec3) -> Option<CoreGap> {
+    let found = solve(pair, simplex.used(), &simplex.weights, normal)?;
+    Some(CoreGap {
+        lower: found.value,
+        upper: (found.point_b - found.point_a).norm(),
+        normal: found.normal,
+        point_a: found.point_a,
+        point_b: found.point_b,
+    })
+}
+
+/// The local greatest `f` near `normal`, with the features of the given vertices; `None` when it does not converge.
+pub(super) fn solve(
+    pair: &Pair<'_>,
+    vertices: &[Vertex],
+    weights: &[f64],
+    normal: &Vec3,
+) -> Option<Refined> {
+    let mut set = Set::of(vertices, weights);
+    let mut normal = *normal;
+    let mut best: Option<Refined> = None;
+    for _ in 0..SETS_MAX {
+        let Some(end) = converge(pair, &mut set, &normal) else {
+            break;
+        };
+        let all = pair.support(&end.normal);
+        let value = end.normal.dot(&all.w);
+        let least = set.least();
+        if best.is_none_or(|b| value > b.value) {
+            best = Some(Refined { value, ..end });
+        }
+        normal = end.normal;
+        // An element outside the set that reaches further must join it.
+        if value >= least - pair.tiny() || !set.join(&all) {
+            break;
+        }
+    }
+    best
+}
+
+impl Set {
+    /// Vertices on one pair of elements are one: they cluster where a circle is being approached.
+    fn of(vertices: &[Vertex], weights: &[f64]) -> Self {
+        let mut set = Self::default();
+        for (vertex, weight) in vertices.iter().zip(weights) {
+            let same = set.actives[..set.count]
+                .iter_mut()
+                .find(|x| x.of_a == vertex.of_a && x.of_b == vertex.of_b);
+            if let Some(same) = same {
+                same.weight += weight;
+            } else if set.count < 3 {
+                set.actives[set.count] = Active {
+                    of_a: vertex.of_a,
+                    of_b: vertex.of_b,
+                    weight: *weight,
+                    ..Active::default()
+                };
+                set.count += 1;
+            }
+        }
+        set
+    }
+
+    fn join(&mut self, vertex: &Vertex) -> bool {
+        let known = self.actives[..self.count]
+            .iter()
+            .any(|x| x.of_a == vertex.of_a && x.of_b == vertex.of_b);
+        if known || self.count == 3 {
+            return false;
+        }
+        self.actives[self.count] = Active {
+            of_a: vertex.of_a,
+            of_b: vertex.of_b,
+            ..Active::default()
+        };
+        self.count += 1;
+        true
+    }
+
+    fn least(&self) -> f64 {
+        self.actives[..self.count]
+            .iter()
+            .map(|x| x.value)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Supports, slopes and curvatures at `n`; `None` where a circle is seen along its axis.
+    fn evaluate(&mut self, pair: &Pair<'_>, n: &Vec3, e1: &Vec3, e2: &Vec3) -> Option<()> {
+        let in_b = -pair.to_b(n);
+        for x in &mut self.actives[..self.count] {
+            let (a, ta, ka) = element(pair.a.core(), x.of_a, n)?;
+            let (b, tb, kb) = element(pair.b.core(), x.of_b, &in_b)?;
+            x.a = a;
+            x.b = pair.rotation * b + pair.at;
+            let tb = pair.rotation * tb;
+            let w = x.b - x.a;
+            x.value = n.dot(&w);
+            x.slope = [w.dot(e1), w.dot(e2)];
+            let (a1, a2, b1, b2) = (ta.dot(e1), ta.dot(e2), tb.dot(e1), tb.dot(e2));
+            x.bend = [
+                ka * a1 * a1 + kb * b1 * b1,
+                ka * a1 * a2 + kb * b1 * b2,
+                ka * a2 * a2 + kb * b2 * b2,
+            ];
+        }
+        Some(())
+    }
+
+    /// Drops the first element with a negative weight, if another is left.
+    fn drop_negative(&mut self) -> bool {
+        let place = self.actives[..self.count]
+            .iter()
+            .position(|x| x.weight < -1e-9);
+        match place {
+            Some(place) if self.count > 1 => {
+                self.actives[place..self.count].rotate_left(1);
+                self.count -= 1;
+                true
+            }
+            _ => false,
+        }
+    }
+
+    fn witnesses(&self) -> (Vec3, Vec3) {
+        let actives = &self.actives[..self.count];
+        let whole: f64 = actives.iter().map(|x| x.weight.max(0.0)).sum();
+        let (mut a, mut b) = (Vec3::zeros(), Vec3::zeros());
+        for x in actives {
+            let weight = if whole > 0.0 {
+                x.weight.max(0.0) / whole
+            } else {
+                f64::from(u8::from(actives.len() == 1))
+            };
+            a += x.a * weight;
+            b += x.b * weight;
+        }
+        (a, b)
+    }
+}
+
+/// Farthest point of an element along `dir`, the tangent it moves along when `dir` turns, and by how much.
+fn element(core: &Core, element: u32, dir: &Vec3) -> Option<(Vec3, Vec3, f64)> {
+    let Some(circle) = core.circle(element) else {
+        return Some((core.vertex(element)?, Vec3::zeros(), 0.0));
+    };
+    let across = (dir.x * dir.x + dir.y * dir.y).sqrt();
+    if across < 1e-12 {
+        return None;
+    }
+    let (x, y) = (dir.x / across, dir.y / across);
+    Some((
+        Vec3::new(x * circle.radius_m, y * circle.radius_m, circle.z_m),
+        Vec3::new(-y, x, 0.0),
+        circle.radius_m / across,
+    ))
+}
+
+/// Newton steps with one active set, which may lose members.
+fn converge(pair: &Pair<'_>, set: &mut Set, start: &Vec3) -> Option<Refined> {
+    let mut n = *start;
+    let mut last = f64::INFINITY;
+    for _ in 0..STEPS_MAX {
+        let e1 = across(&n);
+        let e2 = n.cross(&e1);
+        set.evaluate(pair, &n, &e1, &e2)?;
+        let (dx, dy, change) = step(set)?;
+        let length = dx.hypot(dy);
+        if length > STEP_LENGTH_MAX || !length.is_finite() {
+            return None;
+        }
+        for (x, d) in set.actives[..set.count].iter_mut().zip(change) {
+            x.weight += d;
+        }
+        if set.drop_negative() {
+            last = f64::INFINITY;
+            continue;
+        }
+        n = unit(&(n + e1 * dx + e2 * dy))?;
+        if length < 1e-15 || (length < 1e-7 && length >= last / 2.0) {
+            break;
+        }
+        last = length;
+    }
+    let e1 = across(&n);
+    let e2 = n.cross(&e1);
+    set.evaluate(pair, &n, &e1, &e2)?;
+    let (point_a, point_b) = set.witnesses();
+    Some(Refined {
+        normal: n,
+        value: set.least(),
+        point_a,
+        point_b,
+    })
+}
+
+/// One Newton step: tangent coordinates and the change of each weight.
+fn step(set: &Set) -> Option<(f64, f64, [f64; 3])> {
+    let k = set.count;
+    let actives = &set.actives[..k];
+    let first = actives.first()?;
+    let mut m = [[0.0; 5]; 4];
+    let size = k + 1;
+    let mut mean = 0.0;
+    for x in actives {
+        for (row, terms) in [[0, 1], [1, 2]].iter().enumerate() {
+            for (column, term) in terms.iter().enumerate() {
+                m[row][column] -= x.weight * x.bend[*term];
+            }
+            m[row][size] -= x.weight * x.slope[row];
+        }
+        mean += x.weight * x.value;
+    }
+    m[0][0] -= mean;
+    m[1][1] -= mean;
+    for (j, x) in actives.iter().enumerate().skip(1) {
+        for axis in 0..2 {
+            let slope = x.slope[axis] - first.slope[axis];
+            m[axis][j + 1] = slope;
+            m[j + 1][axis] = slope;
+        }
+        m[j + 1][size] = first.value - x.value;
+    }
+    let solution = eliminate(&mut m, size)?;
+    let mut change = [0.0; 3];
+    for j in 1..k {
+        change[j] = solution[j + 1];
+        change[0] -= solution[j + 1];
+    }
+    Some((solution[0], solution[1], change))
+}
+
+/// Gauss with row pivots; `None` when singular.
+fn eliminate(m: &mut [[f64; 5]; 4], size: usize) -> Option<[f64; 4]> {
+    for column in 0..size {
+        let pivot =
+            (column..size).max_by(|&i, &j| m[i][column].abs().total_cmp(&m[j][column].abs()))?;
+        m.swap(column, pivot);
+        let lead = m[column];
+        if lead[column] == 0.0 || !lead[column].is_finite() {
+            return None;
+        }
+        for row in m.iter_mut().take(size).skip(column + 1) {
+            let factor = row[column] / lead[column];
+            for (cell, above) in row.iter_mut().zip(lead).take(size + 1).skip(column) {
+                *cell -= factor * above;
+            }
+        }
+    }
+    let mut solution = [0.0; 4];
+    for row in (0..size).rev() {
+        let known: f64 = (row + 1..size).map(|c| m[row][c] * solution[c]).sum();
+        solution[row] = (m[row][size] - known) / m[row][row];
+    }
+    solution.iter().all(|v| v.is_finite()).then_some(solution)
+}

@@ -1,0 +1,205 @@
+//! The point of a simplex that is closest to the origin.
+//!
+//! In: up to four vertices, the newest last. Out: the sub-simplex the closest point lies in, its weights, and the
+//! direction from the origin, from whichever formula is the most accurate for it.
+//!
+//! All sub-simplices with the newest vertex are tried and the least distance of an admissible one wins (Johnson's
+//! back-up procedure): no decision hangs on the sign of a rounded number alone.
+
+use super::pair::{Vertex, unit};
+use crate::math::Vec3;
+
+/// Up to four vertices with the weights of the closest point.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Simplex {
+    pub(super) vertices: [Vertex; 4],
+    pub(super) weights: [f64; 4],
+    pub(super) count: usize,
+}
+
+/// What [`Simplex::reduce`] found.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Reduced {
+    /// The origin is inside, or too close to tell.
+    Inside,
+    /// The closest point and the unit direction to it.
+    Closest {
+        /// Sum of weight times vertex.
+        point: Vec3,
+        /// Unit; orthogonal to the sub-simplex.
+        dir: Vec3,
+    },
+}
+
+/// A candidate: which vertices, with what weights.
+#[derive(Clone, Copy)]
+struct Candidate {
+    places: [usize; 3],
+    weights: [f64; 3],
+    count: usize,
+    point: Vec3,
+    square: f64,
+}
+
+impl Simplex {
+    pub(super) fn push(&mut self, vertex: Vertex) {
+        if self.count < 4 {
+            self.vertices[self.count] = vertex;
+            self.count += 1;
+        }
+    }
+
+    pub(super) fn used(&self) -> &[Vertex] {
+        &self.vertices[..self.count]
+    }
+
+    /// Convex combinations of the points of A and of B.
+    pub(super) fn witnesses(&self) -> (Vec3, Vec3) {
+        let (mut a, mut b) = (Vec3::zeros(), Vec3::zeros());
+        for (vertex, weight) in self.used().iter().zip(&self.weights) {
+            a += vertex.a * *weight;
+            b += vertex.b * *weight;
+        }
+        (a, b)
+    }
+
+    /// Cuts the simplex down to what holds the point closest to the origin.
+    pub(super) fn reduce(&mut self, tiny: f64) -> Reduced {
+        let Some(new) = self.count.checked_sub(1) else {
+            return Reduced::Inside;
+        };
+        if self.count == 4 && self.holds_origin() {
+            return Reduced::Inside;
+        }
+        let w = |k: usize| self.vertices[k].w;
+        let mut best = Candidate {
+            places: [new, 0, 0],
+            weights: [1.0, 0.0, 0.0],
+            count: 1,
+            point: w(new),
+            square: w(new).norm_squared(),
+        };
+        for i in 0..new {
+            let along = w(i) - w(new);
+            let t = -w(new).dot(&along) / along.norm_squared();
+            if t > 0.0 && t < 1.0 {
+                consider(
+                    &mut best,
+                    [new, i, 0],
+                    [1.0 - t, t, 0.0],
+                    2,
+                    w(new) + along * t,
+                );
+            }
+        }
+        for i in 0..new {
+            for j in i + 1..new {
+                if let Some(weights) = on_triangle(&w(new), &w(i), &w(j)) {
+                    let point =
+                        w(new) + (w(i) - w(new)) * weights[1] + (w(j) - w(new)) * weights[2];
+                    consider(&mut best, [new, i, j], weights, 3, point);
+                }
+            }
+        }
+        self.keep(&best);
+        match self.direction(&best.point) {
+            Some(dir) if best.square > tiny * tiny => Reduced::Closest {
+                point: best.point,
+                dir,
+            },
+            _ => Reduced::Inside,
+        }
+    }
+
+    fn keep(&mut self, best: &Candidate) {
+        let old = self.vertices;
+        for k in 0..best.count {
+            self.vertices[k] = old[best.places[k]];
+            self.weights[k] = best.weights[k];
+        }
+        self.count = best.count;
+    }
+
+    /// Unit direction from the origin to the affine hull: for near touching pairs the closest point itself is mostly
+    /// rounding, and what is orthogonal to the features is not.
+    pub(super) fn direction(&self, point: &Vec3) -> Option<Vec3> {
+        let w = |k: usize| self.vertices[k].w;
+        match self.count {
+            2 => {
+                let along = unit(&(w(1) - w(0)))?;
+                let rest = point - along * point.dot(&along);
+                unit(&(rest - along * rest.dot(&along)))
+            }
+            3 => {
+                let normal = unit(&normal_of(&w(0), &w(1), &w(2)))?;
+                let side = normal.dot(&w(0));
+                if side == 0.0 {
+                    unit(point)
+                } else {
+                    Some(normal * side.signum())
+                }
+            }
+            _ => unit(point),
+        }
+    }
+
+    /// Whether the origin lies in the tetrahedron.
+    fn holds_origin(&self) -> bool {
+        let [a, b, c, d] = self.vertices.map(|v| v.w);
+        let det = |p: &Vec3, q: &Vec3, r: &Vec3| p.dot(&q.cross(r));
+        let volume = det(&(b - a), &(c - a), &(d - a));
+        // Weights of the four corners, times the volume, from differences with d where the sizes are least.
+        let from = -d;
+        let (ad, bd, cd) = (a - d, b - d, c - d);
+        let va = det(&from, &bd, &cd);
+        let vb = det(&ad, &from, &cd);
+        let vc = det(&ad, &bd, &from);
+        let whole = det(&ad, &bd, &cd);
+        let vd = whole - va - vb - vc;
+        volume != 0.0 && whole != 0.0 && [va, vb, vc, vd].iter().all(|v| *v / whole >= 0.0)
+    }
+}
+
+fn consider(
+    best: &mut Candidate,
+    places: [usize; 3],
+    weights: [f64; 3],
+    count: usize,
+    point: Vec3,
+) {
+    let square = point.norm_squared();
+    if square < best.square {
+        *best = Candidate {
+            places,
+            weights,
+            count,
+            point,
+            square,
+        };
+    }
+}
+
+/// Normal of a triangle, from its two shorter edges.
+pub(super) fn normal_of(a: &Vec3, b: &Vec3, c: &Vec3) -> Vec3 {
+    let (ab, bc, ca) = (b - a, c - b, a - c);
+    let (x, y, z) = (ab.norm_squared(), bc.norm_squared(), ca.norm_squared());
+    if x >= y && x >= z {
+        bc.cross(&ca)
+    } else if y >= z {
+        ca.cross(&ab)
+    } else {
+        ab.cross(&bc)
+    }
+}
+
+/// Weights of the projection of the origin onto the plane of a triangle, if it falls inside.
+fn on_triangle(a: &Vec3, b: &Vec3, c: &Vec3) -> Option<[f64; 3]> {
+    let (ab, ac) = (b - a, c - a);
+    let normal = normal_of(a, b, c);
+    let square = normal.norm_squared();
+    let to = -a;
+    let wb = normal.dot(&to.cross(&ac)) / square;
+    let wc = normal.dot(&ab.cross(&to)) / square;
+    let wa = 1.0 - wb - wc;
+    (wa > 0.0 && wb > 0.0 && wc > 0.0 && wa.is_finite()).then_some([wa, wb, wc])
+}
