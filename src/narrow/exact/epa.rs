@@ -123,7 +123,7 @@ impl Polytope {
 
     /// Witnesses, and Newton where circles take part.
     fn finish(&self, pair: &Pair<'_>, best: &mut Best, nearest: usize, fits: f64) -> CoreGap {
-        let (mut point_a, mut point_b, mut weights) = self.project(nearest);
+        let (mut point_a, mut point_b, weights) = self.project(nearest);
         // Of faces in one plane only one holds the projection of the origin.
         if weights.iter().any(|w| *w < -1e-9) {
             let mut most = weights.iter().copied().fold(0.0, f64::min);
@@ -133,7 +133,7 @@ impl Polytope {
                     let worst = found.2.iter().copied().fold(0.0, f64::min);
                     if worst > most {
                         most = worst;
-                        (point_a, point_b, weights) = found;
+                        (point_a, point_b) = (found.0, found.1);
                     }
                 }
             }

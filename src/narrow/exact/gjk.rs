@@ -63,8 +63,9 @@ pub(super) fn distance(pair: &Pair<'_>, start: &Vec3) -> Outcome {
     }
     // Curved: roughly first, then Newton on the features found; what is still loose goes round again.
     let mut best: Option<CoreGap> = None;
-    for tolerance in [1e-3, 1e-7, 1e-14] {
-        if matches!(gjk.run(tolerance * pair.scale), Run::Overlap) {
+    let size = pair.a.reach().min(pair.b.reach());
+    for tolerance in [1e-2, 1e-4, 1e-7, 0.0] {
+        if matches!(gjk.run((tolerance * size).max(tiny)), Run::Overlap) {
             return Outcome::Overlap(gjk.simplex);
         }
         let found = gjk.gap();
@@ -77,7 +78,9 @@ pub(super) fn distance(pair: &Pair<'_>, start: &Vec3) -> Outcome {
         if gap.upper - gap.lower <= 4.0 * tiny {
             break;
         }
-        gjk.dir = gap.normal;
+        if gap.lower > gjk.lower {
+            gjk.dir = gap.normal;
+        }
     }
     Outcome::Apart(best.unwrap_or_else(|| gjk.gap()))
 }
