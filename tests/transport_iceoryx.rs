@@ -10,8 +10,24 @@
 
 mod transport_support;
 
-use sweepd::transport::client::{ClientOptions, FrameInfo, Rows, Topics};
-use transport_support::{Files, Manners, SECOND_NS, StandIn, poses};
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use iceoryx2::prelude::{Config, FileName, NodeBuilder, Path as IoxPath, SemanticString, ipc};
+use sweepd::time::{Clock, SystemClock};
+use sweepd::transport::Door;
+use sweepd::transport::client::{ClientOptions, FrameInfo, Heard, Rows, StepError, Topics};
+use sweepd::transport::iceoryx::{
+    Place, Server, ServerOptions, Waker, list_instances, spawn_cleaner,
+};
+use sweepd::wire::{FrameHeader, Hello, Inbox, TransformRow};
+use transport_support::{Files, Manners, SECOND_NS, StandIn, poses, until};
+
+/// Says to the child program which part it plays, and where.
+const PART: &str = "SWEEPD_TEST_PART";
+const ROOT: &str = "SWEEPD_TEST_ROOT";
+const PREFIX: &str = "SWEEPD_TEST_PREFIX";
 
 fn options(files: &Files, source: Option<&str>) -> ClientOptions {
     ClientOptions {
@@ -41,4 +57,340 @@ fn a_step_over_shared_memory_returns_the_result_of_its_frame_and_nothing_is_left
     drop(client);
     daemon.stop();
     assert_eq!(files.left(), Vec::<String>::new());
+}
+
+/// This test program again, as another process; it says a line when it is ready.
+fn spawn(files: &Files, part: &str) -> Child {
+    let mut child = Command::new(std::env::current_exe().unwrap())
+        .args(["--ignored", "--exact", "child_process", "--nocapture"])
+        .env(PART, part)
+        .env(ROOT, &files.root)
+        .env(PREFIX, &files.prefix)
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    assert!(
+        lines.any(|line| line.unwrap().contains("READY")),
+        "the child ended early"
+    );
+    child
+}
+
+fn kill_and_reap(mut child: Child) {
+    child.kill().unwrap();
+    // a zombie counts as alive
+    child.wait().unwrap();
+}
+
+#[test]
+#[ignore = "played by children of the other tests"]
+fn child_process() {
+    let place = Place::new("cell").unwrap().under(
+        std::env::var(ROOT).expect("started by another test"),
+        std::env::var(PREFIX).unwrap(),
+    );
+    let part = std::env::var(PART).unwrap();
+    if part == "daemon" {
+        let daemon = StandIn::iceoryx(&place, Manners::default());
+        println!("READY");
+        std::thread::park();
+        drop(daemon);
+        return;
+    }
+    let mut client = ClientOptions {
+        place,
+        source: Some(part),
+        timeout_ns: 5 * SECOND_NS,
+    }
+    .connect()
+    .unwrap();
+    client.subscribe(Topics::ALL).unwrap();
+    let rows = poses(2, 1.0);
+    client
+        .step(&FrameInfo::default(), Rows::Poses(&rows), 5 * SECOND_NS)
+        .unwrap();
+    println!("READY");
+    loop {
+        std::thread::park();
+    }
+}
+
+#[test]
+fn a_killed_sources_session_ends_and_its_place_is_free_within_a_second() {
+    let files = Files::new();
+    let daemon = StandIn::iceoryx(&files.place, Manners::default());
+    let cleaner = spawn_cleaner(&files.place).unwrap();
+    let child = spawn(&files, "arm");
+    let session = daemon.log().frames[0].0.session;
+    assert_eq!(list_instances(&files.place).unwrap()[0].sources, 1);
+    kill_and_reap(child);
+    let clock = SystemClock;
+    let killed_ns = clock.monotonic_ns();
+    until("the session's end", || {
+        daemon.log().ended.contains(&session)
+    });
+    let ended_ns = clock.monotonic_ns() - killed_ns;
+    assert_eq!(list_instances(&files.place).unwrap()[0].sources, 0);
+    println!("slot free after {} ms", ended_ns / 1_000_000);
+    assert!(ended_ns < SECOND_NS, "{} ms", ended_ns / 1_000_000);
+    drop(cleaner);
+    daemon.stop();
+    assert_eq!(files.left(), Vec::<String>::new());
+}
+
+#[test]
+fn a_killed_reader_does_not_hold_the_others_up() {
+    let files = Files::new();
+    let daemon = StandIn::iceoryx(&files.place, Manners::default());
+    let _cleaner = spawn_cleaner(&files.place).unwrap();
+    let child = spawn(&files, "reader");
+    let mut client = options(&files, Some("sim")).connect().unwrap();
+    client.subscribe(Topics::ALL).unwrap();
+    let mut child = Some(child);
+    for x in 1..=300 {
+        if x == 100 {
+            kill_and_reap(child.take().unwrap());
+        }
+        client
+            .step(
+                &FrameInfo::default(),
+                Rows::Poses(&poses(200, f64::from(x))),
+                2 * SECOND_NS,
+            )
+            .unwrap();
+        assert_eq!(client.view().pairs().unwrap().rows.len(), 200);
+    }
+    drop(client);
+    until("one reader fewer", || {
+        list_instances(&files.place).unwrap()[0].readers == 0
+    });
+    daemon.stop();
+}
+
+#[test]
+fn a_killed_daemon_is_started_again_at_once_and_running_clients_go_on() {
+    let files = Files::new();
+    let child = spawn(&files, "daemon");
+    let mut client = options(&files, Some("sim")).connect().unwrap();
+    client.subscribe(Topics::ALL).unwrap();
+    let step = |client: &mut sweepd::transport::client::Client, x: f64| {
+        client.step(
+            &FrameInfo::default(),
+            Rows::Poses(&poses(3, x)),
+            2 * SECOND_NS,
+        )
+    };
+    step(&mut client, 1.0).unwrap();
+    kill_and_reap(child);
+    assert_eq!(list_instances(&files.place).unwrap()[0].pid, None);
+    let daemon = StandIn::iceoryx(
+        &files.place,
+        Manners {
+            boot_id: 8,
+            ..Manners::default()
+        },
+    );
+    let again = step(&mut client, 2.0).unwrap_err();
+    assert!(matches!(again, StepError::Restarted(_)), "{again}");
+    step(&mut client, 3.0).unwrap();
+    assert_eq!(client.view().pairs().unwrap().rows[0].gap_best_m, 3.0);
+    let answer = client.request("{}", &[], 5 * SECOND_NS).unwrap();
+    assert!(answer.ok, "requests find the new daemon too");
+    drop(client);
+    daemon.stop();
+    assert_eq!(files.left(), Vec::<String>::new());
+}
+
+#[test]
+fn sixteen_killed_sources_leave_room_for_sixteen_more() {
+    let files = Files::new();
+    let daemon = StandIn::iceoryx(&files.place, Manners::default());
+    let _cleaner = spawn_cleaner(&files.place).unwrap();
+    for _round in 0..2 {
+        let children: Vec<_> = (0..16)
+            .map(|number| spawn(&files, &format!("s{number}")))
+            .collect();
+        assert_eq!(list_instances(&files.place).unwrap()[0].sources, 16);
+        children.into_iter().for_each(kill_and_reap);
+        until("sixteen free places", || {
+            list_instances(&files.place).unwrap()[0].sources == 0
+        });
+    }
+    daemon.stop();
+}
+
+#[test]
+fn an_instance_is_listed_with_its_daemon_sources_and_readers() {
+    let files = Files::new();
+    assert_eq!(list_instances(&files.place).unwrap(), []);
+    let daemon = StandIn::iceoryx(&files.place, Manners::default());
+    let mut client = options(&files, Some("sim")).connect().unwrap();
+    client.subscribe(Topics::ALL).unwrap();
+    client
+        .send(&FrameInfo::default(), Rows::Poses(&poses(1, 0.0)))
+        .unwrap();
+    let listed = list_instances(&files.place).unwrap();
+    assert_eq!(listed.len(), 1);
+    let info = &listed[0];
+    assert_eq!(info.instance, "cell");
+    assert_eq!(info.pid, Some(std::process::id()));
+    assert_eq!(info.boot_id, 7);
+    assert_eq!((info.sources, info.readers), (1, 1));
+    assert_eq!((info.pair_readers, info.contact_readers), (1, 1));
+    drop(client);
+    daemon.stop();
+    assert_eq!(list_instances(&files.place).unwrap(), []);
+}
+
+#[test]
+fn a_waker_wakes_the_tick_thread_from_another_thread() {
+    let files = Files::new();
+    let mut server = Server::open(ServerOptions::new(files.place.clone(), 7)).unwrap();
+    let waker = Waker::new(&files.place).unwrap();
+    let clock = SystemClock;
+    while server.wait(0, &clock).unwrap() != sweepd::transport::Wake::default() {}
+    std::thread::scope(|scope| {
+        scope.spawn(|| waker.wake());
+        let wake = server.wait(10 * SECOND_NS, &clock).unwrap();
+        assert!(wake.notified);
+    });
+}
+
+#[test]
+fn a_busy_poll_finds_frames_and_ends_at_its_time() {
+    let files = Files::new();
+    let mut server = Server::open(ServerOptions {
+        busy_poll: true,
+        ..ServerOptions::new(files.place.clone(), 7)
+    })
+    .unwrap();
+    let clock = SystemClock;
+    let before_ns = clock.monotonic_ns();
+    assert!(!server.wait(20_000_000, &clock).unwrap().notified);
+    assert!(clock.monotonic_ns() - before_ns >= 20_000_000);
+    let link = sweepd::transport::iceoryx::IoxLink::open(&files.place, &clock, u64::MAX);
+    let mut link = link.unwrap();
+    sweepd::transport::client::Link::send(
+        &mut link,
+        &FrameHeader::default(),
+        Rows::Poses(&poses(1, 0.0)),
+    )
+    .unwrap();
+    let mut inbox = Inbox::default();
+    until("the frame", || {
+        server.wait(20_000_000, &clock).unwrap();
+        server.receive(&mut inbox, &clock);
+        !inbox.is_empty()
+    });
+}
+
+#[test]
+fn a_client_without_a_daemon_times_out_and_makes_nothing() {
+    let files = Files::new();
+    let none = ClientOptions {
+        timeout_ns: SECOND_NS / 5,
+        ..options(&files, None)
+    };
+    let error = none.connect().unwrap_err();
+    assert_eq!(error.exit_code(), 3, "{error}");
+    assert!(error.to_string().contains("sweepd run"), "{error}");
+    assert!(!files.root.exists(), "only a daemon makes the root");
+}
+
+/// A node of iceoryx2 on the test's files, as any other program could open.
+fn stranger(files: &Files) -> iceoryx2::prelude::Node<ipc::Service> {
+    let mut config = Config::default();
+    let root = IoxPath::new(files.root.to_str().unwrap().as_bytes()).unwrap();
+    config.global.set_root_path(&root);
+    config.global.prefix = FileName::new(files.prefix.as_bytes()).unwrap();
+    NodeBuilder::new().config(&config).create().unwrap()
+}
+
+#[test]
+fn rows_or_headers_of_another_type_are_refused_at_the_door() {
+    let files = Files::new();
+    let _daemon = StandIn::iceoryx(&files.place, Manners::default());
+    let node = stranger(&files);
+    let name = "cell/v1/transforms".try_into().unwrap();
+    let bytes = node
+        .service_builder(&name)
+        .publish_subscribe::<[u8]>()
+        .user_header::<FrameHeader>()
+        .open();
+    let single = node
+        .service_builder(&name)
+        .publish_subscribe::<TransformRow>()
+        .user_header::<FrameHeader>()
+        .open();
+    let bare = node
+        .service_builder(&name)
+        .publish_subscribe::<[TransformRow]>()
+        .open();
+    for (what, refused) in [
+        ("bytes", bytes.is_err()),
+        ("a single row", single.is_err()),
+        ("no header", bare.is_err()),
+    ] {
+        assert!(refused, "{what}");
+    }
+    let mut good = options(&files, Some("sim")).connect().unwrap();
+    good.step(
+        &FrameInfo::default(),
+        Rows::Poses(&poses(1, 1.0)),
+        2 * SECOND_NS,
+    )
+    .unwrap();
+}
+
+#[test]
+fn a_daemon_of_another_wire_version_is_refused_with_both_versions() {
+    let files = Files::new();
+    let server = Server::open(ServerOptions::new(files.place.clone(), 7)).unwrap();
+    // a newer daemon's hello, on the service whose layout is frozen
+    let node = stranger(&files);
+    let hello = node
+        .service_builder(&"cell/hello".try_into().unwrap())
+        .publish_subscribe::<Hello>()
+        .open()
+        .unwrap();
+    let publisher = hello.publisher_builder().create().unwrap();
+    std::thread::scope(|scope| {
+        let client = scope.spawn(|| options(&files, None).connect().map(|_| ()));
+        let mut theirs = Hello {
+            magic: *b"sweepd\0\0",
+            wire_version: 2,
+            ..Hello::default()
+        };
+        theirs.sweepd_version[..5].copy_from_slice(b"9.9.9");
+        while !client.is_finished() {
+            publisher.send_copy(theirs).unwrap();
+            std::thread::park_timeout(Duration::from_millis(10));
+        }
+        let error = client.join().unwrap().unwrap_err();
+        assert_eq!(error.exit_code(), 4);
+        let text = error.to_string();
+        assert!(
+            text.contains("9.9.9") && text.contains("wire version 2"),
+            "{text}"
+        );
+        assert!(text.contains(env!("CARGO_PKG_VERSION")), "{text}");
+    });
+    drop(server);
+}
+
+#[test]
+fn a_removed_root_does_not_let_a_second_daemon_in_and_the_first_goes_on() {
+    let files = Files::new();
+    let daemon = StandIn::iceoryx(&files.place, Manners::default());
+    let mut client = options(&files, Some("sim")).connect().unwrap();
+    std::fs::remove_dir_all(&files.root).unwrap();
+    let refused = Server::open(ServerOptions::new(files.place.clone(), 8)).unwrap_err();
+    assert!(
+        refused.to_string().contains("taken by process"),
+        "{refused}"
+    );
+    assert_eq!(client.wait_tick(5 * SECOND_NS).unwrap(), Heard::Tick);
+    drop(client);
+    drop(daemon);
 }

@@ -1,12 +1,16 @@
 //! Transports: how frames and requests come in and results go out. In: samples of other processes, copied once and
 //! unchecked. Out: an [`Inbox`](crate::wire::Inbox) for the engine, and the engine's [`Outbox`] for readers.
 //!
-//! One door with one surface so far: [`iceoryx`], for other processes.
-//! [`client`] is its other side. A door belongs to the thread that opened it.
+//! Two doors with one surface: [`iceoryx`] for other processes, [`memory`] for threads of this one (tests, the
+//! embedded feed). [`client`] is the other side of both. A door belongs to the thread that opened it.
 
 pub mod client;
+mod hello;
 pub mod iceoryx;
+pub mod memory;
 mod request;
+
+pub use hello::ICEORYX2_VERSION;
 
 use crate::error::Result;
 use crate::time::Clock;

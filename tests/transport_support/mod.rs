@@ -105,8 +105,6 @@ pub struct Log {
 #[derive(Clone, Copy, Debug)]
 pub struct Manners {
     pub boot_id: u64,
-    /// One tick a frame; otherwise one a drain, on the newest frame of each source.
-    pub each_frame: bool,
     /// Before its first tick it sleeps so long.
     pub nap: Duration,
     pub heartbeat_ns: u64,
@@ -116,7 +114,6 @@ impl Default for Manners {
     fn default() -> Self {
         Self {
             boot_id: 7,
-            each_frame: true,
             nap: Duration::ZERO,
             heartbeat_ns: 20_000_000,
         }
@@ -208,22 +205,12 @@ fn serve(door: &mut dyn Door, manners: Manners, stop: &AtomicBool, log: &Mutex<L
         note(log, &inbox);
         answer(door, log);
         let demand = door.demand();
-        let mut ticked = false;
         for frame in inbox.frames() {
             admit(&mut outbox.tick, frame);
-            if manners.each_frame {
-                outbox.tick.cause = TickCause::Frame.code();
-                tick(door, &mut outbox, demand, frame);
-                ticked = true;
-            }
-        }
-        if let Some(frame) = inbox.frames().last()
-            && !manners.each_frame
-        {
+            outbox.tick.cause = TickCause::Frame.code();
             tick(door, &mut outbox, demand, frame);
-            ticked = true;
         }
-        if !ticked {
+        if inbox.frames().is_empty() {
             outbox.tick.cause = TickCause::Heartbeat.code();
             tick(door, &mut outbox, demand, &Frame::default());
             door.housekeeping();
@@ -274,6 +261,11 @@ fn admit(tick: &mut TickRow, frame: &Frame) {
         .find(|&i| tick.sources[i].name == frame.header.source)
         .unwrap_or(known);
     let row = &mut tick.sources[at];
+    let header = &frame.header;
+    if row.session == header.session && (row.epoch, row.seq) >= (header.epoch, header.seq) {
+        tick.rejects[usize::from(RejectReason::OldFrame.code())] += 1;
+        return;
+    }
     row.name = frame.header.source;
     row.session = frame.header.session;
     row.epoch = frame.header.epoch;

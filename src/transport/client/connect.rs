@@ -4,7 +4,8 @@ use std::io::Read;
 
 use super::{Client, LOOK_AGAIN_NS, system_clock};
 use crate::error::{Error, Result};
-use crate::transport::iceoryx::{ICEORYX2_VERSION, IoxLink, Place};
+use crate::transport::ICEORYX2_VERSION;
+use crate::transport::iceoryx::{IoxLink, Place};
 use crate::wire::{Hello, WIRE_VERSION, name_str};
 
 /// How a client connects over shared memory.

@@ -29,6 +29,7 @@ const PLAN_BYTES_MAX: usize = 1 << 24;
 
 type Reader<T> = Option<Subscriber<Ipc, [T], MessageHeader>>;
 type Sender<T> = Option<Publisher<Ipc, [T], FrameHeader>>;
+type Asker = RequestClient<Ipc, [u8], RequestHeader, [u8], AnswerHeader>;
 type Pending = PendingResponse<Ipc, [u8], RequestHeader, [u8], AnswerHeader>;
 
 /// A client's ports over shared memory. Not `Send`.
@@ -36,7 +37,7 @@ type Pending = PendingResponse<Ipc, [u8], RequestHeader, [u8], AnswerHeader>;
 /// Ports keep their services open; all go before the node (field order).
 pub struct IoxLink {
     pending: Vec<Pending>,
-    requests: Option<RequestClient<Ipc, [u8], RequestHeader, [u8], AnswerHeader>>,
+    requests: Option<Asker>,
     transforms: Sender<TransformRow>,
     transforms_vel: Sender<TransformVelRow>,
     wake: Notifier<Ipc>,
@@ -169,7 +170,7 @@ fn not_found(place: &Place, why: &Error) -> Error {
         holder.sweepd_version,
         holder.iceoryx2_version,
         env!("CARGO_PKG_VERSION"),
-        super::ICEORYX2_VERSION
+        crate::transport::ICEORYX2_VERSION
     ))
 }
 

@@ -22,6 +22,3 @@ pub use list::{InstanceInfo, list_instances};
 pub use place::Place;
 pub use server::{Server, ServerOptions};
 pub use waker::Waker;
-
-/// The iceoryx2 this was built with; clients of another one cannot talk to it.
-pub const ICEORYX2_VERSION: &str = "0.10.0";

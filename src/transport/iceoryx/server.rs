@@ -1,40 +1,38 @@
 //! The daemon's side: opens every service, waits, copies frames in. In: samples. Out: [`Inbox`], [`Demand`].
 
 mod asked;
+mod frames;
 mod sent;
+mod waiting;
 
 use std::collections::BTreeMap;
+use std::fmt::Debug;
 use std::time::Duration;
 
+use frames::In;
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::port::event_id::EventId;
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::server::Server as RequestServer;
-use iceoryx2::port::subscriber::Subscriber;
-use iceoryx2::port::{DegradationAction, ReceiveError};
-use iceoryx2::prelude::{CallbackProgression, Node, PayloadHeader, PortFactory as _};
-use iceoryx2::sample::Sample;
+use iceoryx2::prelude::{
+    AllocationStrategy, BackpressureStrategy, Node, PortFactory as _, ZeroCopySend,
+};
 use iceoryx2::service::port_factory::event::PortFactory as EventFactory;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory as PubSub;
 
-use super::ICEORYX2_VERSION;
 use super::lock::{Holder, InstanceLock, RootLock};
 use super::place::Place;
 use super::qos::{self, Ipc, Open, events, failed};
 use crate::error::{Error, Result};
 use crate::limits;
 use crate::time::Clock;
-use crate::transport::{Door, RequestToken, Wake};
+use crate::transport::{Door, ICEORYX2_VERSION, RequestToken, Wake};
 use crate::wire::{
-    AnswerHeader, BodyRow, ContactRow, Demand, FrameHeader, Hello, Inbox, MessageHeader, NameRow,
-    Outbox, PairRow, RejectReason, RequestHeader, TickRow, TransformRow, TransformVelRow,
-    WIRE_VERSION,
+    AnswerHeader, BodyRow, ContactRow, Demand, Hello, Inbox, MessageHeader, NameRow, Outbox,
+    PairRow, RequestHeader, TickRow, TransformRow, TransformVelRow, WIRE_VERSION,
 };
-
-/// Spins of a busy poll between two looks at the wake-up port, whose socket costs a system call.
-const SPINS_PER_LOOK: u32 = 256;
 
 /// How a server opens.
 #[derive(Clone, Debug)]
@@ -68,13 +66,13 @@ impl ServerOptions {
 /// A result message's service and the daemon's publisher on it. Drop order: the port, then the service.
 struct Out<T>
 where
-    T: std::fmt::Debug + iceoryx2::prelude::ZeroCopySend + 'static,
+    T: Debug + ZeroCopySend + 'static,
 {
     publisher: Publisher<Ipc, [T], MessageHeader>,
     service: PubSub<Ipc, [T], MessageHeader>,
 }
 
-impl<T: std::fmt::Debug + iceoryx2::prelude::ZeroCopySend + 'static> Out<T> {
+impl<T: Debug + ZeroCopySend + 'static> Out<T> {
     fn open(node: &Node<Ipc>, place: &Place, topic: &str) -> Result<Self> {
         let service = qos::results::<T>(node, place, topic, Open::Create)?;
         let publisher = qos::slice_publisher(&service, qos::SLICE_LEN_START)?;
@@ -84,17 +82,6 @@ impl<T: std::fmt::Debug + iceoryx2::prelude::ZeroCopySend + 'static> Out<T> {
     fn read(&self) -> bool {
         self.service.dynamic_config().number_of_subscribers() > 0
     }
-}
-
-/// One of the two frame services. Drop order: samples, then the port, then the service.
-struct In<T>
-where
-    T: std::fmt::Debug + iceoryx2::prelude::ZeroCopySend + 'static,
-{
-    /// Samples of the drain in progress: kept until its end, so that one source gives at most its queue.
-    kept: Vec<Sample<Ipc, [T], FrameHeader>>,
-    subscriber: Subscriber<Ipc, [T], FrameHeader>,
-    service: PubSub<Ipc, [T], FrameHeader>,
 }
 
 type Asked = ActiveRequest<Ipc, [u8], RequestHeader, [u8], AnswerHeader>;
@@ -141,7 +128,7 @@ struct Services {
     _events: [EventFactory<Ipc>; 2],
 }
 
-impl std::fmt::Debug for Server {
+impl Debug for Server {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Server")
             .field("options", &self.options)
@@ -167,8 +154,8 @@ impl Server {
         let answers = requests
             .server_builder()
             .initial_max_slice_len(qos::REQUEST_LEN_START)
-            .allocation_strategy(iceoryx2::prelude::AllocationStrategy::PowerOfTwo)
-            .backpressure_strategy(iceoryx2::prelude::BackpressureStrategy::DiscardData)
+            .allocation_strategy(AllocationStrategy::PowerOfTwo)
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
             .create()
             .map_err(|e| refused_twice(place, &e))?;
         let wake = qos::event(&node, place, "wake", Open::Create).map_err(held)?;
@@ -224,97 +211,6 @@ impl Server {
     pub fn receive_errors(&self) -> u64 {
         self.receive_errors
     }
-
-    fn pending(&self) -> bool {
-        let some = |has: std::result::Result<bool, _>| has.unwrap_or(true);
-        some(self.transforms.subscriber.has_samples())
-            || some(self.transforms_vel.subscriber.has_samples())
-            || some(self.answers.has_requests())
-    }
-
-    /// Spins until there is something to receive; looks at the wake-up port now and then for who came and left.
-    fn spin(&mut self, timeout_ns: u64, clock: &dyn Clock) -> Result<Wake> {
-        let until_ns = clock.monotonic_ns().saturating_add(timeout_ns);
-        loop {
-            for _ in 0..SPINS_PER_LOOK {
-                if self.pending() {
-                    // drained, so that a later sleep does not wake for what was already taken
-                    let mut wake = self.listen(Duration::ZERO)?;
-                    wake.notified = true;
-                    return Ok(wake);
-                }
-                std::hint::spin_loop();
-            }
-            let wake = self.listen(Duration::ZERO)?;
-            if wake != Wake::default() || clock.monotonic_ns() >= until_ns {
-                return Ok(wake);
-            }
-        }
-    }
-
-    fn listen(&mut self, timeout: Duration) -> Result<Wake> {
-        let mut wake = Wake::default();
-        let note = |activation: iceoryx2::port::EventActivation| match activation.id.as_value() {
-            events::DEAD | events::CREATED | events::DROPPED => wake.peers_changed = true,
-            _ => wake.notified = true,
-        };
-        let heard = if timeout.is_zero() {
-            self.wake.try_wait(note)
-        } else {
-            self.wake.timed_wait(note, timeout)
-        };
-        match heard {
-            Ok(_) => {}
-            Err(iceoryx2::port::listener::ListenerWaitError::InterruptSignal) => {
-                wake.interrupted = true;
-            }
-            Err(e) => return Err(failed("wake", e)),
-        }
-        self.peers_changed |= wake.peers_changed;
-        Ok(wake)
-    }
-
-    /// The publishers that are there now, before the drain: what a gone one has sent is in the drain that follows.
-    fn list_publishers(&mut self) {
-        let Self {
-            alive,
-            transforms,
-            transforms_vel,
-            ..
-        } = self;
-        alive.clear();
-        transforms.service.dynamic_config().list_publishers(|p| {
-            alive.push(p.publisher_id.value());
-            CallbackProgression::Continue
-        });
-        transforms_vel
-            .service
-            .dynamic_config()
-            .list_publishers(|p| {
-                alive.push(p.publisher_id.value());
-                CallbackProgression::Continue
-            });
-    }
-
-    fn end_sessions(&mut self, inbox: &mut Inbox) {
-        let Self {
-            sessions, alive, ..
-        } = self;
-        let mut gone = Vec::new();
-        sessions.retain(|publisher, session| {
-            let there = alive.contains(publisher);
-            if !there {
-                gone.push(*session);
-            }
-            there
-        });
-        for session in gone {
-            // a client may have had a port on both services
-            if !sessions.values().any(|s| *s == session) && !inbox.ended().contains(&session) {
-                inbox.end_session(session);
-            }
-        }
-    }
 }
 
 impl Door for Server {
@@ -332,40 +228,7 @@ impl Door for Server {
     }
 
     fn receive(&mut self, inbox: &mut Inbox, clock: &dyn Clock) {
-        let now_ns = clock.boottime_ns();
-        // half a heartbeat of slack: a wait that ends at its time-out is not silence
-        let silence_ns = self.options.heartbeat_ns + self.options.heartbeat_ns / 2;
-        let waited = self
-            .drained_ns
-            .is_none_or(|before_ns| now_ns.saturating_sub(before_ns) > silence_ns);
-        self.drained_ns = Some(now_ns);
-        // also without a notice: events are lost where a cleaner removed the socket
-        let look = self.peers_changed || waited;
-        if look {
-            self.peers_changed = false;
-            self.list_publishers();
-        }
-        let stamp = Stamped {
-            now_ns,
-            waited,
-            rows_max: self.options.frame_rows_max,
-        };
-        let Self {
-            transforms,
-            transforms_vel,
-            sessions,
-            receive_errors,
-            ..
-        } = self;
-        *receive_errors += transforms.drain(inbox, &stamp, sessions, |frame, rows| {
-            frame.set_transforms(rows);
-        });
-        *receive_errors += transforms_vel.drain(inbox, &stamp, sessions, |frame, rows| {
-            frame.set_transforms_vel(rows);
-        });
-        if look {
-            self.end_sessions(inbox);
-        }
+        self.take_frames(inbox, clock);
     }
 
     fn demand(&mut self) -> Demand {
@@ -400,79 +263,13 @@ impl Door for Server {
     }
 }
 
-/// What is the same for every frame of a drain.
-struct Stamped {
-    now_ns: u64,
-    waited: bool,
-    rows_max: usize,
-}
-
-impl<T: std::fmt::Debug + iceoryx2::prelude::ZeroCopySend + 'static> In<T> {
-    fn open(node: &Node<Ipc>, place: &Place, topic: &str) -> Result<Self> {
-        let service = qos::frames::<T>(node, place, topic, Open::Create)?;
-        let subscriber = service
-            .subscriber_builder()
-            // one source with broken files must not silence the others
-            .set_degradation_handler(|_, _| DegradationAction::Ignore)
-            .create()
-            .map_err(|e| failed(topic, e))?;
-        Ok(Self {
-            kept: Vec::new(),
-            subscriber,
-            service,
-        })
-    }
-
-    /// Copies what is there into the inbox.
-    ///
-    /// * returns - receives that failed.
-    fn drain(
-        &mut self,
-        inbox: &mut Inbox,
-        stamp: &Stamped,
-        sessions: &mut BTreeMap<u128, u64>,
-        copy: impl Fn(&mut crate::wire::Frame, &[T]),
-    ) -> u64 {
-        let mut errors = 0;
-        loop {
-            match self.subscriber.receive() {
-                Ok(Some(sample)) => {
-                    let header = *sample.user_header();
-                    let publisher = sample.header().publisher_id().value();
-                    sessions.insert(publisher, header.session);
-                    let frame = inbox.push();
-                    frame.header = header;
-                    frame.received_ns = stamp.now_ns;
-                    frame.waited = stamp.waited;
-                    // the count is the sender's word: checked before it makes a slice
-                    let rows = usize::try_from(sample.header().number_of_elements());
-                    if rows.is_ok_and(|rows| rows <= stamp.rows_max) {
-                        copy(frame, sample.payload());
-                    } else {
-                        frame.refused = Some(RejectReason::OverLimit);
-                    }
-                    self.kept.push(sample);
-                }
-                // every source has given its whole queue: the fair end of a drain
-                Ok(None) | Err(ReceiveError::ExceedsMaxBorrows) => break,
-                Err(_) => {
-                    errors += 1;
-                    break;
-                }
-            }
-        }
-        self.kept.clear();
-        errors
-    }
-}
-
 fn single_publisher<T>(service: &PubSub<Ipc, T, ()>) -> Result<Publisher<Ipc, T, ()>>
 where
-    T: std::fmt::Debug + iceoryx2::prelude::ZeroCopySend,
+    T: Debug + ZeroCopySend,
 {
     service
         .publisher_builder()
-        .backpressure_strategy(iceoryx2::prelude::BackpressureStrategy::DiscardData)
+        .backpressure_strategy(BackpressureStrategy::DiscardData)
         .create()
         .map_err(|e| failed("publisher", e))
 }
@@ -489,9 +286,12 @@ fn holder(options: &ServerOptions) -> Holder {
 
 /// A service that is there but does not fit was made by another version, and clients hold it open.
 fn held(e: Error) -> Error {
-    Error::Refused(format!(
-        "{e}; if clients of another sweepd version are still running, end them and try again"
-    ))
+    match e {
+        Error::Io { message, .. } => Error::Refused(format!(
+            "{message}; if clients of another sweepd version are still running, end them and try again"
+        )),
+        other => other,
+    }
 }
 
 fn refused_twice(place: &Place, e: &dyn std::fmt::Display) -> Error {

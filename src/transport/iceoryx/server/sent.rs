@@ -4,24 +4,15 @@ use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::ZeroCopySend;
 
-use super::{ICEORYX2_VERSION, Ipc, Server, failed};
+use super::{Ipc, Server, failed};
 use crate::error::Result;
-use crate::wire::{Hello, MessageHeader, Outbox, TickRow, WIRE_VERSION};
+use crate::transport::hello::hello;
+use crate::wire::{MessageHeader, Outbox, TickRow};
 
 impl Server {
     pub(super) fn say_hello(&mut self) -> Result<()> {
-        let hello = Hello {
-            magic: *b"sweepd\0\0",
-            boot_id: self.options.boot_id,
-            pid: std::process::id(),
-            uid: rustix::process::geteuid().as_raw(),
-            wire_version: WIRE_VERSION,
-            reserved: 0,
-            sweepd_version: padded(env!("CARGO_PKG_VERSION")),
-            iceoryx2_version: padded(ICEORYX2_VERSION),
-        };
         self.hello
-            .send_copy(hello)
+            .send_copy(hello(self.options.boot_id))
             .map(|_| ())
             .map_err(|e| failed("hello", e))
     }
@@ -103,12 +94,4 @@ where
     };
     *sample.user_header_mut() = *header;
     u64::from(sample.write_from_slice(rows).send().is_err())
-}
-
-fn padded(text: &str) -> [u8; 16] {
-    let mut bytes = [0; 16];
-    for (to, from) in bytes.iter_mut().zip(text.bytes()) {
-        *to = from;
-    }
-    bytes
 }

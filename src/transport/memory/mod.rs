@@ -1,0 +1,116 @@
+//! The in-process twin of shared memory: same surface, same queues and losses, no files. For tests and the embedded
+//! feed. In: frames of [`MemoryLink`]s. Out: what a [`MemoryServer`] publishes.
+//!
+//! A [`Hub`] is what the files are for shared memory: it outlives servers and clients, and holds one server at most.
+
+mod link;
+mod server;
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+pub use link::MemoryLink;
+pub use server::MemoryServer;
+
+use crate::transport::client::{Message, Topics};
+use crate::transport::{RequestToken, Wake};
+use crate::wire::{
+    AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, NameRow, PairRow, RequestHeader,
+    TickRow, TransformRow, TransformVelRow,
+};
+
+/// Frames of one source that wait for the daemon; then the oldest goes. As over shared memory.
+const SOURCE_BUFFER: usize = 4;
+/// Messages that wait for one reader; then the oldest goes. As over shared memory.
+const RESULT_BUFFER: usize = 8;
+
+/// Where one server and its clients meet.
+#[derive(Clone, Debug, Default)]
+pub struct Hub {
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug, Default)]
+struct Shared {
+    state: Mutex<State>,
+    to_server: Condvar,
+    to_clients: Condvar,
+}
+
+impl Shared {
+    /// A thread that panicked while it held the state left a whole state: every change is one step.
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[derive(Debug)]
+enum Rows {
+    Poses(Vec<TransformRow>),
+    Moving(Vec<TransformVelRow>),
+}
+
+/// One client's queues.
+#[derive(Debug, Default)]
+struct Peer {
+    topics: Topics,
+    session: u64,
+    left: bool,
+    frames: VecDeque<(FrameHeader, Rows)>,
+    ready: bool,
+    hello: Option<Hello>,
+    tick: VecDeque<TickRow>,
+    pairs: VecDeque<Message<PairRow>>,
+    contacts: VecDeque<Message<ContactRow>>,
+    bodies: VecDeque<Message<BodyRow>>,
+    body_verdicts: VecDeque<Message<u8>>,
+    names: VecDeque<Message<NameRow>>,
+    plan: VecDeque<Message<u8>>,
+    answers: VecDeque<(AnswerHeader, Vec<u8>)>,
+}
+
+/// The newest of each message, for late joiners; gone with its server.
+#[derive(Debug, Default)]
+struct Newest {
+    hello: Option<Hello>,
+    tick: Option<TickRow>,
+    pairs: Option<Message<PairRow>>,
+    contacts: Option<Message<ContactRow>>,
+    bodies: Option<Message<BodyRow>>,
+    body_verdicts: Option<Message<u8>>,
+    names: Option<Message<NameRow>>,
+    plan: Option<Message<u8>>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    served: bool,
+    wake: Wake,
+    peers: BTreeMap<u64, Peer>,
+    peers_made: u64,
+    newest: Newest,
+    requests: VecDeque<(u64, RequestHeader, Vec<u8>)>,
+    asked: BTreeMap<RequestToken, (u64, u64)>,
+}
+
+/// Queues a message; beyond the reader's buffer the oldest goes.
+fn queue<T>(queue: &mut VecDeque<T>, message: T) {
+    if queue.len() == RESULT_BUFFER {
+        queue.pop_front();
+    }
+    queue.push_back(message);
+}
+
+impl Hub {
+    /// An empty hub.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// A client's ports.
+    #[must_use]
+    pub fn link(&self) -> MemoryLink {
+        MemoryLink::new(Arc::clone(&self.shared))
+    }
+}

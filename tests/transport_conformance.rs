@@ -1,0 +1,518 @@
+//! Goal: every door keeps the same promises. Method: one suite, two backends (shared memory, memory of this process),
+//! a stand-in daemon that names in each tick the frames it used.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::float_cmp,
+    clippy::cast_precision_loss,
+    reason = "tests"
+)]
+
+mod transport_support;
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use sweepd::error::Error;
+use sweepd::time::SystemClock;
+use sweepd::transport::client::{
+    Client, ClientOptions, FrameInfo, Heard, Link, Rows, StepError, Topics,
+};
+use sweepd::transport::iceoryx::{IoxLink, Server, ServerOptions};
+use sweepd::transport::memory::{Hub, MemoryServer};
+use sweepd::wire::{
+    EndCause, FrameHeader, RejectReason, RequestHeader, TransformVelRow, WIRE_VERSION, frame_flags,
+    name_bytes,
+};
+use transport_support::{Files, Manners, SECOND_NS, StandIn, poses, until};
+
+/// A transport under test.
+trait Backend: Sync {
+    fn new() -> Self;
+    fn daemon(&self, manners: Manners) -> StandIn;
+    fn small_daemon(&self, frame_rows_max: usize) -> StandIn;
+    fn second_daemon(&self) -> Result<(), Error>;
+    fn client(&self, source: Option<&str>) -> Client;
+    fn link(&self) -> Box<dyn Link>;
+}
+
+struct Shared(Files);
+
+impl Backend for Shared {
+    fn new() -> Self {
+        Self(Files::new())
+    }
+
+    fn daemon(&self, manners: Manners) -> StandIn {
+        StandIn::iceoryx(&self.0.place, manners)
+    }
+
+    fn small_daemon(&self, frame_rows_max: usize) -> StandIn {
+        let options = ServerOptions {
+            frame_rows_max,
+            ..ServerOptions::new(self.0.place.clone(), 7)
+        };
+        StandIn::start(Manners::default(), move || Server::open(options))
+    }
+
+    fn second_daemon(&self) -> Result<(), Error> {
+        Server::open(ServerOptions::new(self.0.place.clone(), 8)).map(|_| ())
+    }
+
+    fn client(&self, source: Option<&str>) -> Client {
+        ClientOptions {
+            place: self.0.place.clone(),
+            source: source.map(ToOwned::to_owned),
+            timeout_ns: 5 * SECOND_NS,
+        }
+        .connect()
+        .unwrap()
+    }
+
+    fn link(&self) -> Box<dyn Link> {
+        Box::new(IoxLink::open(&self.0.place, &SystemClock, u64::MAX).unwrap())
+    }
+}
+
+struct Memory(Hub);
+
+impl Backend for Memory {
+    fn new() -> Self {
+        Self(Hub::new())
+    }
+
+    fn daemon(&self, manners: Manners) -> StandIn {
+        let hub = self.0.clone();
+        StandIn::start(manners, move || {
+            MemoryServer::open(&hub, manners.boot_id, manners.heartbeat_ns)
+        })
+    }
+
+    fn small_daemon(&self, frame_rows_max: usize) -> StandIn {
+        let hub = self.0.clone();
+        StandIn::start(Manners::default(), move || {
+            Ok(MemoryServer::open(&hub, 7, 20_000_000)?.with_frame_rows_max(frame_rows_max))
+        })
+    }
+
+    fn second_daemon(&self) -> Result<(), Error> {
+        MemoryServer::open(&self.0, 8, 20_000_000).map(|_| ())
+    }
+
+    fn client(&self, source: Option<&str>) -> Client {
+        let link = Box::new(self.0.link());
+        Client::over(link, Arc::new(SystemClock), source, 5 * SECOND_NS).unwrap()
+    }
+
+    fn link(&self) -> Box<dyn Link> {
+        Box::new(self.0.link())
+    }
+}
+
+fn step(client: &mut Client, n: u64, x: f64) -> Result<(), StepError> {
+    client
+        .step(
+            &FrameInfo::default(),
+            Rows::Poses(&poses(n, x)),
+            5 * SECOND_NS,
+        )
+        .map(|_| ())
+}
+
+fn raw_header(source: &str, seq: u64, schema: u32) -> FrameHeader {
+    FrameHeader {
+        session: 99,
+        seq,
+        source: name_bytes(source),
+        flags: frame_flags::FULL,
+        schema,
+        ..FrameHeader::default()
+    }
+}
+
+fn a_step_returns_the_result_of_exactly_its_frame<B: Backend>() {
+    let backend = B::new();
+    let _daemon = backend.daemon(Manners::default());
+    let mut client = backend.client(Some("sim"));
+    client.subscribe(Topics::ALL).unwrap();
+    for x in 1..=200 {
+        step(&mut client, 2, f64::from(x)).unwrap();
+        let view = client.view();
+        assert_eq!(view.tick().sources[0].seq, u64::try_from(x).unwrap());
+        assert_eq!(view.pairs().unwrap().rows[1].gap_best_m, f64::from(x));
+        assert_eq!(view.contacts().unwrap().rows.len(), 2);
+    }
+}
+
+fn velocities_come_on_a_type_of_their_own<B: Backend>() {
+    let backend = B::new();
+    let daemon = backend.daemon(Manners::default());
+    let mut client = backend.client(Some("sim"));
+    let rows = [TransformVelRow {
+        linear: [1.0, 2.0, 3.0],
+        ..TransformVelRow::default()
+    }; 4];
+    client
+        .step(&FrameInfo::default(), Rows::Moving(&rows), 5 * SECOND_NS)
+        .unwrap();
+    assert_eq!(daemon.log().frames[0].1, 4);
+}
+
+fn a_frame_that_was_passed_over_is_said_to_be_skipped<B: Backend>() {
+    let backend = B::new();
+    let daemon = backend.daemon(Manners::default());
+    let mut client = backend.client(Some("sim"));
+    let mut newer = backend.link();
+    let header = FrameHeader {
+        session: client.session(),
+        ..raw_header("sim", 1000, WIRE_VERSION)
+    };
+    newer.send(&header, Rows::Poses(&poses(1, 2.0))).unwrap();
+    until("the newer frame", || daemon.log().frames.len() == 1);
+    let skipped = step(&mut client, 1, 1.0).unwrap_err();
+    assert!(matches!(skipped, StepError::Skipped(_)), "{skipped}");
+}
+
+fn a_late_joiner_gets_the_newest_state_from_an_idle_daemon<B: Backend>() {
+    let backend = B::new();
+    let _daemon = backend.daemon(Manners {
+        heartbeat_ns: 200_000_000,
+        ..Manners::default()
+    });
+    let mut client = backend.client(Some("sim"));
+    step(&mut client, 1, 1.0).unwrap();
+    let mut late = backend.client(None);
+    late.subscribe(Topics::ALL).unwrap();
+    assert_eq!(late.wait_tick(5 * SECOND_NS).unwrap(), Heard::Tick);
+    assert!(late.view().tick().header.tick >= 1);
+    until("names and plan of before", || {
+        late.wait_tick(SECOND_NS / 4).unwrap();
+        late.view().names().is_some() && late.view().plan().is_some()
+    });
+    assert_eq!(late.view().names().unwrap().rows.len(), 1);
+    assert_eq!(late.view().plan().unwrap().rows, b"{\"broad\":\"brute\"}");
+}
+
+fn a_slow_reader_holds_nobody_up_and_keeps_the_newest<B: Backend>() {
+    let backend = B::new();
+    let _daemon = backend.daemon(Manners::default());
+    let mut slow = backend.client(None);
+    slow.subscribe(Topics::ALL).unwrap();
+    let mut client = backend.client(Some("sim"));
+    client.subscribe(Topics::ALL).unwrap();
+    for x in 1..=300 {
+        step(&mut client, 50, f64::from(x)).unwrap();
+        assert!(client.view().pairs().is_some());
+    }
+    let newest = client.view().tick().header.tick;
+    assert_eq!(slow.latest().unwrap(), Heard::Tick);
+    assert!(slow.view().tick().header.tick >= newest);
+}
+
+fn sixteen_sources_are_all_heard<B: Backend>() {
+    let backend = B::new();
+    let _daemon = backend.daemon(Manners::default());
+    std::thread::scope(|scope| {
+        for number in 0..16 {
+            let backend = &backend;
+            scope.spawn(move || {
+                let mut client = backend.client(Some(&format!("source_{number}")));
+                for x in 1..=20 {
+                    if let Err(e) = step(&mut client, 10, f64::from(x)) {
+                        panic!("source {number}, frame {x}: {e}");
+                    }
+                }
+            });
+        }
+    });
+    let mut reader = backend.client(None);
+    assert_eq!(reader.wait_tick(5 * SECOND_NS).unwrap(), Heard::Tick);
+    let tick = *reader.view().tick();
+    assert_eq!(tick.sources_len, 16);
+    for row in tick.sources {
+        assert_eq!(row.frames, 20);
+    }
+}
+
+fn a_flooder_does_not_starve_another_source<B: Backend>() {
+    let backend = B::new();
+    let daemon = backend.daemon(Manners::default());
+    let stop = std::sync::atomic::AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let mut link = backend.link();
+            let rows = poses(200, 0.0);
+            let mut seq = 0;
+            while !stop.load(std::sync::atomic::Ordering::Relaxed) {
+                seq += 1;
+                let header = raw_header("flood", seq, WIRE_VERSION);
+                link.send(&header, Rows::Poses(&rows)).unwrap();
+            }
+        });
+        let mut calm = backend.client(Some("calm"));
+        for x in 1..=20 {
+            calm.send(&FrameInfo::default(), Rows::Poses(&poses(1, f64::from(x))))
+                .unwrap();
+            until("the calm source's frame", || {
+                daemon.log().frames.iter().any(|(header, ..)| {
+                    header.source == name_bytes("calm") && header.seq == u64::try_from(x).unwrap()
+                })
+            });
+        }
+        stop.store(true, std::sync::atomic::Ordering::Relaxed);
+    });
+}
+
+fn frames_of_another_layout_or_beyond_limits_are_counted_and_good_ones_still_heard<B: Backend>() {
+    let backend = B::new();
+    let daemon = backend.small_daemon(100);
+    let mut client = backend.client(Some("sim"));
+    let mut stranger = backend.link();
+    stranger
+        .send(
+            &raw_header("old", 1, WIRE_VERSION + 1),
+            Rows::Poses(&poses(1, 0.0)),
+        )
+        .unwrap();
+    stranger
+        .send(
+            &raw_header("old", 2, WIRE_VERSION),
+            Rows::Poses(&poses(101, 0.0)),
+        )
+        .unwrap();
+    until("both strange frames", || daemon.log().frames.len() >= 2);
+    step(&mut client, 100, 1.0).unwrap();
+    let rejects = client.view().tick().rejects;
+    assert_eq!(rejects[usize::from(RejectReason::BadLayout.code())], 1);
+    assert_eq!(rejects[usize::from(RejectReason::OverLimit.code())], 1);
+    let log = daemon.log();
+    let refused = log
+        .frames
+        .iter()
+        .find(|f| f.2 == Some(RejectReason::OverLimit))
+        .unwrap();
+    assert_eq!(refused.1, 0, "its rows are left behind");
+}
+
+fn nothing_is_sent_for_nobody<B: Backend>() {
+    let backend = B::new();
+    let _daemon = backend.daemon(Manners::default());
+    let mut client = backend.client(Some("sim"));
+    step(&mut client, 3, 1.0).unwrap();
+    assert!(client.view().pairs().is_none());
+    client
+        .subscribe(Topics {
+            pairs: true,
+            ..Topics::default()
+        })
+        .unwrap();
+    step(&mut client, 3, 2.0).unwrap();
+    assert_eq!(client.view().pairs().unwrap().rows.len(), 3);
+    assert!(client.view().contacts().is_none());
+}
+
+fn a_request_is_answered_and_a_broken_one_refused<B: Backend>() {
+    let backend = B::new();
+    let daemon = backend.daemon(Manners::default());
+    let mut client = backend.client(None);
+    let blob = vec![7_u8; 100_000];
+    for _ in 0..20 {
+        let answer = client
+            .request("{\"put\":1}", &[&blob, &[1, 2]], 5 * SECOND_NS)
+            .unwrap();
+        assert!(answer.ok);
+        assert_eq!(answer.warnings, ["{\"put\":1}"]);
+        assert_eq!(answer.scene_rev, 9 + 100_000 + 2, "bytes that arrived");
+    }
+    assert_eq!(daemon.log().requests[0][9..100_009], blob[..]);
+    let mut stranger = backend.link();
+    let mut text = Vec::new();
+    for (request, schema, json_len) in [(5, WIRE_VERSION + 1, 2), (6, WIRE_VERSION, 3)] {
+        let header = RequestHeader {
+            json_len,
+            request,
+            schema,
+            reserved: 0,
+        };
+        stranger.request(&header, b"{}", &[]).unwrap();
+        let mut answer = None;
+        until("a refusal", || {
+            answer = stranger.answer(&mut text).unwrap();
+            answer.is_some()
+        });
+        let answer = answer.unwrap();
+        assert_eq!((answer.request, answer.ok), (request, 0));
+        assert!(String::from_utf8_lossy(&text).contains("error"));
+    }
+    assert_eq!(daemon.log().requests.len(), 20, "nobody reads a broken one");
+}
+
+fn a_restarted_daemon_is_told_with_ends_and_running_clients_go_on<B: Backend>() {
+    let backend = B::new();
+    let daemon = backend.daemon(Manners::default());
+    let mut client = backend.client(Some("sim"));
+    client.subscribe(Topics::ALL).unwrap();
+    let mut reader = backend.client(None);
+    reader.subscribe(Topics::ALL).unwrap();
+    step(&mut client, 3, 1.0).unwrap();
+    until("the reader's pairs", || {
+        reader.wait_tick(SECOND_NS).unwrap();
+        reader.view().pairs().is_some_and(|p| p.rows.len() == 3)
+    });
+    daemon.stop();
+    // what came since (heartbeats without pairs) is read, so that the reader's last word is known
+    while reader.wait_tick(SECOND_NS / 20).unwrap() == Heard::Tick {}
+    let before = reader.view().pairs().map_or(0, |p| p.rows.len());
+    let _again = backend.daemon(Manners {
+        boot_id: 8,
+        ..Manners::default()
+    });
+    let heard = reader.wait_tick(5 * SECOND_NS).unwrap();
+    let Heard::Restarted(restarted) = heard else {
+        panic!("{heard:?} before the news of the restart");
+    };
+    assert_eq!((restarted.old_boot, restarted.new_boot), (7, 8));
+    assert_eq!(restarted.ends.len(), before);
+    for end in &restarted.ends {
+        assert_eq!(end.end_cause, EndCause::Restart.code());
+    }
+    assert!(matches!(
+        step(&mut client, 3, 2.0),
+        Err(StepError::Restarted(_))
+    ));
+    step(&mut client, 3, 3.0).unwrap();
+    assert_eq!(client.view().tick().header.boot_id, 8);
+    assert_eq!(client.view().pairs().unwrap().rows[0].gap_best_m, 3.0);
+}
+
+fn the_end_of_a_client_ends_its_session_after_its_frames<B: Backend>() {
+    let backend = B::new();
+    let daemon = backend.daemon(Manners::default());
+    let mut client = backend.client(Some("sim"));
+    let session = client.session();
+    step(&mut client, 1, 1.0).unwrap();
+    client
+        .send(&FrameInfo::default(), Rows::Poses(&poses(1, 2.0)))
+        .unwrap();
+    drop(client);
+    until("the end of the session", || {
+        daemon.log().ended.contains(&session)
+    });
+    assert_eq!(daemon.log().frames.len(), 2, "no frame is lost for it");
+    assert_eq!(daemon.log().ended, [session], "and it is told once");
+}
+
+fn pauses_and_epochs_are_carried<B: Backend>() {
+    let backend = B::new();
+    let daemon = backend.daemon(Manners::default());
+    let mut client = backend.client(Some("sim"));
+    step(&mut client, 1, 1.0).unwrap();
+    client.pause().unwrap();
+    client.reset_epoch();
+    let partial = FrameInfo {
+        partial: true,
+        stamp_ns: 5,
+        clock_id: 2,
+        scene_rev: 3,
+        deadline_ns: 4,
+        time_left_ns: 6,
+    };
+    client.send(&partial, Rows::Poses(&poses(1, 2.0))).unwrap();
+    until("three frames", || daemon.log().frames.len() == 3);
+    let frames: Vec<_> = daemon.log().frames.iter().map(|f| f.0).collect();
+    let flags: Vec<_> = frames.iter().map(|f| f.flags).collect();
+    assert_eq!(
+        flags,
+        [frame_flags::FULL, frame_flags::PAUSED, frame_flags::PARTIAL]
+    );
+    assert_eq!(
+        [frames[0].epoch, frames[1].epoch, frames[2].epoch],
+        [0, 0, 1]
+    );
+    assert_eq!([frames[0].seq, frames[1].seq, frames[2].seq], [1, 2, 3]);
+    assert!(frames.iter().all(|f| f.sent_ns > 0 && f.session != 0));
+    let last = frames[2];
+    assert_eq!((last.stamp_ns, last.clock_id, last.scene_rev), (5, 2, 3));
+    assert_eq!((last.deadline_ns, last.time_left_ns), (4, 6));
+}
+
+fn frames_that_waited_while_the_daemon_was_silent_say_so<B: Backend>() {
+    let backend = B::new();
+    let daemon = backend.daemon(Manners {
+        nap: Duration::from_millis(200),
+        ..Manners::default()
+    });
+    // a bare link: a client would wait for the hello of the napping daemon
+    let mut early = backend.link();
+    early
+        .send(
+            &raw_header("early", 1, WIRE_VERSION),
+            Rows::Poses(&poses(1, 1.0)),
+        )
+        .unwrap();
+    let mut client = backend.client(Some("sim"));
+    until("the frame", || daemon.log().frames.len() == 1);
+    step(&mut client, 1, 2.0).unwrap();
+    let waited: Vec<_> = daemon.log().frames.iter().map(|f| f.3).collect();
+    assert_eq!(waited, [true, false]);
+}
+
+fn a_second_daemon_is_refused_and_the_first_goes_on<B: Backend>() {
+    let backend = B::new();
+    let daemon = backend.daemon(Manners::default());
+    let refused = backend.second_daemon().unwrap_err();
+    assert_eq!(refused.exit_code(), 4, "{refused}");
+    assert!(refused.to_string().contains("taken"), "{refused}");
+    let mut client = backend.client(Some("sim"));
+    step(&mut client, 1, 1.0).unwrap();
+    daemon.stop();
+    backend.second_daemon().unwrap();
+}
+
+fn a_step_without_a_daemon_times_out_and_says_why<B: Backend>() {
+    let backend = B::new();
+    let daemon = backend.daemon(Manners::default());
+    let mut client = backend.client(Some("sim"));
+    step(&mut client, 1, 1.0).unwrap();
+    daemon.stop();
+    let late = client
+        .step(
+            &FrameInfo::default(),
+            Rows::Poses(&poses(1, 2.0)),
+            SECOND_NS / 10,
+        )
+        .unwrap_err();
+    assert!(matches!(late, StepError::TimedOut(_)), "{late}");
+    assert!(late.to_string().contains("no tick came"), "{late}");
+}
+
+macro_rules! both {
+    ($($name:ident)+) => {
+        mod shared_memory {
+            $(#[test] fn $name() { super::$name::<super::Shared>(); })+
+        }
+        mod memory {
+            $(#[test] fn $name() { super::$name::<super::Memory>(); })+
+        }
+    };
+}
+
+both! {
+    a_step_returns_the_result_of_exactly_its_frame
+    velocities_come_on_a_type_of_their_own
+    a_frame_that_was_passed_over_is_said_to_be_skipped
+    a_late_joiner_gets_the_newest_state_from_an_idle_daemon
+    a_slow_reader_holds_nobody_up_and_keeps_the_newest
+    sixteen_sources_are_all_heard
+    a_flooder_does_not_starve_another_source
+    frames_of_another_layout_or_beyond_limits_are_counted_and_good_ones_still_heard
+    nothing_is_sent_for_nobody
+    a_request_is_answered_and_a_broken_one_refused
+    a_restarted_daemon_is_told_with_ends_and_running_clients_go_on
+    the_end_of_a_client_ends_its_session_after_its_frames
+    pauses_and_epochs_are_carried
+    frames_that_waited_while_the_daemon_was_silent_say_so
+    a_second_daemon_is_refused_and_the_first_goes_on
+    a_step_without_a_daemon_times_out_and_says_why
+}
