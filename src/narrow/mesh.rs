@@ -1,1 +1,31 @@
 //! Mesh pairs as walks over leaves that can stop.
+//!
+//! In: two shapes of which at least one is a mesh, and the pose of B seen from A. Out: a sound interval of their gap
+//! from the first moment on, narrowed by every unit of work, a witness and contacts.
+//!
+//! Every pair of triangles is covered by exactly one entry at any time: on the stack (boxes that may touch), in the
+//! heap (boxes proved apart by so much), or settled (queried, or proved farther than the best distance known).
+//! So the least of all entries is a sound lower bound at any interruption. Three stages:
+//! 1. `Surfaces`: the stack, depth first and nearest child first, until two leaves touch or none is left.
+//! 2. `Inside`: where surfaces are apart and a solid takes part, one point of every connected surface is tested
+//!    against the other solid, both ways (law 3.3).
+//! 3. `Refine`: the heap, best first, until nothing can be nearer than the best leaf pair.
+//!
+//! Refused: breadth-first order (Hubbard): it confirms contacts last of all; one order for all three stages.
+//! Lower ends of overlapping pairs are bounds, not depths: the least overlap of the root boxes along 15 axes, and the
+//! largest ball that fits into a root box (see `bound`).
+
+use super::exact::Closest;
+
+mod bound;
+mod contacts;
+mod half_space;
+mod side;
+mod triangle;
+mod walk;
+
+pub use contacts::{LEAF_CONTACTS_MAX, LeafContact};
+pub use walk::{Goal, Walk, retest_witness};
+
+/// The nearest or deepest pair of leaves met so far.
+pub type Witness = LeafContact;

@@ -10,12 +10,13 @@ mod tree;
 
 pub(crate) use inside::Inside;
 pub(crate) use predicates::side;
-pub(crate) use tree::{Below, Node, Tree};
+use tree::Tree;
+pub(crate) use tree::{Below, Node};
 
 use topology::{Shell, Topology};
 
 use crate::limits::{EXTENT_MAX_M, EXTENT_MIN_M, TRIANGLES_MAX};
-use crate::math::{Aabb, Point, Pose, ROUND};
+use crate::math::{Aabb, Point, Pose, ROUND, Vec3};
 use crate::shape::ShapeError;
 
 /// Triangles in their own frame: a solid when they are closed and face consistently, else a surface.
@@ -151,6 +152,32 @@ impl Mesh {
             bounds.min[k] = centre[k] - reach(-axis);
         }
         bounds.widened(slop)
+    }
+
+    /// A vertex far along `direction`: a guess, but a vertex of a face in any case.
+    ///
+    /// Cost: one path down the tree.
+    pub(crate) fn outlying(&self, direction: &Vec3) -> Point {
+        let nodes = self.tree.nodes();
+        let mut place = 0;
+        loop {
+            match nodes[place as usize].below(place) {
+                Below::Nodes(left, right) => {
+                    let reach = |i: u32| nodes[i as usize].reach(direction);
+                    place = if reach(left) >= reach(right) {
+                        left
+                    } else {
+                        right
+                    };
+                }
+                Below::Triangle(face) => {
+                    let [a, b, c] = self.triangle(face);
+                    let on = |p: &Point| direction.dot(&p.coords);
+                    let best = if on(&a) >= on(&b) { a } else { b };
+                    return if on(&best) >= on(&c) { best } else { c };
+                }
+            }
+        }
     }
 
     /// The tree over its triangles.

@@ -16,6 +16,7 @@ pub(crate) use convex::Core;
 pub use error::ShapeError;
 pub(crate) use load::find_mesh;
 pub use mesh::Mesh;
+pub(crate) use mesh::{Below, Inside, Node, side};
 pub use spec::ShapeSpec;
 
 use crate::math::{Aabb, Point, Pose, Vec3};

@@ -1,5 +1,4 @@
 use super::*;
-use crate::math::Vec3;
 
 fn cuboid(centre: [f64; 3], half: f64, inward: bool) -> (Vec<Point>, Vec<[u32; 3]>) {
     let vertices = (0..8u32)

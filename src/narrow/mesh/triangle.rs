@@ -1,0 +1,295 @@
+//! The gap of two triangles, with its certificate.
+//!
+//! In: corners in one frame, and the rounding that stands behind them. Out: a [`Closest`]. Triangles that are points
+//! or needles are legal.
+//!
+//! Apart: the least distance is one of a corner to a triangle or of two edges' inner points; all are tried. The
+//! upper end is the distance of the two points found, whoever found them; the lower end is the separation along an
+//! axis, sound for any axis, so neither rests on the search being right. Crossing: decided by exact signs; the depth
+//! is the least overlap along the axes of the two, and each axis is a sound bound by itself.
+
+use std::cmp::Ordering;
+
+use super::Closest;
+use crate::math::{Interval, Point, Vec3};
+use crate::shape::side;
+
+/// Three corners.
+pub(super) type Triangle = [Point; 3];
+
+/// Two points and the edges that meet in them: what an axis has to be at right angles to.
+struct Candidate {
+    square: f64,
+    a: Point,
+    b: Point,
+    edges: [Vec3; 2],
+}
+
+impl Candidate {
+    fn offer(&mut self, a: Point, b: Point, edges: [Vec3; 2]) {
+        let square = (b - a).norm_squared();
+        if square < self.square {
+            *self = Self {
+                square,
+                a,
+                b,
+                edges,
+            };
+        }
+    }
+}
+
+/// The gap of two triangles.
+///
+/// * `slop` - bound on the rounding of corners and of distances between them, metres.
+/// * `beyond` - a gap proved to exceed this is of no interest: `None`.
+pub(super) fn gap(a: &Triangle, b: &Triangle, slop: f64, beyond: f64) -> Option<Closest> {
+    let (edges_a, edges_b) = (edges(a), edges(b));
+    let (normal_a, normal_b) = (edges_a[0].cross(&edges_a[1]), edges_b[0].cross(&edges_b[1]));
+    // Three cheap axes turn most pairs away.
+    let middle = (b[0] - a[0]) + (b[1] - a[1]) + (b[2] - a[2]);
+    let mut best = Best::none();
+    for axis in [middle, normal_a, normal_b] {
+        best.try_axis(a, b, &axis);
+    }
+    if best.apart - slop > beyond {
+        return None;
+    }
+
+    if best.apart <= slop && crossing(a, b) {
+        try_all_axes(&mut best, a, b);
+        return Some(overlap(&best, a, b, slop));
+    }
+    let found = closest_points(a, b, &edges_a, &edges_b, &normal_a, &normal_b);
+    let distance = found.square.sqrt();
+    try_feature_axes(&mut best, a, b, &found);
+    let size = edges_a[0].norm() + edges_b[0].norm() + edges_a[1].norm() + edges_b[1].norm();
+    if best.apart < distance - 1e-13 * size - slop {
+        try_all_axes(&mut best, a, b);
+    }
+    let low = (best.apart - slop).max(-slop).min(distance);
+    let normal = (found.b - found.a).try_normalize(slop).unwrap_or(best.axis);
+    Some(Closest {
+        gap: Interval::new(low, distance + slop),
+        best_m: distance,
+        normal,
+        point_a: found.a,
+        point_b: found.b,
+        finished: best.apart >= distance - 1e-9 * size - slop,
+    })
+}
+
+fn edges(t: &Triangle) -> [Vec3; 3] {
+    [t[1] - t[0], t[2] - t[1], t[0] - t[2]]
+}
+
+/// The axis along which the two are farthest apart (or overlap least), from A to B.
+struct Best {
+    apart: f64,
+    axis: Vec3,
+}
+
+impl Best {
+    fn none() -> Self {
+        Self {
+            apart: f64::NEG_INFINITY,
+            axis: Vec3::z(),
+        }
+    }
+
+    fn try_axis(&mut self, a: &Triangle, b: &Triangle, axis: &Vec3) {
+        let square = axis.norm_squared();
+        if square <= f64::MIN_POSITIVE {
+            return;
+        }
+        let unit = axis / square.sqrt();
+        // Relative to one corner: the digits of a common offset are not lost.
+        let on = |p: &Point| unit.dot(&(p - a[0]));
+        let (a1, a2) = (on(&a[1]), on(&a[2]));
+        let (b0, b1, b2) = (on(&b[0]), on(&b[1]), on(&b[2]));
+        let (low_a, high_a) = (a1.min(a2).min(0.0), a1.max(a2).max(0.0));
+        let (low_b, high_b) = (b0.min(b1).min(b2), b0.max(b1).max(b2));
+        if low_b - high_a > self.apart {
+            self.apart = low_b - high_a;
+            self.axis = unit;
+        }
+        if low_a - high_b > self.apart {
+            self.apart = low_a - high_b;
+            self.axis = -unit;
+        }
+    }
+}
+
+/// The axis between the points found, at right angles to the edges that hold them.
+fn try_feature_axes(best: &mut Best, a: &Triangle, b: &Triangle, found: &Candidate) {
+    let square_away = |mut axis: Vec3| {
+        // Twice: what the first round leaves of a nearly parallel pair of edges, the second takes away.
+        for edge in found.edges.iter().chain(&found.edges) {
+            let length = edge.norm_squared();
+            if length > 0.0 {
+                axis -= edge * (axis.dot(edge) / length);
+            }
+        }
+        axis
+    };
+    let between = found.b - found.a;
+    best.try_axis(a, b, &square_away(between));
+    let cross = found.edges[0].cross(&found.edges[1]);
+    if let Some(cross) = cross.try_normalize(f64::MIN_POSITIVE) {
+        best.try_axis(a, b, &square_away(cross));
+    }
+}
+
+/// Face normals, crosses of edges, and normals of edges within the planes: all that can separate two triangles.
+fn try_all_axes(best: &mut Best, a: &Triangle, b: &Triangle) {
+    let (edges_a, edges_b) = (edges(a), edges(b));
+    for (edges, other) in [(&edges_a, &edges_b), (&edges_b, &edges_a)] {
+        let normal = edges[0].cross(&edges[1]);
+        best.try_axis(a, b, &normal);
+        for edge in edges {
+            best.try_axis(a, b, &edge.cross(&normal));
+            // A needle has no normal to speak of; the other's will do.
+            best.try_axis(a, b, &edge.cross(&other[0].cross(&other[1])));
+        }
+    }
+    for u in &edges_a {
+        for v in &edges_b {
+            let cross = u.cross(v);
+            if cross.norm_squared() > 1e-24 * u.norm_squared() * v.norm_squared() {
+                best.try_axis(a, b, &cross);
+            }
+        }
+    }
+}
+
+/// Whether an edge of the one passes through the other; exact for the corners as they are. Triangles in one plane are
+/// not found here: their distance is zero.
+fn crossing(a: &Triangle, b: &Triangle) -> bool {
+    pierces(a, b) || pierces(b, a)
+}
+
+/// Whether an edge of `b` passes through `a`.
+fn pierces(a: &Triangle, b: &Triangle) -> bool {
+    let sides = b.map(|p| side(&a[0], &a[1], &a[2], &p));
+    if sides.iter().all(|s| *s == sides[0]) {
+        return false;
+    }
+    (0..3).any(|k| {
+        let (p, q) = (k, (k + 1) % 3);
+        if sides[p] == sides[q] {
+            return false;
+        }
+        let round = |i: usize| side(&b[p], &b[q], &a[i], &a[(i + 1) % 3]);
+        let turns = [round(0), round(1), round(2)];
+        !(turns.contains(&Ordering::Less) && turns.contains(&Ordering::Greater))
+    })
+}
+
+/// What two crossing triangles say: the least translation that parts them, and points on both along it.
+fn overlap(best: &Best, a: &Triangle, b: &Triangle, slop: f64) -> Closest {
+    let depth = (-best.apart).max(0.0);
+    let deepest = |t: &Triangle, axis: Vec3| {
+        let on = |p: &Point| axis.dot(&(p - a[0]));
+        let mut at = t[0];
+        for p in &t[1..] {
+            if on(p) > on(&at) {
+                at = *p;
+            }
+        }
+        at
+    };
+    let size = (a[1] - a[0]).norm() + (a[2] - a[0]).norm();
+    let point_b = deepest(b, -best.axis);
+    Closest {
+        // Rounding of the corners can part what only just crosses, and nothing else.
+        gap: Interval::new(
+            -depth - slop,
+            if depth > 1e-9 * size + 4.0 * slop {
+                0.0
+            } else {
+                slop
+            },
+        ),
+        best_m: -depth,
+        normal: best.axis,
+        point_a: point_b + best.axis * depth,
+        point_b,
+        finished: true,
+    }
+}
+
+fn closest_points(
+    a: &Triangle,
+    b: &Triangle,
+    edges_a: &[Vec3; 3],
+    edges_b: &[Vec3; 3],
+    normal_a: &Vec3,
+    normal_b: &Vec3,
+) -> Candidate {
+    let mut found = Candidate {
+        square: f64::INFINITY,
+        a: a[0],
+        b: b[0],
+        edges: [Vec3::zeros(); 2],
+    };
+    for p in b {
+        corner(p, a, edges_a, normal_a, |on, edges| {
+            found.offer(on, *p, edges)
+        });
+    }
+    for p in a {
+        corner(p, b, edges_b, normal_b, |on, edges| {
+            found.offer(*p, on, edges)
+        });
+    }
+    for i in 0..3 {
+        for j in 0..3 {
+            let (u, v) = (&edges_a[i], &edges_b[j]);
+            let cross = u.cross(v);
+            let square = cross.norm_squared();
+            if square <= f64::MIN_POSITIVE {
+                continue;
+            }
+            // Both places from the cross product: for nearly parallel edges the usual difference of squares is noise.
+            let from = b[j] - a[i];
+            let s = from.cross(v).dot(&cross) / square;
+            let t = from.cross(u).dot(&cross) / square;
+            if (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t) {
+                found.offer(a[i] + u * s, b[j] + v * t, [*u, *v]);
+            }
+        }
+    }
+    found
+}
+
+/// Offers the points of a triangle that can be nearest to a corner of the other: on its edges, and inside.
+fn corner(
+    p: &Point,
+    t: &Triangle,
+    edges: &[Vec3; 3],
+    normal: &Vec3,
+    mut offer: impl FnMut(Point, [Vec3; 2]),
+) {
+    let square = normal.norm_squared();
+    if square > f64::MIN_POSITIVE {
+        // Weights from areas: each is the share of the part opposite its corner.
+        let weight = |k: usize| edges[k].cross(&(p - t[k])).dot(normal) / square;
+        let (w2, w0, w1) = (weight(0), weight(1), weight(2));
+        if w0 >= 0.0 && w1 >= 0.0 && w2 >= 0.0 {
+            let on = t[0] + edges[0] * w1 - edges[2] * w2;
+            offer(on, [edges[0], edges[1]]);
+        }
+    }
+    for k in 0..3 {
+        let length = edges[k].norm_squared();
+        let along = edges[k].dot(&(p - t[k]));
+        if along <= 0.0 || length <= f64::MIN_POSITIVE {
+            offer(t[k], [Vec3::zeros(); 2]);
+        } else if along < length {
+            offer(
+                t[k] + edges[k] * (along / length),
+                [edges[k], Vec3::zeros()],
+            );
+        }
+    }
+}
