@@ -89,7 +89,7 @@ fn check(hello: &Hello) -> Result<()> {
 }
 
 /// A random number that is not 0, from the kernel.
-pub(super) fn random_u64() -> Result<u64> {
+pub(crate) fn random_u64() -> Result<u64> {
     let mut bytes = [0; 8];
     std::fs::File::open("/dev/urandom")
         .and_then(|mut file| file.read_exact(&mut bytes))

@@ -9,6 +9,7 @@ mod link;
 mod step;
 
 pub use connect::ClientOptions;
+pub(crate) use connect::random_u64;
 pub use follow::{Message, View};
 pub use link::{Link, Rows, Topics};
 pub use step::StepError;
