@@ -14,6 +14,7 @@ use std::path::Path;
 use sweepd::config::Mode;
 use sweepd::ids::BodyId;
 use sweepd::scene::Scene;
+use sweepd::shape::{Geometry, Library, ShapeSpec, build};
 
 fn example() -> Scene {
     Scene::load(Path::new("launch-free-scripts/example_scene.toml")).unwrap()
@@ -54,4 +55,48 @@ fn an_empty_scene_is_legal() {
     let scene = Scene::parse("", "empty.toml", Path::new("")).unwrap();
     assert!(scene.bodies.is_empty() && scene.sources.is_empty());
     assert_eq!(scene.frame_id, "world");
+}
+
+#[test]
+fn the_example_scene_is_built_and_equal_shapes_are_one() {
+    let mut library = Library::new();
+    let built = example().build_shapes(&mut library, |_, _| {}).unwrap();
+    assert_eq!(built.shapes.len(), 12);
+    assert_eq!(library.len(), 13, "each shape once");
+    let again = example().build_shapes(&mut library, |_, _| {}).unwrap();
+    assert!(std::sync::Arc::ptr_eq(
+        &built.shapes[0][0],
+        &again.shapes[0][0]
+    ));
+    drop((built, again));
+    library.prune();
+    assert!(library.is_empty());
+}
+
+#[test]
+fn the_three_wedges_are_the_same_solid() {
+    for file in ["wedge.obj", "wedge.stl", "wedge_text.stl"] {
+        let spec = ShapeSpec::Trimesh {
+            vertices: vec![],
+            faces: vec![],
+            file: Some(file.to_owned()),
+            scale: None,
+            solid: None,
+        };
+        let built = build(&spec, Path::new("tests/data/meshes")).unwrap();
+        let Geometry::Mesh(mesh) = &built.shape.geometry else {
+            panic!("a mesh");
+        };
+        assert!(mesh.is_solid(), "{file}");
+        assert_eq!(
+            (mesh.vertices().len(), mesh.faces().len()),
+            (6, 8),
+            "{file}"
+        );
+        let volume: f64 = (0..8)
+            .map(|k| mesh.triangle(k).map(|p| p.coords))
+            .map(|[a, b, c]| a.dot(&b.cross(&c)) / 6.0)
+            .sum();
+        assert!((volume - 1.5).abs() < 1e-12, "{file} {volume}");
+    }
 }

@@ -3,6 +3,7 @@
 //! In: a TOML file (strict). Out: a checked [`Scene`]; every error names file, line, body and the mend. Requests to
 //! edit a running scene come in as JSON of the same words, and change a scene as a whole or not at all.
 
+mod build;
 mod model;
 mod node;
 mod pattern;
@@ -13,6 +14,7 @@ mod read_shape;
 mod resolve;
 mod table;
 
+pub use build::BuiltShapes;
 pub use model::{BodySpec, Origin, PairAction, PairRule, PlacedSpec, Scene, SourceSpec};
 pub use pattern::{is_pattern, pattern_matches};
 pub use read_body::{BODY_NAME_BYTES_MAX, BodyDraft, SOURCE_NAME_BYTES_MAX};

@@ -7,13 +7,16 @@ mod check;
 mod convex;
 mod error;
 mod height_field;
+mod library;
 mod load;
 mod mesh;
 mod spec;
 
+pub use build::{Built, build};
 pub use convex::Convex;
 pub(crate) use convex::Core;
 pub use error::ShapeError;
+pub use library::Library;
 pub(crate) use load::find_mesh;
 pub use mesh::Mesh;
 pub(crate) use mesh::{Below, Inside, Node, side};

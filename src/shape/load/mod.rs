@@ -1,11 +1,95 @@
 //! Mesh files: STL (binary and text), OBJ, DAE. Own readers, because the ones at hand keep f32 coordinates, skip a DAE's
-//! up-axis, believe any size a file claims, and cannot say in which line a mistake stands.
+//! up-axis, believe any size that a file claims, and cannot say in which line a mistake stands.
 //!
-//! In: a path. Out: vertices in metres, z up, equal ones merged; faces in the file's order.
+//! In: a path. Out: vertices in metres, z up, equal ones merged; faces in the file's order, objects one after another.
 
+mod obj;
+mod polygon;
+mod stl;
+mod weld;
+
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use crate::limits::TRIANGLES_MAX;
+use crate::math::Point;
 use crate::shape::ShapeError;
+
+/// Longest mesh file, bytes: a text STL of the most triangles takes about this.
+const FILE_BYTES_MAX: u64 = 1 << 31;
+
+/// What a mesh file holds.
+#[derive(Debug, Default)]
+pub(crate) struct Soup {
+    /// Metres, z up.
+    pub(crate) vertices: Vec<Point>,
+    /// Places in `vertices`, counter-clockwise seen from outside; all in range.
+    pub(crate) faces: Vec<[u32; 3]>,
+    /// Things to know that did not stop the reading.
+    pub(crate) warnings: Vec<String>,
+}
+
+/// A mistake in a file: line, where there are lines, and what is wrong.
+#[derive(Debug)]
+struct Flaw {
+    line: Option<usize>,
+    error: FlawKind,
+}
+
+#[derive(Debug)]
+enum FlawKind {
+    Format(String),
+    Shape(ShapeError),
+}
+
+impl Flaw {
+    fn at(line: usize, message: impl Into<String>) -> Self {
+        Self {
+            line: Some(line),
+            error: FlawKind::Format(message.into()),
+        }
+    }
+
+    fn new(message: impl Into<String>) -> Self {
+        Self {
+            line: None,
+            error: FlawKind::Format(message.into()),
+        }
+    }
+}
+
+impl From<ShapeError> for Flaw {
+    fn from(error: ShapeError) -> Self {
+        Self {
+            line: None,
+            error: FlawKind::Shape(error),
+        }
+    }
+}
+
+impl Soup {
+    /// Adds a vertex and yields its place.
+    fn vertex(&mut self, vertex: Point) -> Result<u32, Flaw> {
+        let place = u32::try_from(self.vertices.len())
+            .map_err(|_| Flaw::new("more than 2^32 vertices: split the file"))?;
+        self.vertices.push(vertex);
+        Ok(place)
+    }
+
+    /// Adds a face, up to the limit.
+    fn face(&mut self, face: [u32; 3]) -> Result<(), Flaw> {
+        if self.faces.len() == TRIANGLES_MAX {
+            // The count goes on to be unknown: the file is not read to its end.
+            return Err(ShapeError::TooManyTriangles {
+                given: TRIANGLES_MAX as u64 + 1,
+            }
+            .into());
+        }
+        self.faces.push(face);
+        Ok(())
+    }
+}
 
 /// Where a mesh file is, if it is there and of a known kind.
 ///
@@ -15,16 +99,46 @@ use crate::shape::ShapeError;
 /// `Unreadable` for a missing file or a folder, `Format` for an unknown ending.
 pub(crate) fn find_mesh(base: &Path, file: &str) -> Result<PathBuf, ShapeError> {
     let path = base.join(file);
-    let unreadable = |message: String| ShapeError::Unreadable {
-        path: path.display().to_string(),
-        message,
-    };
-    let meta = std::fs::metadata(&path).map_err(|e| unreadable(e.to_string()))?;
+    let meta = std::fs::metadata(&path).map_err(|e| unreadable(&path, e.to_string()))?;
     if !meta.is_file() {
-        return Err(unreadable("this is not a file".to_owned()));
+        return Err(unreadable(&path, "this is not a file".to_owned()));
     }
     kind(&path)?;
     Ok(path)
+}
+
+/// Reads a mesh file.
+///
+/// * `scale` - factor on each axis of the file's coordinates (after its own unit and up-axis); where an odd number of
+///   factors is negative it mirrors, and faces are turned so that outside stays outside.
+///
+/// # Errors
+/// `Unreadable`, `Format` with the line, `TooManyTriangles` before such a file is read whole, `NotFinite`.
+pub(crate) fn load(base: &Path, file: &str, scale: Option<[f64; 3]>) -> Result<Soup, ShapeError> {
+    let path = find_mesh(base, file)?;
+    let kind = kind(&path)?;
+    let bytes = read(&path, kind)?;
+    let mut soup = parse(kind, &bytes).map_err(|flaw| match flaw.error {
+        FlawKind::Shape(error) => error,
+        FlawKind::Format(message) => ShapeError::Format {
+            path: path.display().to_string(),
+            line: flaw.line,
+            message,
+        },
+    })?;
+    if let Some(scale) = scale {
+        scale_by(&mut soup, scale);
+    }
+    check_finite(&soup, &path)?;
+    weld::weld(&mut soup);
+    Ok(soup)
+}
+
+fn parse(kind: Kind, bytes: &[u8]) -> Result<Soup, Flaw> {
+    match kind {
+        Kind::Stl => stl::parse(bytes),
+        Kind::Obj => obj::parse(bytes),
+    }
 }
 
 /// The formats that are read.
@@ -32,7 +146,6 @@ pub(crate) fn find_mesh(base: &Path, file: &str) -> Result<PathBuf, ShapeError> 
 enum Kind {
     Stl,
     Obj,
-    Dae,
 }
 
 fn kind(path: &Path) -> Result<Kind, ShapeError> {
@@ -44,11 +157,91 @@ fn kind(path: &Path) -> Result<Kind, ShapeError> {
     match ending.as_str() {
         "stl" => Ok(Kind::Stl),
         "obj" => Ok(Kind::Obj),
-        "dae" => Ok(Kind::Dae),
         _ => Err(ShapeError::Format {
             path: path.display().to_string(),
             line: None,
-            message: format!("files ending in \".{ending}\" are not read: use .stl, .obj or .dae"),
+            message: format!("files ending in \".{ending}\" are not read: use .stl or .obj"),
         }),
+    }
+}
+
+fn unreadable(path: &Path, message: String) -> ShapeError {
+    ShapeError::Unreadable {
+        path: path.display().to_string(),
+        message,
+    }
+}
+
+/// The bytes of a file; one that is too large is refused by its head.
+fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, ShapeError> {
+    let failed = |e: std::io::Error| unreadable(path, e.to_string());
+    let mut file = File::open(path).map_err(failed)?;
+    let size = file.metadata().map_err(failed)?.len();
+    let mut bytes = Vec::new();
+    if kind == Kind::Stl {
+        file.by_ref()
+            .take(stl::HEAD_BYTES)
+            .read_to_end(&mut bytes)
+            .map_err(failed)?;
+        if let Some(given) = stl::claimed(&bytes).filter(|given| *given > TRIANGLES_MAX as u64) {
+            return Err(ShapeError::TooManyTriangles { given });
+        }
+    }
+    if size > FILE_BYTES_MAX {
+        return Err(unreadable(
+            path,
+            format!("the file has {size} bytes, more than {FILE_BYTES_MAX}; simplify the mesh"),
+        ));
+    }
+    // A file that grows while it is read ends at the limit too.
+    file.take(FILE_BYTES_MAX)
+        .read_to_end(&mut bytes)
+        .map_err(failed)?;
+    Ok(bytes)
+}
+
+fn scale_by(soup: &mut Soup, scale: [f64; 3]) {
+    for vertex in &mut soup.vertices {
+        for (x, factor) in vertex.iter_mut().zip(scale) {
+            *x *= factor;
+        }
+    }
+    if scale.iter().filter(|factor| **factor < 0.0).count() % 2 == 1 {
+        for face in &mut soup.faces {
+            face.swap(1, 2);
+        }
+    }
+}
+
+fn check_finite(soup: &Soup, path: &Path) -> Result<(), ShapeError> {
+    let bad = soup
+        .vertices
+        .iter()
+        .flat_map(|v| v.iter())
+        .find(|x| !x.is_finite());
+    bad.map_or(Ok(()), |value| {
+        Err(ShapeError::NotFinite {
+            what: format!("{}: a coordinate, scaled,", path.display()),
+            value: *value,
+        })
+    })
+}
+
+/// A finite number of a text file.
+fn number(word: &str, line: usize) -> Result<f64, Flaw> {
+    match word.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        Ok(value) => Err(Flaw::at(
+            line,
+            format!("{value} is not finite: export the mesh again"),
+        )),
+        Err(_) => {
+            let shown: String = word.chars().take(20).collect();
+            let text = format!(
+                "\"{}\" is not a number: mend it, or export the mesh again",
+                shown.escape_default()
+            );
+            Err(Flaw::at(line, text))
+        }
     }
 }
