@@ -21,6 +21,7 @@ mod brute;
 mod commit;
 mod forced;
 mod members;
+mod of_world;
 mod sap;
 mod touched;
 

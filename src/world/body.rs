@@ -104,6 +104,16 @@ impl Motion {
         }
     }
 
+    /// Takes a new anchor at the pose last moved to: for a body that enters the broad phase, whose certificates are yet
+    /// to be made and should not pay for where it was before.
+    pub fn anchor_here(&mut self, pose: &Pose) {
+        if self.offset_m > 0.0 {
+            self.path_m = self.spent_m();
+            self.offset_m = 0.0;
+        }
+        self.anchor = *pose;
+    }
+
     /// `S + d`: what a certificate's expiry is compared with.
     #[must_use]
     pub fn spent_m(&self) -> f64 {

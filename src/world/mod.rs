@@ -2,7 +2,351 @@
 //!
 //! In: frames (`wire::Inbox`), edits, the time. Out: a [`ChangeSet`] for the broad phase. Bad input is never an
 //! error here: it is a counted `RejectReason`, and what it leaves unknown is said so.
+//!
+//! A tick calls, in this order: [`World::begin_tick`], [`World::apply`] for each edit request, [`World::admit`] for
+//! each frame, [`World::age`] once. After that [`World::changes`] is complete.
 
+mod admit;
+mod age;
 mod body;
+mod census;
+mod edit;
+mod edit_check;
+mod edit_links;
+mod filters;
+mod lists;
+mod names;
+mod place;
+mod rules;
+mod source;
+mod validate;
 
+use std::sync::Arc;
+
+pub use admit::Admission;
 pub use body::{Body, ChangeSet, Motion, PlacedShape, Removed};
+pub use edit::{Applied, Edit};
+pub use filters::{Because, Filters};
+pub use source::SourceState;
+
+use crate::config::Config;
+use crate::error::{Error, Result};
+use crate::ids::{BodyId, BodySlot, SourceSlot};
+use crate::math::Aabb;
+use crate::scene::Scene;
+use crate::wire::{BodyStatus, REJECTS_LEN, Reason, RejectReason};
+use age::Ages;
+use census::slot_at;
+use lists::Lists;
+use names::Names;
+use place::Entry;
+use source::SessionsOver;
+
+/// How many bodies are in which state; what the tick row says of them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Bodies in the scene.
+    pub bodies: u64,
+    /// Bodies whose place is not known: not received, rejected or stale.
+    pub unknown: u64,
+    /// Bits of `wire::Reason` that the bodies and sources give.
+    pub reasons: u32,
+    /// Bodies by `BodyStatus`.
+    pub by_status: [u64; BodyStatus::ALL.len()],
+}
+
+/// Bodies, sources, filters and ages.
+#[derive(Clone, Debug)]
+pub struct World {
+    bodies: Vec<Option<Body>>,
+    entries: Vec<Entry>,
+    ages: Ages,
+    /// The bodies there are, by id.
+    order: Vec<(BodyId, BodySlot)>,
+    names: Names,
+    filters: Filters,
+    rigid_groups: Names,
+    sources: Vec<SourceState>,
+    over: SessionsOver,
+    /// Slots free for another body.
+    free: Vec<BodySlot>,
+    /// Slots freed in this tick.
+    resting: Vec<BodySlot>,
+    /// Bodies that take their pose from another.
+    attached: Vec<BodySlot>,
+    /// Stale bodies whose reach still grows.
+    growing: Vec<BodySlot>,
+    lists: Lists,
+    rejects: [u64; REJECTS_LEN],
+    by_status: [u64; BodyStatus::ALL.len()],
+    /// Number given to the newest pose frame of any source.
+    pose_frames: u64,
+    scene_rev: u64,
+    names_changed: bool,
+    edited: bool,
+    /// The change set was not taken yet by a tick: what `new` put there.
+    first: bool,
+    tick: u64,
+    now_ns: u64,
+    stale_reach_m: f64,
+    bodies_limit: usize,
+}
+
+impl World {
+    /// The world of a scene before any frame: bodies that cannot move are known, all others are not received.
+    ///
+    /// * `shapes` - one list a body, in the scene's order.
+    /// * `clock_now_boot_ns` - `CLOCK_BOOTTIME`.
+    ///
+    /// # Errors
+    /// `Error::Scene` when the scene does not hold together: names or ids twice, a reference to nothing, shapes
+    /// missing, too many bodies.
+    pub fn new(
+        scene: &Scene,
+        shapes: Vec<Arc<[PlacedShape]>>,
+        clock_now_boot_ns: u64,
+    ) -> Result<Self> {
+        if shapes.len() != scene.bodies.len() {
+            let (given, wanted) = (shapes.len(), scene.bodies.len());
+            return Err(Error::Scene(format!(
+                "shapes of {given} bodies were built for {wanted} bodies: build each body's shapes"
+            )));
+        }
+        let mut world = Self::empty(&scene.config, clock_now_boot_ns);
+        let len = scene.bodies.len();
+        let own = |source: usize| {
+            scene
+                .bodies
+                .iter()
+                .filter(move |b| b.source == Some(source))
+        };
+        world.sources = scene
+            .sources
+            .iter()
+            .enumerate()
+            .map(|(place, spec)| SourceState::new(spec, own(place).count()))
+            .collect();
+        let edits: Vec<Edit> = scene
+            .bodies
+            .iter()
+            .zip(shapes)
+            .map(|(body, shapes)| Edit::Put {
+                body: Arc::new(body.clone()),
+                shapes,
+            })
+            .collect();
+        world
+            .filters
+            .rules
+            .set(scene.rules.clone(), &mut world.names);
+        world.check(&edits, false).map_err(Error::Scene)?;
+        world.apply_checked(&edits);
+        world.scene_rev = 1;
+        world.names_changed = true;
+        world.edited = true;
+        world.first = true;
+        world.growing.reserve(len);
+        Ok(world)
+    }
+
+    fn empty(config: &Config, now_ns: u64) -> Self {
+        Self {
+            bodies: Vec::new(),
+            entries: Vec::new(),
+            ages: Ages::default(),
+            order: Vec::new(),
+            names: Names::default(),
+            filters: Filters::default(),
+            rigid_groups: Names::default(),
+            sources: Vec::new(),
+            over: SessionsOver::new(),
+            free: Vec::new(),
+            resting: Vec::new(),
+            attached: Vec::new(),
+            growing: Vec::new(),
+            lists: Lists::default(),
+            rejects: [0; REJECTS_LEN],
+            by_status: [0; BodyStatus::ALL.len()],
+            pose_frames: 0,
+            scene_rev: 0,
+            names_changed: false,
+            edited: false,
+            first: false,
+            tick: 0,
+            now_ns,
+            stale_reach_m: config.stale_reach_m,
+            bodies_limit: config.limits.bodies,
+        }
+    }
+
+    /// Opens a tick: the change set is empty again, and slots freed in the tick before may be used.
+    pub fn begin_tick(&mut self, tick: u64) {
+        self.tick = tick;
+        if !std::mem::take(&mut self.first) {
+            self.lists.clear();
+            self.names_changed = false;
+            self.edited = false;
+        }
+        self.free.append(&mut self.resting);
+    }
+
+    /// What this tick changed so far; complete after [`World::age`].
+    #[must_use]
+    pub fn changes(&self) -> &ChangeSet {
+        self.lists.set()
+    }
+
+    /// A body, by slot.
+    #[must_use]
+    pub fn body(&self, slot: BodySlot) -> Option<&Body> {
+        self.bodies.get(slot.index())?.as_ref()
+    }
+
+    /// All bodies with their slots, by id.
+    pub fn bodies(&self) -> impl Iterator<Item = (BodySlot, &Body)> {
+        let body = |&(_, slot): &(BodyId, BodySlot)| Some((slot, self.body(slot)?));
+        self.order.iter().filter_map(body)
+    }
+
+    /// Where a body is.
+    #[must_use]
+    pub fn slot_of(&self, id: BodyId) -> Option<BodySlot> {
+        let at = self.order.binary_search_by_key(&id, |e| e.0).ok()?;
+        Some(self.order[at].1)
+    }
+
+    /// Where the body of a name is.
+    #[must_use]
+    pub fn slot_named(&self, name: &str) -> Option<BodySlot> {
+        self.names.find_name(name)?.slot
+    }
+
+    /// One more than the highest slot ever in use: the length for arrays that run parallel to the bodies.
+    #[must_use]
+    pub fn slots_len(&self) -> usize {
+        self.bodies.len()
+    }
+
+    /// A body's proxy: its tight box, widened by `report_within_m` and its reach; `None` where no body is.
+    #[must_use]
+    pub fn proxy(&self, slot: BodySlot) -> Option<&Aabb> {
+        Some(&self.body(slot)?.proxy)
+    }
+
+    /// The sources, in the scene's order.
+    #[must_use]
+    pub fn sources(&self) -> &[SourceState] {
+        &self.sources
+    }
+
+    /// The place of a source.
+    #[must_use]
+    pub fn source_named(&self, name: &str) -> Option<SourceSlot> {
+        let place = self.sources.iter().position(|s| s.name == name)?;
+        Some(SourceSlot(slot_at(place).0))
+    }
+
+    /// Refusals in this boot, by `RejectReason`.
+    #[must_use]
+    pub fn rejects(&self) -> &[u64; REJECTS_LEN] {
+        &self.rejects
+    }
+
+    /// Revision of the scene: 1 at the start, raised by each request that changed something.
+    #[must_use]
+    pub fn scene_rev(&self) -> u64 {
+        self.scene_rev
+    }
+
+    /// Whether bodies came or went in this tick, so that names must be sent again.
+    #[must_use]
+    pub fn names_changed(&self) -> bool {
+        self.names_changed
+    }
+
+    /// Whether an edit changed the scene in this tick (always so in the first), so that forced pairs, filters and plan
+    /// must be looked at again.
+    #[must_use]
+    pub fn scene_changed(&self) -> bool {
+        self.edited
+    }
+
+    /// The filters: which pairs are checked and reported.
+    #[must_use]
+    pub fn filters(&self) -> &Filters {
+        &self.filters
+    }
+
+    /// Below which gap a pair is reported, metres.
+    #[must_use]
+    pub fn report_within(&self, a: BodySlot, b: BodySlot) -> f64 {
+        self.filters.report_within(a, b)
+    }
+
+    /// How many pairs a rule, neighbour, rigid group or attachment ignores.
+    #[must_use]
+    pub fn ignored_pairs_count(&self) -> u64 {
+        self.filters.ignored_pairs_count()
+    }
+
+    /// Oldest and newest sender's stamp among the poses in use, nanoseconds; zeros where there is none. As of
+    /// [`World::age`].
+    #[must_use]
+    pub fn stamps(&self) -> (u64, u64) {
+        self.ages.stamps()
+    }
+
+    /// What the bodies and sources make of the tick.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        let of = |status: BodyStatus| self.by_status[usize::from(status.code())];
+        let bodies: u64 = self.by_status.iter().sum();
+        let silent = !self.sources.is_empty() && self.sources.iter().all(|s| s.frames == 0);
+        let reasons = [
+            (Reason::NotReceived, of(BodyStatus::NotReceived) > 0),
+            (Reason::Rejected, of(BodyStatus::Rejected) > 0),
+            (Reason::Stale, of(BodyStatus::Stale) > 0),
+            (Reason::Held, of(BodyStatus::Held) > 0),
+            (Reason::RemovedByAge, of(BodyStatus::RemovedByAge) > 0),
+            (
+                Reason::NoInput,
+                bodies == of(BodyStatus::Disabled) || silent,
+            ),
+        ];
+        Counts {
+            bodies,
+            unknown: of(BodyStatus::NotReceived) + of(BodyStatus::Rejected) + of(BodyStatus::Stale),
+            reasons: reasons
+                .iter()
+                .filter(|(_, holds)| *holds)
+                .fold(0, |bits, (reason, _)| bits | reason.bit()),
+            by_status: self.by_status,
+        }
+    }
+
+    /// Counts frames that were passed over because a newer one of their source was there.
+    pub fn note_skipped(&mut self, source: SourceSlot, frames: u64) {
+        if let Some(source) = self.sources.get_mut(source.index()) {
+            source.skipped += frames;
+        }
+    }
+
+    /// Counts a refusal that the transport found before a frame could be made of it.
+    pub fn note_reject(&mut self, reason: RejectReason) {
+        self.rejects[usize::from(reason.code())] += 1;
+    }
+
+    /// The client of a source is dead (its node is gone): its session is over, another may begin at once.
+    pub fn session_dead(&mut self, source: SourceSlot) {
+        if let Some(state) = self.sources.get_mut(source.index())
+            && state.session != 0
+        {
+            self.over.put(source, state.session);
+            state.session = 0;
+            state.order = None;
+            if state.waiting.until_ns.take().is_some() {
+                state.skipped += 1;
+            }
+        }
+    }
+}

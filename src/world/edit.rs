@@ -1,0 +1,412 @@
+//! Scene edits at run time: put, remove, enable, filter, rules, attach, reset.
+//!
+//! In: one request, a list of [`Edit`]s with shapes already built. Out: all of it done and a new scene revision, or
+//! nothing done and a text that says what to change. An edit allocates; a tick without one does not.
+
+use std::sync::Arc;
+
+use super::World;
+use super::body::PlacedShape;
+use super::census::slot_at;
+use super::filters::{ENABLED, Hot, LIVE, MOVES, NO_GROUP, UNBOUNDED};
+use super::names::NameId;
+use super::place::{Entry, new_body};
+use super::rules::sides_of;
+use crate::ids::{BodyId, BodySlot, SourceSlot};
+use crate::math::Pose;
+use crate::scene::{BodySpec, PairRule};
+use crate::wire::{BodyStatus, EndCause};
+
+/// One change of the scene.
+#[derive(Clone, Debug)]
+pub enum Edit {
+    /// A body by name: new, or in place of the one of this name. The same content again changes nothing.
+    Put {
+        /// What it is; id 0: the one its name had in this boot, or the least that is free.
+        body: Arc<BodySpec>,
+        /// Its built shapes, in the order of `body.shapes`.
+        shapes: Arc<[PlacedShape]>,
+    },
+    /// Takes a body out.
+    Remove {
+        /// Its name.
+        name: String,
+    },
+    /// Lets a body take part, or not.
+    Enable {
+        /// Its name.
+        name: String,
+        /// Whether it takes part.
+        enabled: bool,
+    },
+    /// Sets a body's group and mask.
+    Filter {
+        /// Its name.
+        name: String,
+        /// Groups it belongs to; `None`: as they are.
+        group: Option<u32>,
+        /// Groups it collides with; `None`: as they are.
+        mask: Option<u32>,
+    },
+    /// Adds a pair rule behind all others, so that it wins over them.
+    Rule(PairRule),
+    /// Takes out every pair rule of these two sides, in either order.
+    DropRules {
+        /// The one side, as the rule says it.
+        a: String,
+        /// The other side.
+        b: String,
+    },
+    /// Hangs a body on another, or lets it go.
+    Attach {
+        /// Its name.
+        name: String,
+        /// The body to hang it on; `None`: it is on its own again.
+        to: Option<String>,
+        /// Its pose seen from there; `None`: where it is now.
+        pose: Option<Pose>,
+    },
+    /// Forgets every pose: pairs end, bodies that move are not received again.
+    Reset {
+        /// Of this source's bodies only; `None`: of all.
+        source: Option<String>,
+    },
+}
+
+/// What a request did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Applied {
+    /// Scene revision from which on it holds.
+    pub scene_rev: u64,
+    /// Whether anything changed.
+    pub changed: bool,
+}
+
+/// What has to be done once for a request, after its last edit.
+#[derive(Clone, Copy, Debug, Default)]
+struct After {
+    changed: bool,
+    links: bool,
+    census: bool,
+}
+
+impl World {
+    /// Applies one request: all of its edits in their order, or none.
+    ///
+    /// # Errors
+    /// A text for the user: which edit names what, and what to change. Then nothing of the request was applied.
+    pub fn apply(&mut self, edits: &[Edit]) -> Result<Applied, String> {
+        self.check(edits, true)?;
+        Ok(self.apply_checked(edits))
+    }
+
+    /// Applies edits that [`World::check`] let pass.
+    pub(super) fn apply_checked(&mut self, edits: &[Edit]) -> Applied {
+        let mut after = After::default();
+        for edit in edits {
+            self.apply_one(edit, &mut after);
+        }
+        if after.links {
+            self.link();
+        }
+        if after.census {
+            self.recount();
+        }
+        if after.changed {
+            self.scene_rev += 1;
+            self.edited = true;
+        }
+        Applied {
+            scene_rev: self.scene_rev,
+            changed: after.changed,
+        }
+    }
+
+    fn apply_one(&mut self, edit: &Edit, after: &mut After) {
+        let changed = match edit {
+            Edit::Put { body, shapes } => {
+                let put = self.put(body, shapes);
+                after.links |= put;
+                put
+            }
+            Edit::Remove { name } => {
+                let removed = self.remove(name);
+                after.links |= removed;
+                removed
+            }
+            Edit::Enable { name, enabled } => self.enable(name, *enabled),
+            Edit::Filter { name, group, mask } => self.filter(name, *group, *mask),
+            Edit::Rule(rule) => self.add_rule(rule),
+            Edit::DropRules { a, b } => self.drop_rules(a, b),
+            Edit::Attach { name, to, pose } => {
+                let attached = self.attach(name, to.as_deref(), pose.as_ref());
+                after.links |= attached;
+                attached
+            }
+            Edit::Reset { source } => {
+                self.reset(source.as_deref());
+                after.changed = true;
+                return;
+            }
+        };
+        after.changed |= changed;
+        after.census |= changed;
+    }
+
+    /// Puts a body, unless the very same is there.
+    fn put(&mut self, spec: &Arc<BodySpec>, shapes: &Arc<[PlacedShape]>) -> bool {
+        let known = self.names.find_name(&spec.name).and_then(|n| n.slot);
+        if let Some(slot) = known {
+            if self.is_same(slot, spec, shapes) {
+                return false;
+            }
+            self.clear_slot(slot, EndCause::Removed);
+        }
+        let name = self.names.intern(&spec.name);
+        let wanted = (spec.id != BodyId(0)).then_some(spec.id);
+        let id = self.names.claim(name, wanted);
+        let slot = known
+            .or_else(|| self.free.pop())
+            .unwrap_or_else(|| self.new_slot());
+        let kept = self.names.get_mut(name);
+        kept.slot = Some(slot);
+        kept.generation += 1;
+        let (mut body, tight) = new_body(spec, shapes.clone(), kept.generation);
+        body.id = id;
+        body.source = spec.source.map(|s| SourceSlot(slot_at(s).0));
+        let mut entry = Entry::gone(slot);
+        entry.enabled = spec.enabled;
+        entry.has_pose = !spec.moves;
+        entry.tight = tight;
+        entry.attach = spec
+            .attached_to
+            .as_ref()
+            .map(|to| (self.names.intern(to), spec.pose));
+        entry.spec = Some(spec.clone());
+        self.entries[slot.index()] = entry;
+        let parent = spec.parent.as_ref().map(|p| self.names.intern(p));
+        let rigid = spec
+            .rigid_group
+            .as_ref()
+            .map(|g| self.rigid_groups.intern(g).0);
+        let flag = |on: bool, bit: u16| if on { bit } else { 0 };
+        self.filters.sync_names(&self.names);
+        self.filters.bodies[slot.index()] = Hot {
+            flags: LIVE
+                | flag(spec.enabled, ENABLED)
+                | flag(spec.moves, MOVES)
+                | flag(body.unbounded, UNBOUNDED),
+            group: spec.group,
+            mask: spec.mask,
+            name,
+            parent: parent.unwrap_or(NameId::NONE),
+            rigid: rigid.unwrap_or(NO_GROUP),
+            root: name,
+            report_within_m: spec.report_within_m,
+        };
+        self.filters.mark_ruled(slot.index());
+        self.by_status[usize::from(body.status.code())] += 1;
+        if let Err(at) = self.order.binary_search_by_key(&id, |e| e.0) {
+            self.order.insert(at, (id, slot));
+        }
+        self.bodies[slot.index()] = Some(body);
+        self.names_changed = true;
+        self.settle(slot, true);
+        true
+    }
+
+    /// Whether a put would change nothing: the same words, shapes of the same measures, and no edit in between.
+    fn is_same(&self, slot: BodySlot, spec: &BodySpec, shapes: &[PlacedShape]) -> bool {
+        let entry = &self.entries[slot.index()];
+        let (Some(old), Some(body)) = (&entry.spec, self.body(slot)) else {
+            return false;
+        };
+        let same_words = if spec.id == BodyId(0) || old.id == BodyId(0) {
+            let with_id = |s: &BodySpec| BodySpec {
+                id: body.id,
+                ..s.clone()
+            };
+            with_id(old) == with_id(spec)
+        } else {
+            **old == *spec
+        };
+        // A file may have changed under the same name.
+        let same_shapes = body.shapes.len() == shapes.len()
+            && body.shapes.iter().zip(shapes).all(|(a, b)| {
+                a.shape.aabb == b.shape.aabb && a.shape.radius.to_bits() == b.shape.radius.to_bits()
+            });
+        !entry.edited && same_words && same_shapes
+    }
+
+    fn new_slot(&mut self) -> BodySlot {
+        let slot = slot_at(self.bodies.len());
+        self.bodies.push(None);
+        self.entries.push(Entry::gone(slot));
+        self.filters.bodies.push(Hot::GONE);
+        self.filters.margins_m.push(0.0);
+        self.ages.grow(self.bodies.len());
+        self.lists.grow(self.bodies.len());
+        slot
+    }
+
+    /// Takes a slot's body out of everything but the names.
+    fn clear_slot(&mut self, slot: BodySlot, cause: EndCause) {
+        let Some(body) = self.bodies[slot.index()].take() else {
+            return;
+        };
+        if body.in_broad {
+            self.lists.remove(slot, cause);
+        }
+        self.lists.forget(slot);
+        self.by_status[usize::from(body.status.code())] -= 1;
+        if let Ok(at) = self.order.binary_search_by_key(&body.id, |e| e.0) {
+            self.order.remove(at);
+        }
+        self.growing.retain(|&other| other != slot);
+        self.entries[slot.index()] = Entry::gone(slot);
+        self.filters.bodies[slot.index()] = Hot::GONE;
+        self.ages.set(slot, None, None);
+        if let Some(name) = self.names.find(&body.name) {
+            self.names.get_mut(name).slot = None;
+        }
+        self.names_changed = true;
+    }
+
+    fn remove(&mut self, name: &str) -> bool {
+        let Some(slot) = self.slot_named(name) else {
+            return false;
+        };
+        self.clear_slot(slot, EndCause::Removed);
+        self.resting.push(slot);
+        true
+    }
+
+    fn enable(&mut self, name: &str, enabled: bool) -> bool {
+        let Some(slot) = self.slot_named(name) else {
+            return false;
+        };
+        let entry = &mut self.entries[slot.index()];
+        if entry.enabled == enabled {
+            return false;
+        }
+        entry.enabled = enabled;
+        entry.edited = true;
+        if let Some(hot) = self.hot(slot) {
+            hot.flags = if enabled {
+                hot.flags | ENABLED
+            } else {
+                hot.flags & !ENABLED
+            };
+        }
+        self.settle(slot, false);
+        true
+    }
+
+    fn filter(&mut self, name: &str, group: Option<u32>, mask: Option<u32>) -> bool {
+        let Some(slot) = self.slot_named(name) else {
+            return false;
+        };
+        let Some(hot) = self.hot(slot) else {
+            return false;
+        };
+        let (group, mask) = (group.unwrap_or(hot.group), mask.unwrap_or(hot.mask));
+        if (group, mask) == (hot.group, hot.mask) {
+            return false;
+        }
+        (hot.group, hot.mask) = (group, mask);
+        self.entries[slot.index()].edited = true;
+        self.requery(slot);
+        true
+    }
+
+    /// Has a body's pairs found again, where it is in the broad phase.
+    pub(super) fn requery(&mut self, slot: BodySlot) {
+        if self.body(slot).is_some_and(|body| body.in_broad) {
+            self.lists.requery(slot);
+        }
+    }
+
+    fn add_rule(&mut self, rule: &PairRule) -> bool {
+        if self.filters.rules.list().last() == Some(rule) {
+            return false;
+        }
+        let mut list = self.filters.rules.list().to_vec();
+        // The same rule further up has nothing to say behind this one.
+        list.retain(|other| other != rule);
+        list.push(rule.clone());
+        self.set_rules(list, std::slice::from_ref(rule));
+        true
+    }
+
+    fn drop_rules(&mut self, a: &str, b: &str) -> bool {
+        let (dropped, list): (Vec<PairRule>, Vec<PairRule>) = self
+            .filters
+            .rules
+            .list()
+            .iter()
+            .cloned()
+            .partition(|r| is_rule_of(r, a, b));
+        self.set_rules(list, &dropped);
+        !dropped.is_empty()
+    }
+
+    /// New rules, and a new search for the pairs of all bodies that the changed ones speak of.
+    fn set_rules(&mut self, list: Vec<PairRule>, changed: &[PairRule]) {
+        self.filters.rules.set(list, &mut self.names);
+        for index in 0..self.bodies.len() {
+            self.filters.mark_ruled(index);
+            let slot = slot_at(index);
+            let named = self
+                .body(slot)
+                .is_some_and(|body| changed.iter().any(|rule| sides_of(rule, &body.name) != 0));
+            if named {
+                self.requery(slot);
+            }
+        }
+    }
+
+    fn reset(&mut self, source: Option<&str>) {
+        if let Some(name) = source {
+            if let Some(source) = self.source_named(name) {
+                self.forget_poses(source);
+            }
+            return;
+        }
+        for index in 0..self.bodies.len() {
+            let slot = slot_at(index);
+            let Some(body) = self.body(slot) else {
+                continue;
+            };
+            if body.moves {
+                self.forget_pose(slot);
+            } else if body.in_broad {
+                // It stays where it is, but its pairs end and begin anew.
+                self.lists.remove(slot, EndCause::Reset);
+                self.lists.insert(slot);
+            }
+        }
+    }
+
+    /// What the filters make of the scene after an edit: ignored and forced pairs, and how wide boxes must be.
+    fn recount(&mut self) {
+        self.filters.count_ignored(&self.names);
+        self.filters.find_forced(&self.names);
+        for index in 0..self.bodies.len() {
+            let slot = slot_at(index);
+            let Some(body) = self.body(slot) else {
+                continue;
+            };
+            let margin_m = self.margin_of(slot, body);
+            let entry = &self.entries[index];
+            let narrowed = body.status != BodyStatus::Stale && entry.widened_m != margin_m;
+            if entry.widened_m < margin_m || narrowed {
+                self.settle(slot, false);
+            }
+        }
+    }
+}
+
+/// Whether a rule has these two sides, in either order.
+pub(super) fn is_rule_of(rule: &PairRule, a: &str, b: &str) -> bool {
+    (rule.a == a && rule.b == b) || (rule.a == b && rule.b == a)
+}

@@ -1,0 +1,336 @@
+//! Looks at a whole request before any of it is applied, so that it succeeds or fails as one.
+//!
+//! In: edits in their order. Out: nothing, or a text that says which edit, what is wrong and what to change.
+
+use std::collections::BTreeMap;
+
+use super::World;
+use super::edit::{Edit, is_rule_of};
+use super::rules::sides_of;
+use crate::ids::BodyId;
+use crate::limits::SHAPES_PER_BODY_MAX;
+use crate::math::Pose;
+use crate::scene::{BodySpec, PairRule};
+use crate::wire::BODY_NAME_LEN;
+
+/// Most names met in a boot: each is kept, because an id stays with its name.
+const NAMES_MAX: usize = 1 << 22;
+/// Most pair rules. Every new name is matched with each rule that has a pattern.
+const RULES_MAX: usize = 1 << 20;
+
+/// The scene as it would be after the edits looked at so far, where they change it.
+struct Draft<'a> {
+    world: &'a World,
+    /// Bodies that the request puts (with what they hang on) or removes (`None`).
+    bodies: BTreeMap<&'a str, Option<Hangs<'a>>>,
+    /// Names that ids were given to by the request.
+    ids: BTreeMap<BodyId, &'a str>,
+    len: usize,
+    rules: Option<Vec<PairRule>>,
+}
+
+/// What a body hangs on.
+type Hangs<'a> = Option<&'a str>;
+
+impl World {
+    /// Whether a request can be applied as a whole.
+    ///
+    /// * `numbered` - whether errors say which edit it is.
+    pub(super) fn check(&self, edits: &[Edit], numbered: bool) -> Result<(), String> {
+        let mut draft = Draft {
+            world: self,
+            bodies: BTreeMap::new(),
+            ids: BTreeMap::new(),
+            len: self.order.len(),
+            rules: None,
+        };
+        for (at, edit) in edits.iter().enumerate() {
+            draft.look_at(edit).map_err(|text| {
+                if numbered {
+                    format!("edit {}: {text}", at + 1)
+                } else {
+                    text
+                }
+            })?;
+        }
+        draft.references_hold(edits)
+    }
+
+    /// Whether the place of a body is known well enough to hang something on it, or it on something.
+    fn is_placed(&self, name: &str) -> bool {
+        let Some(slot) = self.slot_named(name) else {
+            return false;
+        };
+        let root = &self.entries[self.entries[slot.index()].root.index()];
+        root.has_pose && !root.refused
+    }
+}
+
+impl<'a> Draft<'a> {
+    fn look_at(&mut self, edit: &'a Edit) -> Result<(), String> {
+        match edit {
+            Edit::Put { body, shapes } => self.look_at_put(body, shapes.len()),
+            Edit::Remove { name } => {
+                self.must_have(name)?;
+                self.bodies.insert(name, None);
+                self.len -= 1;
+                Ok(())
+            }
+            Edit::Enable { name, .. } | Edit::Filter { name, .. } => self.must_have(name),
+            Edit::Rule(rule) => self.look_at_rule(rule),
+            Edit::DropRules { a, b } => self.look_at_drop(a, b),
+            Edit::Attach { name, to, pose } => {
+                self.look_at_attach(name, to.as_deref(), pose.as_ref())
+            }
+            Edit::Reset { source } => match source {
+                Some(name) if self.world.source_named(name).is_none() => Err(format!(
+                    "there is no source `{name}`: name one of the scene's sources, or none to reset all"
+                )),
+                _ => Ok(()),
+            },
+        }
+    }
+
+    /// Whether a body is there at this point of the request.
+    fn has(&self, name: &str) -> bool {
+        match self.bodies.get(name) {
+            Some(body) => body.is_some(),
+            None => self.world.slot_named(name).is_some(),
+        }
+    }
+
+    fn must_have(&self, name: &str) -> Result<(), String> {
+        if self.has(name) {
+            return Ok(());
+        }
+        Err(format!(
+            "there is no body `{name}`: correct the name, or put the body first"
+        ))
+    }
+
+    fn look_at_put(&mut self, spec: &'a BodySpec, shapes: usize) -> Result<(), String> {
+        let name = &*spec.name;
+        let wrong = |what: String| Err(format!("body `{name}`: {what}"));
+        if name.is_empty() || name.len() > BODY_NAME_LEN {
+            return wrong(format!("a name has 1 to {BODY_NAME_LEN} bytes"));
+        }
+        if shapes == 0 || shapes > SHAPES_PER_BODY_MAX {
+            return wrong(format!(
+                "a body has 1 to {SHAPES_PER_BODY_MAX} shapes, not {shapes}"
+            ));
+        }
+        let p = &spec.pose;
+        let numbers = p.translation.vector.iter().chain(p.rotation.coords.iter());
+        if !numbers
+            .chain([&spec.report_within_m])
+            .all(|v| v.is_finite())
+        {
+            return wrong("its pose and `report_within_m` must be finite".to_owned());
+        }
+        let speed_mps = spec.max_speed_mps.unwrap_or(0.0);
+        if spec.report_within_m < 0.0 || !speed_mps.is_finite() || speed_mps < 0.0 {
+            return wrong("`report_within_m` and `max_speed_mps` are not negative".to_owned());
+        }
+        match spec.source {
+            Some(source) if source >= self.world.sources.len() => {
+                return wrong("its source is not in the scene: name one of the scene's".to_owned());
+            }
+            None if spec.moves && spec.attached_to.is_none() => {
+                return wrong("it moves, but no source may move it: give `source`".to_owned());
+            }
+            _ => {}
+        }
+        self.look_at_id(spec)?;
+        if !self.has(name) {
+            self.len += 1;
+            if self.len > self.world.bodies_limit {
+                let limit = self.world.bodies_limit;
+                return wrong(format!(
+                    "the scene is full ({limit} bodies): raise `limits.bodies`"
+                ));
+            }
+            if self.world.names.len() + self.bodies.len() >= NAMES_MAX {
+                return wrong(format!(
+                    "{NAMES_MAX} names were used since the start: use names again, or restart"
+                ));
+            }
+        }
+        self.bodies.insert(name, Some(spec.attached_to.as_deref()));
+        Ok(())
+    }
+
+    /// An id belongs to one name for a boot, and a name has one id.
+    fn look_at_id(&mut self, spec: &'a BodySpec) -> Result<(), String> {
+        if spec.id == BodyId(0) {
+            return Ok(());
+        }
+        let (name, id) = (&*spec.name, spec.id.0);
+        let names = &self.world.names;
+        let had = names.find_name(name).and_then(|n| n.id);
+        if let Some(had) = had.filter(|had| *had != spec.id) {
+            return Err(format!(
+                "body `{name}` has the id {} for this run of the daemon, not {id}: give that, or none",
+                had.0
+            ));
+        }
+        let owner = names.owner_of(spec.id).map(|n| &*n.text);
+        let owner = owner.or_else(|| self.ids.get(&spec.id).copied());
+        if let Some(owner) = owner.filter(|owner| *owner != name) {
+            return Err(format!(
+                "body `{name}`: the id {id} belongs to `{owner}`: give another, or none"
+            ));
+        }
+        self.ids.insert(spec.id, name);
+        Ok(())
+    }
+
+    fn names(&self) -> impl Iterator<Item = &str> {
+        let world = self.world;
+        let there = world.names.all().iter().filter(|n| n.slot.is_some());
+        let put = self.bodies.iter().filter(|(_, b)| b.is_some());
+        there
+            .map(|n| &*n.text)
+            .filter(|name| !matches!(self.bodies.get(name), Some(None)))
+            .chain(put.map(|(name, _)| *name))
+    }
+
+    fn rules(&mut self) -> &mut Vec<PairRule> {
+        let list = self.world.filters.rules.list();
+        self.rules.get_or_insert_with(|| list.to_vec())
+    }
+
+    fn look_at_rule(&mut self, rule: &PairRule) -> Result<(), String> {
+        if rule
+            .report_within_m
+            .is_some_and(|m| !m.is_finite() || m < 0.0)
+        {
+            return Err("a rule's `report_within_m` is finite and not negative".to_owned());
+        }
+        let (mut a, mut b) = (false, false);
+        for name in self.names() {
+            let sides = sides_of(rule, name);
+            a |= sides & 1 != 0;
+            b |= sides & 2 != 0;
+        }
+        if let Some(side) = [(a, &rule.a), (b, &rule.b)].iter().find(|(any, _)| !any) {
+            return Err(format!(
+                "no body matches `{}`: correct the rule, or put the body first",
+                side.1
+            ));
+        }
+        if self.rules().len() >= RULES_MAX {
+            return Err(format!(
+                "there are {RULES_MAX} pair rules: drop some, or use patterns"
+            ));
+        }
+        self.rules().push(rule.clone());
+        Ok(())
+    }
+
+    fn look_at_drop(&mut self, a: &str, b: &str) -> Result<(), String> {
+        let before = self.rules().len();
+        self.rules().retain(|rule| !is_rule_of(rule, a, b));
+        if self.rules().len() == before {
+            return Err(format!(
+                "there is no pair rule for `{a}` and `{b}`: write both as the rule does"
+            ));
+        }
+        Ok(())
+    }
+
+    fn look_at_attach(
+        &mut self,
+        name: &'a str,
+        to: Option<&'a str>,
+        pose: Option<&Pose>,
+    ) -> Result<(), String> {
+        self.must_have(name)?;
+        if pose.is_some_and(|p| !p.to_homogeneous().iter().all(|v| v.is_finite())) {
+            return Err(format!("body `{name}`: its pose must be finite"));
+        }
+        // What this request puts has no place of its own yet but its start pose.
+        let placed = |name: &str| self.bodies.contains_key(name) || self.world.is_placed(name);
+        match to {
+            Some(to) => {
+                self.must_have(to)?;
+                if pose.is_none() && !(placed(name) && placed(to)) {
+                    return Err(format!(
+                        "it is not known where `{name}` is seen from `{to}`: give `pose`, or wait for their frames"
+                    ));
+                }
+            }
+            None => self.look_at_detach(name, pose, placed(name))?,
+        }
+        self.bodies.insert(name, Some(to));
+        Ok(())
+    }
+
+    /// A body let go needs a place, if it cannot move, or a source.
+    fn look_at_detach(&self, name: &str, pose: Option<&Pose>, placed: bool) -> Result<(), String> {
+        let slot = self.world.slot_named(name);
+        let spec = slot.and_then(|s| self.world.entries[s.index()].spec.as_ref());
+        let Some(spec) = spec else {
+            return Ok(());
+        };
+        if spec.moves && pose.is_some() {
+            return Err(format!(
+                "body `{name}` moves: its source says where it is, leave out `pose`"
+            ));
+        }
+        if spec.moves && spec.source.is_none() {
+            return Err(format!(
+                "body `{name}` moves, but no source may move it: put it with a `source`"
+            ));
+        }
+        if !spec.moves && pose.is_none() && !placed {
+            return Err(format!("it is not known where `{name}` is: give `pose`"));
+        }
+        Ok(())
+    }
+
+    /// After the last edit: parents and attachments are there, and none hangs on itself.
+    fn references_hold(&self, edits: &[Edit]) -> Result<(), String> {
+        for edit in edits {
+            if let Edit::Put { body, .. } = edit
+                && self.has(&body.name)
+                && let Some(parent) = body.parent.as_deref().filter(|p| !self.has(p))
+            {
+                return Err(format!(
+                    "body `{}`: there is no body `{parent}` to be its parent: correct the name, or put it too",
+                    body.name
+                ));
+            }
+        }
+        let names: Vec<&str> = self.names().collect();
+        if !names.iter().any(|name| self.hangs_on(name).is_some()) {
+            return Ok(());
+        }
+        for name in &names {
+            let (mut at, mut steps) = (*name, 0);
+            while let Some(to) = self.hangs_on(at) {
+                if !self.has(to) {
+                    return Err(format!(
+                        "body `{at}` hangs on `{to}`, which is not there: let it go or remove it too"
+                    ));
+                }
+                steps += 1;
+                if steps > names.len() {
+                    return Err(format!(
+                        "body `{name}` would hang on itself: let one go first"
+                    ));
+                }
+                at = to;
+            }
+        }
+        Ok(())
+    }
+
+    fn hangs_on(&self, name: &str) -> Option<&str> {
+        if let Some(body) = self.bodies.get(name) {
+            return body.flatten();
+        }
+        let slot = self.world.slot_named(name)?;
+        let (to, _) = self.world.entries[slot.index()].attach?;
+        Some(&self.world.names.get(to).text)
+    }
+}

@@ -1,0 +1,261 @@
+//! Which pairs are checked, and why not the others.
+//!
+//! In: masks, neighbours, rigid groups and rules, compiled when the scene changes. Out: a yes or no a pair. The common
+//! pair (no rule speaks of both bodies) costs two loads of one cache line each and a few compares. The order of what
+//! beats what: bodies that cannot be paired at all, then rules (the last that matches), then neighbours, rigid groups
+//! and attached bodies, then masks.
+
+use super::names::{NameId, Names};
+use super::rules::{Rules, ignores};
+use crate::ids::{BodySlot, PairKey};
+
+pub(super) const LIVE: u16 = 1;
+pub(super) const ENABLED: u16 = 2;
+pub(super) const MOVES: u16 = 4;
+pub(super) const UNBOUNDED: u16 = 8;
+pub(super) const KEEPS: u16 = 16;
+/// A rule of two plain names speaks of it.
+pub(super) const EXACT: u16 = 32;
+/// A rule with a pattern speaks of it.
+pub(super) const SIDED: u16 = 64;
+
+/// No group.
+pub(super) const NO_GROUP: u32 = u32::MAX;
+
+/// Why a pair is checked or not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Because {
+    /// The masks allow it: checked.
+    Masks,
+    /// A `check` rule: checked.
+    CheckRule,
+    /// An `ignore` rule.
+    IgnoreRule,
+    /// The one is the other's parent.
+    Neighbours,
+    /// Both are in one rigid group.
+    RigidGroup,
+    /// Both hang on one body.
+    Attached,
+    /// The masks do not allow it.
+    MasksIgnore,
+    /// Neither can move.
+    CannotMove,
+    /// Both are half-spaces.
+    HalfSpaces,
+    /// A body is disabled, or not there.
+    Disabled,
+}
+
+impl Because {
+    /// Whether the pair is checked.
+    #[must_use]
+    pub fn allows(self) -> bool {
+        matches!(self, Self::Masks | Self::CheckRule)
+    }
+
+    /// Whether it counts as an ignored pair: a rule, neighbour, rigid group or attachment says so.
+    #[must_use]
+    pub fn is_ignored(self) -> bool {
+        matches!(
+            self,
+            Self::IgnoreRule | Self::Neighbours | Self::RigidGroup | Self::Attached
+        )
+    }
+
+    /// The word for people.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Masks => "masks allow",
+            Self::CheckRule => "check rule",
+            Self::IgnoreRule => "ignore rule",
+            Self::Neighbours => "neighbours",
+            Self::RigidGroup => "rigid group",
+            Self::Attached => "attached to one body",
+            Self::MasksIgnore => "masks",
+            Self::CannotMove => "neither can move",
+            Self::HalfSpaces => "two half-spaces",
+            Self::Disabled => "disabled",
+        }
+    }
+}
+
+/// What the filters need of one body, side by side in one cache line.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hot {
+    pub(super) flags: u16,
+    pub(super) group: u32,
+    pub(super) mask: u32,
+    pub(super) name: NameId,
+    pub(super) parent: NameId,
+    pub(super) rigid: u32,
+    /// Name of the body it hangs on in the end; its own where it hangs on none.
+    pub(super) root: NameId,
+    pub(super) report_within_m: f64,
+}
+
+impl Hot {
+    pub(super) const GONE: Self = Self {
+        flags: 0,
+        group: 0,
+        mask: 0,
+        name: NameId::NONE,
+        parent: NameId::NONE,
+        rigid: NO_GROUP,
+        root: NameId::NONE,
+        report_within_m: 0.0,
+    };
+
+    pub(super) fn has(&self, flag: u16) -> bool {
+        self.flags & flag != 0
+    }
+}
+
+/// The compiled filters.
+#[derive(Clone, Debug, Default)]
+pub struct Filters {
+    pub(super) bodies: Vec<Hot>,
+    pub(super) rules: Rules,
+    pub(super) ignored: u64,
+    pub(super) forced: Vec<PairKey>,
+    /// Per slot: by how much a box must be widened for rules whose pairs are too many to be forced, metres.
+    pub(super) margins_m: Vec<f64>,
+}
+
+impl Filters {
+    /// Whether this pair is checked. Symmetric.
+    #[must_use]
+    pub fn allows(&self, a: BodySlot, b: BodySlot) -> bool {
+        self.decide(a, b).allows()
+    }
+
+    /// Whether the body's box says nothing, because its place is not known and its reach has no bound.
+    #[must_use]
+    pub fn keeps(&self, slot: BodySlot) -> bool {
+        self.bodies
+            .get(slot.index())
+            .is_some_and(|hot| hot.has(KEEPS))
+    }
+
+    /// Whether a pair is checked, and why.
+    #[must_use]
+    pub fn decide(&self, a: BodySlot, b: BodySlot) -> Because {
+        let (Some(hot_a), Some(hot_b)) = (self.bodies.get(a.index()), self.bodies.get(b.index()))
+        else {
+            return Because::Disabled;
+        };
+        let both = hot_a.flags & hot_b.flags;
+        if a == b || both & LIVE == 0 || both & ENABLED == 0 {
+            return Because::Disabled;
+        }
+        if let Some(never) = never(hot_a, hot_b) {
+            return never;
+        }
+        if both & (EXACT | SIDED) != 0
+            && let Some((_, rule)) = self.rules.last_match(hot_a.name, hot_b.name)
+        {
+            return by_rule(ignores(rule));
+        }
+        by_default(hot_a, hot_b)
+    }
+
+    /// The reason text of the rule that decides a pair; `None` where none does.
+    #[must_use]
+    pub fn rule_reason(&self, a: BodySlot, b: BodySlot) -> Option<&str> {
+        let (hot_a, hot_b) = (self.bodies.get(a.index())?, self.bodies.get(b.index())?);
+        if hot_a.flags & hot_b.flags & (EXACT | SIDED) == 0 {
+            return None;
+        }
+        let (_, rule) = self.rules.last_match(hot_a.name, hot_b.name)?;
+        Some(&rule.reason)
+    }
+
+    /// Below which gap a pair is reported, metres: the larger of its bodies' values; a rule's value overrides it.
+    #[must_use]
+    pub fn report_within(&self, a: BodySlot, b: BodySlot) -> f64 {
+        let (Some(hot_a), Some(hot_b)) = (self.bodies.get(a.index()), self.bodies.get(b.index()))
+        else {
+            return 0.0;
+        };
+        if self.rules.any_report()
+            && hot_a.flags & hot_b.flags & (EXACT | SIDED) != 0
+            && let Some((_, rule)) = self.rules.last_match(hot_a.name, hot_b.name)
+            && let Some(report_within_m) = rule.report_within_m
+        {
+            return report_within_m;
+        }
+        hot_a.report_within_m.max(hot_b.report_within_m)
+    }
+
+    /// Pairs that are candidates at any distance, because a rule reports them farther than their boxes are widened.
+    /// Sorted; only allowed pairs; their bodies may be out of the broad phase.
+    #[must_use]
+    pub fn forced_pairs(&self) -> &[PairKey] {
+        &self.forced
+    }
+
+    /// How many pairs a rule, neighbour, rigid group or attachment ignores.
+    #[must_use]
+    pub fn ignored_pairs_count(&self) -> u64 {
+        self.ignored
+    }
+
+    /// Marks what the rules say of a slot's name, after the rules or the slot changed.
+    pub(super) fn mark_ruled(&mut self, slot: usize) {
+        let hot = &mut self.bodies[slot];
+        hot.flags &= !(EXACT | SIDED);
+        if hot.has(LIVE) {
+            let (exact, sided) = self.rules.speaks_of(hot.name);
+            hot.flags |= if exact { EXACT } else { 0 } | if sided { SIDED } else { 0 };
+        }
+    }
+
+    /// Compiles the rules for names that are new, or all of them.
+    pub(super) fn sync_names(&mut self, names: &Names) {
+        self.rules.sync(names);
+    }
+}
+
+/// What no rule can change.
+pub(super) fn never(a: &Hot, b: &Hot) -> Option<Because> {
+    if (a.flags | b.flags) & MOVES == 0 {
+        return Some(Because::CannotMove);
+    }
+    (a.flags & b.flags & UNBOUNDED != 0).then_some(Because::HalfSpaces)
+}
+
+/// What a rule's word makes of a pair.
+pub(super) fn by_rule(ignores: bool) -> Because {
+    if ignores {
+        Because::IgnoreRule
+    } else {
+        Because::CheckRule
+    }
+}
+
+/// What holds where no rule matches.
+pub(super) fn by_default(a: &Hot, b: &Hot) -> Because {
+    if are_neighbours(a, b) {
+        return Because::Neighbours;
+    }
+    by_default_of_strangers(a, b)
+}
+
+/// What holds where no rule matches and neither is the other's parent.
+pub(super) fn by_default_of_strangers(a: &Hot, b: &Hot) -> Because {
+    if a.rigid == b.rigid && a.rigid != NO_GROUP {
+        Because::RigidGroup
+    } else if a.root == b.root {
+        Because::Attached
+    } else if a.group & b.mask != 0 && b.group & a.mask != 0 {
+        Because::Masks
+    } else {
+        Because::MasksIgnore
+    }
+}
+
+/// Whether the one is the other's parent.
+pub(super) fn are_neighbours(a: &Hot, b: &Hot) -> bool {
+    a.parent == b.name || b.parent == a.name
+}

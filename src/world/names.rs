@@ -1,0 +1,129 @@
+//! Names, for a boot: a dense number each, so that rules and neighbours never compare strings in a tick.
+//!
+//! In: names of bodies, parents and rules as they turn up. Out: their numbers, and what a name keeps when its body is
+//! removed and put again (id, generation). Names are never forgotten: an id stays with its name for a boot.
+
+use std::collections::BTreeMap;
+
+use crate::ids::{BodyId, BodySlot};
+
+/// A name's number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct NameId(pub(super) u32);
+
+impl NameId {
+    /// No name.
+    pub(super) const NONE: Self = Self(u32::MAX);
+
+    pub(super) fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
+/// What is kept of a name.
+#[derive(Clone, Debug)]
+pub(super) struct Name {
+    pub(super) text: Box<str>,
+    /// The body's id, as soon as it ever had one.
+    pub(super) id: Option<BodyId>,
+    /// Of the newest body of this name; 0: never put.
+    pub(super) generation: u32,
+    /// Where its body is now.
+    pub(super) slot: Option<BodySlot>,
+}
+
+/// All names met in this boot.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Names {
+    numbers: BTreeMap<Box<str>, NameId>,
+    list: Vec<Name>,
+    /// Which name an id was given to.
+    ids: BTreeMap<BodyId, NameId>,
+    /// No id below this one is free.
+    least_free: u64,
+}
+
+impl Names {
+    /// The number of a name, given when it is new.
+    pub(super) fn intern(&mut self, text: &str) -> NameId {
+        if let Some(&name) = self.numbers.get(text) {
+            return name;
+        }
+        let name = NameId(u32::try_from(self.list.len()).unwrap_or(u32::MAX - 1));
+        self.numbers.insert(text.into(), name);
+        self.list.push(Name {
+            text: text.into(),
+            id: None,
+            generation: 0,
+            slot: None,
+        });
+        name
+    }
+
+    /// The number of a name that was met before.
+    pub(super) fn find(&self, text: &str) -> Option<NameId> {
+        self.numbers.get(text).copied()
+    }
+
+    /// What is kept of a name that was met before.
+    pub(super) fn find_name(&self, text: &str) -> Option<&Name> {
+        self.find(text).map(|name| self.get(name))
+    }
+
+    pub(super) fn get(&self, name: NameId) -> &Name {
+        &self.list[name.index()]
+    }
+
+    pub(super) fn get_mut(&mut self, name: NameId) -> &mut Name {
+        &mut self.list[name.index()]
+    }
+
+    pub(super) fn all(&self) -> &[Name] {
+        &self.list
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Which name has this id.
+    pub(super) fn owner_of(&self, id: BodyId) -> Option<&Name> {
+        self.ids.get(&id).map(|&name| self.get(name))
+    }
+
+    /// Gives the name this id, or the one it has, or (`None`) the least that is free.
+    pub(super) fn claim(&mut self, name: NameId, wanted: Option<BodyId>) -> BodyId {
+        if let Some(id) = self.get(name).id {
+            return id;
+        }
+        let id = wanted.unwrap_or_else(|| self.least_free());
+        self.ids.insert(id, name);
+        self.get_mut(name).id = Some(id);
+        id
+    }
+
+    fn least_free(&mut self) -> BodyId {
+        let mut id = self.least_free.max(1);
+        while self.ids.contains_key(&BodyId(id)) {
+            id += 1;
+        }
+        self.least_free = id;
+        BodyId(id)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_id_stays_with_its_name_and_the_least_free_one_is_given() {
+        let mut names = Names::default();
+        let (a, b, c) = (names.intern("a"), names.intern("b"), names.intern("c"));
+        assert_eq!(names.claim(b, Some(BodyId(1))), BodyId(1));
+        assert_eq!(names.claim(a, None), BodyId(2));
+        assert_eq!(names.claim(c, None), BodyId(3));
+        assert_eq!(names.claim(b, Some(BodyId(9))), BodyId(1));
+        assert_eq!(&*names.owner_of(BodyId(3)).unwrap().text, "c");
+    }
+}

@@ -1,0 +1,364 @@
+//! Where a body is and how well that is known: status, reach, proxy, and what a change of them means to the lists.
+//!
+//! In: a pose, a refusal, an age, an edit. Out: the body as the engine sees it, and its place in the change set.
+
+use std::sync::Arc;
+
+use super::World;
+use super::body::{Body, Motion, PlacedShape};
+use super::filters::{Hot, KEEPS};
+use super::names::NameId;
+use crate::config::OnStale;
+use crate::ids::BodySlot;
+use crate::math::{Aabb, Point, Pose, ROUND};
+use crate::scene::BodySpec;
+use crate::shape::Geometry;
+use crate::wire::{BodyStatus, EndCause};
+
+/// What the world keeps of a body beside what the engine sees.
+#[derive(Clone, Debug)]
+pub(super) struct Entry {
+    pub(super) spec: Option<Arc<BodySpec>>,
+    /// An edit made it other than `spec` says.
+    pub(super) edited: bool,
+    pub(super) enabled: bool,
+    /// A pose was admitted since it was put or reset; always so for a body that cannot move.
+    pub(super) has_pose: bool,
+    /// Its newest pose was refused.
+    pub(super) refused: bool,
+    /// In `World::growing`.
+    pub(super) growing: bool,
+    /// The last admitted row as it came: position, then quaternion x, y, z, w.
+    pub(super) raw: [f64; 7],
+    /// Number of the last pose frame that held it.
+    pub(super) seen: u64,
+    /// Number of the last pose frame that held it more than once.
+    pub(super) twice: u64,
+    /// Tick in which its pose, age or what is known of it last changed.
+    pub(super) touched: u64,
+    /// Tight box at the body's pose.
+    pub(super) tight: Aabb,
+    /// By how much `Body::proxy` is wider than `tight`, metres.
+    pub(super) widened_m: f64,
+    /// The body it hangs on and its pose there.
+    pub(super) attach: Option<(NameId, Pose)>,
+    /// The body it hangs on in the end, itself where it hangs on none, and its pose seen from there.
+    pub(super) root: BodySlot,
+    pub(super) root_pose: Pose,
+}
+
+impl Entry {
+    /// Of a slot without a body.
+    pub(super) fn gone(slot: BodySlot) -> Self {
+        Self {
+            spec: None,
+            edited: false,
+            enabled: false,
+            has_pose: false,
+            refused: false,
+            growing: false,
+            raw: [f64::NAN; 7],
+            seen: 0,
+            twice: 0,
+            touched: 0,
+            tight: Aabb::empty(),
+            widened_m: 0.0,
+            attach: None,
+            root: slot,
+            root_pose: Pose::identity(),
+        }
+    }
+}
+
+/// What is known of a body's place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Judgement {
+    pub(super) status: BodyStatus,
+    pub(super) reach_m: f64,
+    pub(super) in_broad: bool,
+}
+
+impl World {
+    /// What is known of a body's place at `self.now_ns`.
+    pub(super) fn judge(&self, slot: BodySlot, body: &Body) -> Judgement {
+        let entry = &self.entries[slot.index()];
+        let root = &self.entries[entry.root.index()];
+        let (status, reach_m) = if !entry.enabled {
+            (BodyStatus::Disabled, 0.0)
+        } else if !body.moves {
+            (BodyStatus::Known, 0.0)
+        } else if root.refused {
+            (BodyStatus::Rejected, f64::INFINITY)
+        } else if !root.has_pose {
+            (BodyStatus::NotReceived, f64::INFINITY)
+        } else {
+            self.judge_age(body, entry.root)
+        };
+        let in_broad = match status {
+            BodyStatus::Known | BodyStatus::Stale | BodyStatus::Held => true,
+            // Its last good pose is kept; without one there is nothing to keep.
+            BodyStatus::Rejected => root.has_pose,
+            _ => false,
+        };
+        Judgement {
+            status,
+            reach_m,
+            in_broad,
+        }
+    }
+
+    /// Age and what follows from it belong to the root; the speed is the body's own.
+    fn judge_age(&self, body: &Body, root: BodySlot) -> (BodyStatus, f64) {
+        let root_body = self.body(root).unwrap_or(body);
+        let age_ns = self
+            .now_ns
+            .saturating_sub(root_body.since_ns.unwrap_or_default());
+        if age_ns < self.timeout_of(root_body) {
+            return (BodyStatus::Known, 0.0);
+        }
+        match root_body.on_stale {
+            OnStale::Hold => (BodyStatus::Held, 0.0),
+            OnStale::Remove => (BodyStatus::RemovedByAge, f64::INFINITY),
+            OnStale::Unknown => {
+                let reach_m = body.max_speed_mps.map_or(f64::INFINITY, |speed_mps| {
+                    // Three roundings, each by half an ulp: four are added.
+                    let age_s = age_ns as f64 * 1e-9;
+                    (speed_mps * age_s * (1.0 + 8.0 * ROUND)).next_up()
+                });
+                let bounded = reach_m <= self.stale_reach_m;
+                (
+                    BodyStatus::Stale,
+                    if bounded { reach_m } else { f64::INFINITY },
+                )
+            }
+        }
+    }
+
+    /// The time-out of a body's source; none for a body without one, which cannot move.
+    pub(super) fn timeout_of(&self, body: &Body) -> u64 {
+        let source = body.source.and_then(|s| self.sources.get(s.index()));
+        source.map_or(u64::MAX, |s| s.timeout_ns)
+    }
+
+    /// Puts a body at a pose and takes its motion and tight box with it.
+    ///
+    /// * returns - whether that changed anything, bit by bit.
+    pub(super) fn place(&mut self, slot: BodySlot, pose: &Pose) -> bool {
+        let Some(body) = self.bodies[slot.index()].as_mut() else {
+            return false;
+        };
+        if same_bits(&body.pose, pose) {
+            return false;
+        }
+        body.pose = *pose;
+        if !body.unbounded {
+            body.motion.advance(pose, &body.centre, body.radius);
+        }
+        self.entries[slot.index()].tight = tight_box(&body.shapes, pose);
+        true
+    }
+
+    /// Judges a body anew and brings proxy, flags, tallies and the change set in line with it.
+    ///
+    /// * `pose_changed` - whether [`World::place`] moved it since it was settled last.
+    pub(super) fn settle(&mut self, slot: BodySlot, pose_changed: bool) {
+        let Some(body) = self.body(slot) else {
+            return;
+        };
+        let judged = self.judge(slot, body);
+        let (was_status, was_reach_m, was_in) = (body.status, body.reach_m, body.in_broad);
+        let margin_m = self.margin_of(slot, body);
+        let entry = &mut self.entries[slot.index()];
+        entry.touched = self.tick;
+        // A reach without bound leaves the box as it was: the pairs it has are kept, no new ones are made from it.
+        let widened_m = if judged.reach_m.is_finite() {
+            (margin_m + judged.reach_m).next_up()
+        } else {
+            entry.widened_m.max(margin_m)
+        };
+        let Some(body) = self.bodies[slot.index()].as_mut() else {
+            return;
+        };
+        let rewidened = widened_m.to_bits() != entry.widened_m.to_bits();
+        if pose_changed || rewidened {
+            entry.widened_m = widened_m;
+            body.proxy = entry.tight.widened(widened_m);
+        }
+        body.status = judged.status;
+        body.reach_m = judged.reach_m;
+        body.in_broad = judged.in_broad;
+        let status_changed = was_status != judged.status;
+        if status_changed {
+            self.by_status[usize::from(was_status.code())] -= 1;
+            self.by_status[usize::from(judged.status.code())] += 1;
+        }
+        let restated = status_changed || was_reach_m.to_bits() != judged.reach_m.to_bits();
+        self.watch(slot, judged);
+        self.list(
+            slot,
+            was_in,
+            judged,
+            pose_changed || rewidened,
+            restated && !pose_changed,
+        );
+    }
+
+    /// Flags, deadline and growth that follow from a judgement.
+    fn watch(&mut self, slot: BodySlot, judged: Judgement) {
+        let Some(body) = self.bodies[slot.index()].as_ref() else {
+            return;
+        };
+        let deadline_ns = (body.moves && judged.status == BodyStatus::Known).then(|| {
+            body.since_ns
+                .unwrap_or_default()
+                .saturating_add(self.timeout_of(body))
+        });
+        let stamp_ns = (judged.in_broad && body.moves).then_some(body.stamp_ns);
+        self.ages.set(slot, deadline_ns, stamp_ns);
+        let entry = &mut self.entries[slot.index()];
+        let grows = judged.status == BodyStatus::Stale && judged.reach_m.is_finite();
+        if grows && !entry.growing {
+            entry.growing = true;
+            self.growing.push(slot);
+        }
+        let hot = &mut self.filters.bodies[slot.index()];
+        let kept = hot.has(KEEPS);
+        let keeps = judged.in_broad && judged.reach_m.is_infinite();
+        hot.flags = if keeps {
+            hot.flags | KEEPS
+        } else {
+            hot.flags & !KEEPS
+        };
+        if kept && !keeps && judged.in_broad {
+            self.lists.requery(slot);
+        }
+    }
+
+    /// Notes a change in the lists of the tick.
+    fn list(&mut self, slot: BodySlot, was_in: bool, now: Judgement, moved: bool, restated: bool) {
+        match (was_in, now.in_broad) {
+            (false, true) => {
+                self.lists.insert(slot);
+                if let Some(body) = self.bodies[slot.index()].as_mut() {
+                    body.motion.anchor_here(&body.pose);
+                }
+            }
+            (true, false) => self.lists.remove(slot, cause_of(now.status)),
+            (true, true) if moved => self.lists.moved(slot),
+            _ => {}
+        }
+        if restated {
+            self.lists.restated(slot);
+        }
+    }
+
+    /// By how much a body's box is wider than tight when its place is known, metres.
+    pub(super) fn margin_of(&self, slot: BodySlot, body: &Body) -> f64 {
+        let ruled_m = self.filters.margins_m.get(slot.index()).copied();
+        body.report_within_m.max(ruled_m.unwrap_or_default())
+    }
+
+    /// What the filters see of a slot.
+    pub(super) fn hot(&mut self, slot: BodySlot) -> Option<&mut Hot> {
+        self.filters.bodies.get_mut(slot.index())
+    }
+}
+
+/// Why the pairs of a body end when it leaves the broad phase.
+fn cause_of(status: BodyStatus) -> EndCause {
+    match status {
+        BodyStatus::Disabled => EndCause::Disabled,
+        BodyStatus::RemovedByAge => EndCause::SourceLost,
+        _ => EndCause::Reset,
+    }
+}
+
+/// A body at rest at its start pose, from what the scene says of it.
+pub(super) fn new_body(
+    spec: &BodySpec,
+    shapes: Arc<[PlacedShape]>,
+    generation: u32,
+) -> (Body, Aabb) {
+    let unbounded = shapes
+        .iter()
+        .any(|s| matches!(s.shape.geometry, Geometry::HalfSpace { .. }));
+    let (centre, radius) = sphere_around(&shapes, unbounded);
+    let tight = tight_box(&shapes, &spec.pose);
+    let body = Body {
+        id: spec.id,
+        name: spec.name.clone(),
+        generation,
+        shapes,
+        moves: spec.moves,
+        unbounded,
+        pose: spec.pose,
+        velocity: None,
+        centre,
+        radius,
+        motion: Motion::at(&spec.pose),
+        proxy: tight.widened(spec.report_within_m),
+        // Settled right after; until then it counts as what it is before anything is known.
+        status: BodyStatus::NotReceived,
+        reach_m: f64::INFINITY,
+        reject: None,
+        source: None,
+        stamp_ns: 0,
+        since_ns: None,
+        received_ns: 0,
+        report_within_m: spec.report_within_m,
+        max_speed_mps: spec.max_speed_mps,
+        on_stale: spec.on_stale,
+        in_broad: false,
+    };
+    (body, tight)
+}
+
+/// The tight box of shapes at a body's pose, rounded outward.
+pub(super) fn tight_box(shapes: &[PlacedShape], pose: &Pose) -> Aabb {
+    let at = &pose.translation.vector;
+    shapes.iter().fold(Aabb::empty(), |all, placed| {
+        let on = &placed.pose.translation.vector;
+        let own = &placed.shape.aabb.max.coords;
+        let tight = placed.shape.aabb_at(&(pose * placed.pose));
+        // The box is tight at the rounded product of the two poses; the true product is this near to it.
+        let rounding_m = 32.0 * ROUND * (at.amax() + on.amax() + own.amax());
+        all.merged(&if rounding_m.is_finite() {
+            tight.widened(rounding_m)
+        } else {
+            tight
+        })
+    })
+}
+
+/// Centre and radius of a sphere around all shapes, body frame; the radius is rounded up.
+fn sphere_around(shapes: &[PlacedShape], unbounded: bool) -> (Point, f64) {
+    if unbounded {
+        return (Point::origin(), f64::INFINITY);
+    }
+    let centres = || shapes.iter().map(|s| s.pose * s.shape.centre);
+    let centre = match shapes {
+        [_] => centres().next().unwrap_or_else(Point::origin),
+        _ => Aabb::of(&centres().collect::<Vec<_>>()).centre(),
+    };
+    let radius = centres()
+        .zip(shapes)
+        .map(|(at, placed)| (at - centre).norm() + placed.shape.radius)
+        .fold(0.0, f64::max);
+    // A rotation, a translation and a difference of coordinates no larger than these.
+    let magnitude = shapes
+        .iter()
+        .map(|s| s.pose.translation.vector.amax() + s.shape.centre.coords.amax())
+        .fold(radius, f64::max);
+    (centre, radius + 32.0 * ROUND * magnitude)
+}
+
+fn same_bits(one: &Pose, other: &Pose) -> bool {
+    let (v, w) = (&one.translation.vector, &other.translation.vector);
+    let (q, r) = (&one.rotation.as_vector(), &other.rotation.as_vector());
+    v.iter()
+        .zip(w.iter())
+        .all(|(a, b)| a.to_bits() == b.to_bits())
+        && q.iter()
+            .zip(r.iter())
+            .all(|(a, b)| a.to_bits() == b.to_bits())
+}

@@ -1,0 +1,227 @@
+//! Pair rules, compiled: for each name the rules that speak of it, so that a pair is decided by a short merge.
+//!
+//! In: the scene's rules, in order, and rules added by edits. Out: the last rule that matches a pair of names. A rule
+//! of two plain names costs one search; a rule with patterns is matched with each name once, when either turns up.
+
+use super::names::{NameId, Names};
+use crate::scene::{PairAction, PairRule, is_pattern, pattern_matches as matches};
+
+/// The name stands on the `a` side of the rule.
+pub(super) const SIDE_A: u8 = 1;
+/// The name stands on the `b` side of the rule.
+pub(super) const SIDE_B: u8 = 2;
+
+/// The rules that speak of one name.
+#[derive(Clone, Debug, Default)]
+struct OfName {
+    /// Rules of two plain names: the other name and the rule, by name; of one pair the last rule only.
+    exact: Vec<(u32, u32)>,
+    /// Rules with a pattern: the rule and the sides this name stands on, by rule.
+    sided: Vec<(u32, u8)>,
+}
+
+/// The rules and what they say of each name.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rules {
+    list: Vec<PairRule>,
+    of_name: Vec<OfName>,
+    /// The rules with a pattern.
+    patterned: Vec<u32>,
+    any_report: bool,
+}
+
+impl Rules {
+    pub(super) fn list(&self) -> &[PairRule] {
+        &self.list
+    }
+
+    /// Replaces all rules.
+    pub(super) fn set(&mut self, list: Vec<PairRule>, names: &mut Names) {
+        self.list = list;
+        self.of_name.clear();
+        self.patterned.clear();
+        self.any_report = self.list.iter().any(|r| r.report_within_m.is_some());
+        // Plain names first, so that every name of a rule has its number before patterns are matched.
+        for place in 0..self.list.len() {
+            let (a, b) = (self.list[place].a.clone(), self.list[place].b.clone());
+            if is_pattern(&a) || is_pattern(&b) {
+                self.patterned.push(number(place));
+            } else {
+                let (a, b) = (names.intern(&a), names.intern(&b));
+                self.of_name.resize_with(names.len(), OfName::default);
+                let rule = number(place);
+                self.put_exact(a, b, rule);
+                self.put_exact(b, a, rule);
+            }
+        }
+        self.of_name.resize_with(names.len(), OfName::default);
+        for name in 0..names.len() {
+            self.match_patterns(name, names);
+        }
+    }
+
+    /// Compiles the rules for names that have turned up since.
+    pub(super) fn sync(&mut self, names: &Names) {
+        let old = self.of_name.len();
+        self.of_name.resize_with(names.len(), OfName::default);
+        for name in old..names.len() {
+            self.match_patterns(name, names);
+        }
+    }
+
+    fn put_exact(&mut self, name: NameId, other: NameId, rule: u32) {
+        let list = &mut self.of_name[name.index()].exact;
+        match list.binary_search_by_key(&other.0, |e| e.0) {
+            Ok(at) => list[at].1 = rule,
+            Err(at) => list.insert(at, (other.0, rule)),
+        }
+    }
+
+    fn match_patterns(&mut self, name: usize, names: &Names) {
+        let text = &*names.all()[name].text;
+        let of_name = &mut self.of_name[name];
+        for &place in &self.patterned {
+            let sides = sides_of(&self.list[place as usize], text);
+            if sides != 0 {
+                of_name.sided.push((place, sides));
+            }
+        }
+    }
+
+    /// Whether a rule speaks of this name at all: (with a plain partner, with a pattern).
+    pub(super) fn speaks_of(&self, name: NameId) -> (bool, bool) {
+        let of_name = &self.of_name[name.index()];
+        (!of_name.exact.is_empty(), !of_name.sided.is_empty())
+    }
+
+    /// Whether any rule says how near its pairs are reported.
+    pub(super) fn any_report(&self) -> bool {
+        self.any_report
+    }
+
+    /// The last rule that matches a pair.
+    ///
+    /// Cost: a search in the shorter list of plain rules, and a merge of the two lists of pattern rules.
+    pub(super) fn last_match(&self, a: NameId, b: NameId) -> Option<(usize, &PairRule)> {
+        let (of_a, of_b) = (&self.of_name[a.index()], &self.of_name[b.index()]);
+        let exact = if of_a.exact.len() <= of_b.exact.len() {
+            find_exact(&of_a.exact, b)
+        } else {
+            find_exact(&of_b.exact, a)
+        };
+        let rule = exact.max(last_sided(&of_a.sided, &of_b.sided))? as usize;
+        self.list.get(rule).map(|r| (rule, r))
+    }
+
+    /// The last pattern rule that matches two lists of [`Rules::sided_of`].
+    pub(super) fn last_sided_match(
+        &self,
+        a: &[(u32, u8)],
+        b: &[(u32, u8)],
+    ) -> Option<(usize, &PairRule)> {
+        let rule = last_sided(a, b)? as usize;
+        self.list.get(rule).map(|r| (rule, r))
+    }
+
+    /// The pattern rules that speak of a name.
+    pub(super) fn sided_of(&self, name: NameId) -> &[(u32, u8)] {
+        &self.of_name[name.index()].sided
+    }
+
+    /// The names that a plain rule pairs with this one.
+    pub(super) fn exact_partners(&self, name: NameId) -> impl Iterator<Item = NameId> + '_ {
+        self.of_name[name.index()]
+            .exact
+            .iter()
+            .map(|&(other, _)| NameId(other))
+    }
+}
+
+/// The sides of the rule on which a name stands.
+pub(super) fn sides_of(rule: &PairRule, text: &str) -> u8 {
+    let side = |pattern: &str, bit: u8| if matches(pattern, text) { bit } else { 0 };
+    side(&rule.a, SIDE_A) | side(&rule.b, SIDE_B)
+}
+
+/// Whether two names on these sides are a pair of the rule.
+fn sides_meet(one: u8, other: u8) -> bool {
+    (one & SIDE_A != 0 && other & SIDE_B != 0) || (one & SIDE_B != 0 && other & SIDE_A != 0)
+}
+
+/// Whether a rule ignores its pairs.
+pub(super) fn ignores(rule: &PairRule) -> bool {
+    rule.action == PairAction::Ignore
+}
+
+fn find_exact(list: &[(u32, u32)], other: NameId) -> Option<u32> {
+    let at = list.binary_search_by_key(&other.0, |e| e.0).ok()?;
+    Some(list[at].1)
+}
+
+fn last_sided(a: &[(u32, u8)], b: &[(u32, u8)]) -> Option<u32> {
+    let (mut a, mut b) = (a.iter().rev().peekable(), b.iter().rev().peekable());
+    while let (Some(&&(rule_a, side_a)), Some(&&(rule_b, side_b))) = (a.peek(), b.peek()) {
+        if rule_a == rule_b && sides_meet(side_a, side_b) {
+            return Some(rule_a);
+        }
+        if rule_a >= rule_b {
+            a.next();
+        }
+        if rule_b >= rule_a {
+            b.next();
+        }
+    }
+    None
+}
+
+/// The number of rules is limited far below u32.
+fn number(place: usize) -> u32 {
+    u32::try_from(place).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rule(action: PairAction, a: &str, b: &str) -> PairRule {
+        PairRule {
+            action,
+            a: a.to_owned(),
+            b: b.to_owned(),
+            reason: String::new(),
+            report_within_m: None,
+        }
+    }
+
+    #[test]
+    fn compiled_rules_say_what_matching_each_pair_from_the_last_says() {
+        use PairAction::{Check, Ignore};
+        let list = vec![
+            rule(Ignore, "*", "*"),
+            rule(Check, "arm_*", "wall"),
+            rule(Ignore, "arm_1", "wall"),
+            rule(Check, "arm_?", "arm_*"),
+            rule(Ignore, "arm_1", "arm_2"),
+            rule(Check, "wall", "arm_1"),
+            rule(Ignore, "box", "*_2"),
+        ];
+        let texts = ["arm_1", "arm_2", "arm_22", "wall", "box", "x"];
+        // Some names are there before the rules, some turn up after.
+        let mut names = Names::default();
+        names.intern(texts[0]);
+        names.intern(texts[5]);
+        let mut rules = Rules::default();
+        rules.set(list.clone(), &mut names);
+        let ids = texts.map(|t| names.intern(t));
+        rules.sync(&names);
+        for (a, &id_a) in texts.iter().zip(&ids) {
+            for (b, &id_b) in texts.iter().zip(&ids).filter(|(b, _)| b != &a) {
+                let wanted = list.iter().rposition(|r| {
+                    (matches(&r.a, a) && matches(&r.b, b)) || (matches(&r.a, b) && matches(&r.b, a))
+                });
+                let found = rules.last_match(id_a, id_b).map(|(at, _)| at);
+                assert_eq!(found, wanted, "{a} {b}");
+            }
+        }
+    }
+}

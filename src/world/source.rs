@@ -1,0 +1,196 @@
+//! Sources: who may speak for a group of bodies, in which session, and how far it has come.
+//!
+//! In: frame headers. Out: whether a frame is of the session in force and newer than its newest; sessions that are
+//! over stay over for this boot.
+
+use super::body::Body;
+use crate::ids::{BodySlot, SourceSlot};
+use crate::limits::SESSIONS_OVER_MAX;
+use crate::scene::SourceSpec;
+use crate::wire::{Frame, FrameHeader, RejectReason, SourceRow, frame_flags, name_bytes};
+
+/// A source as the world knows it.
+#[derive(Clone, Debug)]
+pub struct SourceState {
+    /// Its name.
+    pub name: String,
+    /// Without a frame for this long it is no longer alive and its bodies are stale, nanoseconds.
+    pub timeout_ns: u64,
+    /// Session in force; 0: none.
+    pub session: u64,
+    /// Newest `(epoch, seq)` taken note of, waiting frames included.
+    pub(super) order: Option<(u64, u64)>,
+    /// Header of the newest frame admitted in this boot.
+    pub(super) newest: Option<FrameHeader>,
+    /// When the age of that frame starts, nanoseconds of `CLOCK_BOOTTIME`.
+    pub(super) since_ns: u64,
+    /// When the session in force was last heard, nanoseconds of `CLOCK_BOOTTIME`.
+    pub(super) heard_ns: u64,
+    /// Whether its newest frame is young enough, as of the last tick.
+    pub(super) alive: bool,
+    pub(super) frames: u64,
+    pub(super) skipped: u64,
+    pub(super) refused: u64,
+    /// Number of its last pose frame; bodies carry the number of the last frame that held them.
+    pub(super) pose_frame: u64,
+    /// The slots of its last pose frame, row by row: where its next frame will most likely have them too.
+    pub(super) rows: Vec<BodySlot>,
+    /// A frame that needs a later scene revision.
+    pub(super) waiting: Waiting,
+}
+
+/// A frame that waits for a scene revision; its memory is kept.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Waiting {
+    pub(super) frame: Frame,
+    /// When its wait ends, nanoseconds of `CLOCK_BOOTTIME`; `None`: no frame waits.
+    pub(super) until_ns: Option<u64>,
+}
+
+impl SourceState {
+    pub(super) fn new(spec: &SourceSpec, bodies: usize) -> Self {
+        Self {
+            name: spec.name.clone(),
+            timeout_ns: spec.timeout_ns,
+            session: 0,
+            order: None,
+            newest: None,
+            since_ns: 0,
+            heard_ns: 0,
+            alive: false,
+            frames: 0,
+            skipped: 0,
+            refused: 0,
+            pose_frame: 0,
+            rows: Vec::with_capacity(bodies),
+            waiting: Waiting::default(),
+        }
+    }
+
+    /// Whether its newest frame was younger than its time-out when the tick judged ages.
+    #[must_use]
+    pub fn alive(&self) -> bool {
+        self.alive
+    }
+
+    /// Frames admitted in this boot.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        self.frames
+    }
+
+    /// When its newest frame is too old, nanoseconds of `CLOCK_BOOTTIME`; `None` when it is already.
+    pub(super) fn deadline_ns(&self) -> Option<u64> {
+        self.alive
+            .then(|| self.since_ns.saturating_add(self.timeout_ns))
+    }
+
+    /// As a row of the tick.
+    #[must_use]
+    pub fn to_row(&self, now_boot_ns: u64) -> SourceRow {
+        let newest = self.newest.unwrap_or_default();
+        let age_ns = now_boot_ns.saturating_sub(self.since_ns);
+        SourceRow {
+            name: name_bytes(&self.name),
+            session: self.session,
+            epoch: newest.epoch,
+            seq: newest.seq,
+            stamp_ns: newest.stamp_ns,
+            age_ns: self.newest.map_or(u64::MAX, |_| age_ns),
+            frames: self.frames,
+            skipped: self.skipped,
+            refused: self.refused,
+            clock_id: newest.clock_id,
+            alive: u8::from(self.alive),
+            paused: u8::from(newest.flags == frame_flags::PAUSED),
+            reserved: [0; 2],
+        }
+    }
+}
+
+/// What a frame's session and number mean for its source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Standing {
+    /// The next frame of the session and epoch in force.
+    Next,
+    /// The first frame of a new session or epoch: what was known of the source's bodies is void.
+    Afresh,
+    /// Not to be admitted.
+    Refused(RejectReason),
+}
+
+/// Sessions that are over, the newest kept.
+#[derive(Clone, Debug)]
+pub(super) struct SessionsOver {
+    list: Vec<(SourceSlot, u64)>,
+    /// Where the next one goes once the list is full.
+    next: usize,
+}
+
+impl SessionsOver {
+    pub(super) fn new() -> Self {
+        Self {
+            list: Vec::with_capacity(SESSIONS_OVER_MAX),
+            next: 0,
+        }
+    }
+
+    pub(super) fn holds(&self, source: SourceSlot, session: u64) -> bool {
+        self.list.contains(&(source, session))
+    }
+
+    pub(super) fn put(&mut self, source: SourceSlot, session: u64) {
+        if self.list.len() < SESSIONS_OVER_MAX {
+            self.list.push((source, session));
+        } else if let Some(place) = self.list.get_mut(self.next) {
+            *place = (source, session);
+            self.next = (self.next + 1) % SESSIONS_OVER_MAX;
+        }
+    }
+}
+
+/// Judges a header by session and order, and takes note of it: which session is in force, when it was heard.
+///
+/// A session ends here when another asks and it has not been heard for the source's time-out.
+pub(super) fn stand(
+    source: &mut SourceState,
+    slot: SourceSlot,
+    over: &mut SessionsOver,
+    header: &FrameHeader,
+    received_ns: u64,
+) -> Standing {
+    let order = (header.epoch, header.seq);
+    if header.session != source.session {
+        if over.holds(slot, header.session) {
+            return Standing::Refused(RejectReason::SessionOver);
+        }
+        if source.session != 0 {
+            let silent_ns = received_ns.saturating_sub(source.heard_ns);
+            if silent_ns < source.timeout_ns {
+                return Standing::Refused(RejectReason::SourceTaken);
+            }
+            over.put(slot, source.session);
+        }
+        source.session = header.session;
+        source.heard_ns = received_ns;
+        source.order = Some(order);
+        return Standing::Afresh;
+    }
+    source.heard_ns = source.heard_ns.max(received_ns);
+    match source.order {
+        Some(newest) if order <= newest => Standing::Refused(RejectReason::OldFrame),
+        Some((epoch, _)) if header.epoch == epoch => {
+            source.order = Some(order);
+            Standing::Next
+        }
+        _ => {
+            source.order = Some(order);
+            Standing::Afresh
+        }
+    }
+}
+
+/// Whether a source may move a body.
+pub(super) fn owns(source: SourceSlot, body: &Body) -> bool {
+    body.moves && body.source == Some(source)
+}

@@ -1,0 +1,102 @@
+//! A full check of the world's own structure, for tests after every tick and on demand.
+
+use super::World;
+use super::body::Body;
+use super::filters::{ENABLED, KEEPS, LIVE, MOVES, UNBOUNDED};
+use crate::ids::BodySlot;
+use crate::wire::BodyStatus;
+
+impl World {
+    /// Checks everything that the other calls rely on. Cost: O(bodies log bodies).
+    ///
+    /// # Errors
+    /// What does not hold, and of which body.
+    pub fn validate(&self) -> Result<(), String> {
+        self.lists.validate()?;
+        if !self.order.is_sorted_by(|a, b| a.0 < b.0) {
+            return Err("the bodies are not in the order of their ids".to_owned());
+        }
+        let there = self.bodies.iter().flatten().count();
+        if there != self.order.len()
+            || there + self.free.len() + self.resting.len() != self.bodies.len()
+        {
+            return Err("a slot is lost, or stands twice".to_owned());
+        }
+        let mut by_status = [0; BodyStatus::ALL.len()];
+        for (slot, body) in self.bodies() {
+            by_status[usize::from(body.status.code())] += 1;
+            self.validate_body(slot, body)
+                .map_err(|what| format!("body `{}`: {what}", body.name))?;
+        }
+        if by_status != self.by_status {
+            return Err("the tallies by status are off".to_owned());
+        }
+        Ok(())
+    }
+
+    fn validate_body(&self, slot: BodySlot, body: &Body) -> Result<(), &'static str> {
+        let check = |holds: bool, what: &'static str| if holds { Ok(()) } else { Err(what) };
+        let (entry, hot) = (
+            &self.entries[slot.index()],
+            &self.filters.bodies[slot.index()],
+        );
+        check(
+            self.slot_of(body.id) == Some(slot),
+            "its id leads elsewhere",
+        )?;
+        check(
+            self.slot_named(&body.name) == Some(slot),
+            "its name leads elsewhere",
+        )?;
+        let name = self.names.get(hot.name);
+        check(name.id == Some(body.id), "its name has another id")?;
+        check(*name.text == *body.name, "its filters have another name")?;
+        check(
+            name.generation == body.generation,
+            "its name has another generation",
+        )?;
+        check(hot.has(LIVE), "the filters do not know it")?;
+        check(
+            hot.has(ENABLED) == entry.enabled,
+            "the filters disagree on enabled",
+        )?;
+        check(
+            hot.has(MOVES) == body.moves,
+            "the filters disagree on moves",
+        )?;
+        check(
+            hot.has(UNBOUNDED) == body.unbounded,
+            "the filters disagree on unbounded",
+        )?;
+        let keeps = body.in_broad && body.reach_m.is_infinite();
+        check(hot.has(KEEPS) == keeps, "the filters disagree on keeps")?;
+        let judged = self.judge(slot, body);
+        check(
+            judged.status == body.status,
+            "its status is not what its age says",
+        )?;
+        check(
+            judged.reach_m.to_bits() == body.reach_m.to_bits(),
+            "its reach is off",
+        )?;
+        check(
+            judged.in_broad == body.in_broad,
+            "it is in the broad phase, or not, by mistake",
+        )?;
+        let margin_m = self.margin_of(slot, body);
+        let needed_m = if body.reach_m.is_finite() {
+            margin_m + body.reach_m
+        } else {
+            margin_m
+        };
+        let holds = body.proxy.holds(&entry.tight.widened(needed_m));
+        check(holds || !body.in_broad, "its box does not hold it")?;
+        let placed = self.entries[entry.root.index()].has_pose;
+        check(
+            !body.in_broad || placed,
+            "it is in the broad phase without a pose",
+        )?;
+        let rooted = (entry.root != slot) == self.attached.contains(&slot);
+        check(rooted, "it hangs on a body, or not, by mistake")
+    }
+}

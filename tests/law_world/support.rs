@@ -1,0 +1,282 @@
+//! Scenes of 1 m cubes, frames, and a world that checks itself after every step.
+
+use std::sync::Arc;
+
+use sweepd::config::{Config, OnStale};
+use sweepd::ids::{BodyId, BodySlot, SourceSlot};
+use sweepd::math::{Point, Pose};
+use sweepd::scene::{BodySpec, PairAction, PairRule, PlacedSpec, Scene, SourceSpec};
+use sweepd::shape::{Geometry, Mesh, Shape, ShapeSpec};
+use sweepd::wire::{
+    BodyStatus, EndCause, Frame, RejectReason, TransformRow, WIRE_VERSION, frame_flags, name_bytes,
+};
+use sweepd::world::{Admission, Body, Edit, PlacedShape, World};
+
+pub const MS: u64 = 1_000_000;
+/// The time-out of every source here.
+pub const TIMEOUT_NS: u64 = 500 * MS;
+/// When the daemon starts.
+pub const START_NS: u64 = 10_000 * MS;
+
+/// A cube of 1 m, centred.
+pub fn cube() -> Arc<[PlacedShape]> {
+    let corner = |k: usize| {
+        let at = |bit: usize| if k & bit == 0 { -0.5 } else { 0.5 };
+        Point::new(at(1), at(2), at(4))
+    };
+    let faces = vec![
+        [0, 2, 1],
+        [1, 2, 3],
+        [4, 5, 6],
+        [5, 7, 6],
+        [0, 1, 4],
+        [1, 5, 4],
+        [2, 6, 3],
+        [3, 6, 7],
+        [0, 4, 2],
+        [2, 4, 6],
+        [1, 3, 5],
+        [3, 7, 5],
+    ];
+    let mesh = Mesh::new((0..8).map(corner).collect(), faces, Some(true)).unwrap();
+    let shape = Shape {
+        aabb: mesh.aabb(),
+        centre: mesh.centre(),
+        radius: mesh.radius(),
+        geometry: Geometry::Mesh(mesh),
+    };
+    Arc::from([PlacedShape {
+        shape: Arc::new(shape),
+        pose: Pose::identity(),
+    }])
+}
+
+/// A half-space.
+pub fn floor() -> Arc<[PlacedShape]> {
+    let everywhere = Point::new(f64::INFINITY, f64::INFINITY, f64::INFINITY);
+    let shape = Shape {
+        aabb: sweepd::math::Aabb {
+            min: -everywhere,
+            max: everywhere,
+        },
+        centre: Point::origin(),
+        radius: f64::INFINITY,
+        geometry: Geometry::HalfSpace {
+            normal: sweepd::math::Vec3::z(),
+            offset: 0.0,
+        },
+    };
+    Arc::from([PlacedShape {
+        shape: Arc::new(shape),
+        pose: Pose::identity(),
+    }])
+}
+
+/// A body that moves, of the first source.
+pub fn moving(name: &str, id: u64) -> BodySpec {
+    let shape = ShapeSpec::Box {
+        half_extents: [0.5; 3],
+    };
+    BodySpec {
+        name: name.to_owned(),
+        id: BodyId(id),
+        shapes: vec![PlacedSpec {
+            shape,
+            pose: Pose::identity(),
+        }],
+        pose: Pose::identity(),
+        moves: true,
+        continuous: false,
+        source: Some(0),
+        group: 1,
+        mask: u32::MAX,
+        parent: None,
+        attached_to: None,
+        rigid_group: None,
+        report_within_m: 0.0,
+        max_speed_mps: None,
+        on_stale: OnStale::Unknown,
+        enabled: true,
+    }
+}
+
+/// A body that cannot move, at `x` metres.
+pub fn fixed(name: &str, id: u64, x: f64) -> BodySpec {
+    BodySpec {
+        moves: false,
+        source: None,
+        pose: Pose::translation(x, 0.0, 0.0),
+        ..moving(name, id)
+    }
+}
+
+pub fn rule(action: PairAction, a: &str, b: &str) -> PairRule {
+    PairRule {
+        action,
+        a: a.to_owned(),
+        b: b.to_owned(),
+        reason: "test".to_owned(),
+        report_within_m: None,
+    }
+}
+
+pub fn scene(bodies: Vec<BodySpec>, rules: Vec<PairRule>) -> Scene {
+    let source = |name: &str| SourceSpec {
+        name: name.to_owned(),
+        timeout_ns: TIMEOUT_NS,
+    };
+    Scene {
+        frame_id: "world".to_owned(),
+        config: Config::default(),
+        sources: vec![source("sim"), source("robot")],
+        bodies,
+        rules,
+        ..Scene::default()
+    }
+}
+
+/// A row at `x` metres.
+pub fn row(body: u64, x: f64) -> TransformRow {
+    TransformRow {
+        body,
+        position: [x, 0.0, 0.0],
+        orientation: [0.0, 0.0, 0.0, 1.0],
+        ..TransformRow::default()
+    }
+}
+
+/// A full frame of session 1 of `source`, sent at `at_ns`.
+pub fn frame(source: &str, seq: u64, at_ns: u64, rows: &[TransformRow]) -> Frame {
+    let mut frame = Frame::default();
+    frame.header.schema = WIRE_VERSION;
+    frame.header.source = name_bytes(source);
+    frame.header.session = 1;
+    frame.header.seq = seq;
+    frame.header.sent_ns = at_ns;
+    frame.header.stamp_ns = at_ns;
+    frame.header.flags = frame_flags::FULL;
+    frame.received_ns = at_ns;
+    frame.transforms.extend_from_slice(rows);
+    frame
+}
+
+/// A world and its time; every step is followed by a full check of the structure.
+pub struct Bench {
+    pub world: World,
+    pub now_ns: u64,
+    pub tick: u64,
+}
+
+impl Bench {
+    pub fn of(bodies: Vec<BodySpec>) -> Self {
+        Self::with_rules(bodies, Vec::new())
+    }
+
+    pub fn with_rules(bodies: Vec<BodySpec>, rules: Vec<PairRule>) -> Self {
+        let shapes = bodies.iter().map(|_| cube()).collect();
+        let world = World::new(&scene(bodies, rules), shapes, START_NS).unwrap();
+        let mut bench = Self {
+            world,
+            now_ns: START_NS,
+            tick: 0,
+        };
+        bench.tick_at(START_NS, &[], &[]);
+        bench
+    }
+
+    /// One tick: edits (one request each), frames, ages; then the structure is checked.
+    pub fn tick_at(&mut self, now_ns: u64, edits: &[Edit], frames: &[Frame]) -> Vec<Admission> {
+        self.tick += 1;
+        self.now_ns = now_ns;
+        self.world.begin_tick(self.tick);
+        for edit in edits {
+            self.world.apply(std::slice::from_ref(edit)).unwrap();
+        }
+        let admit = |frame| self.world.admit(frame, now_ns);
+        let admissions = frames.iter().map(admit).collect();
+        self.world.age(now_ns);
+        self.world.validate().unwrap();
+        admissions
+    }
+
+    /// A tick `after_ns` later with one frame that has just come.
+    pub fn send(
+        &mut self,
+        after_ns: u64,
+        source: &str,
+        seq: u64,
+        rows: &[TransformRow],
+    ) -> Admission {
+        let now_ns = self.now_ns + after_ns;
+        self.tick_at(now_ns, &[], &[frame(source, seq, now_ns, rows)])[0]
+    }
+
+    /// A tick `after_ns` later with nothing new.
+    pub fn wait(&mut self, after_ns: u64) {
+        self.tick_at(self.now_ns + after_ns, &[], &[]);
+    }
+
+    /// A tick at once with one edit.
+    pub fn edit(&mut self, edit: Edit) {
+        self.tick_at(self.now_ns, &[edit], &[]);
+    }
+
+    /// What a refused request says; nothing may have changed.
+    pub fn refused(&mut self, edits: &[Edit]) -> String {
+        let (rev, changes) = (
+            self.world.scene_rev(),
+            format!("{:?}", self.world.changes()),
+        );
+        let text = self.world.apply(edits).unwrap_err();
+        assert_eq!(self.world.scene_rev(), rev);
+        assert_eq!(format!("{:?}", self.world.changes()), changes);
+        self.world.validate().unwrap();
+        text
+    }
+
+    pub fn slot(&self, name: &str) -> BodySlot {
+        self.world.slot_named(name).unwrap()
+    }
+
+    pub fn body(&self, name: &str) -> &Body {
+        self.world.body(self.slot(name)).unwrap()
+    }
+
+    pub fn status(&self, name: &str) -> BodyStatus {
+        self.body(name).status
+    }
+
+    pub fn inserted(&self, name: &str) -> bool {
+        self.world.changes().inserted.contains(&self.slot(name))
+    }
+
+    /// Why the body left the broad phase in this tick.
+    pub fn removed(&self, name: &str) -> Option<EndCause> {
+        let slot = self.slot(name);
+        let removed = &self.world.changes().removed;
+        removed.iter().find(|r| r.slot == slot).map(|r| r.cause)
+    }
+
+    pub fn rejects(&self, reason: RejectReason) -> u64 {
+        self.world.rejects()[usize::from(reason.code())]
+    }
+
+    pub fn has_reason(&self, reason: sweepd::wire::Reason) -> bool {
+        self.world.counts().reasons & reason.bit() != 0
+    }
+}
+
+pub fn refused(source: u32, reason: RejectReason) -> Admission {
+    Admission::Refused {
+        source: Some(SourceSlot(source)),
+        reason,
+    }
+}
+
+pub fn admitted(source: u32, poses: u64, refused_rows: u64) -> Admission {
+    Admission::Admitted {
+        source: SourceSlot(source),
+        poses,
+        refused_rows,
+    }
+}
