@@ -395,6 +395,7 @@ fn the_end_of_a_client_ends_its_session_after_its_frames<B: Backend>() {
     client
         .send(&FrameInfo::default(), Rows::Poses(&poses(1, 2.0)))
         .unwrap();
+    assert_eq!(daemon.log().ended, [0_u64; 0], "it lives");
     drop(client);
     until("the end of the session", || {
         daemon.log().ended.contains(&session)

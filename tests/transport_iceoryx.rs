@@ -124,13 +124,15 @@ fn a_killed_sources_session_ends_and_its_place_is_free_within_a_second() {
     let child = spawn(&files, "arm");
     let session = daemon.log().frames[0].0.session;
     assert_eq!(list_instances(&files.place).unwrap()[0].sources, 1);
-    kill_and_reap(child);
+    assert_eq!(daemon.log().ended, [0_u64; 0], "it lives");
     let clock = SystemClock;
+    kill_and_reap(child);
     let killed_ns = clock.monotonic_ns();
     until("the session's end", || {
         daemon.log().ended.contains(&session)
     });
     let ended_ns = clock.monotonic_ns() - killed_ns;
+    assert_eq!(daemon.log().ended, [session], "told once");
     assert_eq!(list_instances(&files.place).unwrap()[0].sources, 0);
     println!("slot free after {} ms", ended_ns / 1_000_000);
     assert!(ended_ns < SECOND_NS, "{} ms", ended_ns / 1_000_000);

@@ -112,7 +112,10 @@ pub struct Server {
     options: ServerOptions,
     /// Publisher ids of each session seen, to tell when its node is gone.
     sessions: BTreeMap<u128, u64>,
+    /// Publishers there at the last look, and those found gone at it.
     alive: Vec<u128>,
+    gone: Vec<u128>,
+    looked_ns: u64,
     peers_changed: bool,
     drained_ns: Option<u64>,
     demand: Demand,
@@ -195,6 +198,8 @@ impl Server {
             _lock: lock,
             sessions: BTreeMap::new(),
             alive: Vec::new(),
+            gone: Vec::new(),
+            looked_ns: 0,
             peers_changed: false,
             drained_ns: None,
             demand: Demand::default(),

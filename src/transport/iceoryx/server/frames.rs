@@ -103,11 +103,13 @@ impl Server {
             .is_none_or(|before_ns| now_ns.saturating_sub(before_ns) > silence_ns);
         self.drained_ns = Some(now_ns);
         // also without a notice: events are lost where a cleaner removed the socket
-        let look = self.peers_changed || waited;
-        if look {
-            self.peers_changed = false;
-            self.list_publishers();
+        let looked_long_ago = now_ns.saturating_sub(self.looked_ns) > self.options.heartbeat_ns;
+        if std::mem::take(&mut self.peers_changed) || looked_long_ago {
+            self.looked_ns = now_ns;
+            // before the drain, which then has all that those who are gone have sent
+            self.note_gone_publishers();
         }
+        let known = self.sessions.len();
         let stamp = Stamped {
             now_ns,
             waited,
@@ -126,15 +128,16 @@ impl Server {
         *receive_errors += transforms_vel.drain(inbox, &stamp, sessions, |frame, rows| {
             frame.set_transforms_vel(rows);
         });
-        if look {
-            self.end_sessions(inbox);
-        }
+        // who came and left between the look and the drain must be looked at again
+        self.peers_changed |= self.sessions.len() > known;
+        self.end_sessions(inbox);
     }
 
-    /// The publishers that are there now, before the drain: what a gone one has sent is in the drain that follows.
-    fn list_publishers(&mut self) {
+    fn note_gone_publishers(&mut self) {
         let Self {
             alive,
+            gone,
+            sessions,
             transforms,
             transforms_vel,
             ..
@@ -151,23 +154,17 @@ impl Server {
                 alive.push(p.publisher_id.value());
                 CallbackProgression::Continue
             });
+        let there = |publisher: &u128| alive.contains(publisher);
+        gone.extend(sessions.keys().filter(|publisher| !there(publisher)));
     }
 
     fn end_sessions(&mut self, inbox: &mut Inbox) {
-        let Self {
-            sessions, alive, ..
-        } = self;
-        let mut gone = Vec::new();
-        sessions.retain(|publisher, session| {
-            let there = alive.contains(publisher);
-            if !there {
-                gone.push(*session);
-            }
-            there
-        });
-        for session in gone {
-            // a client may have had a port on both services
-            if !sessions.values().any(|s| *s == session) && !inbox.ended().contains(&session) {
+        for publisher in self.gone.drain(..) {
+            let Some(session) = self.sessions.remove(&publisher) else {
+                continue;
+            };
+            // a client may have a port on both services: its session ends with the last
+            if !self.sessions.values().any(|s| *s == session) {
                 inbox.end_session(session);
             }
         }
