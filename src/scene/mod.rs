@@ -11,6 +11,7 @@ mod read_body;
 mod read_rule;
 mod read_scene;
 mod read_shape;
+mod request;
 mod resolve;
 mod table;
 
@@ -18,3 +19,4 @@ pub use build::BuiltShapes;
 pub use model::{BodySpec, Origin, PairAction, PairRule, PlacedSpec, Scene, SourceSpec};
 pub use pattern::{is_pattern, pattern_matches};
 pub use read_body::{BODY_NAME_BYTES_MAX, BodyDraft, SOURCE_NAME_BYTES_MAX};
+pub use request::{EDITS_MAX, Edit, EditRequest};

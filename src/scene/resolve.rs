@@ -148,7 +148,7 @@ fn settle_ids(drafts: &mut [BodyDraft]) -> Result<(), Fault> {
     Ok(())
 }
 
-fn settle_source(draft: &mut BodyDraft, sources: &[SourceSpec]) -> Result<(), Fault> {
+pub(crate) fn settle_source(draft: &mut BodyDraft, sources: &[SourceSpec]) -> Result<(), Fault> {
     let Some(name) = &draft.source else {
         if !draft.spec.moves {
             return Ok(());
@@ -181,7 +181,11 @@ fn settle_source(draft: &mut BodyDraft, sources: &[SourceSpec]) -> Result<(), Fa
 }
 
 /// Mesh files must be there; they are read when shapes are built.
-fn check_files(draft: &BodyDraft, base: &Path, seen: &mut BTreeSet<String>) -> Result<(), Fault> {
+pub(crate) fn check_files(
+    draft: &BodyDraft,
+    base: &Path,
+    seen: &mut BTreeSet<String>,
+) -> Result<(), Fault> {
     for (place, placed) in draft.spec.shapes.iter().enumerate() {
         let (ShapeSpec::Convex { file, .. } | ShapeSpec::Trimesh { file, .. }) = &placed.shape
         else {

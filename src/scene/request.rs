@@ -1,0 +1,397 @@
+//! Requests to edit a running scene: JSON in the words of scene files, with bulk geometry behind it.
+//!
+//! In: the JSON of a request and the bytes behind it. Out: checked edits, in order; what they say of bodies and sources
+//! that the scene has or has not is checked where they are applied, all of them or none.
+//!
+//! ```json
+//! { "edits": [
+//!     { "put": { "name": "box", "source": "sim", "shape": { "type": "box", "half_extents": [1, 1, 1] } } },
+//!     { "put": { "name": "part", "moves": false, "shape": { "type": "trimesh",
+//!         "vertices_blob": { "offset": 0, "count": 8 }, "faces_blob": { "offset": 192, "count": 12 } } } },
+//!     { "remove": "old" },
+//!     { "enable": { "body": "box", "enabled": false } },
+//!     { "filter": { "body": "box", "group": 1, "mask": 4294967295 } },
+//!     { "rule": { "action": "ignore", "a": "box", "b": "part", "reason": "glued" } },
+//!     { "drop_rules": { "a": "box", "b": "part" } },
+//!     { "attach": { "body": "box", "to": "part", "position": [0, 0, 1] } },
+//!     { "detach": "box" },
+//!     { "reset": { "source": "sim" } }
+//! ] }
+//! ```
+//!
+//! A blob is `count` rows, `offset` bytes behind the JSON, little-endian: three f64 a vertex, three u32 a face.
+
+use std::path::Path;
+
+use crate::math::Pose;
+use crate::scene::node::{Fault, Node, Value};
+use crate::scene::read_body::{
+    BODY_NAME_BYTES_MAX, BodyDraft, SOURCE_NAME_BYTES_MAX, read_body, title,
+};
+use crate::scene::read_rule::read_rule;
+use crate::scene::read_shape::read_pose;
+use crate::scene::resolve::{check_files, settle_source};
+use crate::scene::table::{Table, list, nearest, shortened};
+use crate::scene::{BodySpec, PairRule, SourceSpec};
+
+/// Edits in one request; more are to be sent in several.
+pub const EDITS_MAX: usize = 1 << 17;
+
+/// Several edits that are done together or not at all.
+#[derive(Debug)]
+pub struct EditRequest {
+    /// In order.
+    pub edits: Vec<Edit>,
+}
+
+/// One change of the scene, checked by itself.
+#[derive(Debug)]
+pub enum Edit {
+    /// A body by name: new, or in place of the one of this name; the same content again changes nothing.
+    Put(Box<BodyDraft>),
+    /// Takes a body out.
+    Remove {
+        /// Its name.
+        name: String,
+    },
+    /// Lets a body take part, or not.
+    Enable {
+        /// Its name.
+        name: String,
+        /// Whether it takes part.
+        enabled: bool,
+    },
+    /// Sets a body's group and mask.
+    Filter {
+        /// Its name.
+        name: String,
+        /// Groups it belongs to; `None`: as they are.
+        group: Option<u32>,
+        /// Groups it collides with; `None`: as they are.
+        mask: Option<u32>,
+    },
+    /// Adds a pair rule behind all others, so that it wins over them.
+    Rule(PairRule),
+    /// Takes out every pair rule of these two sides, in either order.
+    DropRules {
+        /// The one side, as the rule says it.
+        a: String,
+        /// The other side.
+        b: String,
+    },
+    /// Hangs a body on another, or lets it go.
+    Attach {
+        /// Its name.
+        name: String,
+        /// The body to hang it on; `None`: it is on its own again.
+        to: Option<String>,
+        /// Its pose seen from there; `None`: where it is now.
+        pose: Option<Pose>,
+    },
+    /// Forgets every pose: pairs end, bodies that move are not received again.
+    Reset {
+        /// Of this source's bodies only; `None`: of all.
+        source: Option<String>,
+    },
+}
+
+impl EditRequest {
+    /// Reads a request.
+    ///
+    /// * `json` - the JSON at the front of the payload.
+    /// * `blobs` - the bytes behind it.
+    ///
+    /// # Errors
+    /// One text that names the edit, the body, what is wrong and what to change.
+    pub fn parse(json: &[u8], blobs: &[u8]) -> Result<Self, String> {
+        read(json, blobs).map_err(|fault| fault.text)
+    }
+}
+
+impl BodyDraft {
+    /// The body, its source found and its mesh files seen; an id that was not given stays 0.
+    ///
+    /// * `sources` - of the running scene.
+    /// * `base` - the folder that mesh files are relative to.
+    ///
+    /// # Errors
+    /// One text that names the body, what is wrong and what to change.
+    pub fn settle(mut self, sources: &[SourceSpec], base: &Path) -> Result<BodySpec, String> {
+        settle_source(&mut self, sources)
+            .and_then(|()| check_files(&self, base, &mut std::collections::BTreeSet::new()))
+            .map_err(|fault| fault.text)?;
+        Ok(self.spec)
+    }
+
+    /// Its name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.spec.name
+    }
+}
+
+fn read(json: &[u8], blobs: &[u8]) -> Result<EditRequest, Fault> {
+    let mut table = Table::open(Node::from_json(json)?, "a request", &["edits"])?;
+    let nodes = list(table.need("edits")?, "edits")?;
+    if nodes.is_empty() || nodes.len() > EDITS_MAX {
+        let text = format!("edits has {} edits: write 1 to {EDITS_MAX}", nodes.len());
+        return Err(Fault::new(None, text));
+    }
+    let mut edits = Vec::with_capacity(nodes.len());
+    for (place, node) in nodes.into_iter().enumerate() {
+        let edit = read_edit(node, blobs);
+        edits.push(edit.map_err(|fault| fault.within(&format!("edit {}", place + 1)))?);
+    }
+    Ok(EditRequest { edits })
+}
+
+const VERBS: &[&str] = &[
+    "put",
+    "remove",
+    "enable",
+    "filter",
+    "rule",
+    "drop_rules",
+    "attach",
+    "detach",
+    "reset",
+];
+
+fn read_edit(node: Node, blobs: &[u8]) -> Result<Edit, Fault> {
+    let mend = format!("write one of {}", VERBS.join(", "));
+    let Value::Table(entries) = node.value else {
+        let text = format!("an edit is a table with one key: {mend}");
+        return Err(Fault::new(None, text));
+    };
+    let count = entries.len();
+    let Ok([entry]) = <[_; 1]>::try_from(entries) else {
+        let text = format!("an edit has one key, this one has {count}: {mend}");
+        return Err(Fault::new(None, text));
+    };
+    let verb = entry.key.as_str();
+    let fault_within = |fault: Fault| fault.within(verb);
+    match verb {
+        "put" => {
+            let title = title(&entry.node, 1);
+            return read_body(entry.node, Some(blobs))
+                .map(|draft| Edit::Put(Box::new(draft)))
+                .map_err(|fault| fault.within(&title));
+        }
+        "rule" => read_rule(entry.node).map(Edit::Rule),
+        "remove" => plain_name(entry.node).map(|name| Edit::Remove { name }),
+        "detach" => plain_name(entry.node).map(|name| Edit::Attach {
+            name,
+            to: None,
+            pose: None,
+        }),
+        "enable" => read_enable(entry.node),
+        "filter" => read_filter(entry.node),
+        "drop_rules" => read_drop(entry.node),
+        "attach" => read_attach(entry.node),
+        "reset" => {
+            let source = Table::open(entry.node, "this edit", &["source"])
+                .and_then(|mut table| table.name("source", SOURCE_NAME_BYTES_MAX));
+            source.map(|source| Edit::Reset { source })
+        }
+        _ => {
+            let mend = match nearest(verb, VERBS) {
+                Some(nearest) => format!("did you mean `{nearest}`?"),
+                None => mend,
+            };
+            let text = format!("there is no edit `{}`: {mend}", shortened(verb));
+            return Err(Fault::new(None, text));
+        }
+    }
+    .map_err(fault_within)
+}
+
+/// A body's name as the whole value.
+fn plain_name(node: Node) -> Result<String, Fault> {
+    let text = match node.value {
+        Value::Text(name) if (1..=BODY_NAME_BYTES_MAX).contains(&name.len()) => return Ok(name),
+        Value::Text(name) => format!("the name has {} bytes", name.len()),
+        _ => format!("here stands {}", node.kind()),
+    };
+    let mend = format!("write a body's name, 1 to {BODY_NAME_BYTES_MAX} bytes");
+    Err(Fault::new(None, format!("{text}: {mend}")))
+}
+
+fn need_name(table: &mut Table, key: &str) -> Result<String, Fault> {
+    let name = table.name(key, BODY_NAME_BYTES_MAX)?;
+    name.ok_or_else(|| Fault::new(None, format!("`{key}` is missing: write a body's name")))
+}
+
+fn read_enable(node: Node) -> Result<Edit, Fault> {
+    let mut table = Table::open(node, "this edit", &["body", "enabled"])?;
+    let name = need_name(&mut table, "body")?;
+    let enabled = table.flag("enabled")?;
+    let text = "`enabled` is missing: write true or false";
+    Ok(Edit::Enable {
+        name,
+        enabled: enabled.ok_or_else(|| Fault::new(None, text))?,
+    })
+}
+
+fn read_filter(node: Node) -> Result<Edit, Fault> {
+    let mut table = Table::open(node, "this edit", &["body", "group", "mask"])?;
+    let name = need_name(&mut table, "body")?;
+    let (group, mask) = (table.bits("group")?, table.bits("mask")?);
+    if group.is_none() && mask.is_none() {
+        let text = "neither `group` nor `mask` is given: add one";
+        return Err(Fault::new(None, text));
+    }
+    Ok(Edit::Filter { name, group, mask })
+}
+
+fn read_drop(node: Node) -> Result<Edit, Fault> {
+    let mut table = Table::open(node, "this edit", &["a", "b"])?;
+    Ok(Edit::DropRules {
+        a: need_name(&mut table, "a")?,
+        b: need_name(&mut table, "b")?,
+    })
+}
+
+fn read_attach(node: Node) -> Result<Edit, Fault> {
+    let keys = &["body", "to", "position", "orientation"];
+    let mut table = Table::open(node, "this edit", keys)?;
+    let name = need_name(&mut table, "body")?;
+    let to = need_name(&mut table, "to")?;
+    if name == to {
+        let text = format!(
+            "body \"{}\" cannot hang on itself: name another",
+            shortened(&name)
+        );
+        return Err(Fault::new(None, text));
+    }
+    let has_pose = table.has("position") || table.has("orientation");
+    let pose = read_pose(&mut table)?;
+    Ok(Edit::Attach {
+        name,
+        to: Some(to),
+        pose: has_pose.then_some(pose),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::ShapeSpec;
+
+    fn error(json: &str) -> String {
+        EditRequest::parse(json.as_bytes(), &[0; 24]).unwrap_err()
+    }
+
+    #[test]
+    fn every_edit_is_read() {
+        let json = r#"{ "edits": [
+            { "put": { "name": "box", "id": 18446744073709551615, "source": "sim",
+                "shape": { "type": "box", "half_extents": [1, 1, 1] } } },
+            { "remove": "old" },
+            { "enable": { "body": "box", "enabled": false } },
+            { "filter": { "body": "box", "mask": 4294967295 } },
+            { "rule": { "action": "ignore", "a": "box", "b": "part*", "reason": "glued" } },
+            { "drop_rules": { "a": "box", "b": "part" } },
+            { "attach": { "body": "box", "to": "part", "position": [0, 0, 1] } },
+            { "attach": { "body": "box", "to": "part" } },
+            { "detach": "box" },
+            { "reset": { "source": "sim" } },
+            { "reset": {} }
+        ] }"#;
+        let edits = EditRequest::parse(json.as_bytes(), &[]).unwrap().edits;
+        assert_eq!(edits.len(), 11);
+        let Edit::Put(draft) = edits.into_iter().next().unwrap() else {
+            panic!("a put");
+        };
+        let sources = ["other", "sim"].map(|name| SourceSpec {
+            name: name.to_owned(),
+            timeout_ns: 1,
+        });
+        let spec = draft.settle(&sources, Path::new("")).unwrap();
+        assert_eq!((spec.id.0, spec.source), (u64::MAX, Some(1)));
+    }
+
+    #[test]
+    fn blobs_are_read_and_checked_for_their_ends() {
+        let mut blobs = vec![7_u8];
+        for x in [0.0_f64, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0] {
+            blobs.extend(x.to_le_bytes());
+        }
+        for k in [0_u32, 1, 2] {
+            blobs.extend(k.to_le_bytes());
+        }
+        let json = |vertices: u64, offset: u64| {
+            format!(
+                r#"{{"edits": [{{"put": {{"name": "t", "moves": false, "shape": {{"type": "trimesh",
+                "vertices_blob": {{"offset": 1, "count": {vertices}}},
+                "faces_blob": {{"offset": {offset}, "count": 1}} }} }} }}]}}"#
+            )
+        };
+        let request = EditRequest::parse(json(3, 73).as_bytes(), &blobs).unwrap();
+        let [Edit::Put(draft)] = &request.edits[..] else {
+            panic!("one put");
+        };
+        let ShapeSpec::Trimesh {
+            vertices, faces, ..
+        } = &draft.spec.shapes[0].shape
+        else {
+            panic!("a mesh");
+        };
+        assert_eq!(vertices[1], [1.0, 0.0, 0.0]);
+        assert_eq!(faces[..], [[0, 1, 2]]);
+        let past = EditRequest::parse(json(3, 74).as_bytes(), &blobs).unwrap_err();
+        assert!(
+            past.contains("edit 1: body \"t\": faces_blob ends at byte 86"),
+            "{past}"
+        );
+        let huge = EditRequest::parse(json(1 << 40, 73).as_bytes(), &blobs).unwrap_err();
+        assert!(huge.contains("count is out of range"), "{huge}");
+    }
+
+    #[test]
+    fn each_mistake_is_one_text_that_names_edit_body_and_mend() {
+        for (json, wanted) in [
+            ("", "this is not JSON"),
+            ("{}", "a request needs `edits`"),
+            (r#"{"edits": []}"#, "write 1 to"),
+            (r#"{"edit": []}"#, "did you mean `edits`?"),
+            (r#"{"edits": [{}]}"#, "edit 1: an edit has one key"),
+            (
+                r#"{"edits": [{"remove": "a", "detach": "a"}]}"#,
+                "this one has 2",
+            ),
+            (r#"{"edits": [{"remov": "a"}]}"#, "did you mean `remove`?"),
+            (
+                r#"{"edits": [{"remove": ""}]}"#,
+                "edit 1: remove: the name has 0 bytes",
+            ),
+            (
+                r#"{"edits": [{"reset": {}}, {"enable": {"body": "a"}}]}"#,
+                "edit 2: enable: `enabled` is missing",
+            ),
+            (
+                r#"{"edits": [{"filter": {"body": "a"}}]}"#,
+                "neither `group` nor `mask`",
+            ),
+            (
+                r#"{"edits": [{"attach": {"body": "a", "to": "a"}}]}"#,
+                "cannot hang on itself",
+            ),
+            (
+                r#"{"edits": [{"put": {"name": "b", "shape": {"type": "sphere", "radius": -1}}}]}"#,
+                "edit 1: body \"b\": radius is -1 m: write a size",
+            ),
+            (
+                r#"{"edits": [{"put": {"name": "b", "shape": {"type": "sphere", "radius": 1e999}}}]}"#,
+                "this is not JSON: number out of range",
+            ),
+            (
+                r#"{"edits": [{"put": {"name": "b", "shape": {"type": "convex", "vertices": [[0, 0, 0]],
+                    "vertices_blob": {"offset": 0, "count": 1}}}}]}"#,
+                "vertices beside vertices_blob: keep one of them",
+            ),
+        ] {
+            let text = error(json);
+            assert!(text.contains(wanted), "{json}: {text}");
+        }
+    }
+}
