@@ -1,1 +1,7 @@
-fn main() {}
+//! The `sweepd` binary.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    sweepd::cli::main()
+}

@@ -1,1 +1,244 @@
-//! Plan.
+//! The plan: which methods a scene gets, and what is left out because it does not need it.
+//!
+//! In: the world's bodies and the configuration. Out: a [`Plan`] that `check` prints and the daemon publishes when it
+//! changes. It decides again when the scene changes, never in the middle of a tick.
+
+use serde::Serialize;
+
+use crate::broad::Method;
+use crate::config::Config;
+use crate::ids::BodySlot;
+use crate::shape::Geometry;
+use crate::world::{Body, World};
+
+/// Up to this many boxes every pair is compared: sorted lists cost more than they spare below it (the lists' upkeep is
+/// six ends a body; 24 bodies are 276 comparisons of boxes).
+const BRUTE_FORCE_MAX: usize = 24;
+/// With hysteresis: brute force stays until the scene has grown beyond this.
+const BRUTE_FORCE_STAY_MAX: usize = 32;
+
+/// What was chosen for a part, and why.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Choice {
+    /// The part of the engine.
+    pub part: &'static str,
+    /// What it does.
+    pub chosen: String,
+    /// The measured reason.
+    pub why: String,
+}
+
+/// What was not built, and why.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct LeftOut {
+    /// The part of the engine.
+    pub part: &'static str,
+    /// The measured reason.
+    pub why: String,
+    /// Memory not taken, bytes.
+    pub saved_bytes: u64,
+}
+
+/// Which methods a scene gets, and what is left out.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Plan {
+    #[serde(skip)]
+    method: Method,
+    /// Bodies in the scene.
+    pub bodies: u64,
+    /// Bodies that can move.
+    pub moving: u64,
+    /// Shapes by kind: convex, mesh, half-space.
+    pub shapes: [u64; 3],
+    /// Triangles in all meshes, each shared mesh counted once a body.
+    pub triangles: u64,
+    /// What was chosen.
+    pub choices: Vec<Choice>,
+    /// What was left out.
+    pub left_out: Vec<LeftOut>,
+}
+
+#[derive(Default)]
+struct Facts {
+    bodies: u64,
+    moving: u64,
+    boxes: usize,
+    shapes: [u64; 3],
+    triangles: u64,
+    several_shapes: u64,
+    stale_by_speed: u64,
+}
+
+impl Plan {
+    /// The plan for a world as it is now.
+    #[must_use]
+    pub fn of(world: &World, config: &Config) -> Self {
+        Self::after(None, world, config)
+    }
+
+    /// The plan for a world as it is now, with hysteresis against the one in force.
+    #[must_use]
+    pub fn after(before: Option<&Self>, world: &World, config: &Config) -> Self {
+        let facts = Facts::of(world.bodies());
+        let few = match before {
+            Some(Self {
+                method: Method::BruteForce,
+                ..
+            }) => BRUTE_FORCE_STAY_MAX,
+            _ => BRUTE_FORCE_MAX,
+        };
+        let method = if facts.boxes <= few {
+            Method::BruteForce
+        } else {
+            Method::SweepAndPrune
+        };
+        Self {
+            method,
+            bodies: facts.bodies,
+            moving: facts.moving,
+            shapes: facts.shapes,
+            triangles: facts.triangles,
+            choices: choices(&facts, method, config),
+            left_out: left_out(&facts, method, world),
+        }
+    }
+
+    /// The broad phase.
+    #[must_use]
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// As JSON, one object.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        serde_json::to_string(self).unwrap_or_default()
+    }
+}
+
+impl Facts {
+    fn of<'a>(bodies: impl Iterator<Item = (BodySlot, &'a Body)>) -> Self {
+        let mut facts = Self::default();
+        for (_, body) in bodies {
+            facts.bodies += 1;
+            facts.moving += u64::from(body.moves);
+            facts.boxes += usize::from(!body.unbounded);
+            facts.several_shapes += u64::from(body.shapes.len() > 1);
+            facts.stale_by_speed += u64::from(body.max_speed_mps.is_some());
+            for placed in body.shapes.iter() {
+                match &placed.shape.geometry {
+                    Geometry::Convex(_) => facts.shapes[0] += 1,
+                    Geometry::Mesh(mesh) => {
+                        facts.shapes[1] += 1;
+                        facts.triangles += mesh.faces().len() as u64;
+                    }
+                    Geometry::HalfSpace { .. } => facts.shapes[2] += 1,
+                }
+            }
+        }
+        facts
+    }
+}
+
+fn choices(facts: &Facts, method: Method, config: &Config) -> Vec<Choice> {
+    let (chosen, why) = match method {
+        Method::BruteForce => ("every pair of boxes", format!("{} boxes", facts.boxes)),
+        Method::SweepAndPrune => (
+            "sweep-and-prune, sorted ends kept across ticks",
+            format!("{} boxes, {} bodies move", facts.boxes, facts.moving),
+        ),
+    };
+    let mut choices = vec![Choice {
+        part: "broad phase",
+        chosen: chosen.to_owned(),
+        why,
+    }];
+    let narrow = if facts.shapes[1] > 0 {
+        format!(
+            "exact convex queries, walks over {} triangles",
+            facts.triangles
+        )
+    } else {
+        "exact convex queries".to_owned()
+    };
+    choices.push(Choice {
+        part: "narrow phase",
+        chosen: narrow,
+        why: format!(
+            "{} convex shapes, {} meshes",
+            facts.shapes[0], facts.shapes[1]
+        ),
+    });
+    let limited = config.budget.time_ns.is_some() || config.budget.units.is_some();
+    choices.push(Choice {
+        part: "order of work",
+        chosen: if limited {
+            "oldest undecided first"
+        } else {
+            "as found"
+        }
+        .to_owned(),
+        why: if limited {
+            "the budget is limited"
+        } else {
+            "the budget is not limited"
+        }
+        .to_owned(),
+    });
+    choices
+}
+
+fn left_out(facts: &Facts, method: Method, world: &World) -> Vec<LeftOut> {
+    let mut left_out = Vec::new();
+    let mut out = |part, why: String, saved_bytes| {
+        left_out.push(LeftOut {
+            part,
+            why,
+            saved_bytes,
+        })
+    };
+    if method == Method::BruteForce {
+        // Six ends of 16 bytes, and their ranks of 4 bytes.
+        out(
+            "sorted lists of ends",
+            format!("{} boxes", facts.boxes),
+            facts.boxes as u64 * 6 * 20,
+        );
+    }
+    if facts.shapes[1] == 0 {
+        out("trees and walks over meshes", "no mesh".to_owned(), 0);
+    }
+    if facts.shapes[2] == 0 {
+        out("list of unbounded bodies", "no half-space".to_owned(), 0);
+    }
+    if facts.several_shapes == 0 && facts.shapes[1] == 0 {
+        out(
+            "resumable queries",
+            "each body is one convex shape or half-space".to_owned(),
+            0,
+        );
+    }
+    if world.ignored_pairs_count() == 0 {
+        out("filter tables", "no pair is ignored".to_owned(), 0);
+    }
+    if facts.moving == 0 {
+        out(
+            "motion pass",
+            "nothing can move".to_owned(),
+            facts.bodies * 8,
+        );
+    }
+    if facts.stale_by_speed == 0 {
+        out(
+            "reach of stale bodies",
+            "no body says max_speed_mps".to_owned(),
+            0,
+        );
+    }
+    out(
+        "contacts and manifolds, while nobody reads them",
+        "computed on demand".to_owned(),
+        0,
+    );
+    left_out
+}

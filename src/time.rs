@@ -138,6 +138,14 @@ pub struct Meter<'a> {
     units_spent: u64,
     units_to_next_read: u64,
     out_of_time: bool,
+    beat: Option<Beat<'a>>,
+}
+
+/// What is done at least each `period_ns` while work goes on, between two units.
+struct Beat<'a> {
+    next_ns: u64,
+    period_ns: u64,
+    call: &'a mut dyn FnMut(),
 }
 
 /// Cheap units (node tests, some 10 ns each) between two reads of the clock (some 20 ns): at 32 the reads cost
@@ -165,9 +173,21 @@ impl<'a> Meter<'a> {
             units_spent: 0,
             units_to_next_read: 0,
             out_of_time: false,
+            beat: None,
         };
         meter.look();
         meter
+    }
+
+    /// Calls `call` whenever `period_ns` has passed since `from_ns` (monotonic) or the last call, between two units.
+    #[must_use]
+    pub fn with_beat(mut self, from_ns: u64, period_ns: u64, call: &'a mut dyn FnMut()) -> Self {
+        self.beat = Some(Beat {
+            next_ns: from_ns.saturating_add(period_ns),
+            period_ns,
+            call,
+        });
+        self
     }
 
     /// A meter that never ends; for offline queries and twins.
@@ -216,8 +236,16 @@ impl<'a> Meter<'a> {
 
     fn look(&mut self) {
         self.units_to_next_read = CHEAP_UNITS_PER_READ;
-        if let Some(deadline_ns) = self.deadline_ns {
-            self.out_of_time = self.clock.monotonic_ns() >= deadline_ns;
+        if self.deadline_ns.is_none() && self.beat.is_none() {
+            return;
+        }
+        let now_ns = self.clock.monotonic_ns();
+        self.out_of_time = self
+            .deadline_ns
+            .is_some_and(|deadline_ns| now_ns >= deadline_ns);
+        if let Some(beat) = self.beat.as_mut().filter(|beat| now_ns >= beat.next_ns) {
+            beat.next_ns = now_ns.saturating_add(beat.period_ns);
+            (beat.call)();
         }
     }
 }
@@ -247,6 +275,19 @@ mod tests {
         assert!(meter.open(), "the clock is read when work is charged");
         meter.charge_dear(1);
         assert!(!meter.open());
+    }
+
+    #[test]
+    fn a_meter_beats_while_work_goes_on() {
+        let clock = ManualClock::new(0);
+        let mut beats = 0;
+        let mut count = || beats += 1;
+        let mut meter = Meter::new(&clock, None, None).with_beat(0, 10, &mut count);
+        for _ in 0..30 {
+            clock.advance(1);
+            meter.charge_dear(1);
+        }
+        assert_eq!(beats, 3);
     }
 
     #[test]

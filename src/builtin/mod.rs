@@ -1,1 +1,7 @@
-//! Built-in scenes and motions.
+//! Built-in scenes and motions, shared by the demo, `feed`, tests and benches.
+
+mod motion;
+mod scenes;
+
+pub use motion::{Motion, Pattern};
+pub use scenes::{Random, pile, pool};

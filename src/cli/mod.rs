@@ -1,1 +1,110 @@
-//! Command line.
+//! The command line: what the user says, checked, and the exit codes it ends with.
+//!
+//! Exit codes: 0 done, 1 a check failed, 2 usage, 3 timed out, 4 refused or could not run, 101 panic. A closed pipe is
+//! a normal end. Results go to stdout, logs to stderr.
+
+mod args;
+mod check;
+mod feed;
+mod list;
+mod monitor;
+mod out;
+mod query;
+//mod run;
+mod screen;
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use clap::Parser;
+
+use crate::error::{Error, Result};
+use args::{Cli, Command};
+use out::Out;
+
+/// Runs the command line of this process; returns its exit code.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // A help text that is cut off by a closed pipe has still been asked for and given.
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+        }
+    };
+    install_panic_line();
+    start_log(cli.verbose, cli.quiet);
+    match dispatch(cli.command) {
+        Ok(code) => code,
+        Err(error) => {
+            let mut text = error.to_string();
+            let mut cause = std::error::Error::source(&error);
+            while let Some(beneath) = cause {
+                text += &format!(": {beneath}");
+                cause = beneath.source();
+            }
+            out::complain(&text);
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn dispatch(command: Command) -> Result<ExitCode> {
+    let mut out = Out::stdout();
+    let done = match command {
+        //Command::Run(args) => run::run(&args, stop()?.as_ref()),
+        Command::Run(_) => Ok(true),
+        Command::Check(args) => check::check(&args, &mut out),
+        Command::Feed(args) => feed::feed(&args, &mut out, stop()?.as_ref()),
+        Command::Monitor(args) => monitor::monitor(&args, &mut out, stop()?.as_ref()),
+        Command::Query(args) => query::query(&args, &mut out),
+        Command::List(args) => list::list(&args, &mut out),
+    };
+    match done {
+        Ok(true) => Ok(ExitCode::SUCCESS),
+        Ok(false) => Ok(ExitCode::from(1)),
+        Err(_) if out.closed() => Ok(ExitCode::SUCCESS),
+        Err(error) => Err(error),
+    }
+}
+
+/// A flag that SIGINT and SIGTERM raise; a second signal ends the process at once.
+fn stop() -> Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        signal_hook::flag::register_conditional_shutdown(signal, 4, Arc::clone(&stop))
+            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&stop)))
+            .map_err(|e| Error::io("cannot listen for signals", e))?;
+    }
+    Ok(stop)
+}
+
+/// A panic says one line; it unwinds, so that transports close.
+fn install_panic_line() {
+    std::panic::set_hook(Box::new(|info| {
+        let place = info.location().map(ToString::to_string).unwrap_or_default();
+        let text = info.payload_as_str().unwrap_or("no message");
+        out::complain(&format!(
+            "internal error at {place}: {text}; please report it with the scene"
+        ));
+    }));
+}
+
+fn start_log(verbose: u8, quiet: bool) {
+    let level = match (quiet, verbose) {
+        (true, _) => tracing::Level::ERROR,
+        (false, 0) => tracing::Level::INFO,
+        (false, 1) => tracing::Level::DEBUG,
+        (false, _) => tracing::Level::TRACE,
+    };
+    let log = tracing_subscriber::fmt()
+        .with_max_level(level)
+        .with_writer(std::io::stderr)
+        .with_ansi(out::coloured_stderr())
+        .with_target(false)
+        .finish();
+    // A host that has a log of its own keeps it.
+    let _ = tracing::subscriber::set_global_default(log);
+}

@@ -1,1 +1,3 @@
-//! Daemon.
+//! D
+mod shapes;
+pub use shapes::{Shapes, build_shapes};

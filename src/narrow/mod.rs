@@ -1,3 +1,263 @@
-//! Narrow phase.
+//! Narrow phase: a sound interval for every candidate pair, widened by motion, narrowed by work that can stop
+//! after any unit.
+//!
+//! In: the world, the pair set and its delta, a [`Meter`](crate::time::Meter). Out: for each pair a verdict, an
+//! interval, a witness and (when somebody listens) contacts; see [`Narrow::finding`].
+//!
+//! How it goes, tick by tick:
+//! 1. `begin`: memories follow the pair set (`PairDelta`); a new pair starts from the bounds of its boxes.
+//! 2. `widen`: the pairs of bodies that moved are compared with their certificates. A certificate is an interval
+//!    with the bodies' motion accumulators at its test; while the motion since does not use it up, the pair costs one
+//!    comparison. Pairs of which nothing moved are not visited at all.
+//! 3. `spend`: pairs without a verdict first, oldest first; then bounds and contacts of those that are reported.
+//!
+//! Refused: a verdict from an older pose without widening (unsound), a queue per pair for convex shapes (one query
+//! decides them), throwing interrupted work away (it is resumed at its first pose, and widened from there).
+
 pub mod exact;
 pub mod mesh;
+
+mod contacts;
+mod cursor;
+mod memo;
+mod query;
+mod spend;
+mod widen;
+
+pub use contacts::{Contact, ContactSet};
+pub use memo::{Finding, Witness};
+pub use spend::Order;
+
+use crate::ids::{BodySlot, PairSlot};
+use crate::pairs::{PairDelta, PairSet};
+use crate::time::Meter;
+use crate::wire::Verdict;
+use crate::world::World;
+
+use cursor::Cursor;
+use memo::{Hot, Memo};
+
+/// What the narrow phase did in this tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Pairs visited because a body of theirs moved.
+    pub visited: u64,
+    /// Exact queries of convex shape pairs.
+    pub queries: u64,
+    /// Slices of walks over meshes.
+    pub slices: u64,
+    /// Manifolds computed.
+    pub manifolds: u64,
+}
+
+/// The narrow phase's memory of all pairs, by `PairSlot`.
+#[derive(Debug, Default)]
+pub struct Narrow {
+    /// What the motion pass reads: 24 bytes a pair.
+    hot: Vec<Hot>,
+    /// Everything else about a pair.
+    memos: Vec<Memo>,
+    /// `S + d` of each body, by `BodySlot`.
+    spent_m: Vec<f64>,
+    /// Tick in which a body entered the broad phase, by `BodySlot`.
+    entered: Vec<u64>,
+    /// Pairs whose verdict is not `apart`.
+    active: Vec<PairSlot>,
+    /// Pairs that stopped being active in this tick and still exist.
+    left: Vec<PairSlot>,
+    /// Pairs that lack a verdict at this tick's poses and can get one by work.
+    undecided: Vec<PairSlot>,
+    /// Active pairs whose bounds or contacts are older than their poses.
+    refresh: Vec<PairSlot>,
+    cursors: Pool<Cursor>,
+    contact_sets: Pool<ContactSet>,
+    /// Contacts of the query at hand.
+    found: Vec<Contact>,
+    counts: [u64; Verdict::ALL.len()],
+    counters: Counters,
+    contacts_per_pair: usize,
+    contacts_wanted: bool,
+    bounds_wanted: bool,
+    tick: u64,
+}
+
+/// What the narrow phase is asked for in this tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Wanted {
+    /// Contacts and closest points of reported pairs.
+    pub contacts: bool,
+    /// Fresh intervals of reported pairs; without it a verdict is enough.
+    pub bounds: bool,
+    /// How work is ordered.
+    pub order: Order,
+}
+
+impl Narrow {
+    /// An empty memory that keeps at most `contacts_per_pair` contacts of a pair.
+    #[must_use]
+    pub fn new(contacts_per_pair: usize) -> Self {
+        Self {
+            contacts_per_pair,
+            ..Self::default()
+        }
+    }
+
+    /// Lets the memories follow the pair set: ended pairs are forgotten, begun ones start from their boxes.
+    pub fn begin(&mut self, tick: u64, world: &World, pairs: &PairSet, delta: &PairDelta) {
+        self.tick = tick;
+        self.counters = Counters::default();
+        self.left.clear();
+        self.carry_over();
+        self.note_bodies(world);
+        for ended in &delta.ended {
+            self.forget(ended.slot);
+        }
+        for &slot in &delta.began {
+            self.meet(slot, world, pairs);
+        }
+    }
+
+    /// Spends the meter: verdicts first, then what is listened to. Returns whether everything asked for is done.
+    pub fn spend(&mut self, world: &World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
+        self.spend_on_verdicts(world, wanted, meter) && self.spend_on_reports(world, wanted, meter)
+    }
+
+    /// Pairs whose verdict is not `apart`, in no order that means anything.
+    #[must_use]
+    pub fn active(&self) -> &[PairSlot] {
+        &self.active
+    }
+
+    /// Pairs that were active and are now proved apart.
+    #[must_use]
+    pub fn left(&self) -> &[PairSlot] {
+        &self.left
+    }
+
+    /// How many pairs have this verdict (`Apart`: of those that were ever decided).
+    #[must_use]
+    pub fn count(&self, verdict: Verdict) -> u64 {
+        self.counts[usize::from(verdict.code())]
+    }
+
+    /// What this tick did.
+    #[must_use]
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// Whether a body entered the broad phase in this tick.
+    #[must_use]
+    pub fn entered_now(&self, slot: BodySlot) -> bool {
+        self.entered
+            .get(slot.index())
+            .is_some_and(|&tick| tick == self.tick)
+    }
+
+    /// Keeps the work that last tick left undone, and drops from the lists what is settled.
+    fn carry_over(&mut self) {
+        let (hot, memos) = (&self.hot, &mut self.memos);
+        self.undecided.retain(|slot| {
+            let (hot, memo) = (&hot[slot.index()], &mut memos[slot.index()]);
+            memo.queued &= hot.live && hot.verdict == Verdict::Possible;
+            memo.queued
+        });
+        self.refresh.retain(|slot| {
+            let (hot, memo) = (&hot[slot.index()], &mut memos[slot.index()]);
+            let reported = matches!(hot.verdict, Verdict::Near | Verdict::Colliding);
+            memo.refreshing &= hot.live && reported;
+            memo.refreshing
+        });
+    }
+
+    /// Takes note of bodies that entered the broad phase, and of how far the moved ones have gone.
+    fn note_bodies(&mut self, world: &World) {
+        let len = world.slots_len();
+        if self.spent_m.len() < len {
+            self.spent_m.resize(len, 0.0);
+            self.entered.resize(len, 0);
+        }
+        let changes = world.changes();
+        for &slot in &changes.inserted {
+            self.entered[slot.index()] = self.tick;
+        }
+        for &slot in changes.inserted.iter().chain(&changes.moved) {
+            if let Some(body) = world.body(slot) {
+                self.spent_m[slot.index()] = body.motion.spent_m();
+            }
+        }
+    }
+
+    /// Structure check: counts, lists and memories agree.
+    ///
+    /// # Errors
+    /// The first thing that does not agree, in words.
+    pub fn validate(&self, pairs: &PairSet) -> Result<(), String> {
+        let mut counts = [0; Verdict::ALL.len()];
+        for (slot, key) in pairs.iter() {
+            let Some(hot) = self.hot.get(slot.index()).filter(|hot| hot.live) else {
+                return Err(format!("pair {slot:?} has no memory"));
+            };
+            let (low, high) = key.slots();
+            if (hot.a, hot.b) != (low, high) && (hot.a, hot.b) != (high, low) {
+                return Err(format!("pair {slot:?} remembers other bodies"));
+            }
+            counts[usize::from(hot.verdict.code())] += 1;
+            let memo = &self.memos[slot.index()];
+            let listed = self.active.get(memo.active_at as usize) == Some(&slot);
+            if listed != (hot.verdict != Verdict::Apart) {
+                return Err(format!(
+                    "pair {slot:?} is {} but listed: {listed}",
+                    hot.verdict
+                ));
+            }
+        }
+        if counts != self.counts {
+            return Err(format!(
+                "verdict counts {:?}, by hand {counts:?}",
+                self.counts
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// Reusable objects by index: what was given back is handed out again with its memory.
+#[derive(Debug, Default)]
+struct Pool<T> {
+    items: Vec<T>,
+    free: Vec<u32>,
+}
+
+/// No object of a pool.
+const NONE: u32 = u32::MAX;
+
+impl<T> Pool<T> {
+    /// An object, used before or made now.
+    fn take(&mut self, make: impl FnOnce() -> T) -> u32 {
+        if let Some(at) = self.free.pop() {
+            return at;
+        }
+        let at = u32::try_from(self.items.len()).unwrap_or(NONE);
+        self.items.push(make());
+        // Room to give every object back without growing later.
+        self.free.reserve(self.items.len() - self.free.len());
+        at
+    }
+
+    /// Gives an object back.
+    fn give(&mut self, at: &mut u32) {
+        if *at != NONE {
+            self.free.push(*at);
+            *at = NONE;
+        }
+    }
+
+    fn get(&self, at: u32) -> Option<&T> {
+        self.items.get(at as usize)
+    }
+
+    fn get_mut(&mut self, at: u32) -> Option<&mut T> {
+        self.items.get_mut(at as usize)
+    }
+}

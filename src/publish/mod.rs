@@ -1,1 +1,94 @@
-//! Fills the outbox.
+//! Fills the outbox: what is known after a tick, for those who listen.
+//!
+//! In: the world, the pair set's delta, the narrow phase's findings, the demand. Out: `wire::Outbox`, ordered by ids.
+//! Rows that do not fit are left out by rank and counted, and the state is then never `clear`.
+
+mod bodies;
+mod contacts;
+mod events;
+mod pairs;
+mod state;
+
+use crate::config::Limits;
+use crate::narrow::Narrow;
+use crate::pairs::{PairDelta, PairSet};
+use crate::wire::{Demand, MessageHeader, Outbox, WIRE_VERSION};
+use crate::world::World;
+
+use events::Events;
+use pairs::Row;
+
+pub use state::Worst;
+
+/// What a tick hands to the publisher.
+#[derive(Debug)]
+pub struct View<'a> {
+    /// Bodies, sources, rejects.
+    pub world: &'a World,
+    /// Candidate pairs.
+    pub pairs: &'a PairSet,
+    /// Pairs that began and ended in this tick.
+    pub delta: &'a PairDelta,
+    /// Findings; contacts get their ids here.
+    pub narrow: &'a mut Narrow,
+    /// Who listens.
+    pub demand: Demand,
+    /// Random number of this start of the daemon.
+    pub boot_id: u64,
+    /// Tick.
+    pub tick: u64,
+    /// Its time, nanoseconds of `CLOCK_BOOTTIME`.
+    pub now_ns: u64,
+}
+
+/// Remembers what was certified and sent, and reuses its memory from tick to tick.
+#[derive(Debug)]
+pub struct Publisher {
+    limits: Limits,
+    events: Events,
+    rows: Vec<Row>,
+    contact_ranks: Vec<contacts::Rank>,
+    verdicts: Vec<u8>,
+    next_contact: u64,
+}
+
+impl Publisher {
+    /// A publisher that keeps to these limits.
+    #[must_use]
+    pub fn new(limits: Limits) -> Self {
+        Self {
+            limits,
+            events: Events::default(),
+            rows: Vec::new(),
+            contact_ranks: Vec::new(),
+            verdicts: Vec::new(),
+            next_contact: 1,
+        }
+    }
+
+    /// Fills every message that is listened to, then the tick's own counts, state and reasons.
+    pub fn fill(&mut self, view: &mut View<'_>, out: &mut Outbox) {
+        let header = Self::header(view);
+        self.events
+            .collect(view.tick, view.world, view.narrow, view.delta);
+        let pairs_left = self.fill_pairs(view, header, out);
+        let contacts_left = self.fill_contacts(view, header, out);
+        let bodies_left = self.fill_bodies(view, header, out);
+        Self::fill_names(view, out);
+        let left = pairs_left + contacts_left + bodies_left;
+        self.fill_tick(view, header, left, out);
+    }
+
+    fn header(view: &View<'_>) -> MessageHeader {
+        let (oldest, newest) = view.world.stamps();
+        MessageHeader {
+            boot_id: view.boot_id,
+            tick: view.tick,
+            scene_rev: view.world.scene_rev(),
+            oldest_stamp_ns: oldest,
+            newest_stamp_ns: newest,
+            schema: WIRE_VERSION,
+            ..MessageHeader::default()
+        }
+    }
+}

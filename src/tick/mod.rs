@@ -1,1 +1,452 @@
-//! Engine.
+//! The engine: one tick, in order. A library type with no transport in it; the daemon, tests and benches drive the
+//! same one.
+//!
+//! In: [`TickInput`] (frames, edits, demand, budget, and why this tick). Out: a filled [`Outbox`].
+
+mod floor;
+// pub mod pace;
+
+use std::sync::Arc;
+
+use crate::broad::{BroadPhase, Method};
+use crate::config::Config;
+use crate::error::Result;
+use crate::ids::SourceSlot;
+use crate::narrow::{Counters, Narrow, Order, Wanted};
+use crate::pairs::{PairDelta, PairSet};
+use crate::plan::Plan;
+use crate::publish::{Publisher, View};
+use crate::scene::Scene;
+use crate::time::{Budget, Clock, Meter};
+use crate::wire::{
+    Demand, Inbox, MessageHeader, Outbox, Reason, Stage, State, TickCause, TickRow, WIRE_VERSION,
+};
+use crate::world::{Applied, ChangeSet, Edit, PlacedShape, World};
+
+use floor::{Floor, Laps};
+
+/// One request's edits: all of them are done, or none.
+#[derive(Clone, Debug)]
+pub struct EditBatch {
+    /// The asker's number, echoed in the outcome.
+    pub token: u64,
+    /// The edits, in their order.
+    pub edits: Vec<Edit>,
+    /// Things the asker should know that stop nothing.
+    pub warnings: Vec<String>,
+}
+
+/// What became of a batch.
+#[derive(Clone, Debug)]
+pub struct EditOutcome {
+    /// The asker's number.
+    pub token: u64,
+    /// Done from which scene revision on, or what to change.
+    pub result: std::result::Result<Applied, String>,
+    /// As in the batch.
+    pub warnings: Vec<String>,
+}
+
+/// What one tick is given.
+pub struct TickInput<'a> {
+    /// Frames to admit, in order.
+    pub inbox: &'a Inbox,
+    /// Edits to apply, each batch whole or not at all.
+    pub edits: &'a [EditBatch],
+    /// Who listens.
+    pub demand: Demand,
+    /// What may be spent.
+    pub budget: Budget,
+    /// Why this tick.
+    pub cause: TickCause,
+    /// Place of the source whose frame caused it.
+    pub cause_source: Option<usize>,
+    /// When the daemon woke for it, `CLOCK_MONOTONIC` nanoseconds.
+    pub woke_ns: u64,
+    /// Gets a bare `unknown` tick at least each heartbeat while this tick goes on.
+    pub pulse: Option<&'a mut dyn FnMut(&TickRow)>,
+}
+
+impl std::fmt::Debug for TickInput<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("TickInput")
+            .field("frames", &self.inbox.frames().len())
+            .field("edits", &self.edits.len())
+            .field("demand", &self.demand)
+            .field("budget", &self.budget)
+            .field("cause", &self.cause)
+            .finish_non_exhaustive()
+    }
+}
+
+/// The engine.
+pub struct Engine {
+    world: World,
+    broad: BroadPhase,
+    /// The method of `broad`.
+    method: Method,
+    /// All bodies as inserted: how a broad phase of another method begins.
+    whole: ChangeSet,
+    pairs: PairSet,
+    delta: PairDelta,
+    narrow: Narrow,
+    publisher: Publisher,
+    plan: Plan,
+    out: Outbox,
+    outcomes: Vec<EditOutcome>,
+    clock: Arc<dyn Clock>,
+    config: Config,
+    floor: Floor,
+    boot_id: u64,
+    tick: u64,
+    /// Time of this tick, nanoseconds of `CLOCK_BOOTTIME`.
+    now_ns: u64,
+    missed: u64,
+    rebuilds: u64,
+}
+
+impl std::fmt::Debug for Engine {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Engine")
+            .field("tick", &self.tick)
+            .field("pairs", &self.pairs.len())
+            .finish_non_exhaustive()
+    }
+}
+
+impl Engine {
+    /// An engine for a checked scene and its built shapes.
+    ///
+    /// * `shapes` - one list a body, in the scene's order.
+    /// * `boot_id` - random number of this start.
+    ///
+    /// # Errors
+    /// `Error::Scene` when the scene holds more than its limits allow.
+    pub fn new(
+        scene: &Scene,
+        shapes: Vec<Arc<[PlacedShape]>>,
+        boot_id: u64,
+        clock: Arc<dyn Clock>,
+    ) -> Result<Self> {
+        let limits = scene.config.limits;
+        let world = World::new(scene, shapes, clock.boottime_ns())?;
+        let plan = Plan::of(&world, &scene.config);
+        Ok(Self {
+            broad: BroadPhase::new(plan.method()),
+            method: plan.method(),
+            whole: ChangeSet::default(),
+            pairs: PairSet::new(limits.pairs),
+            delta: PairDelta::default(),
+            narrow: Narrow::new(limits.contacts_per_pair),
+            publisher: Publisher::new(limits),
+            out: Outbox {
+                plan: plan.to_json(),
+                plan_changed: true,
+                ..Outbox::default()
+            },
+            outcomes: Vec::new(),
+            config: scene.config.clone(),
+            floor: Floor::default(),
+            tick: 0,
+            now_ns: 0,
+            missed: 0,
+            rebuilds: 0,
+            world,
+            plan,
+            clock,
+            boot_id,
+        })
+    }
+
+    /// Runs one tick.
+    pub fn tick(&mut self, mut input: TickInput<'_>) -> &Outbox {
+        let mut laps = self.begin(&input);
+        self.admit(&input);
+        laps.lap(Stage::World);
+        self.find_candidates();
+        laps.lap(Stage::Broad);
+        self.widen();
+        laps.lap(Stage::Widen);
+        let units = self.narrow_within(&mut input, &laps);
+        laps.lap(Stage::Narrow);
+        self.publish(input.demand);
+        laps.lap(Stage::Publish);
+        self.finish(&input, &laps, units);
+        &self.out
+    }
+
+    /// What the transports took to send the last outbox; part of the next tick's floor.
+    pub fn note_send_ns(&mut self, send_ns: u64) {
+        self.floor.note_send(send_ns);
+    }
+
+    /// What became of the edits of the last tick.
+    #[must_use]
+    pub fn outcomes(&self) -> &[EditOutcome] {
+        &self.outcomes
+    }
+
+    /// The bodies, sources and filters.
+    #[must_use]
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// The narrow phase's findings.
+    #[must_use]
+    pub fn narrow(&self) -> &Narrow {
+        &self.narrow
+    }
+
+    /// The candidate pairs.
+    #[must_use]
+    pub fn pairs(&self) -> &PairSet {
+        &self.pairs
+    }
+
+    /// The plan in force.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// What the narrow phase did in the last tick.
+    #[must_use]
+    pub fn counters(&self) -> Counters {
+        self.narrow.counters()
+    }
+
+    /// Ticks so far.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        self.tick
+    }
+
+    /// Full structure check of every room that keeps state.
+    ///
+    /// # Errors
+    /// The first thing that does not hold, in words.
+    pub fn validate(&self) -> std::result::Result<(), String> {
+        self.world.validate()?;
+        self.broad
+            .validate(&self.world, self.world.filters(), &self.pairs)?;
+        self.narrow.validate(&self.pairs)
+    }
+
+    fn begin(&mut self, input: &TickInput<'_>) -> Laps {
+        self.tick += 1;
+        self.outcomes.clear();
+        self.delta.clear();
+        Laps::start(Arc::clone(&self.clock), input.woke_ns)
+    }
+
+    fn admit(&mut self, input: &TickInput<'_>) {
+        let now_ns = self.clock.boottime_ns();
+        self.now_ns = now_ns;
+        self.world.begin_tick(self.tick);
+        for &session in input.inbox.ended() {
+            self.end_session(session);
+        }
+        for batch in input.edits {
+            let result = self.world.apply(&batch.edits);
+            let (token, warnings) = (batch.token, batch.warnings.clone());
+            self.outcomes.push(EditOutcome {
+                token,
+                result,
+                warnings,
+            });
+        }
+        for frame in input.inbox.frames() {
+            self.world.admit(frame, now_ns);
+        }
+        self.world.age(now_ns);
+        if !input.edits.is_empty() {
+            self.replan();
+        }
+    }
+
+    /// A client's node is dead: its session is over.
+    fn end_session(&mut self, session: u64) {
+        let sources = self.world.sources().iter();
+        let owner = sources
+            .map(|source| source.to_row(self.now_ns).session)
+            .position(|own| own == session);
+        if let Some(at) = owner.and_then(|at| u32::try_from(at).ok()) {
+            self.world.session_dead(SourceSlot(at));
+        }
+    }
+
+    /// The earliest deadline that a frame of this tick carries, `CLOCK_MONOTONIC` nanoseconds.
+    fn frames_deadline_ns(&self, inbox: &Inbox, woke_ns: u64) -> Option<u64> {
+        let frames = inbox.frames().iter();
+        let deadlines = frames.filter_map(|frame| {
+            let header = &frame.header;
+            let own = (header.deadline_ns != 0).then_some(header.deadline_ns);
+            let waited_ns = self.now_ns.saturating_sub(frame.received_ns);
+            let left = (header.time_left_ns != 0).then(|| {
+                woke_ns
+                    .saturating_add(header.time_left_ns)
+                    .saturating_sub(waited_ns)
+            });
+            earliest(own, left)
+        });
+        deadlines.min()
+    }
+
+    fn replan(&mut self) {
+        let plan = Plan::after(Some(&self.plan), &self.world, &self.config);
+        if plan != self.plan {
+            self.out.plan = plan.to_json();
+            self.out.plan_changed = true;
+            self.plan = plan;
+        }
+    }
+
+    fn find_candidates(&mut self) {
+        let (world, filters) = (&self.world, self.world.filters());
+        let method = self.plan.method();
+        let anew = self.method != method;
+        if anew {
+            self.method = method;
+            self.broad = BroadPhase::new(method);
+            self.whole.clear();
+            let inside = world.bodies().filter(|(_, body)| body.in_broad);
+            self.whole.inserted.extend(inside.map(|(slot, _)| slot));
+        }
+        if anew || world.scene_changed() {
+            self.broad.force(filters.forced_pairs());
+        }
+        let changes = if anew { &self.whole } else { world.changes() };
+        self.broad
+            .update(changes, world, filters, &mut self.pairs, &mut self.delta);
+    }
+
+    fn widen(&mut self) {
+        self.narrow
+            .begin(self.tick, &self.world, &self.pairs, &self.delta);
+        self.narrow.widen(&self.world, &self.pairs);
+    }
+
+    /// Spends what the budget leaves above the floor; returns the units spent.
+    fn narrow_within(&mut self, input: &mut TickInput<'_>, laps: &Laps) -> u64 {
+        let budget = input.budget;
+        let order = match budget {
+            Budget {
+                time_ns: None,
+                units: None,
+            } => Order::AsFound,
+            Budget {
+                time_ns: Some(_), ..
+            } => Order::Aged,
+            Budget {
+                time_ns: None,
+                units: Some(_),
+            } => Order::Counted,
+        };
+        let demand = input.demand;
+        let wanted = Wanted {
+            contacts: demand.contacts,
+            bounds: demand.pairs || demand.contacts,
+            order,
+        };
+        let deadline_ns = budget.time_ns.map(|time_ns| laps.woke_ns() + time_ns);
+        let deadline_ns = earliest(
+            deadline_ns,
+            self.frames_deadline_ns(input.inbox, laps.woke_ns()),
+        )
+        .map(|deadline_ns| deadline_ns.saturating_sub(self.floor.reserve_ns()));
+        let row = self.bare_tick(input);
+        let mut quiet = |_: &TickRow| {};
+        let pulse: &mut dyn FnMut(&TickRow) = match input.pulse.as_mut() {
+            Some(pulse) => *pulse,
+            None => &mut quiet,
+        };
+        let mut beat = || pulse(&row);
+        let clock = Arc::clone(&self.clock);
+        let mut meter = Meter::new(clock.as_ref(), deadline_ns, budget.units).with_beat(
+            laps.woke_ns(),
+            self.config.heartbeat_ns,
+            &mut beat,
+        );
+        self.narrow.spend(&self.world, wanted, &mut meter);
+        meter.spent()
+    }
+
+    /// The tick that goes out alone while this one takes longer than a heartbeat.
+    fn bare_tick(&self, input: &TickInput<'_>) -> TickRow {
+        TickRow {
+            header: MessageHeader {
+                boot_id: self.boot_id,
+                tick: self.tick,
+                scene_rev: self.world.scene_rev(),
+                state: State::Unknown.code(),
+                schema: WIRE_VERSION,
+                ..MessageHeader::default()
+            },
+            bodies: self.world.counts().bodies,
+            candidates: self.pairs.len() as u64,
+            reasons: Reason::Undecided.bit(),
+            cause: input.cause.code(),
+            cause_source: place(input.cause_source),
+            sent_ns: self.clock.boottime_ns(),
+            ..TickRow::default()
+        }
+    }
+
+    fn publish(&mut self, demand: Demand) {
+        let mut view = View {
+            world: &self.world,
+            pairs: &self.pairs,
+            delta: &self.delta,
+            narrow: &mut self.narrow,
+            demand,
+            boot_id: self.boot_id,
+            tick: self.tick,
+            now_ns: self.now_ns,
+        };
+        self.publisher.fill(&mut view, &mut self.out);
+    }
+
+    /// Fills the tick's times and units, and learns the floor.
+    fn finish(&mut self, input: &TickInput<'_>, laps: &Laps, units: u64) {
+        let floor_ns = self.floor.learn(laps);
+        let elapsed_ns = laps.elapsed_ns() + self.floor.send_ns();
+        let budget_ns = input.budget.time_ns.unwrap_or(u64::MAX);
+        // Below its floor a tick takes the floor: told by the flag, not counted as missed by fault of the work.
+        let overrun = elapsed_ns > budget_ns;
+        self.missed += u64::from(overrun);
+        let row = &mut self.out.tick;
+        laps.fill(&mut row.stage_ns);
+        row.stage_ns[usize::from(Stage::Send.code())] = self.floor.send_ns();
+        row.sent_ns = self.clock.boottime_ns();
+        row.elapsed_ns = elapsed_ns;
+        row.budget_ns = budget_ns;
+        row.budget_units = input.budget.units.unwrap_or(u64::MAX);
+        row.floor_ns = floor_ns;
+        row.units = units;
+        row.cause = input.cause.code();
+        row.cause_source = place(input.cause_source);
+        row.overrun = u8::from(overrun);
+        row.missed = self.missed;
+        row.rebuilds = self.rebuilds;
+    }
+
+    /// Says that names and plan have been sent.
+    pub fn note_sent(&mut self) {
+        self.out.plan_changed = false;
+        self.out.names_changed = false;
+    }
+}
+
+fn earliest(one: Option<u64>, other: Option<u64>) -> Option<u64> {
+    match (one, other) {
+        (Some(one), Some(other)) => Some(one.min(other)),
+        (one, other) => one.or(other),
+    }
+}
+
+fn place(source: Option<usize>) -> u8 {
+    source
+        .and_then(|source| u8::try_from(source).ok())
+        .unwrap_or(u8::MAX)
+}

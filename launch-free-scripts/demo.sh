@@ -1,0 +1,67 @@
+#!/usr/bin/env bash
+# Shows sweepd at work: a daemon, a source that moves bodies, and a monitor, each a process of its own, joined by shared
+# memory. Ends by itself (or at Ctrl-C) and leaves nothing behind.
+#
+#   ./launch-free-scripts/demo.sh [--seconds N] [--count N] [--pile] [--mujoco [MODEL.xml]]
+#
+#   --seconds N   how long to run (default 10)
+#   --count N     bodies of the built-in scene (default 60)
+#   --pile        bodies on a floor instead of bodies in free space
+#   --mujoco      a real simulator as the source: installs MuJoCo into a virtual environment of its own (.venv-demo)
+set -euo pipefail
+
+usage() { sed -n '2,/^set /p' "$0" | sed '$d; s/^# \{0,1\}//'; }
+
+seconds=10 count=60 kind=pool mujoco='' model=''
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --seconds) seconds=${2:?--seconds needs a number}; shift 2 ;;
+    --count) count=${2:?--count needs a number}; shift 2 ;;
+    --pile) kind=pile; shift ;;
+    --mujoco) mujoco=yes; shift; if [ $# -gt 0 ] && [ "${1#-}" = "$1" ]; then model=$1; shift; fi ;;
+    -h|--help) usage; exit 0 ;;
+    *) echo "demo.sh: unknown option $1" >&2; usage >&2; exit 2 ;;
+  esac
+done
+
+here=$(cd "$(dirname "$0")" && pwd)
+root=$(dirname "$here")
+instance="demo_$$"
+work=$(mktemp -d)
+pids=()
+
+finish() {
+  trap - EXIT INT TERM
+  for pid in "${pids[@]}"; do kill -INT "$pid" 2>/dev/null || true; done
+  for pid in "${pids[@]}"; do wait "$pid" 2>/dev/null || true; done
+  rm -rf "$work"
+}
+trap finish EXIT
+trap 'exit 130' INT
+trap 'exit 143' TERM
+
+# The lean build: shared memory only.
+echo "building (the first time takes a few minutes)"
+cargo build --quiet --release --no-default-features --manifest-path "$root/Cargo.toml" --bin sweepd
+sweepd=${CARGO_TARGET_DIR:-$root/target}/release/sweepd
+
+if [ -n "$mujoco" ]; then
+  venv=$root/.venv-demo
+  [ -x "$venv/bin/python" ] || python3 -m venv "$venv"
+  "$venv/bin/pip" install --quiet --disable-pip-version-check mujoco "$root/msgs/python"
+  exec_model=${model:-$here/models/robot.xml}
+  "$venv/bin/python" "$here/mujoco_bridge.py" "$exec_model" --spawn "$sweepd" --instance "$instance" --steps 500 --compare
+  exit 0
+fi
+
+scene=$work/scene.toml
+"$sweepd" feed --write-scene "$scene" --kind "$kind" --count "$count" --seed 7
+"$sweepd" check "$scene"
+"$sweepd" --quiet run "$scene" --instance "$instance" --budget 2ms & pids+=($!)
+"$sweepd" --quiet feed "$scene" --instance "$instance" --rate 100 & pids+=($!)
+timeout --foreground -s INT "$seconds" "$sweepd" monitor --instance "$instance" --contacts --pairs 12 || [ $? -eq 124 ]
+echo
+echo "one tick as JSON:"
+"$sweepd" monitor --instance "$instance" --json --ticks 1 --pairs 2
+finish
+echo "done: daemon, source and monitor have ended, shared memory is clean"

@@ -1,0 +1,265 @@
+//! Flags and arguments.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::builtin::Pattern;
+
+/// A collision server: body poses in over shared memory, colliding pairs and contacts out, within a time budget a tick.
+#[derive(Debug, Parser)]
+#[command(name = "sweepd", version, max_term_width = 100, after_help = AFTER)]
+pub(super) struct Cli {
+    /// Say more on stderr (twice: everything).
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub(super) verbose: u8,
+    /// Say errors only.
+    #[arg(short, long, global = true)]
+    pub(super) quiet: bool,
+    #[command(subcommand)]
+    pub(super) command: Command,
+}
+
+const AFTER: &str = "\
+Try it, in three terminals:
+  sweepd feed --write-scene pool.toml --count 200    make a scene of 200 bodies
+  sweepd run pool.toml                               the daemon
+  sweepd feed pool.toml                              a source that moves them
+  sweepd monitor                                     what touches what
+
+Exit codes: 0 done, 1 a check failed, 2 usage or a bad scene, 3 timed out, 4 refused or could not run, 101 internal error.
+Environment: NO_COLOR switches colours off.";
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Run the daemon for a scene until SIGINT or SIGTERM.
+    Run(RunArgs),
+    /// Read and validate a scene; print the plan, ignored pairs and warnings.
+    Check(CheckArgs),
+    /// Move a scene's bodies by a built-in motion: a source for demos and load.
+    Feed(FeedArgs),
+    /// Watch a running daemon: state, pairs by name, gaps, budget, sources, rejects.
+    Monitor(MonitorArgs),
+    /// Answer shape-pair questions offline.
+    Query(QueryArgs),
+    /// List running instances.
+    List(ListArgs),
+}
+
+/// Which daemon.
+#[derive(Clone, Debug, Args)]
+pub(super) struct Which {
+    /// Name of the daemon: a-z, 0-9 and _, at most 32.
+    #[arg(long, default_value = "default", value_name = "NAME")]
+    pub(super) instance: String,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct RunArgs {
+    /// The scene file (TOML); `launch-free-scripts/example_scene.toml` shows every key.
+    #[arg(value_name = "SCENE")]
+    pub(super) scene: PathBuf,
+    #[command(flatten)]
+    pub(super) which: Which,
+    /// Time a tick may take, such as `2ms`, `500us`, or `none`; the scene's value otherwise.
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub(super) budget: Option<Limit>,
+    /// Work units a tick may take, or `none`; the scene's value otherwise. Runs replay bit for bit.
+    #[arg(long, value_name = "UNITS", value_parser = units)]
+    pub(super) budget_units: Option<Limit>,
+    /// What makes a tick: `on_all`, `on_frame=SOURCE` or `rate=HZ`; the scene's value otherwise.
+    #[arg(long, value_name = "MODE", value_parser = mode)]
+    pub(super) mode: Option<crate::config::Mode>,
+    /// Poll instead of sleeping: microseconds less latency for a whole core.
+    #[arg(long)]
+    pub(super) busy_poll: bool,
+    /// End after so many ticks.
+    #[arg(long, value_name = "N")]
+    pub(super) ticks: Option<u64>,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct CheckArgs {
+    /// The scene file (TOML).
+    #[arg(value_name = "SCENE")]
+    pub(super) scene: PathBuf,
+    /// One JSON object instead of text.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// List every ignored pair, not only how many (up to 10,000).
+    #[arg(long)]
+    pub(super) ignored: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct FeedArgs {
+    /// The scene whose bodies to move; the daemon must run the same.
+    #[arg(value_name = "SCENE", required_unless_present = "write_scene")]
+    pub(super) scene: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) which: Which,
+    /// The source to be; the scene's first otherwise.
+    #[arg(long, value_name = "NAME")]
+    pub(super) source: Option<String>,
+    /// Frames a second.
+    #[arg(long, default_value_t = 100.0, value_name = "HZ")]
+    pub(super) rate: f64,
+    /// Bodies to move (the others are sent at rest); with --write-scene: bodies to make.
+    #[arg(long, value_name = "N")]
+    pub(super) count: Option<usize>,
+    /// Seed of the motion (and of the scene made).
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub(super) seed: u64,
+    /// How bodies move.
+    #[arg(long, value_enum, default_value_t = Pattern::Wander)]
+    pub(super) motion: Pattern,
+    /// End after so many frames.
+    #[arg(long, value_name = "N")]
+    pub(super) frames: Option<u64>,
+    /// How long to wait for the daemon, such as `10s`.
+    #[arg(long, default_value = "10s", value_name = "TIME", value_parser = nanoseconds)]
+    pub(super) wait: u64,
+    /// Write a scene of `--count` mixed bodies to this file, and end.
+    #[arg(long, value_name = "FILE")]
+    pub(super) write_scene: Option<PathBuf>,
+    /// The scene to write: `pool` (in free space) or `pile` (on a floor).
+    #[arg(long, default_value = "pool", value_parser = ["pool", "pile"], value_name = "KIND")]
+    pub(super) kind: String,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct MonitorArgs {
+    #[command(flatten)]
+    pub(super) which: Which,
+    /// One JSON object a tick instead of a screen.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// End after so many ticks.
+    #[arg(long, value_name = "N")]
+    pub(super) ticks: Option<u64>,
+    /// End with code 3 when no tick comes for so long.
+    #[arg(long, default_value = "10s", value_name = "TIME", value_parser = nanoseconds)]
+    pub(super) wait: u64,
+    /// Pairs shown (or written) at most.
+    #[arg(long, default_value_t = 20, value_name = "N")]
+    pub(super) pairs: usize,
+    /// Also read contacts: the daemon then computes them.
+    #[arg(long)]
+    pub(super) contacts: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct QueryArgs {
+    /// A file of cases, one JSON object a line (`-`: standard input); one answer a line, in order.
+    ///
+    /// A case: {"id", "a": SHAPE, "pose_a": {"t": [x,y,z], "q": [w,x,y,z]}, "b": SHAPE, "pose_b": ...}.
+    #[arg(long, value_name = "IN.jsonl")]
+    pub(super) batch: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ListArgs {
+    /// One JSON object an instance.
+    #[arg(long)]
+    pub(super) json: bool,
+}
+
+/// A limit given by hand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Limit {
+    /// No limit.
+    None,
+    /// Nanoseconds or units.
+    Of(u64),
+}
+
+fn duration(text: &str) -> Result<Limit, String> {
+    if text == "none" {
+        Ok(Limit::None)
+    } else {
+        nanoseconds(text).map(Limit::Of)
+    }
+}
+
+fn units(text: &str) -> Result<Limit, String> {
+    if text == "none" {
+        return Ok(Limit::None);
+    }
+    text.parse()
+        .map(Limit::Of)
+        .map_err(|_| "a whole number of work units, or none".to_owned())
+}
+
+/// Nanoseconds of `2ms`, `1.5s`, `500us`, `100ns`, `0`.
+fn nanoseconds(text: &str) -> Result<u64, String> {
+    let wanted = || format!("`{text}` is no time: write a number and ns, us, ms or s, such as 2ms");
+    let split = text
+        .find(|c: char| c.is_ascii_alphabetic())
+        .unwrap_or(text.len());
+    let (number, unit) = text.split_at(split);
+    let number: f64 = number.trim().parse().map_err(|_| wanted())?;
+    let scale = match unit {
+        "ns" => 1.0,
+        "us" => 1e3,
+        "ms" => 1e6,
+        "s" => 1e9,
+        "" if number == 0.0 => 1.0,
+        _ => return Err(wanted()),
+    };
+    let ns = number * scale;
+    if !(0.0..1e18).contains(&ns) {
+        return Err(wanted());
+    }
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "checked just above"
+    )]
+    Ok(ns.round() as u64)
+}
+
+fn mode(text: &str) -> Result<crate::config::Mode, String> {
+    use crate::config::Mode;
+    match text.split_once('=') {
+        None if text == "on_all" => Ok(Mode::OnAll),
+        Some(("on_frame", source)) if !source.is_empty() => Ok(Mode::OnFrame(source.to_owned())),
+        Some(("rate", hertz)) => match hertz.parse::<f64>() {
+            Ok(hertz) if hertz > 0.0 && hertz <= 1e6 => Ok(Mode::Rate(hertz)),
+            _ => Err(format!(
+                "`{hertz}` is no rate: write hertz above 0, such as rate=100"
+            )),
+        },
+        _ => Err("write on_all, on_frame=SOURCE or rate=HZ".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_read_with_their_units() {
+        assert_eq!(nanoseconds("2ms"), Ok(2_000_000));
+        assert_eq!(nanoseconds("1.5s"), Ok(1_500_000_000));
+        assert_eq!(duration("none"), Ok(Limit::None));
+        assert_eq!(nanoseconds("0"), Ok(0));
+        for bad in ["", "ms", "2", "-1ms", "2 hours", "1e30s", "nan ms"] {
+            assert!(nanoseconds(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn modes_are_read_as_in_scene_files() {
+        use crate::config::Mode;
+        assert_eq!(mode("on_all"), Ok(Mode::OnAll));
+        assert_eq!(mode("on_frame=sim"), Ok(Mode::OnFrame("sim".to_owned())));
+        assert!(mode("rate=0").is_err());
+        assert!(mode("on_frame=").is_err());
+    }
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        use clap::CommandFactory as _;
+        Cli::command().debug_assert();
+    }
+}

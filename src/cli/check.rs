@@ -1,0 +1,106 @@
+//! `sweepd check`: reads a scene as the daemon would, and says what it would do with it.
+
+use serde_json::json;
+
+use crate::daemon::build_shapes;
+use crate::error::Result;
+use crate::plan::Plan;
+use crate::scene::Scene;
+use crate::time::{Clock, SystemClock};
+use crate::world::{Body, World};
+
+use super::args::CheckArgs;
+use super::out::Out;
+
+/// Ignored pairs listed at most.
+const IGNORED_SHOWN: usize = 10_000;
+
+/// Prints the plan, what was left out, ignored pairs and warnings.
+pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
+    let scene = Scene::load(&args.scene)?;
+    let shapes = build_shapes(&scene)?;
+    let warnings = shapes.warnings.clone();
+    let world = World::new(&scene, shapes.bodies, SystemClock.boottime_ns())?;
+    let plan = Plan::of(&world, &scene.config);
+    if args.json {
+        let ignored = ignored(&world);
+        let line = json!({
+            "scene": args.scene.display().to_string(),
+            "frame_id": scene.frame_id,
+            "bodies": scene.bodies.len(),
+            "sources": scene.sources.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(),
+            "plan": plan,
+            "ignored_pairs": world.ignored_pairs_count(),
+            "ignored": ignored.iter().map(|(a, b, why)| json!([a, b, why])).collect::<Vec<_>>(),
+            "warnings": warnings,
+        });
+        out.line(&line.to_string())?;
+        out.flush()?;
+        return Ok(true);
+    }
+    out.line(&format!(
+        "{}: {} bodies, {} sources, frame `{}`",
+        args.scene.display(),
+        scene.bodies.len(),
+        scene.sources.len(),
+        scene.frame_id
+    ))?;
+    for choice in &plan.choices {
+        out.line(&format!(
+            "  {:<16} {}  ({})",
+            choice.part, choice.chosen, choice.why
+        ))?;
+    }
+    for part in &plan.left_out {
+        let saved = if part.saved_bytes > 0 {
+            format!(", {} bytes saved", part.saved_bytes)
+        } else {
+            String::new()
+        };
+        out.line(&format!(
+            "  left out         {}  ({}{saved})",
+            part.part, part.why
+        ))?;
+    }
+    out.line(&format!(
+        "  ignored pairs    {}",
+        world.ignored_pairs_count()
+    ))?;
+    if args.ignored {
+        for (a, b, why) in ignored(&world) {
+            out.line(&format!("    {a} - {b}: {why}"))?;
+        }
+    }
+    for warning in &warnings {
+        out.line(&format!("warning: {warning}"))?;
+    }
+    out.line("the scene is fine")?;
+    out.flush()?;
+    Ok(true)
+}
+
+/// The ignored pairs with their reasons, by id.
+fn ignored(world: &World) -> Vec<(&str, &str, String)> {
+    let bodies: Vec<(_, &Body)> = world.bodies().collect();
+    let mut list = Vec::new();
+    for (at, (slot_a, a)) in bodies.iter().enumerate() {
+        for (slot_b, b) in &bodies[at + 1..] {
+            let because = world.filters().decide(*slot_a, *slot_b);
+            if because.is_ignored() {
+                let rule = world
+                    .filters()
+                    .rule_reason(*slot_a, *slot_b)
+                    .map(|r| format!(": {r}"));
+                list.push((
+                    a.name.as_str(),
+                    b.name.as_str(),
+                    format!("{}{}", because.word(), rule.unwrap_or_default()),
+                ));
+                if list.len() == IGNORED_SHOWN {
+                    return list;
+                }
+            }
+        }
+    }
+    list
+}

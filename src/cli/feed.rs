@@ -1,0 +1,183 @@
+//! `sweepd feed`: a built-in source of moving bodies, and the maker of scenes for it.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::builtin::{Motion, Random, pile, pool};
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::time::{Clock, SystemClock};
+use crate::transport::client::{Client, FrameInfo, Rows};
+use crate::wire::TransformRow;
+
+use super::args::FeedArgs;
+use super::out::Out;
+
+/// Bodies of a written scene when no count is given.
+const COUNT_DEFAULT: usize = 200;
+/// Longest sleep between two looks at the stop flag, nanoseconds.
+const LOOK_NS: u64 = 50_000_000;
+
+/// Moves the bodies of a scene until stopped, or writes a scene.
+pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
+    if let Some(path) = &args.write_scene {
+        let count = args.count.unwrap_or(COUNT_DEFAULT);
+        let text = if args.kind == "pile" {
+            pile(count, args.seed)
+        } else {
+            pool(count, args.seed)
+        };
+        std::fs::write(path, text)
+            .map_err(|e| Error::io(format!("cannot write {}", path.display()), e))?;
+        out.line(&format!("wrote {}: {count} bodies", path.display()))?;
+        out.flush()?;
+        return Ok(true);
+    }
+    let Some(path) = &args.scene else {
+        return Err(Error::Usage(
+            "give a scene file, or --write-scene FILE to make one".to_owned(),
+        ));
+    };
+    if !(args.rate > 0.0 && args.rate <= 1e6) {
+        return Err(Error::Usage(format!(
+            "--rate {}: give frames a second, above 0 and at most 1e6",
+            args.rate
+        )));
+    }
+    let scene = Scene::load(path)?;
+    let source = source_of(&scene, args.source.as_deref())?;
+    let name = scene.sources[source].name.clone();
+    let mut bodies = Bodies::of(&scene, source, args);
+    let mut client = Client::connect(&args.which.instance, Some(&name), args.wait)?;
+    tracing::info!(
+        "feeding {} bodies as `{name}` at {} Hz",
+        bodies.rows.len(),
+        args.rate
+    );
+    let clock = SystemClock;
+    let start_ns = clock.monotonic_ns();
+    let mut frame = 0_u64;
+    while !stop.load(Ordering::Relaxed) && args.frames.is_none_or(|most| frame < most) {
+        #[allow(
+            clippy::cast_precision_loss,
+            reason = "frame counts are far below 2^53"
+        )]
+        let time_s = frame as f64 / args.rate;
+        bodies.move_to(time_s);
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a time, not negative"
+        )]
+        let at_ns = (time_s * 1e9) as u64;
+        client.send(
+            &FrameInfo {
+                stamp_ns: at_ns,
+                ..FrameInfo::default()
+            },
+            Rows::Poses(&bodies.rows),
+        )?;
+        frame += 1;
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            clippy::cast_precision_loss,
+            reason = "as above"
+        )]
+        let next_ns = start_ns + (frame as f64 / args.rate * 1e9) as u64;
+        sleep_until(&clock, next_ns, stop);
+    }
+    Ok(true)
+}
+
+/// The place of the source to be.
+fn source_of(scene: &Scene, name: Option<&str>) -> Result<usize> {
+    let names = || {
+        scene
+            .sources
+            .iter()
+            .map(|s| s.name.as_str())
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    match name {
+        None if scene.sources.is_empty() => Err(Error::Usage(
+            "the scene has no [[source]]; nothing in it can be moved".to_owned(),
+        )),
+        None => Ok(0),
+        Some(name) => scene
+            .sources
+            .iter()
+            .position(|s| s.name == name)
+            .ok_or_else(|| {
+                Error::Usage(format!(
+                    "--source {name}: the scene has no such source; it has: {}",
+                    names()
+                ))
+            }),
+    }
+}
+
+/// The rows to send and how they move.
+struct Bodies {
+    rows: Vec<TransformRow>,
+    motions: Vec<Motion>,
+    moving: usize,
+}
+
+impl Bodies {
+    fn of(scene: &Scene, source: usize, args: &FeedArgs) -> Self {
+        let mut random = Random::new(args.seed);
+        let own = scene
+            .bodies
+            .iter()
+            .filter(|b| b.moves && b.source == Some(source) && b.attached_to.is_none());
+        let (rows, motions): (Vec<_>, Vec<_>) = own
+            .map(|body| {
+                let row = TransformRow {
+                    body: body.id.0,
+                    ..TransformRow::default()
+                };
+                (row, Motion::new(body.pose, args.motion, &mut random))
+            })
+            .unzip();
+        let moving = args.count.unwrap_or(rows.len()).min(rows.len());
+        let mut bodies = Self {
+            rows,
+            motions,
+            moving,
+        };
+        bodies.place(0.0, 0);
+        bodies
+    }
+
+    fn move_to(&mut self, time_s: f64) {
+        self.place(time_s, self.rows.len() - self.moving);
+    }
+
+    /// Writes the poses of all but the last `still` bodies.
+    fn place(&mut self, time_s: f64, still: usize) {
+        let moving = self.rows.len() - still;
+        for (row, motion) in self.rows.iter_mut().zip(&self.motions).take(moving) {
+            let pose = motion.pose_at(time_s);
+            let q = pose.rotation.as_vector();
+            row.position = pose.translation.vector.into();
+            row.orientation = [q.x, q.y, q.z, q.w];
+        }
+    }
+}
+
+/// Sleeps until a moment of `CLOCK_MONOTONIC`, with a look at the stop flag now and then.
+fn sleep_until(clock: &dyn Clock, until_ns: u64, stop: &AtomicBool) {
+    loop {
+        let now_ns = clock.monotonic_ns();
+        if now_ns >= until_ns || stop.load(Ordering::Relaxed) {
+            return;
+        }
+        let wait_ns = (until_ns - now_ns).min(LOOK_NS);
+        #[allow(
+            clippy::disallowed_methods,
+            reason = "a source that paces itself has nothing else to wait for"
+        )]
+        std::thread::sleep(std::time::Duration::from_nanos(wait_ns));
+    }
+}

@@ -1,0 +1,51 @@
+//! `sweepd list`: running instances.
+
+use serde_json::json;
+
+use crate::error::Result;
+use crate::transport::iceoryx::{InstanceInfo, Place, list_instances};
+
+use super::args::ListArgs;
+use super::out::Out;
+
+/// Lists the instances of this user.
+pub(super) fn list(args: &ListArgs, out: &mut Out) -> Result<bool> {
+    let instances = list_instances(&Place::new("default")?)?;
+    for instance in &instances {
+        out.line(&if args.json {
+            as_json(instance)
+        } else {
+            as_text(instance)
+        })?;
+    }
+    if instances.is_empty() && !args.json {
+        out.line("no instance is running")?;
+    }
+    out.flush()?;
+    Ok(true)
+}
+
+fn as_json(i: &InstanceInfo) -> String {
+    json!({
+        "instance": i.instance,
+        "pid": i.pid,
+        "boot_id": format!("{:016x}", i.boot_id),
+        "version": i.sweepd_version,
+        "sources": i.sources,
+        "readers": i.readers,
+        "pair_readers": i.pair_readers,
+        "contact_readers": i.contact_readers,
+    })
+    .to_string()
+}
+
+fn as_text(i: &InstanceInfo) -> String {
+    let daemon = match i.pid {
+        Some(pid) => format!("pid {pid}, sweepd {}", i.sweepd_version),
+        None => "no daemon".to_owned(),
+    };
+    format!(
+        "{:<20} {daemon}; {} sources, {} readers ({} of pairs, {} of contacts)",
+        i.instance, i.sources, i.readers, i.pair_readers, i.contact_readers
+    )
+}

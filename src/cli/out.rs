@@ -1,0 +1,75 @@
+//! Standard output that survives a closed pipe, and complaints on stderr.
+
+use std::io::{IsTerminal as _, Write};
+
+use crate::error::{Error, Result};
+
+/// Standard output. A closed pipe is remembered: it ends the command normally.
+pub(super) struct Out {
+    sink: Box<dyn Write>,
+    closed: bool,
+}
+
+impl Out {
+    /// This process's standard output.
+    pub(super) fn stdout() -> Self {
+        Self {
+            sink: Box::new(std::io::BufWriter::new(std::io::stdout())),
+            closed: false,
+        }
+    }
+
+    /// Writes a line and its end.
+    pub(super) fn line(&mut self, text: &str) -> Result<()> {
+        let done = writeln!(self.sink, "{text}");
+        self.take(done)
+    }
+
+    /// Writes text as it is.
+    pub(super) fn text(&mut self, text: &str) -> Result<()> {
+        let done = self.sink.write_all(text.as_bytes());
+        self.take(done)
+    }
+
+    /// Hands over what is buffered.
+    pub(super) fn flush(&mut self) -> Result<()> {
+        let done = self.sink.flush();
+        self.take(done)
+    }
+
+    /// The sink itself, for code that writes a stream of its own.
+    pub(super) fn sink(&mut self) -> &mut dyn Write {
+        &mut self.sink
+    }
+
+    /// Whether the reader has gone away.
+    pub(super) fn closed(&mut self) -> bool {
+        self.closed
+            || self
+                .sink
+                .flush()
+                .is_err_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+    }
+
+    fn take(&mut self, done: std::io::Result<()>) -> Result<()> {
+        done.map_err(|e| {
+            self.closed |= e.kind() == std::io::ErrorKind::BrokenPipe;
+            Error::io("cannot write to standard output", e)
+        })
+    }
+}
+
+/// One line on stderr; that it may be closed is nobody's fault.
+pub(super) fn complain(text: &str) {
+    let _ = writeln!(std::io::stderr(), "sweepd: {text}");
+}
+
+/// Whether stderr wants colours.
+pub(super) fn coloured_stderr() -> bool {
+    std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty())
+}
+
+/// Whether stdout wants colours.
+pub(super) fn coloured_stdout() -> bool {
+    std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty())
+}

@@ -1,0 +1,215 @@
+//! A resumable query of a whole body pair: shape pair by shape pair, meshes leaf by leaf.
+//!
+//! A cursor keeps the relative pose it was started at; whatever it has found holds at that pose, and its certificate
+//! carries the motion accumulators of that moment, so that interrupted work stays valid after the bodies have moved.
+
+use crate::math::{Interval, Pose};
+use crate::time::Meter;
+use crate::world::Body;
+
+use super::Counters;
+use super::contacts::Contact;
+use super::exact::Warm;
+use super::memo::Witness;
+use super::mesh::{Goal, Walk};
+use super::query::{
+    add_manifold, is_simple, shape_gap, shape_pose, sound, sphere_bound, witness_of,
+};
+
+/// Units of one turn of a walk over meshes before the next pair has its turn: at 32 the clock costs 2.5 %.
+const SLICE_UNITS: u64 = 32;
+
+/// A resumable query.
+#[derive(Debug)]
+pub(super) struct Cursor {
+    /// Pose of B's body seen from A's, at the start.
+    pub(super) rel: Pose,
+    /// Sum of both bodies' `S - d` at the start.
+    pub(super) credit_m: f64,
+    /// Tick of the start.
+    pub(super) tick: u64,
+    /// Verdict only, or bounds and contacts.
+    pub(super) goal: Goal,
+    /// Least gap of the shape pairs finished so far.
+    pub(super) gap: Interval,
+    /// Where it is.
+    pub(super) witness: Option<Witness>,
+    /// Contacts found so far.
+    pub(super) found: Vec<Contact>,
+    next: usize,
+    walking: bool,
+    walk: Walk,
+}
+
+impl Default for Cursor {
+    fn default() -> Self {
+        Self {
+            rel: Pose::identity(),
+            credit_m: 0.0,
+            tick: 0,
+            goal: Goal::Verdict,
+            gap: Interval::UNKNOWN,
+            witness: None,
+            found: Vec::new(),
+            next: 0,
+            walking: false,
+            walk: Walk::default(),
+        }
+    }
+}
+
+/// How far a turn of a cursor came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Turn {
+    /// Every shape pair is accounted for, or the goal is reached.
+    Finished,
+    /// There is more to do.
+    Open,
+}
+
+impl Cursor {
+    /// Starts over at a relative pose.
+    pub(super) fn start(&mut self, rel: Pose, credit_m: f64, tick: u64, goal: Goal) {
+        self.rel = rel;
+        self.credit_m = credit_m;
+        self.tick = tick;
+        self.goal = goal;
+        self.gap = Interval {
+            min: f64::INFINITY,
+            max: f64::INFINITY,
+        };
+        self.witness = None;
+        self.found.clear();
+        self.next = 0;
+        self.walking = false;
+    }
+
+    /// An upper bound on the gap at the start's pose, from whatever is done by now.
+    pub(super) fn upper(&self) -> f64 {
+        if self.walking {
+            self.gap.max.min(self.walk.interval().max)
+        } else {
+            self.gap.max
+        }
+    }
+
+    /// Works until the goal is reached, the slice is used up, or the meter closes.
+    pub(super) fn turn(
+        &mut self,
+        (a, b): (&Body, &Body),
+        report_m: f64,
+        meter: &mut Meter<'_>,
+        counters: &mut Counters,
+    ) -> Turn {
+        let stop_at = meter.spent() + SLICE_UNITS;
+        let pairs = a.shapes.len() * b.shapes.len();
+        while self.next < pairs {
+            if !meter.open() || meter.spent() >= stop_at {
+                return Turn::Open;
+            }
+            if self.goal == Goal::Verdict && self.gap.max <= 0.0 {
+                return Turn::Finished;
+            }
+            if self.shape_pair((a, b), report_m, stop_at, meter, counters) {
+                self.next += 1;
+            }
+        }
+        Turn::Finished
+    }
+
+    /// Works on the current shape pair; whether it is accounted for.
+    fn shape_pair(
+        &mut self,
+        (a, b): (&Body, &Body),
+        report_m: f64,
+        stop_at: u64,
+        meter: &mut Meter<'_>,
+        counters: &mut Counters,
+    ) -> bool {
+        let (place_a, place_b) = (self.next / b.shapes.len(), self.next % b.shapes.len());
+        let (one, other) = (&a.shapes[place_a], &b.shapes[place_b]);
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "limits::SHAPES_PER_BODY_MAX fits"
+        )]
+        let places = (place_a as u32, place_b as u32);
+        if !self.walking {
+            let bound = sphere_bound(one, other, &self.rel);
+            // A shape pair that cannot be the least (nor, where contacts are wanted, touch) needs no query.
+            let enough = match self.goal {
+                Goal::Verdict => report_m.max(0.0),
+                Goal::Gap | Goal::Contacts => self.gap.max.max(0.0),
+            };
+            if bound > enough {
+                meter.charge(1);
+                self.gap.min = self.gap.min.min(bound);
+                return true;
+            }
+        }
+        let pos12 = shape_pose(one, other, &self.rel);
+        if is_simple(&one.shape, &other.shape) {
+            counters.queries += 1;
+            if let Some(closest) = shape_gap(&one.shape, &other.shape, &pos12, &mut Warm::default())
+            {
+                let gap = sound(closest.gap);
+                if gap.max < self.gap.max {
+                    self.witness = Some(witness_of(one, other, &pos12, &closest, places));
+                }
+                if self.goal == Goal::Contacts && gap.min <= 0.0 {
+                    counters.manifolds += 1;
+                    add_manifold((a, b), places, &pos12, &closest, &mut self.found);
+                }
+                self.gap = self.gap.least(gap);
+            }
+            meter.charge_dear(1);
+            return true;
+        }
+        if !self.walking {
+            self.walk.start(&one.shape, &other.shape, &pos12);
+            self.walking = true;
+        }
+        counters.slices += 1;
+        let left = stop_at.saturating_sub(meter.spent()).max(1);
+        if !self
+            .walk
+            .advance(&one.shape, &other.shape, self.goal, left, meter)
+        {
+            return false;
+        }
+        self.walking = false;
+        self.take_walk((a, b), places, &pos12);
+        true
+    }
+
+    /// Takes over what a finished walk found.
+    fn take_walk(&mut self, (a, b): (&Body, &Body), places: (u32, u32), pos12: &Pose) {
+        let (one, other) = (&a.shapes[places.0 as usize], &b.shapes[places.1 as usize]);
+        let gap = sound(self.walk.interval());
+        if let Some(leaf) = self.walk.witness().filter(|_| gap.max < self.gap.max) {
+            self.witness = Some(Witness {
+                triangle_a: leaf.triangle_a,
+                triangle_b: leaf.triangle_b,
+                ..witness_of(one, other, pos12, &leaf.closest, places)
+            });
+        }
+        if self.goal == Goal::Contacts && gap.min <= 0.0 {
+            for leaf in self.walk.contacts() {
+                let seen = witness_of(one, other, pos12, &leaf.closest, places);
+                self.found.push(Contact {
+                    id: 0,
+                    shape_a: places.0,
+                    shape_b: places.1,
+                    triangle_a: leaf.triangle_a,
+                    triangle_b: leaf.triangle_b,
+                    feature: 0,
+                    point_a: seen.point_a,
+                    point_b: seen.point_b,
+                    normal: seen.normal,
+                    gap_m: leaf.closest.best_m,
+                    gap,
+                });
+            }
+        }
+        self.gap = self.gap.least(gap);
+    }
+}

@@ -1,0 +1,382 @@
+//! What is remembered of a pair: its certificate, its verdict, its witness.
+
+use crate::ids::{BodySlot, PairSlot};
+use crate::math::{Interval, Point, Pose, Vec3, chord, displacement, relative};
+use crate::pairs::PairSet;
+use crate::shape::Geometry;
+use crate::wire::{Level, NO_INDEX, Verdict};
+use crate::world::{Body, World};
+
+use super::exact::Warm;
+use super::{NONE, Narrow};
+
+/// What the motion pass reads of a pair.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hot {
+    /// Body with the smaller id.
+    pub(super) a: BodySlot,
+    /// Body with the larger id.
+    pub(super) b: BodySlot,
+    /// The pair is proved apart (and not near) while `S + d` of both sum to less, metres; minus infinity: look closer.
+    pub(super) expiry_m: f64,
+    /// Tick of the last visit, cut to 32 bits: only "this tick or not" is asked.
+    pub(super) visited: u32,
+    pub(super) verdict: Verdict,
+    pub(super) live: bool,
+}
+
+/// Everything else.
+#[derive(Clone, Debug)]
+pub(super) struct Memo {
+    /// Certified at the test's poses.
+    pub(super) gap: Interval,
+    /// Sum of both bodies' `S - d` at the test, metres.
+    pub(super) credit_m: f64,
+    /// Pose of B's body seen from A's at the test.
+    pub(super) rel: Pose,
+    /// Tick of the test's poses; 0: never tested, `gap` comes from the boxes.
+    pub(super) tested: u64,
+    /// The query was finished at the test.
+    pub(super) finished: bool,
+    /// The interval was narrowed as far as the exact query goes, not only as far as a verdict needed.
+    pub(super) tight: bool,
+    /// Tick in which the witness was last asked again.
+    pub(super) retested: u64,
+    /// At this tick's poses.
+    pub(super) now: Interval,
+    /// Motion and reach that `now` was widened by, metres; 0: `now` is `gap`.
+    pub(super) widened_m: f64,
+    /// Nothing moved relative to the test's poses.
+    pub(super) rest: bool,
+    /// On the list of undecided pairs.
+    pub(super) queued: bool,
+    /// On the list of reports to refresh.
+    pub(super) refreshing: bool,
+    /// Pairs nearer than this are `near`, metres.
+    pub(super) report_m: f64,
+    /// First tick without a verdict since the last one with; 0: decided.
+    pub(super) undecided_since: u64,
+    /// First tick of the pair.
+    pub(super) born: u64,
+    pub(super) witness: Option<Witness>,
+    /// Where the next query starts from.
+    pub(super) warm: Warm,
+    /// Tick of the poses the contacts belong to.
+    pub(super) contacts_tick: u64,
+    pub(super) active_at: u32,
+    pub(super) cursor: u32,
+    pub(super) contacts: u32,
+}
+
+/// Where a pair is nearest or deepest: the shapes, triangles and points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Witness {
+    /// Best estimate of the gap there, metres.
+    pub best_m: f64,
+    /// On A's surface, A's body frame, metres.
+    pub point_a: Point,
+    /// On B's surface, B's body frame, metres.
+    pub point_b: Point,
+    /// Unit, A's body frame, from A to B.
+    pub normal: Vec3,
+    /// Place of the shape in A.
+    pub shape_a: u32,
+    /// Place of the shape in B.
+    pub shape_b: u32,
+    /// Triangle of A's shape, or `NO_INDEX`.
+    pub triangle_a: u32,
+    /// Triangle of B's shape, or `NO_INDEX`.
+    pub triangle_b: u32,
+}
+
+/// What is known of a pair in this tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Finding<'a> {
+    /// Body with the smaller id.
+    pub a: BodySlot,
+    /// Body with the larger id.
+    pub b: BodySlot,
+    /// Verdict at this tick's poses.
+    pub verdict: Verdict,
+    /// Sound interval of the gap at this tick's poses, metres.
+    pub gap: Interval,
+    /// Nearest or deepest place at the last test.
+    pub witness: Option<&'a Witness>,
+    /// How far work came.
+    pub level: Level,
+    /// Finished, with 0 inside the rounding interval.
+    pub touching: bool,
+    /// Tick of the poses that the bound was computed at; 0: boxes only.
+    pub tested: u64,
+    /// First tick without a verdict; 0: decided.
+    pub undecided_since: u64,
+    /// First tick of the pair.
+    pub born: u64,
+    /// Pairs nearer than this are `near`, metres.
+    pub report_m: f64,
+}
+
+impl Memo {
+    pub(super) fn new() -> Self {
+        Self {
+            gap: Interval::UNKNOWN,
+            credit_m: 0.0,
+            rel: Pose::identity(),
+            tested: 0,
+            finished: false,
+            tight: false,
+            retested: 0,
+            now: Interval::UNKNOWN,
+            widened_m: 0.0,
+            rest: false,
+            queued: false,
+            refreshing: false,
+            report_m: 0.0,
+            undecided_since: 0,
+            born: 0,
+            witness: None,
+            warm: Warm::default(),
+            contacts_tick: 0,
+            active_at: NONE,
+            cursor: NONE,
+            contacts: NONE,
+        }
+    }
+
+    /// Finished at just these poses, and 0 cannot be told from the gap.
+    pub(super) fn touching(&self) -> bool {
+        self.finished && self.widened_m == 0.0 && self.gap.contains(0.0)
+    }
+
+    /// The verdict that the interval of this tick allows.
+    pub(super) fn verdict(&self) -> Verdict {
+        if self.now.max <= 0.0 || self.touching() {
+            Verdict::Colliding
+        } else if self.now.min <= 0.0 {
+            Verdict::Possible
+        } else if self.now.min < self.report_m {
+            Verdict::Near
+        } else {
+            Verdict::Apart
+        }
+    }
+}
+
+/// Bounds on the gap of two bodies from their boxes (or a half-space's plane) alone.
+///
+/// Lower: along each axis, what separates the boxes, or how deep they overlap. It holds for every gap of DESIGN 3.2:
+/// a translation by the overlap separates convex pieces, and a point of the one under the surface of the other leaves
+/// the other's box within the overlap. Upper: any two points of the two are no farther apart than this.
+pub(super) fn box_bounds(a: &Body, b: &Body) -> Interval {
+    if a.unbounded || b.unbounded {
+        return Interval::UNKNOWN;
+    }
+    let least = |k: usize| (b.proxy.min[k] - a.proxy.max[k]).max(a.proxy.min[k] - b.proxy.max[k]);
+    let low = least(0).max(least(1)).max(least(2));
+    let centres = (a.pose * a.centre - b.pose * b.centre).norm();
+    let high = (centres + a.radius + b.radius) * (1.0 + 8.0 * f64::EPSILON);
+    Interval {
+        min: low.next_down().min(high),
+        max: high,
+    }
+}
+
+/// An upper bound on how much the gap of two bodies changed between two relative poses, metres.
+///
+/// The displacement of the smaller body's surface seen from the other; for a half-space the change of the centre's
+/// height above its plane, plus what the relative turn adds.
+pub(super) fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f64 {
+    if then == now {
+        return 0.0;
+    }
+    match (half_space_of(a), half_space_of(b)) {
+        (Some(normal), _) => plane_motion(&normal, then, now, &b.centre, b.radius),
+        (None, Some(normal)) => plane_motion(
+            &normal,
+            &then.inverse(),
+            &now.inverse(),
+            &a.centre,
+            a.radius,
+        ),
+        (None, None) if a.unbounded || b.unbounded => f64::INFINITY,
+        (None, None) if a.radius < b.radius => {
+            displacement(&then.inverse(), &now.inverse(), &a.centre, a.radius)
+        }
+        (None, None) => displacement(then, now, &b.centre, b.radius),
+    }
+}
+
+fn plane_motion(normal: &Vec3, then: &Pose, now: &Pose, centre: &Point, radius: f64) -> f64 {
+    let (from, to) = (then * centre, now * centre);
+    let height = normal.dot(&(to - from)).abs();
+    let magnitude = from.coords.amax().max(to.coords.amax()) + centre.coords.amax() + radius;
+    (height + chord(&then.rotation, &now.rotation) * radius) * (1.0 + 8.0 * f64::EPSILON)
+        + 16.0 * f64::EPSILON * magnitude
+}
+
+/// The outward normal in the body's frame, when the body is one half-space and nothing else.
+fn half_space_of(body: &Body) -> Option<Vec3> {
+    let [placed] = &*body.shapes else { return None };
+    match &placed.shape.geometry {
+        Geometry::HalfSpace { normal, .. } => Some(placed.pose.rotation * normal),
+        Geometry::Convex(_) | Geometry::Mesh(_) => None,
+    }
+}
+
+impl Narrow {
+    /// What is known of a pair; `None` for a slot that holds no pair.
+    #[must_use]
+    pub fn finding(&self, slot: PairSlot) -> Option<Finding<'_>> {
+        let hot = self.hot.get(slot.index()).filter(|hot| hot.live)?;
+        let memo = &self.memos[slot.index()];
+        let level = if memo.tested == 0 {
+            Level::Boxes
+        } else if memo.cursor != NONE {
+            Level::Partial
+        } else if memo.widened_m > 0.0 {
+            Level::Carried
+        } else if memo.tight {
+            Level::Exact
+        } else {
+            Level::Partial
+        };
+        Some(Finding {
+            a: hot.a,
+            b: hot.b,
+            verdict: hot.verdict,
+            gap: memo.now,
+            witness: memo.witness.as_ref(),
+            level,
+            touching: memo.touching(),
+            tested: memo.tested,
+            undecided_since: memo.undecided_since,
+            born: memo.born,
+            report_m: memo.report_m,
+        })
+    }
+
+    /// Starts the memory of a pair that has begun.
+    pub(super) fn meet(&mut self, slot: PairSlot, world: &World, pairs: &PairSet) {
+        let Some(key) = pairs.get(slot) else { return };
+        let (one, other) = key.slots();
+        let (Some(first), Some(second)) = (world.body(one), world.body(other)) else {
+            return;
+        };
+        let swap = second.id < first.id;
+        let (a, b) = if swap { (other, one) } else { (one, other) };
+        let (body_a, body_b) = if swap {
+            (second, first)
+        } else {
+            (first, second)
+        };
+        while self.hot.len() <= slot.index() {
+            self.hot.push(Hot::dead());
+            self.memos.push(Memo::new());
+        }
+        self.hot[slot.index()] = Hot {
+            a,
+            b,
+            expiry_m: f64::NEG_INFINITY,
+            visited: 0,
+            verdict: Verdict::Apart,
+            live: true,
+        };
+        self.counts[usize::from(Verdict::Apart.code())] += 1;
+        let memo = &mut self.memos[slot.index()];
+        *memo = Memo {
+            gap: box_bounds(body_a, body_b),
+            credit_m: body_a.motion.credit_m() + body_b.motion.credit_m(),
+            rel: relative(&body_a.pose, &body_b.pose),
+            report_m: world.report_within(one, other),
+            born: self.tick,
+            ..Memo::new()
+        };
+        self.look(slot, world);
+    }
+
+    /// Ends the memory of a pair.
+    pub(super) fn forget(&mut self, slot: PairSlot) {
+        let Some(hot) = self.hot.get_mut(slot.index()).filter(|hot| hot.live) else {
+            return;
+        };
+        self.counts[usize::from(hot.verdict.code())] -= 1;
+        hot.live = false;
+        hot.verdict = Verdict::Apart;
+        self.deactivate(slot);
+        let memo = &mut self.memos[slot.index()];
+        memo.undecided_since = 0;
+        memo.queued = false;
+        memo.refreshing = false;
+        self.cursors.give(&mut memo.cursor);
+        self.contact_sets.give(&mut memo.contacts);
+    }
+
+    /// Takes a verdict and keeps lists and counts in step.
+    pub(super) fn settle(&mut self, slot: PairSlot, verdict: Verdict) {
+        let hot = &mut self.hot[slot.index()];
+        let before = std::mem::replace(&mut hot.verdict, verdict);
+        let memo = &mut self.memos[slot.index()];
+        if verdict == Verdict::Possible {
+            if memo.undecided_since == 0 {
+                memo.undecided_since = self.tick;
+            }
+        } else {
+            memo.undecided_since = 0;
+        }
+        if before == verdict {
+            return;
+        }
+        self.counts[usize::from(before.code())] -= 1;
+        self.counts[usize::from(verdict.code())] += 1;
+        if verdict == Verdict::Apart {
+            self.contact_sets.give(&mut memo.contacts);
+            memo.contacts_tick = 0;
+            self.deactivate(slot);
+            self.left.push(slot);
+        } else if before == Verdict::Apart {
+            memo.active_at = u32::try_from(self.active.len()).unwrap_or(NONE);
+            self.active.push(slot);
+        }
+    }
+
+    fn deactivate(&mut self, slot: PairSlot) {
+        let at = std::mem::replace(&mut self.memos[slot.index()].active_at, NONE);
+        if at == NONE {
+            return;
+        }
+        self.active.swap_remove(at as usize);
+        if let Some(&moved) = self.active.get(at as usize) {
+            self.memos[moved.index()].active_at = at;
+        }
+    }
+}
+
+impl Hot {
+    pub(super) fn dead() -> Self {
+        Self {
+            a: BodySlot(0),
+            b: BodySlot(0),
+            expiry_m: f64::NEG_INFINITY,
+            visited: 0,
+            verdict: Verdict::Apart,
+            live: false,
+        }
+    }
+}
+
+impl Witness {
+    /// A witness without triangles.
+    #[must_use]
+    pub(super) fn of_shapes(shape_a: u32, shape_b: u32) -> Self {
+        Self {
+            best_m: f64::NAN,
+            point_a: Point::origin(),
+            point_b: Point::origin(),
+            normal: Vec3::z(),
+            shape_a,
+            shape_b,
+            triangle_a: NO_INDEX,
+            triangle_b: NO_INDEX,
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Queries of shape pairs without meshes, and the change of frames around them.
+
+use crate::math::{Interval, Pose, relative};
+use crate::shape::{Geometry, Shape};
+use crate::wire::NO_INDEX;
+use crate::world::{Body, PlacedShape};
+
+use super::contacts::Contact;
+use super::exact::{
+    Closest, Manifold, Warm, convex_gap, gap_to_half_space, half_space_gap, manifold,
+};
+use super::memo::Witness;
+use super::mesh::retest_witness;
+
+/// Whether the pair of shapes is answered by one exact query.
+pub(super) fn is_simple(a: &Shape, b: &Shape) -> bool {
+    !matches!(a.geometry, Geometry::Mesh(_)) && !matches!(b.geometry, Geometry::Mesh(_))
+}
+
+/// The pose of shape 2 seen from shape 1, from that of body 2 seen from body 1.
+pub(super) fn shape_pose(a: &PlacedShape, b: &PlacedShape, bodies12: &Pose) -> Pose {
+    relative(&a.pose, &(bodies12 * b.pose))
+}
+
+/// One exact query; `None` for a mesh or two half-spaces. The answer is in shape A's frame.
+pub(super) fn shape_gap(a: &Shape, b: &Shape, pos12: &Pose, warm: &mut Warm) -> Option<Closest> {
+    match (&a.geometry, &b.geometry) {
+        (Geometry::Convex(one), Geometry::Convex(other)) => {
+            Some(convex_gap(one, other, pos12, warm))
+        }
+        (Geometry::HalfSpace { normal, offset }, Geometry::Convex(other)) => {
+            Some(half_space_gap(normal, *offset, other, pos12))
+        }
+        (Geometry::Convex(one), Geometry::HalfSpace { normal, offset }) => {
+            Some(gap_to_half_space(one, normal, *offset, pos12))
+        }
+        _ => None,
+    }
+}
+
+/// The answer of a shape pair as the witness of the body pair.
+pub(super) fn witness_of(
+    a: &PlacedShape,
+    b: &PlacedShape,
+    pos12: &Pose,
+    closest: &Closest,
+    places: (u32, u32),
+) -> Witness {
+    Witness {
+        best_m: closest.best_m,
+        point_a: a.pose * closest.point_a,
+        point_b: b.pose * pos12.inverse_transform_point(&closest.point_b),
+        normal: a.pose.rotation * closest.normal,
+        ..Witness::of_shapes(places.0, places.1)
+    }
+}
+
+/// Appends the manifold of a colliding shape pair to `found`.
+pub(super) fn add_manifold(
+    (a, b): (&Body, &Body),
+    (place_a, place_b): (u32, u32),
+    pos12: &Pose,
+    closest: &Closest,
+    found: &mut Vec<Contact>,
+) {
+    let (Some(one), Some(other)) = (
+        a.shapes.get(place_a as usize),
+        b.shapes.get(place_b as usize),
+    ) else {
+        return;
+    };
+    let contact = |point_a, point_b, gap_m, feature| Contact {
+        id: 0,
+        shape_a: place_a,
+        shape_b: place_b,
+        triangle_a: NO_INDEX,
+        triangle_b: NO_INDEX,
+        feature,
+        point_a: one.pose * point_a,
+        point_b: other.pose * pos12.inverse_transform_point(&point_b),
+        normal: one.pose.rotation * closest.normal,
+        gap_m,
+        gap: closest.gap,
+    };
+    let mut points = Manifold::default();
+    if let (Geometry::Convex(first), Geometry::Convex(second)) =
+        (&one.shape.geometry, &other.shape.geometry)
+    {
+        manifold(first, second, pos12, closest, 0.0, &mut points);
+    }
+    if points.is_empty() {
+        found.push(contact(
+            closest.point_a,
+            closest.point_b,
+            closest.best_m,
+            NO_INDEX,
+        ));
+    }
+    for p in points.points() {
+        found.push(contact(p.point_a, p.point_b, p.gap_m, p.feature));
+    }
+}
+
+/// One exact query of what touched last: two shapes, or two of their triangles.
+pub(super) fn retest(a: &Shape, b: &Shape, pos12: &Pose, (ta, tb): (u32, u32)) -> Option<Closest> {
+    if is_simple(a, b) {
+        shape_gap(a, b, pos12, &mut Warm::default())
+    } else {
+        retest_witness(a, b, pos12, ta, tb)
+    }
+}
+
+/// A lower bound on the gap of two placed shapes from their bounding spheres; minus infinity for a half-space.
+pub(super) fn sphere_bound(a: &PlacedShape, b: &PlacedShape, bodies12: &Pose) -> f64 {
+    let (ra, rb) = (a.shape.radius, b.shape.radius);
+    if !(ra.is_finite() && rb.is_finite()) {
+        return f64::NEG_INFINITY;
+    }
+    let (ca, cb) = (
+        a.pose * a.shape.centre,
+        bodies12 * (b.pose * b.shape.centre),
+    );
+    let magnitude = ca.coords.amax() + cb.coords.amax() + ra + rb;
+    (cb - ca).norm() - ra - rb - 16.0 * f64::EPSILON * magnitude
+}
+
+/// The certificate of an answer, never narrower than its rounding allows and with its ends in order.
+pub(super) fn sound(gap: Interval) -> Interval {
+    if gap.min <= gap.max {
+        gap
+    } else {
+        Interval {
+            min: gap.max.min(gap.min),
+            max: gap.min.max(gap.max),
+        }
+    }
+}

@@ -1,0 +1,381 @@
+//! Spending the budget: verdicts first, oldest first, in slices; then what is listened to.
+
+use std::cmp::Reverse;
+
+use crate::ids::PairSlot;
+use crate::math::{Interval, relative};
+use crate::time::Meter;
+use crate::wire::Verdict;
+use crate::world::{Body, World};
+
+use super::contacts::ContactSet;
+use super::cursor::{Cursor, Turn};
+use super::memo::{Witness, relative_motion};
+use super::mesh::Goal;
+use super::query::{add_manifold, is_simple, retest, shape_gap, shape_pose, sound, witness_of};
+use super::{NONE, Narrow, Wanted};
+
+/// How work is ordered. What is finished in the end does not depend on it; what is finished when time runs out does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// As found: for a budget without limit, where order means nothing.
+    AsFound,
+    /// Last tick's contacts, then the longest undecided, then the fastest: for a budget in time.
+    Aged,
+    /// As `Aged`, with ties broken by body ids: for a budget in units, so that a run replays bit for bit whatever the
+    /// slots are.
+    Counted,
+}
+
+/// What a query found, and when and where it holds.
+struct Answer {
+    gap: Interval,
+    finished: bool,
+    witness: Option<Witness>,
+}
+
+impl Narrow {
+    /// Gives undecided pairs their verdicts, in slices; whether none is left.
+    ///
+    /// Nothing starves: a pair's turn comes by its age, so a pair that stays undecided becomes the oldest after at most
+    /// as many ticks as it takes to decide those that were older.
+    pub(super) fn spend_on_verdicts(
+        &mut self,
+        world: &World,
+        wanted: Wanted,
+        meter: &mut Meter<'_>,
+    ) -> bool {
+        let mut work = std::mem::take(&mut self.undecided);
+        self.arrange(&mut work, wanted.order, world);
+        // With no limit the contacts are computed while the answer is at hand; else every verdict comes first.
+        let at_once = wanted.order == Order::AsFound && wanted.contacts;
+        let goal = if at_once {
+            Goal::Contacts
+        } else {
+            Goal::Verdict
+        };
+        let mut open = work.len();
+        while open > 0 && meter.open() {
+            let mut left = 0;
+            for at in 0..open {
+                let slot = work[at];
+                let idle = self.hot[slot.index()].verdict != Verdict::Possible;
+                if idle || (meter.open() && self.work(slot, goal, world, meter)) {
+                    self.memos[slot.index()].queued = false;
+                } else {
+                    work[left] = slot;
+                    left += 1;
+                }
+            }
+            open = left;
+        }
+        work.truncate(open);
+        self.undecided = work;
+        self.undecided.is_empty()
+    }
+
+    /// Refreshes bounds and contacts of reported pairs; whether all are done.
+    pub(super) fn spend_on_reports(
+        &mut self,
+        world: &World,
+        wanted: Wanted,
+        meter: &mut Meter<'_>,
+    ) -> bool {
+        self.follow_demand(wanted);
+        if !(wanted.bounds || wanted.contacts) {
+            return true;
+        }
+        let mut work = std::mem::take(&mut self.refresh);
+        self.arrange(&mut work, wanted.order, world);
+        let goal = if wanted.contacts {
+            Goal::Contacts
+        } else {
+            Goal::Gap
+        };
+        let mut open = work.len();
+        while open > 0 && meter.open() {
+            let mut left = 0;
+            for at in 0..open {
+                let slot = work[at];
+                let reported = matches!(
+                    self.hot[slot.index()].verdict,
+                    Verdict::Near | Verdict::Colliding
+                );
+                let idle = !reported || self.fresh(slot, wanted.contacts);
+                if idle || (meter.open() && self.work(slot, goal, world, meter)) {
+                    self.memos[slot.index()].refreshing = false;
+                } else {
+                    work[left] = slot;
+                    left += 1;
+                }
+            }
+            open = left;
+        }
+        work.truncate(open);
+        self.refresh = work;
+        self.refresh.is_empty()
+    }
+
+    /// When somebody begins to listen, pairs at rest owe them what was left out before.
+    fn follow_demand(&mut self, wanted: Wanted) {
+        let more =
+            (wanted.contacts && !self.contacts_wanted) || (wanted.bounds && !self.bounds_wanted);
+        self.contacts_wanted = wanted.contacts;
+        self.bounds_wanted = wanted.bounds;
+        if !more {
+            return;
+        }
+        for at in 0..self.active.len() {
+            let slot = self.active[at];
+            let memo = &mut self.memos[slot.index()];
+            if !memo.refreshing {
+                memo.refreshing = true;
+                self.refresh.push(slot);
+            }
+        }
+    }
+
+    /// Whether a reported pair's bounds (and contacts) belong to this tick's poses.
+    fn fresh(&self, slot: PairSlot, contacts: bool) -> bool {
+        let memo = &self.memos[slot.index()];
+        let colliding = self.hot[slot.index()].verdict == Verdict::Colliding;
+        let bounds = memo.tight && (memo.tested == self.tick || memo.rest);
+        bounds && (!contacts || !colliding || memo.contacts_tick >= memo.tested)
+    }
+
+    fn arrange(&self, work: &mut [PairSlot], order: Order, world: &World) {
+        let key = |slot: PairSlot| {
+            let memo = &self.memos[slot.index()];
+            let touched = memo.witness.is_some_and(|w| w.best_m <= 0.0);
+            let age = if memo.undecided_since == 0 {
+                self.tick
+            } else {
+                memo.undecided_since
+            };
+            // Positive floats order like their bits; the fastest first.
+            (
+                !(touched && age == self.tick),
+                age,
+                Reverse(memo.widened_m.max(0.0).to_bits()),
+            )
+        };
+        let ids = |slot: PairSlot| {
+            let hot = &self.hot[slot.index()];
+            (
+                world.body(hot.a).map(|body| body.id),
+                world.body(hot.b).map(|body| body.id),
+            )
+        };
+        match order {
+            Order::AsFound => {}
+            Order::Aged => work.sort_unstable_by_key(|&slot| key(slot)),
+            Order::Counted => work.sort_unstable_by_key(|&slot| (key(slot), ids(slot))),
+        }
+    }
+
+    /// One turn of work on a pair; whether nothing is left to do for `goal`.
+    fn work(&mut self, slot: PairSlot, goal: Goal, world: &World, meter: &mut Meter<'_>) -> bool {
+        let hot = self.hot[slot.index()];
+        let (Some(a), Some(b)) = (world.body(hot.a), world.body(hot.b)) else {
+            return true;
+        };
+        let mut open = false;
+        if let ([one], [other]) = (&*a.shapes, &*b.shapes)
+            && is_simple(&one.shape, &other.shape)
+        {
+            self.query_once(slot, (a, b), goal);
+            meter.charge_dear(1);
+        } else if goal == Goal::Verdict && self.witness_due(slot) {
+            self.retest_witness(slot, (a, b));
+            meter.charge_dear(1);
+            open = true;
+        } else {
+            open = self.turn_cursor(slot, (a, b), goal, meter) == Turn::Open;
+        }
+        self.widen_pair(slot, world);
+        let memo = &self.memos[slot.index()];
+        let verdict = memo.verdict();
+        // A resumed query may have been overtaken by motion: then another one starts at this tick's poses.
+        let current = !open && memo.tested == self.tick;
+        self.settle(slot, verdict);
+        self.owe_report(slot, goal);
+        match goal {
+            Goal::Verdict => verdict != Verdict::Possible || current,
+            Goal::Gap | Goal::Contacts => current,
+        }
+    }
+
+    /// A verdict found by a query that was asked for no more owes bounds and contacts to whoever listens.
+    fn owe_report(&mut self, slot: PairSlot, goal: Goal) {
+        let reported = matches!(
+            self.hot[slot.index()].verdict,
+            Verdict::Near | Verdict::Colliding
+        );
+        let memo = &mut self.memos[slot.index()];
+        if goal == Goal::Verdict && reported && !memo.refreshing {
+            memo.refreshing = true;
+            self.refresh.push(slot);
+        }
+    }
+
+    /// The one query that decides a pair of single shapes without meshes.
+    fn query_once(&mut self, slot: PairSlot, (a, b): (&Body, &Body), goal: Goal) {
+        let rel = relative(&a.pose, &b.pose);
+        let pos12 = shape_pose(&a.shapes[0], &b.shapes[0], &rel);
+        let memo = &mut self.memos[slot.index()];
+        let Some(closest) = shape_gap(
+            &a.shapes[0].shape,
+            &b.shapes[0].shape,
+            &pos12,
+            &mut memo.warm,
+        ) else {
+            return;
+        };
+        self.counters.queries += 1;
+        let witness = witness_of(&a.shapes[0], &b.shapes[0], &pos12, &closest, (0, 0));
+        memo.rel = rel;
+        memo.credit_m = a.motion.credit_m() + b.motion.credit_m();
+        memo.tested = self.tick;
+        memo.tight = closest.finished;
+        let answer = Answer {
+            gap: sound(closest.gap),
+            finished: closest.finished,
+            witness: Some(witness),
+        };
+        self.store(slot, answer);
+        if goal == Goal::Contacts && closest.gap.min <= 0.0 {
+            self.counters.manifolds += 1;
+            self.found.clear();
+            add_manifold((a, b), (0, 0), &pos12, &closest, &mut self.found);
+            self.keep_contacts(slot, a.radius.min(b.radius));
+        }
+    }
+
+    /// One turn of a pair that takes several: resumed where it stopped, or started at this tick's poses.
+    fn turn_cursor(
+        &mut self,
+        slot: PairSlot,
+        (a, b): (&Body, &Body),
+        goal: Goal,
+        meter: &mut Meter<'_>,
+    ) -> Turn {
+        let memo = &mut self.memos[slot.index()];
+        let fresh = memo.cursor == NONE;
+        if fresh {
+            memo.cursor = self.cursors.take(Cursor::default);
+        }
+        let Some(cursor) = self.cursors.get_mut(memo.cursor) else {
+            return Turn::Finished;
+        };
+        if fresh || (cursor.goal == Goal::Verdict && goal != Goal::Verdict) {
+            let credit_m = a.motion.credit_m() + b.motion.credit_m();
+            cursor.start(relative(&a.pose, &b.pose), credit_m, self.tick, goal);
+        }
+        let turn = cursor.turn((a, b), memo.report_m, meter, &mut self.counters);
+        let certified = cursor.upper() <= 0.0 && memo.now.max > 0.0;
+        if turn == Turn::Open && !certified {
+            return Turn::Open;
+        }
+        // What was known before holds at this tick's poses; carried back to the cursor's, it loses the motion between.
+        let since = relative_motion(a, b, &cursor.rel, &relative(&a.pose, &b.pose));
+        let known_low = (memo.now.min - since).next_down();
+        let whole =
+            turn == Turn::Finished && !(cursor.goal == Goal::Verdict && cursor.gap.max <= 0.0);
+        let low = if whole { cursor.gap.min } else { known_low };
+        memo.rel = cursor.rel;
+        memo.credit_m = cursor.credit_m;
+        memo.tested = cursor.tick;
+        memo.tight = whole && cursor.goal != Goal::Verdict;
+        let answer = Answer {
+            gap: Interval {
+                min: low.min(cursor.upper()),
+                max: cursor.upper(),
+            },
+            finished: whole,
+            witness: cursor.witness,
+        };
+        let contacts = cursor.goal == Goal::Contacts && turn == Turn::Finished;
+        if contacts {
+            std::mem::swap(&mut self.found, &mut cursor.found);
+        }
+        if turn == Turn::Finished {
+            self.cursors.give(&mut memo.cursor);
+        }
+        self.store(slot, answer);
+        if contacts {
+            self.keep_contacts(slot, a.radius.min(b.radius));
+        }
+        turn
+    }
+
+    /// Whether last tick's contact is worth a look before anything else.
+    fn witness_due(&self, slot: PairSlot) -> bool {
+        let memo = &self.memos[slot.index()];
+        memo.witness.is_some_and(|w| w.best_m <= 0.0) && memo.retested != self.tick && !memo.rest
+    }
+
+    /// Asks the shapes (and triangles) that touched last whether they still do: one unit, and while contact lasts the
+    /// verdict costs no more.
+    fn retest_witness(&mut self, slot: PairSlot, (a, b): (&Body, &Body)) {
+        let memo = &mut self.memos[slot.index()];
+        memo.retested = self.tick;
+        let Some(last) = memo.witness else { return };
+        let places = (last.shape_a, last.shape_b);
+        let (Some(one), Some(other)) = (
+            a.shapes.get(places.0 as usize),
+            b.shapes.get(places.1 as usize),
+        ) else {
+            return;
+        };
+        let rel = relative(&a.pose, &b.pose);
+        let pos12 = shape_pose(one, other, &rel);
+        self.counters.queries += 1;
+        let triangles = (last.triangle_a, last.triangle_b);
+        let Some(closest) = retest(&one.shape, &other.shape, &pos12, triangles) else {
+            return;
+        };
+        if closest.gap.max > 0.0 {
+            return;
+        }
+        // A certified touch at these very poses; the lower end is what motion left of the old one.
+        memo.gap = Interval {
+            min: memo.now.min.min(closest.gap.max),
+            max: closest.gap.max,
+        };
+        memo.rel = rel;
+        memo.credit_m = a.motion.credit_m() + b.motion.credit_m();
+        memo.tested = self.tick;
+        memo.finished = false;
+        memo.tight = false;
+        memo.witness = Some(Witness {
+            triangle_a: last.triangle_a,
+            triangle_b: last.triangle_b,
+            ..witness_of(one, other, &pos12, &closest, places)
+        });
+    }
+
+    fn store(&mut self, slot: PairSlot, answer: Answer) {
+        let memo = &mut self.memos[slot.index()];
+        memo.gap = answer.gap;
+        memo.finished = answer.finished;
+        if answer.witness.is_some() {
+            memo.witness = answer.witness;
+        }
+    }
+
+    /// Hands `found` to the pair's contact set; ids go on where the contact does.
+    fn keep_contacts(&mut self, slot: PairSlot, radius: f64) {
+        let most = self.contacts_per_pair;
+        let memo = &mut self.memos[slot.index()];
+        if memo.contacts == NONE {
+            memo.contacts = self.contact_sets.take(|| ContactSet::with_room(most));
+            if let Some(set) = self.contact_sets.get_mut(memo.contacts) {
+                set.clear();
+            }
+        }
+        memo.contacts_tick = memo.tested;
+        if let Some(set) = self.contact_sets.get_mut(memo.contacts) {
+            set.replace(&mut self.found, most, radius);
+        }
+    }
+}

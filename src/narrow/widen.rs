@@ -1,0 +1,121 @@
+//! The motion pass: which certificates still hold. Costs in proportion to what moved.
+
+use crate::ids::PairSlot;
+use crate::math::{Interval, ROUND, relative};
+use crate::pairs::PairSet;
+use crate::wire::{BodyStatus, Verdict};
+use crate::world::World;
+
+use super::memo::relative_motion;
+use super::{NONE, Narrow};
+
+impl Narrow {
+    /// Compares the pairs of every body that moved or whose status changed with their certificates.
+    ///
+    /// Undecided pairs of earlier ticks are in the work list already; this adds those that have become undecided.
+    pub fn widen(&mut self, world: &World, pairs: &PairSet) {
+        let changes = world.changes();
+        let changed = changes.moved.len() + changes.restated.len();
+        // Above this share a straight walk over the 24-byte records beats chasing each body's list.
+        if changed * 4 > world.slots_len() {
+            for slot in 0..self.hot.len() {
+                if self.hot[slot].live {
+                    #[allow(
+                        clippy::cast_possible_truncation,
+                        reason = "slots are u32 by limits::PAIRS"
+                    )]
+                    self.visit(PairSlot(slot as u32), world);
+                }
+            }
+            return;
+        }
+        for &body in changes
+            .moved
+            .iter()
+            .chain(&changes.restated)
+            .chain(&changes.requery)
+        {
+            for slot in pairs.pairs_of(body) {
+                self.visit(slot, world);
+            }
+        }
+    }
+
+    /// Visits a pair once in a tick: one comparison while its certificate holds.
+    fn visit(&mut self, slot: PairSlot, world: &World) {
+        let hot = &mut self.hot[slot.index()];
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "only equality with this tick is asked"
+        )]
+        let stamp = self.tick as u32;
+        if hot.visited == stamp {
+            return;
+        }
+        hot.visited = stamp;
+        self.counters.visited += 1;
+        let spent_m = self.spent_m[hot.a.index()] + self.spent_m[hot.b.index()];
+        if spent_m.next_up() < hot.expiry_m {
+            return;
+        }
+        self.look(slot, world);
+    }
+
+    /// Widens a pair's interval to this tick's poses, and puts it on the work list its verdict calls for.
+    pub(super) fn look(&mut self, slot: PairSlot, world: &World) {
+        self.widen_pair(slot, world);
+        let memo = &mut self.memos[slot.index()];
+        let verdict = memo.verdict();
+        // An unbounded reach cannot be worked away, and a finished test at these very poses has said all it can.
+        let reachable = memo.widened_m < f64::INFINITY;
+        if verdict == Verdict::Possible
+            && reachable
+            && !(memo.finished && memo.rest)
+            && !memo.queued
+        {
+            memo.queued = true;
+            self.undecided.push(slot);
+        }
+        let reported = matches!(verdict, Verdict::Near | Verdict::Colliding);
+        if reported && reachable && !(memo.tight && memo.rest) && !memo.refreshing {
+            memo.refreshing = true;
+            self.refresh.push(slot);
+        }
+        self.settle(slot, verdict);
+    }
+
+    /// Recomputes `now` from the certificate, the motion since, and the bodies' reach.
+    pub(super) fn widen_pair(&mut self, slot: PairSlot, world: &World) {
+        let hot = &mut self.hot[slot.index()];
+        let memo = &mut self.memos[slot.index()];
+        let (Some(a), Some(b)) = (world.body(hot.a), world.body(hot.b)) else {
+            return;
+        };
+        let reach_m = a.reach_m + b.reach_m;
+        let rel = relative(&a.pose, &b.pose);
+        let by_path = if (a.unbounded && a.moves) || (b.unbounded && b.moves) {
+            f64::INFINITY
+        } else {
+            let spent = self.spent_m[hot.a.index()] + self.spent_m[hot.b.index()];
+            (spent - memo.credit_m).next_up()
+        };
+        let by_pose = relative_motion(a, b, &memo.rel, &rel);
+        let motion_m = by_path.min(by_pose).max(0.0);
+        memo.rest = motion_m == 0.0;
+        memo.widened_m = motion_m + reach_m;
+        memo.now = match memo.widened_m {
+            0.0 => memo.gap,
+            m if m.is_finite() => memo.gap.widened(m),
+            _ => Interval::UNKNOWN,
+        };
+        let known = |status| matches!(status, BodyStatus::Known | BodyStatus::Held);
+        let still = reach_m == 0.0 && known(a.status) && known(b.status) && by_path.is_finite();
+        // The comparison that spares the next visits: gap_min - (spent - credit) > report.
+        hot.expiry_m = if still && memo.cursor == NONE {
+            let sum = memo.gap.min + memo.credit_m - memo.report_m.max(0.0);
+            sum - 4.0 * ROUND * (memo.gap.min.abs() + memo.credit_m.abs() + memo.report_m.abs())
+        } else {
+            f64::NEG_INFINITY
+        };
+    }
+}

@@ -1,0 +1,258 @@
+//! Begin, persist, end: what is certified about each pair's collisions, and events that still wait to be sent.
+//!
+//! Events are about certified collisions only. With less budget a begin comes later; it is never wrong. An event that
+//! does not fit into a message waits here with its range, also after its pair is gone.
+
+use crate::ids::{BodyId, PairSlot};
+use crate::narrow::{Finding, Narrow};
+use crate::pairs::PairDelta;
+use crate::wire::{EndCause, Verdict};
+use crate::world::World;
+
+/// A pair by its bodies' ids, the smaller first.
+pub(super) type Ids = (BodyId, BodyId);
+
+/// The ticks in which something may have happened, both ends included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Ticks {
+    pub(super) first: u64,
+    pub(super) last: u64,
+}
+
+/// The events of one pair that wait to be sent: an end, then a begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct PairEvent {
+    pub(super) ids: Ids,
+    /// Order in which it happened, for events of one pair.
+    seq: u64,
+    pub(super) end: Option<(Ticks, EndCause)>,
+    pub(super) begin: Option<Ticks>,
+}
+
+/// What is certified about a pair.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct History {
+    ids: Ids,
+    /// Last certified verdict.
+    pub(super) verdict: Verdict,
+    /// Its tick; 0: never.
+    pub(super) tick: u64,
+    /// Certified colliding, and not certified ended since.
+    pub(super) colliding: bool,
+    /// Last tick in which the pair was more than plainly apart.
+    active: u64,
+}
+
+impl History {
+    const NONE: Self = Self {
+        ids: (BodyId(0), BodyId(0)),
+        verdict: Verdict::None,
+        tick: 0,
+        colliding: false,
+        active: 0,
+    };
+}
+
+/// The history of every pair and the events that wait.
+#[derive(Debug, Default)]
+pub(super) struct Events {
+    /// By `PairSlot`.
+    histories: Vec<History>,
+    /// By ids; one entry a pair after [`Events::collect`].
+    waiting: Vec<PairEvent>,
+    seq: u64,
+    /// Begins and their ends that were both never sent.
+    pub(super) cancelled: u64,
+}
+
+impl Events {
+    /// Takes this tick's verdicts and ended pairs, and appends the events they make.
+    pub(super) fn collect(&mut self, tick: u64, world: &World, narrow: &Narrow, delta: &PairDelta) {
+        for ended in &delta.ended {
+            if let Some(history) = self.histories.get_mut(ended.slot.index()) {
+                let gone = std::mem::replace(history, History::NONE);
+                if gone.colliding {
+                    let ticks = Ticks {
+                        first: gone.tick + 1,
+                        last: tick,
+                    };
+                    self.push(gone.ids, Some((ticks, ended.cause)), None);
+                }
+            }
+        }
+        for &slot in narrow.left() {
+            // Touched by an earlier tick, or nothing was ever certified of it that could end.
+            if self
+                .histories
+                .get(slot.index())
+                .is_some_and(|history| history.tick != 0)
+                && let Some(finding) = narrow.finding(slot)
+            {
+                self.certify(tick, slot, &finding, narrow, world);
+            }
+        }
+        for &slot in narrow.active() {
+            if let Some(finding) = narrow.finding(slot) {
+                self.certify(tick, slot, &finding, narrow, world);
+            }
+        }
+        self.merge();
+    }
+
+    /// The history of a pair.
+    pub(super) fn history(&self, slot: PairSlot) -> History {
+        self.histories
+            .get(slot.index())
+            .copied()
+            .unwrap_or(History::NONE)
+    }
+
+    /// Events that wait, by ids.
+    pub(super) fn waiting(&self) -> &[PairEvent] {
+        &self.waiting
+    }
+
+    /// Forgets what was sent: all events but those `kept` says to keep.
+    pub(super) fn sent(&mut self, mut kept: impl FnMut(Ids) -> bool) {
+        self.waiting.retain(|event| kept(event.ids));
+    }
+
+    /// Takes a pair's verdict of this tick.
+    fn certify(
+        &mut self,
+        tick: u64,
+        slot: PairSlot,
+        finding: &Finding<'_>,
+        narrow: &Narrow,
+        world: &World,
+    ) {
+        let (Some(a), Some(b)) = (world.body(finding.a), world.body(finding.b)) else {
+            return;
+        };
+        if self.histories.len() <= slot.index() {
+            self.histories.resize(slot.index() + 1, History::NONE);
+        }
+        let mut history = self.histories[slot.index()];
+        history.ids = (a.id, b.id);
+        // Not active in the tick before: proved apart there by its certificate or by its boxes, unless a body is new.
+        let entered = narrow.entered_now(finding.a) || narrow.entered_now(finding.b);
+        let known_before = finding.born < tick || !entered;
+        if history.active + 1 < tick && known_before && tick > 1 {
+            history.verdict = Verdict::Apart;
+            history.tick = tick - 1;
+        }
+        history.active = tick;
+        let first = if history.tick == 0 {
+            finding.born
+        } else {
+            history.tick + 1
+        };
+        let ticks = Ticks { first, last: tick };
+        match finding.verdict {
+            Verdict::Colliding => {
+                if !history.colliding {
+                    self.push(history.ids, None, Some(ticks));
+                }
+                history.colliding = true;
+            }
+            Verdict::Near | Verdict::Apart => {
+                if history.colliding {
+                    self.push(history.ids, Some((ticks, EndCause::Separated)), None);
+                }
+                history.colliding = false;
+            }
+            Verdict::Possible | Verdict::None => {
+                self.histories[slot.index()] = history;
+                return;
+            }
+        }
+        history.verdict = finding.verdict;
+        history.tick = tick;
+        self.histories[slot.index()] = history;
+    }
+
+    fn push(&mut self, ids: Ids, end: Option<(Ticks, EndCause)>, begin: Option<Ticks>) {
+        self.seq += 1;
+        self.waiting.push(PairEvent {
+            ids,
+            seq: self.seq,
+            end,
+            begin,
+        });
+    }
+
+    /// One entry a pair: a begin that was never sent and the end that follows it cancel.
+    fn merge(&mut self) {
+        self.waiting
+            .sort_unstable_by_key(|event| (event.ids, event.seq));
+        let cancelled = &mut self.cancelled;
+        self.waiting.dedup_by(|next, kept| {
+            if next.ids != kept.ids {
+                return false;
+            }
+            if next.end.is_some() {
+                if kept.begin.take().is_some() {
+                    *cancelled += 1;
+                } else {
+                    kept.end = next.end;
+                }
+            }
+            if next.begin.is_some() {
+                kept.begin = next.begin;
+            }
+            true
+        });
+        self.waiting
+            .retain(|event| event.end.is_some() || event.begin.is_some());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ticks(first: u64, last: u64) -> Ticks {
+        Ticks { first, last }
+    }
+
+    #[test]
+    fn law_3_9_a_begin_and_its_end_that_were_never_sent_cancel_and_are_counted() {
+        let ids = (BodyId(1), BodyId(2));
+        let mut events = Events::default();
+        events.push(ids, None, Some(ticks(3, 4)));
+        events.push(ids, Some((ticks(5, 5), EndCause::Separated)), None);
+        events.merge();
+        assert!(events.waiting().is_empty());
+        assert_eq!(events.cancelled, 1);
+    }
+
+    #[test]
+    fn law_3_5_an_end_and_a_begin_of_one_pair_share_a_row_in_that_order() {
+        let ids = (BodyId(1), BodyId(2));
+        let mut events = Events::default();
+        events.push(ids, Some((ticks(5, 5), EndCause::Removed)), None);
+        events.push(ids, None, Some(ticks(6, 7)));
+        events.merge();
+        let [event] = events.waiting() else {
+            panic!("one row")
+        };
+        assert_eq!(event.end, Some((ticks(5, 5), EndCause::Removed)));
+        assert_eq!(event.begin, Some(ticks(6, 7)));
+        assert_eq!(events.cancelled, 0);
+    }
+
+    #[test]
+    fn law_3_9_an_unsent_end_survives_a_begin_that_is_cancelled_later() {
+        let ids = (BodyId(1), BodyId(2));
+        let mut events = Events::default();
+        events.push(ids, Some((ticks(5, 5), EndCause::Separated)), None);
+        events.push(ids, None, Some(ticks(6, 6)));
+        events.push(ids, Some((ticks(7, 7), EndCause::Removed)), None);
+        events.merge();
+        let [event] = events.waiting() else {
+            panic!("one row")
+        };
+        assert_eq!(event.end, Some((ticks(5, 5), EndCause::Separated)));
+        assert_eq!(event.begin, None);
+    }
+}

@@ -1,0 +1,203 @@
+//! Rows of `pairs`: every pair that is not plainly apart, and every event.
+
+use crate::ids::{BodyId, PairKey, PairSlot};
+use crate::math::{Point, Vec3};
+use crate::narrow::{Finding, Witness};
+use crate::wire::{BodyStatus, Event, Level, MessageHeader, Outbox, PairRow, Verdict, pair_flags};
+use crate::world::Body;
+
+use super::events::PairEvent;
+use super::{Publisher, View};
+
+/// A row to be: where it stands by rank, and what it is made of.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    ids: (BodyId, BodyId),
+    /// Events first, then colliding, possible, near.
+    class: u8,
+    /// Deepest first within a class, metres.
+    depth_m: f64,
+    slot: Option<PairSlot>,
+    event: Option<PairEvent>,
+}
+
+impl Publisher {
+    /// Fills `pairs`; returns how many rows did not fit.
+    pub(super) fn fill_pairs(
+        &mut self,
+        view: &View<'_>,
+        header: MessageHeader,
+        out: &mut Outbox,
+    ) -> u64 {
+        out.pairs.clear();
+        if !view.demand.pairs {
+            // Who begins to listen later sees the full state; there is nobody to tell what happened before.
+            self.events.sent(|_| false);
+            return 0;
+        }
+        self.gather(view);
+        let left_out = self.rank();
+        for row in &self.rows {
+            out.pairs.push(self.pair_row(view, row));
+        }
+        let rows = &self.rows;
+        if left_out == 0 {
+            self.events.sent(|_| false);
+        } else {
+            self.events
+                .sent(|ids| rows.binary_search_by_key(&ids, |row| row.ids).is_err());
+        }
+        out.pairs_header = MessageHeader {
+            truncated: left_out,
+            ..header
+        };
+        left_out
+    }
+
+    /// All rows there could be: active pairs, and pairs with events that are not active.
+    fn gather(&mut self, view: &View<'_>) {
+        self.rows.clear();
+        for &slot in view.narrow.active() {
+            let Some(finding) = view.narrow.finding(slot) else {
+                continue;
+            };
+            let (Some(a), Some(b)) = (view.world.body(finding.a), view.world.body(finding.b))
+            else {
+                continue;
+            };
+            let class = match finding.verdict {
+                Verdict::Colliding => 1,
+                Verdict::Possible => 2,
+                Verdict::Near | Verdict::Apart | Verdict::None => 3,
+            };
+            let depth_m = finding.gap.min;
+            self.rows.push(Row {
+                ids: (a.id, b.id),
+                class,
+                depth_m,
+                slot: Some(slot),
+                event: None,
+            });
+        }
+        self.rows.sort_unstable_by_key(|row| row.ids);
+        let active = self.rows.len();
+        for &event in self.events.waiting() {
+            match self.rows[..active].binary_search_by_key(&event.ids, |row| row.ids) {
+                Ok(at) => {
+                    self.rows[at].event = Some(event);
+                    self.rows[at].class = 0;
+                }
+                Err(_) => self.rows.push(Row {
+                    ids: event.ids,
+                    class: 0,
+                    depth_m: 0.0,
+                    slot: self.slot_of(view, event.ids),
+                    event: Some(event),
+                }),
+            }
+        }
+    }
+
+    /// The slot of a pair that is apart but still a candidate.
+    fn slot_of(&self, view: &View<'_>, ids: (BodyId, BodyId)) -> Option<PairSlot> {
+        let (a, b) = (view.world.slot_of(ids.0)?, view.world.slot_of(ids.1)?);
+        view.pairs.find(PairKey::new(a, b))
+    }
+
+    /// Leaves out what does not fit, worst rank first, and orders the rest by ids; returns how many were left out.
+    fn rank(&mut self) -> u64 {
+        let most = self.limits.pair_rows;
+        let left_out = self.rows.len().saturating_sub(most);
+        if left_out > 0 {
+            self.rows.sort_unstable_by(|x, y| {
+                (x.class.cmp(&y.class))
+                    .then(x.depth_m.total_cmp(&y.depth_m))
+                    .then(x.ids.cmp(&y.ids))
+            });
+            self.rows.truncate(most);
+        }
+        self.rows.sort_unstable_by_key(|row| row.ids);
+        left_out as u64
+    }
+
+    fn pair_row(&self, view: &View<'_>, row: &Row) -> PairRow {
+        let mut out = PairRow {
+            body_a: row.ids.0.0,
+            body_b: row.ids.1.0,
+            gap_min_m: f64::NEG_INFINITY,
+            gap_max_m: f64::INFINITY,
+            gap_best_m: f64::NAN,
+            closing_mps: f64::NAN,
+            ..PairRow::default()
+        };
+        match row
+            .slot
+            .and_then(|slot| Some((slot, view.narrow.finding(slot)?)))
+        {
+            Some((slot, finding)) => self.describe(view, slot, &finding, &mut out),
+            None => out.flags |= pair_flags::GONE,
+        }
+        if let Some(event) = row.event {
+            if let Some((ticks, cause)) = event.end {
+                out.events |= Event::End.bit();
+                out.end_cause = cause.code();
+                (out.end_first_tick, out.end_last_tick) = (ticks.first, ticks.last);
+            }
+            if let Some(ticks) = event.begin {
+                out.events |= Event::Begin.bit();
+                (out.begin_first_tick, out.begin_last_tick) = (ticks.first, ticks.last);
+            }
+        }
+        if out.verdict == Verdict::Colliding.code() && out.events & Event::Begin.bit() == 0 {
+            out.events |= Event::Persist.bit();
+        }
+        out
+    }
+
+    fn describe(&self, view: &View<'_>, slot: PairSlot, finding: &Finding<'_>, out: &mut PairRow) {
+        let (Some(a), Some(b)) = (view.world.body(finding.a), view.world.body(finding.b)) else {
+            return;
+        };
+        let history = self.events.history(slot);
+        out.verdict = finding.verdict.code();
+        out.level = finding.level.code();
+        out.certified_verdict = history.verdict.code();
+        out.certified_tick = history.tick;
+        (out.gap_min_m, out.gap_max_m) = (finding.gap.min, finding.gap.max);
+        out.bound_age_ticks =
+            u32::try_from(view.tick - finding.tested.max(finding.born)).unwrap_or(u32::MAX);
+        if let Some(witness) = finding.witness {
+            // An estimate is never outside what is proved.
+            out.gap_best_m = witness.best_m.max(finding.gap.min).min(finding.gap.max);
+            out.closing_mps = closing_speed(a, b, witness);
+        }
+        if finding.touching {
+            out.flags |= pair_flags::TOUCHING;
+        }
+        if finding.level != Level::Exact {
+            out.flags |= pair_flags::ESTIMATE;
+        }
+        for body in [a, b] {
+            match body.status {
+                BodyStatus::Known => {}
+                BodyStatus::Held => out.flags |= pair_flags::HELD_BODY,
+                _ => out.flags |= pair_flags::UNKNOWN_BODY,
+            }
+        }
+    }
+}
+
+/// How fast the gap shrinks at the witness, metres a second; NaN where a moving body's velocity is not known.
+fn closing_speed(a: &Body, b: &Body, witness: &Witness) -> f64 {
+    let velocity_at = |body: &Body, point: Point| {
+        let [lx, ly, lz, ax, ay, az] = match body.velocity {
+            Some(velocity) => velocity,
+            None if body.moves => [f64::NAN; 6],
+            None => [0.0; 6],
+        };
+        let arm = body.pose.rotation * point.coords;
+        Vec3::new(lx, ly, lz) + Vec3::new(ax, ay, az).cross(&arm)
+    };
+    let relative = velocity_at(b, witness.point_b) - velocity_at(a, witness.point_a);
+    -relative.dot(&(a.pose.rotation * witness.normal))
+}

@@ -1,0 +1,133 @@
+//! The tick in one word, its reasons, its counts, and the worst pair.
+
+use crate::ids::BodyId;
+use crate::wire::{MessageHeader, Outbox, Reason, SOURCES_MAX, SourceRow, State, TickRow, Verdict};
+
+use super::{Publisher, View};
+
+/// The pair that a person should look at first.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Worst {
+    /// Body ids, the smaller first; 0: none.
+    pub ids: (BodyId, BodyId),
+    /// `Verdict` code, then depth: the order of worseness.
+    rank: (u8, f64),
+}
+
+impl Publisher {
+    /// Fills the tick's counts, state, reasons and sources; times and units are the engine's to fill.
+    pub(super) fn fill_tick(
+        &self,
+        view: &View<'_>,
+        header: MessageHeader,
+        left_out: u64,
+        out: &mut Outbox,
+    ) {
+        let narrow = &view.narrow;
+        let counts = view.world.counts();
+        let truncated = left_out + view.pairs.missing();
+        let possible = narrow.count(Verdict::Possible);
+        let mut reasons = counts.reasons;
+        if truncated > 0 {
+            reasons |= Reason::Truncated.bit();
+        }
+        if possible > 0 {
+            reasons |= Reason::Undecided.bit();
+        }
+        if counts.bodies == 0 {
+            reasons |= Reason::NoInput.bit();
+        }
+        let unsafe_reasons = reasons & !Reason::Undecided.bit();
+        let state = if narrow.count(Verdict::Colliding) > 0 {
+            State::Colliding
+        } else if unsafe_reasons != 0 || counts.unknown > 0 {
+            State::Unknown
+        } else if possible > 0 {
+            State::Possible
+        } else if narrow.count(Verdict::Near) > 0 {
+            State::Near
+        } else {
+            State::Clear
+        };
+        let (worst, widest_m, oldest) = self.survey(view);
+        out.tick = TickRow {
+            header: MessageHeader {
+                truncated,
+                state: state.code(),
+                ..header
+            },
+            rejects: *view.world.rejects(),
+            bodies: counts.bodies,
+            unknown: counts.unknown,
+            candidates: view.pairs.len() as u64,
+            colliding: narrow.count(Verdict::Colliding),
+            possible,
+            near: narrow.count(Verdict::Near),
+            ignored: view.world.ignored_pairs_count(),
+            cancelled_events: self.events.cancelled,
+            worst_a: worst.ids.0.0,
+            worst_b: worst.ids.1.0,
+            widest_m,
+            oldest_undecided_ticks: oldest,
+            reasons,
+            sources: sources(view),
+            sources_len: u8::try_from(view.world.sources().len()).unwrap_or(u8::MAX),
+            ..TickRow::default()
+        };
+        for message in [
+            &mut out.pairs_header,
+            &mut out.contacts_header,
+            &mut out.bodies_header,
+        ] {
+            *message = MessageHeader {
+                truncated: message.truncated,
+                state: state.code(),
+                ..header
+            };
+        }
+    }
+
+    /// The worst pair, the widest interval in metres, and for how many ticks the oldest undecided pair has been so.
+    fn survey(&self, view: &View<'_>) -> (Worst, f64, u64) {
+        let mut worst = Worst::default();
+        let (mut widest_m, mut oldest) = (0.0_f64, 0);
+        for &slot in view.narrow.active() {
+            let Some(finding) = view.narrow.finding(slot) else {
+                continue;
+            };
+            widest_m = widest_m.max(finding.gap.width());
+            if finding.undecided_since != 0 {
+                oldest = oldest.max(view.tick - finding.undecided_since + 1);
+            }
+            let depth = -finding
+                .witness
+                .map_or(finding.gap.min, |witness| witness.best_m);
+            let rank = (finding.verdict.code(), depth);
+            let ids = || {
+                Some((
+                    view.world.body(finding.a)?.id,
+                    view.world.body(finding.b)?.id,
+                ))
+            };
+            let order = rank
+                .0
+                .cmp(&worst.rank.0)
+                .then(rank.1.total_cmp(&worst.rank.1));
+            if order.is_ge()
+                && let Some(ids) = ids()
+                && (order.is_gt() || ids < worst.ids || worst.ids.0 == BodyId(0))
+            {
+                worst = Worst { ids, rank };
+            }
+        }
+        (worst, widest_m, oldest)
+    }
+}
+
+fn sources(view: &View<'_>) -> [SourceRow; SOURCES_MAX] {
+    let mut rows = [SourceRow::default(); SOURCES_MAX];
+    for (row, source) in rows.iter_mut().zip(view.world.sources()) {
+        *row = source.to_row(view.now_ns);
+    }
+    rows
+}

@@ -1,0 +1,144 @@
+//! Goal: the engine as a whole gives sound answers. Method: built-in scenes moved by built-in motions, each tick's
+//! published pairs against exact queries of every pair of bodies.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test"
+)]
+
+mod harness;
+
+use harness::{Drive, exact_gap};
+use sweepd::builtin::{Pattern, pile, pool};
+use sweepd::time::Budget;
+use sweepd::wire::{Demand, State, Verdict};
+
+/// Every pair of bodies by brute force against what was published; returns (colliding, possible).
+fn compare(drive: &Drive) -> (usize, usize) {
+    let out = drive.out();
+    let engine = drive.engine();
+    let bodies: Vec<_> = engine.world().bodies().map(|(_, body)| body).collect();
+    let (mut colliding, mut possible) = (0, 0);
+    for (at, a) in bodies.iter().enumerate() {
+        for b in &bodies[at + 1..] {
+            if !(a.moves || b.moves) {
+                continue;
+            }
+            let row = out
+                .pairs
+                .iter()
+                .find(|row| (row.body_a, row.body_b) == (a.id.0, b.id.0));
+            let verdict = row.map_or(Verdict::Apart, |row| {
+                Verdict::from_code(row.verdict).unwrap()
+            });
+            let truth = exact_gap(a, b);
+            match verdict {
+                Verdict::Apart | Verdict::Near => {
+                    assert!(
+                        truth.max > 0.0,
+                        "{} and {} collide by {truth:?}, said {verdict}",
+                        a.name,
+                        b.name
+                    );
+                }
+                Verdict::Colliding => {
+                    colliding += 1;
+                    assert!(
+                        truth.min <= 0.0,
+                        "{} and {} are apart by {truth:?}",
+                        a.name,
+                        b.name
+                    );
+                }
+                Verdict::Possible => {
+                    possible += 1;
+                    println!(
+                        "possible: {} {} {:?} {:?} now {truth:?}",
+                        a.name,
+                        b.name,
+                        row.map(|r| (r.gap_min_m, r.gap_max_m, r.level)),
+                        exact_gap(a, b)
+                    );
+                }
+                Verdict::None => panic!("no verdict"),
+            }
+            if let Some(row) = row.filter(|row| row.verdict != 0) {
+                let meets = row.gap_min_m <= truth.max && truth.min <= row.gap_max_m;
+                assert!(
+                    meets,
+                    "{} and {}: [{}, {}] excludes {truth:?}",
+                    a.name, b.name, row.gap_min_m, row.gap_max_m
+                );
+            }
+        }
+    }
+    (colliding, possible)
+}
+
+#[test]
+fn with_an_unlimited_budget_every_pair_is_decided_and_right() {
+    let mut colliding = 0;
+    for (scene, seed) in [(pool(120, 3), 1), (pile(120, 4), 2)] {
+        let mut drive = Drive::new(&scene, Pattern::Wander, seed);
+        for tick in 0..40 {
+            drive.step(tick, Budget::UNLIMITED, Demand::ALL);
+            let (hits, undecided) = compare(&drive);
+            assert_eq!(undecided, 0);
+            colliding += hits;
+            assert_eq!(drive.out().tick.colliding as usize, hits);
+            drive.engine().validate().unwrap();
+        }
+    }
+    assert!(
+        colliding > 1000,
+        "{colliding} collisions are too few to mean anything"
+    );
+}
+
+#[test]
+fn at_any_budget_even_zero_no_collision_is_missing() {
+    for units in [0, 1, 5, 20, 100] {
+        let mut drive = Drive::new(&pool(120, 5), Pattern::Wander, 9);
+        let mut undecided = 0;
+        for tick in 0..25 {
+            drive.step(tick, Budget::units(units), Demand::ALL);
+            undecided += compare(&drive).1;
+            assert!(drive.out().tick.units <= units);
+            drive.engine().validate().unwrap();
+        }
+        assert!(
+            units > 50 || undecided > 0,
+            "a budget of {units} units cut nothing off"
+        );
+    }
+}
+
+#[test]
+fn a_scene_apart_is_clear_and_one_in_contact_is_colliding() {
+    let scene = |x: f64| {
+        format!(
+            "frame_id = \"world\"\n[[source]]\nname = \"feed\"\n\
+             [[body]]\nname = \"a\"\nmoves = true\nshape = {{ type = \"sphere\", radius = 1.0 }}\n\
+             [[body]]\nname = \"b\"\nmoves = true\nposition = [{x}, 0.0, 0.0]\nshape = {{ type = \"sphere\", radius = 1.0 }}\n"
+        )
+    };
+    let mut apart = Drive::new(&scene(2.5), Pattern::Rest, 1);
+    apart.step(0, Budget::UNLIMITED, Demand::ALL);
+    assert_eq!(
+        State::from_code(apart.out().tick.header.state),
+        Some(State::Clear)
+    );
+    let mut touching = Drive::new(&scene(1.5), Pattern::Rest, 1);
+    touching.step(0, Budget::UNLIMITED, Demand::ALL);
+    assert_eq!(
+        State::from_code(touching.out().tick.header.state),
+        Some(State::Colliding)
+    );
+    let [contact] = touching.out().contacts.as_slice() else {
+        panic!("one contact of two spheres")
+    };
+    assert!((contact.gap_m + 0.5).abs() < 1e-12);
+    assert_eq!(contact.normal, [1.0, 0.0, 0.0]);
+}
