@@ -3,6 +3,7 @@
 //!
 //! In: a path. Out: vertices in metres, z up, equal ones merged; faces in the file's order, objects one after another.
 
+mod dae;
 mod obj;
 mod polygon;
 mod stl;
@@ -18,6 +19,11 @@ use crate::shape::ShapeError;
 
 /// Longest mesh file, bytes: a text STL of the most triangles takes about this.
 const FILE_BYTES_MAX: u64 = 1 << 31;
+
+const _: () = assert!(VERTICES_MAX < u32::MAX as usize);
+
+/// Vertices of one mesh file: three for each triangle, as STL has them.
+const VERTICES_MAX: usize = 3 * TRIANGLES_MAX;
 
 /// What a mesh file holds.
 #[derive(Debug, Default)]
@@ -69,10 +75,20 @@ impl From<ShapeError> for Flaw {
 }
 
 impl Soup {
+    /// Makes sure that `more` vertices may be added.
+    fn reserve(&self, more: usize) -> Result<(), Flaw> {
+        if more <= VERTICES_MAX - self.vertices.len().min(VERTICES_MAX) {
+            return Ok(());
+        }
+        Err(Flaw::new(format!(
+            "more than {VERTICES_MAX} vertices: simplify the mesh, or split the file"
+        )))
+    }
+
     /// Adds a vertex and yields its place.
     fn vertex(&mut self, vertex: Point) -> Result<u32, Flaw> {
-        let place = u32::try_from(self.vertices.len())
-            .map_err(|_| Flaw::new("more than 2^32 vertices: split the file"))?;
+        self.reserve(1)?;
+        let place = u32::try_from(self.vertices.len()).unwrap_or(u32::MAX);
         self.vertices.push(vertex);
         Ok(place)
     }
@@ -138,6 +154,7 @@ fn parse(kind: Kind, bytes: &[u8]) -> Result<Soup, Flaw> {
     match kind {
         Kind::Stl => stl::parse(bytes),
         Kind::Obj => obj::parse(bytes),
+        Kind::Dae => dae::parse(bytes),
     }
 }
 
@@ -146,6 +163,7 @@ fn parse(kind: Kind, bytes: &[u8]) -> Result<Soup, Flaw> {
 enum Kind {
     Stl,
     Obj,
+    Dae,
 }
 
 fn kind(path: &Path) -> Result<Kind, ShapeError> {
@@ -157,10 +175,11 @@ fn kind(path: &Path) -> Result<Kind, ShapeError> {
     match ending.as_str() {
         "stl" => Ok(Kind::Stl),
         "obj" => Ok(Kind::Obj),
+        "dae" => Ok(Kind::Dae),
         _ => Err(ShapeError::Format {
             path: path.display().to_string(),
             line: None,
-            message: format!("files ending in \".{ending}\" are not read: use .stl or .obj"),
+            message: format!("files ending in \".{ending}\" are not read: use .stl, .obj or .dae"),
         }),
     }
 }
@@ -245,3 +264,6 @@ fn number(word: &str, line: usize) -> Result<f64, Flaw> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,7 @@
 //! Wavefront OBJ: vertices and polygons; colours, normals, textures, materials, groups, lines and points are skipped.
 
-use super::{Flaw, Soup, number, polygon};
+use super::polygon::{self, CORNERS_MAX};
+use super::{Flaw, Soup, number};
 use crate::math::Point;
 
 /// Words that carry no surface.
@@ -25,9 +26,6 @@ const SKIPPED: &[&str] = &[
     "shadow_obj",
     "trace_obj",
 ];
-
-/// Corners of one polygon: beyond it cutting ears takes too long.
-const CORNERS_MAX: usize = 10_000;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Flaw> {
     // Names are in any encoding; everything else is ASCII.

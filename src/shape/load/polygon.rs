@@ -2,6 +2,9 @@
 
 use crate::math::{Point, Vec3};
 
+/// Corners of one polygon: beyond it cutting ears takes too long.
+pub(super) const CORNERS_MAX: usize = 10_000;
+
 /// The triangles of a polygon, facing as it does.
 ///
 /// A fan of a polygon that is not convex covers what is not there and leaves out what is; ears do not.
