@@ -1,0 +1,22 @@
+"""Talk to sweepd, a collision server, over shared memory.
+
+``sweepd.layout`` needs nothing but the standard library; ``sweepd.Client`` needs iceoryx2 and numpy, and loads them
+when it is first named.
+"""
+
+from . import layout
+
+__all__ = ["Client", "Refused", "Restarted", "Result", "Skipped", "SweepdError", "TimedOut", "layout"]
+__version__ = "0.1.0"
+
+
+def __getattr__(name):
+    if name == "Client" or name == "Result":
+        from . import client
+
+        return getattr(client, name)
+    if name in __all__:
+        from . import errors
+
+        return getattr(errors, name)
+    raise AttributeError(f"module 'sweepd' has no attribute {name!r}")

@@ -1,0 +1,662 @@
+"""Wire version 1 of sweepd as ctypes structures: pure standard library, nothing imported but ctypes.
+
+``msgs/README.md`` has the services and what each message means; ``tests/wire_layout.rs`` compares this module with
+it, with the C header and with the daemon. SI units, right-handed, z up. Quaternions are x, y, z, w.
+"""
+
+import ctypes
+from enum import IntEnum, IntFlag
+
+WIRE_VERSION = 1
+#: No sub-shape: a contact of a shape that has no triangles.
+NO_INDEX = 0xFFFFFFFF
+SOURCE_NAME_LEN = 32
+BODY_NAME_LEN = 104
+REJECTS_LEN = 16
+STAGES_LEN = 8
+SOURCES_MAX = 16
+
+
+class _Row(ctypes.Structure):
+    """A row or header; iceoryx2 matches it by ``type_name()`` and size."""
+
+    TYPE_NAME = ""
+
+    @classmethod
+    def type_name(cls):
+        """The name iceoryx2 compares."""
+        return cls.TYPE_NAME
+
+
+class TransformRow(_Row):
+    """One body's pose."""
+
+    TYPE_NAME = "sweepd.v1.Transform"
+    _fields_ = [
+        # Body id.
+        ("body", ctypes.c_uint64),
+        # Zero.
+        ("flags", ctypes.c_uint32),
+        # Zero.
+        ("reserved", ctypes.c_uint32),
+        # Origin of the body's frame in the scene's frame, metres.
+        ("position", ctypes.c_double * 3),
+        # Orientation x, y, z, w, unit length within 1e-2.
+        ("orientation", ctypes.c_double * 4),
+    ]
+
+
+class TransformVelRow(_Row):
+    """One body's pose and velocity."""
+
+    TYPE_NAME = "sweepd.v1.TransformVel"
+    _fields_ = [
+        # Pose, as TransformRow.
+        ("transform", TransformRow),
+        # Velocity of the body frame's origin in the scene's frame, metres a second.
+        ("linear", ctypes.c_double * 3),
+        # Angular velocity in the scene's frame, radians a second.
+        ("angular", ctypes.c_double * 3),
+    ]
+
+
+class FrameHeader(_Row):
+    """User header of transforms and transforms_vel: whose frame, which one, how old, how urgent."""
+
+    TYPE_NAME = "sweepd.v1.FrameHeader"
+    _fields_ = [
+        # Random number drawn at each client start; never 0.
+        ("session", ctypes.c_uint64),
+        # Raised by the client when its world resets.
+        ("epoch", ctypes.c_uint64),
+        # Counts the frames of a session; order within a session is (epoch, seq).
+        ("seq", ctypes.c_uint64),
+        # When the client sent it, nanoseconds of CLOCK_BOOTTIME; 0: not said, then age counts from receipt.
+        ("sent_ns", ctypes.c_uint64),
+        # The sender's own stamp of the poses, nanoseconds of the clock clock_id; echoed, never trusted.
+        ("stamp_ns", ctypes.c_uint64),
+        # Least scene revision these poses need; 0: any.
+        ("scene_rev", ctypes.c_uint64),
+        # Deadline of the tick on CLOCK_MONOTONIC, nanoseconds; 0: none. Can shorten the budget, never lengthen
+        # it.
+        ("deadline_ns", ctypes.c_uint64),
+        # Time left for the tick from receipt, nanoseconds; 0: not said.
+        ("time_left_ns", ctypes.c_uint64),
+        # Name of the source, NUL-padded UTF-8.
+        ("source", ctypes.c_uint8 * SOURCE_NAME_LEN),
+        # frame_flags: full, partial or paused.
+        ("flags", ctypes.c_uint32),
+        # The sender's number for the clock of stamp_ns; echoed.
+        ("clock_id", ctypes.c_uint32),
+        # WIRE_VERSION of the sender.
+        ("schema", ctypes.c_uint32),
+        # Zero.
+        ("reserved", ctypes.c_uint32),
+    ]
+
+
+class MessageHeader(_Row):
+    """User header of every message the daemon publishes."""
+
+    TYPE_NAME = "sweepd.v1.MessageHeader"
+    _fields_ = [
+        # Random number of this start of the daemon.
+        ("boot_id", ctypes.c_uint64),
+        # Tick, from 1.
+        ("tick", ctypes.c_uint64),
+        # Scene revision the tick used.
+        ("scene_rev", ctypes.c_uint64),
+        # Oldest sender's stamp among the poses used, nanoseconds.
+        ("oldest_stamp_ns", ctypes.c_uint64),
+        # Newest sender's stamp among the poses used, nanoseconds.
+        ("newest_stamp_ns", ctypes.c_uint64),
+        # Rows that did not fit into this message.
+        ("truncated", ctypes.c_uint64),
+        # State of the tick.
+        ("state", ctypes.c_uint8),
+        # Zero.
+        ("reserved", ctypes.c_uint8 * 3),
+        # WIRE_VERSION.
+        ("schema", ctypes.c_uint32),
+    ]
+
+
+class PairRow(_Row):
+    """One pair that is not plainly apart, or one last event of a pair."""
+
+    TYPE_NAME = "sweepd.v1.Pair"
+    _fields_ = [
+        # Smaller body id.
+        ("body_a", ctypes.c_uint64),
+        # Larger body id.
+        ("body_b", ctypes.c_uint64),
+        # Lower end of the proved gap, metres, signed; minus infinity: nothing known.
+        ("gap_min_m", ctypes.c_double),
+        # Upper end of the proved gap, metres, signed; infinity: nothing known.
+        ("gap_max_m", ctypes.c_double),
+        # Best estimate of the gap, metres, signed; NaN: none.
+        ("gap_best_m", ctypes.c_double),
+        # How fast the gap shrinks along the normal, metres a second; negative: it grows; NaN: velocities unknown.
+        ("closing_mps", ctypes.c_double),
+        # Begin: the earliest tick in which it may have happened.
+        ("begin_first_tick", ctypes.c_uint64),
+        # Begin: the tick in which it was certified.
+        ("begin_last_tick", ctypes.c_uint64),
+        # End: the earliest tick in which it may have happened.
+        ("end_first_tick", ctypes.c_uint64),
+        # End: the tick in which it was certified or caused.
+        ("end_last_tick", ctypes.c_uint64),
+        # Tick of the last certified verdict; 0: never.
+        ("certified_tick", ctypes.c_uint64),
+        # Ticks since the interval was computed at the poses of its tick.
+        ("bound_age_ticks", ctypes.c_uint32),
+        # Verdict at this tick's poses.
+        ("verdict", ctypes.c_uint8),
+        # Last certified Verdict: apart, near or colliding.
+        ("certified_verdict", ctypes.c_uint8),
+        # Bits of Event.
+        ("events", ctypes.c_uint8),
+        # EndCause of the end in this row.
+        ("end_cause", ctypes.c_uint8),
+        # Level reached.
+        ("level", ctypes.c_uint8),
+        # pair_flags.
+        ("flags", ctypes.c_uint8),
+        # Zero.
+        ("reserved", ctypes.c_uint8 * 6),
+    ]
+
+
+class ContactRow(_Row):
+    """One point of contact, or the closest points of a near pair."""
+
+    TYPE_NAME = "sweepd.v1.Contact"
+    _fields_ = [
+        # Stays while the contact does.
+        ("id", ctypes.c_uint64),
+        # Smaller body id.
+        ("body_a", ctypes.c_uint64),
+        # Larger body id.
+        ("body_b", ctypes.c_uint64),
+        # Point on A's surface, scene frame, metres.
+        ("point_a", ctypes.c_double * 3),
+        # Point on B's surface, scene frame, metres.
+        ("point_b", ctypes.c_double * 3),
+        # Point on A's surface, A's body frame, metres.
+        ("point_a_body", ctypes.c_double * 3),
+        # Point on B's surface, B's body frame, metres.
+        ("point_b_body", ctypes.c_double * 3),
+        # Unit, scene frame, from A to B.
+        ("normal", ctypes.c_double * 3),
+        # Gap at this contact, metres; negative: depth.
+        ("gap_m", ctypes.c_double),
+        # Lower end of the shape pair's proved gap, metres.
+        ("gap_min_m", ctypes.c_double),
+        # Upper end of the shape pair's proved gap, metres.
+        ("gap_max_m", ctypes.c_double),
+        # Shape of A, by its place in the body.
+        ("shape_a", ctypes.c_uint32),
+        # Shape of B, by its place in the body.
+        ("shape_b", ctypes.c_uint32),
+        # Triangle of A's shape; u32::MAX: none.
+        ("triangle_a", ctypes.c_uint32),
+        # Triangle of B's shape; u32::MAX: none.
+        ("triangle_b", ctypes.c_uint32),
+        # contact_flags.
+        ("flags", ctypes.c_uint32),
+        # ContactKind.
+        ("kind", ctypes.c_uint8),
+        # Zero.
+        ("reserved", ctypes.c_uint8 * 3),
+    ]
+
+
+class BodyRow(_Row):
+    """One body."""
+
+    TYPE_NAME = "sweepd.v1.Body"
+    _fields_ = [
+        # Body id.
+        ("body", ctypes.c_uint64),
+        # Last admitted position of the body's frame, scene frame, metres.
+        ("position", ctypes.c_double * 3),
+        # Last admitted orientation x, y, z, w.
+        ("orientation", ctypes.c_double * 4),
+        # The sender's stamp of that pose, nanoseconds.
+        ("stamp_ns", ctypes.c_uint64),
+        # Receipt of that pose, nanoseconds of CLOCK_BOOTTIME.
+        ("received_ns", ctypes.c_uint64),
+        # Age at this tick, nanoseconds; u64::MAX: never received.
+        ("age_ns", ctypes.c_uint64),
+        # Generation: raised when a body of this name is put again.
+        ("generation", ctypes.c_uint32),
+        # Place of its source in TickRow::sources; u32::MAX: none.
+        ("source", ctypes.c_uint32),
+        # BodyStatus.
+        ("status", ctypes.c_uint8),
+        # Worst Verdict over all its pairs.
+        ("verdict", ctypes.c_uint8),
+        # Last RejectReason, when the status is rejected.
+        ("reject", ctypes.c_uint8),
+        # Zero.
+        ("reserved", ctypes.c_uint8 * 5),
+    ]
+
+
+class NameRow(_Row):
+    """A body's name."""
+
+    TYPE_NAME = "sweepd.v1.Name"
+    _fields_ = [
+        # Body id.
+        ("body", ctypes.c_uint64),
+        # Place of its source in TickRow::sources; u32::MAX: none.
+        ("source", ctypes.c_uint32),
+        # Generation of the body.
+        ("generation", ctypes.c_uint32),
+        # Bytes of the name in use.
+        ("len", ctypes.c_uint32),
+        # Zero.
+        ("reserved", ctypes.c_uint32),
+        # UTF-8, NUL-padded.
+        ("name", ctypes.c_uint8 * BODY_NAME_LEN),
+    ]
+
+
+class SourceRow(_Row):
+    """One source as the tick saw it."""
+
+    TYPE_NAME = "sweepd.v1.Source"
+    _fields_ = [
+        # Name, NUL-padded UTF-8; empty: no source in this place.
+        ("name", ctypes.c_uint8 * SOURCE_NAME_LEN),
+        # Session in force; 0: none yet.
+        ("session", ctypes.c_uint64),
+        # Epoch of its newest frame.
+        ("epoch", ctypes.c_uint64),
+        # Number of its newest frame.
+        ("seq", ctypes.c_uint64),
+        # Sender's stamp of its newest frame, nanoseconds.
+        ("stamp_ns", ctypes.c_uint64),
+        # Age of its newest frame, nanoseconds; u64::MAX: none yet.
+        ("age_ns", ctypes.c_uint64),
+        # Frames admitted in this boot.
+        ("frames", ctypes.c_uint64),
+        # Frames passed over because a newer one was there.
+        ("skipped", ctypes.c_uint64),
+        # Frames refused.
+        ("refused", ctypes.c_uint64),
+        # Sender's number for the clock of stamp_ns.
+        ("clock_id", ctypes.c_uint32),
+        # 1: alive (a frame within its time-out).
+        ("alive", ctypes.c_uint8),
+        # 1: its newest frame was paused.
+        ("paused", ctypes.c_uint8),
+        # Zero.
+        ("reserved", ctypes.c_uint8 * 2),
+    ]
+
+
+class TickRow(_Row):
+    """The tick: published last, at least each heartbeat, never truncated."""
+
+    TYPE_NAME = "sweepd.v1.Tick"
+    _fields_ = [
+        # As in every message; truncated here is the sum over all messages.
+        ("header", MessageHeader),
+        # When the tick ended, nanoseconds of CLOCK_BOOTTIME.
+        ("sent_ns", ctypes.c_uint64),
+        # From wake-up to the outbox filled, nanoseconds.
+        ("elapsed_ns", ctypes.c_uint64),
+        # Work budget in time, nanoseconds; u64::MAX: none.
+        ("budget_ns", ctypes.c_uint64),
+        # Work budget in units; u64::MAX: none.
+        ("budget_units", ctypes.c_uint64),
+        # What this tick could not cut (admission, broad phase, widening, publishing), nanoseconds.
+        ("floor_ns", ctypes.c_uint64),
+        # Work units spent.
+        ("units", ctypes.c_uint64),
+        # Nanoseconds by Stage; sending: of the tick before.
+        ("stage_ns", ctypes.c_uint64 * STAGES_LEN),
+        # Refusals in this boot by RejectReason.
+        ("rejects", ctypes.c_uint64 * REJECTS_LEN),
+        # Bodies in the scene.
+        ("bodies", ctypes.c_uint64),
+        # Bodies whose place is not known.
+        ("unknown", ctypes.c_uint64),
+        # Pairs of overlapping boxes.
+        ("candidates", ctypes.c_uint64),
+        # Pairs certified colliding.
+        ("colliding", ctypes.c_uint64),
+        # Pairs not decided.
+        ("possible", ctypes.c_uint64),
+        # Pairs apart, but nearer than their report_within_m.
+        ("near", ctypes.c_uint64),
+        # Pairs of bodies that a rule, neighbour or rigid group ignores.
+        ("ignored", ctypes.c_uint64),
+        # Ticks of this boot that ended after their budget.
+        ("missed", ctypes.c_uint64),
+        # Begins and their ends that were never sent, because rows did not fit.
+        ("cancelled_events", ctypes.c_uint64),
+        # Body ids of the worst pair (smaller first); 0: none.
+        ("worst_a", ctypes.c_uint64),
+        # See worst_a.
+        ("worst_b", ctypes.c_uint64),
+        # Widest interval among the pairs published, metres.
+        ("widest_m", ctypes.c_double),
+        # Ticks for which the oldest undecided pair has been so.
+        ("oldest_undecided_ticks", ctypes.c_uint64),
+        # Bits of Reason.
+        ("reasons", ctypes.c_uint32),
+        # TickCause.
+        ("cause", ctypes.c_uint8),
+        # 1: ended after its budget.
+        ("overrun", ctypes.c_uint8),
+        # Sources in use in sources.
+        ("sources_len", ctypes.c_uint8),
+        # Place in sources whose frame caused the tick; 255: none.
+        ("cause_source", ctypes.c_uint8),
+        # Where validate failed and a structure was rebuilt, times in this boot.
+        ("rebuilds", ctypes.c_uint64),
+        # The sources, in the scene's order.
+        ("sources", SourceRow * SOURCES_MAX),
+    ]
+
+
+class Hello(_Row):
+    """What a client reads before anything else. This layout is frozen for ever."""
+
+    TYPE_NAME = "sweepd.Hello"
+    _fields_ = [
+        # b"sweepd\0\0".
+        ("magic", ctypes.c_uint8 * 8),
+        # Random number of this start of the daemon.
+        ("boot_id", ctypes.c_uint64),
+        # Process id of the daemon.
+        ("pid", ctypes.c_uint32),
+        # User id of the daemon.
+        ("uid", ctypes.c_uint32),
+        # WIRE_VERSION of the daemon.
+        ("wire_version", ctypes.c_uint32),
+        # Zero.
+        ("reserved", ctypes.c_uint32),
+        # sweepd's version, NUL-padded ASCII.
+        ("sweepd_version", ctypes.c_uint8 * 16),
+        # iceoryx2's version, NUL-padded ASCII.
+        ("iceoryx2_version", ctypes.c_uint8 * 16),
+    ]
+
+
+class RequestHeader(_Row):
+    """User header of a request; the payload is json_len bytes of JSON, then the blobs it names by offset."""
+
+    TYPE_NAME = "sweepd.v1.RequestHeader"
+    _fields_ = [
+        # Bytes of JSON at the front of the payload.
+        ("json_len", ctypes.c_uint64),
+        # The client's number for this request, echoed.
+        ("request", ctypes.c_uint64),
+        # WIRE_VERSION of the sender.
+        ("schema", ctypes.c_uint32),
+        # Zero.
+        ("reserved", ctypes.c_uint32),
+    ]
+
+
+class AnswerHeader(_Row):
+    """User header of an answer; the payload is JSON."""
+
+    TYPE_NAME = "sweepd.v1.AnswerHeader"
+    _fields_ = [
+        # Random number of this start of the daemon.
+        ("boot_id", ctypes.c_uint64),
+        # The client's number of the request.
+        ("request", ctypes.c_uint64),
+        # WIRE_VERSION.
+        ("schema", ctypes.c_uint32),
+        # 1: done, 0: refused.
+        ("ok", ctypes.c_uint32),
+    ]
+
+
+class Verdict(IntEnum):
+    """What is known of a pair at the poses this tick used."""
+
+    # No verdict was ever certified.
+    NONE = 0
+    # gap_min > 0, and not below the pair's report_within_m.
+    APART = 1
+    # gap_min > 0 and below the pair's report_within_m.
+    NEAR = 2
+    # Not decided: 0 lies inside the interval and work was not finished, or a body is unknown.
+    POSSIBLE = 3
+    # gap_max <= 0, or finished with 0 inside the rounding interval (touching).
+    COLLIDING = 4
+
+
+class State(IntEnum):
+    """The tick in one word: the first that applies, from the last to the first here."""
+
+    # At least one body, all known, every enabled pair proved apart, nothing cut off.
+    CLEAR = 0
+    # As clear, but some pair is nearer than its report_within_m.
+    NEAR = 1
+    # Some pair is not decided.
+    POSSIBLE = 2
+    # Something is missing: see the reason bits.
+    UNKNOWN = 3
+    # At least one certified collision.
+    COLLIDING = 4
+
+
+class Reason(IntEnum):
+    """Why a tick is unknown or not clear; bit numbers of TickRow::reasons."""
+
+    # A moving body has had no admitted pose in this boot.
+    NOT_RECEIVED = 0
+    # A body's newest pose is too old.
+    STALE = 1
+    # A too old body is held at its last pose by request.
+    HELD = 2
+    # A too old body was taken out of the scene by request.
+    REMOVED_BY_AGE = 3
+    # A body's newest pose was refused.
+    REJECTED = 4
+    # Rows or pairs did not fit.
+    TRUNCATED = 5
+    # Work was not finished.
+    UNDECIDED = 6
+    # There is no body, or no source has sent anything.
+    NO_INPUT = 7
+
+
+class TickCause(IntEnum):
+    """Why a tick was run."""
+
+    # A frame (in on_all a round of frames) or the rate's next beat.
+    FRAME = 0
+    # A body or a source reached its time-out.
+    TIMEOUT = 1
+    # Nothing else happened for a heartbeat.
+    HEARTBEAT = 2
+    # A scene edit was applied.
+    EDIT = 3
+
+
+class Event(IntEnum):
+    """Bits of PairRow::events; a row may carry an end and a begin, in that order."""
+
+    # First tick in which the pair is certified colliding.
+    BEGIN = 0
+    # Certified colliding before and now.
+    PERSIST = 1
+    # Certified not colliding, or ended by a cause.
+    END = 2
+
+
+class EndCause(IntEnum):
+    """Why a collision ended."""
+
+    # No end in this row.
+    NONE = 0
+    # The bodies were certified apart.
+    SEPARATED = 1
+    # A body was removed from the scene.
+    REMOVED = 2
+    # A body was disabled.
+    DISABLED = 3
+    # A filter or pair rule now ignores the pair.
+    FILTERED = 4
+    # A source's session or epoch changed, or the scene was reset.
+    RESET = 5
+    # The daemon restarted; said by the client library when the boot id changes.
+    RESTART = 6
+    # A body was taken out for its age (on_stale = "remove").
+    SOURCE_LOST = 7
+
+
+class RejectReason(IntEnum):
+    """Why a pose, a frame or a request was refused; index into TickRow::rejects."""
+
+    # A position or quaternion holds NaN or infinity.
+    NOT_FINITE = 0
+    # A quaternion's length differs from 1 by more than 1e-2.
+    BAD_QUATERNION = 1
+    # A body id that the scene does not have.
+    UNKNOWN_BODY = 2
+    # The body belongs to another source.
+    WRONG_SOURCE = 3
+    # A source name that the scene does not have.
+    UNKNOWN_SOURCE = 4
+    # Another session of this source is alive.
+    SOURCE_TAKEN = 5
+    # The session has ended; the client must open a new one.
+    SESSION_OVER = 6
+    # A frame that is not newer than the newest of its session.
+    OLD_FRAME = 7
+    # The frame needs a scene revision that did not come in time.
+    SCENE_REVISION = 8
+    # A layout number, flags or a count that do not fit.
+    BAD_LAYOUT = 9
+    # The same body twice in one frame.
+    DUPLICATE = 10
+    # The body takes its pose from another (attach), or cannot move.
+    NOT_STEERABLE = 11
+    # Frames that waited while the daemon was silent too long, without sent_ns.
+    TOO_OLD = 12
+    # A frame or pose beyond a limit (rows a frame, coordinates).
+    OVER_LIMIT = 13
+
+
+class BodyStatus(IntEnum):
+    """Whether a body's place is known."""
+
+    # Its newest pose is admitted and young enough, or it cannot move.
+    KNOWN = 0
+    # It moves, and no pose was admitted in this boot (or since a reset).
+    NOT_RECEIVED = 1
+    # Its newest pose was refused.
+    REJECTED = 2
+    # Too old; its pairs are possible within reach.
+    STALE = 3
+    # Too old, held at its last pose by request.
+    HELD = 4
+    # Too old, taken out by request.
+    REMOVED_BY_AGE = 5
+    # Disabled by an edit.
+    DISABLED = 6
+    # The pair set was full: its pairs are not all there.
+    TRUNCATED = 7
+
+
+class Level(IntEnum):
+    """How far the work on a pair came."""
+
+    # Nothing but the boxes.
+    BOXES = 0
+    # An older answer, widened by the motion since.
+    CARRIED = 1
+    # Some leaves or shape pairs are still open.
+    PARTIAL = 2
+    # The exact query is finished at this tick's poses.
+    EXACT = 3
+
+
+class ContactKind(IntEnum):
+    """What a contact row is."""
+
+    # A point of a contact manifold.
+    CONTACT = 0
+    # The closest points of a near pair.
+    CLOSEST = 1
+
+
+class Stage(IntEnum):
+    """The stages of a tick; index into TickRow::stage_ns."""
+
+    # Admission of frames and edits, ages.
+    WORLD = 0
+    # Broad phase.
+    BROAD = 1
+    # Widening every moved pair's interval.
+    WIDEN = 2
+    # Narrowing within the budget.
+    NARROW = 3
+    # Filling the outbox.
+    PUBLISH = 4
+    # Handing the outbox to the transports, in the tick before.
+    SEND = 5
+
+
+class FrameFlags(IntFlag):
+    """Bits of FrameHeader::flags; exactly one of the three."""
+
+    # Holds every body of its source.
+    FULL = 1
+    # Holds some bodies of its source.
+    PARTIAL = 2
+    # Holds none: the world stands still, ages are renewed for one time-out.
+    PAUSED = 4
+
+
+class PairFlags(IntFlag):
+    """Bits of PairRow::flags."""
+
+    # Finished, and 0 lies inside the rounding interval: touching counts as colliding.
+    TOUCHING = 1
+    # gap_best_m, gap_max_m or the contacts are estimates, not proved.
+    ESTIMATE = 2
+    # A body of the pair is unknown, stale or truncated.
+    UNKNOWN_BODY = 4
+    # A body of the pair is held at an old pose.
+    HELD_BODY = 8
+    # The pair is gone (removed, filtered, ended by a cause); this row only carries its last event.
+    GONE = 16
+
+
+class ContactFlags(IntFlag):
+    """Bits of ContactRow::flags."""
+
+    # Taken at an older pose and carried along with body A.
+    ESTIMATE = 1
+
+
+#: Every structure that crosses a process boundary, by name.
+LAYOUTS = {
+    row.__name__: row
+    for row in (
+        TransformRow,
+        TransformVelRow,
+        FrameHeader,
+        MessageHeader,
+        PairRow,
+        ContactRow,
+        BodyRow,
+        NameRow,
+        SourceRow,
+        TickRow,
+        Hello,
+        RequestHeader,
+        AnswerHeader,
+    )
+}
