@@ -4,6 +4,7 @@
 //! warnings that `check` shows.
 
 mod inside;
+mod outline;
 mod predicates;
 mod topology;
 mod tree;
@@ -13,11 +14,15 @@ pub(crate) use predicates::side;
 use tree::Tree;
 pub(crate) use tree::{Below, Node};
 
+use outline::Outline;
 use topology::{Shell, Topology};
 
 use crate::limits::{EXTENT_MAX_M, EXTENT_MIN_M, TRIANGLES_MAX};
 use crate::math::{Aabb, Point, Pose, ROUND, Vec3};
 use crate::shape::ShapeError;
+
+/// Above this many vertices a table of directions gives the box at a pose.
+const OUTLINE_VERTICES_MIN: usize = 24;
 
 /// Triangles in their own frame: a solid when they are closed and face consistently, else a surface.
 #[derive(Debug)]
@@ -28,6 +33,8 @@ pub struct Mesh {
     shells: Vec<u32>,
     warnings: Vec<String>,
     tree: Tree,
+    /// None for a small mesh, whose vertices are walked.
+    outline: Option<Outline>,
     bounds: Aabb,
     centre: Point,
     radius: f64,
@@ -63,7 +70,10 @@ impl Mesh {
 
         let centre = bounds.centre();
         let tree = Tree::new(&vertices, &faces, centre);
+        let outline = (vertices.len() > OUTLINE_VERTICES_MIN)
+            .then(|| Outline::new(|direction| tree.reach(&vertices, &faces, direction)));
         let mut mesh = Self {
+            outline,
             radius: radius(&vertices, &faces, &centre),
             shells: topology.shells.iter().map(|s| s.vertex).collect(),
             vertices,
@@ -137,7 +147,9 @@ impl Mesh {
 
     /// Its tight box at `pose`, rounded outward.
     ///
-    /// Cost: six walks down the tree, each of at most a fixed number of nodes.
+    /// Exact for a small mesh; of a large one up to 0.4 % larger than tight, exact along its own axes.
+    ///
+    /// Cost: some 100 ns, whatever the number of triangles.
     #[must_use]
     pub fn aabb_at(&self, pose: &Pose) -> Aabb {
         let rotation = pose.rotation.to_rotation_matrix();
@@ -147,11 +159,24 @@ impl Mesh {
         let mut bounds = Aabb::empty();
         for k in 0..3 {
             let axis = rotation.matrix().row(k).transpose();
-            let reach = |d| self.tree.reach(&self.vertices, &self.faces, &d);
-            bounds.max[k] = centre[k] + reach(axis);
-            bounds.min[k] = centre[k] - reach(-axis);
+            let [up, down] = match &self.outline {
+                Some(outline) => [outline.reach(&axis), outline.reach(&-axis)],
+                None => self.extent(&axis),
+            };
+            // No direction reaches beyond the ball.
+            bounds.max[k] = centre[k] + up.min(self.radius);
+            bounds.min[k] = centre[k] - down.min(self.radius);
         }
         bounds.widened(slop)
+    }
+
+    /// How far the vertices of faces reach from the centre along a direction and against it.
+    fn extent(&self, direction: &Vec3) -> [f64; 2] {
+        let named = self.faces.iter().flatten();
+        named.fold([f64::NEG_INFINITY; 2], |[up, down], &v| {
+            let on = direction.dot(&(self.vertices[v as usize] - self.centre));
+            [up.max(on), down.max(-on)]
+        })
     }
 
     /// A vertex far along `direction`: a guess, but a vertex of a face in any case.

@@ -91,6 +91,8 @@ pub struct Walk {
     heap: BinaryHeap<Entry>,
     /// Boxes of the sides that are convex.
     one: Option<[Node; 2]>,
+    /// A solid mesh takes part.
+    solids: bool,
     containment: Containment,
     inside: Inside,
     /// Next inside test: 0: points of A in B, 1: points of B in A; and which point.
@@ -187,10 +189,29 @@ impl Walk {
         Interval::new(low.min(high), high)
     }
 
-    /// The leaf pair with the least gap met so far; its gap is one of two leaves, not of the pair.
+    /// The leaf pair with the least gap met so far; its gap is that of two leaves. Where one shape is within the
+    /// other, the surfaces' nearest points met so far, with the normal that leads out.
     #[must_use]
     pub fn witness(&self) -> Option<Witness> {
-        self.witness
+        match (self.witness, self.containment) {
+            (Some(witness), Containment::Inside) => Some(self.way_out(&witness)),
+            (witness, _) => witness,
+        }
+    }
+
+    /// Of surfaces that are apart though one shape is within the other: moving B towards A's nearest point leads out.
+    fn way_out(&self, witness: &Witness) -> Witness {
+        let found = witness.closest;
+        let closest = Closest {
+            gap: self.interval(),
+            best_m: (-found.best_m).clamp(self.interval().min, self.interval().max),
+            normal: -found.normal,
+            ..found
+        };
+        LeafContact {
+            closest,
+            ..*witness
+        }
     }
 
     /// Leaf pairs that touch or cross, at most [`super::LEAF_CONTACTS_MAX`]; all of them once `Goal::Contacts` is
@@ -219,14 +240,14 @@ impl Walk {
             Side::Mesh(mesh) if !mesh.is_solid() => 0.0,
             _ => node.half().min(),
         };
-        let solids = a.1.has_inside_test() || b.1.has_inside_test();
-        self.floor = if solids {
+        self.solids = a.1.has_inside_test() || b.1.has_inside_test();
+        self.floor = if self.solids {
             low.max(-ball(a.1, &root_a.0).max(ball(b.1, &root_b.0)) - self.frame.slop)
         } else {
             low
         };
         // Roots apart: nothing can be inside anything.
-        if low > 0.0 || !solids {
+        if low > 0.0 || !self.solids {
             self.containment = Containment::Outside;
         }
 
@@ -308,6 +329,9 @@ impl Walk {
             let open = self.heap.peek().map_or(f64::INFINITY, |e| e.low);
             if open >= self.leaf_low {
                 self.stage = Stage::Done;
+                if let (Containment::Inside, Some(way_out)) = (self.containment, self.witness()) {
+                    self.contacts.add(way_out);
+                }
             }
         }
     }
@@ -370,7 +394,14 @@ impl Walk {
             return;
         };
         self.leaf_low = self.leaf_low.min(closest.gap.min.max(low));
-        self.high = self.high.min(closest.gap.max);
+        // A solid's depth is that of a point, and the translation that parts two leaves can be more: of an overlap
+        // their query proves no more than that it is one.
+        let high = if self.solids {
+            closest.gap.max.max(0.0)
+        } else {
+            closest.gap.max
+        };
+        self.high = self.high.min(high);
         let triangle = |(side, i): (Side<'_>, u32)| match side {
             Side::Mesh(_) => i,
             Side::Convex(_) => u32::MAX,

@@ -20,7 +20,6 @@ pub(crate) struct Inside {
     point: Point,
     stack: Vec<u32>,
     winding: i64,
-    on_surface: bool,
 }
 
 impl Inside {
@@ -30,7 +29,6 @@ impl Inside {
         self.stack.clear();
         self.stack.push(0);
         self.winding = 0;
-        self.on_surface = false;
     }
 
     /// Whether the walk is over.
@@ -41,11 +39,6 @@ impl Inside {
     /// How often the surface winds round the point; meaningful when finished.
     pub(crate) fn winding(&self) -> i64 {
         self.winding
-    }
-
-    /// Whether a triangle was met that holds the point itself.
-    pub(crate) fn on_surface(&self) -> bool {
-        self.on_surface
     }
 
     /// Tests one node. `counts` says which triangles take part (all of them, or those of one shell).
@@ -97,7 +90,7 @@ impl Inside {
         // The normal has the sign of `outline` along x: the triangle is ahead when the point is behind it.
         match (side(&triangle[0], &triangle[1], &triangle[2], p), outline) {
             (Ordering::Less, 1..) | (Ordering::Greater, ..=-1) => self.winding += outline,
-            (Ordering::Equal, _) => self.on_surface = true,
+            // On the surface itself: the distance is zero and decides.
             _ => {}
         }
     }

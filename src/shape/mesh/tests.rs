@@ -157,3 +157,54 @@ fn the_box_at_a_pose_holds_every_vertex_and_touches_the_outermost() {
         assert!(tight.widened(1e-7).holds(&got), "{got:?} {tight:?}");
     }
 }
+
+#[test]
+fn the_box_of_a_large_mesh_holds_it_and_is_hardly_larger() {
+    // A sphere of many triangles, the worst case of a table of directions, and a plate with its corners.
+    let mut vertices = vec![Point::new(0.0, 0.0, 1.0), Point::new(0.0, 0.0, -1.0)];
+    let mut faces = Vec::new();
+    let (rows, columns) = (20u32, 40u32);
+    for i in 1..rows {
+        for j in 0..columns {
+            let theta = std::f64::consts::PI * f64::from(i) / f64::from(rows);
+            let phi = std::f64::consts::TAU * f64::from(j) / f64::from(columns);
+            vertices.push(Point::new(
+                theta.sin() * phi.cos(),
+                theta.sin() * phi.sin(),
+                theta.cos(),
+            ));
+            let at = |i: u32, j: u32| 2 + (i - 1) * columns + j % columns;
+            if i > 1 {
+                faces.push([at(i - 1, j), at(i, j), at(i, j + 1)]);
+                faces.push([at(i - 1, j), at(i, j + 1), at(i - 1, j + 1)]);
+            } else {
+                faces.push([0, at(1, j), at(1, j + 1)]);
+            }
+            if i == rows - 1 {
+                faces.push([1, at(i, j + 1), at(i, j)]);
+            }
+        }
+    }
+    let plate: Vec<Point> = (vertices.iter())
+        .map(|v| Point::new(3.0 * v.x.signum() * v.x.abs().sqrt(), v.y, 0.01 * v.z))
+        .collect();
+    for points in [vertices, plate] {
+        let mesh = Mesh::new(points, faces.clone(), None).unwrap();
+        assert!(mesh.is_solid() && mesh.outline.is_some());
+        for k in 0..200 {
+            let turn = Vec3::new(0.31, 0.17, -0.53) * f64::from(k) * 0.1;
+            let pose = Pose::new(Vec3::new(5.0, -3.0, 2.0), turn);
+            let tight = Aabb::of(&mesh.vertices().iter().map(|v| pose * v).collect::<Vec<_>>());
+            let got = mesh.aabb_at(&pose);
+            assert!(got.holds(&tight), "{k} {got:?} {tight:?}");
+            assert!(
+                tight.widened(0.02 * mesh.radius()).holds(&got),
+                "{k} {got:?} {tight:?}"
+            );
+            assert!(
+                k > 0 || tight.widened(1e-6).holds(&got),
+                "along its axes it is exact"
+            );
+        }
+    }
+}
