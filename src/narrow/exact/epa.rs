@@ -99,7 +99,7 @@ impl Polytope {
             lower: f64::NEG_INFINITY,
             normal: Vec3::z(),
         };
-        let (mut nearest, mut fits) = (0, f64::NEG_INFINITY);
+        let (mut nearest, mut fits, mut last) = (0, f64::NEG_INFINITY, f64::NEG_INFINITY);
         for _ in 0..STEPS_MAX {
             let Some(place) = self.nearest() else {
                 break;
@@ -110,6 +110,7 @@ impl Polytope {
             let new = pair.support(&-face.normal);
             let reach = face.normal.dot(&new.w);
             best.offer(-reach, &-face.normal);
+            last = -reach;
             if reach - face.distance <= tolerance || -best.lower - face.distance <= tolerance {
                 break;
             }
@@ -117,6 +118,12 @@ impl Polytope {
             if known || !self.grow(place, new, pair.tiny()) {
                 break;
             }
+        }
+        // Of directions that are equally good the last one has the witnesses.
+        if last >= best.lower - tolerance
+            && let Some(face) = self.faces.get(nearest)
+        {
+            best.normal = -face.normal;
         }
         self.finish(pair, &mut best, nearest, fits)
     }

@@ -268,11 +268,15 @@ fn overlap_lines(of_a: &Feature, of_b: &Feature, normal: &Vec3, found: &mut Foun
         let on_b = (s - place[0]) / span;
         #[allow(clippy::cast_possible_truncation, reason = "0 or 1")]
         let k32 = k as u32;
+        // The far point is put straight across: the lines may lean a little against each other.
         if (0.0..=1.0).contains(&on_b) {
-            found.take(&(a[0] + along * s), &(b[0] + other * on_b), 0x100 | k32);
+            let end = a[0] + along * s;
+            let gap = normal.dot(&(b[0] + other * on_b - end));
+            found.take(&end, &(end + normal * gap), 0x100 | k32);
         }
         if (0.0..=1.0).contains(&place[k]) {
-            found.take(&(a[0] + along * place[k]), &b[k], 0x200 | k32);
+            let gap = normal.dot(&(b[k] - a[0] - along * place[k]));
+            found.take(&(b[k] - normal * gap), &b[k], 0x200 | k32);
         }
     }
 }
