@@ -205,7 +205,10 @@ fn greatest(a: &Solid, b: &Solid, pos12: &Pose, hint: &Vec3, samples: u32) -> (f
     tops.truncate(6);
     for top in &mut tops {
         let mut step = 0.1;
-        while step > 1e-9 {
+        for _ in 0..200 {
+            if step < 1e-8 {
+                break;
+            }
             let u = top
                 .1
                 .cross(&if top.1.x.abs() < 0.6 {

@@ -6,7 +6,7 @@
 //! 2017, Improving the GJK algorithm.
 
 use super::newton;
-use super::pair::{CoreGap, Pair, unit};
+use super::pair::{CoreGap, Pair, Vertex, unit};
 use super::simplex::{Reduced, Simplex};
 use crate::math::Vec3;
 
@@ -56,16 +56,17 @@ pub(super) fn distance(pair: &Pair<'_>, start: &Vec3) -> Outcome {
     };
     let tiny = pair.tiny();
     if pair.polytopes {
-        return match gjk.run(tiny / 2.0) {
+        return match gjk.run(tiny / 2.0, None) {
             Run::Overlap => Outcome::Overlap(gjk.simplex),
-            Run::Ended => Outcome::Apart(gjk.gap()),
+            Run::Ended => gjk.decide(gjk.gap()),
         };
     }
     // Curved: roughly first, then Newton on the features found; what is still loose goes round again.
     let mut best: Option<CoreGap> = None;
+    let mut hint = None;
     let size = pair.a.reach().min(pair.b.reach());
     for tolerance in [1e-2, 1e-4, 1e-7, 0.0] {
-        if matches!(gjk.run((tolerance * size).max(tiny)), Run::Overlap) {
+        if matches!(gjk.run((tolerance * size).max(tiny), hint), Run::Overlap) {
             return Outcome::Overlap(gjk.simplex);
         }
         let found = gjk.gap();
@@ -78,11 +79,9 @@ pub(super) fn distance(pair: &Pair<'_>, start: &Vec3) -> Outcome {
         if gap.upper - gap.lower <= 4.0 * tiny {
             break;
         }
-        if gap.lower > gjk.lower {
-            gjk.dir = gap.normal;
-        }
+        hint = (gap.lower > gjk.lower).then_some(gap.normal);
     }
-    Outcome::Apart(best.unwrap_or_else(|| gjk.gap()))
+    gjk.decide(best.unwrap_or_else(|| gjk.gap()))
 }
 
 /// The tighter end of each; witnesses follow the upper end, the normal the lower.
@@ -99,37 +98,71 @@ fn better(one: &CoreGap, other: &CoreGap) -> CoreGap {
 }
 
 impl Gjk<'_> {
-    fn run(&mut self, tolerance: f64) -> Run {
-        let tiny = self.pair.tiny();
-        for _ in 0..STEPS_MAX {
-            let new = self.pair.support(&self.dir);
-            let lower = self.dir.dot(&new.w);
-            if lower > self.lower {
-                self.lower = lower;
-                self.normal = self.dir;
-            }
-            if self.upper - self.lower <= tolerance
-                || self.simplex.used().iter().any(|v| v.w == new.w)
+    /// Where no direction separates, the polytope has to tell: the simplex may have stalled around the origin.
+    fn decide(&self, gap: CoreGap) -> Outcome {
+        if gap.lower < -self.pair.tiny() {
+            Outcome::Overlap(self.simplex)
+        } else {
+            Outcome::Apart(gap)
+        }
+    }
+
+    fn run(&mut self, tolerance: f64, hint: Option<Vec3>) -> Run {
+        // What Newton found is asked first; it may add nothing.
+        if let Some(hint) = hint {
+            let asked = self.ask(&hint);
+            if let Some(new) = asked
+                && matches!(self.add(new), Some(Run::Overlap))
             {
+                return Run::Overlap;
+            }
+        }
+        for _ in 0..STEPS_MAX {
+            let dir = self.dir;
+            let asked = self.ask(&dir);
+            if self.upper - self.lower <= tolerance {
                 return Run::Ended;
             }
-            let before = self.simplex;
-            self.simplex.push(new);
-            match self.simplex.reduce(tiny / 4.0) {
-                Reduced::Inside => return Run::Overlap,
-                Reduced::Closest { point, dir } => {
-                    let upper = point.norm();
-                    if upper >= self.upper {
-                        self.simplex = before;
-                        return Run::Ended;
-                    }
-                    self.point = point;
-                    self.upper = upper;
-                    self.dir = dir;
-                }
+            let Some(new) = asked else {
+                return Run::Ended;
+            };
+            if let Some(end) = self.add(new) {
+                return end;
             }
         }
         Run::Ended
+    }
+
+    /// Asks one direction; `None` when the simplex has that vertex already.
+    fn ask(&mut self, dir: &Vec3) -> Option<Vertex> {
+        let new = self.pair.support(dir);
+        let lower = dir.dot(&new.w);
+        if lower > self.lower {
+            self.lower = lower;
+            self.normal = *dir;
+        }
+        let known = self.simplex.used().iter().any(|v| v.w == new.w);
+        (!known).then_some(new)
+    }
+
+    /// Puts a vertex in; `Some` when that ends the run.
+    fn add(&mut self, new: Vertex) -> Option<Run> {
+        let before = self.simplex;
+        self.simplex.push(new);
+        match self.simplex.reduce(self.pair.tiny() / 4.0) {
+            Reduced::Inside => Some(Run::Overlap),
+            Reduced::Closest { point, dir } => {
+                let upper = point.norm();
+                if upper >= self.upper {
+                    self.simplex = before;
+                    return Some(Run::Ended);
+                }
+                self.point = point;
+                self.upper = upper;
+                self.dir = dir;
+                None
+            }
+        }
     }
 
     fn gap(&self) -> CoreGap {

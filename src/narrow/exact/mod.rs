@@ -21,6 +21,7 @@
 //! multiple of the pair's size, so nothing is scaled or cached and no copy of a hull is kept.
 
 mod closed;
+mod coaxial;
 mod epa;
 mod feature;
 mod gjk;
@@ -123,7 +124,9 @@ fn iterate(pair: &Pair<'_>, warm: &Warm) -> CoreGap {
     };
     match gjk::distance(pair, &start) {
         gjk::Outcome::Apart(gap) => gap,
-        gjk::Outcome::Overlap(simplex) => epa::depth(pair, &simplex),
+        gjk::Outcome::Overlap(simplex) => {
+            coaxial::gap(pair).unwrap_or_else(|| epa::depth(pair, &simplex))
+        }
     }
 }
 
