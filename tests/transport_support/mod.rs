@@ -189,11 +189,13 @@ fn serve(door: &mut dyn Door, manners: Manners, stop: &AtomicBool, log: &Mutex<L
     let (mut inbox, mut outbox) = (Inbox::default(), Outbox::default());
     outbox.tick.header.boot_id = manners.boot_id;
     outbox.tick.header.schema = WIRE_VERSION;
-    outbox.names = vec![NameRow {
+    let mut name = NameRow {
         body: 1,
-        len: 1,
+        len: 3,
         ..NameRow::default()
-    }];
+    };
+    name.name[..3].copy_from_slice(b"box");
+    outbox.names = vec![name];
     outbox.plan = "{\"broad\":\"brute\"}".to_owned();
     outbox.names_changed = true;
     outbox.plan_changed = true;

@@ -1,0 +1,362 @@
+"""The client: poses out, the result of exactly that frame in."""
+
+import ctypes
+import json
+import secrets
+import time
+
+import numpy as np
+
+from . import layout
+from .errors import Refused, Restarted, Skipped, SweepdError, TimedOut
+from .ports import Ports
+
+_LOOK_AGAIN_S = 0.05
+_BOOTS_OVER_MAX = 16
+_TOPICS = {
+    "pairs": layout.PairRow,
+    "contacts": layout.ContactRow,
+    "bodies": layout.BodyRow,
+    "body_verdicts": ctypes.c_uint8,
+    "names": layout.NameRow,
+    "plan": ctypes.c_uint8,
+}
+_POSE = np.dtype(layout.TransformRow)
+
+
+def _text(chars):
+    return bytes(chars).split(b"\0")[0].decode("utf-8", "replace")
+
+
+class Result:
+    """A tick and what belongs to it.
+
+    ``tick`` is a structure (see ``msgs/README.md``); ``pairs``, ``contacts`` and ``bodies`` are numpy structured
+    arrays over shared memory, None where the client did not listen or a newer one overtook it. Keep at most three
+    results, or copy what you keep.
+    """
+
+    def __init__(self, tick, messages):
+        self.tick = tick
+        self.pairs = messages.get("pairs")
+        self.contacts = messages.get("contacts")
+        self.bodies = messages.get("bodies")
+        self.body_verdicts = messages.get("body_verdicts")
+
+    @property
+    def state(self):
+        """The tick in one word: clear, near, possible, unknown or colliding."""
+        return layout.State(self.tick.header.state).name.lower()
+
+    @property
+    def colliding(self):
+        """``(n, 2)`` ids of the pairs certified colliding at the poses of this tick, by id."""
+        if self.pairs is None:
+            raise SweepdError("this client does not listen to pairs")
+        rows = self.pairs
+        gone = rows["flags"] & int(layout.PairFlags.GONE) != 0
+        rows = rows[(rows["verdict"] == layout.Verdict.COLLIDING) & ~gone]
+        return np.stack([rows["body_a"], rows["body_b"]], axis=1)
+
+
+class Client:
+    """A client of one instance: a source of frames, or with ``source=None`` a reader.
+
+    * ``quat_order``: how you write quaternions, ``"xyzw"`` (ROS) or ``"wxyz"`` (MuJoCo). It must be said.
+    * ``listen``: the messages to listen to; the daemon computes what somebody listens to.
+    * ``timeout_s``: how long to look for a daemon.
+    * ``root``, ``prefix``: other files than iceoryx2's default ones; the daemon's must be the same.
+    """
+
+    def __init__(
+        self,
+        instance="default",
+        source="sim",
+        *,
+        quat_order,
+        timeout_s=5.0,
+        listen=("pairs", "contacts"),
+        root=None,
+        prefix=None,
+    ):
+        if quat_order not in ("xyzw", "wxyz"):
+            raise SweepdError(f'quat_order={quat_order!r}: say "xyzw" or "wxyz"')
+        self._wxyz = quat_order == "wxyz"
+        self._source = source
+        if source is not None and not 1 <= len(source.encode()) <= layout.SOURCE_NAME_LEN:
+            raise SweepdError(f"source name {source!r}: 1 to {layout.SOURCE_NAME_LEN} bytes")
+        unknown = set(listen) - set(_TOPICS)
+        if unknown:
+            raise SweepdError(f"listen={sorted(unknown)}: there are {', '.join(_TOPICS)}")
+        self._ports = Ports(instance, timeout_s, root, prefix)
+        self._topics = list(dict.fromkeys([*listen, "names"]))
+        for topic in self._topics:
+            self._ports.subscribe(topic, _TOPICS[topic])
+        self._ahead = {topic: None for topic in self._topics}
+        self._now = {topic: None for topic in self._topics}
+        #: This client's session, drawn at its start.
+        self.session = secrets.randbits(64) or 1
+        self._epoch = 0
+        self._seq = 0
+        self._requests = 0
+        self._tick = None
+        self._held = None
+        self._boots_over = []
+        self._names = (None, {})
+        self._wait_names(timeout_s)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_exception):
+        self.close()
+
+    def close(self):
+        """Frees the ports; the session is over."""
+        self._ahead, self._now = {}, {}
+        self._ports.close()
+
+    @property
+    def hello(self):
+        """What the daemon said of itself at the connection."""
+        return self._ports.hello
+
+    @property
+    def names(self):
+        """Name to id of every body in the scene, as of the newest tick heard."""
+        message = self._now.get("names")
+        if message is None:
+            return {}
+        header, rows = message
+        key = (header.boot_id, header.tick)
+        if self._names[0] != key:
+            ids = {bytes(row["name"])[: row["len"]].decode(): int(row["body"]) for row in rows}
+            self._names = (key, ids)
+        return self._names[1]
+
+    def send(
+        self, poses, *, stamp_ns=0, clock_id=0, scene_rev=0, deadline_ns=0, time_left_ns=0, partial=False
+    ):
+        """Sends a frame and does not wait. Returns its number.
+
+        * ``poses``: ``{name: (position, quaternion)}``, or ``(ids, positions, quaternions)`` as arrays of shape
+          ``(n,)``, ``(n, 3)``, ``(n, 4)``; metres, quaternions in the order you said. An array made by ``rows()`` is
+          sent as it is.
+        * ``partial``: these are some bodies of the source only.
+        """
+        flags = layout.FrameFlags.PARTIAL if partial else layout.FrameFlags.FULL
+        fields = dict(
+            stamp_ns=stamp_ns,
+            clock_id=clock_id,
+            scene_rev=scene_rev,
+            deadline_ns=deadline_ns,
+            time_left_ns=time_left_ns,
+        )
+        return self._send(self.rows(poses), flags, fields)
+
+    def pause(self):
+        """Says that the world stands still: the ages of its bodies are renewed for one time-out."""
+        return self._send(np.empty(0, _POSE), layout.FrameFlags.PAUSED, {})
+
+    def reset_epoch(self):
+        """Says that the world was reset: with the next frame every pair of the source's bodies ends."""
+        self._epoch += 1
+
+    def step(self, poses, timeout_s=1.0, **fields):
+        """Sends a frame and returns the :class:`Result` of exactly that frame.
+
+        Raises TimedOut (with what was refused meanwhile), Restarted or Skipped.
+        """
+        self._drain()
+        before = self._tick
+        seq = self.send(poses, **fields)
+        until = time.monotonic() + timeout_s
+        while True:
+            if not self._next(until):
+                raise TimedOut(self._why_no_result(seq, before, timeout_s))
+            row = self._row(self._tick)
+            if row is None or row.session != self.session:
+                continue
+            if (row.epoch, row.seq) == (self._epoch, seq):
+                return self._result()
+            if (row.epoch, row.seq) > (self._epoch, seq):
+                raise Skipped(seq)
+
+    def latest(self):
+        """The newest :class:`Result` there is, without waiting; None before the first tick."""
+        self._drain()
+        return None if self._tick is None else self._result()
+
+    def wait(self, timeout_s=1.0):
+        """The :class:`Result` of the next tick; raises TimedOut or Restarted."""
+        if not self._next(time.monotonic() + timeout_s):
+            raise TimedOut(f"no tick within {timeout_s} s; is the daemon running?")
+        return self._result()
+
+    def request(self, edits, blobs=(), timeout_s=5.0):
+        """Sends a scene edit or a query (anything ``json`` can write) and returns the daemon's answer as a dict.
+
+        Raises Refused with the daemon's words when it refused, TimedOut when it is silent.
+        """
+        text = json.dumps(edits).encode()
+        self._requests += 1
+        header = layout.RequestHeader(
+            json_len=len(text), request=self._requests, schema=layout.WIRE_VERSION
+        )
+        self._ports.request(header, b"".join([text, *(bytes(blob) for blob in blobs)]))
+        until = time.monotonic() + timeout_s
+        while True:
+            answered = self._ports.answer()
+            if answered is not None and answered[0].request == header.request:
+                answer = json.loads(answered[1])
+                if not answered[0].ok:
+                    raise Refused(answer.get("error", "refused"))
+                return answer
+            left = until - time.monotonic()
+            if left <= 0:
+                raise TimedOut(f"no answer within {timeout_s} s")
+            self._ports.wait(min(left, _LOOK_AGAIN_S))
+
+    def rows(self, poses):
+        """Poses as an array of TransformRow, to be filled once and changed in place for later frames."""
+        if isinstance(poses, np.ndarray) and poses.dtype == _POSE:
+            return poses
+        if isinstance(poses, dict):
+            ids = self._ids(poses)
+            positions = [pose[0] for pose in poses.values()]
+            quaternions = [pose[1] for pose in poses.values()]
+        else:
+            ids, positions, quaternions = poses
+        rows = np.zeros(len(ids), _POSE)
+        rows["body"] = ids
+        if len(ids):
+            quaternions = np.asarray(quaternions, dtype=np.float64)
+            rows["position"] = positions
+            rows["orientation"] = np.roll(quaternions, -1, axis=-1) if self._wxyz else quaternions
+        return rows
+
+    def _ids(self, poses):
+        names = self.names
+        try:
+            return [names[name] for name in poses]
+        except KeyError as e:
+            raise SweepdError(f"the scene has no body {e}; it has {', '.join(sorted(names)) or 'none'}") from None
+
+    def _send(self, rows, flags, fields):
+        if self._source is None:
+            raise SweepdError("this client was opened as a reader; name a source to send frames")
+        header = layout.FrameHeader(
+            session=self.session,
+            epoch=self._epoch,
+            seq=self._seq + 1,
+            sent_ns=time.clock_gettime_ns(time.CLOCK_BOOTTIME),
+            flags=flags,
+            schema=layout.WIRE_VERSION,
+            **fields,
+        )
+        name = self._source.encode()
+        header.source[: len(name)] = name
+        self._ports.send("transforms", layout.TransformRow, header, rows)
+        self._seq += 1
+        return self._seq
+
+    def _row(self, tick):
+        for row in tick.sources[: tick.sources_len]:
+            if _text(row.name) == self._source:
+                return row
+        return None
+
+    def _wait_names(self, timeout_s):
+        """Names come with the newest state, a moment after the connection."""
+        until = time.monotonic() + timeout_s
+        while self._now["names"] is None and self._next(until):
+            pass
+
+    def _drain(self):
+        """Takes what is there, up to the newest tick; raises Restarted."""
+        while self._take():
+            pass
+
+    def _next(self, until):
+        """The next newer tick and all that belongs to it; False when the time is up."""
+        while not self._take():
+            left = until - time.monotonic()
+            if left <= 0:
+                return False
+            self._ports.wait(min(left, _LOOK_AGAIN_S))
+        return True
+
+    def _take(self):
+        while True:
+            tick, self._held = self._held or self._ports.tick(), None
+            if tick is None:
+                return False
+            new = tick.header
+            # queues of an old and a new daemon are read in no certain order
+            if new.boot_id in self._boots_over:
+                continue
+            old = self._tick and self._tick.header
+            if old and old.boot_id != new.boot_id:
+                self._restart(old, tick)
+            if old and new.tick <= old.tick:
+                continue
+            self._tick = tick
+            for topic in self._topics:
+                self._advance(topic, new)
+            return True
+
+    def _restart(self, old, tick):
+        self._boots_over = [*self._boots_over[1 - _BOOTS_OVER_MAX :], old.boot_id]
+        ends = np.empty((0, 2), np.uint64)
+        pairs = self._now.get("pairs")
+        if pairs is not None and pairs[0].boot_id == old.boot_id:
+            rows = pairs[1]
+            there = rows["flags"] & int(layout.PairFlags.GONE) == 0
+            rows = rows[there & (rows["certified_verdict"] == layout.Verdict.COLLIDING)]
+            ends = np.stack([rows["body_a"], rows["body_b"]], axis=1)
+        self._tick, self._held = None, tick
+        raise Restarted(old.boot_id, tick.header.boot_id, ends)
+
+    def _advance(self, topic, tick):
+        """Takes messages up to the tick; one of a later tick or boot is kept for then."""
+        while True:
+            ahead = self._ahead[topic]
+            if ahead is None:
+                # nothing is held that is not needed: four messages are all a reader may hold
+                ahead = self._ahead[topic] = self._ports.message(topic)
+            if ahead is None:
+                return
+            header = ahead[0]
+            if header.boot_id in self._boots_over:
+                self._ahead[topic] = None
+            elif header.boot_id == tick.boot_id and header.tick <= tick.tick:
+                now = self._now[topic]
+                if now is None or now[0].boot_id != header.boot_id or now[0].tick < header.tick:
+                    self._now[topic] = ahead
+                self._ahead[topic] = None
+            else:
+                return
+            ahead = None
+
+    def _result(self):
+        tick = self._tick.header
+        messages = {
+            topic: now[1]
+            for topic, now in self._now.items()
+            if now is not None and (now[0].boot_id, now[0].tick) == (tick.boot_id, tick.tick)
+        }
+        return Result(self._tick, messages)
+
+    def _why_no_result(self, seq, before, timeout_s):
+        text = f"no result of frame {seq} of `{self._source}` within {timeout_s} s"
+        tick = self._tick
+        if tick is None or (before is not None and tick.header.tick == before.header.tick):
+            return f"{text}: no tick came at all; is the daemon running?"
+        if self._row(tick) is None:
+            known = ", ".join(_text(row.name) for row in tick.sources[: tick.sources_len])
+            text += f"; the scene has no such source, it has: {known}"
+        for reason in layout.RejectReason:
+            refused = tick.rejects[reason] - (before.rejects[reason] if before else 0)
+            if refused > 0:
+                text += f"; {refused} refused as {reason.name.lower()}"
+        return text

@@ -1,0 +1,32 @@
+"""What can go wrong for a client; every message says what to change."""
+
+
+class SweepdError(Exception):
+    """Any failure of this package."""
+
+
+class TimedOut(SweepdError):
+    """Nothing came within the time allowed."""
+
+
+class Refused(SweepdError):
+    """The daemon, its version or its files do not fit this client."""
+
+
+class Restarted(SweepdError):
+    """The daemon restarted: every pair has ended. The next step goes on with the new one."""
+
+    def __init__(self, old_boot, new_boot, ends):
+        super().__init__(f"the daemon restarted (boot {old_boot:x} is over, {new_boot:x} began)")
+        self.old_boot = old_boot
+        self.new_boot = new_boot
+        #: ``(body_a, body_b)`` of each pair that was certified colliding when last heard of.
+        self.ends = ends
+
+
+class Skipped(SweepdError):
+    """A tick used a newer frame of this source; this one has no result of its own."""
+
+    def __init__(self, seq):
+        super().__init__(f"frame {seq} was passed over: a newer frame of the source was used")
+        self.seq = seq

@@ -1,0 +1,265 @@
+"""Shared memory: iceoryx2's ports of one client, as numpy arrays without copies.
+
+An array over a received message keeps its sample alive, and with it the place in shared memory; a reader may hold
+four messages of a kind, so copy what you keep.
+"""
+
+import ctypes
+import os
+import time
+
+import iceoryx2 as iox2
+import numpy as np
+
+from . import layout
+from .errors import Refused, SweepdError, TimedOut
+
+#: Event ids of ``wake`` and ``ready``.
+SENT, ASKED = 1, 2
+_RETRY_S = 0.05
+_SLICE_LEN_START = 256
+_REQUEST_LEN_START = 1 << 14
+_ROWS_MAX = 1 << 26
+
+
+def dtype(row):
+    """The numpy structured type of a row."""
+    return np.dtype(row)
+
+
+class _Held:
+    """Memory of a sample for numpy; the arrays made from it keep the sample."""
+
+    def __init__(self, sample, address, count, kind):
+        self._sample = sample
+        self.__array_interface__ = {
+            "version": 3,
+            "data": (address, True),
+            "shape": (count * kind.itemsize,),
+            "typestr": "|u1",
+        }
+
+
+def _view(sample, kind):
+    # the header's count: a slice's own length counted bytes in iceoryx2 0.10.0 (issue 1533)
+    count = sample.header.number_of_elements
+    if count == 0:
+        return np.empty(0, kind)
+    if count > _ROWS_MAX:
+        raise SweepdError(f"a message says that it has {count} rows")
+    return np.asarray(_Held(sample, sample.payload_ptr, count, kind)).view(kind)
+
+
+def _fill(address, kind, rows):
+    """Copies rows into shared memory; one copy, the only one on this side."""
+    if len(rows):
+        memory = (ctypes.c_uint8 * (len(rows) * kind.itemsize)).from_address(address)
+        np.frombuffer(memory, dtype=kind)[:] = rows
+
+
+def check_name(instance):
+    """Refuses what cannot be an instance's name."""
+    fits = 1 <= len(instance) <= 32 and all(c in "abcdefghijklmnopqrstuvwxyz0123456789_" for c in instance)
+    if not fits:
+        raise Refused(f"instance name {instance!r}: use 1 to 32 of a-z, 0-9 and _")
+
+
+def _config(root, prefix):
+    # never from a file: a configuration in the current directory would put us on other files than the daemon
+    config = iox2.config.default()
+    if root is not None:
+        config.global_cfg.root_path = iox2.Path.new(str(root))
+    if prefix is not None:
+        config.global_cfg.prefix = iox2.FileName.new(prefix)
+    return config
+
+
+def _check_owner(config):
+    """True when the root is there; another user's is refused: iceoryx2 would drop our samples in silence."""
+    path = config.global_cfg.root_path.to_string()
+    try:
+        owner = os.stat(path).st_uid
+    except FileNotFoundError:
+        return False
+    except OSError as e:
+        raise Refused(f"{path}: {e.strerror}; shared memory belongs to one user, run as that user") from e
+    if owner != os.geteuid():
+        raise Refused(
+            f"{path} belongs to user id {owner}, this process runs as {os.geteuid()}; "
+            "run both as one user, or give both another root"
+        )
+    return True
+
+
+class Ports:
+    """The ports of one client. Use it from one thread."""
+
+    def __init__(self, instance, timeout_s, root=None, prefix=None):
+        check_name(instance)
+        iox2.set_log_level_from_env_or(iox2.LogLevel.Fatal)
+        self._instance = instance
+        self._config = _config(root, prefix)
+        self._senders = {}
+        self._readers = {}
+        self._client = None
+        self._pending = []
+        until = time.monotonic() + timeout_s
+        while True:
+            why = "its files are missing"
+            if _check_owner(self._config):
+                try:
+                    self._open()
+                    break
+                except SweepdError:
+                    raise
+                except Exception as e:  # iceoryx2 has one exception type for each port
+                    why = str(e)
+            if time.monotonic() >= until:
+                raise TimedOut(
+                    f"no daemon runs as instance `{instance}` ({why}); start one with `sweepd run`, "
+                    "`sweepd list` shows who is there"
+                )
+            time.sleep(_RETRY_S)
+        self.hello = self._greet(until)
+
+    def _open(self):
+        self._node = (
+            iox2.NodeBuilder.new()
+            .config(self._config)
+            # signals belong to the host program
+            .signal_handling_mode(iox2.SignalHandlingMode.Disabled)
+            .create(iox2.ServiceType.Ipc)
+        )
+        self._hello = self._service(f"{self._instance}/hello").publish_subscribe(layout.Hello).open()
+        self._hello = self._hello.subscriber_builder().create()
+        self._tick = self._topic("tick").publish_subscribe(layout.TickRow).open().subscriber_builder().create()
+        self._ready = self._topic("ready").event().open().listener_builder().create()
+        # last: its coming wakes the daemon, which then sends us the newest hello and tick
+        self._wake = self._topic("wake").event().open().notifier_builder().create()
+
+    def _service(self, name):
+        return self._node.service_builder(iox2.ServiceName.new(name))
+
+    def _topic(self, topic):
+        return self._service(f"{self._instance}/v{layout.WIRE_VERSION}/{topic}")
+
+    def _greet(self, until):
+        while True:
+            sample = self._hello.receive()
+            if sample is not None:
+                hello = layout.Hello.from_buffer_copy(sample.payload().contents)
+                _check_hello(hello)
+                return hello
+            if time.monotonic() >= until:
+                raise TimedOut("the instance's services are there, but no daemon says hello; is it running?")
+            self.wait(0.005)
+
+    def wake(self, event):
+        """Tells the daemon; one that is away finds what was sent when it is back."""
+        self._wake.notify_with_custom_event_id(iox2.EventId.new(event))
+
+    def wait(self, timeout_s):
+        """Sleeps until the daemon has sent something, or the time is up."""
+        self._ready.timed_wait(iox2.Duration.from_secs_f64(max(timeout_s, 0.0)))
+
+    def subscribe(self, topic, row):
+        """Listens to a message kind from now on."""
+        if topic not in self._readers:
+            service = self._topic(topic).publish_subscribe(iox2.Slice[row]).user_header(layout.MessageHeader).open()
+            kind = np.dtype(row)
+            self._readers[topic] = (service.subscriber_builder().create(), kind)
+            self.wake(14)
+
+    def tick(self):
+        """The next tick as a structure of its own, or None."""
+        sample = self._tick.receive()
+        if sample is None:
+            return None
+        return layout.TickRow.from_buffer_copy(sample.payload().contents)
+
+    def message(self, topic):
+        """The next message of a kind as ``(header, rows)``, or None; the rows lie in shared memory."""
+        reader, kind = self._readers[topic]
+        try:
+            sample = reader.receive()
+        except Exception as e:
+            raise SweepdError(
+                f"{topic} cannot be received ({e}); where four results are still held, copy what you keep "
+                "(`result.pairs.copy()`)"
+            ) from e
+        if sample is None:
+            return None
+        header = layout.MessageHeader.from_buffer_copy(sample.user_header().contents)
+        return header, _view(sample, kind)
+
+    def send(self, topic, row, header, rows):
+        """Hands a frame over and wakes the daemon."""
+        if topic not in self._senders:
+            service = self._topic(topic).publish_subscribe(iox2.Slice[row]).user_header(layout.FrameHeader).open()
+            self._senders[topic] = (
+                service.publisher_builder()
+                # a sample sent right after a growth is lost if its sender ends before it is mapped
+                .initial_max_slice_len(max(len(rows), _SLICE_LEN_START))
+                .allocation_strategy(iox2.AllocationStrategy.PowerOfTwo)
+                .backpressure_strategy(iox2.BackpressureStrategy.DiscardData)
+                .create()
+            )
+        sample = self._senders[topic].loan_slice_uninit(len(rows))
+        ctypes.memmove(sample.user_header_ptr, ctypes.byref(header), ctypes.sizeof(header))
+        _fill(sample.payload_ptr, np.dtype(row), rows)
+        sample.assume_init().send()
+        self.wake(SENT)
+
+    def request(self, header, payload):
+        """Sends a request; the answer comes with :meth:`answer`."""
+        if self._client is None:
+            service = (
+                self._topic("requests")
+                .request_response(iox2.Slice[ctypes.c_uint8], iox2.Slice[ctypes.c_uint8])
+                .request_header(layout.RequestHeader)
+                .response_header(layout.AnswerHeader)
+                .open()
+            )
+            self._client = (
+                service.client_builder()
+                .initial_max_slice_len(max(len(payload), _REQUEST_LEN_START))
+                .allocation_strategy(iox2.AllocationStrategy.PowerOfTwo)
+                .create()
+            )
+        self._pending = [pending for pending in self._pending if pending.is_connected]
+        request = self._client.loan_slice_uninit(len(payload))
+        ctypes.memmove(request.user_header_ptr, ctypes.byref(header), ctypes.sizeof(header))
+        ctypes.memmove(request.payload_ptr, payload, len(payload))
+        self._pending.append(request.assume_init().send())
+        self.wake(ASKED)
+
+    def answer(self):
+        """The next answer as ``(header, bytes)``, or None."""
+        for pending in self._pending:
+            response = pending.receive()
+            if response is not None:
+                self._pending.remove(pending)
+                header = layout.AnswerHeader.from_buffer_copy(response.user_header().contents)
+                return header, ctypes.string_at(response.payload_ptr, response.header.number_of_elements)
+        return None
+
+    def close(self):
+        """Frees the ports: samples and ports first, the node last."""
+        self._pending, self._senders, self._readers = [], {}, {}
+        self._client = self._tick = self._hello = self._ready = self._wake = self._node = None
+
+
+def _text(chars):
+    return bytes(chars).split(b"\0")[0].decode("utf-8", "replace")
+
+
+def _check_hello(hello):
+    from . import __version__
+
+    theirs, iceoryx2 = _text(hello.sweepd_version), _text(hello.iceoryx2_version)
+    if bytes(hello.magic) != b"sweepd\0\0" or hello.wire_version != layout.WIRE_VERSION or iceoryx2 != "0.10.0":
+        raise Refused(
+            f"the daemon is sweepd {theirs} (wire version {hello.wire_version}, iceoryx2 {iceoryx2}), this client "
+            f"sweepd {__version__} (wire version {layout.WIRE_VERSION}, iceoryx2 0.10.0); use the same version on "
+            "both sides"
+        )
