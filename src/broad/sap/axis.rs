@@ -13,6 +13,8 @@ use crate::ids::BodySlot;
 
 /// Tag of an end whose body left.
 const DEAD: u32 = u32::MAX;
+/// Ends gathered at once: a few cache lines.
+const GATHER: usize = 32;
 /// Position of an end that is not in the list.
 const NOWHERE: u32 = u32::MAX;
 
@@ -90,6 +92,23 @@ impl<T: Fn(&Bounds, &Bounds) -> bool> Passing<'_, T> {
         self.tests += 1;
         if (self.test)(&self.bounds[one.index()], &self.bounds[other.index()]) {
             self.met.push((one, other));
+        }
+    }
+
+    /// The lower end of `one` passed all `ends` but the first, which is its own place.
+    #[inline]
+    fn meet_all(&mut self, one: BodySlot, ends: &[End]) {
+        // Which ends are upper ones is as good as random, so they are gathered without a branch.
+        for chunk in ends.get(1..).unwrap_or_default().chunks(GATHER) {
+            let mut uppers = [0_u32; GATHER];
+            let mut len = 0;
+            for end in chunk {
+                uppers[len] = end.tag >> 1;
+                len += usize::from(end.upper() & !end.dead());
+            }
+            for other in &uppers[..len] {
+                self.meet(one, BodySlot(*other));
+            }
         }
     }
 }
@@ -171,13 +190,10 @@ impl Axis {
                 }
             } else {
                 while to > 0 && end.before(self.ends[to - 1]) {
-                    let other = self.ends[to - 1];
-                    if other.upper() && !other.dead() {
-                        passing.meet(end.slot(), other.slot());
-                    }
-                    self.ends[to] = other;
+                    self.ends[to] = self.ends[to - 1];
                     to -= 1;
                 }
+                passing.meet_all(end.slot(), &self.ends[to..=at]);
             }
             if to < at {
                 self.ends[to] = end;

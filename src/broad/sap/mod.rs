@@ -65,7 +65,7 @@ impl Sap {
         let bodies = members.bounded().len();
         let bulk = self.came.len() * 4 > bodies;
         let busy = !self.moved.is_empty() || !self.came.is_empty();
-        let look = busy && self.choice.looks() && self.look(bodies);
+        let look = busy && self.choice.looks(bodies) && self.look(bodies);
         if bulk || look || !self.repair(members, work) {
             self.resort(members, work);
         } else {
@@ -171,9 +171,15 @@ impl Sap {
         } else {
             &self.asked
         };
-        let each = who.len() as u64 * members.bounded().len() as u64;
-        if each > 2 * self.choice.sweep_tests() + 1024 && skipped.is_none() {
-            self.sweep_all(members, |slot| members.has(slot, ASKED), work);
+        if self
+            .choice
+            .prefers_sweep(who.len(), members.bounded().len())
+        {
+            let flag = if skipped.is_some() { CAME } else { ASKED };
+            if !self.sweep_all(members, |slot| members.has(slot, flag), work) {
+                self.choice.keep_all();
+                self.resort(members, work);
+            }
             return;
         }
         for slot in who {
@@ -185,7 +191,7 @@ impl Sap {
             let found = members.bounded().iter().filter(meets);
             self.met.extend(found.map(|other| (*slot, *other)));
         }
-        work.tests += each;
+        work.tests += who.len() as u64 * members.bounded().len() as u64;
     }
 
     /// Sorts every list anew and finds the pairs of all touched bodies by one sweep.
@@ -234,6 +240,7 @@ impl Sap {
         };
         let (fits, tests) = self.sweep.run(&course, members, asked, &mut self.met);
         work.tests += tests;
+        self.choice.note_sweep(tests);
         fits
     }
 
