@@ -10,7 +10,7 @@ mod list;
 mod monitor;
 mod out;
 mod query;
-//mod run;
+mod run;
 mod screen;
 
 use std::process::ExitCode;
@@ -54,8 +54,7 @@ pub fn main() -> ExitCode {
 fn dispatch(command: Command) -> Result<ExitCode> {
     let mut out = Out::stdout();
     let done = match command {
-        //Command::Run(args) => run::run(&args, stop()?.as_ref()),
-        Command::Run(_) => Ok(true),
+        Command::Run(args) => run::run(&args, stop()?.as_ref()),
         Command::Check(args) => check::check(&args, &mut out),
         Command::Feed(args) => feed::feed(&args, &mut out, stop()?.as_ref()),
         Command::Monitor(args) => monitor::monitor(&args, &mut out, stop()?.as_ref()),

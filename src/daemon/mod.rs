@@ -1,3 +1,206 @@
-//! D
+//! The daemon: one thread owns the ports and runs the engine; shapes of scene edits are built on another.
+//!
+//! In: a scene, a [`Door`], a stop flag. Out: ticks, until told to stop.
+
+mod builder;
 mod shapes;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::config::Config;
+use crate::error::Result;
+use crate::scene::Scene;
+use crate::tick::pace::{Due, Pacer};
+use crate::tick::{EditBatch, Engine, TickInput};
+use crate::time::{Budget, Clock};
+use crate::transport::{Door, RequestToken};
+use crate::wire::{Answer, Inbox, TickRow};
+
+use builder::Builder;
+
 pub use shapes::{Shapes, build_shapes};
+
+/// While a worker builds shapes the loop looks this often whether they are ready, nanoseconds.
+const BUILD_LOOK_NS: u64 = 2_000_000;
+/// Longest wait, nanoseconds: a signal that comes between the look at the stop flag and the wait is seen then.
+const WAIT_MAX_NS: u64 = 100_000_000;
+
+/// A running daemon.
+pub struct Daemon<'a> {
+    engine: Engine,
+    pacer: Pacer,
+    builder: Builder,
+    config: Config,
+    clock: Arc<dyn Clock>,
+    door: &'a mut dyn Door,
+    arrived: Inbox,
+    due: Inbox,
+    ready: Vec<EditBatch>,
+}
+
+impl std::fmt::Debug for Daemon<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Daemon").field("engine", &self.engine).finish_non_exhaustive()
+    }
+}
+
+impl<'a> Daemon<'a> {
+    /// A daemon for a scene with its shapes, on an open door.
+    ///
+    /// # Errors
+    /// As [`Engine::new`] and [`Pacer::new`]; `Error::Io` when the worker thread cannot be started.
+    pub fn new(
+        scene: &Scene,
+        shapes: Shapes,
+        boot_id: u64,
+        clock: Arc<dyn Clock>,
+        door: &'a mut dyn Door,
+    ) -> Result<Self> {
+        Ok(Self {
+            builder: Builder::start(shapes.library, scene)?,
+            engine: Engine::new(scene, shapes.bodies, boot_id, Arc::clone(&clock))?,
+            pacer: Pacer::new(&scene.config, &scene.sources)?,
+            config: scene.config.clone(),
+            clock,
+            door,
+            arrived: Inbox::default(),
+            due: Inbox::default(),
+            ready: Vec::new(),
+        })
+    }
+
+    /// Runs until `stop` is raised, or for `ticks` ticks.
+    ///
+    /// # Errors
+    /// `Error::Io` when a port breaks; the daemon must then be started again.
+    pub fn run(&mut self, stop: &AtomicBool, ticks: Option<u64>) -> Result<()> {
+        while !stop.load(Ordering::Relaxed) {
+            let wait_ns = self.wait_ns();
+            self.door.wait(wait_ns, self.clock.as_ref())?;
+            if self.round(ticks)? {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes what has come and runs every tick that is due; whether `ticks` have been run.
+    ///
+    /// # Errors
+    /// As [`Daemon::run`].
+    pub fn round(&mut self, ticks: Option<u64>) -> Result<bool> {
+        let mut woke_ns = self.clock.monotonic_ns();
+        self.receive()?;
+        let mut idle = true;
+        loop {
+            let (now_ns, timeout_ns) = (self.clock.boottime_ns(), self.engine.world().next_timeout());
+            let edits = !self.ready.is_empty();
+            let Some(due) = self.pacer.due(now_ns, edits, timeout_ns, &mut self.due) else { break };
+            self.tick(due, woke_ns)?;
+            if ticks.is_some_and(|most| self.engine.ticks() >= most) {
+                return Ok(true);
+            }
+            idle = false;
+            woke_ns = self.clock.monotonic_ns();
+        }
+        if idle {
+            self.door.housekeeping();
+        }
+        Ok(false)
+    }
+
+    /// The engine, for a look at its state.
+    #[must_use]
+    pub fn engine(&self) -> &Engine {
+        &self.engine
+    }
+
+    fn wait_ns(&self) -> u64 {
+        let now_ns = self.clock.boottime_ns();
+        let next_ns = self.pacer.wake_ns(now_ns, self.engine.world().next_timeout());
+        let wait_ns = next_ns.saturating_sub(now_ns).min(WAIT_MAX_NS);
+        if self.builder.busy() { wait_ns.min(BUILD_LOOK_NS) } else { wait_ns }
+    }
+
+    /// Takes frames and requests; requests go to the worker, built edits come back from it.
+    fn receive(&mut self) -> Result<()> {
+        self.door.receive(&mut self.arrived, self.clock.as_ref());
+        self.pacer.take(&mut self.arrived, self.clock.boottime_ns());
+        let builder = &mut self.builder;
+        self.door.requests(&mut |token, header, payload| {
+            builder.ask(token, usize::try_from(header.json_len).unwrap_or(usize::MAX), payload);
+        });
+        while let Some((token, built)) = self.builder.finished() {
+            match built {
+                Ok(batch) => self.ready.push(batch),
+                Err(error) => {
+                    let answer = Answer { error: Some(error), ..Answer::default() };
+                    self.answer(token, &answer)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Runs one tick and sends what it filled.
+    fn tick(&mut self, due: Due, woke_ns: u64) -> Result<()> {
+        let engine = &mut self.engine;
+        self.pacer.drain_passed(|source, frames| {
+            if let Some(source) = source {
+                engine.note_skipped(source, frames);
+            }
+        });
+        let demand = self.door.demand();
+        let budget = if due.ages_only { Budget { units: Some(0), ..self.config.budget } } else { self.config.budget };
+        let mut broken = None;
+        let door = &mut *self.door;
+        let mut pulse = |row: &TickRow| {
+            if let Err(error) = door.publish_tick(row) {
+                broken = Some(error);
+            }
+        };
+        let input = TickInput {
+            inbox: &self.due,
+            edits: &self.ready,
+            demand,
+            budget,
+            cause: due.cause,
+            cause_source: due.source.map(crate::ids::SourceSlot::index),
+            woke_ns,
+            pulse: Some(&mut pulse),
+        };
+        let outbox = self.engine.tick(input);
+        if let Some(error) = broken {
+            return Err(error);
+        }
+        let start_ns = self.clock.monotonic_ns();
+        let lost = self.door.publish(outbox)?;
+        let send_ns = self.clock.monotonic_ns().saturating_sub(start_ns);
+        if lost > 0 {
+            tracing::debug!("{lost} messages of tick {} could not be handed over", self.engine.ticks());
+        }
+        self.engine.note_sent(send_ns);
+        self.settle_edits()
+    }
+
+    /// Answers the requests whose edits the last tick applied or refused.
+    fn settle_edits(&mut self) -> Result<()> {
+        self.ready.clear();
+        for at in 0..self.engine.outcomes().len() {
+            let outcome = &self.engine.outcomes()[at];
+            let (token, warnings) = (RequestToken(outcome.token), outcome.warnings.clone());
+            let answer = match &outcome.result {
+                Ok(applied) => Answer { ok: true, scene_rev: applied.scene_rev, error: None, warnings },
+                Err(error) => Answer { error: Some(error.clone()), warnings, ..Answer::default() },
+            };
+            self.answer(token, &answer)?;
+        }
+        Ok(())
+    }
+
+    fn answer(&mut self, token: RequestToken, answer: &Answer) -> Result<()> {
+        let json = serde_json::to_string(answer).unwrap_or_default();
+        self.door.answer(token, answer.ok, &json)
+    }
+}

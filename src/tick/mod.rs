@@ -175,9 +175,15 @@ impl Engine {
         &self.out
     }
 
-    /// What the transports took to send the last outbox; part of the next tick's floor.
-    pub fn note_send_ns(&mut self, send_ns: u64) {
+    /// The last outbox has been sent, which took `send_ns`: part of the next tick's floor.
+    pub fn note_sent(&mut self, send_ns: u64) {
         self.floor.note_send(send_ns);
+        self.out.plan_changed = false;
+    }
+
+    /// Frames of a source that were passed over for newer ones.
+    pub fn note_skipped(&mut self, source: SourceSlot, frames: u64) {
+        self.world.note_skipped(source, frames);
     }
 
     /// What became of the edits of the last tick.
@@ -429,12 +435,6 @@ impl Engine {
         row.overrun = u8::from(overrun);
         row.missed = self.missed;
         row.rebuilds = self.rebuilds;
-    }
-
-    /// Says that names and plan have been sent.
-    pub fn note_sent(&mut self) {
-        self.out.plan_changed = false;
-        self.out.names_changed = false;
     }
 }
 

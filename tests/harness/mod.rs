@@ -91,13 +91,42 @@ impl Drive {
 
     /// Moves all bodies to the poses of frame `tick` and runs a tick.
     pub fn step(&mut self, tick: u64, budget: Budget, demand: Demand) -> &Outbox {
+        self.place(tick);
+        self.send(budget, demand)
+    }
+
+    /// As [`Drive::step`], with `armed` set while the engine runs and without a copy of its outbox.
+    pub fn step_counted(
+        &mut self,
+        tick: u64,
+        budget: Budget,
+        demand: Demand,
+        armed: &'static std::thread::LocalKey<std::cell::Cell<bool>>,
+    ) {
+        self.place(tick);
+        self.fill();
+        let input = TickInput {
+            inbox: &self.inbox,
+            edits: &[],
+            demand,
+            budget,
+            cause: TickCause::Frame,
+            cause_source: None,
+            woke_ns: self.clock.monotonic_ns(),
+            pulse: None,
+        };
+        armed.with(|armed| armed.set(true));
+        self.engine.tick(input);
+        armed.with(|armed| armed.set(false));
+    }
+
+    fn place(&mut self, tick: u64) {
         #[allow(clippy::cast_precision_loss, reason = "small counts")]
         let time_s = tick as f64 * 0.01;
         for at in 0..self.rows.len() {
             let pose = self.motions[at].pose_at(time_s);
             self.set(at, &pose);
         }
-        self.send(budget, demand)
     }
 
     /// Sets the pose of the `at`-th moving body in the next frame.
@@ -109,6 +138,12 @@ impl Drive {
 
     /// Sends the rows as they are and runs a tick.
     pub fn send(&mut self, budget: Budget, demand: Demand) -> &Outbox {
+        self.fill();
+        self.tick(budget, demand, TickCause::Frame)
+    }
+
+    /// Fills the inbox with a full frame of the rows as they are.
+    fn fill(&mut self) {
         self.clock.advance(FRAME_NS);
         self.seq += 1;
         self.inbox.clear();
@@ -125,7 +160,6 @@ impl Drive {
         };
         frame.received_ns = self.clock.boottime_ns();
         frame.set_transforms(&self.rows);
-        self.tick(budget, demand, TickCause::Frame)
     }
 
     /// Runs a tick without a frame.

@@ -1,0 +1,68 @@
+//! `sweepd run`: the daemon on shared memory.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use crate::config::Mode;
+use crate::daemon::{Daemon, build_shapes};
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::time::{Clock, SystemClock};
+use crate::transport::iceoryx::{Place, Server, ServerOptions, spawn_cleaner};
+
+use super::args::{Limit, RunArgs};
+
+/// Runs the daemon until a signal, or for the ticks asked for.
+pub(super) fn run(args: &RunArgs, stop: &AtomicBool) -> Result<bool> {
+    let mut scene = Scene::load(&args.scene)?;
+    apply(args, &mut scene)?;
+    let shapes = build_shapes(&scene)?;
+    for warning in &shapes.warnings {
+        tracing::warn!("{warning}");
+    }
+    let place = Place::new(&args.which.instance)?;
+    let boot_id = crate::transport::client::random_u64()?;
+    let mut options = ServerOptions::new(place.clone(), boot_id);
+    options.heartbeat_ns = scene.config.heartbeat_ns;
+    options.busy_poll = args.busy_poll;
+    let mut server = Server::open(options)?;
+    // Dead clients are cleaned up beside the tick, never in it.
+    let _cleaner = spawn_cleaner(&place)?;
+    let clock: Arc<dyn Clock> = Arc::new(SystemClock);
+    let mut daemon = Daemon::new(&scene, shapes, boot_id, clock, &mut server)?;
+    tracing::info!(
+        "instance `{}` runs {}: {} bodies, {} sources",
+        args.which.instance,
+        args.scene.display(),
+        scene.bodies.len(),
+        scene.sources.len()
+    );
+    daemon.run(stop, args.ticks)?;
+    tracing::info!("ended after {} ticks", daemon.engine().ticks());
+    Ok(true)
+}
+
+/// Flags override the scene.
+fn apply(args: &RunArgs, scene: &mut Scene) -> Result<()> {
+    let limit = |limit| match limit {
+        Limit::None => None,
+        Limit::Of(most) => Some(most),
+    };
+    if let Some(budget) = args.budget {
+        scene.config.budget.time_ns = limit(budget);
+    }
+    if let Some(units) = args.budget_units {
+        scene.config.budget.units = limit(units);
+    }
+    if let Some(mode) = &args.mode {
+        if let Mode::OnFrame(source) = mode
+            && !scene.sources.iter().any(|own| own.name == *source)
+        {
+            return Err(Error::Usage(format!(
+                "--mode on_frame={source}: the scene has no source of that name; add a [[source]] or name another"
+            )));
+        }
+        scene.config.mode = mode.clone();
+    }
+    Ok(())
+}

@@ -1,0 +1,80 @@
+//! Goal: no allocation in a tick after warm-up at constant scene size. Method: a counting allocator around the system's,
+//! armed for the ticks that count.
+
+#![allow(unsafe_code, reason = "a counting allocator has no safe form")]
+#![allow(clippy::unwrap_used, reason = "a test")]
+
+mod harness;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use harness::Drive;
+use sweepd::builtin::{Pattern, pile, pool};
+use sweepd::time::Budget;
+use sweepd::wire::Demand;
+
+struct Counting;
+
+thread_local! {
+    static ARMED: Cell<bool> = const { Cell::new(false) };
+    static COUNT: Cell<u64> = const { Cell::new(0) };
+}
+
+fn note() {
+    ARMED.with(|armed| {
+        if armed.get() {
+            COUNT.with(|count| count.set(count.get() + 1));
+        }
+    });
+}
+
+// SAFETY: every call goes to the system's allocator unchanged; counting touches two thread-local cells that need no
+// memory of their own.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        note();
+        // SAFETY: the caller's promise about `layout` is passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: `pointer` came from `alloc` above with this layout.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        note();
+        // SAFETY: as in `dealloc`, and the caller's promise about `size` is passed on.
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Allocations of a motion's frames at their third time: what they need has been seen.
+fn count(scene: &str, budget: Budget, ticks: u64) -> u64 {
+    let mut drive = Drive::new(scene, Pattern::Wander, 3);
+    for tick in (0..ticks).chain(0..ticks) {
+        drive.step(tick, budget, Demand::ALL);
+    }
+    for tick in 0..ticks {
+        COUNT.with(|count| count.set(0));
+        drive.step_counted(tick, budget, Demand::ALL, &ARMED);
+        let now = COUNT.with(Cell::get);
+        if now > 0 {
+            return now;
+        }
+    }
+    0
+}
+
+#[test]
+fn a_tick_allocates_nothing_after_warm_up() {
+    for (name, scene) in [("pool", pool(300, 1)), ("pile", pile(300, 2))] {
+        for budget in [Budget::UNLIMITED, Budget::units(50), Budget::time_ns(100_000)] {
+            assert_eq!(count(&scene, budget, 150), 0, "{name} with {budget:?}");
+        }
+    }
+}
