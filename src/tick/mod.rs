@@ -4,7 +4,7 @@
 //! In: [`TickInput`] (frames, edits, demand, budget, and why this tick). Out: a filled [`Outbox`].
 
 mod floor;
-// pub mod pace;
+pub mod pace;
 
 use std::sync::Arc;
 

@@ -71,6 +71,11 @@ impl Inbox {
         &self.frames[..self.len]
     }
 
+    /// The frames, to be taken out by swapping, so that memory goes round and none is allocated.
+    pub fn frames_mut(&mut self) -> &mut [Frame] {
+        &mut self.frames[..self.len]
+    }
+
     /// Notes that the node behind a session is gone; the session is over after this inbox's frames.
     pub fn end_session(&mut self, session: u64) {
         self.ended.push(session);

@@ -83,6 +83,9 @@ impl World {
         let Some(source) = self.source_named(name) else {
             return Err((None, RejectReason::UnknownSource));
         };
+        if let Some(reason) = frame.refused {
+            return Err((Some(source), reason));
+        }
         let rows = frame.transforms.len();
         let paused = header.flags == frame_flags::PAUSED;
         let has_poses = matches!(header.flags, frame_flags::FULL | frame_flags::PARTIAL);

@@ -15,7 +15,7 @@ use super::rules::sides_of;
 use crate::ids::{BodyId, BodySlot, SourceSlot};
 use crate::math::Pose;
 use crate::scene::{BodySpec, PairRule};
-use crate::wire::{BodyStatus, EndCause};
+use crate::wire::EndCause;
 
 /// One change of the scene.
 #[derive(Clone, Debug)]
@@ -396,10 +396,8 @@ impl World {
             let Some(body) = self.body(slot) else {
                 continue;
             };
-            let margin_m = self.margin_of(slot, body);
-            let entry = &self.entries[index];
-            let narrowed = body.status != BodyStatus::Stale && entry.widened_m != margin_m;
-            if entry.widened_m < margin_m || narrowed {
+            let wanted_m = self.widening(slot, body, body.reach_m);
+            if wanted_m.to_bits() != self.entries[index].widened_m.to_bits() {
                 self.settle(slot, false);
             }
         }

@@ -149,8 +149,9 @@ impl Lists {
     /// What is wrong with the places, if anything.
     pub(super) fn validate(&self) -> Result<(), String> {
         let set = &self.set;
-        let lists: [(&str, &Vec<BodySlot>, fn(&Places) -> u32); 4] = [
-            ("inserted", &set.inserted, |p| p.inserted),
+        type Place = fn(&Places) -> u32;
+        let lists = [
+            ("inserted", &set.inserted, (|p| p.inserted) as Place),
             ("moved", &set.moved, |p| p.moved),
             ("requery", &set.requery, |p| p.requery),
             ("restated", &set.restated, |p| p.restated),

@@ -349,4 +349,13 @@ impl World {
             }
         }
     }
+
+    /// As [`World::session_dead`], of whichever sources this session speaks for.
+    pub fn end_session(&mut self, session: u64) {
+        for place in 0..self.sources.len() {
+            if self.sources[place].session == session {
+                self.session_dead(SourceSlot(slot_at(place).0));
+            }
+        }
+    }
 }

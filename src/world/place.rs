@@ -167,15 +167,9 @@ impl World {
         };
         let judged = self.judge(slot, body);
         let (was_status, was_reach_m, was_in) = (body.status, body.reach_m, body.in_broad);
-        let margin_m = self.margin_of(slot, body);
+        let widened_m = self.widening(slot, body, judged.reach_m);
         let entry = &mut self.entries[slot.index()];
         entry.touched = self.tick;
-        // A reach without bound leaves the box as it was: the pairs it has are kept, no new ones are made from it.
-        let widened_m = if judged.reach_m.is_finite() {
-            (margin_m + judged.reach_m).next_up()
-        } else {
-            entry.widened_m.max(margin_m)
-        };
         let Some(body) = self.bodies[slot.index()].as_mut() else {
             return;
         };
@@ -249,6 +243,18 @@ impl World {
         }
         if restated {
             self.lists.restated(slot);
+        }
+    }
+
+    /// By how much a body's box is to be wider than tight at a reach, metres.
+    ///
+    /// A reach without bound leaves the box as it was: the pairs it has are kept, no new ones are made from it.
+    pub(super) fn widening(&self, slot: BodySlot, body: &Body, reach_m: f64) -> f64 {
+        let margin_m = self.margin_of(slot, body);
+        if reach_m.is_finite() {
+            (margin_m + reach_m).next_up()
+        } else {
+            self.entries[slot.index()].widened_m.max(margin_m)
         }
     }
 

@@ -1,5 +1,7 @@
 //! Scenes of 1 m cubes, frames, and a world that checks itself after every step.
 
+#![allow(dead_code, reason = "two test crates include this file")]
+
 use std::sync::Arc;
 
 use sweepd::config::{Config, OnStale};
@@ -12,14 +14,14 @@ use sweepd::wire::{
 };
 use sweepd::world::{Admission, Body, Edit, PlacedShape, World};
 
-pub const MS: u64 = 1_000_000;
+pub(crate) const MS: u64 = 1_000_000;
 /// The time-out of every source here.
-pub const TIMEOUT_NS: u64 = 500 * MS;
+pub(crate) const TIMEOUT_NS: u64 = 500 * MS;
 /// When the daemon starts.
-pub const START_NS: u64 = 10_000 * MS;
+pub(crate) const START_NS: u64 = 10_000 * MS;
 
 /// A cube of 1 m, centred.
-pub fn cube() -> Arc<[PlacedShape]> {
+pub(crate) fn cube() -> Arc<[PlacedShape]> {
     let corner = |k: usize| {
         let at = |bit: usize| if k & bit == 0 { -0.5 } else { 0.5 };
         Point::new(at(1), at(2), at(4))
@@ -52,7 +54,7 @@ pub fn cube() -> Arc<[PlacedShape]> {
 }
 
 /// A half-space.
-pub fn floor() -> Arc<[PlacedShape]> {
+pub(crate) fn floor() -> Arc<[PlacedShape]> {
     let everywhere = Point::new(f64::INFINITY, f64::INFINITY, f64::INFINITY);
     let shape = Shape {
         aabb: sweepd::math::Aabb {
@@ -73,7 +75,7 @@ pub fn floor() -> Arc<[PlacedShape]> {
 }
 
 /// A body that moves, of the first source.
-pub fn moving(name: &str, id: u64) -> BodySpec {
+pub(crate) fn moving(name: &str, id: u64) -> BodySpec {
     let shape = ShapeSpec::Box {
         half_extents: [0.5; 3],
     };
@@ -101,7 +103,7 @@ pub fn moving(name: &str, id: u64) -> BodySpec {
 }
 
 /// A body that cannot move, at `x` metres.
-pub fn fixed(name: &str, id: u64, x: f64) -> BodySpec {
+pub(crate) fn fixed(name: &str, id: u64, x: f64) -> BodySpec {
     BodySpec {
         moves: false,
         source: None,
@@ -110,7 +112,7 @@ pub fn fixed(name: &str, id: u64, x: f64) -> BodySpec {
     }
 }
 
-pub fn rule(action: PairAction, a: &str, b: &str) -> PairRule {
+pub(crate) fn rule(action: PairAction, a: &str, b: &str) -> PairRule {
     PairRule {
         action,
         a: a.to_owned(),
@@ -120,7 +122,8 @@ pub fn rule(action: PairAction, a: &str, b: &str) -> PairRule {
     }
 }
 
-pub fn scene(bodies: Vec<BodySpec>, rules: Vec<PairRule>) -> Scene {
+/// A scene of two sources, `sim` and `robot`.
+pub(crate) fn scene(bodies: Vec<BodySpec>, rules: Vec<PairRule>) -> Scene {
     let source = |name: &str| SourceSpec {
         name: name.to_owned(),
         timeout_ns: TIMEOUT_NS,
@@ -136,7 +139,7 @@ pub fn scene(bodies: Vec<BodySpec>, rules: Vec<PairRule>) -> Scene {
 }
 
 /// A row at `x` metres.
-pub fn row(body: u64, x: f64) -> TransformRow {
+pub(crate) fn row(body: u64, x: f64) -> TransformRow {
     TransformRow {
         body,
         position: [x, 0.0, 0.0],
@@ -146,7 +149,7 @@ pub fn row(body: u64, x: f64) -> TransformRow {
 }
 
 /// A full frame of session 1 of `source`, sent at `at_ns`.
-pub fn frame(source: &str, seq: u64, at_ns: u64, rows: &[TransformRow]) -> Frame {
+pub(crate) fn frame(source: &str, seq: u64, at_ns: u64, rows: &[TransformRow]) -> Frame {
     let mut frame = Frame::default();
     frame.header.schema = WIRE_VERSION;
     frame.header.source = name_bytes(source);
@@ -161,18 +164,18 @@ pub fn frame(source: &str, seq: u64, at_ns: u64, rows: &[TransformRow]) -> Frame
 }
 
 /// A world and its time; every step is followed by a full check of the structure.
-pub struct Bench {
-    pub world: World,
-    pub now_ns: u64,
-    pub tick: u64,
+pub(crate) struct Bench {
+    pub(crate) world: World,
+    pub(crate) now_ns: u64,
+    pub(crate) tick: u64,
 }
 
 impl Bench {
-    pub fn of(bodies: Vec<BodySpec>) -> Self {
+    pub(crate) fn of(bodies: Vec<BodySpec>) -> Self {
         Self::with_rules(bodies, Vec::new())
     }
 
-    pub fn with_rules(bodies: Vec<BodySpec>, rules: Vec<PairRule>) -> Self {
+    pub(crate) fn with_rules(bodies: Vec<BodySpec>, rules: Vec<PairRule>) -> Self {
         let shapes = bodies.iter().map(|_| cube()).collect();
         let world = World::new(&scene(bodies, rules), shapes, START_NS).unwrap();
         let mut bench = Self {
@@ -185,7 +188,12 @@ impl Bench {
     }
 
     /// One tick: edits (one request each), frames, ages; then the structure is checked.
-    pub fn tick_at(&mut self, now_ns: u64, edits: &[Edit], frames: &[Frame]) -> Vec<Admission> {
+    pub(crate) fn tick_at(
+        &mut self,
+        now_ns: u64,
+        edits: &[Edit],
+        frames: &[Frame],
+    ) -> Vec<Admission> {
         self.tick += 1;
         self.now_ns = now_ns;
         self.world.begin_tick(self.tick);
@@ -200,7 +208,7 @@ impl Bench {
     }
 
     /// A tick `after_ns` later with one frame that has just come.
-    pub fn send(
+    pub(crate) fn send(
         &mut self,
         after_ns: u64,
         source: &str,
@@ -212,17 +220,17 @@ impl Bench {
     }
 
     /// A tick `after_ns` later with nothing new.
-    pub fn wait(&mut self, after_ns: u64) {
+    pub(crate) fn wait(&mut self, after_ns: u64) {
         self.tick_at(self.now_ns + after_ns, &[], &[]);
     }
 
     /// A tick at once with one edit.
-    pub fn edit(&mut self, edit: Edit) {
+    pub(crate) fn edit(&mut self, edit: Edit) {
         self.tick_at(self.now_ns, &[edit], &[]);
     }
 
     /// What a refused request says; nothing may have changed.
-    pub fn refused(&mut self, edits: &[Edit]) -> String {
+    pub(crate) fn refused(&mut self, edits: &[Edit]) -> String {
         let (rev, changes) = (
             self.world.scene_rev(),
             format!("{:?}", self.world.changes()),
@@ -234,46 +242,46 @@ impl Bench {
         text
     }
 
-    pub fn slot(&self, name: &str) -> BodySlot {
+    pub(crate) fn slot(&self, name: &str) -> BodySlot {
         self.world.slot_named(name).unwrap()
     }
 
-    pub fn body(&self, name: &str) -> &Body {
+    pub(crate) fn body(&self, name: &str) -> &Body {
         self.world.body(self.slot(name)).unwrap()
     }
 
-    pub fn status(&self, name: &str) -> BodyStatus {
+    pub(crate) fn status(&self, name: &str) -> BodyStatus {
         self.body(name).status
     }
 
-    pub fn inserted(&self, name: &str) -> bool {
+    pub(crate) fn inserted(&self, name: &str) -> bool {
         self.world.changes().inserted.contains(&self.slot(name))
     }
 
     /// Why the body left the broad phase in this tick.
-    pub fn removed(&self, name: &str) -> Option<EndCause> {
+    pub(crate) fn removed(&self, name: &str) -> Option<EndCause> {
         let slot = self.slot(name);
         let removed = &self.world.changes().removed;
         removed.iter().find(|r| r.slot == slot).map(|r| r.cause)
     }
 
-    pub fn rejects(&self, reason: RejectReason) -> u64 {
+    pub(crate) fn rejects(&self, reason: RejectReason) -> u64 {
         self.world.rejects()[usize::from(reason.code())]
     }
 
-    pub fn has_reason(&self, reason: sweepd::wire::Reason) -> bool {
+    pub(crate) fn has_reason(&self, reason: sweepd::wire::Reason) -> bool {
         self.world.counts().reasons & reason.bit() != 0
     }
 }
 
-pub fn refused(source: u32, reason: RejectReason) -> Admission {
+pub(crate) fn refused(source: u32, reason: RejectReason) -> Admission {
     Admission::Refused {
         source: Some(SourceSlot(source)),
         reason,
     }
 }
 
-pub fn admitted(source: u32, poses: u64, refused_rows: u64) -> Admission {
+pub(crate) fn admitted(source: u32, poses: u64, refused_rows: u64) -> Admission {
     Admission::Admitted {
         source: SourceSlot(source),
         poses,

@@ -1,0 +1,529 @@
+//! Goal: the modes of DESIGN 4.4, and that silence is never taken for safety. Method: the pacer and a world, a clock
+//! turned by hand from wake-up to wake-up, frames delivered at given times; every tick is noted down.
+#![allow(
+    clippy::unwrap_used,
+    clippy::float_cmp,
+    reason = "helpers of tests are not covered by the test allowance; milliseconds here are whole numbers"
+)]
+
+#[path = "law_world/support.rs"]
+mod support;
+
+use sweepd::config::{Config, Mode};
+use sweepd::ids::SourceSlot;
+use sweepd::scene::Scene;
+use sweepd::tick::pace::{Due, Pacer};
+use sweepd::time::{Clock, ManualClock};
+use sweepd::wire::{BodyStatus, Frame, Inbox, TickCause, frame_flags};
+use sweepd::world::{Edit, World};
+
+use support::{MS, START_NS, TIMEOUT_NS, cube, fixed, frame, moving, row, scene};
+
+const HEARTBEAT_NS: u64 = 100 * MS;
+const LATE_NS: u64 = 5 * MS;
+
+/// One tick as it went out.
+#[derive(Clone, Debug)]
+struct Tick {
+    /// Since the start.
+    at_ms: f64,
+    due: Due,
+    /// `(source, seq)` of its frames.
+    frames: Vec<(String, u64)>,
+    /// Whether the world alone forbids `clear`.
+    unsafe_word: bool,
+    known: u64,
+}
+
+/// A daemon without transports: pacer, world, clock.
+struct Daemon {
+    pacer: Pacer,
+    world: World,
+    clock: ManualClock,
+    drained: Inbox,
+    inbox: Inbox,
+    edits: Vec<Edit>,
+    ticks: Vec<Tick>,
+    passed: Vec<(Option<SourceSlot>, u64)>,
+}
+
+fn two_bodies(mode: Mode) -> Scene {
+    let mut robot = moving("b", 2);
+    robot.source = Some(1);
+    let mut scene = scene(
+        vec![moving("a", 1), robot, fixed("wall", 3, 9.0)],
+        Vec::new(),
+    );
+    scene.config = Config {
+        mode,
+        heartbeat_ns: HEARTBEAT_NS,
+        late_ns: LATE_NS,
+        ..Config::default()
+    };
+    scene
+}
+
+impl Daemon {
+    fn of(mode: Mode) -> Self {
+        let scene = two_bodies(mode);
+        let shapes = scene.bodies.iter().map(|_| cube()).collect();
+        Self {
+            pacer: Pacer::new(&scene.config, &scene.sources).unwrap(),
+            world: World::new(&scene, shapes, START_NS).unwrap(),
+            clock: ManualClock::new(START_NS),
+            drained: Inbox::default(),
+            inbox: Inbox::default(),
+            edits: Vec::new(),
+            ticks: Vec::new(),
+            passed: Vec::new(),
+        }
+    }
+
+    /// Delivers frames (milliseconds since the start, frame) and runs every tick that falls due until `end_ms`.
+    fn run(&mut self, end_ms: f64, mut frames: Vec<(f64, Frame)>) -> &[Tick] {
+        let first = self.ticks.len();
+        let end_ns = ns(end_ms);
+        frames.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut frames = frames.into_iter().peekable();
+        loop {
+            self.run_due();
+            let now_ns = self.clock.boottime_ns();
+            let wake_ns = self.pacer.wake_ns(now_ns, self.world.next_timeout());
+            assert!(wake_ns > now_ns, "woken for nothing");
+            let next_ns = frames.peek().map_or(u64::MAX, |f| ns(f.0)).min(wake_ns);
+            if next_ns > end_ns {
+                self.clock.advance(end_ns - now_ns);
+                return &self.ticks[first..];
+            }
+            self.clock.advance(next_ns - now_ns);
+            while let Some((at_ms, mut frame)) = frames.next_if(|f| ns(f.0) <= next_ns) {
+                frame.received_ns = ns(at_ms);
+                frame.header.sent_ns = ns(at_ms);
+                *self.drained.push() = frame;
+            }
+            self.pacer.take(&mut self.drained, next_ns);
+        }
+    }
+
+    fn run_due(&mut self) {
+        loop {
+            let now_ns = self.clock.boottime_ns();
+            let timeout_ns = self.world.next_timeout();
+            let edits = !self.edits.is_empty();
+            let Some(due) = self.pacer.due(now_ns, edits, timeout_ns, &mut self.inbox) else {
+                return;
+            };
+            self.tick(due, now_ns);
+        }
+    }
+
+    fn tick(&mut self, due: Due, now_ns: u64) {
+        self.world.begin_tick(self.ticks.len() as u64 + 1);
+        for edit in self.edits.drain(..) {
+            self.world.apply(&[edit]).unwrap();
+        }
+        for frame in self.inbox.frames() {
+            self.world.admit(frame, now_ns);
+        }
+        for &session in self.inbox.ended() {
+            self.world.end_session(session);
+        }
+        self.world.age(now_ns);
+        self.world.validate().unwrap();
+        let passed = &mut self.passed;
+        self.pacer
+            .drain_passed(|source, n| passed.push((source, n)));
+        let name = |f: &Frame| sweepd::wire::name_str(&f.header.source).unwrap().to_owned();
+        let frames = self.inbox.frames().iter();
+        let counts = self.world.counts();
+        self.ticks.push(Tick {
+            at_ms: (now_ns - START_NS) as f64 / MS as f64,
+            due,
+            frames: frames.map(|f| (name(f), f.header.seq)).collect(),
+            unsafe_word: counts.unknown > 0 || counts.reasons != 0,
+            known: counts.by_status[usize::from(BodyStatus::Known.code())],
+        });
+    }
+
+    fn passed_of(&self, source: u32) -> u64 {
+        let of = self
+            .passed
+            .iter()
+            .filter(|p| p.0 == Some(SourceSlot(source)));
+        of.map(|p| p.1).sum()
+    }
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "small positive milliseconds"
+)]
+fn ns(ms: f64) -> u64 {
+    START_NS + (ms * MS as f64).round() as u64
+}
+
+fn modes() -> [Mode; 4] {
+    [
+        Mode::OnFrame("sim".to_owned()),
+        Mode::OnAll,
+        Mode::Rate(500.0),
+        Mode::Rate(2.0),
+    ]
+}
+
+fn sim(seq: u64) -> Frame {
+    frame("sim", seq, 0, &[row(1, 0.0)])
+}
+
+fn robot(seq: u64) -> Frame {
+    frame("robot", seq, 0, &[row(2, 5.0)])
+}
+
+/// `count` frames, one each `every_ms` from `from_ms` on, numbered from 1.
+fn stream(make: fn(u64) -> Frame, count: u64, from_ms: f64, every_ms: f64) -> Vec<(f64, Frame)> {
+    (0..count)
+        .map(|k| (from_ms + every_ms * k as f64, make(k + 1)))
+        .collect()
+}
+
+fn assert_heartbeats(ticks: &[Tick], from_ms: f64, end_ms: f64) {
+    let mut last_ms = from_ms;
+    for at_ms in ticks.iter().map(|t| t.at_ms).chain([end_ms]) {
+        assert!(
+            at_ms - last_ms <= 100.0,
+            "silence from {last_ms} to {at_ms} ms"
+        );
+        last_ms = at_ms;
+    }
+}
+
+fn causes(ticks: &[Tick]) -> Vec<TickCause> {
+    ticks.iter().map(|t| t.due.cause).collect()
+}
+
+#[test]
+fn law_4_4_silence_of_a_daemon_started_without_sources_is_never_clear() {
+    for mode in modes() {
+        let mut daemon = Daemon::of(mode);
+        let ticks = daemon.run(2000.0, Vec::new());
+        assert_eq!(ticks[0].at_ms, 0.0, "the first tick goes out at once");
+        assert_heartbeats(ticks, 0.0, 2000.0);
+        assert!(ticks.iter().all(|t| t.unsafe_word));
+    }
+}
+
+#[test]
+fn law_4_4_silence_of_killed_sources_is_never_clear() {
+    for mode in modes() {
+        let mut daemon = Daemon::of(mode.clone());
+        let mut frames = stream(sim, 50, 1.0, 10.0);
+        frames.extend(stream(robot, 50, 1.0, 10.0));
+        // The last frames come at 491 ms.
+        let ticks = daemon.run(3000.0, frames);
+        assert_heartbeats(ticks, 0.0, 3000.0);
+        assert!(
+            ticks.iter().any(|t| !t.unsafe_word),
+            "{mode:?}: it was well before"
+        );
+        let after = |t: &&Tick| t.at_ms >= 991.0;
+        assert!(
+            ticks.iter().filter(after).all(|t| t.unsafe_word),
+            "{mode:?}"
+        );
+        let timeout = ticks.iter().find(|t| t.due.cause == TickCause::Timeout);
+        assert!(timeout.is_some_and(|t| t.at_ms <= 991.0), "{mode:?}");
+    }
+}
+
+#[test]
+fn law_4_4_silence_of_a_pose_that_is_never_sent_is_never_clear() {
+    for mode in modes() {
+        let mut daemon = Daemon::of(mode);
+        // The robot never sends.
+        let ticks = daemon.run(2000.0, stream(sim, 200, 1.0, 10.0));
+        assert_heartbeats(ticks, 0.0, 2000.0);
+        assert!(ticks.iter().all(|t| t.unsafe_word));
+    }
+}
+
+#[test]
+fn law_4_4_silence_of_a_suspended_machine_is_never_clear() {
+    for mode in modes() {
+        let mut daemon = Daemon::of(mode.clone());
+        let mut frames = stream(sim, 40, 1.0, 10.0);
+        frames.extend(stream(robot, 40, 1.0, 10.0));
+        daemon.run(400.0, frames);
+        // Asleep for an hour; the wake-up is late by all of it.
+        daemon.clock.advance(3_600_000 * MS);
+        let first = daemon.ticks.len();
+        daemon.run_due();
+        let ticks = &daemon.ticks[first..];
+        assert!(!ticks.is_empty(), "{mode:?}");
+        assert!(
+            ticks.iter().all(|t| t.unsafe_word && t.known == 1),
+            "{mode:?}"
+        );
+    }
+}
+
+#[test]
+fn law_4_4_on_frame_makes_one_tick_of_each_frame_in_order() {
+    let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
+    // Five frames at once, and a robot that is ten times as fast.
+    let mut frames: Vec<_> = (1..=5).map(|seq| (20.0, sim(seq))).collect();
+    frames.extend(stream(robot, 100, 0.5, 1.0));
+    let ticks = daemon.run(100.0, frames);
+    let by_frame: Vec<_> = ticks
+        .iter()
+        .filter(|t| t.due.cause == TickCause::Frame)
+        .collect();
+    assert_eq!(by_frame.len(), 5);
+    for (tick, seq) in by_frame.iter().zip(1..) {
+        assert!(tick.frames.contains(&("sim".to_owned(), seq)));
+        assert_eq!(tick.due.source, Some(SourceSlot(0)));
+        assert!(!tick.due.ages_only);
+    }
+    // The robot's newest goes with the first, the nineteen before it are passed over and counted.
+    assert_eq!(by_frame[0].frames[0], ("robot".to_owned(), 20));
+    assert_eq!(daemon.passed_of(0), 0);
+    assert!(daemon.passed_of(1) >= 19);
+    // All other ticks judge ages only and take nothing.
+    let others = daemon
+        .ticks
+        .iter()
+        .filter(|t| t.due.cause != TickCause::Frame);
+    for tick in others {
+        assert!(tick.due.ages_only && tick.frames.is_empty());
+    }
+}
+
+#[test]
+fn law_4_4_a_paused_frame_counts_as_a_frame_in_every_mode() {
+    for mode in modes() {
+        let mut daemon = Daemon::of(mode.clone());
+        let pause = |seq| {
+            let mut frame = frame("sim", seq, 0, &[]);
+            frame.header.flags = frame_flags::PAUSED;
+            frame
+        };
+        let mut frames = vec![(1.0, sim(1)), (1.0, robot(1))];
+        frames.extend((2..=12).map(|seq| (100.0 * seq as f64, pause(seq))));
+        frames.extend((2..=12).map(|seq| (100.0 * seq as f64, robot(seq))));
+        let ticks = daemon.run(1250.0, frames);
+        assert!(ticks.last().is_some_and(|t| t.known == 3), "{mode:?}");
+        if mode == Mode::OnFrame("sim".to_owned()) {
+            let by_frame = ticks.iter().filter(|t| t.due.cause == TickCause::Frame);
+            assert_eq!(by_frame.count(), 12);
+        }
+    }
+}
+
+#[test]
+fn law_4_4_a_round_takes_the_newest_frame_of_each_live_source() {
+    let mut daemon = Daemon::of(Mode::OnAll);
+    let frames = vec![
+        (1.0, sim(1)),
+        (1.0, robot(1)),
+        // The faster source sends twice before the slower one: its first is passed over.
+        (10.0, sim(2)),
+        (11.0, sim(3)),
+        (12.0, robot(2)),
+    ];
+    let ticks = daemon.run(50.0, frames);
+    let taken = |t: &Tick, name: &str, seq| t.frames.contains(&(name.to_owned(), seq));
+    assert_eq!(
+        causes(ticks),
+        [TickCause::Heartbeat, TickCause::Frame, TickCause::Frame]
+    );
+    assert!(taken(&ticks[1], "sim", 1) && taken(&ticks[1], "robot", 1));
+    assert_eq!(ticks[2].at_ms, 12.0);
+    assert!(taken(&ticks[2], "sim", 3) && taken(&ticks[2], "robot", 2));
+    assert_eq!(daemon.passed_of(0), 1);
+}
+
+#[test]
+fn law_4_4_a_late_source_is_not_waited_for_until_its_next_frame() {
+    let mut daemon = Daemon::of(Mode::OnAll);
+    let frames = vec![
+        (1.0, sim(1)),
+        (1.0, robot(1)),
+        // The robot is late for this round, which closes 5 ms after its first frame, ...
+        (10.0, sim(2)),
+        // ... and holds up none of the next ones, ...
+        (20.0, sim(3)),
+        (30.0, sim(4)),
+        // ... until it is back: its own frame opens a round that takes the sim's.
+        (35.0, robot(2)),
+        (37.0, sim(5)),
+        (40.0, sim(6)),
+    ];
+    let ticks = daemon.run(60.0, frames);
+    let at: Vec<f64> = ticks[1..].iter().map(|t| t.at_ms).collect();
+    assert_eq!(at, [1.0, 15.0, 20.0, 30.0, 37.0, 45.0]);
+}
+
+#[test]
+fn law_4_4_a_partial_frame_is_never_passed_over_for_a_newer_one() {
+    let mut daemon = Daemon::of(Mode::Rate(50.0));
+    let partial = |seq, body| {
+        let mut frame = frame("sim", seq, 0, &[row(body, 1.0)]);
+        frame.header.flags = frame_flags::PARTIAL;
+        frame
+    };
+    let frames = vec![
+        (1.0, partial(1, 1)),
+        (2.0, partial(2, 99)),
+        (3.0, sim(3)),
+        (4.0, sim(4)),
+    ];
+    let ticks = daemon.run(25.0, frames);
+    assert_eq!(
+        daemon.passed_of(0),
+        3,
+        "full frames stand for all before them"
+    );
+    assert_eq!(daemon.ticks.last().unwrap().frames, [("sim".to_owned(), 4)]);
+    let frames = vec![
+        (26.0, sim(5)),
+        (27.0, partial(6, 1)),
+        (28.0, partial(7, 99)),
+    ];
+    let ticks_len = daemon.run(45.0, frames).len();
+    assert!(ticks_len > 0);
+    assert_eq!(daemon.ticks.last().unwrap().frames.len(), 3);
+    assert_eq!(daemon.passed_of(0), 3);
+}
+
+#[test]
+fn law_4_4_a_rate_does_not_make_up_for_missed_beats() {
+    let mut daemon = Daemon::of(Mode::Rate(100.0));
+    let ticks = daemon.run(50.0, Vec::new());
+    assert_eq!(ticks.len(), 6, "at 0, 10, .. 50 ms");
+    // The daemon is held up for 35 ms: one tick at once, then the beats as they were.
+    daemon.clock.advance(35 * MS);
+    let at: Vec<f64> = daemon
+        .run(110.0, Vec::new())
+        .iter()
+        .map(|t| t.at_ms)
+        .collect();
+    assert_eq!(at, [85.0, 90.0, 100.0, 110.0]);
+}
+
+#[test]
+fn law_4_4_a_slow_rate_takes_the_newest_state_with_each_heartbeat() {
+    let mut daemon = Daemon::of(Mode::Rate(1.0));
+    let mut frames = stream(sim, 190, 1.0, 10.0);
+    frames.extend(stream(robot, 190, 1.0, 10.0));
+    let ticks = daemon.run(1900.0, frames);
+    assert_heartbeats(ticks, 0.0, 1900.0);
+    // A body is not called stale because its frames waited for the beat.
+    assert!(ticks[1..].iter().all(|t| t.known == 3 && !t.unsafe_word));
+}
+
+#[test]
+fn law_4_4_an_edit_makes_a_tick_at_once_in_every_mode() {
+    for mode in modes() {
+        let mut daemon = Daemon::of(mode.clone());
+        daemon.run(33.0, Vec::new());
+        daemon.edits.push(Edit::Remove {
+            name: "wall".to_owned(),
+        });
+        let first = daemon.ticks.len();
+        daemon.run_due();
+        assert_eq!(
+            causes(&daemon.ticks[first..]),
+            [TickCause::Edit],
+            "{mode:?}"
+        );
+        assert_eq!(daemon.world.scene_rev(), 2);
+        let ages_only = matches!(mode, Mode::OnFrame(_));
+        assert_eq!(daemon.ticks[first].due.ages_only, ages_only);
+    }
+}
+
+#[test]
+fn law_4_2_a_session_that_was_heard_in_time_is_not_taken_over_by_a_frame_that_waited_behind_it() {
+    let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
+    let mut other = robot(1);
+    other.header.session = 77;
+    // The robot sends all the time; an intruder asks once; no tick for 700 ms takes either.
+    let mut frames = vec![
+        (1.0, robot(1)),
+        (2.0, sim(1)),
+        (600.0, other),
+        (710.0, sim(2)),
+    ];
+    frames.extend((2..=70).map(|seq| (10.0 * seq as f64, robot(seq))));
+    daemon.run(720.0, frames);
+    assert_eq!(daemon.world.sources()[1].session, 1);
+    let taken = sweepd::wire::RejectReason::SourceTaken;
+    assert_eq!(daemon.world.rejects()[usize::from(taken.code())], 1);
+}
+
+#[test]
+fn law_4_2_an_ended_session_ends_after_the_last_of_its_frames() {
+    let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
+    *daemon.drained.push() = robot(1);
+    daemon.drained.end_session(1);
+    let now_ns = daemon.clock.boottime_ns();
+    daemon.pacer.take(&mut daemon.drained, now_ns);
+    // The first tick is a heartbeat and takes no frame: the session is not ended before it was heard.
+    daemon.run(10.0, Vec::new());
+    assert_eq!(daemon.world.sources()[1].frames(), 0);
+    let mut lead = sim(1);
+    lead.header.session = 2;
+    daemon.run(20.0, vec![(15.0, lead)]);
+    assert_eq!(daemon.world.sources()[1].frames(), 1);
+    assert_eq!(daemon.world.sources()[1].session, 0);
+}
+
+#[test]
+fn frames_of_no_source_and_beyond_the_limit_are_counted() {
+    let mut daemon = Daemon::of(Mode::OnAll);
+    let frames = (0..100)
+        .map(|seq| (1.0, frame("nobody", seq, 0, &[])))
+        .collect();
+    daemon.run(200.0, frames);
+    let unknown = sweepd::wire::RejectReason::UnknownSource;
+    let refused = daemon.world.rejects()[usize::from(unknown.code())];
+    let passed: u64 = daemon
+        .passed
+        .iter()
+        .filter(|p| p.0.is_none())
+        .map(|p| p.1)
+        .sum();
+    assert_eq!(refused + passed, 100);
+}
+
+#[test]
+fn a_mode_that_cannot_be_is_refused_with_what_to_change() {
+    let scene = two_bodies(Mode::OnFrame("simm".to_owned()));
+    let text = Pacer::new(&scene.config, &scene.sources)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        text.contains("simm") && text.contains("sim, robot"),
+        "{text}"
+    );
+    for hz in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let scene = two_bodies(Mode::Rate(hz));
+        assert!(Pacer::new(&scene.config, &scene.sources).is_err(), "{hz}");
+    }
+}
+
+#[test]
+fn timeouts_are_told_at_their_time() {
+    for mode in modes() {
+        let mut daemon = Daemon::of(mode.clone());
+        let ticks = daemon.run(700.0, vec![(150.0, sim(1)), (150.0, robot(1))]);
+        // A beat may be there at the very time-out and tell it.
+        let at_ms = 150.0 + TIMEOUT_NS as f64 / MS as f64;
+        let told = ticks.iter().find(|t| t.at_ms >= at_ms).unwrap();
+        assert!(told.unsafe_word && told.at_ms <= at_ms, "{mode:?} {told:?}");
+        assert!(told.known == 1 && ticks.iter().any(|t| t.known == 3));
+        if mode != Mode::Rate(500.0) {
+            assert_eq!(told.due.cause, TickCause::Timeout);
+        }
+    }
+}
