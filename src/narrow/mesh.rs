@@ -19,13 +19,17 @@ use super::exact::Closest;
 
 mod bound;
 mod contacts;
+mod containment;
+mod front;
 mod half_space;
+mod retest;
 mod side;
 mod triangle;
 mod walk;
 
 pub use contacts::{LEAF_CONTACTS_MAX, LeafContact};
-pub use walk::{Goal, Walk, retest_witness};
+pub use retest::retest_witness;
+pub use walk::{Goal, Walk};
 
 /// The nearest or deepest pair of leaves met so far.
 pub type Witness = LeafContact;

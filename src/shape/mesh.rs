@@ -159,24 +159,24 @@ impl Mesh {
         let mut bounds = Aabb::empty();
         for k in 0..3 {
             let axis = rotation.matrix().row(k).transpose();
-            let [up, down] = match &self.outline {
-                Some(outline) => [outline.reach(&axis), outline.reach(&-axis)],
-                None => self.extent(&axis),
-            };
-            // No direction reaches beyond the ball.
-            bounds.max[k] = centre[k] + up.min(self.radius);
-            bounds.min[k] = centre[k] - down.min(self.radius);
+            let [up, down] = self.extent(&axis);
+            bounds.max[k] = centre[k] + up;
+            bounds.min[k] = centre[k] - down;
         }
         bounds.widened(slop)
     }
 
-    /// How far the vertices of faces reach from the centre along a direction and against it.
-    fn extent(&self, direction: &Vec3) -> [f64; 2] {
-        let named = self.faces.iter().flatten();
-        named.fold([f64::NEG_INFINITY; 2], |[up, down], &v| {
-            let on = direction.dot(&(self.vertices[v as usize] - self.centre));
-            [up.max(on), down.max(-on)]
-        })
+    /// Upper bounds, but for rounding, on how far it reaches from its centre along a unit direction and against it.
+    pub(crate) fn extent(&self, direction: &Vec3) -> [f64; 2] {
+        let Some(outline) = &self.outline else {
+            let named = self.faces.iter().flatten();
+            return named.fold([f64::NEG_INFINITY; 2], |[up, down], &v| {
+                let on = direction.dot(&(self.vertices[v as usize] - self.centre));
+                [up.max(on), down.max(-on)]
+            });
+        };
+        // No direction reaches beyond the ball.
+        [*direction, -direction].map(|along| outline.reach(&along).min(self.radius))
     }
 
     /// A vertex far along `direction`: a guess, but a vertex of a face in any case.

@@ -117,6 +117,15 @@ impl Frame {
         self.rotation.transpose() * direction
     }
 
+    /// Unit axes worth a look for the two as wholes, A's frame: those of A, those of B, and the line between them.
+    pub(super) fn axes(&self) -> impl Iterator<Item = Vec3> {
+        let rotation = self.rotation;
+        let of_a = (0..3).map(|k| Vec3::ith(k, 1.0));
+        let of_b = (0..3).map(move |k| rotation.column(k).into_owned());
+        let line = self.between.try_normalize(self.slop);
+        of_a.chain(of_b).chain(line)
+    }
+
     /// From the middle of A's tree to that of B's, A's frame.
     pub(super) fn between(&self) -> Vec3 {
         self.between

@@ -35,9 +35,22 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// Whether its inside belongs to it and is found by inside tests (that of a convex shape is in its leaf query).
-    pub(super) fn has_inside_test(self) -> bool {
-        matches!(self, Self::Mesh(mesh) if mesh.is_solid())
+    /// The solid mesh that it is; the inside of a convex shape is in its leaf query, a surface has none.
+    pub(super) fn solid(self) -> Option<&'a Mesh> {
+        match self {
+            Self::Mesh(mesh) if mesh.is_solid() => Some(mesh),
+            _ => None,
+        }
+    }
+
+    /// Upper bounds on how far it reaches from the origin of its tree along a direction of its frame, and against it.
+    fn extent(self, direction: &Vec3, origin: &Point) -> [f64; 2] {
+        match self {
+            Self::Mesh(mesh) => mesh.extent(direction),
+            Self::Convex(convex) => {
+                [*direction, -direction].map(|along| along.dot(&(convex.support(&along) - origin)))
+            }
+        }
     }
 
     /// How many points stand for all its connected surfaces.
@@ -63,6 +76,21 @@ impl<'a> Side<'a> {
             Self::Convex(convex) => convex.support(direction),
         }
     }
+}
+
+/// A lower bound on the gap of all of A and all of B, tighter than that of their root boxes: the separation along
+/// the axes of both and along the line between their origins, from how far each truly reaches.
+pub(super) fn low(a: (Side<'_>, &Point), b: (Side<'_>, &Point), frame: &Frame) -> f64 {
+    let mut best = f64::NEG_INFINITY;
+    for axis in frame.axes() {
+        let [up_a, down_a] = a.0.extent(&axis, a.1);
+        let [up_b, down_b] = b.0.extent(&frame.turn_to_b(&axis), b.1);
+        let between = axis.dot(&frame.between());
+        best = best
+            .max(between - up_a - down_b)
+            .max(-between - down_a - up_b);
+    }
+    best - frame.slop
 }
 
 /// The gap of one triangle (or convex shape) of A and one of B, in A's frame; `None` when it is proved to exceed

@@ -14,9 +14,6 @@ use crate::math::{Vec3, f32_up};
 const CELLS: usize = 16;
 const NODES: usize = CELLS + 1;
 
-/// Directions in an outline; below this many vertices walking all of them is as cheap and exact.
-pub(super) const DIRECTIONS: usize = 6 * NODES * NODES;
-
 /// The table.
 #[derive(Debug)]
 pub(super) struct Outline {
@@ -27,8 +24,8 @@ pub(super) struct Outline {
 impl Outline {
     /// * `reach` - an upper bound on `d . v` over all vertices, for a direction of any length.
     pub(super) fn new(reach: impl Fn(&Vec3) -> f64) -> Self {
-        let at = |k: usize| 2.0 * step(k) - 1.0;
-        let mut all = Vec::with_capacity(DIRECTIONS);
+        let at = |k: usize| 2.0 * count(k) / count(CELLS) - 1.0;
+        let mut all = Vec::with_capacity(6 * NODES * NODES);
         for face in 0..6 {
             for i in 0..NODES {
                 for j in 0..NODES {
@@ -62,22 +59,21 @@ impl Outline {
     }
 }
 
-/// `k / CELLS`, exact.
-fn step(k: usize) -> f64 {
-    // CELLS is a small power of two.
-    f64::from(u32::try_from(k).unwrap_or(0)) / f64::from(u32::try_from(CELLS).unwrap_or(1))
+fn count(k: usize) -> f64 {
+    f64::from(u32::try_from(k).unwrap_or(u32::MAX))
 }
 
 /// The cell of a coordinate in [-1, 1], and the place in it from 0 to 1.
 fn cell(x: f64) -> (usize, f64) {
-    let scaled = (x.clamp(-1.0, 1.0) + 1.0) * 0.5 * step(CELLS * CELLS);
+    let scaled = (x.clamp(-1.0, 1.0) + 1.0) * 0.5 * count(CELLS);
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "from 0 to CELLS by the clamp"
     )]
     let place = (scaled as usize).min(CELLS - 1);
-    (place, scaled - step(place * CELLS))
+    (place, scaled - count(place))
 }
 
+// Coordinates of the grid are exact.
 const _: () = assert!(CELLS.is_power_of_two());

@@ -1,0 +1,86 @@
+//! Whether one shape of a pair lies within the other though their surfaces are apart (law 3.3).
+//!
+//! One point of every connected surface is tested against the other solid, both ways. That is enough: were a point
+//! in both shapes, a way out of it would meet the surface of the one within the other, and a connected surface that
+//! crosses nothing is inside as a whole or not at all.
+
+use super::bound::Frame;
+use super::side::Side;
+use crate::shape::Inside;
+
+/// What is known of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Containment {
+    /// One of the two may hold a part of the other.
+    #[default]
+    Open,
+    /// No surface of the one lies in the other.
+    Outside,
+    /// One does.
+    Inside,
+}
+
+/// The tests, one node at a time. Keeps its memory.
+#[derive(Debug, Default)]
+pub(super) struct ShellTests {
+    state: Containment,
+    inside: Inside,
+    /// 0: points of A in B; 1: points of B in A; and which point.
+    way: usize,
+    place: usize,
+    /// A test is under way.
+    testing: bool,
+}
+
+impl ShellTests {
+    /// Starts; `needed`: false where the outcome is known to be outside.
+    pub(super) fn start(&mut self, needed: bool) {
+        self.state = if needed {
+            Containment::Open
+        } else {
+            Containment::Outside
+        };
+        (self.way, self.place, self.testing) = (0, 0, false);
+    }
+
+    pub(super) fn state(&self) -> Containment {
+        self.state
+    }
+
+    /// Tests one node, or moves on to the next test.
+    pub(super) fn step(&mut self, a: Side<'_>, b: Side<'_>, frame: &Frame) {
+        let (of, within) = match self.way {
+            0 => (a, b),
+            1 => (b, a),
+            _ => {
+                self.state = Containment::Outside;
+                return;
+            }
+        };
+        let Some(solid) = within.solid() else {
+            (self.way, self.place) = (self.way + 1, 0);
+            return;
+        };
+        if !self.testing {
+            if self.place == of.shell_count() {
+                (self.way, self.place) = (self.way + 1, 0);
+                return;
+            }
+            let point = of.shell_point(self.place);
+            self.inside.start(if self.way == 0 {
+                frame.to_b(&point)
+            } else {
+                frame.to_a(&point)
+            });
+            self.testing = true;
+        }
+        self.inside.step(solid, |_| true);
+        if self.inside.finished() {
+            self.testing = false;
+            self.place += 1;
+            if self.inside.winding() != 0 {
+                self.state = Containment::Inside;
+            }
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Last tick's contact first: one leaf pair, queried again at a new pose.
+
+use super::bound::Frame;
+use super::side::{Side, leaf};
+use crate::math::{Point, Pose};
+use crate::narrow::exact::Closest;
+use crate::shape::{Node, Shape};
+
+/// The root box of a side and what it is relative to, own frame.
+pub(super) fn tree_of(shape: &Shape, side: Side<'_>) -> (Node, Point) {
+    match side {
+        Side::Mesh(mesh) => (mesh.tree().nodes()[0], mesh.tree().origin()),
+        Side::Convex(_) => {
+            let origin = shape.aabb.centre();
+            let (low, high) = (shape.aabb.min - origin, shape.aabb.max - origin);
+            (Node::leaf(&low, &high, 0), origin)
+        }
+    }
+}
+
+/// Greatest distance of a point from the local origin, metres.
+pub(super) fn reach_of(shape: &Shape) -> f64 {
+    shape.centre.coords.norm() + shape.radius
+}
+
+/// Queries the leaf pair of last tick's contact again: one unit. `None` when the two have no such leaves.
+///
+/// * `triangle_a`, `triangle_b` - of a [`super::Witness`] or [`super::LeafContact`]; `u32::MAX` for a side that is no mesh.
+#[must_use]
+pub fn retest_witness(
+    a: &Shape,
+    b: &Shape,
+    pos12: &Pose,
+    triangle_a: u32,
+    triangle_b: u32,
+) -> Option<Closest> {
+    let (side_a, side_b) = (Side::of(a)?, Side::of(b)?);
+    let there = |side: Side<'_>, i: u32| match side {
+        Side::Mesh(mesh) => (i as usize) < mesh.faces().len(),
+        Side::Convex(_) => true,
+    };
+    if !there(side_a, triangle_a) || !there(side_b, triangle_b) {
+        return None;
+    }
+    let (origin_a, origin_b) = (tree_of(a, side_a).1, tree_of(b, side_b).1);
+    let frame = Frame::new(pos12, (origin_a, reach_of(a)), (origin_b, reach_of(b)));
+    if !frame.slop.is_finite() {
+        return None;
+    }
+    let (leaf_a, leaf_b) = ((side_a, triangle_a), (side_b, triangle_b));
+    leaf(leaf_a, leaf_b, &frame, f64::INFINITY)
+}
