@@ -6,5 +6,6 @@
     reason = "helpers of tests, and numbers that must come through bit by bit"
 )]
 
+mod sources;
 mod support;
 mod unknown;
