@@ -12,7 +12,7 @@
 
 use std::cell::RefCell;
 
-use super::newton;
+use super::newton::{self, Refined};
 use super::pair::{CoreGap, Pair, Vertex, across, unit};
 use super::simplex::{Simplex, normal_of};
 use crate::math::Vec3;
@@ -20,7 +20,11 @@ use crate::math::Vec3;
 /// Growth steps: polytopes end by themselves long before, overlapping curved cores take 40 to 120.
 const STEPS_MAX: usize = 300;
 /// Relative width at which curved cores end; polytopes end at roundoff.
-const CURVED: f64 = 2e-8;
+const CURVED: f64 = 5e-8;
+/// Height of the difference over a face, in parts of the smaller core, from which its features are worth a Newton run.
+const NEAR: f64 = 2e-2;
+/// Cosine between face normals beyond which a face belongs to another local optimum.
+const ANOTHER: f64 = 0.98;
 
 /// A triangle of the polytope; corners counter-clockwise seen from outside.
 #[derive(Clone, Copy)]
@@ -70,11 +74,14 @@ struct Best {
     /// `f(normal)`.
     lower: f64,
     normal: Vec3,
+    /// The face it was found at; faces are never overwritten, so it stays readable.
+    face: usize,
 }
 
 impl Best {
-    fn offer(&mut self, lower: f64, normal: &Vec3) {
+    fn offer(&mut self, lower: f64, normal: &Vec3, face: usize) {
         if lower > self.lower {
+            self.face = face;
             self.lower = lower;
             self.normal = *normal;
         }
@@ -98,7 +105,10 @@ impl Polytope {
         let mut best = Best {
             lower: f64::NEG_INFINITY,
             normal: Vec3::z(),
+            face: 0,
         };
+        let mut refined: Option<Refined> = None;
+        let near = NEAR * pair.a.reach().min(pair.b.reach());
         let (mut nearest, mut fits, mut last) = (0, f64::NEG_INFINITY, f64::NEG_INFINITY);
         for _ in 0..STEPS_MAX {
             let Some(place) = self.nearest() else {
@@ -109,21 +119,47 @@ impl Polytope {
             fits = fits.max(face.distance);
             let new = pair.support(&-face.normal);
             let reach = face.normal.dot(&new.w);
-            best.offer(-reach, &-face.normal);
+            best.offer(-reach, &-face.normal, place);
             last = -reach;
             if reach - face.distance <= tolerance || -best.lower - face.distance <= tolerance {
                 break;
+            }
+            // A first look at the features: the closest point itself becomes a corner, which saves most of the steps.
+            let looks_new = refined.is_none_or(|r| r.normal.dot(&face.normal) > -ANOTHER);
+            if !pair.polytopes && looks_new && reach - face.distance <= near {
+                let corners = face.corners.map(|k| self.vertices[k]);
+                let found = newton::solve(pair, &corners, &self.project(place).2, &-face.normal);
+                if let Some(found) = found.filter(|r| r.value > best.lower) {
+                    best.offer(found.value, &found.normal, place);
+                    refined = Some(found);
+                    let corner = found.corner();
+                    let height = face.normal.dot(&corner.w) - face.distance;
+                    if height > pair.tiny() {
+                        if self.grow(place, corner, pair.tiny()) {
+                            continue;
+                        }
+                        break;
+                    }
+                }
             }
             let known = face.corners.iter().any(|&k| self.vertices[k].w == new.w);
             if known || !self.grow(place, new, pair.tiny()) {
                 break;
             }
         }
+        if let Some(found) = refined.filter(|r| r.value >= best.lower) {
+            return CoreGap {
+                lower: best.lower,
+                upper: (-fits).max(best.lower),
+                normal: found.normal,
+                point_a: found.point_a,
+                point_b: found.point_b,
+            };
+        }
         // Of directions that are equally good the last one has the witnesses.
-        if last >= best.lower - tolerance
-            && let Some(face) = self.faces.get(nearest)
-        {
-            best.normal = -face.normal;
+        match self.faces.get(nearest) {
+            Some(face) if last >= best.lower - pair.tiny() => best.normal = -face.normal,
+            _ => nearest = best.face,
         }
         self.finish(pair, &mut best, nearest, fits)
     }
@@ -153,7 +189,7 @@ impl Polytope {
             if let Some(found) = newton::solve(pair, &corners, &weights, &best.normal)
                 && found.value > best.lower
             {
-                best.offer(found.value, &found.normal);
+                best.offer(found.value, &found.normal, nearest);
                 (point_a, point_b) = (found.point_a, found.point_b);
             }
         }

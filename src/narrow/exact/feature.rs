@@ -7,9 +7,7 @@ use crate::math::Vec3;
 use crate::shape::Core;
 
 /// Corners of one feature; faces of hulls with more are thinned out (a manifold keeps four points anyway).
-pub(super) const CORNERS_MAX: usize = 16;
-/// Corners of the polygon that stands for a cap: its inscribed regular polygon turned so that one corner is deepest.
-const CAP_CORNERS: usize = 8;
+pub(super) const CORNERS_MAX: usize = 8;
 
 /// A polygon (three corners and more), a segment or a point.
 pub(super) struct Feature {
@@ -161,18 +159,30 @@ impl Feature {
         self.normal[k] = up;
     }
 
-    /// A regular polygon in a circle, one corner at the circle's deepest point.
+    /// The regular octagon in a circle, one corner at the circle's deepest point.
     fn cap(&mut self, radius_m: f64, z_m: f64, dir: &Vec3, up: f64) {
         let off = dir.x.hypot(dir.y);
         // Lying flat there is no deepest point, and a fixed start keeps the ids still.
-        let start = if off > 1e-3 { dir.y.atan2(dir.x) } else { 0.0 };
+        let (x, y) = if off > 1e-3 {
+            (radius_m * dir.x / off, radius_m * dir.y / off)
+        } else {
+            (radius_m, 0.0)
+        };
         let first = u32::from(up > 0.0) << 4;
-        for (k, id) in (0..CAP_CORNERS).zip(first..) {
-            let angle = start + std::f64::consts::TAU * k as f64 / CAP_CORNERS as f64;
-            self.push(
-                Vec3::new(radius_m * angle.cos(), radius_m * angle.sin(), z_m),
-                id,
-            );
+        // Eighths of a turn from there.
+        let h = std::f64::consts::FRAC_1_SQRT_2;
+        let turns = [
+            (1., 0.),
+            (h, h),
+            (0., 1.),
+            (-h, h),
+            (-1., 0.),
+            (-h, -h),
+            (0., -1.),
+            (h, -h),
+        ];
+        for ((cos, sin), id) in turns.into_iter().zip(first..) {
+            self.push(Vec3::new(x * cos - y * sin, x * sin + y * cos, z_m), id);
         }
         self.normal = Vec3::z() * up;
     }

@@ -11,6 +11,7 @@ use super::pair::Pair;
 use super::{Closest, Convex};
 use crate::limits::MANIFOLD_POINTS_MAX;
 use crate::math::{Point, Pose, Vec3};
+use crate::shape::Core;
 
 /// Faces that lean further from the normal than this (cosine) share no patch worth clipping.
 const FACING: f64 = 0.7;
@@ -89,6 +90,15 @@ pub fn manifold(
         return;
     }
     let normal = closest.normal;
+    if matches!(a.core(), Core::Point) || matches!(b.core(), Core::Point) {
+        out.points[0] = Some(ManifoldPoint {
+            point_a: closest.point_a,
+            point_b: closest.point_b,
+            gap_m: closest.best_m,
+            feature: WITNESS,
+        });
+        return;
+    }
     let of_a = Feature::of_a(&pair, &normal);
     let of_b = Feature::of_b(&pair, &normal);
     let mut found = Found::new(&pair, closest, prediction_m);
@@ -101,6 +111,41 @@ pub fn manifold(
         overlap_lines(&of_a, &of_b, &normal, &mut found);
     }
     found.write(out);
+}
+
+/// The middle of what two cores share along `normal` once B has moved out by `-gap`: clipped features, least points only.
+/// `None` where they show no faces to clip.
+pub(super) fn deepest_shared(pair: &Pair<'_>, normal: &Vec3, gap: f64) -> Option<(Vec3, Vec3)> {
+    let of_a = Feature::of_a(pair, normal);
+    let of_b = Feature::of_b(pair, normal);
+    let (base, incident, base_is_b) = if of_a.facing(normal) >= of_b.facing(normal) {
+        (&of_a, &of_b, false)
+    } else {
+        (&of_b, &of_a, true)
+    };
+    if base.facing(normal) < FACING {
+        return None;
+    }
+    let clipped = Clipped::onto(base, incident, normal);
+    let (mut sum, mut count) = (Vec3::zeros(), 0.0);
+    let plane = base.used().first()?;
+    for clip in &clipped.points[..clipped.count] {
+        let over = normal.dot(&(clip.at - plane));
+        let over = if base_is_b { -over } else { over };
+        if over <= gap + 1e-9 * pair.scale {
+            sum += clip.at;
+            count += 1.0;
+        }
+    }
+    if count == 0.0 {
+        return None;
+    }
+    let at = sum / count;
+    Some(if base_is_b {
+        (at, at + normal * gap)
+    } else {
+        (at - normal * gap, at)
+    })
 }
 
 /// Points found so far, on the shapes' surfaces.
@@ -218,17 +263,8 @@ fn clip_onto(
     base_is_b: bool,
     found: &mut Found,
 ) {
-    let mut clipped = Clipped::of(incident);
+    let clipped = Clipped::onto(base, incident, normal);
     let corners = base.used();
-    let centre: Vec3 = corners.iter().sum::<Vec3>() / corners.len() as f64;
-    for (k, corner) in corners.iter().enumerate() {
-        let next = corners[(k + 1) % corners.len()];
-        let mut outward = (next - corner).cross(normal);
-        if outward.dot(&(corner - centre)) < 0.0 {
-            outward = -outward;
-        }
-        clipped.cut(corner, &outward, base.id(k));
-    }
     let steep = base.normal.dot(normal);
     let side = if base_is_b { 1 << 31 } else { 0 };
     for clip in &clipped.points[..clipped.count] {
@@ -282,6 +318,22 @@ fn overlap_lines(of_a: &Feature, of_b: &Feature, normal: &Vec3, found: &mut Foun
 }
 
 impl Clipped {
+    /// `incident`, cut by the planes along the normal on the edges of `base`.
+    fn onto(base: &Feature, incident: &Feature, normal: &Vec3) -> Self {
+        let mut clipped = Self::of(incident);
+        let corners = base.used();
+        let centre: Vec3 = corners.iter().sum::<Vec3>() / corners.len() as f64;
+        for (k, corner) in corners.iter().enumerate() {
+            let next = corners[(k + 1) % corners.len()];
+            let mut outward = (next - corner).cross(normal);
+            if outward.dot(&(corner - centre)) < 0.0 {
+                outward = -outward;
+            }
+            clipped.cut(corner, &outward, base.id(k));
+        }
+        clipped
+    }
+
     fn of(feature: &Feature) -> Self {
         let mut points = [Clip::default(); 2 * CORNERS_MAX];
         for (k, corner) in feature.used().iter().enumerate() {

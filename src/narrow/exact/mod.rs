@@ -6,8 +6,9 @@
 //! How: shapes are cores with a ball rolled around them, and the gap of the shapes is that of the cores minus both
 //! radii, so all work is on cores. Every core is the hull of vertices and circles.
 //! * Point and segment pairs, and a point against anything, have closed forms (`closed`).
-//! * Else GJK (`gjk`) finds the features that are closest, or that the cores overlap; then separating axes (`sat`)
-//!   for boxes and segments, or an expanding polytope (`epa`) give the least translation.
+//! * Two boxes try their separating axes (`sat`) first.
+//! * Else GJK (`gjk`) finds the features that are closest, or that the cores overlap; then an expanding polytope
+//!   (`epa`) gives the least translation, and a form of its own where two axes coincide (`coaxial`).
 //! * Where a circle takes part both stop early and a Newton method on the features (`newton`) finishes: it finds the
 //!   normal that makes `f` greatest, outside and inside alike.
 //!
@@ -28,6 +29,7 @@ mod gjk;
 mod manifold;
 mod newton;
 mod pair;
+mod sat;
 mod simplex;
 
 use crate::math::{Interval, Point, Pose, Vec3};
@@ -121,6 +123,11 @@ fn iterate(pair: &Pair<'_>, warm: &Warm) -> CoreGap {
         pair.guess()
     } else {
         warm.normal
+    };
+    let start = match sat::boxes(pair) {
+        Some(sat::Axes::Overlap(gap)) => return gap,
+        Some(sat::Axes::Apart(normal)) => normal,
+        None => start,
     };
     match gjk::distance(pair, &start) {
         gjk::Outcome::Apart(gap) => gap,

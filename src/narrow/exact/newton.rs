@@ -56,6 +56,19 @@ pub(super) struct Refined {
     pub(super) point_b: Vec3,
 }
 
+impl Refined {
+    /// The closest point of the difference; it lies on no one element.
+    pub(super) fn corner(&self) -> Vertex {
+        Vertex {
+            w: self.point_b - self.point_a,
+            a: self.point_a,
+            b: self.point_b,
+            of_a: u32::MAX >> 1,
+            of_b: u32::MAX >> 1,
+        }
+    }
+}
+
 /// A better gap of two cores that are apart.
 pub(super) fn refine(pair: &Pair<'_>, simplex: &Simplex, normal: &Vec3) -> Option<CoreGap> {
     let found = solve(pair, simplex.used(), &simplex.weights, normal)?;
