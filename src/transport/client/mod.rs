@@ -117,7 +117,7 @@ impl Client {
             source: source.map(ToOwned::to_owned),
             hello: Hello::default(),
             frame: FrameId {
-                session: connect::random_u64()?,
+                session: random_u64()?,
                 epoch: 0,
                 seq: 0,
             },
