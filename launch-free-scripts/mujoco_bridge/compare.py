@@ -1,0 +1,86 @@
+"""sweepd's colliding set against MuJoCo's, step by step.
+
+In: both sets of one step. Out: a tally. A difference is exempt only where MuJoCo's or the third judge's gap is within
+1e-6 m of 0; more than 1 % of such is a failure too.
+"""
+
+from .judge import BAND_M
+
+EXEMPT_SHARE_MAX = 0.01
+"""Greatest share of exempt pair-steps."""
+SHOWN_MAX = 20
+"""Differences that are kept in words."""
+
+
+class Compare:
+    """Counts over all steps."""
+
+    def __init__(self, scene, judge):
+        self.scene = scene
+        self.judge = judge
+        self.steps = 0
+        self.steps_equal = 0
+        self.colliding = 0
+        self.in_band = 0
+        self.exempt = 0
+        self.different = 0
+        self.undecided = 0
+        self.shown = []
+
+    def step(self, number, sweepd, possible, mujoco):
+        """Compares one step.
+
+        * `sweepd` - set of pairs that it says collide. `possible` - set of pairs that it left open.
+        * `mujoco` - dict of pairs that collide there, with `dist` in metres.
+        """
+        self.steps += 1
+        self.colliding += len(sweepd | mujoco.keys())
+        self.in_band += sum(abs(dist) <= BAND_M for dist in mujoco.values())
+        self.undecided += len(possible)
+        bad = 0
+        for pair in sorted((sweepd ^ mujoco.keys()) - possible):
+            gap = self.judge.gap(*pair)
+            by_mujoco = mujoco.get(pair)
+            near = abs(gap) <= BAND_M or (by_mujoco is not None and abs(by_mujoco) <= BAND_M)
+            self.exempt += near
+            bad += not near
+            self.show(number, pair, pair in sweepd, by_mujoco, gap, near)
+        for pair in sorted(possible):
+            gap = self.judge.gap(*pair)
+            bad += abs(gap) > BAND_M
+        self.different += bad
+        self.steps_equal += bad == 0
+
+    def show(self, number, pair, by_sweepd, by_mujoco, gap, near):
+        """Keeps the first differences in words."""
+        if len(self.shown) < SHOWN_MAX:
+            first, second = (f"{self.scene.names[k]} ({self.scene.shapes[k]['type']})" for k in pair)
+            self.shown.append(
+                f"step {number}: {first} and {second}:"
+                f" sweepd {'collides' if by_sweepd else 'apart'},"
+                f" MuJoCo {'apart' if by_mujoco is None else f'collides, dist {by_mujoco:.3g} m'},"
+                f" third judge {gap:.3g} m: {'exempt' if near else 'DIFFERENT'}"
+            )
+
+    def share(self):
+        """Exempt pair-steps by colliding pair-steps."""
+        return self.exempt / max(1, self.colliding)
+
+    def holds(self):
+        """Whether the sets are equal in every step."""
+        return self.different == 0 and self.share() <= EXEMPT_SHARE_MAX
+
+    def summary(self):
+        """Counts for `--json`."""
+        return {
+            "steps": self.steps,
+            "steps_equal": self.steps_equal,
+            "colliding_pair_steps": self.colliding,
+            "different_pair_steps": self.different,
+            "exempt_pair_steps": self.exempt,
+            "exempt_share": self.share(),
+            "mujoco_within_band": self.in_band,
+            "possible_pair_steps": self.undecided,
+            "equal": self.holds(),
+            "differences": self.shown,
+        }
