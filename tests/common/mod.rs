@@ -2,7 +2,10 @@
 
 #![allow(
     dead_code,
-    reason = "each test crate includes this file and uses its own part"
+    unreachable_pub,
+    clippy::unwrap_used,
+    clippy::cast_precision_loss,
+    reason = "each test and bench includes this file and uses its own part; nobody else calls it"
 )]
 
 /// `SplitMix64` (Steele, Lea and Flood 2014): every seed is good, and equal on every machine.
