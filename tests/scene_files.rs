@@ -100,3 +100,265 @@ fn the_three_wedges_are_the_same_solid() {
         assert!((volume - 1.5).abs() < 1e-12, "{file} {volume}");
     }
 }
+
+/// The error of a scene text, with sources `one` and `two` before it where it has none of its own.
+fn error(text: &str) -> String {
+    match Scene::parse(text, "bad.toml", Path::new("tests/data/meshes")) {
+        Err(error) => error.to_string(),
+        Ok(_) => panic!("this scene should be refused:\n{text}"),
+    }
+}
+
+/// A ball that stands still, with more keys.
+fn ball(name: &str, keys: &str) -> String {
+    format!(
+        "[[body]]\nname = \"{name}\"\nmoves = false\n{keys}\nshape = {{ type = \"sphere\", radius = 1 }}\n"
+    )
+}
+
+/// A body that stands still, with this shape in line 4.
+fn shaped(shape: &str) -> String {
+    format!("[[body]]\nname = \"b\"\nmoves = false\nshape = {{ {shape} }}\n")
+}
+
+/// The cases of a file: lines `=> WANTED`, each followed by the text of a wrong scene; lines with `##` are comments.
+fn cases(name: &str) -> Vec<(String, String)> {
+    let path = format!("tests/data/scenes/{name}");
+    let mut cases: Vec<(String, String)> = Vec::new();
+    for line in std::fs::read_to_string(path).unwrap().lines() {
+        if let Some(wanted) = line.strip_prefix("=> ") {
+            cases.push((String::new(), wanted.to_owned()));
+        } else if let Some((text, _)) = cases.last_mut() {
+            text.push_str(line);
+            text.push('\n');
+        } else {
+            assert!(line.starts_with("##"), "{line}");
+        }
+    }
+    cases
+}
+
+#[test]
+fn each_wrong_shape_is_one_error_with_file_line_body_and_mend() {
+    let text = std::fs::read_to_string("tests/data/scenes/wrong_shapes.txt").unwrap();
+    let mut seen = 0;
+    for line in text.lines().filter(|line| !line.starts_with("##")) {
+        let (shape, wanted) = line.split_once(" => ").unwrap();
+        let text = error(&shaped(shape));
+        assert!(
+            text.starts_with("bad.toml:4: body \"b\": "),
+            "{shape}: {text}"
+        );
+        assert!(
+            text.contains(wanted) && !text.contains('\n'),
+            "{shape}: {text}"
+        );
+        seen += 1;
+    }
+    assert_eq!(seen, 45);
+}
+
+#[test]
+fn each_wrong_body_and_setting_is_one_error_with_file_line_and_mend() {
+    let mut seen = Vec::new();
+    for name in ["wrong_bodies.txt", "wrong_settings.txt"] {
+        let cases = cases(name);
+        for (text, wanted) in &cases {
+            let error = error(text);
+            assert!(error.contains(wanted), "{text}\n{error}");
+            assert!(
+                error.starts_with("bad.toml:") && !error.contains('\n'),
+                "{error}"
+            );
+        }
+        seen.push(cases.len());
+    }
+    assert_eq!(seen, [33, 25]);
+}
+
+#[test]
+fn a_file_that_cannot_be_read_is_told_by_its_name() {
+    let error = Scene::load(Path::new("tests/data/scenes/none.toml")).unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .contains("tests/data/scenes/none.toml: the scene file cannot be read")
+    );
+    assert_eq!(error.exit_code(), 4);
+    let error = Scene::load(Path::new("tests/data/meshes/wedge.stl")).unwrap_err();
+    assert_eq!(error.exit_code(), 2);
+}
+
+#[test]
+fn a_mesh_that_fails_when_it_is_built_names_file_line_and_body() {
+    let folder = std::env::temp_dir().join(format!("sweepd_scene_{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("empty.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\n").unwrap();
+    std::fs::write(folder.join("broken.obj"), "v 0 0 0\nv 1 oops 0\n").unwrap();
+    let mut results = Vec::new();
+    for file in ["empty.obj", "broken.obj"] {
+        let text = ball("first", "") + &shaped(&format!("type = \"trimesh\", file = \"{file}\""));
+        let scene = Scene::parse(&text, "scene.toml", &folder).unwrap();
+        results.push(
+            scene
+                .build_shapes(&mut Library::new(), |_, _| {})
+                .unwrap_err()
+                .to_string(),
+        );
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+    assert!(
+        results[0].starts_with("scene.toml:9: body \"b\": the mesh has no triangle"),
+        "{}",
+        results[0]
+    );
+    assert!(
+        results[1].starts_with("scene.toml:9: body \"b\": ")
+            && results[1].contains("broken.obj:2: \"oops\""),
+        "{}",
+        results[1]
+    );
+}
+
+#[test]
+fn a_flat_hull_and_odd_sizes_are_told_when_they_are_built() {
+    let built = |shape: &str| {
+        let scene = Scene::parse(&shaped(shape), "scene.toml", Path::new("")).unwrap();
+        scene.build_shapes(&mut Library::new(), |_, _| {})
+    };
+    let flat = built("type = \"convex\", vertices = [[0,0,0],[1,0,0],[0,1,0],[1,1,0]]");
+    let error = flat.unwrap_err().to_string();
+    assert!(
+        error.starts_with("scene.toml:4: body \"b\": ") && error.contains("flat"),
+        "{error}"
+    );
+    for (radius, wanted) in [("0.0004", "under 1 mm"), ("51", "over 100 m")] {
+        let warnings = built(&format!("type = \"sphere\", radius = {radius}"))
+            .unwrap()
+            .warnings;
+        assert_eq!(warnings.len(), 1, "{warnings:?}");
+        assert!(
+            warnings[0].starts_with("scene.toml:4: body \"b\": ") && warnings[0].contains(wanted),
+            "{warnings:?}"
+        );
+    }
+    for radius in ["0.0005", "50"] {
+        assert!(
+            built(&format!("type = \"sphere\", radius = {radius}"))
+                .unwrap()
+                .warnings
+                .is_empty()
+        );
+    }
+}
+
+#[test]
+fn odd_but_legal_things_are_notes() {
+    let notes = |text: &str| Scene::parse(text, "a.toml", Path::new("")).unwrap().notes();
+    assert!(notes("")[0].contains("no body"));
+    assert!(example().notes().is_empty(), "{:?}", example().notes());
+    let plane = "shape = { type = \"half_space\", normal = [0, 0, 1] }";
+    let two = format!(
+        "[[body]]\nname = \"a\"\nmoves = false\n{plane}\n[[body]]\nname = \"b\"\nmoves = false\n{plane}\n"
+    );
+    assert!(notes(&two)[0].contains("two half-spaces are never paired"));
+    let rule = "[[source]]\nname = \"s\"\n[[rule]]\naction = \"ignore\"\na = \"x*\"\nb = \"b\"\n"
+        .to_owned()
+        + &ball("b", "");
+    let all = notes(&rule);
+    assert!(all[0].contains("source \"s\" has no body"), "{all:?}");
+    assert!(
+        all[1].contains("rule 1: no body has the pattern \"x*\""),
+        "{all:?}"
+    );
+    assert!(all[2].contains("no reason"), "{all:?}");
+}
+
+#[test]
+fn the_last_rule_that_matches_decides_either_way_round() {
+    let scene = example();
+    assert_eq!(scene.rule_for("fixture", "parcel_2").unwrap().a, "parcel_*");
+    assert_eq!(
+        scene
+            .rule_for("arm_base", "gripper")
+            .unwrap()
+            .report_within_m,
+        Some(0.1)
+    );
+    assert!(scene.rule_for("parcel_1", "parcel_2").is_none());
+}
+
+#[test]
+fn ten_thousand_bodies_share_one_shape() {
+    let mut text = "[[source]]\nname = \"sim\"\n".to_owned();
+    for k in 0..10_000 {
+        text += &format!(
+            "[[body]]\nname = \"part_{k}\"\nposition = [{k}, 0, 0]\nshape = {{ type = \"box\", half_extents = [0.1, 0.2, 0.3] }}\n"
+        );
+    }
+    let scene = Scene::parse(&text, "many.toml", Path::new("")).unwrap();
+    let mut library = Library::new();
+    let built = scene.build_shapes(&mut library, |_, _| {}).unwrap();
+    assert_eq!((built.shapes.len(), library.len()), (10_000, 1));
+    assert_eq!(scene.origin.shape_lines[9_999], [2 + 4 * 10_000]);
+}
+
+#[test]
+fn no_damage_to_a_scene_causes_a_panic() {
+    let whole = std::fs::read_to_string("launch-free-scripts/example_scene.toml").unwrap();
+    let words = [
+        "nan",
+        "-1",
+        "1e400",
+        "[",
+        "]",
+        "{",
+        "}",
+        "\"",
+        "=",
+        "\n",
+        "[[body]]",
+        "#",
+        "0x",
+        "id = 1\n",
+        "'''",
+        "\u{0}",
+        "ü",
+        ",",
+        "1979-05-27",
+    ];
+    let mut state = 0x5eed_u64;
+    let mut random = |bound: usize| {
+        // SplitMix64 (Steele, Lea, Flood 2014), so that the damage is the same everywhere.
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        usize::try_from((z ^ (z >> 31)) % bound as u64).unwrap()
+    };
+    let mut refused = 0;
+    for round in 0..1500 {
+        let mut letters: Vec<char> = whole.chars().collect();
+        for _ in 0..=random(3) {
+            let at = random(letters.len());
+            let end = (at + random(30)).min(letters.len());
+            match random(3) {
+                0 => drop(letters.drain(at..end)),
+                1 => drop(letters.splice(at..end, words[random(words.len())].chars())),
+                _ => drop(letters.splice(at..at, words[random(words.len())].chars())),
+            }
+        }
+        let text: String = letters.into_iter().collect();
+        let read = std::panic::catch_unwind(|| {
+            Scene::parse(&text, "a.toml", Path::new("launch-free-scripts"))
+        });
+        match read.unwrap_or_else(|_| panic!("round {round} (seed 0x5eed) panics")) {
+            Ok(scene) => assert_eq!(scene.origin.shape_lines.len(), scene.bodies.len()),
+            Err(error) => {
+                refused += 1;
+                assert!(error.to_string().starts_with("a.toml:"), "{error}");
+            }
+        }
+    }
+    assert!(refused > 500, "{refused}");
+}

@@ -6,6 +6,7 @@
 mod build;
 mod model;
 mod node;
+mod notes;
 mod pattern;
 mod read_body;
 mod read_rule;

@@ -336,7 +336,10 @@ mod tests {
         else {
             panic!("a mesh");
         };
-        assert_eq!(vertices[1], [1.0, 0.0, 0.0]);
+        assert_eq!(
+            vertices[1].map(f64::to_bits),
+            [1.0_f64, 0.0, 0.0].map(f64::to_bits)
+        );
         assert_eq!(faces[..], [[0, 1, 2]]);
         let past = EditRequest::parse(json(3, 74).as_bytes(), &blobs).unwrap_err();
         assert!(

@@ -177,6 +177,10 @@ impl Table {
 }
 
 /// A finite number.
+#[allow(
+    clippy::needless_pass_by_value,
+    reason = "a node is taken apart by whoever reads it; the others need it whole"
+)]
 pub(crate) fn real(node: Node, what: &str) -> Result<f64, Fault> {
     let real = match node.value {
         Value::Real(real) => real,

@@ -134,7 +134,7 @@ mod tests {
             faces[12..]
                 .iter()
                 .flatten()
-                .any(|i| points[*i as usize].z == -1.5)
+                .any(|i| points[*i as usize].z <= -1.5)
         );
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::math::{Point, Vec3};
 
-/// Corners of one polygon: beyond it cutting ears takes too long.
-pub(super) const CORNERS_MAX: usize = 10_000;
+/// Corners of a polygon that is not convex: cutting ears takes up to the third power of them.
+const EAR_CORNERS_MAX: usize = 1000;
 
 /// The triangles of a polygon, facing as it does.
 ///
@@ -50,12 +50,24 @@ pub(super) fn cut(vertices: &[Point], corners: &[u32]) -> Result<Vec<[u32; 3]>, 
             .map(|k| [corners[0], corners[k], corners[k + 1]])
             .collect());
     }
+    if corners.len() > EAR_CORNERS_MAX {
+        let count = corners.len();
+        return Err(format!(
+            "a face of {count} corners is not convex: export the mesh as triangles"
+        ));
+    }
     ears(corners, &points)
 }
 
 /// Twice the signed area of a triangle: positive to the left.
 fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+/// Whether two points are one: only then may a corner lie on an ear.
+#[allow(clippy::float_cmp, reason = "the same corner, copied, not computed")]
+fn same(a: [f64; 2], b: [f64; 2]) -> bool {
+    a == b
 }
 
 fn ears(corners: &[u32], points: &[[f64; 2]]) -> Result<Vec<[u32; 3]>, String> {
@@ -72,9 +84,9 @@ fn ears(corners: &[u32], points: &[[f64; 2]]) -> Result<Vec<[u32; 3]>, String> {
         );
         let [a, b, c] = [points[before], points[tip], points[after]];
         let holds = |p: [f64; 2]| {
-            p != a
-                && p != b
-                && p != c
+            !same(p, a)
+                && !same(p, b)
+                && !same(p, c)
                 && turn(a, b, p) >= 0.0
                 && turn(b, c, p) >= 0.0
                 && turn(c, a, p) >= 0.0

@@ -50,7 +50,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Flaw> {
     let count = u64::from(u32::from_le_bytes(raw));
     // A line end behind the last triangle is a known habit of exporters.
     let extra = (bytes.len() as u64).checked_sub(expected(count));
-    if !extra.is_some_and(|extra| extra <= 2) {
+    if extra.is_none_or(|extra| extra > 2) {
         return Err(Flaw::new(format!(
             "the header says {count} triangles, which take {} bytes, but the file has {}: it is cut off or damaged, export the mesh again",
             expected(count),

@@ -28,7 +28,9 @@ pub(super) fn weld(soup: &mut Soup) {
     });
     // For each vertex the first in its place, then that one's new number.
     let mut first_of: Vec<u32> = (0..count).collect();
-    for group in order.chunk_by(|a, b| key(&vertices[*a as usize]) == key(&vertices[*b as usize])) {
+    for group in
+        order.chunk_by(|a, b| compare(&vertices[*a as usize], &vertices[*b as usize]).is_eq())
+    {
         for place in group {
             first_of[*place as usize] = group[0];
         }

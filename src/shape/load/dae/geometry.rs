@@ -307,7 +307,7 @@ fn read_polylist<'a>(
 }
 
 fn cut(part: &Part, corners: &[u32], at: Node<'_, '_>) -> Result<Vec<[u32; 3]>, Flaw> {
-    if corners.len() < 3 || corners.len() > polygon::CORNERS_MAX {
+    if corners.len() < 3 {
         let text = format!(
             "a face has {} corners: export the mesh as triangles",
             corners.len()

@@ -171,11 +171,11 @@ impl Frame {
             }
         };
         // An asset further down may name another unit; files in the wild repeat the first at most.
-        let inner = root.descendants().filter(|node| {
+        let mut inner = root.descendants().filter(|node| {
             matches!(node.tag_name().name(), "unit" | "up_axis")
                 && node.ancestors().nth(2).is_some_and(|up| up != root)
         });
-        for node in inner {
+        if let Some(node) = inner.next() {
             let text = "a second unit or up-axis further down: export the mesh with one for all";
             return Err(flaw(node, text));
         }
@@ -259,3 +259,6 @@ fn whole(node: Node<'_, '_>, attribute: &str) -> Result<Option<usize>, Flaw> {
     };
     text.trim().parse().map(Some).map_err(fault)
 }
+
+#[cfg(test)]
+mod tests;

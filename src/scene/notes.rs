@@ -1,0 +1,129 @@
+//! Things to know about a scene that are no mistakes: what `check` prints beside its errors.
+
+use std::collections::BTreeMap;
+
+use crate::scene::table::shortened;
+use crate::scene::{BodySpec, PairRule, Scene, is_pattern, pattern_matches};
+use crate::shape::ShapeSpec;
+
+impl PairRule {
+    /// Whether it speaks of the pair of these two names, either way round.
+    #[must_use]
+    pub fn matches(&self, one: &str, other: &str) -> bool {
+        (pattern_matches(&self.a, one) && pattern_matches(&self.b, other))
+            || (pattern_matches(&self.a, other) && pattern_matches(&self.b, one))
+    }
+}
+
+impl BodySpec {
+    /// Whether one of its shapes is a half-space: it has no box, and is paired with every bounded body.
+    #[must_use]
+    pub fn is_unbounded(&self) -> bool {
+        let is_half_space = |shape: &ShapeSpec| matches!(shape, ShapeSpec::HalfSpace { .. });
+        self.shapes
+            .iter()
+            .any(|placed| is_half_space(&placed.shape))
+    }
+}
+
+impl Scene {
+    /// The rule that decides about a pair of names: the last that matches.
+    ///
+    /// Cost: O(rules x names); for listings, not for ticks.
+    #[must_use]
+    pub fn rule_for(&self, one: &str, other: &str) -> Option<&PairRule> {
+        self.rules
+            .iter()
+            .rev()
+            .find(|rule| rule.matches(one, other))
+    }
+
+    /// What is odd but legal, one sentence each: nothing to watch, rules and sources without a body, half-spaces.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        if self.bodies.is_empty() {
+            notes.push("the scene has no body: its state is never clear, add [[body]]".to_owned());
+        }
+        let unbounded: Vec<&str> = self
+            .bodies
+            .iter()
+            .filter(|body| body.is_unbounded())
+            .map(|body| body.name.as_str())
+            .collect();
+        if let [first, second, ..] = unbounded[..] {
+            notes.push(format!(
+                "{} bodies are half-spaces (\"{}\", \"{}\"{}): two half-spaces are never paired",
+                unbounded.len(),
+                shortened(first),
+                shortened(second),
+                if unbounded.len() > 2 { ", .." } else { "" }
+            ));
+        }
+        self.note_sources(&mut notes);
+        self.note_rules(&mut notes);
+        self.note_groups(&mut notes);
+        notes
+    }
+
+    fn note_sources(&self, notes: &mut Vec<String>) {
+        for (place, source) in self.sources.iter().enumerate() {
+            if !self.bodies.iter().any(|body| body.source == Some(place)) {
+                let name = shortened(&source.name);
+                notes.push(format!(
+                    "source \"{name}\" has no body: it has nothing to send"
+                ));
+            }
+        }
+    }
+
+    fn note_rules(&self, notes: &mut Vec<String>) {
+        let matched = |side: &str| {
+            self.bodies
+                .iter()
+                .any(|body| pattern_matches(side, &body.name))
+        };
+        for (place, rule) in self.rules.iter().enumerate() {
+            for side in [&rule.a, &rule.b] {
+                if !matched(side) {
+                    let kind = if is_pattern(side) { "pattern" } else { "name" };
+                    notes.push(format!(
+                        "rule {}: no body has the {kind} \"{}\"",
+                        place + 1,
+                        shortened(side)
+                    ));
+                }
+            }
+            if rule.reason.is_empty() {
+                notes.push(format!("rule {}: no reason is given", place + 1));
+            }
+        }
+    }
+
+    fn note_groups(&self, notes: &mut Vec<String>) {
+        let mut members: BTreeMap<&str, usize> = BTreeMap::new();
+        for body in &self.bodies {
+            if let Some(group) = &body.rigid_group {
+                *members.entry(group).or_default() += 1;
+            }
+            if body.group == 0 || body.mask == 0 {
+                notes.push(format!(
+                    "body \"{}\" has group or mask 0: it collides with nothing but what a rule checks",
+                    shortened(&body.name)
+                ));
+            }
+            if is_pattern(&body.name) {
+                notes.push(format!(
+                    "body \"{}\" has * or ? in its name: a rule of this name is a pattern",
+                    shortened(&body.name)
+                ));
+            }
+        }
+        for (group, _) in members.iter().filter(|(_, count)| **count == 1) {
+            notes.push(format!(
+                "rigid_group \"{}\" has one body only",
+                shortened(group)
+            ));
+        }
+    }
+}
