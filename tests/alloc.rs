@@ -73,7 +73,11 @@ fn count(scene: &str, budget: Budget, ticks: u64) -> u64 {
 #[test]
 fn a_tick_allocates_nothing_after_warm_up() {
     for (name, scene) in [("pool", pool(300, 1)), ("pile", pile(300, 2))] {
-        for budget in [Budget::UNLIMITED, Budget::units(50), Budget::time_ns(100_000)] {
+        for budget in [
+            Budget::UNLIMITED,
+            Budget::units(50),
+            Budget::time_ns(100_000),
+        ] {
             assert_eq!(count(&scene, budget, 150), 0, "{name} with {budget:?}");
         }
     }

@@ -377,7 +377,7 @@ fn law_4_4_a_partial_frame_is_never_passed_over_for_a_newer_one() {
         (3.0, sim(3)),
         (4.0, sim(4)),
     ];
-    let ticks = daemon.run(25.0, frames);
+    daemon.run(25.0, frames);
     assert_eq!(
         daemon.passed_of(0),
         3,

@@ -56,13 +56,26 @@ impl Builder {
             .name("sweepd-shapes".to_owned())
             .spawn(work)
             .map_err(|e| Error::io("cannot start the thread that builds shapes", e))?;
-        Ok(Self { asked: Some(asked), built, open: 0, worker: Some(worker) })
+        Ok(Self {
+            asked: Some(asked),
+            built,
+            open: 0,
+            worker: Some(worker),
+        })
     }
 
     /// Hands over a request.
     pub(super) fn ask(&mut self, token: RequestToken, json_len: usize, payload: &[u8]) {
-        let request = Asked { token, json_len, payload: payload.to_vec() };
-        if self.asked.as_ref().is_some_and(|asked| asked.send(request).is_ok()) {
+        let request = Asked {
+            token,
+            json_len,
+            payload: payload.to_vec(),
+        };
+        if self
+            .asked
+            .as_ref()
+            .is_some_and(|asked| asked.send(request).is_ok())
+        {
             self.open += 1;
         }
     }
@@ -109,22 +122,39 @@ impl Against {
             edits.push(self.edit(edit, &mut warnings)?);
         }
         self.library.prune();
-        Ok(EditBatch { token: request.token.0, edits, warnings })
+        Ok(EditBatch {
+            token: request.token.0,
+            edits,
+            warnings,
+        })
     }
 
-    fn edit(&mut self, asked: Asking, warnings: &mut Vec<String>) -> std::result::Result<Edit, String> {
+    fn edit(
+        &mut self,
+        asked: Asking,
+        warnings: &mut Vec<String>,
+    ) -> std::result::Result<Edit, String> {
         Ok(match asked {
             Asking::Put(draft) => {
                 let body = draft.settle(&self.sources, &self.base)?;
                 let mut shapes = Vec::with_capacity(body.shapes.len());
                 for (place, spec) in body.shapes.iter().enumerate() {
                     let built = self.library.get(&spec.shape, &self.base);
-                    let built = built.map_err(|e| format!("body \"{}\": shape {}: {e}", body.name, place + 1))?;
-                    warnings.extend(built.warnings.iter().map(|w| format!("body \"{}\": {w}", body.name)));
+                    let built = built
+                        .map_err(|e| format!("body \"{}\": shape {}: {e}", body.name, place + 1))?;
+                    warnings.extend(
+                        built
+                            .warnings
+                            .iter()
+                            .map(|w| format!("body \"{}\": {w}", body.name)),
+                    );
                     shapes.push(built.shape);
                 }
                 let shapes = place(&body, shapes);
-                Edit::Put { body: Arc::new(body), shapes }
+                Edit::Put {
+                    body: Arc::new(body),
+                    shapes,
+                }
             }
             Asking::Remove { name } => Edit::Remove { name },
             Asking::Enable { name, enabled } => Edit::Enable { name, enabled },

@@ -41,7 +41,9 @@ pub struct Daemon<'a> {
 
 impl std::fmt::Debug for Daemon<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Daemon").field("engine", &self.engine).finish_non_exhaustive()
+        f.debug_struct("Daemon")
+            .field("engine", &self.engine)
+            .finish_non_exhaustive()
     }
 }
 
@@ -94,9 +96,12 @@ impl<'a> Daemon<'a> {
         self.receive()?;
         let mut idle = true;
         loop {
-            let (now_ns, timeout_ns) = (self.clock.boottime_ns(), self.engine.world().next_timeout());
+            let (now_ns, timeout_ns) =
+                (self.clock.boottime_ns(), self.engine.world().next_timeout());
             let edits = !self.ready.is_empty();
-            let Some(due) = self.pacer.due(now_ns, edits, timeout_ns, &mut self.due) else { break };
+            let Some(due) = self.pacer.due(now_ns, edits, timeout_ns, &mut self.due) else {
+                break;
+            };
             self.tick(due, woke_ns)?;
             if ticks.is_some_and(|most| self.engine.ticks() >= most) {
                 return Ok(true);
@@ -118,9 +123,15 @@ impl<'a> Daemon<'a> {
 
     fn wait_ns(&self) -> u64 {
         let now_ns = self.clock.boottime_ns();
-        let next_ns = self.pacer.wake_ns(now_ns, self.engine.world().next_timeout());
+        let next_ns = self
+            .pacer
+            .wake_ns(now_ns, self.engine.world().next_timeout());
         let wait_ns = next_ns.saturating_sub(now_ns).min(WAIT_MAX_NS);
-        if self.builder.busy() { wait_ns.min(BUILD_LOOK_NS) } else { wait_ns }
+        if self.builder.busy() {
+            wait_ns.min(BUILD_LOOK_NS)
+        } else {
+            wait_ns
+        }
     }
 
     /// Takes frames and requests; requests go to the worker, built edits come back from it.
@@ -129,13 +140,20 @@ impl<'a> Daemon<'a> {
         self.pacer.take(&mut self.arrived, self.clock.boottime_ns());
         let builder = &mut self.builder;
         self.door.requests(&mut |token, header, payload| {
-            builder.ask(token, usize::try_from(header.json_len).unwrap_or(usize::MAX), payload);
+            builder.ask(
+                token,
+                usize::try_from(header.json_len).unwrap_or(usize::MAX),
+                payload,
+            );
         });
         while let Some((token, built)) = self.builder.finished() {
             match built {
                 Ok(batch) => self.ready.push(batch),
                 Err(error) => {
-                    let answer = Answer { error: Some(error), ..Answer::default() };
+                    let answer = Answer {
+                        error: Some(error),
+                        ..Answer::default()
+                    };
                     self.answer(token, &answer)?;
                 }
             }
@@ -152,7 +170,14 @@ impl<'a> Daemon<'a> {
             }
         });
         let demand = self.door.demand();
-        let budget = if due.ages_only { Budget { units: Some(0), ..self.config.budget } } else { self.config.budget };
+        let budget = if due.ages_only {
+            Budget {
+                units: Some(0),
+                ..self.config.budget
+            }
+        } else {
+            self.config.budget
+        };
         let mut broken = None;
         let door = &mut *self.door;
         let mut pulse = |row: &TickRow| {
@@ -178,7 +203,10 @@ impl<'a> Daemon<'a> {
         let lost = self.door.publish(outbox)?;
         let send_ns = self.clock.monotonic_ns().saturating_sub(start_ns);
         if lost > 0 {
-            tracing::debug!("{lost} messages of tick {} could not be handed over", self.engine.ticks());
+            tracing::debug!(
+                "{lost} messages of tick {} could not be handed over",
+                self.engine.ticks()
+            );
         }
         self.engine.note_sent(send_ns);
         self.settle_edits()
@@ -191,8 +219,17 @@ impl<'a> Daemon<'a> {
             let outcome = &self.engine.outcomes()[at];
             let (token, warnings) = (RequestToken(outcome.token), outcome.warnings.clone());
             let answer = match &outcome.result {
-                Ok(applied) => Answer { ok: true, scene_rev: applied.scene_rev, error: None, warnings },
-                Err(error) => Answer { error: Some(error.clone()), warnings, ..Answer::default() },
+                Ok(applied) => Answer {
+                    ok: true,
+                    scene_rev: applied.scene_rev,
+                    error: None,
+                    warnings,
+                },
+                Err(error) => Answer {
+                    error: Some(error.clone()),
+                    warnings,
+                    ..Answer::default()
+                },
             };
             self.answer(token, &answer)?;
         }

@@ -44,6 +44,11 @@ impl World {
         let root = &self.entries[entry.root.index()];
         let (has_pose, refused) = (root.has_pose, root.refused);
         let spec = entry.spec.clone();
+        // What it hung on does not move: until now its place was beyond doubt.
+        let now_ns = self.now_ns;
+        if let Some(body) = self.bodies[slot.index()].as_mut().filter(|b| !b.moves) {
+            body.since_ns = Some(now_ns);
+        }
         let entry = &mut self.entries[slot.index()];
         entry.attach = None;
         entry.has_pose = has_pose;

@@ -6,6 +6,8 @@
     reason = "helpers of tests, and numbers that must come through bit by bit"
 )]
 
+mod edits;
+mod filters;
 mod sources;
 mod support;
 mod unknown;

@@ -1,0 +1,416 @@
+//! Scene edits and attached bodies: DESIGN 3.1, 3.5, 3.10, 6.
+
+use std::sync::Arc;
+
+use sweepd::ids::BodyId;
+use sweepd::math::{Pose, Vec3};
+use sweepd::scene::{BodySpec, PairAction};
+use sweepd::wire::{BodyStatus, EndCause, Reason, RejectReason};
+use sweepd::world::Edit;
+
+use crate::support::{Bench, MS, TIMEOUT_NS, admitted, cube, fixed, moving, row, rule};
+
+fn put(spec: BodySpec) -> Edit {
+    Edit::Put {
+        body: Arc::new(spec),
+        shapes: cube(),
+    }
+}
+
+fn named(name: &str) -> String {
+    name.to_owned()
+}
+
+fn attach(name: &str, to: Option<&str>, pose: Option<Pose>) -> Edit {
+    Edit::Attach {
+        name: named(name),
+        to: to.map(named),
+        pose,
+    }
+}
+
+#[test]
+fn law_3_1_remove_then_put_of_one_name_makes_a_new_generation_with_the_same_id() {
+    let mut bench = Bench::of(vec![moving("a", 1), moving("b", 2)]);
+    bench.send(MS, "sim", 1, &[row(1, 0.0), row(2, 5.0)]);
+    let slot = bench.slot("a");
+    bench.edit(Edit::Remove { name: named("a") });
+    let removed = bench.world.changes().removed.clone();
+    assert_eq!(removed.len(), 1);
+    assert_eq!(
+        (removed[0].slot, removed[0].cause),
+        (slot, EndCause::Removed)
+    );
+    assert!(bench.world.body(slot).is_none() && bench.world.names_changed());
+    // Its frames find no body; the other's good rows are not lost.
+    let admission = bench.send(MS, "sim", 2, &[row(1, 0.0), row(2, 5.0)]);
+    assert_eq!(admission, admitted(0, 1, 1));
+    bench.edit(put(moving("a", 0)));
+    assert_eq!(bench.body("a").id, BodyId(1), "an id stays with its name");
+    assert_eq!(bench.body("a").generation, 2);
+    assert_eq!(bench.status("a"), BodyStatus::NotReceived);
+    assert!(!bench.world.changes().inserted.contains(&bench.slot("a")));
+}
+
+#[test]
+fn law_3_1_a_put_in_place_ends_the_old_pairs_and_begins_unknown() {
+    let mut bench = Bench::of(vec![moving("a", 1), fixed("wall", 2, 9.0)]);
+    bench.send(MS, "sim", 1, &[row(1, 0.0)]);
+    let larger = BodySpec {
+        report_within_m: 0.5,
+        ..moving("a", 1)
+    };
+    bench.edit(put(larger));
+    assert_eq!(bench.removed("a"), Some(EndCause::Removed));
+    assert_eq!(bench.body("a").generation, 2);
+    assert_eq!(bench.status("a"), BodyStatus::NotReceived);
+    // One that cannot move leaves and comes back in one tick.
+    bench.edit(put(fixed("wall", 2, 8.0)));
+    assert_eq!(bench.removed("wall"), Some(EndCause::Removed));
+    assert!(bench.inserted("wall"));
+    assert_eq!(bench.body("wall").generation, 2);
+}
+
+#[test]
+fn law_6_a_put_of_the_same_content_changes_nothing() {
+    let mut bench = Bench::of(vec![moving("a", 1)]);
+    bench.send(MS, "sim", 1, &[row(1, 0.0)]);
+    let rev = bench.world.scene_rev();
+    bench.edit(put(moving("a", 1)));
+    bench.edit(put(moving("a", 0)));
+    assert_eq!(bench.world.scene_rev(), rev);
+    assert_eq!(bench.status("a"), BodyStatus::Known);
+    assert!(!bench.world.names_changed() && !bench.world.scene_changed());
+    // After an edit in between the same words mean a change again.
+    bench.edit(Edit::Filter {
+        name: named("a"),
+        group: Some(4),
+        mask: None,
+    });
+    assert_eq!(bench.world.scene_rev(), rev + 1);
+    bench.edit(put(moving("a", 1)));
+    assert_eq!(bench.world.scene_rev(), rev + 2);
+}
+
+#[test]
+fn law_6_a_request_is_done_as_a_whole_or_not_at_all() {
+    let mut bench = Bench::of(vec![moving("a", 1)]);
+    let text = bench.refused(&[
+        put(moving("b", 0)),
+        Edit::Remove { name: named("a") },
+        Edit::Remove {
+            name: named("nobody"),
+        },
+    ]);
+    assert_eq!(
+        text,
+        "edit 3: there is no body `nobody`: correct the name, or put the body first"
+    );
+    assert!(bench.world.slot_named("b").is_none());
+    // Within a request, what was put before is there, and what was removed is not.
+    bench.tick_at(bench.now_ns, &[], &[]);
+    let edits = [
+        put(moving("b", 0)),
+        Edit::Enable {
+            name: named("b"),
+            enabled: false,
+        },
+    ];
+    assert!(bench.world.apply(&edits).unwrap().changed);
+    assert_eq!(bench.status("b"), BodyStatus::Disabled);
+    let edits = [
+        Edit::Remove { name: named("b") },
+        Edit::Remove { name: named("b") },
+    ];
+    assert!(bench.refused(&edits).starts_with("edit 2"));
+}
+
+#[test]
+fn law_6_an_edit_that_names_nothing_says_what_to_change() {
+    let mut bench = Bench::of(vec![moving("a", 1), fixed("wall", 2, 9.0)]);
+    let enable = Edit::Enable {
+        name: named("x"),
+        enabled: true,
+    };
+    let filter = Edit::Filter {
+        name: named("x"),
+        group: None,
+        mask: None,
+    };
+    let drop_rules = Edit::DropRules {
+        a: named("a"),
+        b: named("x"),
+    };
+    let reset = Edit::Reset {
+        source: Some(named("x")),
+    };
+    let parent = BodySpec {
+        parent: Some(named("x")),
+        ..moving("b", 0)
+    };
+    for edit in [
+        enable,
+        filter,
+        drop_rules,
+        reset,
+        Edit::Rule(rule(PairAction::Ignore, "a", "x*")),
+        attach("a", Some("x"), None),
+        attach("x", Some("a"), None),
+        put(parent),
+    ] {
+        let text = bench.refused(std::slice::from_ref(&edit));
+        assert!(text.contains("`x`") || text.contains("`x*`"), "{text}");
+        assert!(text.contains(": ") && text.len() > 40, "{text}");
+    }
+}
+
+#[test]
+fn law_6_a_body_that_cannot_be_is_refused() {
+    let mut bench = Bench::of(vec![moving("a", 1)]);
+    let lost = BodySpec {
+        source: None,
+        ..moving("b", 0)
+    };
+    let far = BodySpec {
+        source: Some(9),
+        ..moving("b", 0)
+    };
+    let nan = BodySpec {
+        pose: Pose::translation(f64::NAN, 0.0, 0.0),
+        ..moving("b", 0)
+    };
+    let speed = BodySpec {
+        max_speed_mps: Some(-1.0),
+        ..moving("b", 0)
+    };
+    let ids = [
+        moving("b", 1),
+        moving("a", 7),
+        moving("", 0),
+        moving(&"n".repeat(105), 0),
+    ];
+    for spec in [lost, far, nan, speed].into_iter().chain(ids) {
+        let text = bench.refused(&[put(spec.clone())]);
+        assert!(text.starts_with("edit 1: body `"), "{text}");
+    }
+    // Two new names in one request cannot have one id.
+    let text = bench.refused(&[put(moving("b", 5)), put(moving("c", 5))]);
+    assert!(text.contains("belongs to `b`"), "{text}");
+}
+
+#[test]
+fn law_3_5_disabling_ends_by_cause_and_enabling_brings_the_pose_that_came_meanwhile() {
+    let mut bench = Bench::of(vec![moving("a", 1)]);
+    bench.send(MS, "sim", 1, &[row(1, 0.0)]);
+    let enable = |enabled| Edit::Enable {
+        name: named("a"),
+        enabled,
+    };
+    bench.edit(enable(false));
+    assert_eq!(bench.removed("a"), Some(EndCause::Disabled));
+    assert!(
+        bench.has_reason(Reason::NoInput),
+        "nothing is watched: that is not safe"
+    );
+    bench.send(MS, "sim", 2, &[row(1, 3.0)]);
+    assert_eq!(bench.status("a"), BodyStatus::Disabled);
+    bench.edit(enable(true));
+    assert!(bench.inserted("a"));
+    assert_eq!(bench.body("a").pose.translation.vector.x, 3.0);
+    assert!(bench.body("a").proxy.min.x > 2.0);
+    // Off for longer than its time-out it comes back as what it is.
+    bench.edit(enable(false));
+    bench.wait(TIMEOUT_NS);
+    bench.edit(enable(true));
+    assert_eq!(bench.status("a"), BodyStatus::Stale);
+}
+
+#[test]
+fn law_3_5_a_reset_ends_all_pairs_and_forgets_all_poses() {
+    let mut robot = moving("b", 2);
+    robot.source = Some(1);
+    let mut bench = Bench::of(vec![moving("a", 1), robot, fixed("wall", 3, 9.0)]);
+    bench.send(MS, "sim", 1, &[row(1, 0.0)]);
+    bench.send(MS, "robot", 1, &[row(2, 5.0)]);
+    bench.edit(Edit::Reset {
+        source: Some(named("sim")),
+    });
+    assert_eq!(bench.removed("a"), Some(EndCause::Reset));
+    assert_eq!((bench.removed("b"), bench.removed("wall")), (None, None));
+    assert_eq!(bench.status("a"), BodyStatus::NotReceived);
+    bench.edit(Edit::Reset { source: None });
+    assert_eq!(bench.removed("b"), Some(EndCause::Reset));
+    assert_eq!(bench.removed("wall"), Some(EndCause::Reset));
+    assert!(bench.inserted("wall") && !bench.inserted("b"));
+    assert_eq!(bench.status("wall"), BodyStatus::Known);
+}
+
+#[test]
+fn law_3_10_an_edit_that_enables_a_pair_asks_for_its_bodies_again() {
+    let mut bench = Bench::with_rules(
+        vec![moving("a", 1), moving("b", 2), moving("c", 3)],
+        vec![rule(PairAction::Ignore, "a", "b")],
+    );
+    bench.send(MS, "sim", 1, &[row(1, 0.0), row(2, 0.5), row(3, 9.0)]);
+    let (a, b, c) = (bench.slot("a"), bench.slot("b"), bench.slot("c"));
+    assert!(!bench.world.filters().allows(a, b));
+    bench.edit(Edit::Rule(rule(PairAction::Check, "a", "b")));
+    assert!(bench.world.filters().allows(a, b));
+    let requery = bench.world.changes().requery.clone();
+    assert!(requery.contains(&a) && requery.contains(&b) && !requery.contains(&c));
+    // Both rules go, one way round or the other; what is left are the masks.
+    bench.edit(Edit::DropRules {
+        a: named("b"),
+        b: named("a"),
+    });
+    assert_eq!(bench.world.changes().requery.len(), 2);
+    bench.edit(Edit::Filter {
+        name: named("c"),
+        group: Some(0),
+        mask: None,
+    });
+    assert_eq!(bench.world.changes().requery, [c]);
+    assert!(!bench.world.filters().allows(a, c));
+}
+
+#[test]
+fn law_3_10_an_attached_body_takes_pose_age_and_unknown_from_its_parent() {
+    let held = BodySpec {
+        attached_to: Some(named("gripper")),
+        pose: Pose::translation(0.0, 0.0, 2.0),
+        ..moving("held", 2)
+    };
+    // The scene may name the parent after the child.
+    let mut bench = Bench::of(vec![held, moving("gripper", 1)]);
+    assert_eq!(bench.status("held"), BodyStatus::NotReceived);
+    // Its own frames are refused.
+    assert_eq!(
+        bench.send(MS, "sim", 1, &[row(1, 3.0), row(2, 8.0)]),
+        admitted(0, 1, 1)
+    );
+    assert_eq!(bench.rejects(RejectReason::NotSteerable), 1);
+    assert_eq!(bench.status("held"), BodyStatus::Known);
+    assert!(bench.inserted("held"));
+    let at = bench.body("held").pose.translation.vector;
+    assert_eq!(at, Vec3::new(3.0, 0.0, 2.0));
+    bench.send(MS, "sim", 2, &[row(1, 4.0)]);
+    assert_eq!(bench.body("held").pose.translation.vector.x, 4.0);
+    assert!(bench.world.changes().moved.contains(&bench.slot("held")));
+    assert!(bench.body("held").proxy.min.x > 3.0);
+    // Refused with its parent, known again with it, old with it.
+    bench.send(MS, "sim", 3, &[row(1, f64::NAN)]);
+    assert_eq!(bench.status("held"), BodyStatus::Rejected);
+    bench.send(MS, "sim", 4, &[row(1, 4.0)]);
+    assert_eq!(bench.status("held"), BodyStatus::Known);
+    bench.wait(TIMEOUT_NS);
+    assert_eq!(bench.status("held"), BodyStatus::Stale);
+    let (gripper, held) = (bench.slot("gripper"), bench.slot("held"));
+    assert!(!bench.world.filters().allows(gripper, held));
+}
+
+#[test]
+fn law_3_10_a_body_is_grasped_where_it_is_and_let_go_where_it_is() {
+    let mut bench = Bench::of(vec![moving("gripper", 1), moving("box", 2)]);
+    bench.send(MS, "sim", 1, &[row(1, 1.0), row(2, 1.75)]);
+    bench.edit(attach("box", Some("gripper"), None));
+    assert_eq!(bench.world.scene_rev(), 2);
+    assert_eq!(bench.body("box").pose.translation.vector.x, 1.75);
+    assert!(bench.world.changes().requery.contains(&bench.slot("box")));
+    bench.send(MS, "sim", 2, &[row(1, 5.0)]);
+    assert_eq!(bench.body("box").pose.translation.vector.x, 5.75);
+    bench.edit(attach("box", None, None));
+    assert_eq!(bench.status("box"), BodyStatus::Known);
+    assert_eq!(bench.body("box").pose.translation.vector.x, 5.75);
+    // From now on its own source speaks for it, and is missed.
+    bench.send(TIMEOUT_NS, "sim", 3, &[row(1, 9.0)]);
+    assert_eq!(bench.body("box").pose.translation.vector.x, 5.75);
+    assert_eq!(bench.status("box"), BodyStatus::Stale);
+    assert_eq!(bench.send(MS, "sim", 4, &[row(2, 2.0)]), admitted(0, 1, 0));
+    assert_eq!(bench.status("box"), BodyStatus::Known);
+}
+
+#[test]
+fn law_3_10_chains_hang_together_and_rings_are_refused() {
+    let bodies = ["a", "b", "c", "d"]
+        .iter()
+        .zip(1..)
+        .map(|(n, id)| moving(n, id));
+    let mut bench = Bench::of(bodies.collect());
+    let up = Some(Pose::translation(0.0, 0.0, 2.0));
+    bench.edit(attach("b", Some("a"), up));
+    bench.edit(attach("c", Some("b"), up));
+    let text = bench.refused(&[attach("a", Some("c"), up)]);
+    assert!(text.contains("hang on itself"), "{text}");
+    let text = bench.refused(&[Edit::Remove { name: named("b") }]);
+    assert!(text.contains("`c` hangs on `b`"), "{text}");
+    bench.send(MS, "sim", 1, &[row(1, 1.0)]);
+    assert_eq!(
+        bench.body("c").pose.translation.vector,
+        Vec3::new(1.0, 0.0, 4.0)
+    );
+    let (b, c) = (bench.slot("b"), bench.slot("c"));
+    assert!(!bench.world.filters().allows(b, c), "both hang on `a`");
+    // Where it is not known where something is, it is not known where to hang it.
+    let text = bench.refused(&[attach("d", Some("c"), None)]);
+    assert!(text.contains("give `pose`"), "{text}");
+}
+
+#[test]
+fn law_3_10_what_hangs_on_a_fixed_body_cannot_move() {
+    let mut bench = Bench::of(vec![fixed("wall", 1, 9.0), moving("lamp", 2)]);
+    let to = Some(Pose::translation(0.0, 1.0, 0.0));
+    bench.edit(attach("lamp", Some("wall"), to));
+    assert_eq!(bench.status("lamp"), BodyStatus::Known);
+    assert_eq!(
+        bench.body("lamp").pose.translation.vector,
+        Vec3::new(9.0, 1.0, 0.0)
+    );
+    assert!(!bench.body("lamp").moves && bench.inserted("lamp"));
+    bench.wait(10 * TIMEOUT_NS);
+    assert_eq!(bench.status("lamp"), BodyStatus::Known);
+    bench.edit(attach("lamp", None, None));
+    assert!(bench.body("lamp").moves);
+    assert_eq!(bench.status("lamp"), BodyStatus::Known, "until now it was");
+    bench.wait(TIMEOUT_NS);
+    assert_eq!(bench.status("lamp"), BodyStatus::Stale);
+}
+
+#[test]
+fn a_full_scene_says_which_limit_to_raise() {
+    let mut scene = crate::support::scene(vec![moving("a", 1)], Vec::new());
+    scene.config.limits.bodies = 1;
+    let mut world = sweepd::world::World::new(&scene, vec![cube()], 0).unwrap();
+    let text = world.apply(&[put(moving("b", 0))]).unwrap_err();
+    assert!(text.contains("limits.bodies"), "{text}");
+    // In place of one that goes in the same request there is room.
+    let edits = [Edit::Remove { name: named("a") }, put(moving("b", 0))];
+    assert!(world.apply(&edits).unwrap().changed);
+    world.validate().unwrap();
+}
+
+#[test]
+fn an_empty_scene_is_a_world_without_input() {
+    let mut bench = Bench::of(Vec::new());
+    assert!(bench.has_reason(Reason::NoInput));
+    bench.edit(put(fixed("wall", 0, 0.0)));
+    assert_eq!(bench.world.counts().bodies, 1);
+    assert_eq!(bench.body("wall").id, BodyId(1));
+}
+
+#[test]
+fn a_scene_that_does_not_hold_together_is_no_world() {
+    let new = |bodies: Vec<BodySpec>| {
+        let scene = crate::support::scene(bodies.clone(), Vec::new());
+        let shapes = bodies.iter().map(|_| cube()).collect();
+        sweepd::world::World::new(&scene, shapes, 0)
+    };
+    let text = new(vec![moving("a", 1), moving("b", 1)])
+        .unwrap_err()
+        .to_string();
+    assert!(text.starts_with("body `b`"), "{text}");
+    let lost = BodySpec {
+        attached_to: Some(named("x")),
+        ..moving("a", 1)
+    };
+    assert!(new(vec![lost]).unwrap_err().to_string().contains("`x`"));
+}
