@@ -136,3 +136,25 @@ fn a_closed_meter_stops_the_walk_at_once_and_it_resumes_where_it_was() {
     assert_eq!(closed.spent(), 0);
     assert!(walk.interval().max.is_finite());
 }
+
+#[test]
+fn a_deadline_stops_the_walk_within_one_leaf_query() {
+    let a = shape(&meshes::bumpy_sphere(12, 14, 0.1), None);
+    let pose = Pose::new(Vec3::new(2.4, 0.1, 0.2), Vec3::new(0.3, 0.2, 0.1));
+    for deadline_ns in [1, 50, 150] {
+        let clock = ManualClock::new(0);
+        // Every look at the clock takes 10 ns, so one look late is 10 ns late.
+        clock.step_each_read(10);
+        let mut meter = Meter::new(&clock, Some(deadline_ns), None);
+        let mut walk = Walk::default();
+        walk.start(&a, &a, &pose);
+        assert!(!walk.advance(&a, &a, Goal::Gap, u64::MAX, &mut meter));
+        assert!(!meter.open());
+        let late = sweepd::time::Clock::monotonic_ns(&clock).saturating_sub(deadline_ns);
+        assert!(late <= 20, "{late} ns late");
+        // And it is sound there, and goes on.
+        assert!(walk.interval().min <= walk.interval().max);
+        let mut meter = Meter::unlimited(&clock);
+        assert!(walk.advance(&a, &a, Goal::Gap, u64::MAX, &mut meter));
+    }
+}

@@ -319,20 +319,20 @@ impl Walk {
                 }
             }
         };
-        let [first, second] = pairs.map(|(i, j)| Entry {
-            low: (self.frame.low(&nodes_a[i as usize], &nodes_b[j as usize])).max(entry.low),
-            a: i,
-            b: j,
-        });
+        let bounds = pairs.map(|(i, j)| self.frame.low(&nodes_a[i as usize], &nodes_b[j as usize]));
         meter.charge(2);
-        // The nearer one last, so that it is on top of the stack.
-        let (near, far) = if first.low <= second.low {
-            (first, second)
+        // The nearer one last, so that it is on top of the stack; by its own bound, for what the parent knew may be
+        // more and is the same for both.
+        let order = if bounds[0] <= bounds[1] {
+            [1, 0]
         } else {
-            (second, first)
+            [0, 1]
         };
-        self.put(far);
-        self.put(near);
+        for k in order {
+            let (a, b) = pairs[k];
+            let low = bounds[k].max(entry.low);
+            self.put(Entry { low, a, b });
+        }
     }
 
     fn put(&mut self, entry: Entry) {
