@@ -354,12 +354,19 @@ fn check(a: &Solid, b: &Solid, pose: &Pose, c: &Closest, samples: u32) -> (f64, 
             Some(format!("gap.min {:e} above every f {top:e}", c.gap.min)),
         );
     }
-    let apart = c.point_b - c.point_a - c.normal * c.best_m;
-    if apart.norm() > 1e-6 * (size + pose.translation.vector.norm()) {
-        return (
-            width,
-            Some(format!("points differ by {:e} from the gap", apart.norm())),
-        );
+    // Both points lie in their shapes: below every support plane.
+    let within = 1e-6 * (size + pose.translation.vector.norm());
+    for k in 0..64 {
+        let (x, y) = (f64::from(k) * 2.4, f64::from(k) / 32.0 - 1.0 + 1.0 / 64.0);
+        let off = (1.0 - y * y).sqrt();
+        let n = Vec3::new(off * x.cos(), off * x.sin(), y);
+        let (in_a, in_b) = (n.dot(&c.point_a.coords), pose.inverse() * c.point_b);
+        if in_a > a.reach(&n) + within || n.dot(&in_b.coords) > b.reach(&n) + within {
+            return (
+                width,
+                Some(format!("a closest point outside its shape along {n:?}")),
+            );
+        }
     }
     (width, None)
 }

@@ -146,12 +146,16 @@ fn finish(pair: &Pair<'_>, core: &CoreGap) -> Closest {
     let high = (core.upper - margins + pad).next_up().max(low);
     let along = core.normal.dot(&(core.point_b - core.point_a));
     let best_m = (along - margins).clamp(low, high);
+    // Straight across from each other; where a method ends at 1e-7 the points give way by as much.
+    let middle = (core.point_a + core.point_b) / 2.0;
+    let half = core.normal * ((best_m + margins) / 2.0);
+    let (core_a, core_b) = (middle - half, middle + half);
     Closest {
         gap: Interval::new(low, high),
         best_m,
         normal: core.normal,
-        point_a: Point::from(core.point_a + core.normal * ra),
-        point_b: Point::from(core.point_b - core.normal * rb),
+        point_a: Point::from(core_a + core.normal * ra),
+        point_b: Point::from(core_b - core.normal * rb),
         finished: high - low <= FINISHED * (pair.scale + margins),
     }
 }

@@ -1,0 +1,264 @@
+//! `query --batch` and the exact queries on bad input, and on the pairs that the library beneath got wrong.
+//!
+//! The failures listed here were measured on parry3d-f64 0.31.1 `contact`; each has a closed truth.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test"
+)]
+
+use std::fmt::Write as _;
+
+use serde_json::{Value, json};
+use sweepd::math::{Point, Pose, Quat, Vec3};
+use sweepd::narrow::exact::{Closest, Warm, convex_gap, gap_to_half_space, half_space_gap};
+use sweepd::shape::Convex;
+
+fn ask(text: &[u8]) -> (bool, Vec<Value>) {
+    let mut out = Vec::new();
+    let whole = sweepd::query::batch::run(text, &mut out).unwrap();
+    let lines = String::from_utf8(out).unwrap();
+    (
+        whole,
+        lines
+            .lines()
+            .map(|l| serde_json::from_str(l).unwrap())
+            .collect(),
+    )
+}
+
+fn line(id: &str, a: &Value, b: &Value, t: [f64; 3]) -> String {
+    json!({
+        "id": id, "a": a, "b": b,
+        "pose_a": {"t": [0.0, 0.0, 0.0], "q": [1.0, 0.0, 0.0, 0.0]},
+        "pose_b": {"t": t, "q": [2.0, 0.0, 0.0, 0.0]},
+    })
+    .to_string()
+}
+
+fn gap(a: &Convex, b: &Convex, at: Vec3) -> Closest {
+    let pose = Pose::from_parts(at.into(), Quat::identity());
+    convex_gap(a, b, &pose, &mut Warm::default())
+}
+
+fn assert_gap(c: &Closest, truth: f64, size: f64) {
+    assert!(c.gap.contains(truth), "{c:?} misses {truth:e}");
+    assert!(
+        (c.best_m - truth).abs() <= 1e-12 * size,
+        "{c:?} for {truth:e}"
+    );
+    assert!(c.gap.width() <= 1e-6 * size, "{c:?}");
+}
+
+#[test]
+fn bug_coincident_boxes_and_capsules_are_as_deep_as_they_are() {
+    let cuboid = Convex::cuboid(Vec3::new(0.6, 0.52, 0.7));
+    assert_gap(&gap(&cuboid, &cuboid, Vec3::zeros()), -1.04, 1.0);
+    let capsule = Convex::capsule(0.505, 0.4);
+    assert_gap(&gap(&capsule, &capsule, Vec3::zeros()), -1.01, 1.0);
+    let sphere = Convex::sphere(0.5);
+    assert_gap(&gap(&sphere, &sphere, Vec3::zeros()), -1.0, 1.0);
+    let cylinder = Convex::cylinder(0.3, 0.4);
+    assert_gap(&gap(&cylinder, &cylinder, Vec3::zeros()), -0.6, 1.0);
+    let cone = Convex::cone(0.5, 0.1);
+    assert_gap(&gap(&cone, &cone, Vec3::zeros()), -0.2, 1.0);
+}
+
+#[test]
+fn bug_micrometre_shapes_have_the_gap_of_metre_shapes_scaled() {
+    for s in [1e-9, 1e-6, 1e-3, 1.0, 1e6] {
+        let cuboid = Convex::cuboid(Vec3::new(s, 2.0 * s, 3.0 * s));
+        let c = gap(&cuboid, &cuboid, Vec3::new(2.5 * s, 0.3 * s, 0.2 * s));
+        assert_gap(&c, 0.5 * s, s);
+        let cylinder = Convex::cylinder(s, s);
+        assert_gap(
+            &gap(&cylinder, &cylinder, Vec3::new(0.0, 2.001 * s, 0.0)),
+            0.001 * s,
+            s,
+        );
+        let cone = Convex::cone(s, s);
+        assert_gap(
+            &gap(&cone, &cuboid, Vec3::new(0.0, 0.0, 3.9 * s)),
+            -0.1 * s,
+            s,
+        );
+    }
+}
+
+#[test]
+fn bug_thin_coaxial_discs_are_apart_by_what_is_between_them() {
+    let disc = Convex::cylinder(1.0, 1e-4);
+    assert_gap(
+        &gap(&disc, &disc, Vec3::new(0.0, 0.0, 2e-4 + 1e-6)),
+        1e-6,
+        1.0,
+    );
+    assert_gap(
+        &gap(&disc, &disc, Vec3::new(0.1, 0.0, 2e-4 - 1e-6)),
+        -1e-6,
+        1.0,
+    );
+}
+
+#[test]
+fn bug_a_thin_hull_keeps_its_corners() {
+    let mut points = Vec::new();
+    for (x, y, z) in [
+        (0., 0., 1.),
+        (1., 0., -1.),
+        (1., 1., 1.),
+        (0., 1., -1.),
+        (0.5, 0.5, 2.),
+    ] {
+        points.push(Point::new(x, y, z * 1e-6));
+    }
+    let hull = Convex::hull(&points).unwrap();
+    let ball = Convex::sphere(0.5);
+    assert_gap(
+        &gap(&hull, &ball, Vec3::new(0.5, 0.5, 0.5 + 3e-6)),
+        1e-6,
+        1.0,
+    );
+}
+
+#[test]
+fn a_half_space_is_met_by_the_deepest_point_in_either_order() {
+    let cone = Convex::cone(0.5, 0.25);
+    let turned = Quat::from_axis_angle(&Vec3::x_axis(), 0.2);
+    let pose = Pose::from_parts(Vec3::new(3.0, -2.0, 0.4).into(), turned);
+    let one = half_space_gap(&Vec3::z(), 0.1, &cone, &pose);
+    let deepest = 0.4 - 0.25 * 0.2_f64.cos() - 0.5 * 0.2_f64.sin();
+    assert_gap(&one, deepest - 0.1, 1.0);
+    let other = gap_to_half_space(&cone, &Vec3::z(), 0.1, &pose.inverse());
+    assert_gap(&other, deepest - 0.1, 1.0);
+    let normal = pose.rotation * other.normal;
+    assert!((normal + one.normal).norm() < 1e-12, "A to B, mirrored");
+}
+
+#[test]
+fn swapping_moving_and_scaling_a_pair_changes_nothing_but_the_frame() {
+    let shapes = [
+        Convex::cuboid(Vec3::new(0.3, 0.5, 0.7)),
+        Convex::cone(0.4, 0.6),
+        Convex::cylinder(0.5, 0.2),
+        Convex::capsule(0.2, 0.5),
+    ];
+    for (i, a) in shapes.iter().enumerate() {
+        for (j, b) in shapes.iter().enumerate() {
+            for k in 0..20_u32 {
+                let x = f64::from(k);
+                let turn = Quat::from_euler_angles(x, 2.0 * x, 3.0 * x);
+                let at = Vec3::new(x.sin(), x.cos(), (1.7 * x).sin()) * (0.2 + 0.08 * x);
+                let pose = Pose::from_parts(at.into(), turn);
+                let one = convex_gap(a, b, &pose, &mut Warm::default());
+                let back = convex_gap(b, a, &pose.inverse(), &mut Warm::default());
+                assert!(
+                    (one.best_m - back.best_m).abs() < 1e-7,
+                    "{i} {j} {k}: {one:?} {back:?}"
+                );
+                let mut warm = Warm::default();
+                let _ = convex_gap(a, b, &pose, &mut warm);
+                let again = convex_gap(a, b, &pose, &mut warm);
+                assert!((one.best_m - again.best_m).abs() < 1e-7, "{i} {j} {k}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_line_that_cannot_be_read_gets_an_error_and_the_others_an_answer() {
+    let ball = json!({"type": "sphere", "radius": 1.0});
+    let mut text = String::from("\u{feff}");
+    let good = line("good \u{1f980}", &ball, &ball, [3.0, 0.0, 0.0]);
+    let _ = write!(text, "{good}\r\n\r\n   \n");
+    let bad_shapes = [
+        json!({"type": "sphere", "radius": -1.0}),
+        json!({"type": "sphere", "radius": null}),
+        json!({"type": "sphere"}),
+        json!({"type": "blob"}),
+        json!({"type": "convex", "vertices": []}),
+        json!({"type": "trimesh", "vertices": [[0.0, 0.0, 0.0]], "faces": []}),
+        json!({"type": "trimesh", "vertices": [[0.0, 0.0, 0.0]], "faces": [[0, 1, 2]]}),
+        json!({"type": "box", "half_extents": [1.0, 0.0, 1.0]}),
+        json!({"type": "half_space", "normal": [0.0, 0.0, 0.0]}),
+        json!({"type": "convex", "file": "/etc/passwd"}),
+        json!(7),
+    ];
+    for (k, bad) in bad_shapes.iter().enumerate() {
+        let _ = writeln!(text, "{}", line(&format!("bad {k}"), &ball, bad, [0.0; 3]));
+    }
+    let deep = "[".repeat(5000);
+    let _ = writeln!(text, "{deep}\nnot json\n{{\"id\": 1e999}}\n{{}}\n[1]");
+    let zero = good.replace("[2.0,0.0,0.0,0.0]", "[0.0,0.0,0.0,0.0]");
+    assert_ne!(zero, good);
+    let _ = writeln!(text, "{zero}");
+    let mut bytes = text.into_bytes();
+    bytes.extend_from_slice(b"\xff\xfe\x00\n");
+    bytes.extend_from_slice(good.as_bytes());
+    let (whole, answers) = ask(&bytes);
+    assert!(!whole);
+    assert_eq!(answers.len(), 1 + bad_shapes.len() + 5 + 1 + 1 + 1);
+    for (k, answer) in answers.iter().enumerate() {
+        let first_or_last = k == 0 || k + 1 == answers.len();
+        if first_or_last {
+            assert_eq!(answer["id"], "good \u{1f980}");
+            assert!((answer["gap_m"].as_f64().unwrap() - 1.0).abs() < 1e-14);
+            assert_eq!(answer["colliding"], false);
+        } else {
+            assert!(
+                answer["error"]
+                    .as_str()
+                    .is_some_and(|e| e.starts_with("line ")),
+                "{answer}"
+            );
+            assert_eq!(answer.as_object().unwrap().len(), 2, "{answer}");
+        }
+        if (1..=bad_shapes.len()).contains(&k) {
+            assert_eq!(answer["id"], format!("bad {}", k - 1));
+        }
+    }
+}
+
+#[test]
+fn a_crossing_mesh_surface_has_no_gap_and_a_surface_around_a_ball_is_apart() {
+    let corners: Vec<[f64; 3]> = (0..8)
+        .map(|k| [0, 1, 2].map(|b| if k >> b & 1 == 1 { 2.0 } else { -2.0 }))
+        .collect();
+    let faces = [
+        [0, 1, 3],
+        [0, 3, 2],
+        [4, 6, 7],
+        [4, 7, 5],
+        [0, 4, 5],
+        [0, 5, 1],
+        [2, 3, 7],
+        [2, 7, 6],
+        [0, 2, 6],
+        [0, 6, 4],
+        [1, 5, 7],
+        [1, 7, 3],
+    ];
+    let mesh = json!({"type": "trimesh", "vertices": corners, "faces": faces});
+    let ball = json!({"type": "sphere", "radius": 1.0});
+    let floor = json!({"type": "half_space", "normal": [0.0, 0.0, 2.0], "offset": -2.5});
+    let text = [
+        line("inside", &mesh, &ball, [0.0, 0.0, 0.5]),
+        line("crossing", &mesh, &ball, [0.0, 0.0, 1.5]),
+        line("meshes", &mesh, &mesh, [0.1, 0.2, 0.3]),
+        line("meshes apart", &mesh, &mesh, [0.0, 4.5, 0.0]),
+        line("floor", &mesh, &floor, [0.0, 0.0, 0.0]),
+    ]
+    .join("\n");
+    let (whole, answers) = ask(text.as_bytes());
+    assert!(whole);
+    let gaps: Vec<Option<f64>> = answers.iter().map(|a| a["gap_m"].as_f64()).collect();
+    let near = |k: usize, truth: f64| (gaps[k].unwrap() - truth).abs() < 1e-12;
+    assert!(near(0, 0.5) && near(3, 0.5) && near(4, 0.5), "{answers:?}");
+    for k in [1, 2] {
+        assert_eq!(gaps[k], None);
+        assert_eq!(answers[k]["colliding"], true);
+        assert_eq!(answers[k]["gap_max_m"], 0.0);
+        assert!(answers[k]["gap_min_m"].as_f64().unwrap() < 0.0);
+    }
+}
