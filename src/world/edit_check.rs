@@ -5,7 +5,8 @@
 use std::collections::BTreeMap;
 
 use super::World;
-use super::edit::{Edit, is_rule_of};
+use super::edit::Edit;
+use super::edit_rules::is_rule_of;
 use super::rules::sides_of;
 use crate::ids::BodyId;
 use crate::limits::SHAPES_PER_BODY_MAX;

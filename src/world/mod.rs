@@ -7,12 +7,14 @@
 //! each frame, [`World::age`] once. After that [`World::changes`] is complete.
 
 mod admit;
+mod admit_rows;
 mod age;
 mod body;
 mod census;
 mod edit;
 mod edit_check;
 mod edit_links;
+mod edit_rules;
 mod filters;
 mod lists;
 mod names;

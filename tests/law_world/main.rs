@@ -6,6 +6,9 @@
     reason = "helpers of tests, and numbers that must come through bit by bit"
 )]
 
+mod churn;
+#[path = "../common/mod.rs"]
+mod common;
 mod edits;
 mod filters;
 mod sources;

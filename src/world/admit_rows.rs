@@ -1,0 +1,165 @@
+//! The rows of an admitted frame: poses taken, ages renewed, bad ones refused with their bodies.
+//!
+//! In: a frame whose rows have been matched with bodies. Out: bodies placed and settled. A row that repeats the last
+//! pose bit by bit only renews the age.
+
+use super::World;
+use super::admit::{NO_BODY, Times};
+use crate::ids::{BodySlot, SourceSlot};
+use crate::limits::{COORDINATE_MAX_M, QUATERNION_NORM_TOLERANCE};
+use crate::math::{Pose, pose_from};
+use crate::wire::{BodyStatus, Frame, FrameHeader, RejectReason, TransformRow};
+
+impl World {
+    /// Takes the poses of the rows that were found. Of a body that stands there twice no row is taken: which one is
+    /// its newest pose nobody can say.
+    pub(super) fn take_rows(
+        &mut self,
+        source: SourceSlot,
+        frame: &Frame,
+        rows: &[BodySlot],
+        times: Times,
+    ) -> u64 {
+        let number = self.sources[source.index()].pose_frame;
+        let deadline_ns = times
+            .since_ns
+            .saturating_add(self.sources[source.index()].timeout_ns);
+        let young = deadline_ns > self.now_ns;
+        let mut refused = 0;
+        for (at, (row, &slot)) in frame.transforms.iter().zip(rows).enumerate() {
+            if slot == NO_BODY {
+                continue;
+            }
+            let velocity = frame.velocities.get(at);
+            let raw = raw_of(row);
+            let entry = &self.entries[slot.index()];
+            let twice = entry.twice == number;
+            let repeated = entry.has_pose && !entry.refused && same_raw(&entry.raw, &raw);
+            let checked = if twice {
+                Err(RejectReason::Duplicate)
+            } else if velocity.is_some_and(|v| !v.iter().all(|x| x.is_finite())) {
+                Err(RejectReason::NotFinite)
+            } else if repeated {
+                Ok(None)
+            } else {
+                pose_of(row).map(Some)
+            };
+            match checked {
+                Ok(pose) => {
+                    self.renew(slot, &frame.header, velocity.copied(), times);
+                    self.accept(slot, pose.map(|pose| (pose, raw)), deadline_ns, young);
+                }
+                Err(reason) => {
+                    self.note_reject(reason);
+                    self.refuse_pose(slot, reason);
+                    refused += 1;
+                }
+            }
+        }
+        refused
+    }
+
+    /// A good row: its stamp, velocity and age.
+    fn renew(
+        &mut self,
+        slot: BodySlot,
+        header: &FrameHeader,
+        velocity: Option<[f64; 6]>,
+        times: Times,
+    ) {
+        if let Some(body) = self.bodies[slot.index()].as_mut() {
+            body.velocity = velocity;
+            body.stamp_ns = header.stamp_ns;
+            body.since_ns = Some(times.since_ns);
+            body.received_ns = times.received_ns;
+        }
+    }
+
+    /// A good row: its pose, where it is not the one the body has.
+    fn accept(
+        &mut self,
+        slot: BodySlot,
+        pose: Option<(Pose, [f64; 7])>,
+        deadline_ns: u64,
+        young: bool,
+    ) {
+        let mut moved = false;
+        if let Some((pose, raw)) = pose {
+            moved = self.place(slot, &pose);
+            let entry = &mut self.entries[slot.index()];
+            entry.raw = raw;
+            entry.has_pose = true;
+            entry.refused = false;
+        }
+        let Some(body) = self.bodies[slot.index()].as_mut() else {
+            return;
+        };
+        body.reject = None;
+        let known = body.status == BodyStatus::Known && body.in_broad;
+        if known && young && !moved {
+            // The common case of a world at rest: nothing but the age is new.
+            let stamp_ns = body.stamp_ns;
+            self.ages.set(slot, Some(deadline_ns), Some(stamp_ns));
+            self.entries[slot.index()].touched = self.tick;
+        } else {
+            self.settle(slot, moved);
+        }
+    }
+
+    /// The newest pose of a body was refused: it is unknown until a good one comes; its last good one is kept.
+    fn refuse_pose(&mut self, slot: BodySlot, reason: RejectReason) {
+        self.entries[slot.index()].refused = true;
+        if let Some(body) = self.bodies[slot.index()].as_mut() {
+            body.reject = Some(reason);
+        }
+        self.settle(slot, false);
+    }
+
+    /// A paused frame: the poses of the last pose frame still hold, for one more time-out.
+    pub(super) fn renew_last_poses(&mut self, source: SourceSlot, times: Times) {
+        let number = self.sources[source.index()].pose_frame;
+        let rows = std::mem::take(&mut self.sources[source.index()].rows);
+        for &slot in rows.iter().filter(|slot| **slot != NO_BODY) {
+            let entry = &self.entries[slot.index()];
+            // A body put anew or reset since has no pose that could be renewed.
+            if entry.seen != number || !entry.has_pose || entry.refused || number == 0 {
+                continue;
+            }
+            if let Some(body) = self.bodies[slot.index()].as_mut() {
+                body.since_ns = Some(times.since_ns);
+                self.settle(slot, false);
+            }
+        }
+        self.sources[source.index()].rows = rows;
+    }
+}
+
+fn raw_of(row: &TransformRow) -> [f64; 7] {
+    let ([x, y, z], [i, j, k, w]) = (row.position, row.orientation);
+    [x, y, z, i, j, k, w]
+}
+
+/// Bit by bit; a row that holds NaN is never the same as one that was admitted.
+fn same_raw(one: &[f64; 7], other: &[f64; 7]) -> bool {
+    one[0].is_finite()
+        && one
+            .iter()
+            .zip(other)
+            .all(|(a, b)| a.to_bits() == b.to_bits())
+}
+
+/// The pose of a row, or what is wrong with it.
+fn pose_of(row: &TransformRow) -> Result<Pose, RejectReason> {
+    let finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
+    if !finite(&row.position) || !finite(&row.orientation) {
+        return Err(RejectReason::NotFinite);
+    }
+    if row.position.iter().any(|v| v.abs() > COORDINATE_MAX_M) {
+        return Err(RejectReason::OverLimit);
+    }
+    let square: f64 = row.orientation.iter().map(|v| v * v).sum();
+    if (square.sqrt() - 1.0).abs() > QUATERNION_NORM_TOLERANCE {
+        return Err(RejectReason::BadQuaternion);
+    }
+    pose_from(row.position, row.orientation).ok_or(RejectReason::BadQuaternion)
+}
