@@ -29,7 +29,7 @@ fn python() -> Option<String> {
         "{python} of SWEEPD_PYTHON has no iceoryx2 and numpy"
     );
     if !can {
-        println!("no python3 with iceoryx2 and numpy (SWEEPD_PYTHON): the client was not run");
+        eprintln!("no python3 with iceoryx2 and numpy (SWEEPD_PYTHON): the client was not run");
     }
     can.then_some(python)
 }

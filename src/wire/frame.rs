@@ -76,7 +76,7 @@ impl Inbox {
         &mut self.frames[..self.len]
     }
 
-    /// Notes that the node behind a session is gone; the session is over after this inbox's frames.
+    /// Notes that the node behind a session is gone: the session is over.
     pub fn end_session(&mut self, session: u64) {
         self.ended.push(session);
     }
