@@ -164,11 +164,8 @@ impl<'a> Daemon<'a> {
     /// Runs one tick and sends what it filled.
     fn tick(&mut self, due: Due, woke_ns: u64) -> Result<()> {
         let engine = &mut self.engine;
-        self.pacer.drain_passed(|source, frames| {
-            if let Some(source) = source {
-                engine.note_skipped(source, frames);
-            }
-        });
+        self.pacer
+            .drain_passed(|source, frames| engine.note_skipped(source, frames));
         let demand = self.door.demand();
         let budget = if due.ages_only {
             Budget {

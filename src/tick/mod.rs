@@ -19,7 +19,8 @@ use crate::publish::{Publisher, View};
 use crate::scene::Scene;
 use crate::time::{Budget, Clock, Meter};
 use crate::wire::{
-    Demand, Inbox, MessageHeader, Outbox, Reason, Stage, State, TickCause, TickRow, WIRE_VERSION,
+    Demand, Inbox, MessageHeader, Outbox, Reason, RejectReason, Stage, State, TickCause, TickRow,
+    WIRE_VERSION,
 };
 use crate::world::{Applied, ChangeSet, Edit, PlacedShape, World};
 
@@ -181,9 +182,12 @@ impl Engine {
         self.out.plan_changed = false;
     }
 
-    /// Frames of a source that were passed over for newer ones.
-    pub fn note_skipped(&mut self, source: SourceSlot, frames: u64) {
-        self.world.note_skipped(source, frames);
+    /// Frames of a source that were passed over for newer ones; `None`: of no source of the scene.
+    pub fn note_skipped(&mut self, source: Option<SourceSlot>, frames: u64) {
+        match source {
+            Some(source) => self.world.note_skipped(source, frames),
+            None => (0..frames).for_each(|_| self.world.note_reject(RejectReason::UnknownSource)),
+        }
     }
 
     /// What became of the edits of the last tick.
@@ -208,6 +212,12 @@ impl Engine {
     #[must_use]
     pub fn pairs(&self) -> &PairSet {
         &self.pairs
+    }
+
+    /// What the last tick filled.
+    #[must_use]
+    pub fn outbox(&self) -> &Outbox {
+        &self.out
     }
 
     /// The plan in force.
@@ -250,9 +260,6 @@ impl Engine {
         let now_ns = self.clock.boottime_ns();
         self.now_ns = now_ns;
         self.world.begin_tick(self.tick);
-        for &session in input.inbox.ended() {
-            self.end_session(session);
-        }
         for batch in input.edits {
             let result = self.world.apply(&batch.edits);
             let (token, warnings) = (batch.token, batch.warnings.clone());
@@ -265,20 +272,13 @@ impl Engine {
         for frame in input.inbox.frames() {
             self.world.admit(frame, now_ns);
         }
+        // After its last frames: a client that leaves has still said where its bodies are.
+        for &session in input.inbox.ended() {
+            self.world.end_session(session);
+        }
         self.world.age(now_ns);
         if !input.edits.is_empty() {
             self.replan();
-        }
-    }
-
-    /// A client's node is dead: its session is over.
-    fn end_session(&mut self, session: u64) {
-        let sources = self.world.sources().iter();
-        let owner = sources
-            .map(|source| source.to_row(self.now_ns).session)
-            .position(|own| own == session);
-        if let Some(at) = owner.and_then(|at| u32::try_from(at).ok()) {
-            self.world.session_dead(SourceSlot(at));
         }
     }
 

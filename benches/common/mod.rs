@@ -1,0 +1,219 @@
+//! What the benches share: an engine fed by hand, quantiles, and the columns that say where a figure comes from.
+
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "shared by benches that each use a part of it"
+)]
+
+use std::path::Path;
+use std::sync::Arc;
+
+use sweepd::builtin::Random;
+use sweepd::daemon::build_shapes;
+use sweepd::math::{Pose, Vec3};
+use sweepd::scene::Scene;
+use sweepd::tick::{Engine, TickInput};
+use sweepd::time::{Budget, Clock, SystemClock};
+use sweepd::wire::{
+    Demand, FrameHeader, Inbox, Outbox, TickCause, TransformRow, WIRE_VERSION, frame_flags,
+    name_bytes,
+};
+
+/// An engine and the frame it is fed with.
+pub struct Bench {
+    pub engine: Engine,
+    pub scene: Scene,
+    pub rows: Vec<TransformRow>,
+    clock: Arc<SystemClock>,
+    inbox: Inbox,
+    seq: u64,
+}
+
+impl Bench {
+    pub fn new(text: &str) -> Self {
+        let scene = Scene::parse(text, "bench", Path::new(".")).unwrap();
+        let shapes = build_shapes(&scene).unwrap();
+        let clock = Arc::new(SystemClock);
+        let engine = Engine::new(
+            &scene,
+            shapes.bodies,
+            1,
+            Arc::clone(&clock) as Arc<dyn Clock>,
+        )
+        .unwrap();
+        let moving = scene.bodies.iter().filter(|body| body.moves);
+        let rows = moving.map(|body| row(body.id.0, &body.pose)).collect();
+        Self {
+            engine,
+            scene,
+            rows,
+            clock,
+            inbox: Inbox::default(),
+            seq: 0,
+        }
+    }
+
+    /// One tick with a frame of these rows; returns the wall time and the thread's CPU time of the tick, nanoseconds.
+    pub fn tick(
+        &mut self,
+        rows: &[TransformRow],
+        full: bool,
+        budget: Budget,
+        demand: Demand,
+    ) -> (u64, u64) {
+        self.seq += 1;
+        self.inbox.clear();
+        let frame = self.inbox.push();
+        frame.header = FrameHeader {
+            session: 1,
+            seq: self.seq,
+            source: name_bytes("feed"),
+            flags: if full {
+                frame_flags::FULL
+            } else {
+                frame_flags::PARTIAL
+            },
+            schema: WIRE_VERSION,
+            ..FrameHeader::default()
+        };
+        frame.received_ns = self.clock.boottime_ns();
+        frame.set_transforms(rows);
+        let (woke_ns, cpu_ns) = (self.clock.monotonic_ns(), self.clock.thread_cpu_ns());
+        self.engine.tick(TickInput {
+            inbox: &self.inbox,
+            edits: &[],
+            demand,
+            budget,
+            cause: TickCause::Frame,
+            cause_source: Some(0),
+            woke_ns,
+            pulse: None,
+        });
+        (
+            self.clock.monotonic_ns() - woke_ns,
+            self.clock.thread_cpu_ns() - cpu_ns,
+        )
+    }
+
+    pub fn out(&self) -> &Outbox {
+        self.engine.outbox()
+    }
+}
+
+pub fn row(body: u64, pose: &Pose) -> TransformRow {
+    let q = pose.rotation.as_vector();
+    TransformRow {
+        body,
+        position: pose.translation.vector.into(),
+        orientation: [q.x, q.y, q.z, q.w],
+        ..TransformRow::default()
+    }
+}
+
+/// Bodies that fly straight and turn evenly, bouncing off the walls of their cube.
+pub struct Flight {
+    pub poses: Vec<Pose>,
+    velocities: Vec<Vec3>,
+    spins: Vec<Vec3>,
+    side: f64,
+}
+
+impl Flight {
+    /// * `step` - metres a tick.
+    pub fn new(scene: &Scene, step: f64, seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let moving: Vec<_> = scene.bodies.iter().filter(|body| body.moves).collect();
+        let mut direction = || {
+            let v = Vec3::new(
+                random.range(-1.0, 1.0),
+                random.range(-1.0, 1.0),
+                random.range(-1.0, 1.0),
+            );
+            v / v.norm().max(1e-3)
+        };
+        let velocities = moving.iter().map(|_| direction() * step).collect();
+        let spins = moving.iter().map(|_| direction() * step).collect();
+        #[allow(clippy::cast_precision_loss, reason = "small counts")]
+        let side = (moving.len() as f64 / 0.5).cbrt();
+        Self {
+            poses: moving.iter().map(|body| body.pose).collect(),
+            velocities,
+            spins,
+            side,
+        }
+    }
+
+    pub fn advance(&mut self) {
+        for (at, pose) in self.poses.iter_mut().enumerate() {
+            let velocity = &mut self.velocities[at];
+            for k in 0..3 {
+                let next = pose.translation.vector[k] + velocity[k];
+                if !(0.0..=self.side).contains(&next) {
+                    velocity[k] = -velocity[k];
+                }
+            }
+            pose.translation.vector += *velocity;
+            pose.append_rotation_wrt_center_mut(&nalgebra::UnitQuaternion::from_scaled_axis(
+                self.spins[at],
+            ));
+            pose.rotation.renormalize();
+        }
+    }
+}
+
+/// The `share` quantile of times, in the unit given.
+pub fn quantile(times: &mut [u64], share: f64) -> u64 {
+    times.sort_unstable();
+    #[allow(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "an index"
+    )]
+    let at = ((times.len() as f64 - 1.0) * share).round() as usize;
+    times[at]
+}
+
+/// Machine, commit and compiler, as CSV columns.
+pub fn provenance() -> String {
+    let run = |command: &str, args: &[&str]| {
+        let out = std::process::Command::new(command).args(args).output();
+        out.map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
+            .unwrap_or_default()
+    };
+    let cpu = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let field = |name: &str| {
+        let line = cpu
+            .lines()
+            .find(|line| line.starts_with(name))
+            .unwrap_or_default();
+        line.split(':').nth(1).unwrap_or_default().trim().to_owned()
+    };
+    let avx512 = if cpu.contains("avx512f") {
+        "avx512"
+    } else {
+        "no avx512"
+    };
+    let cores = std::thread::available_parallelism().map_or(0, std::num::NonZero::get);
+    format!(
+        "{} family {} model {} {avx512} {cores} cores,{},{}",
+        field("model name"),
+        field("cpu family"),
+        field("model\t"),
+        run("git", &["rev-parse", "--short", "HEAD"]),
+        run("rustc", &["--version"]).replace(',', " ")
+    )
+}
+
+/// Writes a CSV beside the bench, and to standard output.
+pub fn save(name: &str, text: &str) {
+    print!("{text}");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("benches/results")
+        .join(name);
+    if let Err(error) = std::fs::write(&path, text) {
+        eprintln!("cannot write {}: {error}", path.display());
+    }
+}
