@@ -32,6 +32,8 @@ pub(super) struct Cursor {
     pub(super) goal: Goal,
     /// Least gap of the shape pairs finished so far.
     pub(super) gap: Interval,
+    /// Whether 0 inside the interval of a finished query means touching: every shape pair so far said so.
+    pub(super) certain: bool,
     /// Where it is.
     pub(super) witness: Option<Witness>,
     /// Contacts found so far.
@@ -49,6 +51,7 @@ impl Default for Cursor {
             tick: 0,
             goal: Goal::Verdict,
             gap: Interval::UNKNOWN,
+            certain: true,
             witness: None,
             found: Vec::new(),
             next: 0,
@@ -78,6 +81,7 @@ impl Cursor {
             min: f64::INFINITY,
             max: f64::INFINITY,
         };
+        self.certain = true;
         self.witness = None;
         self.found.clear();
         self.next = 0;
@@ -152,6 +156,7 @@ impl Cursor {
             if let Some(closest) = shape_gap(&one.shape, &other.shape, &pos12, &mut Warm::default())
             {
                 let gap = sound(closest.gap);
+                self.certain &= closest.finished || !gap.contains(0.0);
                 if gap.max < self.gap.max {
                     self.witness = Some(witness_of(one, other, &pos12, &closest, places));
                 }
@@ -185,6 +190,7 @@ impl Cursor {
     fn take_walk(&mut self, (a, b): (&Body, &Body), places: (u32, u32), pos12: &Pose) {
         let (one, other) = (&a.shapes[places.0 as usize], &b.shapes[places.1 as usize]);
         let gap = sound(self.walk.interval());
+        self.certain &= self.walk.is_certain();
         if let Some(leaf) = self.walk.witness().filter(|_| gap.max < self.gap.max) {
             self.witness = Some(Witness {
                 triangle_a: leaf.triangle_a,

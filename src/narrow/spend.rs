@@ -291,7 +291,7 @@ impl Narrow {
                 min: low.min(cursor.upper()),
                 max: cursor.upper(),
             },
-            finished: whole,
+            finished: whole && cursor.certain,
             witness: cursor.witness,
         };
         let contacts = cursor.goal == Goal::Contacts && turn == Turn::Finished;
