@@ -1,0 +1,185 @@
+//! What shared memory costs a lockstep client: from its send to its receipt of the result, beyond the tick's own
+//! time, by event and by spinning on both sides.
+//!
+//! Method: a daemon without geometry in a process of its own (this program again) answers each frame with a tick and
+//! one pair a body; the tick says how long it took from wake-up to the outbox filled, which is taken off. CSV on
+//! standard output: `cargo bench --bench shm_latency [-- FRAMES]`.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    missing_docs,
+    reason = "a bench ends at the first failure"
+)]
+
+use std::io::{BufRead, BufReader, Read};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+use sweepd::time::{Clock, SystemClock};
+use sweepd::transport::Door;
+use sweepd::transport::client::{ClientOptions, FrameInfo, Rows, Topics};
+use sweepd::transport::iceoryx::{Place, Server, ServerOptions};
+use sweepd::wire::{Inbox, Outbox, PairRow, TransformRow, WIRE_VERSION};
+
+const SECOND_NS: u64 = 1_000_000_000;
+const FRAMES_DEFAULT: usize = 20_000;
+/// Frames before the measurement: connections, growth of slices, page faults.
+const FRAMES_WARM: usize = 500;
+
+fn place(root: &str) -> Place {
+    Place::new("bench").unwrap().under(root, "swbench_")
+}
+
+/// The daemon's part: until its standard input ends.
+fn serve(root: &str, busy_poll: bool) {
+    let clock = SystemClock;
+    let mut server = Server::open(ServerOptions {
+        busy_poll,
+        ..ServerOptions::new(place(root), 7)
+    })
+    .unwrap();
+    println!("READY");
+    std::thread::spawn(|| {
+        let mut nothing = Vec::new();
+        let _ended = std::io::stdin().read_to_end(&mut nothing);
+        let root = std::env::args().nth(2).unwrap();
+        // the door is on the other thread: the mark is a file that it looks for
+        std::fs::write(format!("{root}/stop"), "").unwrap();
+    });
+    let (mut inbox, mut outbox) = (Inbox::default(), Outbox::default());
+    outbox.tick.header.boot_id = 7;
+    outbox.tick.header.schema = WIRE_VERSION;
+    let stop = PathBuf::from(root).join("stop");
+    loop {
+        server.wait(SECOND_NS / 10, &clock).unwrap();
+        let woke_ns = clock.monotonic_ns();
+        inbox.clear();
+        server.receive(&mut inbox, &clock);
+        if inbox.frames().is_empty() {
+            if stop.exists() {
+                return;
+            }
+            server.housekeeping();
+        }
+        let demand = server.demand();
+        for frame in inbox.frames() {
+            let row = &mut outbox.tick.sources[0];
+            row.name = frame.header.source;
+            row.session = frame.header.session;
+            row.epoch = frame.header.epoch;
+            row.seq = frame.header.seq;
+            outbox.tick.sources_len = 1;
+            outbox.tick.header.tick += 1;
+            outbox.pairs_header = outbox.tick.header;
+            outbox.pairs.clear();
+            if demand.pairs {
+                let pairs = frame.transforms.iter().map(|row| PairRow {
+                    body_a: row.body,
+                    body_b: row.body + 1,
+                    ..PairRow::default()
+                });
+                outbox.pairs.extend(pairs);
+            }
+            outbox.tick.elapsed_ns = clock.monotonic_ns() - woke_ns;
+            server.publish(&outbox).unwrap();
+        }
+    }
+}
+
+fn at(sorted: &[u64], share: f64) -> f64 {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        clippy::cast_precision_loss,
+        reason = "an index below a million"
+    )]
+    let place = ((sorted.len() - 1) as f64 * share) as usize;
+    #[allow(clippy::cast_precision_loss, reason = "nanoseconds below a minute")]
+    let us = sorted[place] as f64 / 1000.0;
+    us
+}
+
+fn measure(how: &str, bodies: u64, frames: usize) {
+    let root = std::env::temp_dir().join(format!("swbench_{}", std::process::id()));
+    let root = root.to_str().unwrap().to_owned();
+    let mut daemon = Command::new(std::env::current_exe().unwrap())
+        .args(["serve", &root, how])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    BufReader::new(daemon.stdout.as_mut().unwrap())
+        .read_line(&mut line)
+        .unwrap();
+    let mut client = ClientOptions {
+        place: place(&root),
+        source: Some("sim".to_owned()),
+        timeout_ns: 5 * SECOND_NS,
+    }
+    .connect()
+    .unwrap();
+    client.set_spin(how == "polling");
+    client
+        .subscribe(Topics {
+            pairs: true,
+            ..Topics::default()
+        })
+        .unwrap();
+    let rows: Vec<_> = (1..=bodies)
+        .map(|body| TransformRow {
+            body,
+            ..TransformRow::default()
+        })
+        .collect();
+    let clock = SystemClock;
+    let mut latencies_ns = Vec::with_capacity(frames);
+    for frame in 0..FRAMES_WARM + frames {
+        let sent_ns = clock.monotonic_ns();
+        client
+            .step(&FrameInfo::default(), Rows::Poses(&rows), SECOND_NS)
+            .unwrap();
+        let took_ns = clock.monotonic_ns() - sent_ns;
+        assert!(client.view().pairs().is_some());
+        if frame >= FRAMES_WARM {
+            latencies_ns.push(took_ns.saturating_sub(client.view().tick().elapsed_ns));
+        }
+    }
+    latencies_ns.sort_unstable();
+    let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    println!(
+        "{how},{bodies},{frames},{:.1},{:.1},{:.1},{:.1},{}",
+        at(&latencies_ns, 0.5),
+        at(&latencies_ns, 0.9),
+        at(&latencies_ns, 0.99),
+        at(&latencies_ns, 0.999),
+        load.split(' ').next().unwrap_or("")
+    );
+    drop(client);
+    drop(daemon.stdin.take());
+    daemon.wait().unwrap();
+    let _left = std::fs::remove_dir_all(&root);
+}
+
+fn main() {
+    let args: Vec<_> = std::env::args().collect();
+    if args.get(1).is_some_and(|arg| arg == "serve") {
+        return serve(&args[2], args[3] == "polling");
+    }
+    let frames = args
+        .iter()
+        .find_map(|arg| arg.parse().ok())
+        .unwrap_or(FRAMES_DEFAULT);
+    println!("how,bodies,frames,p50_us,p90_us,p99_us,p999_us,load");
+    for how in ["event", "polling"] {
+        for bodies in [1, 100, 1_000, 10_000] {
+            measure(
+                how,
+                bodies,
+                if bodies > 1_000 { frames / 10 } else { frames },
+            );
+        }
+    }
+}
