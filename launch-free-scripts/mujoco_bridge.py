@@ -5,13 +5,14 @@ Any MJCF that MuJoCo compiles: each geom that can collide becomes a body, meshes
 planes half-spaces, height fields height fields; contype, conaffinity, welds, parents, excludes and pairs become
 groups, rigid groups and pair rules. Then every simulated step is one frame, and one tick answers it (lockstep).
 
-  mujoco_bridge.py models/pile.xml --spawn ../target/release/sweepd --compare --steps 500
+  mujoco_bridge.py models/pile.xml --spawn ../target/release/sweepd --compare --at-least 1000
   mujoco_bridge.py model.xml --scene-out scene.toml --steps 0     only writes the scene
   mujoco_bridge.py model.xml --instance lab                       streams to a daemon that runs scene.toml already
 """
 
 import argparse
 import json
+import os
 import signal
 import sys
 import tempfile
@@ -38,10 +39,13 @@ def parse(arguments):
     parser.add_argument("model", type=Path, metavar="MODEL.xml", help="an MJCF file")
     parser.add_argument("--compare", action="store_true", help="check every step against MuJoCo's contacts")
     parser.add_argument("--steps", type=int, metavar="N", help="stop after N steps (default: 500 with --compare, else never)")
+    parser.add_argument("--at-least", type=int, default=0, metavar="N", help="with --compare: fewer colliding pair-steps are a failure")
+    parser.add_argument("--ccd-tolerance", type=float, metavar="M",
+                        help="of MuJoCo's answers in the comparison, e.g. 1e-10 (default: the model's, mostly 1e-6)")  # fmt: skip
     parser.add_argument("--rate", type=float, metavar="HZ", help="at most so many steps a second (default: as fast as answers come)")
     parser.add_argument("--realtime", action="store_true", help="as many steps a second as the model's timestep says")
     parser.add_argument("--spawn", type=Path, metavar="SWEEPD", help="start this daemon, and end it afterwards")
-    parser.add_argument("--instance", default="default", metavar="NAME", help="of the daemon (default: %(default)s)")
+    parser.add_argument("--instance", metavar="NAME", help="of the daemon (default: one of its own with --spawn, else default)")
     parser.add_argument("--scene-out", type=Path, metavar="FILE", help="keep the scene here (default: a temporary file)")
     parser.add_argument("--budget-ms", type=float, metavar="MS", help="wall time of a tick, into the scene (default: no limit)")
     parser.add_argument("--budget-units", type=int, metavar="N", help="work units of a tick, into the scene (default: no limit)")
@@ -57,6 +61,8 @@ def parse(arguments):
     chosen = parser.parse_args(arguments)
     if chosen.steps is None and chosen.compare:
         chosen.steps = 500
+    if chosen.instance is None:
+        chosen.instance = f"mujoco_{os.getpid()}" if chosen.spawn else "default"
     return chosen
 
 
@@ -84,6 +90,8 @@ def main(arguments=None):
     except TimeoutError as error:
         print(f"mujoco_bridge: sweepd did not answer: {error}", file=sys.stderr)
         return 3
+    except KeyboardInterrupt:
+        return 130
     report(run, chosen)
     return run.exit_code()
 

@@ -10,16 +10,25 @@ import mujoco
 import numpy as np
 
 from . import shapes
+from .model import Refused
 
+CCD_ITERATIONS = 200
+"""Enough for a tolerance of 1e-10; MuJoCo's default is 35."""
 BAND_M = 1e-6
 """A pair whose gap is nearer to 0 than this is decided by rounding: MuJoCo's own tolerance (ccd_tolerance) is 1e-6."""
 
 
 class Judge:
-    """MuJoCo's contacts at margin 0."""
+    """MuJoCo's contacts at margin 0.
 
-    def __init__(self, model, scene):
+    * `ccd_tolerance` - of MuJoCo's convex collisions, metres; None: the model's own (1e-6 unless it says otherwise).
+    """
+
+    def __init__(self, model, scene, ccd_tolerance=None):
         self.model = copy.copy(model)
+        if ccd_tolerance is not None:
+            self.model.opt.ccd_tolerance = ccd_tolerance
+            self.model.opt.ccd_iterations = max(CCD_ITERATIONS, self.model.opt.ccd_iterations)
         for name in ("geom_margin", "geom_gap", "geom_adhesion", "pair_margin", "pair_gap", "pair_adhesion", "body_margin"):
             if hasattr(self.model, name):
                 getattr(self.model, name)[:] = 0
@@ -41,12 +50,12 @@ class Judge:
     def contacts(self):
         """Colliding pairs as places in the scene, smaller first, with MuJoCo's least `dist`, metres.
 
-        Raises MemoryError when MuJoCo had no room for all contacts.
+        Raises Refused when MuJoCo had no room for all contacts.
         """
         mujoco.mj_collision(self.model, self.data)
         warning = self.data.warning[mujoco.mjtWarning.mjWARN_CONTACTFULL]
         if warning.number:
-            raise MemoryError('MuJoCo had no room for its contacts: raise <size memory="..."/> in the model')
+            raise Refused('MuJoCo had no room for its contacts: raise <size memory="..."/> in the model')
         found = {}
         for (first, second), dist in zip(self.data.contact.geom, self.data.contact.dist):
             if first < 0 or second < 0 or dist > 0:

@@ -30,9 +30,9 @@ class Run:
         self.data = mujoco.MjData(self.model)
         self.start()
         self.scene = Scene(self.model)
-        self.judge = Judge(self.model, self.scene)
+        self.judge = Judge(self.model, self.scene, chosen.ccd_tolerance)
         self.judge.look(self.data)
-        self.compare = Compare(self.scene, self.judge) if chosen.compare else None
+        self.compare = Compare(self.scene, self.judge, chosen.at_least) if chosen.compare else None
         self.random = np.random.default_rng(chosen.seed)
         self.done = 0
         self.answer_s = 0.0
@@ -79,6 +79,9 @@ class Run:
                 listen=("pairs",),
             ) as client:
                 self.require_scene(client)
+                if daemon:
+                    # Another daemon of this name would have answered, and ours would be gone.
+                    daemon.require_alive()
                 self.all_steps(client)
         except KeyboardInterrupt:
             self.interrupted = True
@@ -118,7 +121,11 @@ class Run:
         """Simulates, sends the poses at the new state, and waits for the answer to exactly that frame."""
         if self.chosen.ctrl_noise and self.model.nu:
             self.push()
+        before_s = self.data.time
         mujoco.mj_step(self.model, self.data)
+        if self.data.time < before_s:
+            # MuJoCo starts anew when a simulation explodes: the world has jumped.
+            client.reset_epoch()
         self.judge.look(self.data)
         poses = self.scene.poses(self.judge.data)[self.scene.moving]
         frame = (self.scene.ids[self.scene.moving], poses[:, :3], poses[:, 3:])
@@ -143,7 +150,9 @@ class Run:
 
     def sets(self, result):
         """Colliding and possible pairs of an answer, as places in the scene."""
-        if result.pairs is None or result.tick.header.truncated:
+        if result.pairs is None:
+            raise Refused("the pairs of a tick were lost on the way: another reader may hold the daemon up")
+        if result.tick.header.truncated:
             raise Refused("the answer is cut off: raise pair_rows under [limits] of the scene")
         place = {int(body): k for k, body in enumerate(self.scene.ids)}
 

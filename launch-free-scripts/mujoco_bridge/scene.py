@@ -95,6 +95,10 @@ def inline(shape):
     for key, value in shape.items():
         if isinstance(value, str):
             text = quoted(value)
+        elif isinstance(value, bool):
+            text = str(value).lower()
+        elif key == "faces":
+            text = repr(value)
         elif isinstance(value, float):
             text = number(value)
         elif value and isinstance(value[0], list):

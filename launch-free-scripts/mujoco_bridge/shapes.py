@@ -10,18 +10,42 @@ import numpy as np
 from .model import GEOM, Refused, geom_title
 
 
+CORNERS_MAX = 4096
+"""Most corners of a hull in sweepd; a larger one is told as the closed mesh of its faces."""
+
+
 def hull_vertices(model, geom):
     """`[n, 3]` vertices that MuJoCo collides a mesh with, metres, geom frame: its hull's, or all where it has no hull."""
     mesh = int(model.geom_dataid[geom])
     first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
     vertices = model.mesh_vert[first : first + count].astype(float)
-    graph = int(model.mesh_graphadr[mesh])
-    if graph >= 0:
-        # Layout of a hull graph: numvert, numface, vert_edgeadr[numvert], vert_globalid[numvert], ...
-        numvert = int(model.mesh_graph[graph])
-        chosen = model.mesh_graph[graph + 2 + numvert : graph + 2 + 2 * numvert]
-        vertices = vertices[chosen]
+    graph = hull_graph(model, mesh)
+    if graph is not None:
+        vertices = vertices[graph[0]]
     return np.unique(vertices, axis=0)
+
+
+def hull_graph(model, mesh):
+    """Vertices `[n]` and faces `[m, 3]` of MuJoCo's hull, as places in the mesh; None where it made no hull."""
+    start = int(model.mesh_graphadr[mesh])
+    if start < 0:
+        return None
+    # Layout: numvert, numface, vert_edgeadr[numvert], vert_globalid[numvert], edge_localid[numvert + 3 numface],
+    # face_globalid[3 numface].
+    graph = model.mesh_graph[start:]
+    numvert, numface = int(graph[0]), int(graph[1])
+    faces = 2 + 3 * numvert + 3 * numface
+    return graph[2 + numvert : 2 + 2 * numvert], graph[faces : faces + 3 * numface].reshape(-1, 3)
+
+
+def hull_faces(model, geom, vertices):
+    """`[m, 3]` faces of the hull as places in `vertices`, the rows of `hull_vertices`."""
+    mesh = int(model.geom_dataid[geom])
+    first = int(model.mesh_vertadr[mesh])
+    corners, faces = hull_graph(model, mesh)
+    place = {tuple(vertex): k for k, vertex in enumerate(vertices.tolist())}
+    new = {int(c): place[tuple(model.mesh_vert[first + int(c)].astype(float).tolist())] for c in corners}
+    return [[new[int(c)] for c in face] for face in faces]
 
 
 def hfield_grid(model, geom):
@@ -53,6 +77,9 @@ def shape_of(model, geom):
         spread = np.linalg.svd(vertices - vertices.mean(axis=0), compute_uv=False)
         if len(vertices) < 4 or spread[2] <= 1e-9 * spread[0]:
             raise Refused(f"{geom_title(model, geom)}: its mesh is flat: give it a thickness")
+        if len(vertices) > CORNERS_MAX and hull_graph(model, int(model.geom_dataid[geom])) is not None:
+            faces = hull_faces(model, geom, vertices)
+            return {"type": "trimesh", "vertices": vertices.tolist(), "faces": faces, "solid": True}
         return {"type": "convex", "vertices": vertices.tolist()}
     if kind == GEOM.mjGEOM_HFIELD:
         heights, full, base = hfield_grid(model, geom)
@@ -79,7 +106,8 @@ def support(shape, directions):
         return shape["radius"] * length + shape["half_height"] * np.abs(directions[:, 2])
     if kind == "cylinder":
         return shape["radius"] * flat + shape["half_height"] * np.abs(directions[:, 2])
-    if kind == "convex":
+    if kind in ("convex", "trimesh"):
+        # A mesh is only written for a hull, so its corners are its ends too.
         return (directions @ np.asarray(shape["vertices"]).T).max(axis=1)
     if kind == "half_space":
         along = directions @ np.asarray(shape["normal"])

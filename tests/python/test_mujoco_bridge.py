@@ -2,10 +2,13 @@
 be fooled. Method: no daemon; scenes are read back with another reader, filters against what MuJoCo really collides
 where everything overlaps, the third judge against formulas and MuJoCo, and the run against a client made up here.
 
-Run: pytest tests/python (needs mujoco and numpy).
+Run: pytest tests/python (needs mujoco and numpy). With SWEEPD=target/release/sweepd also against a live daemon.
 """
 
 import importlib.util
+import json
+import os
+import signal
 import stat
 import subprocess
 import sys
@@ -112,6 +115,27 @@ def test_more_contact_classes_than_bits_become_rules(tmp_path):
     assert matrix_pairs(filters.allowed_by_scene(found.filters, found.names)) == collided(found, of)
 
 
+def test_a_hull_of_too_many_corners_is_told_as_its_closed_mesh(tmp_path):
+    random = np.random.default_rng(2)
+    points = random.standard_normal((5000, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    vertices = " ".join(f"{x:.7f}" for x in points.ravel())
+    ball = f"""<mujoco><asset><mesh name="ball" vertex="{vertices}"/></asset><worldbody>
+      <body><freejoint/><geom type="mesh" mesh="ball"/></body></worldbody></mujoco>"""
+    found = scene.Scene(compiled(tmp_path, ball))
+    shape = found.shapes[0]
+    assert shape["type"] == "trimesh" and shape["solid"]
+    corners, faces = np.array(shape["vertices"]), np.array(shape["faces"])
+    # Closed, once round each way, seen from outside: every edge has its twin, and Euler's sum is 2.
+    edges = {(int(f[k]), int(f[k - 2])) for f in faces for k in range(3)}
+    assert len(edges) == 3 * len(faces) and all((b, a) in edges for a, b in edges)
+    assert len(corners) - len(edges) // 2 + len(faces) == 2
+    volume = np.einsum("ij,ij->i", corners[faces[:, 0]], np.cross(corners[faces[:, 1]], corners[faces[:, 2]])).sum() / 6
+    assert volume == pytest.approx(4 / 3 * np.pi, rel=0.01)
+    read = tomllib.loads(found.text(mujoco.MjData(found.model), "ball", []))
+    assert read["body"][0]["shape"] == shape
+
+
 LACKING = """
 <mujoco>
   <worldbody>
@@ -159,7 +183,8 @@ def test_an_sdf_and_a_flex_are_refused_by_name(tmp_path):
     with pytest.raises(model.Refused, match='geom "ring" is an SDF'):
         compiled(tmp_path, sdf)
     of = compiled(tmp_path, sdf, hull_sdf=True)
-    assert scene.Scene(of).shapes[0]["type"] == "convex"
+    assert of.geom_type[0] == mujoco.mjtGeom.mjGEOM_MESH
+    assert scene.Scene(of).shapes[0]["type"] == "trimesh"
     cloth = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><flexcomp name="cloth" type="grid" count="3 3 1"
       spacing="0.1 0.1 0.1" pos="0 0 1" mass="1" radius="0.01"/></worldbody></mujoco>"""
     with pytest.raises(model.Refused, match='flex "cloth"'):
@@ -467,3 +492,84 @@ def test_the_command_line_writes_a_scene_and_refuses_with_code_4(tmp_path):
     done = subprocess.run([*bridge, model_path, "--steps", "0"], capture_output=True, text=True, check=False)
     assert done.returncode == 4 and '"egg"' in done.stderr and "Traceback" not in done.stderr
     assert subprocess.run([*bridge, "--help"], capture_output=True, check=False).returncode == 0
+
+
+live = pytest.mark.skipif("SWEEPD" not in os.environ, reason="SWEEPD names no daemon to run")
+
+
+def bridge(*arguments):
+    """The command line of a live run."""
+    return [sys.executable, str(SCRIPTS / "mujoco_bridge.py"), "--spawn", os.environ["SWEEPD"], *map(str, arguments)]
+
+
+@live
+@pytest.mark.parametrize("name,noise", [("pile", 0), ("robot", 0.5), ("terrain", 0)])
+def test_live_sweepd_and_mujoco_have_equal_sets_in_every_step(name, noise):
+    command = bridge(SCRIPTS / "models" / f"{name}.xml", "--compare", "--at-least", 1000, "--ctrl-noise", noise, "--json")
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["steps_equal"] == summary["steps"] == 500
+    assert summary["possible_pair_steps"] == 0
+
+
+@live
+@pytest.mark.parametrize("fault", ["place", "turn", "filter"])
+def test_live_a_fault_of_the_bridge_is_a_difference(tmp_path, monkeypatch, fault):
+    """So the equality above is no accident: one body 1 mm off, quaternions in another order, one rule lost."""
+    monkeypatch.setattr(scene.Scene, "poses", faulty_poses(scene.Scene.poses, fault))
+    path = SCRIPTS / "models" / "robot.xml"
+    name = f"fault_{fault}_{os.getpid()}"
+    _, given = chosen(path, "--compare", "--spawn", os.environ["SWEEPD"], "--steps", 100, "--instance", name)
+    faulty = run.Run(given, tmp_path / "scene.toml")
+    if fault == "filter":
+        text = faulty.scene_path.read_text()
+        rule = 'a = "thigh_left:*"\nb = "shin_left:*"'
+        assert rule in text
+        faulty.scene_path.write_text(text.replace(rule, rule.replace("shin_left", "shin_right")))
+    faulty.drive()
+    assert faulty.exit_code() == 1 and faulty.summary()["different_pair_steps"] > 0
+
+
+def faulty_poses(poses, fault):
+    def changed(self, data):
+        found = poses(self, data)
+        if fault == "place":
+            found[self.names.index("foot_left:foot_left"), 2] += 1e-3
+        if fault == "turn":
+            found[:, 3:] = found[:, [4, 5, 6, 3]]
+        return found
+
+    return changed
+
+
+@live
+@pytest.mark.parametrize("how,code", [(signal.SIGINT, 0), (signal.SIGTERM, 143)])
+def test_live_a_signal_ends_bridge_and_daemon(tmp_path, how, code):
+    instance = f"signal_{os.getpid()}_{int(how)}"
+    command = bridge(SCRIPTS / "models" / "robot.xml", "--instance", instance, "--realtime", "--json")
+    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 30
+    while not daemons_of(instance):
+        assert time.monotonic() < deadline, running.communicate()
+        time.sleep(0.1)
+    time.sleep(3)
+    running.send_signal(how)
+    out, err = running.communicate(timeout=30)
+    assert running.returncode == code, out + err
+    assert not daemons_of(instance)
+    if how == signal.SIGINT:
+        assert json.loads(out)["steps"] > 0 and "Traceback" not in err
+
+
+def daemons_of(instance):
+    """Numbers of the processes that run this instance."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            words = entry.read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if instance.encode() in words and b"run" in words:
+            found.append(entry.parent.name)
+    return found
