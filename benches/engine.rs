@@ -7,6 +7,8 @@
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
+    clippy::panic,
+    clippy::cast_sign_loss,
     clippy::too_many_lines,
     reason = "a bench"
 )]

@@ -244,16 +244,6 @@ impl Aabb {
     }
 }
 
-/// To parry's pose.
-#[must_use]
-pub(crate) fn to_glam(pose: &Pose) -> glamx::DPose3 {
-    let (t, q) = (&pose.translation.vector, pose.rotation.as_vector());
-    glamx::DPose3 {
-        rotation: glamx::DQuat::from_xyzw(q.x, q.y, q.z, q.w),
-        translation: to_glam_vec(t),
-    }
-}
-
 /// To parry's vector.
 #[must_use]
 pub(crate) fn to_glam_vec(v: &Vec3) -> glamx::DVec3 {

@@ -2,6 +2,9 @@
 //! published pairs against exact queries of every pair of bodies.
 
 #![allow(
+    clippy::cast_possible_truncation,
+    clippy::float_cmp,
+    clippy::print_stdout,
     clippy::unwrap_used,
     clippy::expect_used,
     clippy::panic,

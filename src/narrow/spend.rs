@@ -242,7 +242,7 @@ impl Narrow {
             finished: closest.finished,
             witness: Some(witness),
         };
-        self.store(slot, answer);
+        self.store(slot, &answer);
         if goal == Goal::Contacts && closest.gap.min <= 0.0 {
             self.counters.manifolds += 1;
             self.found.clear();
@@ -301,7 +301,7 @@ impl Narrow {
         if turn == Turn::Finished {
             self.cursors.give(&mut memo.cursor);
         }
-        self.store(slot, answer);
+        self.store(slot, &answer);
         if contacts {
             self.keep_contacts(slot, a.radius.min(b.radius));
         }
@@ -354,7 +354,7 @@ impl Narrow {
         });
     }
 
-    fn store(&mut self, slot: PairSlot, answer: Answer) {
+    fn store(&mut self, slot: PairSlot, answer: &Answer) {
         let memo = &mut self.memos[slot.index()];
         memo.gap = answer.gap;
         memo.finished = answer.finished;

@@ -70,7 +70,7 @@ impl Floor {
     }
 
     /// The time the last outbox took to send.
-    pub(super) fn send_ns(&self) -> u64 {
+    pub(super) fn last_send_ns(&self) -> u64 {
         self.last_send_ns
     }
 

@@ -416,14 +416,14 @@ impl Engine {
     /// Fills the tick's times and units, and learns the floor.
     fn finish(&mut self, input: &TickInput<'_>, laps: &Laps, units: u64) {
         let floor_ns = self.floor.learn(laps);
-        let elapsed_ns = laps.elapsed_ns() + self.floor.send_ns();
+        let elapsed_ns = laps.elapsed_ns() + self.floor.last_send_ns();
         let budget_ns = input.budget.time_ns.unwrap_or(u64::MAX);
         // Below its floor a tick takes the floor: told by the flag, not counted as missed by fault of the work.
         let overrun = elapsed_ns > budget_ns;
         self.missed += u64::from(overrun);
         let row = &mut self.out.tick;
         laps.fill(&mut row.stage_ns);
-        row.stage_ns[usize::from(Stage::Send.code())] = self.floor.send_ns();
+        row.stage_ns[usize::from(Stage::Send.code())] = self.floor.last_send_ns();
         row.sent_ns = self.clock.boottime_ns();
         row.elapsed_ns = elapsed_ns;
         row.budget_ns = budget_ns;
