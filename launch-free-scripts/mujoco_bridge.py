@@ -70,7 +70,7 @@ def main(arguments=None):
     """Runs the bridge; returns the exit code."""
     chosen = parse(arguments)
     try:
-        import mujoco  # noqa: F401
+        import mujoco
         import numpy  # noqa: F401
     except ImportError as error:
         print(f"mujoco_bridge: {error}: pip install mujoco numpy", file=sys.stderr)
@@ -78,6 +78,8 @@ def main(arguments=None):
     from mujoco_bridge.model import Refused
     from mujoco_bridge.run import Run
 
+    # Without a handler MuJoCo writes its warnings into a file in the current folder.
+    mujoco.set_mju_user_warning(lambda text: print(f"mujoco_bridge: MuJoCo warns: {text}", file=sys.stderr))
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
         with tempfile.TemporaryDirectory(prefix="mujoco_bridge_") as folder:

@@ -4,6 +4,8 @@ In: a path. Out: a compiled `mujoco.MjModel`. A hull replaces its geom in MuJoCo
 same shape.
 """
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 
@@ -37,6 +39,8 @@ def load(path, hull_ellipsoids=False, hull_sdf=False, without_flex=False):
 
     Raises Refused for what MuJoCo cannot compile and for kinds that sweepd lacks.
     """
+    if not Path(path).is_file():
+        raise Refused(f"{path}: there is no such file")
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         model = spec.compile()

@@ -491,6 +491,10 @@ def test_the_command_line_writes_a_scene_and_refuses_with_code_4(tmp_path):
     model_path.write_text(LACKING)
     done = subprocess.run([*bridge, model_path, "--steps", "0"], capture_output=True, text=True, check=False)
     assert done.returncode == 4 and '"egg"' in done.stderr and "Traceback" not in done.stderr
+    done = subprocess.run([*bridge, tmp_path / "none.xml"], capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 4 and "no such file" in done.stderr
+    # MuJoCo's habit of writing a log beside the caller's work is not ours.
+    assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
     assert subprocess.run([*bridge, "--help"], capture_output=True, check=False).returncode == 0
 
 
