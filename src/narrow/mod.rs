@@ -31,7 +31,7 @@ pub use spend::Order;
 use crate::ids::{BodySlot, PairSlot};
 use crate::pairs::{PairDelta, PairSet};
 use crate::time::Meter;
-use crate::wire::Verdict;
+use crate::wire::{BodyStatus, Verdict};
 use crate::world::World;
 
 use cursor::Cursor;
@@ -57,10 +57,13 @@ pub struct Narrow {
     hot: Vec<Hot>,
     /// Everything else about a pair.
     memos: Vec<Memo>,
-    /// `S + d` of each body, by `BodySlot`.
+    /// `S + d` of each body, by `BodySlot`; infinite while the body's place is not known to the point: then no
+    /// certificate spares a look.
     spent_m: Vec<f64>,
-    /// Tick in which a body entered the broad phase, by `BodySlot`.
-    entered: Vec<u64>,
+    /// When pairs of a body may have been missed, by `BodySlot`.
+    unseen: Vec<Unseen>,
+    /// Bodies with a pair that did not fit into the pair set in the tick before.
+    short: Vec<BodySlot>,
     /// Pairs whose verdict is not `apart`.
     active: Vec<PairSlot>,
     /// Pairs that stopped being active in this tick and still exist.
@@ -109,6 +112,7 @@ impl Narrow {
         self.left.clear();
         self.carry_over();
         self.note_bodies(world);
+        self.note_missing(pairs);
         for ended in &delta.ended {
             self.forget(ended.slot);
         }
@@ -146,12 +150,12 @@ impl Narrow {
         self.counters
     }
 
-    /// Whether a body entered the broad phase in this tick.
+    /// From which tick on a pair of this body that begins now may have collided unseen; `None`: had it collided in the
+    /// tick before, its boxes would have said so.
     #[must_use]
-    pub fn entered_now(&self, slot: BodySlot) -> bool {
-        self.entered
-            .get(slot.index())
-            .is_some_and(|&tick| tick == self.tick)
+    pub fn unseen_since(&self, slot: BodySlot) -> Option<u64> {
+        let unseen = self.unseen.get(slot.index())?;
+        (unseen.last >= self.tick).then_some(unseen.first)
     }
 
     /// Keeps the work that last tick left undone, and drops from the lists what is settled.
@@ -170,22 +174,55 @@ impl Narrow {
         });
     }
 
-    /// Takes note of bodies that entered the broad phase, and of how far the moved ones have gone.
+    /// Takes note of bodies that entered the broad phase or whose place is not known, and of how far the others have
+    /// gone.
     fn note_bodies(&mut self, world: &World) {
         let len = world.slots_len();
         if self.spent_m.len() < len {
             self.spent_m.resize(len, 0.0);
-            self.entered.resize(len, 0);
+            self.unseen.resize(len, Unseen::default());
         }
         let changes = world.changes();
-        for &slot in &changes.inserted {
-            self.entered[slot.index()] = self.tick;
-        }
-        for &slot in changes.inserted.iter().chain(&changes.moved) {
-            if let Some(body) = world.body(slot) {
-                self.spent_m[slot.index()] = body.motion.spent_m();
+        let whole = changes.inserted.iter().chain(&changes.moved);
+        for &slot in whole.chain(&changes.restated) {
+            let Some(body) = world.body(slot) else {
+                continue;
+            };
+            let known = matches!(body.status, BodyStatus::Known | BodyStatus::Held);
+            let at_pose = known && body.reach_m == 0.0;
+            self.spent_m[slot.index()] = if at_pose {
+                body.motion.spent_m()
+            } else {
+                f64::INFINITY
+            };
+            let unseen = &mut self.unseen[slot.index()];
+            if at_pose && unseen.last == u64::MAX {
+                unseen.last = self.tick;
+            } else if !at_pose && unseen.last != u64::MAX {
+                *unseen = Unseen {
+                    first: self.tick,
+                    last: u64::MAX,
+                };
             }
         }
+        for &slot in &changes.requery {
+            self.unseen[slot.index()].cover(self.tick, self.tick);
+        }
+        for &slot in &changes.inserted {
+            let unseen = &mut self.unseen[slot.index()];
+            unseen.first = self.tick;
+            unseen.last = unseen.last.max(self.tick);
+        }
+    }
+
+    /// Takes note of bodies whose pairs do not all fit into the pair set: the next tick may find more of them.
+    fn note_missing(&mut self, pairs: &PairSet) {
+        for at in 0..self.short.len() {
+            let slot = self.short[at];
+            self.unseen[slot.index()].cover(self.tick - 1, self.tick);
+        }
+        self.short.clear();
+        self.short.extend_from_slice(pairs.truncated());
     }
 
     /// Structure check: counts, lists and memories agree.
@@ -219,6 +256,26 @@ impl Narrow {
             ));
         }
         Ok(())
+    }
+}
+
+/// Ticks in which pairs of a body may have been missed: it was not in, its place was not known, it was filtered
+/// otherwise, or the pair set was full.
+#[derive(Clone, Copy, Debug, Default)]
+struct Unseen {
+    /// The first of them; for a body that has just come, its first tick.
+    first: u64,
+    /// The last tick in which a pair may begin that was missed before; `u64::MAX`: it goes on.
+    last: u64,
+}
+
+impl Unseen {
+    /// Adds the ticks from `first`, so that pairs that begin up to `last` are known to be late.
+    fn cover(&mut self, first: u64, last: u64) {
+        if self.last < first {
+            self.first = first;
+        }
+        self.last = self.last.max(last);
     }
 }
 

@@ -15,6 +15,11 @@ impl Narrow {
     /// Undecided pairs of earlier ticks are in the work list already; this adds those that have become undecided.
     pub fn widen(&mut self, world: &World, pairs: &PairSet) {
         let changes = world.changes();
+        for &body in &changes.requery {
+            for slot in pairs.pairs_of(body) {
+                self.follow_rules(slot, world);
+            }
+        }
         let changed = changes.moved.len() + changes.restated.len();
         // Above this share a straight walk over the 24-byte records beats chasing each body's list.
         if changed * 4 > world.slots_len() {
@@ -39,6 +44,15 @@ impl Narrow {
                 self.visit(slot, world);
             }
         }
+    }
+
+    /// Takes over what the rules now say of a pair whose bodies' rules changed: its certificate was made for the old
+    /// ones.
+    fn follow_rules(&mut self, slot: PairSlot, world: &World) {
+        let hot = &mut self.hot[slot.index()];
+        hot.expiry_m = f64::NEG_INFINITY;
+        self.memos[slot.index()].report_m = world.report_within(hot.a, hot.b);
+        self.visit(slot, world);
     }
 
     /// Visits a pair once in a tick: one comparison while its certificate holds.
@@ -82,6 +96,13 @@ impl Narrow {
             self.refresh.push(slot);
         }
         self.settle(slot, verdict);
+    }
+
+    /// Brings the interval of a pair that the motion pass passed over up to this tick's poses; its verdict stays.
+    pub fn bring_up(&mut self, slot: PairSlot, world: &World) {
+        if self.finding(slot).is_some() {
+            self.widen_pair(slot, world);
+        }
     }
 
     /// Recomputes `now` from the certificate, the motion since, and the bodies' reach.

@@ -26,14 +26,19 @@ impl Publisher {
                 out.body_verdicts.push(verdict);
             }
             if view.demand.bodies {
-                out.bodies.push(body_row(body, verdict, now_ns));
+                let mut row = body_row(body, verdict, now_ns);
+                if body.status == BodyStatus::Known && view.pairs.is_truncated(slot) {
+                    row.status = BodyStatus::Truncated.code();
+                }
+                out.bodies.push(row);
             }
         }
         out.bodies_header = header;
         0
     }
 
-    /// The worst verdict of each body over its pairs. A body of unknown place is never better than `possible`.
+    /// The worst verdict of each body over its pairs. A body of unknown place, or with a pair
+    /// that did not fit into the pair set, is never better than `possible`.
     fn worst_of_each(&mut self, view: &View<'_>) {
         self.verdicts.clear();
         self.verdicts
@@ -44,6 +49,11 @@ impl Publisher {
                 BodyStatus::Known | BodyStatus::Held | BodyStatus::Disabled
             ) {
                 self.verdicts[slot.index()] = Verdict::Possible.code();
+            }
+        }
+        for &slot in view.pairs.truncated() {
+            if let Some(worst) = self.verdicts.get_mut(slot.index()) {
+                *worst = Verdict::Possible.code();
             }
         }
         for &slot in view.narrow.active() {

@@ -41,6 +41,8 @@ pub(super) struct History {
     pub(super) colliding: bool,
     /// Last tick in which the pair was more than plainly apart.
     active: u64,
+    /// First tick in which it may have collided; 0: not seen yet.
+    born: u64,
 }
 
 impl History {
@@ -50,6 +52,7 @@ impl History {
         tick: 0,
         colliding: false,
         active: 0,
+        born: 0,
     };
 }
 
@@ -134,16 +137,26 @@ impl Events {
         }
         let mut history = self.histories[slot.index()];
         history.ids = (a.id, b.id);
-        // Not active in the tick before: proved apart there by its certificate or by its boxes, unless a body is new.
-        let entered = narrow.entered_now(finding.a) || narrow.entered_now(finding.b);
-        let known_before = finding.born < tick || !entered;
-        if history.active + 1 < tick && known_before && tick > 1 {
+        // Not active in the tick before: proved apart there by its certificate or by its boxes, unless it is new and a
+        // body of it was not in, not known, or not looked for there.
+        let unseen = (finding.born == tick)
+            .then(|| {
+                earlier(
+                    narrow.unseen_since(finding.a),
+                    narrow.unseen_since(finding.b),
+                )
+            })
+            .flatten();
+        if history.active + 1 < tick && unseen.is_none() && tick > 1 {
             history.verdict = Verdict::Apart;
             history.tick = tick - 1;
         }
         history.active = tick;
+        if history.born == 0 {
+            history.born = unseen.unwrap_or(finding.born).min(finding.born);
+        }
         let first = if history.tick == 0 {
-            finding.born
+            history.born
         } else {
             history.tick + 1
         };
@@ -204,6 +217,13 @@ impl Events {
         });
         self.waiting
             .retain(|event| event.end.is_some() || event.begin.is_some());
+    }
+}
+
+fn earlier(one: Option<u64>, other: Option<u64>) -> Option<u64> {
+    match (one, other) {
+        (Some(one), Some(other)) => Some(one.min(other)),
+        (one, other) => one.or(other),
     }
 }
 

@@ -25,7 +25,7 @@ impl Publisher {
     /// Fills `pairs`; returns how many rows did not fit.
     pub(super) fn fill_pairs(
         &mut self,
-        view: &View<'_>,
+        view: &mut View<'_>,
         header: MessageHeader,
         out: &mut Outbox,
     ) -> u64 {
@@ -55,7 +55,7 @@ impl Publisher {
     }
 
     /// All rows there could be: active pairs, and pairs with events that are not active.
-    fn gather(&mut self, view: &View<'_>) {
+    fn gather(&mut self, view: &mut View<'_>) {
         self.rows.clear();
         for &slot in view.narrow.active() {
             let Some(finding) = view.narrow.finding(slot) else {
@@ -87,19 +87,26 @@ impl Publisher {
                     self.rows[at].event = Some(event);
                     self.rows[at].class = 0;
                 }
-                Err(_) => self.rows.push(Row {
-                    ids: event.ids,
-                    class: 0,
-                    depth_m: 0.0,
-                    slot: self.slot_of(view, event.ids),
-                    event: Some(event),
-                }),
+                Err(_) => {
+                    let slot = Self::slot_of(view, event.ids);
+                    // Plainly apart: its certificate may hold, and its interval still be that of older poses.
+                    if let Some(slot) = slot {
+                        view.narrow.bring_up(slot, view.world);
+                    }
+                    self.rows.push(Row {
+                        ids: event.ids,
+                        class: 0,
+                        depth_m: 0.0,
+                        slot,
+                        event: Some(event),
+                    });
+                }
             }
         }
     }
 
     /// The slot of a pair that is apart but still a candidate.
-    fn slot_of(&self, view: &View<'_>, ids: (BodyId, BodyId)) -> Option<PairSlot> {
+    fn slot_of(view: &View<'_>, ids: (BodyId, BodyId)) -> Option<PairSlot> {
         let (a, b) = (view.world.slot_of(ids.0)?, view.world.slot_of(ids.1)?);
         view.pairs.find(PairKey::new(a, b))
     }

@@ -1,7 +1,9 @@
 //! The tick in one word, its reasons, its counts, and the worst pair.
 
-use crate::ids::BodyId;
-use crate::wire::{MessageHeader, Outbox, Reason, SOURCES_MAX, SourceRow, State, TickRow, Verdict};
+use crate::ids::{BodyId, BodySlot};
+use crate::wire::{
+    BodyStatus, MessageHeader, Outbox, Reason, SOURCES_MAX, SourceRow, State, TickRow, Verdict,
+};
 
 use super::{Publisher, View};
 
@@ -37,6 +39,16 @@ impl Publisher {
         if counts.bodies == 0 {
             reasons |= Reason::NoInput.bit();
         }
+        let cut = |&slot: &BodySlot| {
+            let body = view.world.body(slot);
+            body.is_some_and(|body| body.status == BodyStatus::Known)
+        };
+        let cut_bodies = view
+            .pairs
+            .truncated()
+            .iter()
+            .filter(|slot| cut(slot))
+            .count() as u64;
         let unsafe_reasons = reasons & !Reason::Undecided.bit();
         let state = if narrow.count(Verdict::Colliding) > 0 {
             State::Colliding
@@ -58,7 +70,7 @@ impl Publisher {
             },
             rejects: *view.world.rejects(),
             bodies: counts.bodies,
-            unknown: counts.unknown,
+            unknown: counts.unknown + cut_bodies,
             candidates: view.pairs.len() as u64,
             colliding: narrow.count(Verdict::Colliding),
             possible,
