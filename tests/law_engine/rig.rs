@@ -1,0 +1,214 @@
+//! A scene as text, an engine, and hands to move its bodies.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+
+use sweepd::daemon::build_shapes;
+use sweepd::math::Pose;
+use sweepd::scene::{PairAction, PairRule, Scene};
+use sweepd::tick::{EditBatch, Engine, TickInput};
+use sweepd::time::{Budget, Clock, ManualClock};
+use sweepd::wire::{
+    Demand, Event, FrameHeader, Inbox, Outbox, PairRow, Reason, State, TickCause, TransformRow,
+    Verdict, WIRE_VERSION, frame_flags, name_bytes, pair_flags,
+};
+use sweepd::world::Edit;
+
+/// Between two frames.
+pub(crate) const FRAME_NS: u64 = 10_000_000;
+pub(crate) const ALL: Budget = Budget::UNLIMITED;
+pub(crate) const NONE: Budget = Budget {
+    time_ns: None,
+    units: Some(0),
+};
+
+/// A scene: what stands before the source, and its bodies.
+pub(crate) fn scene(head: &str, bodies: &[String]) -> String {
+    let mut text =
+        format!("frame_id = \"world\"\n{head}\n[[source]]\nname = \"feed\"\ntimeout_ms = 500\n");
+    for body in bodies {
+        let _ = write!(text, "\n[[body]]\n{body}");
+    }
+    text
+}
+
+/// A body that moves, with `shape` as an inline table, at x, y, z.
+pub(crate) fn body(id: u64, at: [f64; 3], shape: &str, more: &str) -> String {
+    format!("name = \"b{id}\"\nid = {id}\nmoves = true\nposition = {at:?}\nshape = {shape}\n{more}")
+}
+
+/// A ball of radius 1 m at x.
+pub(crate) fn ball(id: u64, x: f64, more: &str) -> String {
+    body(
+        id,
+        [x, 0.0, 0.0],
+        "{ type = \"sphere\", radius = 1.0 }",
+        more,
+    )
+}
+
+pub(crate) fn rule(action: PairAction, a: &str, b: &str, report_within_m: Option<f64>) -> Edit {
+    Edit::Rule(PairRule {
+        action,
+        a: a.to_owned(),
+        b: b.to_owned(),
+        reason: "test".to_owned(),
+        report_within_m,
+    })
+}
+
+pub(crate) struct Rig {
+    pub(crate) engine: Engine,
+    pub(crate) clock: Arc<ManualClock>,
+    pub(crate) rows: Vec<TransformRow>,
+    pub(crate) demand: Demand,
+    pub(crate) epoch: u64,
+    pub(crate) flags: u32,
+    pub(crate) out: Outbox,
+    seq: u64,
+    inbox: Inbox,
+}
+
+impl Rig {
+    pub(crate) fn new(text: &str) -> Self {
+        let scene = Scene::parse(text, "scene.toml", Path::new(".")).unwrap();
+        let clock = Arc::new(ManualClock::new(1_000_000_000));
+        let shapes = build_shapes(&scene).unwrap().bodies;
+        let engine = Engine::new(&scene, shapes, 7, Arc::clone(&clock) as Arc<dyn Clock>).unwrap();
+        let moving = scene
+            .bodies
+            .iter()
+            .filter(|b| b.moves && b.attached_to.is_none());
+        let rows = moving.map(|b| row(b.id.0, &b.pose)).collect();
+        Self {
+            engine,
+            clock,
+            rows,
+            demand: Demand::ALL,
+            epoch: 1,
+            flags: frame_flags::FULL,
+            out: Outbox::default(),
+            seq: 0,
+            inbox: Inbox::default(),
+        }
+    }
+
+    /// The row of a body in the next frames.
+    pub(crate) fn row(&mut self, id: u64) -> &mut TransformRow {
+        self.rows.iter_mut().find(|row| row.body == id).unwrap()
+    }
+
+    pub(crate) fn place(&mut self, id: u64, pose: &Pose) {
+        *self.row(id) = row(id, pose);
+    }
+
+    pub(crate) fn move_x(&mut self, id: u64, x: f64) {
+        self.row(id).position[0] = x;
+    }
+
+    /// A frame with the rows as they are, and a tick.
+    pub(crate) fn send(&mut self, budget: Budget) -> &Outbox {
+        self.frame();
+        self.tick(budget, &[], TickCause::Frame)
+    }
+
+    /// A tick without a frame, `after_ns` later.
+    pub(crate) fn idle(&mut self, after_ns: u64, budget: Budget) -> &Outbox {
+        self.clock.advance(after_ns);
+        self.inbox.clear();
+        self.tick(budget, &[], TickCause::Heartbeat)
+    }
+
+    /// A tick with edits and no frame.
+    pub(crate) fn edit(&mut self, edits: Vec<Edit>, budget: Budget) -> &Outbox {
+        self.clock.advance(FRAME_NS);
+        self.inbox.clear();
+        let batch = EditBatch {
+            token: 1,
+            edits,
+            warnings: Vec::new(),
+        };
+        self.tick(budget, &[batch], TickCause::Edit);
+        for outcome in self.engine.outcomes() {
+            outcome.result.as_ref().unwrap();
+        }
+        &self.out
+    }
+
+    fn frame(&mut self) {
+        self.clock.advance(FRAME_NS);
+        self.seq += 1;
+        self.inbox.clear();
+        let frame = self.inbox.push();
+        frame.header = FrameHeader {
+            session: 11,
+            epoch: self.epoch,
+            seq: self.seq,
+            source: name_bytes("feed"),
+            flags: self.flags,
+            schema: WIRE_VERSION,
+            stamp_ns: self.seq * FRAME_NS,
+            ..FrameHeader::default()
+        };
+        frame.received_ns = self.clock.boottime_ns();
+        frame.set_transforms(&self.rows);
+    }
+
+    fn tick(&mut self, budget: Budget, edits: &[EditBatch], cause: TickCause) -> &Outbox {
+        let input = TickInput {
+            inbox: &self.inbox,
+            edits,
+            demand: self.demand,
+            budget,
+            cause,
+            cause_source: None,
+            woke_ns: self.clock.monotonic_ns(),
+            pulse: None,
+        };
+        self.out.clone_from(self.engine.tick(input));
+        self.engine.validate().unwrap();
+        &self.out
+    }
+
+    pub(crate) fn pair(&self, a: u64, b: u64) -> Option<&PairRow> {
+        let mut rows = self.out.pairs.iter();
+        rows.find(|row| (row.body_a, row.body_b) == (a, b))
+    }
+
+    /// The published verdict of a pair; no row, or the last row of a pair that is no candidate any more: apart.
+    pub(crate) fn verdict(&self, a: u64, b: u64) -> Verdict {
+        let row = self
+            .pair(a, b)
+            .filter(|row| row.flags & pair_flags::GONE == 0);
+        row.map_or(Verdict::Apart, |row| {
+            Verdict::from_code(row.verdict).unwrap()
+        })
+    }
+
+    pub(crate) fn state(&self) -> State {
+        State::from_code(self.out.tick.header.state).unwrap()
+    }
+
+    pub(crate) fn because(&self, reason: Reason) -> bool {
+        self.out.tick.reasons & reason.bit() != 0
+    }
+
+    pub(crate) fn ticks(&self) -> u64 {
+        self.engine.ticks()
+    }
+}
+
+pub(crate) fn has(row: &PairRow, event: Event) -> bool {
+    row.events & event.bit() != 0
+}
+
+pub(crate) fn row(id: u64, pose: &Pose) -> TransformRow {
+    let q = pose.rotation.as_vector();
+    TransformRow {
+        body: id,
+        position: pose.translation.vector.into(),
+        orientation: [q.x, q.y, q.z, q.w],
+        ..TransformRow::default()
+    }
+}

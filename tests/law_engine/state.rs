@@ -1,0 +1,220 @@
+//! 3.6 the state in one word, 3.7 unknown bodies.
+
+use sweepd::wire::{BodyStatus, Reason, State, Verdict};
+use sweepd::world::Edit;
+
+use crate::rig::{ALL, FRAME_NS, NONE, Rig, ball, body, scene};
+
+#[test]
+fn law_3_6_the_first_that_applies_of_colliding_unknown_possible_near_clear() {
+    let near = "report_within_m = 0.5";
+    let mut rig = Rig::new(&scene(
+        "",
+        &[ball(1, 0.0, near), ball(2, 1.5, ""), ball(3, 50.0, "")],
+    ));
+    rig.idle(FRAME_NS, ALL);
+    assert_eq!(rig.state(), State::Unknown);
+    assert!(rig.because(Reason::NotReceived));
+    let third = rig.rows.pop().unwrap();
+    rig.send(ALL);
+    assert_eq!(
+        rig.state(),
+        State::Colliding,
+        "unknown bodies hide no collision"
+    );
+    assert!(rig.because(Reason::NotReceived));
+    rig.move_x(2, 9.0);
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Unknown);
+    rig.rows.push(third);
+    rig.move_x(2, 1.5);
+    rig.send(NONE);
+    assert_eq!(rig.state(), State::Possible);
+    assert!(rig.because(Reason::Undecided));
+    rig.move_x(2, 2.3);
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Near);
+    rig.move_x(2, 2.6);
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+    assert_eq!(rig.out.tick.reasons, 0);
+    for message in [
+        &rig.out.pairs_header,
+        &rig.out.contacts_header,
+        &rig.out.bodies_header,
+    ] {
+        assert_eq!(message.state, State::Clear.code());
+    }
+}
+
+#[test]
+fn law_3_6_a_scene_without_bodies_is_not_clear() {
+    let mut rig = Rig::new(&scene("", &[ball(1, 0.0, "")]));
+    rig.edit(
+        vec![Edit::Remove {
+            name: "b1".to_owned(),
+        }],
+        ALL,
+    );
+    assert_eq!(rig.state(), State::Unknown);
+    assert!(rig.because(Reason::NoInput));
+}
+
+#[test]
+fn law_3_6_held_and_removed_bodies_are_not_clear() {
+    for (how, reason) in [
+        ("hold", Reason::Held),
+        ("remove", Reason::RemovedByAge),
+        ("unknown", Reason::Stale),
+    ] {
+        let more = format!("on_stale = \"{how}\"");
+        let mut rig = Rig::new(&scene("", &[ball(1, 0.0, &more), ball(2, 9.0, &more)]));
+        rig.send(ALL);
+        assert_eq!(rig.state(), State::Clear);
+        rig.idle(499_000_000, ALL);
+        assert_eq!(rig.state(), State::Clear);
+        rig.idle(2_000_000, ALL);
+        assert_eq!(rig.state(), State::Unknown, "{how}");
+        assert!(rig.because(reason), "{how}");
+        rig.send(ALL);
+        assert_eq!(rig.state(), State::Clear, "{how}");
+    }
+}
+
+#[test]
+fn law_3_7_a_pair_that_was_proved_apart_is_possible_once_a_body_of_it_is_stale() {
+    // The boxes overlap, the balls do not; nothing moves when the time-out comes.
+    let ball = |id, at| body(id, at, "{ type = \"sphere\", radius = 1.0 }", "");
+    let mut bodies = vec![ball(1, [0.0; 3]), ball(2, [1.5; 3])];
+    // Enough others that a tick which changes two bodies is a small one.
+    bodies.extend((3..40).map(|id| ball(id, [10.0 * id as f64, 0.0, 0.0])));
+    let mut rig = Rig::new(&scene("", &bodies));
+    rig.send(ALL);
+    assert_eq!(rig.out.tick.candidates, 1);
+    assert_eq!(rig.state(), State::Clear);
+    // The others go on, these two are sent no more.
+    rig.rows.retain(|row| row.body > 2);
+    for _ in 0..60 {
+        rig.send(ALL);
+    }
+    assert_eq!(rig.verdict(1, 2), Verdict::Possible);
+    assert_eq!(rig.state(), State::Unknown);
+    assert_eq!(rig.out.body_verdicts[..3], [3, 3, 1]);
+}
+
+#[test]
+fn law_3_7_the_reaches_of_two_stale_bodies_that_approach_add() {
+    // The gap is 1 m: each alone reaches 0.6 m when the pair is lost, both together 1.2 m.
+    for (speeds, possible) in [((1.2, 1.2), true), ((1.2, 0.1), false), ((0.9, 0.9), false)] {
+        let more = |speed: f64| format!("max_speed_mps = {speed}");
+        let bodies = [ball(1, 0.0, &more(speeds.0)), ball(2, 3.0, &more(speeds.1))];
+        let mut rig = Rig::new(&scene("", &bodies));
+        rig.send(ALL);
+        rig.idle(490_000_000, ALL);
+        assert_eq!(rig.verdict(1, 2), Verdict::Apart);
+        rig.idle(20_000_000, ALL);
+        let verdict = rig.verdict(1, 2);
+        assert_eq!(verdict == Verdict::Possible, possible, "{speeds:?}");
+        assert_eq!(rig.state(), State::Unknown);
+        assert!(rig.because(Reason::Stale));
+        // And when it goes on, it grows.
+        rig.idle(140_000_000, ALL);
+        let far = (speeds.0 + speeds.1) * 0.65 >= 1.0;
+        assert_eq!(rig.verdict(1, 2) == Verdict::Possible, far, "{speeds:?}");
+    }
+}
+
+#[test]
+fn law_3_7_a_stale_pair_with_overlapping_boxes_widens_with_its_reach() {
+    let ball = |id, at| {
+        body(
+            id,
+            at,
+            "{ type = \"sphere\", radius = 1.0 }",
+            "max_speed_mps = 0.5",
+        )
+    };
+    // 0.6 m apart, boxes overlap.
+    let mut rig = Rig::new(&scene("", &[ball(1, [0.0; 3]), ball(2, [1.5, 1.5, 1.5])]));
+    rig.send(ALL);
+    assert_eq!(rig.out.tick.candidates, 1);
+    rig.idle(510_000_000, ALL);
+    assert_eq!(
+        rig.verdict(1, 2),
+        Verdict::Apart,
+        "0.51 m of reach for 0.6 m of gap"
+    );
+    rig.idle(150_000_000, ALL);
+    assert_eq!(
+        rig.verdict(1, 2),
+        Verdict::Possible,
+        "0.66 m of reach for 0.6 m of gap"
+    );
+}
+
+#[test]
+fn law_3_7_nan_from_an_exploded_solver_is_unknown_until_good_poses_come() {
+    let mut rig = Rig::new(&scene(
+        "",
+        &[ball(1, 0.0, ""), ball(2, 1.5, ""), ball(3, 9.0, "")],
+    ));
+    rig.send(ALL);
+    let good = *rig.row(2);
+    rig.row(2).position = [f64::NAN; 3];
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Unknown);
+    assert!(rig.because(Reason::Rejected));
+    assert_eq!(rig.verdict(1, 2), Verdict::Possible);
+    let shown = rig.out.bodies[1];
+    assert_eq!(shown.status, BodyStatus::Rejected.code());
+    assert_eq!(shown.position, good.position, "the last good pose is kept");
+    assert_eq!(rig.out.body_verdicts, [3, 3, 1]);
+    assert!(
+        rig.out
+            .pairs
+            .iter()
+            .all(|row| !row.gap_min_m.is_nan() && !row.gap_max_m.is_nan())
+    );
+    *rig.row(2) = good;
+    rig.move_x(2, 2.5);
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+    assert_eq!(rig.verdict(1, 2), Verdict::Apart);
+}
+
+#[test]
+fn law_4_2_after_a_new_epoch_a_partial_frame_makes_known_only_what_it_names() {
+    let mut rig = Rig::new(&scene(
+        "",
+        &[ball(1, 0.0, ""), ball(2, 1.5, ""), ball(3, 9.0, "")],
+    ));
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Colliding);
+    rig.epoch = 2;
+    rig.flags = sweepd::wire::frame_flags::PARTIAL;
+    let all = rig.rows.clone();
+    rig.rows.truncate(1);
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Unknown);
+    assert!(rig.because(Reason::NotReceived));
+    assert_eq!(rig.out.tick.unknown, 2);
+    let row = rig.pair(1, 2).unwrap();
+    assert_eq!(row.end_cause, sweepd::wire::EndCause::Reset.code());
+    rig.rows = all;
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Colliding);
+}
+
+#[test]
+fn budget_zero_is_sound_and_never_clear_while_boxes_overlap() {
+    let mut rig = Rig::new(&scene("", &[ball(1, 0.0, ""), ball(2, 1.5, "")]));
+    for _ in 0..5 {
+        rig.send(NONE);
+        assert_eq!(rig.state(), State::Possible);
+        assert_eq!(rig.out.tick.units, 0);
+    }
+    assert_eq!(rig.out.tick.oldest_undecided_ticks, 5);
+    rig.move_x(2, 2.5);
+    rig.send(NONE);
+    assert_eq!(rig.state(), State::Clear, "boxes alone prove it");
+}

@@ -1,0 +1,140 @@
+//! 3.4 verdicts, 3.11 conventions.
+
+use sweepd::math::{Point, Vec3, pose_from};
+use sweepd::scene::PairAction;
+use sweepd::wire::{ContactKind, State, Verdict};
+use sweepd::world::Edit;
+
+use crate::rig::{ALL, Rig, ball, body, row, rule, scene};
+
+#[test]
+fn law_3_4_near_is_apart_below_the_larger_of_the_two_report_distances() {
+    let near = "report_within_m = 0.5";
+    let bodies = [ball(1, 0.0, near), ball(2, 2.3, ""), ball(3, -2.6, "")];
+    let mut rig = Rig::new(&scene("", &bodies));
+    rig.send(ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Near);
+    assert_eq!(rig.verdict(1, 3), Verdict::Apart);
+    assert_eq!(rig.state(), State::Near);
+    let row = *rig.pair(1, 2).unwrap();
+    assert!(row.gap_min_m <= 0.3 && 0.3 <= row.gap_max_m && row.gap_max_m - row.gap_min_m < 1e-9);
+    let [contact] = rig.out.contacts.as_slice() else {
+        panic!("closest points of the one near pair")
+    };
+    assert_eq!(contact.kind, ContactKind::Closest.code());
+    assert!((contact.gap_m - 0.3).abs() < 1e-9);
+}
+
+#[test]
+fn law_3_4_a_report_distance_never_makes_a_pair_colliding() {
+    for within in [0.0, 1.0, 100.0] {
+        let more = format!("report_within_m = {within}");
+        let mut rig = Rig::new(&scene("", &[ball(1, 0.0, &more), ball(2, 2.001, &more)]));
+        rig.send(ALL);
+        assert_ne!(rig.verdict(1, 2), Verdict::Colliding);
+        assert_eq!(rig.out.tick.colliding, 0);
+        rig.move_x(2, 1.999);
+        rig.send(ALL);
+        assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+    }
+}
+
+#[test]
+fn law_3_4_a_pair_rule_overrides_the_bodies_and_holds_at_once_for_a_pair_at_rest() {
+    let near = "report_within_m = 0.5";
+    let mut rig = Rig::new(&scene("", &[ball(1, 0.0, near), ball(2, 2.3, near)]));
+    rig.send(ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Near);
+    rig.edit(vec![rule(PairAction::Check, "b1", "b2", Some(0.1))], ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Apart);
+    assert_eq!(rig.state(), State::Clear);
+    rig.edit(vec![rule(PairAction::Check, "b1", "b2", Some(0.4))], ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Near);
+    let (a, b) = ("b1".to_owned(), "b2".to_owned());
+    rig.edit(
+        vec![
+            Edit::DropRules { a, b },
+            rule(PairAction::Check, "b?", "b*", Some(0.0)),
+        ],
+        ALL,
+    );
+    assert_eq!(rig.verdict(1, 2), Verdict::Apart);
+    rig.edit(vec![rule(PairAction::Check, "b*", "b*", Some(7.0))], ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Near);
+}
+
+#[test]
+fn law_3_4_touching_collides_and_is_flagged() {
+    let shape = "{ type = \"box\", half_extents = [0.5, 0.5, 0.5] }";
+    let bodies = [
+        body(1, [0.0; 3], shape, ""),
+        body(2, [1.0, 0.0, 0.0], shape, ""),
+    ];
+    let mut rig = Rig::new(&scene("", &bodies));
+    rig.send(ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+    let row = rig.pair(1, 2).unwrap();
+    assert_eq!(row.flags & sweepd::wire::pair_flags::TOUCHING, 1);
+    rig.move_x(2, 1.0 + 1e-6);
+    rig.send(ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Apart);
+}
+
+#[test]
+fn law_3_11_a_has_the_smaller_id_normals_point_from_a_to_b_and_both_frames_agree() {
+    let shape = "{ type = \"box\", half_extents = [0.5, 0.4, 0.3] }";
+    // The file names the larger id first.
+    let bodies = [
+        body(9, [0.0; 3], shape, ""),
+        body(4, [0.7, 0.1, 0.0], shape, ""),
+    ];
+    let mut rig = Rig::new(&scene("", &bodies));
+    let turned = pose_from([0.7, 0.1, 0.05], [0.1, 0.2, 0.3, 0.9]).unwrap();
+    rig.place(4, &turned);
+    let other = pose_from([0.0, 0.0, 0.0], [0.3, -0.1, 0.0, 0.9]).unwrap();
+    *rig.row(9) = row(9, &other);
+    rig.send(ALL);
+    assert_eq!(rig.verdict(4, 9), Verdict::Colliding);
+    assert!(!rig.out.contacts.is_empty());
+    for contact in &rig.out.contacts {
+        assert_eq!((contact.body_a, contact.body_b), (4, 9));
+        let normal = Vec3::from(contact.normal);
+        assert!((normal.norm() - 1.0).abs() < 1e-12);
+        // From A (at x = 0.7) to B (at x = 0).
+        assert!(normal.dot(&(other.translation.vector - turned.translation.vector)) > 0.0);
+        let world_a = turned * Point::from(contact.point_a_body);
+        let world_b = other * Point::from(contact.point_b_body);
+        assert!((world_a - Point::from(contact.point_a)).norm() < 1e-12);
+        assert!((world_b - Point::from(contact.point_b)).norm() < 1e-12);
+        // B's point is `gap` from A's along the normal: against it, where they overlap.
+        let across = Point::from(contact.point_b) - Point::from(contact.point_a);
+        assert!(
+            (across.dot(&normal) - contact.gap_m).abs() < 1e-9,
+            "{contact:?}"
+        );
+    }
+}
+
+#[test]
+fn law_3_11_output_is_ordered_by_ids() {
+    let bodies: Vec<String> = [50, 3, 90, 17, 8]
+        .iter()
+        .map(|&id| ball(id, id as f64 * 1e-3, ""))
+        .collect();
+    let mut rig = Rig::new(&scene("", &bodies));
+    rig.send(ALL);
+    assert_eq!(rig.out.pairs.len(), 10);
+    let ids: Vec<_> = rig
+        .out
+        .pairs
+        .iter()
+        .map(|row| (row.body_a, row.body_b))
+        .collect();
+    assert!(ids.is_sorted() && ids.iter().all(|(a, b)| a < b));
+    assert!(rig.out.bodies.is_sorted_by_key(|row| row.body));
+    assert!(
+        rig.out
+            .contacts
+            .is_sorted_by_key(|row| (row.body_a, row.body_b))
+    );
+}
