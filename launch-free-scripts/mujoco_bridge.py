@@ -23,7 +23,8 @@ With --compare the set of colliding pairs must be equal to MuJoCo's (contacts at
 override off, the simulation itself untouched) in every step. A pair on which they differ is exempt only where MuJoCo's
 distance, or that of a third judge (a search over directions with support functions), is within 1e-6 m of 0, and at
 most 1 % of the colliding pair-steps may be; the count is printed. Not compared: pairs of two bodies that cannot move
-(sweepd never pairs them), and flexes with --without-flex.
+(sweepd never pairs them), and flexes with --without-flex. Under a budget pairs may be left open: then every collision
+must be among the colliding and possible ones, and none may be invented.
 
 exit codes: 0 done and equal, 1 a difference, 2 usage, 3 sweepd did not answer in time, 4 refused or could not run
 needs: pip install mujoco numpy iceoryx2==0.10.0, and pip install ./msgs/python

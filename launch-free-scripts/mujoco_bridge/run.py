@@ -32,7 +32,9 @@ class Run:
         self.scene = Scene(self.model)
         self.judge = Judge(self.model, self.scene, chosen.ccd_tolerance)
         self.judge.look(self.data)
-        self.compare = Compare(self.scene, self.judge, chosen.at_least) if chosen.compare else None
+        budgeted = chosen.budget_ms is not None or chosen.budget_units is not None
+        compare = Compare(self.scene, self.judge, chosen.at_least, budgeted)
+        self.compare = compare if chosen.compare else None
         self.random = np.random.default_rng(chosen.seed)
         self.done = 0
         self.answer_s = 0.0
