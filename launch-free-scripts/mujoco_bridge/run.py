@@ -61,7 +61,7 @@ class Run:
         # Wrong installations are told before a daemon is started.
         try:
             import sweepd
-            import sweepd.client  # noqa: F401
+            import sweepd.client
         except ImportError as error:
             raise Refused(f"{error}: pip install ./msgs/python iceoryx2==0.10.0") from None
         if self.chosen.spawn is None:

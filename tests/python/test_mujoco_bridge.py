@@ -382,7 +382,7 @@ def chosen(*arguments):
     spec = importlib.util.spec_from_file_location("bridge_script", SCRIPTS / "mujoco_bridge.py")
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
-    return script, script.parse([str(a) for a in arguments])
+    return script.parse([str(a) for a in arguments])
 
 
 def test_under_a_budget_open_pairs_are_no_difference_but_missing_and_invented_ones_are():
@@ -439,7 +439,7 @@ def made_up_sweepd(of_run, leave_out=None, silent_at=None):
 
 @pytest.mark.parametrize("leave_out,code", [(None, 0), (30, 1)])
 def test_a_run_is_equal_only_if_every_step_is(tmp_path, monkeypatch, leave_out, code):
-    script, given = chosen(SCRIPTS / "models" / "robot.xml", "--compare", "--steps", 40, "--ctrl-noise", 0.5)
+    given = chosen(SCRIPTS / "models" / "robot.xml", "--compare", "--steps", 40, "--ctrl-noise", 0.5)
     held = []
     for name, module in made_up_sweepd(lambda: held[0], leave_out).items():
         monkeypatch.setitem(sys.modules, name, module)
@@ -452,7 +452,7 @@ def test_a_run_is_equal_only_if_every_step_is(tmp_path, monkeypatch, leave_out, 
 
 
 def test_a_silent_daemon_and_another_scene_are_told(tmp_path, monkeypatch):
-    script, given = chosen(SCRIPTS / "models" / "robot.xml", "--compare", "--steps", 40)
+    given = chosen(SCRIPTS / "models" / "robot.xml", "--compare", "--steps", 40)
     held = [run.Run(given, tmp_path / "scene.toml")]
     for name, module in made_up_sweepd(lambda: held[0], silent_at=3).items():
         monkeypatch.setitem(sys.modules, name, module)
@@ -542,7 +542,7 @@ def test_live_a_fault_of_the_bridge_is_a_difference(tmp_path, monkeypatch, fault
     monkeypatch.setattr(scene.Scene, "poses", faulty_poses(scene.Scene.poses, fault))
     path = SCRIPTS / "models" / "robot.xml"
     name = f"fault_{fault}_{os.getpid()}"
-    _, given = chosen(path, "--compare", "--spawn", os.environ["SWEEPD"], "--steps", 100, "--instance", name)
+    given = chosen(path, "--compare", "--spawn", os.environ["SWEEPD"], "--steps", 100, "--instance", name)
     faulty = run.Run(given, tmp_path / "scene.toml")
     if fault == "filter":
         text = faulty.scene_path.read_text()
