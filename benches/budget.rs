@@ -35,9 +35,22 @@ fn main() {
                 *to = row(to.body, pose);
             }
             // The budget a user would set: the floor as published so far, and so much above it.
-            let floor_ns = if floors.is_empty() { 5_000_000 } else { quantile(&mut floors, 0.5) };
+            let floor_ns = if floors.is_empty() {
+                5_000_000
+            } else {
+                quantile(&mut floors, 0.5)
+            };
             let budget_ns = floor_ns + above_us * 1_000;
-            let (wall_ns, cpu_ns) = bench.tick(&rows, true, Budget::time_ns(budget_ns), Demand::ALL);
+            let (wall_ns, cpu_ns) = bench.tick(
+                &rows,
+                true,
+                Budget::time_ns(budget_ns),
+                Demand {
+                    bodies: false,
+                    body_verdicts: false,
+                    ..Demand::ALL
+                },
+            );
             let out = &bench.out().tick;
             if floors.len() == 64 {
                 floors.remove(0);
@@ -58,7 +71,13 @@ fn main() {
             all += out.candidates;
         }
         let us = |ns: u64| ns as f64 / 1e3;
-        let share = |part: u64, whole: u64| if whole == 0 { f64::NAN } else { 100.0 * part as f64 / whole as f64 };
+        let share = |part: u64, whole: u64| {
+            if whole == 0 {
+                f64::NAN
+            } else {
+                100.0 * part as f64 / whole as f64
+            }
+        };
         csv += &format!(
             "{from},{seed},{bodies},{above_us},{ticks},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.2}\n",
             us(quantile(&mut floors, 0.5)),

@@ -27,6 +27,14 @@ use sweepd::shape::ShapeSpec;
 use sweepd::time::{Budget, Clock, SystemClock};
 use sweepd::wire::Demand;
 
+/// What rapier's pipeline yields too: pairs and contacts.
+const ASKED: Demand = Demand {
+    pairs: true,
+    contacts: true,
+    bodies: false,
+    body_verdicts: false,
+};
+
 /// Rapier's side of the same scene.
 struct Peer {
     pipeline: CollisionPipeline,
@@ -148,7 +156,7 @@ fn main() {
                 for (to, pose) in rows.iter_mut().zip(&flight.poses) {
                     *to = row(to.body, pose);
                 }
-                let (own, _) = ours.tick(&rows, true, Budget::UNLIMITED, Demand::ALL);
+                let (own, _) = ours.tick(&rows, true, Budget::UNLIMITED, ASKED);
                 let theirs = peer.tick(&flight.poses);
                 if tick >= 20 {
                     own_ns.push(own);

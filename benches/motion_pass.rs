@@ -20,7 +20,11 @@ fn dense(bodies: usize, seed: u64) -> String {
     let side = (bodies as f64 / 7.5).cbrt();
     let mut text = String::from("frame_id = \"world\"\n[[source]]\nname = \"feed\"\n");
     for at in 0..bodies {
-        let place = [random.range(0.0, side), random.range(0.0, side), random.range(0.0, side)];
+        let place = [
+            random.range(0.0, side),
+            random.range(0.0, side),
+            random.range(0.0, side),
+        ];
         let _ = write!(
             text,
             "[[body]]\nname = \"b{at}\"\nposition = [{:.6}, {:.6}, {:.6}]\nmoves = true\n\

@@ -17,6 +17,6 @@ if [ "${1:-}" = --rust-only ]; then exit 0; fi
 
 venv=$root/.venv-test
 [ -x "$venv/bin/python" ] || python3 -m venv "$venv"
-"$venv/bin/pip" install --quiet --disable-pip-version-check pytest "$root/msgs/python"
+"$venv/bin/pip" install --quiet --disable-pip-version-check pytest mujoco "$root/msgs/python"
 cargo build --quiet --release --bin sweepd
 SWEEPD=${CARGO_TARGET_DIR:-$root/target}/release/sweepd "$venv/bin/python" -m pytest -q tests/python

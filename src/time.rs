@@ -217,6 +217,11 @@ impl<'a> Meter<'a> {
         self.look();
     }
 
+    /// Reads the clock now, after work that was not charged.
+    pub fn refresh(&mut self) {
+        self.look();
+    }
+
     /// Units charged so far.
     #[must_use]
     pub fn spent(&self) -> u64 {

@@ -74,6 +74,8 @@ pub struct Narrow {
     refresh: Vec<PairSlot>,
     cursors: Pool<Cursor>,
     contact_sets: Pool<ContactSet>,
+    /// Work with its ranks, while it is ordered.
+    keyed: Vec<(u128, PairSlot)>,
     /// Contacts of the query at hand.
     found: Vec<Contact>,
     counts: [u64; Verdict::ALL.len()],

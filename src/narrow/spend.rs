@@ -46,7 +46,7 @@ impl Narrow {
         meter: &mut Meter<'_>,
     ) -> bool {
         let mut work = std::mem::take(&mut self.undecided);
-        self.arrange(&mut work, wanted.order, world);
+        self.arrange(&mut work, wanted.order, world, meter);
         // With no limit the contacts are computed while the answer is at hand; else every verdict comes first.
         let at_once = wanted.order == Order::AsFound && wanted.contacts;
         let goal = if at_once {
@@ -86,7 +86,7 @@ impl Narrow {
             return true;
         }
         let mut work = std::mem::take(&mut self.refresh);
-        self.arrange(&mut work, wanted.order, world);
+        self.arrange(&mut work, wanted.order, world, meter);
         let goal = if wanted.contacts {
             Goal::Contacts
         } else {
@@ -143,34 +143,56 @@ impl Narrow {
         bounds && (!contacts || !colliding || memo.contacts_tick >= memo.tested)
     }
 
-    fn arrange(&self, work: &mut [PairSlot], order: Order, world: &World) {
-        let key = |slot: PairSlot| {
-            let memo = &self.memos[slot.index()];
-            let touched = memo.witness.is_some_and(|w| w.best_m <= 0.0);
-            let age = if memo.undecided_since == 0 {
-                self.tick
-            } else {
-                memo.undecided_since
-            };
-            // Positive floats order like their bits; the fastest first.
-            (
-                !(touched && age == self.tick),
-                age,
-                Reverse(memo.widened_m.max(0.0).to_bits()),
-            )
-        };
-        let ids = |slot: PairSlot| {
-            let hot = &self.hot[slot.index()];
-            (
-                world.body(hot.a).map(|body| body.id),
-                world.body(hot.b).map(|body| body.id),
-            )
-        };
-        match order {
-            Order::AsFound => {}
-            Order::Aged => work.sort_unstable_by_key(|&slot| key(slot)),
-            Order::Counted => work.sort_unstable_by_key(|&slot| (key(slot), ids(slot))),
+    /// Orders work: last tick's contacts first, then the longest undecided, then the fastest.
+    ///
+    /// The keys are gathered once: a sort that looked them up would miss the cache at every comparison.
+    fn arrange(
+        &mut self,
+        work: &mut [PairSlot],
+        order: Order,
+        world: &World,
+        meter: &mut Meter<'_>,
+    ) {
+        if order == Order::AsFound || !meter.open() {
+            return;
         }
+        let mut keyed = std::mem::take(&mut self.keyed);
+        keyed.clear();
+        keyed.extend(work.iter().map(|&slot| (self.rank(slot), slot)));
+        if order == Order::Counted {
+            let ids = |slot: PairSlot| {
+                let hot = &self.hot[slot.index()];
+                (
+                    world.body(hot.a).map(|body| body.id),
+                    world.body(hot.b).map(|body| body.id),
+                )
+            };
+            keyed.sort_unstable_by_key(|&(rank, slot)| (rank, ids(slot)));
+        } else {
+            keyed.sort_unstable();
+        }
+        for (to, (_, slot)) in work.iter_mut().zip(&keyed) {
+            *to = *slot;
+        }
+        self.keyed = keyed;
+        meter.refresh();
+    }
+
+    /// A pair's place in the order of work, the least first: 1 bit whether it is no contact of last tick, 63 bits the tick
+    /// since when it is undecided, 64 bits how far it has moved (positive floats order like their bits), the farthest first.
+    fn rank(&self, slot: PairSlot) -> u128 {
+        let memo = &self.memos[slot.index()];
+        let touched = memo.witness.is_some_and(|w| w.best_m <= 0.0);
+        let since = if memo.undecided_since == 0 {
+            self.tick
+        } else {
+            memo.undecided_since
+        };
+        let fresh_contact = touched && since == self.tick;
+        let speed = memo.widened_m.max(0.0).to_bits();
+        u128::from(!fresh_contact) << 127
+            | u128::from(since & (u64::MAX >> 1)) << 64
+            | u128::from(!speed)
     }
 
     /// One turn of work on a pair; whether nothing is left to do for `goal`.

@@ -11,6 +11,9 @@ pub(super) struct Laps {
     woke_ns: u64,
     last_ns: u64,
     stage_ns: [u64; STAGES_LEN],
+    /// CPU time of this thread at the end of the narrow phase, and what publishing took of it.
+    narrowed_cpu_ns: u64,
+    publish_cpu_ns: u64,
 }
 
 impl Laps {
@@ -22,6 +25,8 @@ impl Laps {
             woke_ns,
             last_ns,
             stage_ns: [0; STAGES_LEN],
+            narrowed_cpu_ns: 0,
+            publish_cpu_ns: 0,
         }
     }
 
@@ -30,6 +35,13 @@ impl Laps {
         let now_ns = self.clock.monotonic_ns();
         self.stage_ns[usize::from(stage.code())] = now_ns.saturating_sub(self.last_ns);
         self.last_ns = now_ns;
+        match stage {
+            Stage::Narrow => self.narrowed_cpu_ns = self.clock.thread_cpu_ns(),
+            Stage::Publish => {
+                self.publish_cpu_ns = self.clock.thread_cpu_ns() - self.narrowed_cpu_ns
+            }
+            _ => {}
+        }
     }
 
     /// From wake-up to the end of the last stage.
@@ -52,7 +64,8 @@ impl Laps {
 
 /// What publishing and sending will take, learned from the ticks before.
 ///
-/// A decaying maximum: an average would be too short every other tick, and the deadline would be missed by it.
+/// A decaying maximum: an average would be too short every other tick, and the deadline would be missed by it. Publishing
+/// is taken by the thread's CPU clock: a slice that the scheduler gave to others says nothing about the next tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Floor {
     publish_ns: u64,
@@ -60,8 +73,8 @@ pub(super) struct Floor {
     last_send_ns: u64,
 }
 
-/// Each tick the remembered maximum loses 1 / 16 of itself: a spike is forgotten in about 40 ticks.
-const DECAY_SHIFT: u32 = 4;
+/// Each tick the remembered maximum loses 1 / 8 of itself: a spike is forgotten in about 20 ticks.
+const DECAY_SHIFT: u32 = 3;
 
 impl Floor {
     /// Time to keep back for publishing and sending.
@@ -81,7 +94,7 @@ impl Floor {
 
     /// Learns from a finished tick; returns its floor.
     pub(super) fn learn(&mut self, laps: &Laps) -> u64 {
-        self.publish_ns = decayed(self.publish_ns).max(laps.of(Stage::Publish));
+        self.publish_ns = decayed(self.publish_ns).max(laps.publish_cpu_ns);
         let woken_ns = laps.elapsed_ns()
             - Stage::ALL
                 .iter()
