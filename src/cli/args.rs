@@ -73,14 +73,14 @@ pub(super) struct RunArgs {
     /// Poll instead of sleeping: microseconds less latency for a whole core.
     #[arg(long)]
     pub(super) busy_poll: bool,
-    /// End after so many ticks.
+    /// End after so many ticks; until a signal otherwise.
     #[arg(long, value_name = "N")]
     pub(super) ticks: Option<u64>,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct CheckArgs {
-    /// The scene file (TOML).
+    /// The scene file (TOML): metres, seconds, quaternions x, y, z, w.
     #[arg(value_name = "SCENE")]
     pub(super) scene: PathBuf,
     /// One JSON object instead of text.
@@ -104,16 +104,16 @@ pub(super) struct FeedArgs {
     /// Frames a second.
     #[arg(long, default_value_t = 100.0, value_name = "HZ")]
     pub(super) rate: f64,
-    /// Bodies to move (the others are sent at rest); with --write-scene: bodies to make.
+    /// Bodies to move, the others are sent at rest (default: all); with --write-scene: bodies to make (default: 200).
     #[arg(long, value_name = "N")]
     pub(super) count: Option<usize>,
     /// Seed of the motion (and of the scene made).
     #[arg(long, default_value_t = 1, value_name = "N")]
     pub(super) seed: u64,
-    /// How bodies move.
+    /// How bodies move: half a metre about their start, 1 mm about it, turning in place, or not at all.
     #[arg(long, value_enum, default_value_t = Pattern::Wander)]
     pub(super) motion: Pattern,
-    /// End after so many frames.
+    /// End after so many frames; until a signal otherwise.
     #[arg(long, value_name = "N")]
     pub(super) frames: Option<u64>,
     /// How long to wait for the daemon, such as `10s`.
@@ -131,10 +131,12 @@ pub(super) struct FeedArgs {
 pub(super) struct MonitorArgs {
     #[command(flatten)]
     pub(super) which: Which,
-    /// One JSON object a tick instead of a screen.
+    /// One JSON object a tick instead of a screen: gaps in metres, times in nanoseconds.
+    ///
+    /// An open end of a gap's interval is null. `pairs_shown` is [rows in this line, rows published].
     #[arg(long)]
     pub(super) json: bool,
-    /// End after so many ticks.
+    /// End after so many ticks; until a signal otherwise.
     #[arg(long, value_name = "N")]
     pub(super) ticks: Option<u64>,
     /// End with code 3 when no tick comes for so long.
@@ -152,7 +154,7 @@ pub(super) struct MonitorArgs {
 pub(super) struct QueryArgs {
     /// A file of cases, one JSON object a line (`-`: standard input); one answer a line, in order.
     ///
-    /// A case: {"id", "a": SHAPE, "pose_a": {"t": [x,y,z], "q": [w,x,y,z]}, "b": SHAPE, "pose_b": ...}.
+    /// Lengths in metres, `t` in the world. A case: {"id", "a": SHAPE, "pose_a": {"t": [x,y,z], "q": [w,x,y,z]}, "b": SHAPE, "pose_b": ...}.
     #[arg(long, value_name = "IN.jsonl")]
     pub(super) batch: PathBuf,
 }

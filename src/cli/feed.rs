@@ -6,16 +6,19 @@ use crate::builtin::{Motion, Random, pile, pool};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::time::{Clock, SystemClock};
-use crate::transport::client::{Client, FrameInfo, Rows};
-use crate::wire::TransformRow;
+use crate::transport::client::{Client, FrameInfo, Heard, Rows};
+use crate::wire::{REJECTS_LEN, RejectReason, TransformRow, name_str};
 
 use super::args::FeedArgs;
 use super::out::Out;
+use super::{connect, load_scene};
 
 /// Bodies of a written scene when no count is given.
 const COUNT_DEFAULT: usize = 200;
 /// Longest sleep between two looks at the stop flag, nanoseconds.
 const LOOK_NS: u64 = 50_000_000;
+/// Time between two looks at what the daemon says of our frames, nanoseconds.
+const HEED_NS: u64 = 1_000_000_000;
 
 /// Moves the bodies of a scene until stopped, or writes a scene.
 pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
@@ -43,19 +46,24 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
             args.rate
         )));
     }
-    let scene = Scene::load(path)?;
+    let scene = load_scene(path)?;
     let source = source_of(&scene, args.source.as_deref())?;
     let name = scene.sources[source].name.clone();
     let mut bodies = Bodies::of(&scene, source, args);
-    let mut client = Client::connect(&args.which.instance, Some(&name), args.wait)?;
+    let Some(mut client) = connect(&args.which.instance, Some(&name), args.wait, stop)? else {
+        return Ok(true);
+    };
     tracing::info!(
-        "feeding {} bodies as `{name}` at {} Hz",
+        "feeding {} bodies ({} of them moving) as `{name}` at {} Hz",
         bodies.rows.len(),
+        bodies.moving,
         args.rate
     );
     let clock = SystemClock;
     let start_ns = clock.monotonic_ns();
     let mut frame = 0_u64;
+    let mut heard = Heeded::default();
+    let mut look_ns = start_ns.saturating_add(HEED_NS);
     while !stop.load(Ordering::Relaxed) && args.frames.is_none_or(|most| frame < most) {
         #[allow(
             clippy::cast_precision_loss,
@@ -77,6 +85,10 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
             Rows::Poses(&bodies.rows),
         )?;
         frame += 1;
+        if clock.monotonic_ns() >= look_ns {
+            look_ns = clock.monotonic_ns().saturating_add(HEED_NS);
+            heard.look(&mut client, &name)?;
+        }
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -87,6 +99,67 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
         sleep_until(&clock, next_ns, stop);
     }
     Ok(true)
+}
+
+/// What the daemon said last, so that a change is told once.
+#[derive(Debug, Default)]
+struct Heeded {
+    boot_id: u64,
+    tick: u64,
+    frames: u64,
+    rejects: [u64; REJECTS_LEN],
+    silent: bool,
+    unused: bool,
+}
+
+impl Heeded {
+    /// Says on stderr what a person who feeds would want to know: silence, a restart, frames that are not used.
+    fn look(&mut self, client: &mut Client, source: &str) -> Result<()> {
+        while client.latest()? != Heard::Silence {}
+        let tick = *client.view().tick();
+        let (boot_id, number) = (tick.header.boot_id, tick.header.tick);
+        let silent = (boot_id, number) == (self.boot_id, self.tick);
+        if silent && !self.silent {
+            tracing::warn!(
+                "no tick since the last second; the daemon may have ended, frames go on"
+            );
+        }
+        if self.boot_id != 0 && boot_id != self.boot_id {
+            tracing::warn!("the daemon restarted");
+            *self = Self::default();
+        }
+        let own = tick.sources.iter().take(usize::from(tick.sources_len));
+        let own = own
+            .filter(|row| name_str(&row.name) == Some(source) && row.session == client.session())
+            .map(|row| row.frames)
+            .next();
+        let unused = !silent && own.is_none_or(|frames| frames == self.frames);
+        if unused && !self.unused {
+            let refused: Vec<String> = RejectReason::ALL
+                .iter()
+                .zip(tick.rejects.iter().zip(&self.rejects))
+                .filter(|(_, (now, before))| now > before)
+                .map(|(reason, (now, before))| format!("{} {reason}", now - before))
+                .collect();
+            tracing::warn!(
+                "the daemon uses no frame of `{source}`; refused since: {}",
+                if refused.is_empty() {
+                    "none".to_owned()
+                } else {
+                    refused.join(", ")
+                }
+            );
+        }
+        *self = Self {
+            boot_id,
+            tick: number,
+            frames: own.unwrap_or(0),
+            rejects: tick.rejects,
+            silent,
+            unused,
+        };
+        Ok(())
+    }
 }
 
 /// The place of the source to be.

@@ -13,13 +13,17 @@ mod query;
 mod run;
 mod screen;
 
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Parser;
 
 use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::time::{Clock as _, SystemClock};
+use crate::transport::client::Client;
 use args::{Cli, Command};
 use out::Out;
 
@@ -78,6 +82,36 @@ fn stop() -> Result<Arc<AtomicBool>> {
             .map_err(|e| Error::io("cannot listen for signals", e))?;
     }
     Ok(stop)
+}
+
+/// Longest try at a connection before a look at the stop flag, nanoseconds.
+const CONNECT_LOOK_NS: u64 = 250_000_000;
+
+/// Connects within `wait_ns`; `None`: stopped before a daemon was there.
+fn connect(
+    instance: &str,
+    source: Option<&str>,
+    wait_ns: u64,
+    stop: &AtomicBool,
+) -> Result<Option<Client>> {
+    let clock = SystemClock;
+    let until_ns = clock.monotonic_ns().saturating_add(wait_ns);
+    loop {
+        let left_ns = until_ns.saturating_sub(clock.monotonic_ns());
+        match Client::connect(instance, source, left_ns.min(CONNECT_LOOK_NS)) {
+            Err(Error::TimedOut(_)) if stop.load(Ordering::Relaxed) => return Ok(None),
+            Err(Error::TimedOut(_)) if left_ns > CONNECT_LOOK_NS => {}
+            done => return done.map(Some),
+        }
+    }
+}
+
+/// The scene of a command; one that cannot be read is the user's to mend, as one that is wrong.
+fn load_scene(path: &Path) -> Result<Scene> {
+    Scene::load(path).map_err(|error| match error {
+        Error::Io { message, .. } => Error::Scene(message),
+        other => other,
+    })
 }
 
 /// A panic says one line; it unwinds, so that transports close.

@@ -7,22 +7,31 @@ use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
 use crate::time::{Clock, SystemClock};
-use crate::transport::client::{Client, Heard, Message, Topics, View};
+use crate::transport::client::{Heard, Message, Restarted, Topics, View};
 use crate::wire::{
     BodyRow, BodyStatus, ContactRow, EndCause, Event, Level, NameRow, PairRow, Reason,
     RejectReason, Stage, State, TickCause, TickRow, Verdict, name_str,
 };
 
 use super::args::MonitorArgs;
+use super::connect;
 use super::out::Out;
 use super::screen::Screen;
 
 /// Longest wait before a look at the stop flag, nanoseconds.
 const LOOK_NS: u64 = 100_000_000;
 
+/// The daemon computes what somebody listens to, so the first ticks heard come without pairs: how long they are passed
+/// over until all that was asked for is there, nanoseconds.
+const WHOLE_WAIT_NS: u64 = 1_000_000_000;
+/// Without a tick for so long the screen says so, nanoseconds: three heartbeats of the usual length.
+const SILENCE_NS: u64 = 300_000_000;
+
 /// Follows an instance until stopped.
 pub(super) fn monitor(args: &MonitorArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
-    let mut client = Client::connect(&args.which.instance, None, args.wait)?;
+    let Some(mut client) = connect(&args.which.instance, None, args.wait, stop)? else {
+        return Ok(true);
+    };
     client.subscribe(Topics {
         pairs: true,
         contacts: args.contacts,
@@ -34,11 +43,17 @@ pub(super) fn monitor(args: &MonitorArgs, out: &mut Out, stop: &AtomicBool) -> R
     let mut names = Names::default();
     let (clock, mut seen) = (SystemClock, 0);
     let mut heard_ns = clock.monotonic_ns();
+    let mut whole_by_ns = heard_ns.saturating_add(WHOLE_WAIT_NS);
     while !stop.load(Ordering::Relaxed) && args.ticks.is_none_or(|most| seen < most) {
         match client.wait_tick(LOOK_NS)? {
             Heard::Tick => {
-                seen += 1;
                 heard_ns = clock.monotonic_ns();
+                if heard_ns < whole_by_ns && !is_whole(client.view(), args) {
+                    continue;
+                }
+                // Later ticks come as they are: what is overtaken in a queue is not waited for.
+                whole_by_ns = 0;
+                seen += 1;
                 names.follow(client.view().names());
                 if args.json {
                     out.line(&tick_json(client.view(), &names, args).to_string())?;
@@ -48,16 +63,12 @@ pub(super) fn monitor(args: &MonitorArgs, out: &mut Out, stop: &AtomicBool) -> R
                 }
             }
             Heard::Restarted(news) => {
+                whole_by_ns = clock.monotonic_ns().saturating_add(WHOLE_WAIT_NS);
                 if args.json {
-                    let ends = news
-                        .ends
-                        .iter()
-                        .map(|row| pair_json(row, &names))
-                        .collect::<Vec<_>>();
-                    let boots = [news.old_boot, news.new_boot].map(|boot| format!("{boot:016x}"));
-                    out.line(
-                        &json!({ "restarted": { "boots": boots, "ends": ends } }).to_string(),
-                    )?;
+                    out.line(&restart_json(&news, &names).to_string())?;
+                    out.flush()?;
+                } else {
+                    screen.note_restart();
                 }
             }
             Heard::Silence => {
@@ -69,7 +80,7 @@ pub(super) fn monitor(args: &MonitorArgs, out: &mut Out, stop: &AtomicBool) -> R
                         args.which.instance
                     )));
                 }
-                if !args.json {
+                if !args.json && silent_ns >= SILENCE_NS {
                     screen.show_silence(silent_ns, out)?;
                 }
             }
@@ -77,6 +88,20 @@ pub(super) fn monitor(args: &MonitorArgs, out: &mut Out, stop: &AtomicBool) -> R
     }
     screen.end(out)?;
     Ok(true)
+}
+
+/// Whether a tick came with all that was asked for.
+fn is_whole(view: &View, args: &MonitorArgs) -> bool {
+    view.names().is_some()
+        && view.pairs().is_some()
+        && (!args.contacts || view.contacts().is_some())
+        && (args.json || view.bodies().is_some())
+}
+
+fn restart_json(news: &Restarted, names: &Names) -> Value {
+    let ends = news.ends.iter().map(|row| pair_json(row, names));
+    let boots = [news.old_boot, news.new_boot].map(|boot| format!("{boot:016x}"));
+    json!({ "restarted": { "boots": boots, "ends": ends.collect::<Vec<_>>() } })
 }
 
 /// Names of bodies by id.

@@ -11,16 +11,17 @@ use crate::time::{Clock, SystemClock};
 use crate::transport::iceoryx::{Place, Server, ServerOptions, spawn_cleaner};
 
 use super::args::{Limit, RunArgs};
+use super::load_scene;
 
 /// Runs the daemon until a signal, or for the ticks asked for.
 pub(super) fn run(args: &RunArgs, stop: &AtomicBool) -> Result<bool> {
-    let mut scene = Scene::load(&args.scene)?;
+    let place = Place::new(&args.which.instance)?;
+    let mut scene = load_scene(&args.scene)?;
     apply(args, &mut scene)?;
     let shapes = build_shapes(&scene)?;
     for warning in &shapes.warnings {
         tracing::warn!("{warning}");
     }
-    let place = Place::new(&args.which.instance)?;
     let boot_id = crate::transport::client::random_u64()?;
     let mut options = ServerOptions::new(place.clone(), boot_id);
     options.heartbeat_ns = scene.config.heartbeat_ns;

@@ -1,4 +1,4 @@
-//! The screen of `sweepd monitor`: redrawn in place, at most ten times a second.
+//! The screen of `sweepd monitor`: redrawn in place on a terminal, at most ten times a second; plain text elsewhere.
 
 use std::fmt::Write as _;
 
@@ -8,12 +8,18 @@ use crate::transport::client::View;
 use crate::wire::{EndCause, Event, PairRow, Stage, TickCause, TickRow, Verdict, name_str};
 
 use super::monitor::{Names, reasons, rejects, state_word, unknown_word};
-use super::out::{Out, coloured_stdout};
+use super::out::{Out, coloured_stdout, drawn_stdout, stdout_lines};
 
 /// Time between two drawings, nanoseconds: faster cannot be read, and would cost the daemon's machine a core.
 const REDRAW_NS: u64 = 100_000_000;
+/// Time between two lines that say silence, where nothing can be drawn in place, nanoseconds.
+const RESAY_NS: u64 = 1_000_000_000;
 /// Unknown bodies listed.
 const UNKNOWN_SHOWN: usize = 5;
+/// Columns of a body's name; longer ones are cut.
+const NAME_WIDTH: usize = 24;
+/// Columns of the bar of the budget.
+const BAR_WIDTH: usize = 20;
 
 const RED: &str = "\x1b[31m";
 const YELLOW: &str = "\x1b[33m";
@@ -25,10 +31,14 @@ const RESET: &str = "\x1b[0m";
 pub(super) struct Screen {
     instance: String,
     pairs: usize,
+    in_place: bool,
     colours: bool,
-    drawn_ns: u64,
-    drawn: bool,
-    ticks: u64,
+    drawn_ns: Option<u64>,
+    /// Tick number and moment of the last drawing, for the rate of ticks.
+    drawn_tick: u64,
+    restarts: u64,
+    /// What stood below the first line, shown on through a silence.
+    below: String,
 }
 
 impl Screen {
@@ -36,36 +46,53 @@ impl Screen {
         Self {
             instance,
             pairs,
+            in_place: drawn_stdout(),
             colours: coloured_stdout(),
-            drawn_ns: 0,
-            drawn: false,
-            ticks: 0,
+            drawn_ns: None,
+            drawn_tick: 0,
+            restarts: 0,
+            below: String::new(),
         }
+    }
+
+    /// Notes that the daemon restarted.
+    pub(super) fn note_restart(&mut self) {
+        self.restarts += 1;
+        self.drawn_tick = 0;
     }
 
     /// Draws the newest tick, unless the last drawing is too recent.
     pub(super) fn show(&mut self, view: &View, names: &Names, out: &mut Out) -> Result<()> {
-        self.ticks += 1;
         let now_ns = SystemClock.monotonic_ns();
-        if self.drawn && now_ns.saturating_sub(self.drawn_ns) < REDRAW_NS {
+        if self.is_recent(now_ns, REDRAW_NS) {
             return Ok(());
         }
-        let mut text = self.head(view.tick());
-        self.sources(view.tick(), &mut text);
-        self.bodies(view, names, &mut text);
-        self.rows(view, names, &mut text);
-        self.draw(&text, now_ns, out)
+        let tick = view.tick();
+        let head = self.head(tick, now_ns);
+        let mut below = String::new();
+        self.counts(tick, &mut below);
+        self.sources(tick, &mut below);
+        self.bodies(view, names, &mut below);
+        self.rows(view, names, &mut below);
+        self.below = below;
+        self.drawn_tick = tick.header.tick;
+        self.draw(&head, true, now_ns, out)
     }
 
-    /// Says that nothing comes any more.
+    /// Says that nothing comes any more, above what came last.
     pub(super) fn show_silence(&mut self, silent_ns: u64, out: &mut Out) -> Result<()> {
-        let text = format!(
-            "{} no tick from `{}` for {} ms\n",
-            self.paint(RED, "SILENT"),
+        let now_ns = SystemClock.monotonic_ns();
+        let pause_ns = if self.in_place { REDRAW_NS } else { RESAY_NS };
+        if self.is_recent(now_ns, pause_ns) {
+            return Ok(());
+        }
+        let head = format!(
+            "sweepd `{}`  {}  no tick for {:.1} s; below is what came last\n",
             self.instance,
-            silent_ns / 1_000_000
+            self.paint(RED, "SILENT"),
+            seconds(silent_ns)
         );
-        self.draw(&text, SystemClock.monotonic_ns(), out)
+        self.draw(&head, self.in_place, now_ns, out)
     }
 
     /// Leaves the last drawing on the screen.
@@ -73,98 +100,145 @@ impl Screen {
         out.flush()
     }
 
-    fn draw(&mut self, text: &str, now_ns: u64, out: &mut Out) -> Result<()> {
-        (self.drawn, self.drawn_ns) = (true, now_ns);
-        if self.colours {
-            // Home, each line cleared behind its text, the rest of the screen cleared: nothing flickers.
-            out.text("\x1b[H")?;
-            out.text(&text.replace('\n', "\x1b[K\n"))?;
-            out.text("\x1b[J")?;
+    fn is_recent(&self, now_ns: u64, pause_ns: u64) -> bool {
+        self.drawn_ns
+            .is_some_and(|drawn_ns| now_ns.saturating_sub(drawn_ns) < pause_ns)
+    }
+
+    fn draw(&mut self, head: &str, whole: bool, now_ns: u64, out: &mut Out) -> Result<()> {
+        self.drawn_ns = Some(now_ns);
+        let below = if whole { self.below.as_str() } else { "" };
+        if self.in_place {
+            // Home, long lines cut by the terminal, each line cleared behind its text, the rest cleared: no flicker,
+            // and nothing scrolls.
+            let most = stdout_lines().map_or(usize::MAX, |lines| lines.saturating_sub(1).max(1));
+            out.text("\x1b[?7l\x1b[H")?;
+            for line in head.lines().chain(below.lines()).take(most) {
+                out.text(&format!("{line}\x1b[K\n"))?;
+            }
+            out.text("\x1b[J\x1b[?7h")?;
         } else {
-            out.text(text)?;
+            out.text(head)?;
+            out.text(below)?;
             out.line("")?;
         }
         out.flush()
     }
 
     fn paint(&self, colour: &str, text: &str) -> String {
-        if self.colours {
+        if self.colours && !colour.is_empty() {
             format!("{colour}{text}{RESET}")
         } else {
             text.to_owned()
         }
     }
 
-    fn head(&self, tick: &TickRow) -> String {
+    fn head(&self, tick: &TickRow, now_ns: u64) -> String {
         let word = state_word(tick);
         let colour = match word {
             "colliding" => RED,
             "clear" => GREEN,
             _ => YELLOW,
         };
-        let mut text = String::new();
-        let why = reasons(tick).join(", ");
         let state = self.paint(BOLD, &self.paint(colour, &word.to_uppercase()));
-        let _ = writeln!(
-            text,
-            "sweepd `{}`  tick {}  {state}  {why}",
+        let mut text = format!(
+            "sweepd `{}`  {state}  tick {}",
             self.instance, tick.header.tick
         );
+        let ticks = tick.header.tick.saturating_sub(self.drawn_tick);
+        if let Some(drawn_ns) = self.drawn_ns
+            && self.drawn_tick > 0
+        {
+            #[allow(
+                clippy::cast_precision_loss,
+                reason = "ticks of a tenth of a second; shown with one digit"
+            )]
+            let rate = ticks as f64 / seconds(now_ns.saturating_sub(drawn_ns)).max(1e-3);
+            let _ = write!(text, " ({rate:.1} a second)");
+        }
+        let cause = TickCause::from_code(tick.cause).map_or("?", TickCause::word);
+        let _ = write!(text, "  by {cause}");
+        if self.restarts > 0 {
+            let _ = write!(text, "  restarts {}", self.restarts);
+        }
+        text.push('\n');
+        text
+    }
+
+    fn counts(&self, tick: &TickRow, text: &mut String) {
+        let why = reasons(tick).join(", ");
+        let why = if why.is_empty() { "-" } else { why.as_str() };
+        let _ = writeln!(text, "reasons    {why}");
         let _ = writeln!(
             text,
-            "bodies {} ({} unknown)   candidates {}   colliding {}   possible {}   near {}   ignored {}   left out {}",
-            tick.bodies,
-            tick.unknown,
-            tick.candidates,
-            tick.colliding,
-            tick.possible,
-            tick.near,
-            tick.ignored,
-            tick.header.truncated
+            "bodies     {:<8} unknown {:<8} ignored pairs {:<8} candidates {}",
+            tick.bodies, tick.unknown, tick.ignored, tick.candidates
         );
-        let budget = if tick.budget_ns == u64::MAX {
-            "no limit".to_owned()
-        } else {
-            time(tick.budget_ns)
-        };
         let _ = writeln!(
             text,
-            "time {} of {budget} (floor {})   units {}   missed {}   cause {}",
-            time(tick.elapsed_ns),
+            "colliding  {:<8} possible {:<7} near {:<17} left out {}",
+            tick.colliding, tick.possible, tick.near, tick.header.truncated
+        );
+        let _ = writeln!(
+            text,
+            "time       {}   floor {}   units {}   missed {}",
+            self.budget(tick),
             time(tick.floor_ns),
             tick.units,
-            tick.missed,
-            TickCause::from_code(tick.cause).map_or("?", TickCause::word)
+            tick.missed
         );
-        text += "stages";
+        *text += "stages    ";
         for stage in Stage::ALL {
-            let _ = write!(
-                text,
-                "  {stage} {}",
-                time(tick.stage_ns[usize::from(stage.code())])
-            );
+            let spent_ns = tick.stage_ns[usize::from(stage.code())];
+            let _ = write!(text, " {stage} {}  ", time(spent_ns));
         }
         text.push('\n');
         let refused = rejects(tick);
         if !refused.is_empty() {
-            let list = refused
+            let list: Vec<String> = refused
                 .iter()
                 .map(|(why, n)| format!("{why} {n}"))
-                .collect::<Vec<_>>()
-                .join("   ");
-            let _ = writeln!(text, "{}", self.paint(YELLOW, &format!("refused  {list}")));
+                .collect();
+            let line = format!("refused    {}", list.join("   "));
+            let _ = writeln!(text, "{}", self.paint(YELLOW, &line));
         }
-        text
+    }
+
+    /// How much of the budget is used, as a bar where there is one.
+    fn budget(&self, tick: &TickRow) -> String {
+        let elapsed = time(tick.elapsed_ns);
+        if tick.budget_ns == u64::MAX {
+            return format!("{elapsed} of no limit");
+        }
+        let width = BAR_WIDTH as u64;
+        let used = (tick.elapsed_ns.saturating_mul(width) / tick.budget_ns.max(1)).min(width);
+        let bar: String = (0..width)
+            .map(|at| if at < used { '#' } else { '.' })
+            .collect();
+        let colour = match tick.overrun {
+            0 => GREEN,
+            _ => RED,
+        };
+        let bar = self.paint(colour, &bar);
+        format!("[{bar}] {elapsed} of {}", time(tick.budget_ns))
     }
 
     fn sources(&self, tick: &TickRow, text: &mut String) {
-        for source in tick.sources.iter().take(usize::from(tick.sources_len)) {
-            let name = name_str(&source.name).unwrap_or("?");
-            let life = match (source.alive, source.paused, source.age_ns) {
-                (_, _, u64::MAX) => self.paint(YELLOW, "nothing yet"),
-                (1, 1, _) => "paused".to_owned(),
-                (1, _, _) => self.paint(GREEN, "alive"),
-                _ => self.paint(RED, "silent"),
+        let len = usize::from(tick.sources_len);
+        if len == 0 {
+            return;
+        }
+        let _ = writeln!(
+            text,
+            "\n{:<24} {:<11} {:>10} {:>12} {:>10} {:>10}",
+            "source", "state", "age", "frame", "skipped", "refused"
+        );
+        for source in tick.sources.iter().take(len) {
+            let (colour, word) = match (source.alive, source.paused, source.age_ns) {
+                (_, _, u64::MAX) => (YELLOW, "nothing yet"),
+                (1, 1, _) => ("", "paused"),
+                (1, _, _) => (GREEN, "alive"),
+                _ => (RED, "silent"),
             };
             let age = if source.age_ns == u64::MAX {
                 "-".to_owned()
@@ -173,33 +247,46 @@ impl Screen {
             };
             let _ = writeln!(
                 text,
-                "source {name:<16} {life}  age {age}  frame {}  skipped {}  refused {}",
-                source.seq, source.skipped, source.refused
+                "{:<24} {} {age:>10} {:>12} {:>10} {:>10}",
+                cut(name_str(&source.name).unwrap_or("?"), NAME_WIDTH),
+                self.paint(colour, &format!("{word:<11}")),
+                source.seq,
+                source.skipped,
+                source.refused
             );
         }
     }
 
     fn bodies(&self, view: &View, names: &Names, text: &mut String) {
         let Some(bodies) = view.bodies() else { return };
-        let unknown = bodies
+        let unknown: Vec<_> = bodies
             .rows
             .iter()
-            .filter_map(|row| Some((row.body, unknown_word(row)?)));
-        for (body, word) in unknown.take(UNKNOWN_SHOWN) {
-            let _ = writeln!(
-                text,
-                "{}",
-                self.paint(YELLOW, &format!("{} is {word}", names.of(body)))
-            );
+            .filter_map(|row| Some((row.body, unknown_word(row)?)))
+            .collect();
+        if unknown.is_empty() {
+            return;
+        }
+        text.push('\n');
+        for (body, word) in unknown.iter().take(UNKNOWN_SHOWN) {
+            let line = format!("{} is {word}", cut(&names.of(*body), NAME_WIDTH));
+            let _ = writeln!(text, "{}", self.paint(YELLOW, &line));
+        }
+        if unknown.len() > UNKNOWN_SHOWN {
+            let _ = writeln!(text, "and {} more", unknown.len() - UNKNOWN_SHOWN);
         }
     }
 
     fn rows(&self, view: &View, names: &Names, text: &mut String) {
         let Some(pairs) = view.pairs() else { return };
+        if pairs.rows.is_empty() {
+            *text += "\nno pair is near, possible or colliding\n";
+            return;
+        }
         let _ = writeln!(
             text,
-            "{:<28} {:<28} {:<9} {:>22} {:>10}  event",
-            "a", "b", "verdict", "gap [m]", "closing"
+            "\n{:<24} {:<24} {:<9} {:>12} {:>12} {:>9}  event",
+            "a", "b", "verdict", "gap from [m]", "to [m]", "closing"
         );
         let mut rows: Vec<&PairRow> = pairs.rows.iter().collect();
         // The worst on top: by verdict, then the deepest.
@@ -208,11 +295,20 @@ impl Screen {
                 .cmp(&x.verdict)
                 .then(x.gap_min_m.total_cmp(&y.gap_min_m))
         });
-        for row in rows.iter().take(self.pairs) {
+        let shown = rows.len().min(self.pairs).min(self.room(text));
+        for row in rows.iter().take(shown) {
             let _ = writeln!(text, "{}", self.row(row, names));
         }
-        if rows.len() > self.pairs {
-            let _ = writeln!(text, "and {} more", rows.len() - self.pairs);
+        if rows.len() > shown {
+            let _ = writeln!(text, "and {} more", rows.len() - shown);
+        }
+    }
+
+    /// Rows that fit below the text, with the head above and a last line that says how many did not.
+    fn room(&self, text: &str) -> usize {
+        match stdout_lines() {
+            Some(lines) if self.in_place => lines.saturating_sub(text.lines().count() + 3),
+            _ => usize::MAX,
         }
     }
 
@@ -234,25 +330,50 @@ impl Screen {
                 Event::Persist => {}
             }
         }
-        let gap = format!("[{:.6}, {:.6}]", row.gap_min_m, row.gap_max_m);
-        let closing = if row.closing_mps.is_nan() {
-            "-".to_owned()
-        } else {
-            format!("{:.3}", row.closing_mps)
-        };
         let word = verdict.map_or("?", Verdict::word);
         let line = format!(
-            "{:<28} {:<28} {word:<9} {gap:>22} {closing:>10}  {}",
-            names.of(row.body_a),
-            names.of(row.body_b),
+            "{:<24} {:<24} {word:<9} {:>12} {:>12} {:>9}  {}",
+            cut(&names.of(row.body_a), NAME_WIDTH),
+            cut(&names.of(row.body_b), NAME_WIDTH),
+            number(row.gap_min_m, 6),
+            number(row.gap_max_m, 6),
+            number(row.closing_mps, 3),
             events.join(", ")
         );
-        if colour.is_empty() {
-            line
-        } else {
-            self.paint(colour, &line)
-        }
+        self.paint(colour, line.trim_end())
     }
+}
+
+/// A name in so many columns at most; the end, which tells alike names apart, stays.
+fn cut(name: &str, width: usize) -> String {
+    let len = name.chars().count();
+    // A name is the sender's word: what would move the cursor is not shown.
+    let mut clean = name.chars().map(|c| if c.is_control() { '?' } else { c });
+    if len <= width {
+        return clean.collect();
+    }
+    let head = width / 2;
+    let tail = width - head - 1;
+    let mut short: String = clean.by_ref().take(head).collect();
+    short.push('~');
+    short.extend(clean.skip(len - head - tail));
+    short
+}
+
+/// A number in few columns; what is not known is a dash, what has no end says so.
+fn number(value: f64, digits: usize) -> String {
+    if value.is_nan() {
+        "-".to_owned()
+    } else if value.abs() >= 1e4 {
+        format!("{value:.2e}")
+    } else {
+        format!("{value:.digits$}")
+    }
+}
+
+#[allow(clippy::cast_precision_loss, reason = "shown with few digits")]
+fn seconds(ns: u64) -> f64 {
+    ns as f64 / 1e9
 }
 
 /// Nanoseconds for people.
@@ -264,5 +385,25 @@ fn time(ns: u64) -> String {
         _ if ns < 1e6 => format!("{:.1} us", ns / 1e3),
         _ if ns < 1e9 => format!("{:.2} ms", ns / 1e6),
         _ => format!("{:.2} s", ns / 1e9),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_names_keep_both_ends_and_no_control_character() {
+        assert_eq!(cut("arm", 24), "arm");
+        let long = cut("robot_left_gripper_finger_distal_12", 24);
+        assert_eq!(long, "robot_left_g~r_distal_12");
+        assert_eq!(cut("a\x1b[2Jb", 24), "a?[2Jb");
+    }
+
+    #[test]
+    fn numbers_stay_within_their_columns() {
+        for value in [0.0, -9_999.999_999, 1e300, f64::NEG_INFINITY, f64::NAN] {
+            assert!(number(value, 6).len() <= 12, "{}", number(value, 6));
+        }
     }
 }

@@ -1,8 +1,10 @@
 //! The worker that turns requests into edits with built shapes, off the tick's thread: a mesh of a million triangles
 //! takes a second to build, and no tick waits for it.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
@@ -14,6 +16,10 @@ use crate::transport::RequestToken;
 use crate::world::Edit;
 
 use super::shapes::place;
+
+/// The answer to a request whose building broke down; the panic itself is told on stderr.
+const INTERNAL: &str =
+    "an internal error of the daemon while it read the request: nothing was changed; see its log";
 
 /// A request on its way to the worker.
 struct Asked {
@@ -30,6 +36,7 @@ pub(super) struct Builder {
     asked: Option<Sender<Asked>>,
     built: Receiver<Built>,
     open: usize,
+    ended: Arc<AtomicBool>,
     worker: Option<JoinHandle<()>>,
 }
 
@@ -43,10 +50,18 @@ impl Builder {
             base: scene.origin.base.clone(),
             library,
         };
+        let ended = Arc::new(AtomicBool::new(false));
+        let told = Arc::clone(&ended);
         let work = move || {
             for request in requests {
+                // What still waits at the end is not built any more.
+                if told.load(Ordering::Relaxed) {
+                    return;
+                }
                 let token = request.token;
-                let answer = against.build(&request);
+                // Whatever goes wrong, its asker gets an answer and the next request is built.
+                let answer = catch_unwind(AssertUnwindSafe(|| against.build(&request)))
+                    .unwrap_or_else(|_| Err(INTERNAL.to_owned()));
                 if answers.send((token, answer)).is_err() {
                     return;
                 }
@@ -60,6 +75,7 @@ impl Builder {
             asked: Some(asked),
             built,
             open: 0,
+            ended,
             worker: Some(worker),
         })
     }
@@ -71,13 +87,8 @@ impl Builder {
             json_len,
             payload: payload.to_vec(),
         };
-        if self
-            .asked
-            .as_ref()
-            .is_some_and(|asked| asked.send(request).is_ok())
-        {
-            self.open += 1;
-        }
+        let asked = self.asked.as_ref();
+        self.open += usize::from(asked.is_some_and(|asked| asked.send(request).is_ok()));
     }
 
     /// Whether a request is being worked on.
@@ -95,10 +106,13 @@ impl Builder {
 
 impl Drop for Builder {
     fn drop(&mut self) {
-        // Closing the queue ends the worker after the request at hand.
+        self.ended.store(true, Ordering::Relaxed);
         self.asked = None;
-        if let Some(worker) = self.worker.take() {
-            let _ = worker.join();
+        // A shape can take seconds to build, and nobody waits for it any more: a busy worker ends by itself.
+        if let Some(worker) = self.worker.take()
+            && self.open == 0
+        {
+            let _ended_anyway = worker.join();
         }
     }
 }

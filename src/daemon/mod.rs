@@ -87,32 +87,23 @@ impl<'a> Daemon<'a> {
         Ok(())
     }
 
-    /// Takes what has come and runs every tick that is due; whether `ticks` have been run.
+    /// Takes what has come and runs the tick that is due, if one is; whether `ticks` have been run.
+    ///
+    /// One tick a round: where ticks are always due (a rate beyond what the machine can do) frames, requests and the
+    /// stop flag are still looked at between any two.
     ///
     /// # Errors
     /// As [`Daemon::run`].
     pub fn round(&mut self, ticks: Option<u64>) -> Result<bool> {
-        let mut woke_ns = self.clock.monotonic_ns();
+        let woke_ns = self.clock.monotonic_ns();
         self.receive()?;
-        let mut idle = true;
-        loop {
-            let (now_ns, timeout_ns) =
-                (self.clock.boottime_ns(), self.engine.world().next_timeout());
-            let edits = !self.ready.is_empty();
-            let Some(due) = self.pacer.due(now_ns, edits, timeout_ns, &mut self.due) else {
-                break;
-            };
-            self.tick(due, woke_ns)?;
-            if ticks.is_some_and(|most| self.engine.ticks() >= most) {
-                return Ok(true);
-            }
-            idle = false;
-            woke_ns = self.clock.monotonic_ns();
+        let (now_ns, timeout_ns) = (self.clock.boottime_ns(), self.engine.world().next_timeout());
+        let edits = !self.ready.is_empty();
+        match self.pacer.due(now_ns, edits, timeout_ns, &mut self.due) {
+            Some(due) => self.tick(due, woke_ns)?,
+            None => self.door.housekeeping(),
         }
-        if idle {
-            self.door.housekeeping();
-        }
-        Ok(false)
+        Ok(ticks.is_some_and(|most| self.engine.ticks() >= most))
     }
 
     /// The engine, for a look at its state.
@@ -140,11 +131,8 @@ impl<'a> Daemon<'a> {
         self.pacer.take(&mut self.arrived, self.clock.boottime_ns());
         let builder = &mut self.builder;
         self.door.requests(&mut |token, header, payload| {
-            builder.ask(
-                token,
-                usize::try_from(header.json_len).unwrap_or(usize::MAX),
-                payload,
-            );
+            let json_len = usize::try_from(header.json_len).unwrap_or(usize::MAX);
+            builder.ask(token, json_len, payload);
         });
         while let Some((token, built)) = self.builder.finished() {
             match built {
@@ -154,7 +142,7 @@ impl<'a> Daemon<'a> {
                         error: Some(error),
                         ..Answer::default()
                     };
-                    self.answer(token, &answer)?;
+                    self.answer(token, &answer);
                 }
             }
         }
@@ -206,11 +194,12 @@ impl<'a> Daemon<'a> {
             );
         }
         self.engine.note_sent(send_ns);
-        self.settle_edits()
+        self.settle_edits();
+        Ok(())
     }
 
     /// Answers the requests whose edits the last tick applied or refused.
-    fn settle_edits(&mut self) -> Result<()> {
+    fn settle_edits(&mut self) {
         self.ready.clear();
         for at in 0..self.engine.outcomes().len() {
             let outcome = &self.engine.outcomes()[at];
@@ -228,13 +217,15 @@ impl<'a> Daemon<'a> {
                     ..Answer::default()
                 },
             };
-            self.answer(token, &answer)?;
+            self.answer(token, &answer);
         }
-        Ok(())
     }
 
-    fn answer(&mut self, token: RequestToken, answer: &Answer) -> Result<()> {
+    /// An answer that cannot be handed over is its asker's loss; the other clients' daemon goes on.
+    fn answer(&mut self, token: RequestToken, answer: &Answer) {
         let json = serde_json::to_string(answer).unwrap_or_default();
-        self.door.answer(token, answer.ok, &json)
+        if let Err(error) = self.door.answer(token, answer.ok, &json) {
+            tracing::warn!("{error}");
+        }
     }
 }

@@ -1,0 +1,253 @@
+//! Goal: the command line as a user and a script meet it: codes, streams, closed pipes, texts. Method: the real
+//! binary as a child; daemons on instances of their own.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::disallowed_methods,
+    reason = "tests"
+)]
+
+mod live;
+
+#[path = "cli/feed.rs"]
+mod feed;
+#[path = "cli/monitor.rs"]
+mod monitor;
+
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::process::{Output, Stdio};
+
+use live::{Desk, TWO_SPHERES, finish, output, sweepd};
+
+const GOOD: &str = r#"{"id": 1, "a": {"type": "sphere", "radius": 0.5}, "pose_a": {"t": [0,0,0], "q": [1,0,0,0]}, "b": {"type": "sphere", "radius": 0.5}, "pose_b": {"t": [3,0,0], "q": [1,0,0,0]}}"#;
+
+fn code(output: &Output) -> Option<i32> {
+    output.status.code()
+}
+
+fn out(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn err(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+/// Starts the binary, reads so many lines, closes the pipe, waits for the end.
+fn head(args: &[&str], lines: usize) -> Output {
+    let mut child = sweepd()
+        .args(args)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut pipe = BufReader::new(child.stdout.take().unwrap());
+    let mut text = String::new();
+    for _ in 0..lines {
+        pipe.read_line(&mut text).unwrap();
+    }
+    drop(pipe);
+    let mut ended = finish(child);
+    ended.stdout = text.into_bytes();
+    ended
+}
+
+#[test]
+fn usage_is_refused_with_code_2_on_stderr_and_help_is_given_with_code_0_on_stdout() {
+    let bad: [&[&str]; 12] = [
+        &[],
+        &["fly"],
+        &["run"],
+        &["run", "x.toml", "--budget", "2"],
+        &["run", "x.toml", "--budget", "-2ms"],
+        &["run", "x.toml", "--budget-units", "2.5"],
+        &["run", "x.toml", "--mode", "rate=-1"],
+        &["run", "x.toml", "--instance", "Not/AName"],
+        &["monitor", "--ticks", "many"],
+        &["monitor", "--instance", "UPPER"],
+        &["feed"],
+        &["query"],
+    ];
+    for args in bad {
+        let ended = output(args);
+        assert_eq!(code(&ended), Some(2), "{args:?} {}", err(&ended));
+        assert!(
+            ended.stdout.is_empty() && !ended.stderr.is_empty(),
+            "{args:?}"
+        );
+    }
+    for command in ["run", "check", "feed", "monitor", "query", "list"] {
+        let ended = output(&[command, "--help"]);
+        assert_eq!(code(&ended), Some(0), "{command}");
+        assert!(ended.stderr.is_empty(), "{command}");
+        assert!(out(&ended).contains("Usage: sweepd"), "{command}");
+    }
+    assert!(out(&output(&["--version"])).contains(env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn help_names_units_and_defaults() {
+    let help = |command: &str| out(&output(&[command, "--help"]));
+    for (command, wanted) in [
+        (
+            "run",
+            &[
+                "2ms",
+                "500us",
+                "[default: default]",
+                "rate=HZ",
+                "scene's value",
+                "until a signal",
+            ][..],
+        ),
+        ("check", &["metres", "10,000"][..]),
+        (
+            "feed",
+            &[
+                "a second [default: 100]",
+                "[default: 1]",
+                "[default: 10s]",
+                "[default: wander]",
+                "[default: pool]",
+                "until a signal",
+                "default: all",
+                "1 mm",
+            ][..],
+        ),
+        (
+            "monitor",
+            &[
+                "[default: 20]",
+                "[default: 10s]",
+                "metres",
+                "nanoseconds",
+                "until a signal",
+            ][..],
+        ),
+        ("query", &["metres", "[w,x,y,z]"][..]),
+        ("list", &["JSON"][..]),
+    ] {
+        let text = help(command)
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ");
+        for word in wanted {
+            assert!(text.contains(word), "{command}: `{word}` in {text}");
+        }
+    }
+}
+
+#[test]
+fn a_scene_that_is_missing_or_wrong_is_code_2_with_its_place() {
+    let desk = Desk::new();
+    let wrong = desk.write(
+        "wrong.toml",
+        "frame_id = \"w\"\n[[body]]\nname = \"a\"\nmoves = false\nshape = { type = \"ball\" }\n",
+    );
+    let wrong = wrong.to_str().unwrap();
+    for command in ["run", "check", "feed"] {
+        let ended = output(&[command, "nowhere/none.toml"]);
+        assert_eq!(code(&ended), Some(2), "{command}");
+        assert!(err(&ended).contains("nowhere/none.toml"), "{}", err(&ended));
+        let ended = output(&[command, wrong]);
+        assert_eq!(code(&ended), Some(2), "{command}");
+        let text = err(&ended);
+        assert!(
+            text.contains("wrong.toml:5") && text.contains("ball"),
+            "{text}"
+        );
+        assert!(ended.stdout.is_empty());
+    }
+    let scene = desk.scene(TWO_SPHERES);
+    let ended = output(&["run", scene.to_str().unwrap(), "--mode", "on_frame=ghost"]);
+    assert_eq!(code(&ended), Some(2));
+    assert!(err(&ended).contains("ghost"), "{}", err(&ended));
+    let ended = output(&["feed", scene.to_str().unwrap(), "--source", "ghost"]);
+    assert_eq!(code(&ended), Some(2));
+    assert!(err(&ended).contains("it has: sim"), "{}", err(&ended));
+}
+
+#[test]
+fn check_says_what_the_daemon_would_do_as_text_and_as_json() {
+    let desk = Desk::new();
+    let scene = desk.scene(&format!("{TWO_SPHERES}parent = \"a\"\n"));
+    let scene = scene.to_str().unwrap();
+    let ended = output(&["check", scene, "--ignored"]);
+    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+    let text = out(&ended);
+    assert!(
+        text.contains("2 bodies, 1 sources") && text.contains("a - b:"),
+        "{text}"
+    );
+    let ended = output(&["check", scene, "--json"]);
+    let json: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
+    assert_eq!(
+        (&json["bodies"], &json["ignored_pairs"]),
+        (&2.into(), &1.into())
+    );
+    assert_eq!(json["ignored"][0][0], "a");
+}
+
+#[test]
+fn a_closed_pipe_is_a_normal_end() {
+    let desk = Desk::new();
+    let scene = desk.scene(TWO_SPHERES);
+    let ended = head(&["check", scene.to_str().unwrap()], 0);
+    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+    let cases = desk.write("cases.jsonl", &format!("{GOOD}\n").repeat(5000));
+    let ended = head(&["query", "--batch", cases.to_str().unwrap()], 1);
+    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+    assert!(out(&ended).contains("\"gap_m\":2.0"), "{}", out(&ended));
+    assert_eq!(err(&ended), "");
+    for args in [
+        &["--help"][..],
+        &["run", "--help"],
+        &["list"],
+        &["list", "--json"],
+    ] {
+        assert_eq!(code(&head(args, 0)), Some(0), "{args:?}");
+    }
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let _up = desk.client(None);
+    for lines in [0, 1, 3] {
+        let ended = head(&["monitor", "--json", "--instance", &desk.instance], lines);
+        assert_eq!(code(&ended), Some(0), "{lines}: {}", err(&ended));
+        assert_eq!(out(&ended).lines().count(), lines);
+        let ended = head(&["monitor", "--instance", &desk.instance], lines);
+        assert_eq!(code(&ended), Some(0), "{lines}: {}", err(&ended));
+    }
+}
+
+#[test]
+fn a_batch_with_a_line_that_cannot_be_read_answers_the_others_and_ends_with_code_1() {
+    let mut child = sweepd()
+        .args(["query", "--batch", "-"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let input = format!("{GOOD}\nrubbish\n{GOOD}\n");
+    child
+        .stdin
+        .take()
+        .unwrap()
+        .write_all(input.as_bytes())
+        .unwrap();
+    let ended = finish(child);
+    assert_eq!(code(&ended), Some(1), "{}", err(&ended));
+    let lines: Vec<serde_json::Value> = out(&ended)
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(
+        (lines.len(), &lines[0]["gap_m"], &lines[2]["gap_m"]),
+        (3, &2.0.into(), &2.0.into())
+    );
+    assert!(lines[1]["error"].as_str().unwrap().contains("line 2"));
+    let ended = output(&["query", "--batch", "none.jsonl"]);
+    assert_eq!(code(&ended), Some(2));
+    assert!(err(&ended).contains("none.jsonl"));
+}

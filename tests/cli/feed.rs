@@ -1,0 +1,152 @@
+//! `sweepd feed` as a source: what it moves, how fast, and what it does without a daemon.
+
+use std::collections::BTreeMap;
+
+use sweepd::transport::client::{Client, Heard};
+use sweepd::wire::State;
+
+use super::{code, err};
+use crate::live::{Desk, SECOND_NS, TWO_SPHERES, output, state, tick_until, until};
+
+/// A daemon and a scene of so many bodies, written by the command itself.
+fn pool(desk: &Desk, count: &str) -> String {
+    let path = desk.dir.join("pool.toml").to_str().unwrap().to_owned();
+    let ended = output(&["feed", "--write-scene", &path, "--count", count]);
+    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+    assert_eq!(code(&output(&["check", &path])), Some(0));
+    path
+}
+
+/// Positions of all bodies by id, of the newest tick with bodies.
+fn places(client: &mut Client) -> BTreeMap<u64, [f64; 3]> {
+    loop {
+        assert_eq!(client.wait_tick(30 * SECOND_NS).unwrap(), Heard::Tick);
+        if let Some(bodies) = client.view().bodies() {
+            return bodies
+                .rows
+                .iter()
+                .map(|row| (row.body, row.position))
+                .collect();
+        }
+    }
+}
+
+#[test]
+fn without_a_daemon_it_ends_with_code_3_after_its_wait() {
+    let desk = Desk::new();
+    let scene = desk.scene(TWO_SPHERES);
+    let scene = scene.to_str().unwrap();
+    let ended = output(&[
+        "feed",
+        scene,
+        "--wait",
+        "300ms",
+        "--instance",
+        &desk.instance,
+    ]);
+    assert_eq!(code(&ended), Some(3));
+    assert!(err(&ended).contains("sweepd run"), "{}", err(&ended));
+    for bad in [
+        ["--rate", "0"],
+        ["--rate", "nan"],
+        ["--motion", "fly"],
+        ["--wait", "3"],
+    ] {
+        let ended = output(&["feed", scene, bad[0], bad[1]]);
+        assert_eq!(code(&ended), Some(2), "{bad:?} {}", err(&ended));
+    }
+}
+
+#[test]
+fn it_sends_so_many_frames_and_moves_so_many_bodies_the_same_for_a_seed() {
+    let desk = Desk::new();
+    let path = pool(&desk, "12");
+    let mut ends = Vec::new();
+    for seed in ["7", "7", "8"] {
+        let _daemon = desk.start("run", &[&path, "--mode", "on_frame=feed"]);
+        let mut client = desk.source("nobody");
+        let args = [
+            path.as_str(),
+            "--count",
+            "5",
+            "--seed",
+            seed,
+            "--rate",
+            "200",
+            "--frames",
+            "40",
+        ];
+        let mut feed = desk.start("feed", &args);
+        let first = tick_until(&mut client, "a frame", |tick| tick.sources[0].seq >= 1);
+        assert!(first.sources[0].seq < 40);
+        let start = places(&mut client);
+        tick_until(&mut client, "the last frame", |tick| {
+            tick.sources[0].seq == 40
+        });
+        let end = places(&mut client);
+        assert_eq!(feed.end().0.code(), Some(0), "{}", feed.stderr());
+        for (id, place) in &end {
+            assert_eq!(*place != start[id], *id <= 5, "body {id} of seed {seed}");
+        }
+        ends.push(end);
+    }
+    assert_eq!(ends[0], ends[1], "one seed, one motion");
+    assert_ne!(ends[0], ends[2]);
+}
+
+#[test]
+fn at_rest_it_keeps_bodies_known_and_nothing_moves() {
+    let desk = Desk::new();
+    let path = pool(&desk, "10");
+    let _daemon = desk.start("run", &[&path]);
+    let _feed = desk.start("feed", &[&path, "--motion", "rest", "--rate", "50"]);
+    let mut client = desk.source("nobody");
+    tick_until(&mut client, "all known", |tick| tick.unknown == 0);
+    let start = places(&mut client);
+    let seq = client.view().tick().sources[0].seq;
+    tick_until(&mut client, "more frames", |tick| {
+        tick.sources[0].seq > seq + 20
+    });
+    assert_eq!(places(&mut client), start);
+}
+
+#[test]
+fn a_feed_started_first_waits_and_one_that_runs_goes_on_over_a_restart() {
+    let desk = Desk::new();
+    let path = pool(&desk, "10");
+    let mut feed = desk.start("feed", &[&path, "--wait", "60s"]);
+    std::thread::sleep(std::time::Duration::from_millis(400));
+    assert_eq!(feed.ended(), None, "{}", feed.stderr());
+    let mut daemon = desk.start("run", &[&path]);
+    let mut client = desk.source("nobody");
+    // It looks at what the daemon says once a second.
+    let boot = tick_until(&mut client, "frames", |tick| tick.sources[0].frames > 150)
+        .header
+        .boot_id;
+    daemon.kill();
+    // Long enough for the feed to see that it is alone.
+    until("told", || feed.stderr().contains("no tick since"));
+    assert_eq!(feed.ended(), None, "{}", feed.stderr());
+    let _next = desk.start("run", &[&path]);
+    let tick = tick_until(&mut client, "frames of the next", |tick| {
+        tick.header.boot_id != boot && tick.sources[0].frames > 5
+    });
+    assert_ne!(state(&tick), State::Unknown);
+    until("the restart told", || {
+        feed.stderr().contains("the daemon restarted")
+    });
+    let (status, _) = feed.stop();
+    assert_eq!(status.code(), Some(0), "{}", feed.stderr());
+}
+
+#[test]
+fn a_second_feed_of_the_same_source_is_told_that_it_is_not_used() {
+    let desk = Desk::new();
+    let path = pool(&desk, "10");
+    let _daemon = desk.start("run", &[&path]);
+    let _first = desk.start("feed", &[&path]);
+    let mut client = desk.client(None);
+    tick_until(&mut client, "frames", |tick| tick.sources[0].frames > 5);
+    let second = desk.start("feed", &[&path]);
+    until("told", || second.stderr().contains("source_taken"));
+}

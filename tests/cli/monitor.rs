@@ -1,0 +1,206 @@
+//! `sweepd monitor` on a pipe and on a terminal, with and without a daemon.
+
+use std::process::Stdio;
+use std::time::Instant;
+
+use rustix::process::Signal;
+
+use super::{code, err, out};
+use crate::live::{Desk, TWO_SPHERES, at, finish, output, step, sweepd, until};
+
+#[test]
+fn without_a_daemon_it_ends_with_code_3_and_says_what_to_do() {
+    let desk = Desk::new();
+    for extra in [&[][..], &["--json"]] {
+        let mut args = vec!["monitor", "--wait", "300ms", "--instance", &desk.instance];
+        args.extend_from_slice(extra);
+        let ended = output(&args);
+        assert_eq!(code(&ended), Some(3), "{}", err(&ended));
+        let text = err(&ended);
+        assert!(
+            text.contains(&desk.instance) && text.contains("sweepd run"),
+            "{text}"
+        );
+        assert!(ended.stdout.is_empty());
+    }
+}
+
+#[test]
+fn one_line_of_json_is_whole_names_pairs_and_contacts() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &["--budget", "5ms"]);
+    let mut client = desk.source("sim");
+    step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
+    for _ in 0..5 {
+        step(&mut client, &[at(1, 0.0), at(2, 0.6)]);
+        let args = [
+            "monitor",
+            "--json",
+            "--contacts",
+            "--ticks",
+            "1",
+            "--instance",
+            &desk.instance,
+        ];
+        let ended = output(&args);
+        assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+        let text = out(&ended);
+        assert_eq!(text.lines().count(), 1, "{text}");
+        let line: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let pair = &line["pairs"][0];
+        assert_eq!(
+            (&pair["a"], &pair["b"]),
+            (&"a".into(), &"b".into()),
+            "{text}"
+        );
+        assert_eq!(line["worst"], serde_json::json!(["a", "b"]), "{text}");
+        assert!(line["contacts"].is_array(), "{text}");
+        assert_eq!(line["budget_ns"], 5_000_000);
+        assert_eq!(line["sources"][0]["name"], "sim");
+    }
+}
+
+#[test]
+fn what_is_no_terminal_gets_no_escape_codes() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
+    let ended = output(&["monitor", "--ticks", "2", "--instance", &desk.instance]);
+    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+    let text = out(&ended);
+    assert!(
+        text.contains("COLLIDING") && text.contains("sim") && !text.contains('\x1b'),
+        "{text}"
+    );
+    assert!(!err(&ended).contains('\x1b'));
+}
+
+/// Runs the monitor behind a terminal of 24 lines of 80 columns.
+fn on_a_terminal(desk: &Desk, environment: &str, ticks: u32) -> Option<String> {
+    let binary = env!("CARGO_BIN_EXE_sweepd");
+    let command = format!(
+        "stty rows 24 cols 80; TERM=xterm {environment} {binary} monitor --ticks {ticks} --instance {}",
+        desk.instance
+    );
+    let child = std::process::Command::new("script")
+        .args(["-qec", &command, "/dev/null"])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn();
+    // `script` is not everywhere; without it there is no terminal to test on.
+    let ended = finish(child.ok()?);
+    assert_eq!(code(&ended), Some(0), "{} {}", out(&ended), err(&ended));
+    Some(out(&ended))
+}
+
+#[test]
+fn a_terminal_is_drawn_on_in_place_and_never_below_its_last_line() {
+    let desk = Desk::new();
+    let scene = desk.dir.join("pile.toml");
+    let scene = scene.to_str().unwrap();
+    output(&[
+        "feed",
+        "--write-scene",
+        scene,
+        "--kind",
+        "pile",
+        "--count",
+        "60",
+    ]);
+    let _daemon = desk.start("run", &[scene, "--budget", "5ms"]);
+    let _feed = desk.start("feed", &[scene]);
+    let _up = desk.client(None);
+    let Some(text) = on_a_terminal(&desk, "", 40) else {
+        return;
+    };
+    assert!(
+        text.contains("\x1b[H") && text.contains("\x1b[3"),
+        "drawn in place, in colours"
+    );
+    for drawing in text.split("\x1b[H").skip(1) {
+        assert!(drawing.lines().count() <= 24, "{drawing}");
+    }
+    assert!(text.ends_with("\x1b[?7h"), "lines wrap again at the end");
+    let plain = on_a_terminal(&desk, "NO_COLOR=1", 2).unwrap();
+    assert!(
+        !plain.contains("\x1b[3") && !plain.contains("\x1b[1m"),
+        "{plain}"
+    );
+}
+
+#[test]
+fn a_silent_daemon_is_told_and_a_restarted_one_is_gone_on_with() {
+    let desk = Desk::new();
+    let mut daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
+    let monitor = desk.start("monitor", &["--json", "--wait", "60s"]);
+    let screen = desk.start("monitor", &["--wait", "60s"]);
+    let mut impatient = desk.start("monitor", &["--json", "--wait", "2s"]);
+    until("lines", || {
+        !monitor.stdout().is_empty()
+            && !screen.stdout().is_empty()
+            && !impatient.stdout().is_empty()
+    });
+    daemon.kill();
+    let (status, _) = impatient.end();
+    assert_eq!(status.code(), Some(3), "{}", impatient.stderr());
+    assert!(
+        impatient.stderr().contains("no tick for"),
+        "{}",
+        impatient.stderr()
+    );
+    until("silence", || screen.stdout().contains("SILENT"));
+    let _next = desk.run(TWO_SPHERES, &[]);
+    until("the restart", || monitor.stdout().contains("\"restarted\""));
+    let text = monitor.stdout();
+    let line = text
+        .lines()
+        .find(|line| line.contains("\"restarted\""))
+        .unwrap();
+    let news: serde_json::Value = serde_json::from_str(line).unwrap();
+    let end = &news["restarted"]["ends"][0];
+    assert_eq!(
+        (&end["a"], &end["end_cause"]),
+        (&"a".into(), &"restart".into()),
+        "{line}"
+    );
+    let before = text.lines().count();
+    until("more lines", || {
+        monitor.stdout().lines().count() > before + 3
+    });
+}
+
+#[test]
+fn a_signal_ends_it_with_code_0_also_while_it_waits_for_a_daemon() {
+    let desk = Desk::new();
+    let mut waiting = desk.start("monitor", &["--wait", "60s"]);
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    waiting.signal(Signal::INT);
+    let start = Instant::now();
+    assert_eq!(waiting.end().0.code(), Some(0), "{}", waiting.stderr());
+    assert!(start.elapsed().as_secs() < 5);
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let mut running = desk.start("monitor", &["--json"]);
+    until("a line", || !running.stdout().is_empty());
+    running.signal(Signal::TERM);
+    assert_eq!(running.end().0.code(), Some(0), "{}", running.stderr());
+}
+
+#[test]
+fn stdout_that_is_closed_from_the_start_is_a_normal_end() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let _up = desk.client(None);
+    let mut child = sweepd()
+        .args(["monitor", "--json", "--instance", &desk.instance])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let ended = finish(child);
+    assert_eq!((code(&ended), err(&ended).as_str()), (Some(0), ""));
+}

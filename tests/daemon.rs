@@ -1,0 +1,23 @@
+//! Goal: the daemon as a client meets it, over shared memory between processes. Method: the real binary as a child,
+//! the Rust client in this process; whatever else runs on the machine, nothing here asserts a short time.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::float_cmp,
+    clippy::disallowed_methods,
+    reason = "tests"
+)]
+
+mod live;
+
+#[path = "daemon/bad_input.rs"]
+mod bad_input;
+#[path = "daemon/edits.rs"]
+mod edits;
+#[path = "daemon/ends.rs"]
+mod ends;
+#[path = "daemon/silence.rs"]
+mod silence;
+#[path = "daemon/steps.rs"]
+mod steps;

@@ -1,0 +1,149 @@
+//! How daemons end and begin: signals, kills, a second one on the same instance.
+
+use rustix::process::Signal;
+use std::time::Duration;
+
+use sweepd::transport::client::{FrameInfo, Heard, Rows, StepError};
+use sweepd::wire::{EndCause, Event};
+
+use crate::live::{Desk, SECOND_NS, TWO_SPHERES, at, output, step, tick_until, until};
+
+/// What `sweepd list --json` says of an instance.
+fn listed(instance: &str) -> Option<serde_json::Value> {
+    let text = output(&["list", "--json"]);
+    assert_eq!(text.status.code(), Some(0));
+    let text = String::from_utf8(text.stdout).unwrap();
+    text.lines()
+        .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap())
+        .find(|line| line["instance"] == instance)
+}
+
+#[test]
+fn a_signal_ends_the_daemon_within_two_seconds_and_leaves_nothing() {
+    for signal in [Signal::INT, Signal::TERM] {
+        let desk = Desk::new();
+        let mut daemon = desk.run(TWO_SPHERES, &[]);
+        let mut client = desk.source("sim");
+        step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
+        assert_eq!(listed(&desk.instance).unwrap()["pid"], daemon.pid());
+        let shared = daemon.shared();
+        assert!(!shared.is_empty() && desk.files().len() > 5);
+        drop(client);
+        daemon.signal(signal);
+        let (status, time) = daemon.end();
+        assert_eq!(status.code(), Some(0), "{}", daemon.stderr());
+        assert!(time < Duration::from_secs(2), "{time:?}");
+        assert_eq!(desk.files(), Vec::<std::path::PathBuf>::new());
+        let left: Vec<_> = shared.iter().filter(|path| path.exists()).collect();
+        assert!(left.is_empty(), "{left:?}");
+        assert_eq!(listed(&desk.instance), None);
+    }
+}
+
+#[test]
+fn a_daemon_that_ends_under_a_client_leaves_nothing_once_the_client_left_too() {
+    let desk = Desk::new();
+    let mut daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
+    assert_eq!(daemon.stop().0.code(), Some(0));
+    assert_eq!(client.wait_tick(SECOND_NS / 5).unwrap(), Heard::Silence);
+    drop(client);
+    assert_eq!(desk.files(), Vec::<std::path::PathBuf>::new());
+}
+
+#[test]
+fn two_signals_at_once_end_the_daemon_and_the_next_one_starts() {
+    let desk = Desk::new();
+    for _ in 0..2 {
+        let mut daemon = desk.run(TWO_SPHERES, &[]);
+        drop(desk.source("sim"));
+        daemon.signal(Signal::INT);
+        let _ended_meanwhile = rustix::process::kill_process(
+            rustix::process::Pid::from_raw(i32::try_from(daemon.pid()).unwrap()).unwrap(),
+            Signal::INT,
+        );
+        // In time for its orderly end, or at once with the code for "could not".
+        let code = daemon.end().0.code();
+        assert!(matches!(code, Some(0 | 4)), "{code:?} {}", daemon.stderr());
+    }
+}
+
+#[test]
+fn a_second_daemon_on_an_instance_is_refused_and_the_first_goes_on() {
+    let desk = Desk::new();
+    let first = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
+    let mut second = desk.run(TWO_SPHERES, &[]);
+    assert_eq!(second.end().0.code(), Some(4));
+    let text = second.stderr();
+    let wanted = format!("taken by process {}", first.pid());
+    assert!(
+        text.contains(&wanted) && text.contains("--instance"),
+        "{text}"
+    );
+    assert_eq!(second.stdout(), "");
+    step(&mut client, &[at(1, 0.0), at(2, 0.6)]);
+    assert_eq!(listed(&desk.instance).unwrap()["pid"], first.pid());
+}
+
+#[test]
+fn a_killed_daemon_started_again_is_told_to_the_client_with_the_ends_of_its_pairs() {
+    let desk = Desk::new();
+    let mut daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
+    let old_boot = client.view().tick().header.boot_id;
+    daemon.kill();
+    assert_eq!(
+        listed(&desk.instance).map_or(serde_json::Value::Null, |l| l["pid"].clone()),
+        serde_json::Value::Null
+    );
+    let mut daemon = desk.run(TWO_SPHERES, &[]);
+    // Frames sent into the gap are sent in vain; the client goes on as it is.
+    let mut told = None;
+    until("the restart", || {
+        let rows = [at(1, 0.0), at(2, 0.5)];
+        match client.step(&FrameInfo::default(), Rows::Poses(&rows), SECOND_NS) {
+            Err(StepError::Restarted(news)) => told = Some(news),
+            Err(StepError::TimedOut(_)) => {}
+            other => panic!("{other:?}"),
+        }
+        told.is_some()
+    });
+    let told = told.unwrap();
+    assert_eq!(told.old_boot, old_boot);
+    assert_ne!(told.new_boot, old_boot);
+    let [end] = &told.ends[..] else {
+        panic!("{:?}", told.ends)
+    };
+    assert_eq!(
+        (end.body_a, end.body_b, end.events),
+        (1, 2, Event::End.bit())
+    );
+    assert_eq!(end.end_cause, EndCause::Restart.code());
+    step(&mut client, &[at(1, 0.0), at(2, 0.4)]);
+    assert_eq!(client.view().tick().header.boot_id, told.new_boot);
+    let pairs = &client.view().pairs().unwrap().rows;
+    assert!((pairs[0].gap_best_m + 0.6).abs() < 1e-9);
+    assert_eq!(daemon.stop().0.code(), Some(0), "{}", daemon.stderr());
+    drop(client);
+    // A daemon and its next one have come and gone, one of them by force.
+    let next = desk.run(TWO_SPHERES, &[]);
+    tick_until(&mut desk.client(None), "the next", |_| true);
+    drop(next);
+    assert_eq!(desk.files(), Vec::<std::path::PathBuf>::new());
+}
+
+#[test]
+fn a_number_of_ticks_ends_the_daemon() {
+    let desk = Desk::new();
+    let mut daemon = desk.run(TWO_SPHERES, &["--ticks", "3"]);
+    assert_eq!(daemon.end().0.code(), Some(0));
+    assert!(
+        daemon.stderr().contains("ended after 3 ticks"),
+        "{}",
+        daemon.stderr()
+    );
+}

@@ -1,0 +1,168 @@
+//! Frames in, results out: lockstep, rounds of two sources, a rate.
+
+use std::time::Instant;
+
+use sweepd::transport::client::{Client, Heard};
+use sweepd::wire::{ContactKind, Event, State, TickCause, Verdict, name_str};
+
+use crate::live::{Desk, SECOND_NS, TWO_SPHERES, at, send, state, step, tick_until, words};
+
+const TWO_SOURCES: &str = r#"
+[run]
+MODE
+[[source]]
+name = "left"
+timeout_ms = 5000
+[[source]]
+name = "right"
+timeout_ms = 5000
+[[body]]
+name = "a"
+source = "left"
+shape = { type = "sphere", radius = 0.5 }
+[[body]]
+name = "b"
+source = "right"
+shape = { type = "sphere", radius = 0.5 }
+"#;
+
+#[test]
+fn each_step_in_lockstep_has_the_pairs_and_contacts_of_its_own_frame() {
+    let desk = Desk::new();
+    let mut daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    let mut touched = false;
+    for number in 0..60_u32 {
+        // There and back through each other, and apart by 2 m.
+        let x = 1.5 - (f64::from(number % 30) / 10.0 - 1.5).abs();
+        let x = 2.0 * x + 0.2;
+        step(&mut client, &[at(1, 0.0), at(2, x)]);
+        let (view, gap_m) = (client.view(), x - 1.0);
+        let tick = view.tick();
+        assert_eq!(tick.cause, TickCause::Frame.code());
+        assert_eq!(tick.sources[0].seq, u64::from(number) + 1);
+        let pairs = &view.pairs().expect("listened to").rows;
+        let contacts = &view.contacts().expect("listened to").rows;
+        if gap_m > 0.0 {
+            assert_eq!(state(tick), State::Clear, "{x} {}", words(tick));
+            assert!(contacts.is_empty());
+        } else {
+            let [pair] = &pairs[..] else {
+                panic!("{x}: {pairs:?}")
+            };
+            assert_eq!(state(tick), State::Colliding);
+            assert_eq!((pair.body_a, pair.body_b), (1, 2));
+            assert_eq!(pair.verdict, Verdict::Colliding.code());
+            assert!(pair.gap_min_m <= gap_m && gap_m <= pair.gap_max_m);
+            assert!((pair.gap_best_m - gap_m).abs() < 1e-9);
+            let begin = pair.events & Event::Begin.bit() != 0;
+            assert_eq!(begin, !touched, "{x}");
+            let [contact] = &contacts[..] else {
+                panic!("{x}: {contacts:?}")
+            };
+            assert_eq!(contact.kind, ContactKind::Contact.code());
+            assert!((contact.gap_m - gap_m).abs() < 1e-6);
+            assert!((contact.normal[0] - 1.0).abs() < 1e-6, "from a to b");
+            assert!((contact.point_a[0] - 0.5).abs() < 1e-6);
+            assert!((contact.point_b[0] - (x - 0.5)).abs() < 1e-6);
+        }
+        if touched && gap_m > 0.0 {
+            let end = pairs.iter().find(|row| row.events & Event::End.bit() != 0);
+            assert!(end.is_some(), "{x}: the end is told");
+        }
+        touched = gap_m <= 0.0;
+    }
+    let names = &client.view().names().unwrap().rows;
+    let names: Vec<_> = names.iter().map(|row| name_str(&row.name)).collect();
+    assert_eq!(names, [Some("a"), Some("b")]);
+    drop(client);
+    assert_eq!(daemon.stop().0.code(), Some(0), "{}", daemon.stderr());
+}
+
+#[test]
+fn a_round_of_two_sources_uses_a_frame_of_each() {
+    let desk = Desk::new();
+    let _daemon = desk.run(
+        &TWO_SOURCES.replace("MODE", "mode = \"on_all\"\nlate_ms = 50"),
+        &[],
+    );
+    let (mut left, mut right) = (desk.source("left"), desk.source("right"));
+    // Both are known to the daemon before rounds are counted: before, it waits for neither.
+    send(&mut left, &[at(1, 0.0)]);
+    send(&mut right, &[at(2, 5.0)]);
+    let used = |client: &mut Client, seqs: [u64; 2]| {
+        tick_until(client, "both frames", |tick| {
+            [tick.sources[0].seq, tick.sources[1].seq] == seqs
+        })
+    };
+    used(&mut left, [1, 1]);
+    for number in 1..=20_u32 {
+        let x = 0.5 + f64::from(number % 2);
+        send(&mut left, &[at(1, 0.0)]);
+        send(&mut right, &[at(2, x)]);
+        let seq = u64::from(number) + 1;
+        // A heartbeat on the way leaves the round under way alone.
+        let tick = used(&mut left, [seq, seq]);
+        assert_eq!(tick.cause, TickCause::Frame.code(), "{}", words(&tick));
+        let wanted = if x < 1.0 {
+            State::Colliding
+        } else {
+            State::Clear
+        };
+        assert_eq!(state(&tick), wanted, "{x} {}", words(&tick));
+    }
+}
+
+#[test]
+fn a_rate_makes_ticks_on_the_newest_state() {
+    let desk = Desk::new();
+    let _daemon = desk.run(&TWO_SOURCES.replace("MODE", "rate = 50"), &[]);
+    let (mut left, mut right) = (desk.source("left"), desk.source("right"));
+    send(&mut left, &[at(1, 0.0)]);
+    send(&mut right, &[at(2, 0.4)]);
+    let first = tick_until(&mut left, "the pair", |tick| {
+        state(tick) == State::Colliding
+    });
+    let start = Instant::now();
+    let last = tick_until(&mut left, "more ticks", |tick| {
+        tick.header.tick >= first.header.tick + 25
+    });
+    assert!(
+        start.elapsed().as_secs_f64() > 0.3,
+        "25 ticks at 50 Hz take half a second"
+    );
+    assert_eq!(first.cause, TickCause::Frame.code());
+    assert_eq!(last.sources[0].seq, 1, "the newest state is the old one");
+}
+
+#[test]
+fn a_rate_beyond_what_the_machine_can_do_still_takes_frames_requests_and_signals() {
+    let desk = Desk::new();
+    let mut daemon = desk.run(TWO_SPHERES, &["--mode", "rate=1000000"]);
+    let mut client = desk.source("sim");
+    send(&mut client, &[at(1, 0.0), at(2, 0.4)]);
+    tick_until(&mut client, "the frame", |tick| {
+        state(tick) == State::Colliding
+    });
+    let answer = client.request(r#"{"edits": [{"reset": {}}]}"#, &[], 30 * SECOND_NS);
+    assert!(answer.unwrap().ok);
+    assert_eq!(daemon.stop().0.code(), Some(0), "{}", daemon.stderr());
+}
+
+#[test]
+fn a_reader_that_never_reads_holds_nobody_up() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let sleeper = desk.source("sim");
+    let mut reader = desk.client(None);
+    assert!(matches!(
+        reader.wait_tick(30 * SECOND_NS).unwrap(),
+        Heard::Tick
+    ));
+    // The one that sleeps has sent nothing: it holds no session.
+    let mut client = desk.source("sim");
+    for number in 0..200_u32 {
+        step(&mut client, &[at(1, 0.0), at(2, f64::from(number))]);
+    }
+    drop(sleeper);
+}

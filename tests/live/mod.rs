@@ -1,0 +1,349 @@
+//! The real binary as a child process, for tests of what a user meets: each daemon has an instance of its own, every
+//! child is ended and waited for, and every wait has an end.
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::missing_panics_doc,
+    clippy::disallowed_methods,
+    unreachable_pub,
+    missing_docs,
+    reason = "shared by several test programs; each uses a part, and a test may panic and sleep"
+)]
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Output, Stdio};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use rustix::process::{Pid, Signal, kill_process};
+use sweepd::transport::client::{Client, FrameInfo, Heard, Rows, Topics};
+use sweepd::wire::{RejectReason, State, TickRow, TransformRow};
+
+pub const SECOND_NS: u64 = 1_000_000_000;
+/// Nothing here takes longer, however busy the machine is.
+pub const LONG: Duration = Duration::from_secs(60);
+
+static NUMBERS: AtomicU64 = AtomicU64::new(0);
+
+/// Two unit spheres (`a` id 1, `b` id 2) of source `sim`, in lockstep.
+pub const TWO_SPHERES: &str = r#"
+[run]
+on_frame = "sim"
+[[source]]
+name = "sim"
+timeout_ms = 3000
+[[body]]
+name = "a"
+shape = { type = "sphere", radius = 0.5 }
+[[body]]
+name = "b"
+shape = { type = "sphere", radius = 0.5 }
+"#;
+
+/// A folder for scenes and logs, and an instance name; the folder goes when it is dropped.
+#[derive(Debug)]
+pub struct Desk {
+    pub instance: String,
+    pub dir: PathBuf,
+}
+
+impl Desk {
+    pub fn new() -> Self {
+        let number = NUMBERS.fetch_add(1, Ordering::Relaxed);
+        let instance = format!("t{}_{number}", std::process::id());
+        let dir = std::env::temp_dir().join(format!("sweepd_{instance}"));
+        std::fs::create_dir_all(&dir).unwrap();
+        Self { instance, dir }
+    }
+
+    pub fn write(&self, name: &str, text: &str) -> PathBuf {
+        let path = self.dir.join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    }
+
+    /// A scene file with this text.
+    pub fn scene(&self, text: &str) -> PathBuf {
+        self.write("scene.toml", text)
+    }
+
+    /// `sweepd COMMAND SCENE? --instance OURS ARGS`, its output in files of the desk.
+    pub fn start(&self, command: &str, args: &[&str]) -> Running {
+        let number = NUMBERS.fetch_add(1, Ordering::Relaxed);
+        let file = |what: &str| self.dir.join(format!("{command}_{number}.{what}"));
+        let (stdout, stderr) = (file("out"), file("err"));
+        let child = sweepd()
+            .arg(command)
+            .args(args)
+            .args(["--instance", &self.instance])
+            .stdin(Stdio::null())
+            .stdout(std::fs::File::create(&stdout).unwrap())
+            .stderr(std::fs::File::create(&stderr).unwrap())
+            .spawn()
+            .unwrap();
+        Running {
+            child,
+            stdout,
+            stderr,
+        }
+    }
+
+    /// A daemon for this scene; it may not be up yet, clients wait for it.
+    pub fn run(&self, scene: &str, args: &[&str]) -> Running {
+        let path = self.scene(scene);
+        let mut all = vec![path.to_str().unwrap()];
+        all.extend_from_slice(args);
+        self.start("run", &all)
+    }
+
+    pub fn client(&self, source: Option<&str>) -> Client {
+        Client::connect(&self.instance, source, 30 * SECOND_NS).unwrap()
+    }
+
+    /// A source that listens to everything.
+    pub fn source(&self, name: &str) -> Client {
+        let mut client = self.client(Some(name));
+        client.subscribe(Topics::ALL).unwrap();
+        client
+    }
+
+    /// Files by this instance's name: the lock, and the services of iceoryx2 that say it.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let mut found = Vec::new();
+        for dir in ["/dev/shm", "/tmp/iceoryx2/services"] {
+            for entry in std::fs::read_dir(dir).into_iter().flatten().flatten() {
+                let path = entry.path();
+                let text = || std::fs::read(&path).unwrap_or_default();
+                let by_name = path.to_string_lossy().contains(&self.instance);
+                let wanted = format!("{}/", self.instance).into_bytes();
+                let names_us = || text().windows(wanted.len()).any(|w| w == wanted);
+                if by_name || (dir.starts_with("/tmp") && names_us()) {
+                    found.push(path);
+                }
+            }
+        }
+        found
+    }
+}
+
+impl Drop for Desk {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.dir);
+    }
+}
+
+/// The binary under test, without anything of the surroundings that changes its output.
+pub fn sweepd() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sweepd"));
+    command.env_remove("NO_COLOR");
+    command
+}
+
+/// Runs the binary to its end.
+pub fn output(args: &[&str]) -> Output {
+    let child = sweepd()
+        .args(args)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    finish(child)
+}
+
+/// Waits for a child with piped output; kills it when it takes far too long.
+pub fn finish(mut child: Child) -> Output {
+    let mut pipes = (child.stdout.take(), child.stderr.take());
+    let read = |pipe: Option<&mut dyn Read>| {
+        let mut bytes = Vec::new();
+        if let Some(pipe) = pipe {
+            pipe.read_to_end(&mut bytes).unwrap();
+        }
+        bytes
+    };
+    let (stdout, stderr) = std::thread::scope(|scope| {
+        let watch = Pid::from_child(&child);
+        let (done, ended) = std::sync::mpsc::channel::<()>();
+        scope.spawn(move || {
+            if ended.recv_timeout(LONG).is_err() {
+                let _ = kill_process(watch, Signal::KILL);
+            }
+        });
+        let errors = scope.spawn(|| read(pipes.1.as_mut().map(|p| p as &mut dyn Read)));
+        let stdout = read(pipes.0.as_mut().map(|p| p as &mut dyn Read));
+        let stderr = errors.join().unwrap();
+        done.send(()).unwrap();
+        (stdout, stderr)
+    });
+    let status = child.wait().unwrap();
+    Output {
+        status,
+        stdout,
+        stderr,
+    }
+}
+
+/// A running child; ended and waited for when it is dropped.
+#[derive(Debug)]
+pub struct Running {
+    child: Child,
+    stdout: PathBuf,
+    stderr: PathBuf,
+}
+
+impl Running {
+    pub fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
+    pub fn signal(&self, signal: Signal) {
+        kill_process(Pid::from_child(&self.child), signal).unwrap();
+    }
+
+    /// `kill -9`, and `wait`: a process that nobody waited for counts as alive.
+    pub fn kill(&mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+
+    pub fn ended(&mut self) -> Option<ExitStatus> {
+        self.child.try_wait().unwrap()
+    }
+
+    /// Waits for its end; returns how it ended and how long that took.
+    pub fn end(&mut self) -> (ExitStatus, Duration) {
+        let start = Instant::now();
+        loop {
+            if let Some(status) = self.ended() {
+                return (status, start.elapsed());
+            }
+            assert!(start.elapsed() < LONG, "still running\n{}", self.stderr());
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    /// SIGTERM and the end.
+    pub fn stop(&mut self) -> (ExitStatus, Duration) {
+        self.signal(Signal::TERM);
+        self.end()
+    }
+
+    pub fn stdout(&self) -> String {
+        read_text(&self.stdout)
+    }
+
+    pub fn stderr(&self) -> String {
+        read_text(&self.stderr)
+    }
+
+    /// Shared memory and files of iceoryx2 that it holds open or mapped.
+    pub fn shared(&self) -> Vec<PathBuf> {
+        let maps = read_text(Path::new(&format!("/proc/{}/maps", self.pid())));
+        let mut paths: Vec<PathBuf> = maps
+            .lines()
+            .filter_map(|line| line.split_whitespace().nth(5))
+            .filter(|path| path.starts_with("/dev/shm/") && !path.contains("global_mgmt"))
+            .map(PathBuf::from)
+            .collect();
+        paths.sort();
+        paths.dedup();
+        paths
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if self.ended().is_some() {
+            return;
+        }
+        // A chance to clean up first.
+        let _ = kill_process(Pid::from_child(&self.child), Signal::TERM);
+        let start = Instant::now();
+        while self.ended().is_none() {
+            if start.elapsed() > Duration::from_secs(10) {
+                let _ = self.child.kill();
+                let _ = self.child.wait();
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+}
+
+fn read_text(path: &Path) -> String {
+    String::from_utf8_lossy(&std::fs::read(path).unwrap_or_default()).into_owned()
+}
+
+/// Waits until it holds.
+pub fn until(what: &str, mut holds: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !holds() {
+        assert!(start.elapsed() < LONG, "never: {what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// A row for a body at a place on the x axis.
+pub fn at(body: u64, x: f64) -> TransformRow {
+    TransformRow {
+        body,
+        position: [x, 0.0, 0.0],
+        orientation: [0.0, 0.0, 0.0, 1.0],
+        ..TransformRow::default()
+    }
+}
+
+/// One step; the view is its result.
+pub fn step(client: &mut Client, rows: &[TransformRow]) {
+    client
+        .step(&FrameInfo::default(), Rows::Poses(rows), 30 * SECOND_NS)
+        .unwrap();
+}
+
+pub fn send(client: &mut Client, rows: &[TransformRow]) {
+    client
+        .send(&FrameInfo::default(), Rows::Poses(rows))
+        .unwrap();
+}
+
+/// The first tick from now on for which it holds; every one on the way is looked at by `each`.
+pub fn tick_until(
+    client: &mut Client,
+    what: &str,
+    mut holds: impl FnMut(&TickRow) -> bool,
+) -> TickRow {
+    let start = Instant::now();
+    loop {
+        assert!(
+            start.elapsed() < LONG,
+            "no tick: {what}; last {:?}",
+            words(client.view().tick())
+        );
+        if client.wait_tick(SECOND_NS).unwrap() == Heard::Tick && holds(client.view().tick()) {
+            return *client.view().tick();
+        }
+    }
+}
+
+pub fn state(tick: &TickRow) -> State {
+    State::from_code(tick.header.state).unwrap()
+}
+
+pub fn rejected(tick: &TickRow, reason: RejectReason) -> u64 {
+    tick.rejects[usize::from(reason.code())]
+}
+
+/// What a tick says, for messages of tests.
+pub fn words(tick: &TickRow) -> String {
+    format!(
+        "tick {} {:?} reasons {:b} cause {} rejects {:?}",
+        tick.header.tick,
+        State::from_code(tick.header.state),
+        tick.reasons,
+        tick.cause,
+        tick.rejects
+    )
+}
