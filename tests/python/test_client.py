@@ -1,0 +1,155 @@
+"""The Python client against a live daemon: what a simulator's author would do, and what can go wrong.
+
+Needs `SWEEPD=path/to/sweepd` and the package of msgs/python with its wheels.
+"""
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sweepd = pytest.importorskip("sweepd")
+
+SWEEPD = os.environ.get("SWEEPD")
+pytestmark = pytest.mark.skipif(not SWEEPD, reason="SWEEPD names no binary")
+ROOT = Path(__file__).resolve().parents[2]
+NO_TURN = (1.0, 0.0, 0.0, 0.0)
+
+SCENE = """
+frame_id = "world"
+[run]
+on_frame = "sim"
+[[source]]
+name = "sim"
+timeout_ms = 300
+[[body]]
+name = "left"
+shape = { type = "sphere", radius = 0.5 }
+[[body]]
+name = "right"
+shape = { type = "box", half_extents = [0.5, 0.5, 0.5] }
+[[body]]
+name = "floor"
+moves = false
+shape = { type = "half_space", normal = [0.0, 0.0, 1.0], offset = -10.0 }
+"""
+
+
+@pytest.fixture
+def daemon(tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE)
+    instance = f"py_{os.getpid()}_{time.monotonic_ns() % 1_000_000}"
+    started = []
+
+    def start():
+        process = subprocess.Popen([SWEEPD, "--quiet", "run", str(scene), "--instance", instance])
+        started.append(process)
+        return process
+
+    start()
+    yield instance, start, started
+    for process in started:
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=10) in (0, -signal.SIGKILL)
+
+
+def poses(x, turn=NO_TURN):
+    return {"left": ((0.0, 0.0, 0.0), NO_TURN), "right": ((x, 0.0, 0.0), turn)}
+
+
+def test_each_step_returns_the_result_of_exactly_its_frame(daemon):
+    with sweepd.Client(daemon[0], "sim", quat_order="wxyz") as client:
+        for step in range(200):
+            x = 1.2 + 0.5 * math.sin(0.1 * step)
+            result = client.step(poses(x), timeout_s=5)
+            if abs(x - 1.0) > 1e-9:
+                assert (len(result.colliding) == 1) == (x < 1.0), (step, x)
+            assert result.state in ("clear", "colliding")
+            if x < 1.0 - 1e-9:
+                row = result.pairs[0]
+                assert row["gap_min_m"] <= x - 1.0 <= row["gap_max_m"]
+                contact = result.contacts[0]
+                np.testing.assert_allclose(contact["normal"], [1, 0, 0], atol=1e-9)
+                np.testing.assert_allclose(contact["gap_m"], x - 1.0, atol=1e-9)
+
+
+def test_a_quaternion_is_read_in_the_order_that_was_said(daemon):
+    half = math.sqrt(0.5)
+    with sweepd.Client(daemon[0], "sim", quat_order="wxyz") as client:
+        # Turned by 45 degrees about z, the box's edge reaches out 0.707.
+        eighth = (math.cos(math.pi / 8), 0.0, 0.0, math.sin(math.pi / 8))
+        result = client.step(poses(1.1, eighth), timeout_s=5)
+        assert len(result.colliding) == 1
+        np.testing.assert_allclose(result.pairs[0]["gap_max_m"], 1.1 - 0.5 - half, atol=1e-9)
+
+
+def test_a_pose_that_is_not_finite_makes_the_body_unknown_until_the_next_good_one(daemon):
+    with sweepd.Client(daemon[0], "sim", quat_order="wxyz") as client:
+        assert client.step(poses(3.0), timeout_s=5).state == "clear"
+        result = client.step(poses(float("nan")), timeout_s=5)
+        assert result.state == "unknown"
+        assert client.step(poses(3.0), timeout_s=5).state == "clear"
+
+
+def test_silence_is_never_clear(daemon):
+    with sweepd.Client(daemon[0], "sim", quat_order="wxyz") as client:
+        assert client.step(poses(3.0), timeout_s=5).state == "clear"
+        until = time.monotonic() + 1.5
+        states = []
+        while time.monotonic() < until:
+            states.append(client.wait(timeout_s=1).state)
+        assert states[-1] == "unknown"
+        assert len(states) >= 8, "a tick at least each heartbeat"
+        assert "clear" not in states[states.index("unknown") :]
+
+
+def test_scene_edits_are_done_whole_or_not_at_all(daemon):
+    with sweepd.Client(daemon[0], "sim", quat_order="wxyz") as client:
+        assert len(client.step(poses(0.5), timeout_s=5).colliding) == 1
+        rule = {"rule": {"action": "ignore", "a": "left", "b": "right", "reason": "test"}}
+        with pytest.raises(sweepd.Refused, match="nobody"):
+            client.request({"edits": [rule, {"remove": "nobody"}]})
+        assert len(client.step(poses(0.5), timeout_s=5).colliding) == 1
+        answer = client.request({"edits": [rule]})
+        assert answer["ok"]
+        result = client.step(poses(0.5), timeout_s=5)
+        assert len(result.colliding) == 0
+        assert result.state == "clear"
+
+
+def test_a_killed_daemon_that_comes_back_is_told_as_a_restart(daemon):
+    instance, start, started = daemon
+    with sweepd.Client(instance, "sim", quat_order="wxyz") as client:
+        client.step(poses(0.5), timeout_s=5)
+        started[0].kill()
+        started[0].wait()
+        start()
+        with pytest.raises(sweepd.Restarted):
+            for _ in range(100):
+                try:
+                    client.step(poses(0.5), timeout_s=0.2)
+                except sweepd.TimedOut:
+                    pass
+        until = time.monotonic() + 10
+        while time.monotonic() < until:
+            try:
+                assert len(client.step(poses(0.5), timeout_s=1).colliding) == 1
+                return
+            except sweepd.TimedOut:
+                pass
+        raise AssertionError("the restarted daemon answered nothing")
+
+
+def test_the_smallest_example_runs(daemon):
+    example = ROOT / "msgs/python/examples/minimal.py"
+    command = [sys.executable, str(example), "left", "--instance", daemon[0], "--steps", "3"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert len(done.stdout.splitlines()) == 3
