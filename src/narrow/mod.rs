@@ -20,13 +20,14 @@ pub mod mesh;
 mod contacts;
 mod cursor;
 mod memo;
+mod order;
 mod query;
 mod spend;
 mod widen;
 
 pub use contacts::{Contact, ContactSet};
 pub use memo::{Finding, Witness};
-pub use spend::Order;
+pub use order::Order;
 
 use crate::ids::{BodySlot, PairSlot};
 use crate::pairs::{PairDelta, PairSet};

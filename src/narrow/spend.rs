@@ -1,7 +1,5 @@
 //! Spending the budget: verdicts first, oldest first, in slices; then what is listened to.
 
-use std::cmp::Reverse;
-
 use crate::ids::PairSlot;
 use crate::math::{Interval, relative};
 use crate::time::Meter;
@@ -12,20 +10,9 @@ use super::contacts::ContactSet;
 use super::cursor::{Cursor, Turn};
 use super::memo::{Witness, relative_motion};
 use super::mesh::Goal;
+use super::order::Order;
 use super::query::{add_manifold, is_simple, retest, shape_gap, shape_pose, sound, witness_of};
 use super::{NONE, Narrow, Wanted};
-
-/// How work is ordered. What is finished in the end does not depend on it; what is finished when time runs out does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Order {
-    /// As found: for a budget without limit, where order means nothing.
-    AsFound,
-    /// Last tick's contacts, then the longest undecided, then the fastest: for a budget in time.
-    Aged,
-    /// As `Aged`, with ties broken by body ids: for a budget in units, so that a run replays bit for bit whatever the
-    /// slots are.
-    Counted,
-}
 
 /// What a query found, and when and where it holds.
 struct Answer {
@@ -141,58 +128,6 @@ impl Narrow {
         let colliding = self.hot[slot.index()].verdict == Verdict::Colliding;
         let bounds = memo.tight && (memo.tested == self.tick || memo.rest);
         bounds && (!contacts || !colliding || memo.contacts_tick >= memo.tested)
-    }
-
-    /// Orders work: last tick's contacts first, then the longest undecided, then the fastest.
-    ///
-    /// The keys are gathered once: a sort that looked them up would miss the cache at every comparison.
-    fn arrange(
-        &mut self,
-        work: &mut [PairSlot],
-        order: Order,
-        world: &World,
-        meter: &mut Meter<'_>,
-    ) {
-        if order == Order::AsFound || !meter.open() {
-            return;
-        }
-        let mut keyed = std::mem::take(&mut self.keyed);
-        keyed.clear();
-        keyed.extend(work.iter().map(|&slot| (self.rank(slot), slot)));
-        if order == Order::Counted {
-            let ids = |slot: PairSlot| {
-                let hot = &self.hot[slot.index()];
-                (
-                    world.body(hot.a).map(|body| body.id),
-                    world.body(hot.b).map(|body| body.id),
-                )
-            };
-            keyed.sort_unstable_by_key(|&(rank, slot)| (rank, ids(slot)));
-        } else {
-            keyed.sort_unstable();
-        }
-        for (to, (_, slot)) in work.iter_mut().zip(&keyed) {
-            *to = *slot;
-        }
-        self.keyed = keyed;
-        meter.refresh();
-    }
-
-    /// A pair's place in the order of work, the least first: 1 bit whether it is no contact of last tick, 63 bits the tick
-    /// since when it is undecided, 64 bits how far it has moved (positive floats order like their bits), the farthest first.
-    fn rank(&self, slot: PairSlot) -> u128 {
-        let memo = &self.memos[slot.index()];
-        let touched = memo.witness.is_some_and(|w| w.best_m <= 0.0);
-        let since = if memo.undecided_since == 0 {
-            self.tick
-        } else {
-            memo.undecided_since
-        };
-        let fresh_contact = touched && since == self.tick;
-        let speed = memo.widened_m.max(0.0).to_bits();
-        u128::from(!fresh_contact) << 127
-            | u128::from(since & (u64::MAX >> 1)) << 64
-            | u128::from(!speed)
     }
 
     /// One turn of work on a pair; whether nothing is left to do for `goal`.
