@@ -154,7 +154,8 @@ pub(super) struct MonitorArgs {
 pub(super) struct QueryArgs {
     /// A file of cases, one JSON object a line (`-`: standard input); one answer a line, in order.
     ///
-    /// Lengths in metres, `t` in the world. A case: {"id", "a": SHAPE, "pose_a": {"t": [x,y,z], "q": [w,x,y,z]}, "b": SHAPE, "pose_b": ...}.
+    /// A case: `{"id", "a": SHAPE, "pose_a": {"t": [x,y,z], "q": [w,x,y,z]}, "b": SHAPE, "pose_b": ...}`, all lengths
+    /// in metres.
     #[arg(long, value_name = "IN.jsonl")]
     pub(super) batch: PathBuf,
 }

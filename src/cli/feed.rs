@@ -59,46 +59,62 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
         bodies.moving,
         args.rate
     );
+    stream(args, &name, &mut bodies, &mut client, stop)?;
+    Ok(true)
+}
+
+/// Sends frame after frame at the rate, until stopped or for the frames asked for.
+fn stream(
+    args: &FeedArgs,
+    source: &str,
+    bodies: &mut Bodies,
+    client: &mut Client,
+    stop: &AtomicBool,
+) -> Result<()> {
     let clock = SystemClock;
-    let start_ns = clock.monotonic_ns();
-    let mut frame = 0_u64;
-    let mut heard = Heeded::default();
+    let mut start_ns = clock.monotonic_ns();
     let mut look_ns = start_ns.saturating_add(HEED_NS);
+    let mut heeded = Heeded::default();
+    let mut frame = 0_u64;
     while !stop.load(Ordering::Relaxed) && args.frames.is_none_or(|most| frame < most) {
-        #[allow(
-            clippy::cast_precision_loss,
-            reason = "frame counts are far below 2^53"
-        )]
-        let time_s = frame as f64 / args.rate;
+        let (time_s, stamp_ns) = moment(frame, args.rate);
         bodies.move_to(time_s);
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a time, not negative"
-        )]
-        let at_ns = (time_s * 1e9) as u64;
-        client.send(
-            &FrameInfo {
-                stamp_ns: at_ns,
-                ..FrameInfo::default()
-            },
-            Rows::Poses(&bodies.rows),
-        )?;
+        let info = FrameInfo {
+            stamp_ns,
+            ..FrameInfo::default()
+        };
+        client.send(&info, Rows::Poses(&bodies.rows))?;
         frame += 1;
-        if clock.monotonic_ns() >= look_ns {
-            look_ns = clock.monotonic_ns().saturating_add(HEED_NS);
-            heard.look(&mut client, &name)?;
+        let next_ns = start_ns.saturating_add(moment(frame, args.rate).1);
+        let now_ns = clock.monotonic_ns();
+        if now_ns >= look_ns {
+            look_ns = now_ns.saturating_add(HEED_NS);
+            heeded.look(client, source)?;
         }
-        #[allow(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            clippy::cast_precision_loss,
-            reason = "as above"
-        )]
-        let next_ns = start_ns + (frame as f64 / args.rate * 1e9) as u64;
+        // Stopped for a while: it goes on from here, with no burst of the frames that were missed.
+        let late_ns = now_ns.saturating_sub(next_ns);
+        if late_ns > HEED_NS {
+            start_ns = start_ns.saturating_add(late_ns);
+        }
         sleep_until(&clock, next_ns, stop);
     }
-    Ok(true)
+    Ok(())
+}
+
+/// When a frame is, from the start: seconds and nanoseconds.
+fn moment(frame: u64, rate_hz: f64) -> (f64, u64) {
+    #[allow(
+        clippy::cast_precision_loss,
+        reason = "frame counts are far below 2^53"
+    )]
+    let time_s = frame as f64 / rate_hz;
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a time, not negative"
+    )]
+    let time_ns = (time_s * 1e9) as u64;
+    (time_s, time_ns)
 }
 
 /// What the daemon said last, so that a change is told once.
@@ -110,6 +126,7 @@ struct Heeded {
     rejects: [u64; REJECTS_LEN],
     silent: bool,
     unused: bool,
+    refusing: bool,
 }
 
 impl Heeded {
@@ -134,20 +151,21 @@ impl Heeded {
             .map(|row| row.frames)
             .next();
         let unused = !silent && own.is_none_or(|frames| frames == self.frames);
+        let refused: Vec<String> = RejectReason::ALL
+            .iter()
+            .zip(tick.rejects.iter().zip(&self.rejects))
+            .filter(|(_, (now, before))| now > before)
+            .map(|(reason, (now, before))| format!("{} {reason}", now - before))
+            .collect();
+        let refusing = !refused.is_empty();
         if unused && !self.unused {
-            let refused: Vec<String> = RejectReason::ALL
-                .iter()
-                .zip(tick.rejects.iter().zip(&self.rejects))
-                .filter(|(_, (now, before))| now > before)
-                .map(|(reason, (now, before))| format!("{} {reason}", now - before))
-                .collect();
+            tracing::warn!("the daemon uses no frame of `{source}`");
+        }
+        if refusing && !self.refusing {
             tracing::warn!(
-                "the daemon uses no frame of `{source}`; refused since: {}",
-                if refused.is_empty() {
-                    "none".to_owned()
-                } else {
-                    refused.join(", ")
-                }
+                "the daemon refuses (counted over all sources): {}; does it run the same scene, and no other \
+                 feed of this source?",
+                refused.join(", ")
             );
         }
         *self = Self {
@@ -157,6 +175,7 @@ impl Heeded {
             rejects: tick.rejects,
             silent,
             unused,
+            refusing,
         };
         Ok(())
     }

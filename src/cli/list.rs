@@ -8,9 +8,11 @@ use crate::transport::iceoryx::{InstanceInfo, Place, list_instances};
 use super::args::ListArgs;
 use super::out::Out;
 
-/// Lists the instances of this user.
+/// Lists the instances of this user: daemons, and names that clients wait at for one.
 pub(super) fn list(args: &ListArgs, out: &mut Out) -> Result<bool> {
-    let instances = list_instances(&Place::new("default")?)?;
+    let mut instances = list_instances(&Place::new("default")?)?;
+    // What a killed daemon left behind runs no more; the next node on this machine cleans it up.
+    instances.retain(|i| i.pid.is_some() || i.sources + i.readers > 0);
     for instance in &instances {
         out.line(&if args.json {
             as_json(instance)

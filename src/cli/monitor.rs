@@ -24,7 +24,8 @@ const LOOK_NS: u64 = 100_000_000;
 /// The daemon computes what somebody listens to, so the first ticks heard come without pairs: how long they are passed
 /// over until all that was asked for is there, nanoseconds.
 const WHOLE_WAIT_NS: u64 = 1_000_000_000;
-/// Without a tick for so long the screen says so, nanoseconds: three heartbeats of the usual length.
+/// Without a tick for so long the screen says so, nanoseconds: three heartbeats of the usual length; for a slower
+/// daemon twice the last time between two ticks.
 const SILENCE_NS: u64 = 300_000_000;
 
 /// Follows an instance until stopped.
@@ -43,11 +44,13 @@ pub(super) fn monitor(args: &MonitorArgs, out: &mut Out, stop: &AtomicBool) -> R
     let mut names = Names::default();
     let (clock, mut seen) = (SystemClock, 0);
     let mut heard_ns = clock.monotonic_ns();
+    let mut silence_ns = SILENCE_NS;
     let mut whole_by_ns = heard_ns.saturating_add(WHOLE_WAIT_NS);
     while !stop.load(Ordering::Relaxed) && args.ticks.is_none_or(|most| seen < most) {
         match client.wait_tick(LOOK_NS)? {
             Heard::Tick => {
-                heard_ns = clock.monotonic_ns();
+                let before_ns = std::mem::replace(&mut heard_ns, clock.monotonic_ns());
+                silence_ns = SILENCE_NS.max(2 * heard_ns.saturating_sub(before_ns));
                 if heard_ns < whole_by_ns && !is_whole(client.view(), args) {
                     continue;
                 }
@@ -80,7 +83,7 @@ pub(super) fn monitor(args: &MonitorArgs, out: &mut Out, stop: &AtomicBool) -> R
                         args.which.instance
                     )));
                 }
-                if !args.json && silent_ns >= SILENCE_NS {
+                if !args.json && silent_ns >= silence_ns {
                     screen.show_silence(silent_ns, out)?;
                 }
             }

@@ -1,5 +1,6 @@
 //! Clients that are wrong in every field: refused, counted, told, and nobody else's data is lost.
 
+use sweepd::limits::FRAME_ROWS_MAX;
 use sweepd::time::{Clock, SystemClock};
 use sweepd::transport::client::{Client, Link, Rows};
 use sweepd::transport::iceoryx::{IoxLink, Place};
@@ -35,6 +36,9 @@ name = "c"
 source = "sim"
 shape = { type = "sphere", radius = 0.5 }
 "#;
+
+/// A change of one header.
+type Change = fn(&mut FrameHeader);
 
 /// A client of `sim` that writes every field of its header by hand.
 struct Raw {
@@ -162,7 +166,7 @@ fn rows_that_are_not_the_sources_to_send_are_refused_and_the_rest_of_the_frame_i
 fn whole_frames_that_do_not_fit_are_refused_and_change_nothing() {
     let desk = Desk::new();
     let (_daemon, mut arm, mut raw) = table(&desk);
-    let changes: [(&str, RejectReason, fn(&mut FrameHeader)); 7] = [
+    let changes: [(&str, RejectReason, Change); 7] = [
         ("schema", RejectReason::BadLayout, |h| h.schema = 99),
         ("no flag", RejectReason::BadLayout, |h| h.flags = 0),
         ("two flags", RejectReason::BadLayout, |h| h.flags = 3),
@@ -187,6 +191,21 @@ fn whole_frames_that_do_not_fit_are_refused_and_change_nothing() {
     tick_until(&mut arm, "the next good one is used", |tick| {
         state(tick) == State::Colliding
     });
+}
+
+#[test]
+fn a_frame_of_more_rows_than_a_scene_can_have_bodies_is_refused_unread() {
+    let desk = Desk::new();
+    let (_daemon, mut arm, mut raw) = table(&desk);
+    let rows = vec![at(1, 5.0); FRAME_ROWS_MAX + 1];
+    raw.send(&rows, |_| {});
+    tick_until(&mut arm, "refused", |tick| {
+        assert_ne!(state(tick), State::Colliding, "{}", words(tick));
+        rejected(tick, RejectReason::OverLimit) > 0
+    });
+    raw.send(&good(), |_| {});
+    send(&mut arm, &[at(2, 5.0)]);
+    tick_until(&mut arm, "clear again", |tick| state(tick) == State::Clear);
 }
 
 #[test]

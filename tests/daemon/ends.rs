@@ -147,3 +147,16 @@ fn a_number_of_ticks_ends_the_daemon() {
         daemon.stderr()
     );
 }
+
+#[test]
+fn a_killed_daemon_without_clients_is_not_listed() {
+    let desk = Desk::new();
+    let mut daemon = desk.run(TWO_SPHERES, &[]);
+    drop(desk.client(None));
+    assert_eq!(listed(&desk.instance).unwrap()["pid"], daemon.pid());
+    daemon.kill();
+    assert_eq!(listed(&desk.instance), None);
+    let next = desk.run(TWO_SPHERES, &[]);
+    drop(desk.client(None));
+    assert_eq!(next.stdout(), "", "logs go to stderr");
+}
