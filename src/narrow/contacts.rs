@@ -37,8 +37,6 @@ pub struct Contact {
 pub struct ContactSet {
     /// Deepest first.
     contacts: Vec<Contact>,
-    /// The set before, while ids are handed on.
-    before: Vec<Contact>,
 }
 
 /// Two points of one shape pair this close, as a share of the smaller body's radius, are the same contact when no
@@ -50,7 +48,6 @@ impl ContactSet {
     pub(super) fn with_room(contacts: usize) -> Self {
         Self {
             contacts: Vec::with_capacity(contacts),
-            before: Vec::with_capacity(contacts),
         }
     }
 
@@ -65,26 +62,32 @@ impl ContactSet {
         self.contacts.clear();
     }
 
-    /// Takes the deepest `most` of `found`; contacts that were there before keep their ids.
-    pub(super) fn replace(&mut self, found: &mut [Contact], most: usize, radius: f64) {
+    /// Takes the deepest `most` of `found`; contacts that were there before keep their ids. `before` is scratch memory.
+    pub(super) fn replace(
+        &mut self,
+        found: &mut [Contact],
+        most: usize,
+        radius: f64,
+        before: &mut Vec<Contact>,
+    ) {
         found.sort_unstable_by(|x, y| x.gap_m.total_cmp(&y.gap_m).then(x.key().cmp(&y.key())));
-        std::mem::swap(&mut self.contacts, &mut self.before);
+        before.clear();
+        before.extend_from_slice(&self.contacts);
         self.contacts.clear();
         self.contacts.extend(found.iter().take(most));
         for contact in &mut self.contacts {
-            let heir = self
-                .before
+            let heir = before
                 .iter()
                 .position(|old| old.id != 0 && old.key() == contact.key());
             let heir = heir.or_else(|| {
-                self.before.iter().position(|old| {
+                before.iter().position(|old| {
                     old.id != 0
                         && (old.shape_a, old.shape_b) == (contact.shape_a, contact.shape_b)
                         && (old.point_a - contact.point_a).norm() <= SAME_POINT * radius
                 })
             });
             if let Some(at) = heir {
-                contact.id = std::mem::take(&mut self.before[at].id);
+                contact.id = std::mem::take(&mut before[at].id);
             }
         }
     }

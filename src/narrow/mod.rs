@@ -79,6 +79,8 @@ pub struct Narrow {
     keyed: Vec<(u128, PairSlot)>,
     /// Contacts of the query at hand.
     found: Vec<Contact>,
+    /// The contacts that a set had before, while ids are handed on.
+    before: Vec<Contact>,
     counts: [u64; Verdict::ALL.len()],
     counters: Counters,
     contacts_per_pair: usize,
@@ -294,15 +296,21 @@ const NONE: u32 = u32::MAX;
 
 impl<T> Pool<T> {
     /// An object, used before or made now.
-    fn take(&mut self, make: impl FnOnce() -> T) -> u32 {
-        if let Some(at) = self.free.pop() {
-            return at;
+    ///
+    /// When there is none left, half as many more are made at once: how many are out at the same time creeps up for long
+    /// where work is cut off, and each new peak would allocate.
+    fn take(&mut self, make: impl Fn() -> T) -> u32 {
+        if self.free.is_empty() {
+            let more = self.items.len() / 2 + 1;
+            for _ in 0..more {
+                let at = u32::try_from(self.items.len()).unwrap_or(NONE);
+                self.items.push(make());
+                self.free.push(at);
+            }
+            // Room to give every object back without growing later.
+            self.free.reserve(self.items.len() - self.free.len());
         }
-        let at = u32::try_from(self.items.len()).unwrap_or(NONE);
-        self.items.push(make());
-        // Room to give every object back without growing later.
-        self.free.reserve(self.items.len() - self.free.len());
-        at
+        self.free.pop().unwrap_or(NONE)
     }
 
     /// Gives an object back.

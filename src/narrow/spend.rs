@@ -332,7 +332,7 @@ impl Narrow {
         }
         memo.contacts_tick = memo.tested;
         if let Some(set) = self.contact_sets.get_mut(memo.contacts) {
-            set.replace(&mut self.found, most, radius);
+            set.replace(&mut self.found, most, radius, &mut self.before);
         }
     }
 }
