@@ -5,10 +5,21 @@
     clippy::panic,
     clippy::float_cmp,
     clippy::cast_precision_loss,
+    missing_docs,
+    missing_debug_implementations,
+    unreachable_pub,
     reason = "a test"
 )]
 
+#[path = "../oracle/mod.rs"]
+mod oracle;
+
+mod edits;
 mod events;
+mod limits;
+mod motion;
+mod order;
 mod rig;
+mod shapes;
 mod state;
 mod verdicts;

@@ -1,0 +1,201 @@
+//! 3.1 generations, 3.10 filters and attached bodies.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use sweepd::math::Pose;
+use sweepd::scene::{PairAction, Scene};
+use sweepd::wire::{BodyStatus, EndCause, Event, State, Verdict};
+use sweepd::world::Edit;
+
+use crate::rig::{ALL, FRAME_NS, Rig, ball, has, rule, scene};
+
+/// The edit that puts the last body of `bodies`.
+fn put(bodies: &[String]) -> Edit {
+    let scene = Scene::parse(&scene("", bodies), "scene.toml", Path::new(".")).unwrap();
+    let shapes = sweepd::daemon::build_shapes(&scene).unwrap().bodies;
+    Edit::Put {
+        body: Arc::new(scene.bodies.last().unwrap().clone()),
+        shapes: Arc::clone(shapes.last().unwrap()),
+    }
+}
+
+#[test]
+fn law_3_1_remove_then_put_of_one_name_ends_and_begins_unknown() {
+    let bodies = [ball(1, 0.0, ""), ball(2, 1.5, "")];
+    let mut rig = Rig::new(&scene("", &bodies));
+    rig.send(ALL);
+    rig.edit(
+        vec![
+            Edit::Remove {
+                name: "b2".to_owned(),
+            },
+            put(&bodies),
+        ],
+        ALL,
+    );
+    let row = rig.pair(1, 2).unwrap();
+    assert!(has(row, Event::End));
+    assert_eq!(row.end_cause, EndCause::Removed.code());
+    let shown = rig.out.bodies[1];
+    assert_eq!(shown.status, BodyStatus::NotReceived.code());
+    assert!(shown.generation > rig.out.bodies[0].generation);
+    assert_eq!(rig.state(), State::Unknown);
+    rig.send(ALL);
+    assert!(has(rig.pair(1, 2).unwrap(), Event::Begin));
+    assert_eq!(rig.state(), State::Colliding);
+}
+
+#[test]
+fn law_3_1_another_shape_of_the_same_name_gets_no_certificate_of_the_old_one() {
+    let small = "{ type = \"sphere\", radius = 0.1 }";
+    let at = [2.5, 0.0, 0.0];
+    let first = crate::rig::body(2, at, small, "");
+    let mut rig = Rig::new(&scene("", &[ball(1, 0.0, ""), first]));
+    rig.row(1).position = [1.4, 0.0, 0.0];
+    rig.row(1).position[1] = 0.9;
+    rig.send(ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Apart);
+    let large = crate::rig::body(2, at, "{ type = \"sphere\", radius = 1.5 }", "");
+    rig.edit(vec![put(&[ball(1, 0.0, ""), large])], ALL);
+    rig.send(ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+}
+
+#[test]
+fn law_3_10_two_bodies_at_rest_are_found_when_an_edit_enables_their_pair() {
+    let enables: [(Vec<Edit>, Vec<Edit>); 3] = [
+        (
+            vec![rule(PairAction::Ignore, "b1", "b2", None)],
+            vec![Edit::DropRules {
+                a: "b1".to_owned(),
+                b: "b2".to_owned(),
+            }],
+        ),
+        (
+            vec![rule(PairAction::Ignore, "b*", "b*", None)],
+            vec![rule(PairAction::Check, "b2", "b1", None)],
+        ),
+        (
+            vec![Edit::Filter {
+                name: "b1".to_owned(),
+                group: None,
+                mask: Some(2),
+            }],
+            vec![Edit::Filter {
+                name: "b2".to_owned(),
+                group: Some(2),
+                mask: None,
+            }],
+        ),
+    ];
+    for crowd in [0, 60] {
+        for (off, on) in &enables {
+            let mut bodies = vec![ball(1, 0.0, ""), ball(2, 1.5, "")];
+            bodies.extend((3..3 + crowd).map(|id| ball(id, 10.0 * id as f64, "")));
+            let mut rig = Rig::new(&scene("", &bodies));
+            rig.send(ALL);
+            assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+            rig.edit(off.clone(), ALL);
+            assert_eq!(rig.pair(1, 2).unwrap().end_cause, EndCause::Filtered.code());
+            rig.send(ALL);
+            assert!(rig.pair(1, 2).is_none());
+            rig.edit(on.clone(), ALL);
+            assert_eq!(rig.verdict(1, 2), Verdict::Colliding, "{on:?}");
+        }
+    }
+}
+
+#[test]
+fn law_3_10_the_tick_counts_ignored_pairs() {
+    let mut rig = Rig::new(&scene(
+        "",
+        &[ball(1, 0.0, ""), ball(2, 1.5, ""), ball(3, 3.0, "")],
+    ));
+    rig.edit(vec![rule(PairAction::Ignore, "b1", "b*", None)], ALL);
+    assert_eq!(rig.out.tick.ignored, 2);
+}
+
+#[test]
+fn law_3_10_an_attached_body_moves_and_is_lost_with_its_parent() {
+    let bodies = [ball(1, 0.0, ""), ball(2, 50.0, ""), ball(3, 100.0, "")];
+    let mut rig = Rig::new(&scene("", &bodies));
+    rig.send(ALL);
+    let attach = Edit::Attach {
+        name: "b2".to_owned(),
+        to: Some("b1".to_owned()),
+        pose: Some(Pose::translation(0.0, 5.0, 0.0)),
+    };
+    rig.edit(vec![attach], ALL);
+    rig.rows.retain(|row| row.body != 2);
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+    // The parent drives the child into the third body.
+    rig.row(1).position = [100.0, -4.0, 0.0];
+    rig.send(ALL);
+    assert_eq!(rig.verdict(2, 3), Verdict::Colliding);
+    rig.row(1).position = [f64::INFINITY; 3];
+    rig.send(ALL);
+    assert_eq!(rig.verdict(2, 3), Verdict::Possible);
+    assert_eq!(rig.out.bodies[1].status, BodyStatus::Rejected.code());
+    rig.row(1).position = [0.0; 3];
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+}
+
+#[test]
+fn law_4_7_contacts_are_computed_only_for_listeners_and_owed_to_those_who_come_later() {
+    let shape = "{ type = \"box\", half_extents = [0.5, 0.5, 0.5] }";
+    let bodies = [
+        crate::rig::body(1, [0.0; 3], shape, ""),
+        crate::rig::body(2, [0.9, 0.0, 0.0], shape, ""),
+    ];
+    let mut rig = Rig::new(&scene("", &bodies));
+    rig.demand.contacts = false;
+    rig.send(ALL);
+    assert_eq!(rig.engine.counters().manifolds, 0);
+    rig.send(ALL);
+    assert_eq!(rig.engine.counters().manifolds, 0);
+    assert_eq!(rig.out.contacts.len(), 0);
+    rig.demand.contacts = true;
+    rig.idle(FRAME_NS, ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+    assert_eq!(rig.out.contacts.len(), 4, "bodies at rest deliver theirs");
+    let ids: Vec<u64> = rig.out.contacts.iter().map(|row| row.id).collect();
+    rig.idle(FRAME_NS, ALL);
+    assert_eq!(
+        rig.engine.counters().queries,
+        0,
+        "nothing moved, nothing is asked again"
+    );
+    assert_eq!(
+        rig.out
+            .contacts
+            .iter()
+            .map(|row| row.id)
+            .collect::<Vec<_>>(),
+        ids
+    );
+}
+
+#[test]
+fn law_4_7_without_listeners_only_verdicts_are_worked_for() {
+    let mut rig = Rig::new(&scene("", &[ball(1, 0.0, ""), ball(2, 1.0, "")]));
+    rig.demand = sweepd::wire::Demand::default();
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Colliding);
+    let mut queries = 0;
+    for k in 0..100 {
+        rig.move_x(2, 1.0 + 0.001 * f64::from(k));
+        rig.send(ALL);
+        assert_eq!(rig.state(), State::Colliding);
+        queries += rig.engine.counters().queries;
+        assert!(
+            rig.out.pairs.is_empty() && rig.out.contacts.is_empty() && rig.out.bodies.is_empty()
+        );
+    }
+    assert!(
+        queries < 10,
+        "{queries} queries for a collision 1 m deep that stays"
+    );
+}

@@ -1,0 +1,198 @@
+//! 3.9 truncation.
+
+use sweepd::wire::{BodyStatus, Event, Reason, State, Verdict};
+
+use crate::rig::{ALL, FRAME_NS, NONE, Rig, ball, has, scene};
+
+/// `n` couples of balls, ids 2k and 2k + 1, the k-th `gap(k)` metres apart; 100 m between couples.
+fn couples(head: &str, n: u64, gap: impl Fn(u64) -> f64, more: &str) -> Rig {
+    let mut bodies = Vec::new();
+    for k in 1..=n {
+        let x = 100.0 * k as f64;
+        bodies.push(ball(2 * k, x, more));
+        bodies.push(ball(2 * k + 1, x + 2.0 + gap(k), more));
+    }
+    Rig::new(&scene(head, &bodies))
+}
+
+fn ids(rig: &Rig) -> Vec<u64> {
+    rig.out.pairs.iter().map(|row| row.body_a / 2).collect()
+}
+
+#[test]
+fn law_3_9_events_that_do_not_fit_wait_with_their_range_and_deeper_pairs_go_first() {
+    let head = "[limits]\npair_rows = 3";
+    let mut rig = couples(head, 5, |k| -0.1 * k as f64, "");
+    rig.send(ALL);
+    assert_eq!(ids(&rig), [3, 4, 5], "the deepest");
+    assert_eq!(rig.out.pairs_header.truncated, 2);
+    assert_eq!(rig.state(), State::Colliding);
+    assert!(rig.because(Reason::Truncated));
+    rig.send(ALL);
+    // The two that waited come first, with the tick in which they began, then the deepest.
+    assert_eq!(ids(&rig), [1, 2, 5]);
+    for row in &rig.out.pairs[..2] {
+        assert!(has(row, Event::Begin));
+        assert_eq!((row.begin_first_tick, row.begin_last_tick), (1, 1));
+    }
+    rig.send(ALL);
+    assert_eq!(ids(&rig), [3, 4, 5]);
+    assert!(rig.out.pairs.iter().all(|row| !has(row, Event::Begin)));
+    assert_eq!(rig.out.tick.colliding, 5, "counts are of all pairs");
+}
+
+#[test]
+fn law_3_9_an_event_waits_after_its_pair_is_gone_and_begin_and_end_unsent_cancel() {
+    let head = "[limits]\npair_rows = 1";
+    let mut rig = couples(head, 3, |k| -0.1 * k as f64, "");
+    rig.send(ALL);
+    assert_eq!(ids(&rig), [3]);
+    for k in 1..=3 {
+        rig.row(2 * k).position[1] = 50.0;
+    }
+    rig.send(ALL);
+    // Begins of 1 and 2 were never sent, and now they have ended.
+    assert_eq!(rig.out.tick.cancelled_events, 2);
+    assert_eq!(ids(&rig), [3]);
+    assert!(has(&rig.out.pairs[0], Event::End));
+    // An end that waits: 3 collides and is told, then all three end at once.
+    let mut rig = couples(head, 3, |k| -0.1 * k as f64, "");
+    for _ in 0..4 {
+        rig.send(ALL);
+    }
+    for k in 1..=3 {
+        rig.row(2 * k).position[1] = 50.0;
+    }
+    let end = rig.ticks() + 1;
+    let mut ended = Vec::new();
+    for _ in 0..3 {
+        rig.send(ALL);
+        assert!(rig.state() != State::Clear || rig.out.pairs_header.truncated == 0);
+        let [row] = rig.out.pairs.as_slice() else {
+            panic!("one row a tick")
+        };
+        assert_eq!((row.end_first_tick, row.end_last_tick), (end, end));
+        ended.push(row.body_a / 2);
+    }
+    ended.sort_unstable();
+    assert_eq!(ended, [1, 2, 3]);
+    rig.send(ALL);
+    assert!(rig.out.pairs.is_empty());
+    assert_eq!(rig.state(), State::Clear);
+}
+
+#[test]
+fn law_3_9_rows_keep_their_rank_colliding_before_possible_before_near() {
+    let near = "report_within_m = 0.5";
+    for (rows, want) in [(1, vec![1]), (2, vec![1, 2]), (3, vec![1, 2, 3])] {
+        let mut rig = couples(
+            &format!("[limits]\npair_rows = {rows}"),
+            3,
+            |k| [0.0, -0.5, 0.3, 0.3][usize::try_from(k).unwrap()],
+            near,
+        );
+        rig.send(ALL);
+        rig.send(ALL);
+        // The second couple moves and nothing is left to look at it: possible.
+        rig.row(4).position[2] = 0.4;
+        rig.send(NONE);
+        assert_eq!(rig.verdict(2, 3), Verdict::Colliding);
+        assert_eq!(ids(&rig), want);
+        assert_eq!(rig.out.pairs_header.truncated, 3 - rows);
+    }
+}
+
+#[test]
+fn law_3_9_the_state_is_never_clear_nor_near_when_something_was_left_out() {
+    let mut rig = couples(
+        "[limits]\npair_rows = 1",
+        3,
+        |_| 0.3,
+        "report_within_m = 0.5",
+    );
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Unknown);
+    assert_eq!(rig.out.tick.header.truncated, 2);
+}
+
+#[test]
+fn law_3_9_contact_rows_that_do_not_fit_are_the_shallowest() {
+    let mut rig = couples("[limits]\ncontact_rows = 2", 4, |k| -0.1 * k as f64, "");
+    rig.send(ALL);
+    let kept: Vec<u64> = rig.out.contacts.iter().map(|row| row.body_a / 2).collect();
+    assert_eq!(kept, [3, 4]);
+    assert_eq!(rig.out.contacts_header.truncated, 2);
+    assert_eq!(rig.out.pairs.len(), 4);
+    assert!(rig.because(Reason::Truncated));
+}
+
+#[test]
+fn law_3_9_beyond_the_pair_set_the_state_is_unknown_and_so_is_each_body_concerned() {
+    let mut rig = couples("[limits]\npairs = 2", 4, |_| 0.1, "report_within_m = 0.05");
+    for k in 1..=4 {
+        // Boxes overlap, balls do not.
+        rig.row(2 * k + 1).position = [100.0 * k as f64 + 1.5, 1.5, 1.5];
+    }
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Unknown);
+    assert!(rig.because(Reason::Truncated));
+    assert_eq!(rig.out.tick.candidates, 2);
+    let unknown = rig
+        .out
+        .bodies
+        .iter()
+        .filter(|row| row.status == BodyStatus::Truncated.code());
+    assert_eq!(unknown.count(), 4);
+    assert_eq!(rig.out.tick.unknown, 4);
+    let verdicts = &rig.out.body_verdicts;
+    assert_eq!(
+        verdicts
+            .iter()
+            .filter(|&&v| v == Verdict::Possible.code())
+            .count(),
+        4
+    );
+    // One couple parts: there is room, and the state heals as far as it can; then the rest.
+    for k in 1..=2 {
+        rig.row(2 * k).position[1] = -50.0;
+    }
+    rig.send(ALL);
+    rig.idle(FRAME_NS, ALL);
+    assert_eq!(rig.state(), State::Clear);
+    assert_eq!(rig.out.tick.unknown, 0);
+}
+
+#[test]
+fn law_3_9_a_pair_that_did_not_fit_is_not_said_to_have_been_apart_before() {
+    let mut rig = couples("[limits]\npairs = 1", 2, |_| -0.5, "");
+    rig.send(ALL);
+    rig.send(ALL);
+    assert_eq!(rig.out.pairs.len(), 1);
+    let (seen, missed) = if ids(&rig) == [1] { (1, 2) } else { (2, 1) };
+    rig.row(2 * seen).position[1] = 50.0;
+    rig.send(ALL);
+    rig.idle(FRAME_NS, ALL);
+    let row = rig.pair(2 * missed, 2 * missed + 1).unwrap();
+    assert_eq!(rig.verdict(2 * missed, 2 * missed + 1), Verdict::Colliding);
+    assert!(row.certified_tick >= 3);
+    assert_eq!(rig.out.tick.colliding, 1);
+}
+
+#[test]
+fn law_3_9_one_byte_a_body_is_never_truncated() {
+    let mut rig = couples(
+        "[limits]\npair_rows = 1\ncontact_rows = 1",
+        20,
+        |k| if k % 2 == 0 { -0.2 } else { 0.4 },
+        "",
+    );
+    rig.send(ALL);
+    let want: Vec<u8> = (1..=20_u64)
+        .flat_map(|k| if k % 2 == 0 { [4, 4] } else { [1, 1] })
+        .collect();
+    assert_eq!(rig.out.body_verdicts, want);
+    assert_eq!(rig.out.bodies.len(), 40);
+    for (row, verdict) in rig.out.bodies.iter().zip(&rig.out.body_verdicts) {
+        assert_eq!(row.verdict, *verdict);
+    }
+}
