@@ -38,12 +38,20 @@ impl Scene {
             .find(|rule| rule.matches(one, other))
     }
 
-    /// What is odd but legal, one sentence each: nothing to watch, rules and sources without a body, half-spaces.
+    /// What is odd but legal, one sentence each: nothing to watch, rules and sources without a body, half-spaces,
+    /// continuous bodies.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         if self.bodies.is_empty() {
             notes.push("the scene has no body: its state is never clear, add [[body]]".to_owned());
+        }
+        if let Some(body) = self.bodies.iter().find(|body| body.continuous) {
+            notes.push(format!(
+                "body \"{}\" says continuous = true, which is kept but not acted on in this version: what happens \
+                 between two of its poses is not seen",
+                shortened(&body.name)
+            ));
         }
         let unbounded: Vec<&str> = self
             .bodies

@@ -1,3 +1,5 @@
+//! Goal: meshes are built as they say: shells, orientation, solids, tree, inside tests. Method: small solids by hand.
+
 use super::*;
 
 fn cuboid(centre: [f64; 3], half: f64, inward: bool) -> (Vec<Point>, Vec<[u32; 3]>) {
