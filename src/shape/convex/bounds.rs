@@ -23,9 +23,11 @@ impl Convex {
         }
         // Entries of the matrix are off by some ulps of 1, dot products by some of the reach, the sum by one of the place.
         let pad = 16.0 * f64::EPSILON * self.reach_m + self.margin_m;
+        // Two ulps further out for the sums; as a product, since stepping to the next float costs ten times as much.
+        let ulps = |v: f64| 2.0 * f64::EPSILON * v.abs();
         Aabb {
-            min: Point::from((at + low).map(|v| (v - pad).next_down().next_down())),
-            max: Point::from((at + high).map(|v| (v + pad).next_up().next_up())),
+            min: Point::from((at + low).map(|v| (v - pad) - ulps(v))),
+            max: Point::from((at + high).map(|v| (v + pad) + ulps(v))),
         }
     }
 }
@@ -44,17 +46,22 @@ impl Core {
                 (-half, half)
             }
             Self::Cylinder { radius_m, half_m } => {
-                let half = dir.x.hypot(dir.y) * radius_m + dir.z.abs() * half_m;
+                let half = across(dir) * radius_m + dir.z.abs() * half_m;
                 (-half, half)
             }
             Self::Cone { radius_m, half_m } => {
-                let (across, apex) = (dir.x.hypot(dir.y) * radius_m, dir.z * half_m);
+                let (across, apex) = (across(dir) * radius_m, dir.z * half_m);
                 (apex.min(-apex - across), apex.max(-apex + across))
             }
             Self::Hull(hull) => span_of(hull.points(), dir),
             Self::Triangle(corners) => span_of(corners, dir),
         }
     }
+}
+
+/// Length of the part of a unit vector that is across z; nothing in it overflows, so `hypot` would only be slow.
+fn across(dir: &Vec3) -> f64 {
+    (dir.x * dir.x + dir.y * dir.y).sqrt()
 }
 
 fn span_of(points: &[Vec3], dir: &Vec3) -> (f64, f64) {
