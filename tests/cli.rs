@@ -172,7 +172,8 @@ fn a_scene_that_is_missing_or_wrong_is_code_2_with_its_place() {
 #[test]
 fn check_says_what_the_daemon_would_do_as_text_and_as_json() {
     let desk = Desk::new();
-    let scene = desk.scene(&format!("{TWO_SPHERES}parent = \"a\"\n"));
+    let rule = "[[rule]]\naction = \"ignore\"\na = \"ghost\"\nb = \"a\"\nreason = \"r\"\n";
+    let scene = desk.scene(&format!("{TWO_SPHERES}parent = \"a\"\n{rule}"));
     let scene = scene.to_str().unwrap();
     let ended = output(&["check", scene, "--ignored"]);
     assert_eq!(code(&ended), Some(0), "{}", err(&ended));
@@ -188,6 +189,9 @@ fn check_says_what_the_daemon_would_do_as_text_and_as_json() {
         (&2.into(), &1.into())
     );
     assert_eq!(json["ignored"][0][0], "a");
+    let odd = "rule 1: no body has the name \"ghost\"";
+    assert!(text.contains(&format!("warning: {odd}")), "{text}");
+    assert_eq!(json["warnings"], serde_json::json!([odd]));
 }
 
 #[test]

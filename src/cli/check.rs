@@ -19,7 +19,8 @@ const IGNORED_SHOWN: usize = 10_000;
 pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
     let scene = load_scene(&args.scene)?;
     let shapes = build_shapes(&scene)?;
-    let warnings = shapes.warnings.clone();
+    let mut warnings = scene.notes();
+    warnings.extend(shapes.warnings);
     let world = World::new(&scene, shapes.bodies, SystemClock.boottime_ns())?;
     let plan = Plan::of(&world, &scene.config);
     if args.json {

@@ -6,6 +6,7 @@
 mod args;
 mod check;
 mod feed;
+mod figures;
 mod list;
 mod monitor;
 mod out;

@@ -19,7 +19,7 @@ pub(super) fn run(args: &RunArgs, stop: &AtomicBool) -> Result<bool> {
     let mut scene = load_scene(&args.scene)?;
     apply(args, &mut scene)?;
     let shapes = build_shapes(&scene)?;
-    for warning in &shapes.warnings {
+    for warning in scene.notes().iter().chain(&shapes.warnings) {
         tracing::warn!("{warning}");
     }
     let boot_id = crate::transport::client::random_u64()?;

@@ -1,0 +1,66 @@
+//! Names, numbers and times in few columns, for people. In: what the daemon says. Out: text without control characters.
+
+/// A name in so many columns at most; the end, which tells alike names apart, stays.
+pub(super) fn cut(name: &str, width: usize) -> String {
+    let len = name.chars().count();
+    // A name is the sender's word: what would move the cursor is not shown.
+    let mut clean = name.chars().map(|c| if c.is_control() { '?' } else { c });
+    if len <= width {
+        return clean.collect();
+    }
+    let head = width / 2;
+    let tail = width - head - 1;
+    let mut short: String = clean.by_ref().take(head).collect();
+    short.push('~');
+    short.extend(clean.skip(len - head - tail));
+    short
+}
+
+/// A number in few columns; what is not known is a dash, what has no end says so.
+pub(super) fn number(value: f64, digits: usize) -> String {
+    if value.is_nan() {
+        "-".to_owned()
+    } else if value.abs() >= 1e4 {
+        format!("{value:.2e}")
+    } else {
+        format!("{value:.digits$}")
+    }
+}
+
+/// Nanoseconds as seconds.
+#[allow(clippy::cast_precision_loss, reason = "shown with few digits")]
+pub(super) fn seconds(ns: u64) -> f64 {
+    ns as f64 / 1e9
+}
+
+/// Nanoseconds for people.
+pub(super) fn time(ns: u64) -> String {
+    #[allow(clippy::cast_precision_loss, reason = "shown with three digits")]
+    let ns = ns as f64;
+    match ns {
+        _ if ns < 1e3 => format!("{ns:.0} ns"),
+        _ if ns < 1e6 => format!("{:.1} us", ns / 1e3),
+        _ if ns < 1e9 => format!("{:.2} ms", ns / 1e6),
+        _ => format!("{:.2} s", ns / 1e9),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_names_keep_both_ends_and_no_control_character() {
+        assert_eq!(cut("arm", 24), "arm");
+        let long = cut("robot_left_gripper_finger_distal_12", 24);
+        assert_eq!(long, "robot_left_g~r_distal_12");
+        assert_eq!(cut("a\x1b[2Jb", 24), "a?[2Jb");
+    }
+
+    #[test]
+    fn numbers_stay_within_their_columns() {
+        for value in [0.0, -9_999.999_999, 1e300, f64::NEG_INFINITY, f64::NAN] {
+            assert!(number(value, 6).len() <= 12, "{}", number(value, 6));
+        }
+    }
+}
