@@ -1,7 +1,7 @@
 //! Narrow phase: a sound interval for every candidate pair, widened by motion, narrowed by work that can stop
 //! after any unit.
 //!
-//! In: the world, the pair set and its delta, a [`Meter`](crate::time::Meter). Out: for each pair a verdict, an
+//! In: the world, the pair set and its delta, a [`Meter`]. Out: for each pair a verdict, an
 //! interval, a witness and (when somebody listens) contacts; see [`Narrow::finding`].
 //!
 //! How it goes, tick by tick:

@@ -1,5 +1,5 @@
 //! Transports: how frames and requests come in and results go out. In: samples of other processes, copied once and
-//! unchecked. Out: an [`Inbox`](crate::wire::Inbox) for the engine, and the engine's [`Outbox`] for readers.
+//! unchecked. Out: an [`Inbox`] for the engine, and the engine's [`Outbox`] for readers.
 //!
 //! Two doors with one surface: [`iceoryx`] for other processes, [`memory`] for threads of this one (tests, the
 //! embedded feed). [`client`] is the other side of both. A door belongs to the thread that opened it.
