@@ -3,7 +3,7 @@
 //!
 //! In: a pair. Out: the gap of the cores, or `None` where there is no closed form.
 
-use super::pair::{CoreGap, Pair, across, unit};
+use super::pair::{CoreGap, Held, Pair, across, unit};
 use crate::math::Vec3;
 use crate::shape::Core;
 
@@ -48,6 +48,7 @@ fn with_lower(pair: &Pair<'_>, normal: Vec3, gap: f64, point_a: Vec3, point_b: V
         normal,
         point_a,
         point_b,
+        held: Held::default(),
     }
 }
 
@@ -216,5 +217,6 @@ fn segments(pair: &Pair<'_>, ha: f64, hb: f64) -> CoreGap {
         normal: best.1,
         point_a,
         point_b,
+        held: Held::default(),
     }
 }

@@ -6,7 +6,7 @@
 //! But the support of the difference depends on the height of the direction alone, and its outline in a half plane is a
 //! polygon whose edges come from those of the two outlines: caps, sides and slants.
 
-use super::pair::{CoreGap, Pair};
+use super::pair::{CoreGap, Held, Pair};
 use crate::math::Vec3;
 use crate::shape::Core;
 
@@ -58,6 +58,7 @@ pub(super) fn gap(pair: &Pair<'_>) -> Option<CoreGap> {
         normal,
         point_a: normal * reach + tangent * middle,
         point_b: normal * (reach + lower) + tangent * middle,
+        held: Held::default(),
     })
 }
 

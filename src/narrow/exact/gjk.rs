@@ -5,8 +5,8 @@
 //! Source: Gilbert, Johnson, Keerthi 1988; directions orthogonal to the features as in Montanari, Petrinic, Barbieri
 //! 2017, Improving the GJK algorithm.
 
-use super::newton;
-use super::pair::{CoreGap, Pair, Vertex, unit};
+use super::newton::{self, Refined};
+use super::pair::{CoreGap, Held, Pair, Vertex, unit};
 use super::simplex::{Reduced, Simplex};
 use crate::math::Vec3;
 
@@ -44,7 +44,22 @@ enum Run {
 }
 
 /// The distance of two cores, or the verdict that they overlap.
-pub(super) fn distance(pair: &Pair<'_>, start: &Vec3) -> Outcome {
+///
+/// * `held` - what an earlier answer with the normal `start` rested on.
+/// * `warm` - what Newton made of it, if anything.
+pub(super) fn distance(
+    pair: &Pair<'_>,
+    start: &Vec3,
+    held: &Held,
+    warm: Option<&Refined>,
+) -> Outcome {
+    let tiny = pair.tiny();
+    if let Some(found) = warm.map(Refined::apart)
+        && found.lower > 0.0
+        && found.upper - found.lower <= 4.0 * tiny
+    {
+        return Outcome::Apart(found);
+    }
     let mut gjk = Gjk {
         pair,
         simplex: Simplex::default(),
@@ -54,7 +69,7 @@ pub(super) fn distance(pair: &Pair<'_>, start: &Vec3) -> Outcome {
         lower: f64::NEG_INFINITY,
         normal: *start,
     };
-    let tiny = pair.tiny();
+    gjk.recall(held);
     if pair.polytopes {
         return match gjk.run(tiny / 2.0, None) {
             Run::Overlap => Outcome::Overlap(gjk.simplex),
@@ -104,6 +119,26 @@ impl Gjk<'_> {
             Outcome::Overlap(self.simplex)
         } else {
             Outcome::Apart(gap)
+        }
+    }
+
+    /// Begins with the simplex of an earlier answer, as far as it is closer to the origin than its first vertex.
+    fn recall(&mut self, held: &Held) {
+        let normal = self.dir;
+        for vertex in self.pair.recall(held, &normal) {
+            if self.simplex.used().iter().any(|v| v.w == vertex.w) {
+                continue;
+            }
+            // Around the origin already: the run begins afresh and meets that verdict again.
+            if matches!(self.add(vertex), Some(Run::Overlap)) {
+                *self = Self {
+                    simplex: Simplex::default(),
+                    dir: normal,
+                    upper: f64::INFINITY,
+                    ..*self
+                };
+                return;
+            }
         }
     }
 
@@ -184,6 +219,7 @@ impl Gjk<'_> {
             normal,
             point_a,
             point_b,
+            held: Held::of(self.simplex.used(), &self.simplex.weights),
         }
     }
 }

@@ -29,6 +29,7 @@ mod gjk;
 mod manifold;
 mod newton;
 mod pair;
+mod polytope;
 mod sat;
 mod simplex;
 
@@ -37,14 +38,18 @@ use crate::shape::Convex;
 
 pub use manifold::{Manifold, ManifoldPoint, manifold};
 
-use pair::{CoreGap, Pair};
+use pair::{CoreGap, Held, Pair};
 
-/// Warm start of one shape pair: the normal found last. The default knows nothing.
+/// Warm start of one shape pair: the normal found last and the features it rested on. The default knows nothing.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Warm {
     /// Unit, A's frame; zero when nothing is known.
     normal: Vec3,
+    /// Ids only: one that the shape does not have is skipped, so a warm start of another shape costs time, no truth.
+    held: Held,
 }
+
+const _: () = assert!(size_of::<Warm>() <= 64, "one is kept for every pair");
 
 /// What an exact query yields, in A's frame.
 #[derive(Clone, Copy, Debug)]
@@ -113,7 +118,10 @@ pub fn convex_gap(a: &Convex, b: &Convex, pos12: &Pose, warm: &mut Warm) -> Clos
         return Closest::unknown();
     }
     let core = closed::gap(&pair).unwrap_or_else(|| iterate(&pair, warm));
-    warm.normal = core.normal;
+    *warm = Warm {
+        normal: core.normal,
+        held: core.held,
+    };
     finish(&pair, &core)
 }
 
@@ -129,10 +137,16 @@ fn iterate(pair: &Pair<'_>, warm: &Warm) -> CoreGap {
         Some(sat::Axes::Apart(normal)) => normal,
         None => start,
     };
-    match gjk::distance(pair, &start) {
+    // Where a circle takes part the features of the last answer are mostly those of this one.
+    let refined = if pair.polytopes {
+        None
+    } else {
+        newton::resume(pair, &warm.held, &start)
+    };
+    match gjk::distance(pair, &start, &warm.held, refined.as_ref()) {
         gjk::Outcome::Apart(gap) => gap,
         gjk::Outcome::Overlap(simplex) => {
-            coaxial::gap(pair).unwrap_or_else(|| epa::depth(pair, &simplex))
+            coaxial::gap(pair).unwrap_or_else(|| epa::depth(pair, &simplex, refined))
         }
     }
 }

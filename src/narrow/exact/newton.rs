@@ -8,7 +8,7 @@
 //! `sum(l_i w_i) = f n` with weights `l_i >= 0` of sum 1. That is a system in the two tangent coordinates of `n` and
 //! the weights; its matrix is the Lagrangian's: minus the circles' curvatures, minus `f`.
 
-use super::pair::{CoreGap, Pair, Vertex, across, unit};
+use super::pair::{CoreGap, Held, Pair, Vertex, across, unit};
 use super::simplex::Simplex;
 use crate::math::Vec3;
 use crate::shape::Core;
@@ -54,9 +54,23 @@ pub(super) struct Refined {
     pub(super) point_a: Vec3,
     /// Convex combination of points of B.
     pub(super) point_b: Vec3,
+    /// The elements that take part.
+    pub(super) held: Held,
 }
 
 impl Refined {
+    /// As the gap of cores that are apart.
+    pub(super) fn apart(&self) -> CoreGap {
+        CoreGap {
+            lower: self.value,
+            upper: (self.point_b - self.point_a).norm(),
+            normal: self.normal,
+            point_a: self.point_a,
+            point_b: self.point_b,
+            held: self.held,
+        }
+    }
+
     /// The closest point of the difference; it lies on no one element.
     pub(super) fn corner(&self) -> Vertex {
         Vertex {
@@ -71,14 +85,19 @@ impl Refined {
 
 /// A better gap of two cores that are apart.
 pub(super) fn refine(pair: &Pair<'_>, simplex: &Simplex, normal: &Vec3) -> Option<CoreGap> {
-    let found = solve(pair, simplex.used(), &simplex.weights, normal)?;
-    Some(CoreGap {
-        lower: found.value,
-        upper: (found.point_b - found.point_a).norm(),
-        normal: found.normal,
-        point_a: found.point_a,
-        point_b: found.point_b,
-    })
+    Some(solve(pair, simplex.used(), &simplex.weights, normal)?.apart())
+}
+
+/// A better answer than an earlier one, from the features it rested on.
+pub(super) fn resume(pair: &Pair<'_>, held: &Held, normal: &Vec3) -> Option<Refined> {
+    let mut set = Set::default();
+    for ((of_a, of_b), weight) in held.of.iter().zip(&held.weights).take(held.count as usize) {
+        set.add(*of_a, *of_b, f64::from(*weight));
+    }
+    if set.count == 0 {
+        return None;
+    }
+    climb(pair, set, normal)
 }
 
 /// The local greatest `f` near `normal`, with the features of the given vertices; `None` when it does not converge.
@@ -88,7 +107,10 @@ pub(super) fn solve(
     weights: &[f64],
     normal: &Vec3,
 ) -> Option<Refined> {
-    let mut set = Set::of(vertices, weights);
+    climb(pair, Set::of(vertices, weights), normal)
+}
+
+fn climb(pair: &Pair<'_>, mut set: Set, normal: &Vec3) -> Option<Refined> {
     let mut normal = *normal;
     let mut best: Option<Refined> = None;
     for _ in 0..SETS_MAX {
@@ -115,22 +137,34 @@ impl Set {
     fn of(vertices: &[Vertex], weights: &[f64]) -> Self {
         let mut set = Self::default();
         for (vertex, weight) in vertices.iter().zip(weights) {
-            let same = set.actives[..set.count]
-                .iter_mut()
-                .find(|x| x.of_a == vertex.of_a && x.of_b == vertex.of_b);
-            if let Some(same) = same {
-                same.weight += weight;
-            } else if set.count < 3 {
-                set.actives[set.count] = Active {
-                    of_a: vertex.of_a,
-                    of_b: vertex.of_b,
-                    weight: *weight,
-                    ..Active::default()
-                };
-                set.count += 1;
-            }
+            set.add(vertex.of_a, vertex.of_b, *weight);
         }
         set
+    }
+
+    fn add(&mut self, of_a: u32, of_b: u32, weight: f64) {
+        let same = self.actives[..self.count]
+            .iter_mut()
+            .find(|x| x.of_a == of_a && x.of_b == of_b);
+        if let Some(same) = same {
+            same.weight += weight;
+        } else if self.count < 3 {
+            self.actives[self.count] = Active {
+                of_a,
+                of_b,
+                weight,
+                ..Active::default()
+            };
+            self.count += 1;
+        }
+    }
+
+    fn held(&self) -> Held {
+        let mut held = Held::default();
+        for x in &self.actives[..self.count] {
+            held.push(x.of_a, x.of_b, x.weight);
+        }
+        held
     }
 
     fn join(&mut self, vertex: &Vertex) -> bool {
@@ -262,6 +296,7 @@ fn converge(pair: &Pair<'_>, set: &mut Set, start: &Vec3) -> Option<Refined> {
         value: set.least(),
         point_a,
         point_b,
+        held: set.held(),
     })
 }
 
@@ -285,19 +320,17 @@ fn step(set: &Set) -> Option<(f64, f64, [f64; 3])> {
     m[0][0] -= mean;
     m[1][1] -= mean;
     for (j, x) in actives.iter().enumerate().skip(1) {
-        for axis in 0..2 {
-            let slope = x.slope[axis] - first.slope[axis];
-            m[axis][j + 1] = slope;
-            m[j + 1][axis] = slope;
-        }
+        let slope = [x.slope[0] - first.slope[0], x.slope[1] - first.slope[1]];
+        (m[0][j + 1], m[1][j + 1]) = (slope[0], slope[1]);
+        m[j + 1][..2].copy_from_slice(&slope);
         m[j + 1][size] = first.value - x.value;
     }
     let solution = eliminate(&mut m, size)?;
     let mut change = [0.0; 3];
-    for j in 1..k {
-        change[j] = solution[j + 1];
-        change[0] -= solution[j + 1];
+    for (weight, value) in change[1..k].iter_mut().zip(&solution[2..]) {
+        *weight = *value;
     }
+    change[0] = -change[1..k].iter().sum::<f64>();
     Some((solution[0], solution[1], change))
 }
 

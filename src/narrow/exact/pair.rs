@@ -4,7 +4,7 @@
 
 use nalgebra::Matrix3;
 
-use crate::math::{Pose, Vec3};
+use crate::math::{Pose, Vec3, f32_down};
 use crate::shape::Convex;
 
 /// A point of the Minkowski difference with the points it comes from, A's frame.
@@ -22,6 +22,35 @@ pub(super) struct Vertex {
     pub(super) of_b: u32,
 }
 
+/// Which elements an answer rests on: enough to begin from there the next time.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Held {
+    /// Element of A, element of B.
+    pub(super) of: [(u32, u32); 3],
+    pub(super) weights: [f32; 3],
+    pub(super) count: u32,
+}
+
+impl Held {
+    /// The first three of the vertices.
+    pub(super) fn of(vertices: &[Vertex], weights: &[f64]) -> Self {
+        let mut held = Self::default();
+        for (vertex, weight) in vertices.iter().zip(weights) {
+            held.push(vertex.of_a, vertex.of_b, *weight);
+        }
+        held
+    }
+
+    pub(super) fn push(&mut self, of_a: u32, of_b: u32, weight: f64) {
+        let place = self.count as usize;
+        if place < self.of.len() {
+            self.of[place] = (of_a, of_b);
+            self.weights[place] = f32_down(weight);
+            self.count += 1;
+        }
+    }
+}
+
 /// What a method found out about two cores.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CoreGap {
@@ -35,6 +64,8 @@ pub(super) struct CoreGap {
     pub(super) point_a: Vec3,
     /// On the core of B; `point_b - point_a` is the gap times the normal.
     pub(super) point_b: Vec3,
+    /// What to begin from the next time.
+    pub(super) held: Held,
 }
 
 /// Two cores in A's frame.
@@ -101,6 +132,25 @@ impl<'a> Pair<'a> {
             of_a,
             of_b,
         }
+    }
+
+    /// The vertices an earlier answer rested on, where they are now; circles are asked along its `normal`.
+    pub(super) fn recall(&self, held: &Held, normal: &Vec3) -> impl Iterator<Item = Vertex> {
+        let in_b = -self.to_b(normal);
+        held.of
+            .into_iter()
+            .take(held.count as usize)
+            .filter_map(move |(of_a, of_b)| {
+                let a = self.a.core().element(of_a, normal)?;
+                let b = self.rotation * self.b.core().element(of_b, &in_b)? + self.at;
+                Some(Vertex {
+                    w: b - a,
+                    a,
+                    b,
+                    of_a,
+                    of_b,
+                })
+            })
     }
 
     /// A first direction: from centre to centre.

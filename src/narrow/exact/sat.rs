@@ -6,7 +6,7 @@
 //! Source: Gottschalk, Lin, Manocha 1996, OBBTree.
 
 use super::manifold::deepest_shared;
-use super::pair::{CoreGap, Pair};
+use super::pair::{CoreGap, Held, Pair};
 use crate::math::Vec3;
 use crate::shape::Core;
 
@@ -62,6 +62,7 @@ pub(super) fn boxes(pair: &Pair<'_>) -> Option<Axes> {
         normal,
         point_a,
         point_b,
+        held: Held::default(),
     }))
 }
 

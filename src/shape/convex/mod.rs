@@ -351,6 +351,14 @@ impl Core {
         }
     }
 
+    /// The point of an element: the vertex, or the farthest one of the circle along `dir`.
+    pub(crate) fn element(&self, element: u32, dir: &Vec3) -> Option<Vec3> {
+        match self.circle(element) {
+            Some(circle) => Some(rim(dir, circle.radius_m, circle.z_m)),
+            None => self.vertex(element),
+        }
+    }
+
     /// Whether it is the hull of finitely many points.
     pub(crate) fn is_polytope(&self) -> bool {
         !matches!(self, Self::Cylinder { .. } | Self::Cone { .. })
