@@ -137,7 +137,7 @@ fn a_half_space_is_met_by_the_deepest_point_in_either_order() {
 }
 
 #[test]
-fn swapping_moving_and_scaling_a_pair_changes_nothing_but_the_frame() {
+fn swapping_a_pair_or_asking_it_again_warm_leaves_its_gap() {
     let shapes = [
         Convex::cuboid(Vec3::new(0.3, 0.5, 0.7)),
         Convex::cone(0.4, 0.6),

@@ -21,7 +21,7 @@ use sweepd::math::{Point, Pose, Quat, Vec3};
 use sweepd::narrow::exact::{Closest, Manifold, Warm, convex_gap, manifold};
 use sweepd::shape::Convex;
 
-/// SplitMix64, seeded.
+/// The generator `SplitMix64`, seeded.
 struct Random(u64);
 
 impl Random {

@@ -56,9 +56,10 @@ fn nanos(poses: &[Pose], mut each: impl FnMut(usize, &Pose)) -> f64 {
     best
 }
 
-#[test]
-#[ignore = "timing; run by hand in release"]
-fn nanoseconds_a_query() {
+/// A name, the shape, and the same of parry.
+type Both = (&'static str, Convex, Box<dyn Shape>);
+
+fn shapes() -> Vec<Both> {
     let mut r = Random(5);
     let (h1, h2) = (hull_points(&mut r, 12), hull_points(&mut r, 64));
     let hull = |p: &[Vec3]| {
@@ -69,7 +70,7 @@ fn nanoseconds_a_query() {
         let points: Vec<_> = p.iter().map(|v| glamx::DVec3::new(v.x, v.y, v.z)).collect();
         Box::new(parry::ConvexPolyhedron::from_convex_hull(&points).unwrap())
     };
-    let shapes: Vec<(&str, Convex, Box<dyn Shape>)> = vec![
+    vec![
         (
             "sphere",
             Convex::sphere(0.5),
@@ -97,7 +98,101 @@ fn nanoseconds_a_query() {
         ),
         ("hull12", hull(&h1), parry_hull(&h1)),
         ("hull64", hull(&h2), parry_hull(&h2)),
-    ];
+    ]
+}
+
+/// Random poses with gaps between `low` and `high`.
+fn poses_of(r: &mut Random, a: &Both, b: &Both, low: f64, high: f64) -> Vec<Pose> {
+    let mut poses = Vec::new();
+    while poses.len() < 1000 {
+        let rotation = UnitQuaternion::from_scaled_axis(r.vector() * 6.0);
+        let mut at = r.vector().normalize();
+        let target = low + (high - low) * r.unit();
+        for _ in 0..2 {
+            let pose = Pose::from_parts(at.into(), rotation);
+            let c = convex_gap(&a.1, &b.1, &pose, &mut Warm::default());
+            at += c.normal * (target - c.best_m);
+        }
+        poses.push(Pose::from_parts(at.into(), rotation));
+    }
+    poses
+}
+
+/// Cold, warm, manifold.
+fn ours(a: &Both, b: &Both, poses: &[Pose]) -> [f64; 3] {
+    let cold = nanos(poses, |_, p| {
+        std::hint::black_box(convex_gap(&a.1, &b.1, p, &mut Warm::default()));
+    });
+    let mut warms = vec![Warm::default(); poses.len()];
+    let warm = nanos(poses, |k, p| {
+        std::hint::black_box(convex_gap(&a.1, &b.1, p, &mut warms[k]));
+    });
+    let closest: Vec<_> = poses
+        .iter()
+        .map(|p| convex_gap(&a.1, &b.1, p, &mut Warm::default()))
+        .collect();
+    let mut out = Manifold::default();
+    let points = nanos(poses, |k, p| {
+        manifold(&a.1, &b.1, p, &closest[k], 0.02, &mut out);
+        std::hint::black_box(&out);
+    });
+    [cold, warm, points]
+}
+
+/// Distance, contact, manifold cold and warm.
+fn parrys(a: &Both, b: &Both, poses: &[Pose]) -> [f64; 4] {
+    let parry_poses: Vec<_> = poses.iter().map(to_parry).collect();
+    let distance = nanos(poses, |k, _| {
+        let _ = std::hint::black_box(query::distance(
+            &glamx::DPose3::IDENTITY,
+            &*a.2,
+            &parry_poses[k],
+            &*b.2,
+        ));
+    });
+    let contact = nanos(poses, |k, _| {
+        let _ = std::hint::black_box(query::contact(
+            &glamx::DPose3::IDENTITY,
+            &*a.2,
+            &parry_poses[k],
+            &*b.2,
+            1.0,
+        ));
+    });
+    let dispatcher = query::DefaultQueryDispatcher;
+    let cold_m = nanos(poses, |k, _| {
+        let mut manifolds: Vec<ContactManifold<(), ()>> = Vec::new();
+        let _ = query::PersistentQueryDispatcher::contact_manifolds(
+            &dispatcher,
+            &parry_poses[k],
+            &*a.2,
+            &*b.2,
+            0.02,
+            &mut manifolds,
+            &mut None,
+        );
+        std::hint::black_box(&manifolds);
+    });
+    let mut kept: Vec<Vec<ContactManifold<(), ()>>> = vec![Vec::new(); poses.len()];
+    let warm_m = nanos(poses, |k, _| {
+        let _ = query::PersistentQueryDispatcher::contact_manifolds(
+            &dispatcher,
+            &parry_poses[k],
+            &*a.2,
+            &*b.2,
+            0.02,
+            &mut kept[k],
+            &mut None,
+        );
+    });
+    [distance, contact, cold_m, warm_m]
+}
+
+#[test]
+#[ignore = "timing; run by hand in release"]
+fn nanoseconds_a_query() {
+    let mut r = Random(5);
+    let shapes = shapes();
     println!(
         "pair               regime    cold    warm  manifold | parry distance contact manifold-cold manifold-warm"
     );
@@ -120,78 +215,9 @@ fn nanoseconds_a_query() {
             ("touch", -0.01, 0.01),
             ("deep", -0.25, -0.05),
         ] {
-            let mut poses = Vec::new();
-            while poses.len() < 1000 {
-                let rotation = UnitQuaternion::from_scaled_axis(r.vector() * 6.0);
-                let mut at = r.vector().normalize();
-                let target = low + (high - low) * r.unit();
-                for _ in 0..2 {
-                    let pose = Pose::from_parts(at.into(), rotation);
-                    let c = convex_gap(&a.1, &b.1, &pose, &mut Warm::default());
-                    at += c.normal * (target - c.best_m);
-                }
-                poses.push(Pose::from_parts(at.into(), rotation));
-            }
-            let parry_poses: Vec<_> = poses.iter().map(to_parry).collect();
-            let cold = nanos(&poses, |_, p| {
-                std::hint::black_box(convex_gap(&a.1, &b.1, p, &mut Warm::default()));
-            });
-            let mut warms = vec![Warm::default(); poses.len()];
-            let warm = nanos(&poses, |k, p| {
-                std::hint::black_box(convex_gap(&a.1, &b.1, p, &mut warms[k]));
-            });
-            let closest: Vec<_> = poses
-                .iter()
-                .map(|p| convex_gap(&a.1, &b.1, p, &mut Warm::default()))
-                .collect();
-            let mut out = Manifold::default();
-            let points = nanos(&poses, |k, p| {
-                manifold(&a.1, &b.1, p, &closest[k], 0.02, &mut out);
-                std::hint::black_box(&out);
-            });
-            let distance = nanos(&poses, |k, _| {
-                let _ = std::hint::black_box(query::distance(
-                    &glamx::DPose3::IDENTITY,
-                    &*a.2,
-                    &parry_poses[k],
-                    &*b.2,
-                ));
-            });
-            let contact = nanos(&poses, |k, _| {
-                let _ = std::hint::black_box(query::contact(
-                    &glamx::DPose3::IDENTITY,
-                    &*a.2,
-                    &parry_poses[k],
-                    &*b.2,
-                    1.0,
-                ));
-            });
-            let dispatcher = query::DefaultQueryDispatcher;
-            let cold_m = nanos(&poses, |k, _| {
-                let mut manifolds: Vec<ContactManifold<(), ()>> = Vec::new();
-                let _ = query::PersistentQueryDispatcher::contact_manifolds(
-                    &dispatcher,
-                    &parry_poses[k],
-                    &*a.2,
-                    &*b.2,
-                    0.02,
-                    &mut manifolds,
-                    &mut None,
-                );
-                std::hint::black_box(&manifolds);
-            });
-            let mut kept: Vec<Vec<ContactManifold<(), ()>>> = vec![Vec::new(); poses.len()];
-            let warm_m = nanos(&poses, |k, _| {
-                let _ = query::PersistentQueryDispatcher::contact_manifolds(
-                    &dispatcher,
-                    &parry_poses[k],
-                    &*a.2,
-                    &*b.2,
-                    0.02,
-                    &mut kept[k],
-                    &mut None,
-                );
-            });
+            let poses = poses_of(&mut r, a, b, low, high);
+            let [cold, warm, points] = ours(a, b, &poses);
+            let [distance, contact, cold_m, warm_m] = parrys(a, b, &poses);
             println!(
                 "{:8} {:8} {regime:6} {cold:7.0} {warm:7.0} {points:7.0}   | {distance:7.0} {contact:7.0} {cold_m:7.0} {warm_m:7.0}",
                 a.0, b.0

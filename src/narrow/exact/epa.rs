@@ -12,6 +12,7 @@
 
 use std::cell::RefCell;
 
+use super::gjk;
 use super::newton::{self, Refined};
 use super::pair::{CoreGap, Held, Pair, across, unit};
 use super::polytope::Polytope;
@@ -22,6 +23,10 @@ use crate::math::Vec3;
 const STEPS_MAX: usize = 300;
 /// Relative width at which curved cores end; polytopes end at roundoff.
 const CURVED: f64 = 5e-8;
+/// Width from which another run is worth its time, in parts of the size.
+const LOOSE: f64 = 5e-7;
+/// How many more runs.
+const ATTEMPTS_MAX: usize = 2;
 /// Height of the difference over a face, in parts of the smaller core, from which its features are worth a Newton run.
 const NEAR: f64 = 2e-2;
 /// Cosine between face normals beyond which a face belongs to another local optimum.
@@ -40,8 +45,21 @@ thread_local! {
 /// * `warm` - what Newton made of the features of an earlier answer, if anything.
 pub(super) fn depth(pair: &Pair<'_>, simplex: &Simplex, warm: Option<Refined>) -> CoreGap {
     let run = |polytope: &mut Polytope| {
-        let gap = polytope.run(pair, simplex, warm);
-        polytope.straight(pair, gap)
+        let upright = [Vec3::x(), Vec3::y(), Vec3::z()];
+        let gap = polytope.run(pair, simplex, &upright, warm);
+        let mut gap = polytope.straight(pair, gap);
+        // A surface that breaks on slivers leaves the ends apart: other first corners make other slivers.
+        for attempt in 0..ATTEMPTS_MAX {
+            if gap.upper - gap.lower <= LOOSE * pair.scale {
+                break;
+            }
+            let one = across(&gap.normal);
+            let turned = [gap.normal, one, gap.normal.cross(&one)];
+            let axes = if attempt == 0 { &upright } else { &turned };
+            let again = polytope.run(pair, &Simplex::default(), axes, None);
+            gap = gjk::better(&gap, &polytope.straight(pair, again));
+        }
+        gap
     };
     SCRATCH.with(|scratch| match scratch.try_borrow_mut() {
         Ok(mut polytope) => run(&mut polytope),
@@ -81,16 +99,33 @@ struct State {
     last: f64,
 }
 
+impl State {
+    /// Whether a face belongs to another local optimum than the one that Newton found.
+    fn is_new(&self, normal: &Vec3) -> bool {
+        self.refined.is_none_or(|r| r.normal.dot(normal) < ANOTHER)
+    }
+}
+
+/// How close both ends must come.
+fn tolerance_m(pair: &Pair<'_>) -> f64 {
+    if pair.polytopes {
+        pair.tiny()
+    } else {
+        CURVED * pair.scale
+    }
+}
+
 impl Polytope {
-    fn run(&mut self, pair: &Pair<'_>, simplex: &Simplex, warm: Option<Refined>) -> CoreGap {
-        if let Err(flat) = self.start(pair, simplex) {
+    fn run(
+        &mut self,
+        pair: &Pair<'_>,
+        simplex: &Simplex,
+        axes: &[Vec3; 3],
+        warm: Option<Refined>,
+    ) -> CoreGap {
+        if let Err(flat) = self.start(pair, simplex, axes) {
             return flat;
         }
-        let tolerance = if pair.polytopes {
-            pair.tiny()
-        } else {
-            CURVED * pair.scale
-        };
         let mut state = State {
             best: Best {
                 lower: f64::NEG_INFINITY,
@@ -103,11 +138,11 @@ impl Polytope {
             last: f64::NEG_INFINITY,
         };
         let sound = match warm {
-            Some(found) => self.plant(pair, &found, tolerance, &mut state),
+            Some(found) => self.plant(pair, &found, &mut state),
             None => true,
         };
         if sound {
-            self.expand(pair, tolerance, &mut state);
+            self.expand(pair, &mut state);
         }
         let best = &mut state.best;
         if let Some(found) = state.refined.filter(|r| r.value >= best.lower) {
@@ -130,13 +165,13 @@ impl Polytope {
     }
 
     /// Grows at the nearest face until both ends meet.
-    fn expand(&mut self, pair: &Pair<'_>, tolerance: f64, state: &mut State) {
+    fn expand(&mut self, pair: &Pair<'_>, state: &mut State) {
         let near = NEAR * pair.a.reach().min(pair.b.reach());
+        let tolerance = tolerance_m(pair);
         for _ in 0..STEPS_MAX {
             let Some(place) = self.nearest() else {
                 break;
             };
-            state.nearest = place;
             let face = self.faces[place];
             state.fits = state.fits.max(face.distance);
             // What is known may be tight already.
@@ -146,20 +181,17 @@ impl Polytope {
             let new = pair.support(&-face.normal);
             let reach = face.normal.dot(&new.w);
             state.best.offer(-reach, &-face.normal, place);
-            state.last = -reach;
+            (state.nearest, state.last) = (place, -reach);
             if reach - face.distance <= tolerance || -state.best.lower - face.distance <= tolerance
             {
                 break;
             }
             // A first look at the features: the closest point itself becomes a corner, which saves most of the steps.
-            let looks_new = state
-                .refined
-                .is_none_or(|r| r.normal.dot(&face.normal) > -ANOTHER);
-            if !pair.polytopes && looks_new && reach - face.distance <= near {
+            if !pair.polytopes && reach - face.distance <= near && state.is_new(&-face.normal) {
                 let corners = face.corners.map(|k| self.vertices[k]);
                 let found = newton::solve(pair, &corners, &self.project(place).2, &-face.normal);
                 if let Some(found) = found.filter(|r| r.value > state.best.lower) {
-                    if !self.plant(pair, &found, tolerance, state) {
+                    if !self.plant(pair, &found, state) {
                         break;
                     }
                     if !self.faces[place].alive {
@@ -176,15 +208,10 @@ impl Polytope {
 
     /// Takes in what Newton found, the closest point and a ring around it: the faces between them lean so little from
     /// the best normal that they are within the tolerance. False when the surface broke.
-    fn plant(
-        &mut self,
-        pair: &Pair<'_>,
-        found: &Refined,
-        tolerance: f64,
-        state: &mut State,
-    ) -> bool {
+    fn plant(&mut self, pair: &Pair<'_>, found: &Refined, state: &mut State) -> bool {
         state.best.offer(found.value, &found.normal, state.nearest);
         state.refined = Some(*found);
+        let tolerance = tolerance_m(pair);
         let (one, tiny) = (across(&found.normal), pair.tiny());
         let other = found.normal.cross(&one);
         let lean = (2.0 * (tolerance / found.value.abs().max(tiny)).sqrt()).min(RING_MAX);
@@ -226,14 +253,12 @@ impl Polytope {
         let mut held = corners.map_or_else(Held::default, |c| Held::of(&c, &weights));
         if !pair.polytopes
             && let Some(corners) = corners
+            && let Some(found) = newton::solve(pair, &corners, &weights, &best.normal)
+            && found.value > best.lower
         {
-            if let Some(found) = newton::solve(pair, &corners, &weights, &best.normal)
-                && found.value > best.lower
-            {
-                best.offer(found.value, &found.normal, nearest);
-                (point_a, point_b) = (found.point_a, found.point_b);
-                held = found.held;
-            }
+            best.offer(found.value, &found.normal, nearest);
+            (point_a, point_b) = (found.point_a, found.point_b);
+            held = found.held;
         }
         CoreGap {
             lower: best.lower,

@@ -100,7 +100,7 @@ pub(super) fn distance(
 }
 
 /// The tighter end of each; witnesses follow the upper end, the normal the lower.
-fn better(one: &CoreGap, other: &CoreGap) -> CoreGap {
+pub(super) fn better(one: &CoreGap, other: &CoreGap) -> CoreGap {
     let (low, high) = (
         if other.lower >= one.lower { other } else { one },
         if other.upper <= one.upper { other } else { one },

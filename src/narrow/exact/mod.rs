@@ -117,7 +117,11 @@ pub fn convex_gap(a: &Convex, b: &Convex, pos12: &Pose, warm: &mut Warm) -> Clos
     if !pair.scale.is_finite() {
         return Closest::unknown();
     }
-    let core = closed::gap(&pair).unwrap_or_else(|| iterate(&pair, warm));
+    // Closed forms begin from nothing, and leave nothing behind.
+    if let Some(core) = closed::gap(&pair) {
+        return finish(&pair, &core);
+    }
+    let core = iterate(&pair, warm);
     *warm = Warm {
         normal: core.normal,
         held: core.held,

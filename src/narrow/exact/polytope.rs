@@ -51,7 +51,15 @@ impl Polytope {
     }
 
     /// A tetrahedron with a volume, or the gap when the difference is flat.
-    pub(super) fn start(&mut self, pair: &Pair<'_>, simplex: &Simplex) -> Result<(), CoreGap> {
+    ///
+    /// * `axes` - orthogonal; where the simplex does not do, the tetrahedron begins along one of them.
+    #[allow(clippy::result_large_err, reason = "lives on the stack for one query")]
+    pub(super) fn start(
+        &mut self,
+        pair: &Pair<'_>,
+        simplex: &Simplex,
+        axes: &[Vec3; 3],
+    ) -> Result<(), CoreGap> {
         self.vertices.clear();
         self.faces.clear();
         self.distances.clear();
@@ -69,8 +77,7 @@ impl Polytope {
             }
         }
         // Two ends along some axis, then the farthest from the line, then from the plane.
-        let mut ends = [Vec3::x(), Vec3::y(), Vec3::z()]
-            .map(|axis| (pair.support(&axis), pair.support(&-axis)));
+        let mut ends = axes.map(|axis| (pair.support(&axis), pair.support(&-axis)));
         ends.sort_by(|s, t| {
             (t.0.w - t.1.w)
                 .norm_squared()

@@ -15,6 +15,8 @@ use crate::shape::Core;
 const PARALLEL: f64 = 1e-8;
 /// A box shows a corner, not an edge, where no part of the normal in its frame is below this.
 const CORNER: f64 = 1e-6;
+/// How far beyond its end an edge may be met, in parts of the size: roundoff of the crossing of two lines.
+const SAME: f64 = 1e-9;
 
 /// What the axes say of two boxes.
 pub(super) enum Axes {
@@ -140,7 +142,19 @@ fn witnesses(pair: &Pair<'_>, least: &Least, gap: f64) -> Option<(Vec3, Vec3)> {
             }
             let (s, t) = (between.dot(&along), between.dot(&other));
             let a = vertex.a + along * ((s - cosine * t) / square);
-            Some((a, a + n * gap))
+            let b = a + n * gap;
+            // The axis of two edges may be that of a face as well, and then the edges need not cross.
+            let half = |core: &Core, k: usize| match core {
+                Core::Cuboid { half } => half[k] + SAME * pair.scale,
+                _ => f64::INFINITY,
+            };
+            let crossing = a[i].abs() <= half(pair.a.core(), i)
+                && other.dot(&(b - pair.at)).abs() <= half(pair.b.core(), j);
+            if crossing {
+                Some((a, b))
+            } else {
+                deepest_shared(pair, n, gap)
+            }
         }
         _ => deepest_shared(pair, n, gap),
     }
