@@ -191,7 +191,7 @@ impl Solid {
 }
 
 /// Sides of the polygon that stands for a circle.
-const SIDES: u32 = 16;
+const SIDES: u32 = 12;
 
 /// A prism or pyramid in (`outside` 0) or round (1) a cylinder or cone.
 fn prism(low: f64, high: f64, h: f64, outside: f64) -> Soup {

@@ -7,7 +7,7 @@
 use sweepd::math::{Point, Pose, Vec3};
 
 use crate::kinds::Solid;
-use crate::oracle::{Placed, Truth, crosses, triangle_distance, truth};
+use crate::oracle::{Placed, Truth, crosses, least_overlap, triangle_distance};
 
 /// The gap lies between.
 #[derive(Clone, Copy, Debug)]
@@ -115,6 +115,52 @@ fn of_meshes(a: At<'_>, b: At<'_>) -> Bounds {
         Truth::Overlap(_) => f64::NEG_INFINITY,
     };
     Bounds { low, high }
+}
+
+/// As the oracle's `truth`, with pairs of triangles passed over whose boxes alone keep them farther apart than what is
+/// known, and corners outside the other's box.
+fn truth(a: &Placed, b: &Placed) -> Truth {
+    let of = |t: &[Point]| {
+        let ends = (t[0], t[0]);
+        t.iter().fold(ends, |(l, h), p| (l.inf(p), h.sup(p)))
+    };
+    let boxes: Vec<_> = b.triangles.iter().map(|t| of(t)).collect();
+    let (mut crossing, mut distance, mut gap) = (false, f64::INFINITY, 0.0_f64);
+    for s in &a.triangles {
+        let (low, high) = of(s);
+        for (t, (from, to)) in b.triangles.iter().zip(&boxes) {
+            let apart = (from - high).sup(&(low - to)).sup(&Vec3::zeros()).norm() * (1.0 - 1e-12);
+            if apart > distance || (apart > 0.0 && crossing) {
+                continue;
+            }
+            if apart == 0.0 && crosses(s, t) {
+                crossing = true;
+                if !a.solid && !b.solid {
+                    gap = gap.min(-least_overlap(s, t));
+                }
+            } else if !crossing {
+                distance = distance.min(triangle_distance(s, t));
+            }
+        }
+    }
+    let mut held = false;
+    for (from, within) in [(a, b), (b, a)] {
+        if !within.solid {
+            continue;
+        }
+        let (low, high) = of(&within.corners);
+        for p in &from.corners {
+            if (0..3).all(|k| low[k] < p[k] && p[k] < high[k]) && within.holds(p) {
+                held = true;
+                gap = gap.min(-within.distance_from(p));
+            }
+        }
+    }
+    if crossing || held {
+        Truth::Overlap(gap)
+    } else {
+        Truth::Apart(distance)
+    }
 }
 
 fn placed((solid, pose): At<'_>, which: usize, from: &Vec3) -> Placed {
