@@ -96,24 +96,8 @@ pub fn any(rng: &mut Rng, kind: usize, s: f64) -> (Solid, ShapeSpec) {
                 },
             )
         }
-        7 => {
-            let one = Vec3::new(1.0, 1.0, 1.0);
-            let soup = match rng.below(4) {
-                0 => meshes::torus(0.7, 0.25, 6, 4),
-                1 => meshes::bumpy_sphere(5, 5, 0.15),
-                2 => meshes::cuboid(one * 0.8).and(meshes::cuboid(one * 0.5).inverted()),
-                _ => meshes::block_with_hole(1.0, 0.5, 0.5),
-            };
-            mesh(soup.scaled(one * s), true)
-        }
-        8 => {
-            let soup = if rng.below(2) == 0 {
-                meshes::patch(rng, 4)
-            } else {
-                meshes::slivers(rng)
-            };
-            mesh(soup.scaled(Vec3::new(s, s, s)), false)
-        }
+        7 => mesh(some_solid(rng).scaled(Vec3::new(s, s, s)), true),
+        8 => mesh(some_surface(rng).scaled(Vec3::new(s, s, s)), false),
         HALF_SPACE => {
             let normal = rng.direction();
             let spec = ShapeSpec::HalfSpace {
@@ -133,6 +117,24 @@ pub fn any(rng: &mut Rng, kind: usize, s: f64) -> (Solid, ShapeSpec) {
             };
             (Solid::Mesh(Soup::new(Vec::new(), Vec::new()), true), spec)
         }
+    }
+}
+
+fn some_solid(rng: &mut Rng) -> Soup {
+    let one = Vec3::new(1.0, 1.0, 1.0);
+    match rng.below(4) {
+        0 => meshes::torus(0.7, 0.25, 6, 4),
+        1 => meshes::bumpy_sphere(5, 5, 0.15),
+        2 => meshes::cuboid(one * 0.8).and(meshes::cuboid(one * 0.5).inverted()),
+        _ => meshes::block_with_hole(1.0, 0.5, 0.5),
+    }
+}
+
+fn some_surface(rng: &mut Rng) -> Soup {
+    if rng.below(2) == 0 {
+        meshes::patch(rng, 4)
+    } else {
+        meshes::slivers(rng)
     }
 }
 

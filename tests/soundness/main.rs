@@ -24,10 +24,11 @@ mod oracle;
 
 mod couples;
 mod kinds;
+mod run;
 mod truth;
 
-use couples::{Run, TICKS};
 use kinds::KINDS;
+use run::{Run, TICKS};
 
 #[test]
 fn law_1_every_verdict_and_interval_holds_the_truth_at_any_budget_for_all_kinds_of_shapes() {
