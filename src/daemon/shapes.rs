@@ -12,7 +12,7 @@ use crate::world::PlacedShape;
 pub struct Shapes {
     /// One list a body, in the scene's order.
     pub bodies: Vec<Arc<[PlacedShape]>>,
-    /// What `check` shows: what is odd but legal, sizes, open meshes, turned shells.
+    /// What `check` shows: sizes, open meshes, turned shells.
     pub warnings: Vec<String>,
     /// The shapes by spec, for edits that use them again.
     pub library: Library,
@@ -31,11 +31,9 @@ pub fn build_shapes(scene: &Scene) -> Result<Shapes> {
         .zip(built.shapes)
         .map(|(body, shapes)| place(body, shapes))
         .collect();
-    let mut warnings = scene.notes();
-    warnings.extend(built.warnings);
     Ok(Shapes {
         bodies,
-        warnings,
+        warnings: built.warnings,
         library,
     })
 }
