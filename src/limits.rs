@@ -41,7 +41,7 @@ pub const HEARTBEAT_MS_DEFAULT: u64 = 100;
 pub const TIMEOUT_MS_DEFAULT: u64 = 500;
 /// Bytes of one scene edit request.
 pub const REQUEST_BYTES_MAX: usize = 1 << 29;
-/// Remembered sessions that are over, per daemon; the oldest is forgotten, and then refused as an old frame anyway.
+/// Remembered sessions that are over, per daemon; beyond it the oldest is forgotten, and its client could come back.
 pub const SESSIONS_OVER_MAX: usize = 1024;
 
 const _: () = {

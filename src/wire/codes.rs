@@ -255,7 +255,7 @@ pub mod pair_flags {
     pub const UNKNOWN_BODY: u8 = 4;
     /// A body of the pair is held at an old pose.
     pub const HELD_BODY: u8 = 8;
-    /// The pair is gone (removed, filtered, ended by a cause); this row only carries its last event.
+    /// The pair is gone (removed, filtered, ended by a cause, or its boxes parted); this row only carries its last event.
     pub const GONE: u8 = 16;
 }
 

@@ -15,7 +15,7 @@
 //! The certificate: for every unit `n`, `f(n) = -(s_A(n) + s_B(-n))` is a lower bound on the gap, so the lower end is
 //! `f` at the best normal found, whoever found it. The upper end is the distance of two points that are convex
 //! combinations of points of the shapes, or minus the radius of a ball that fits into a polytope inscribed in the
-//! Minkowski difference. Both are widened by [`Pair::pad`], which takes up every rounding from the quaternion on.
+//! Minkowski difference. Both are widened by `Pair::pad`, which takes up every rounding from the quaternion on.
 //!
 //! Refused: parry's own queries on this path. Their tolerances are absolute (the answer depends on the unit of
 //! length), coincident shapes come back with depth 0, and curved pairs stop at 1e-7; here every tolerance is a
