@@ -1,5 +1,5 @@
 //! Budgets above the floor: how far a tick overshoots, on the wall and on the thread's CPU clock, and how much of what is
-//! left above the floor is used while work remains. Scene: `pool(10000, 11)`, each body 1 % of its size a tick, pairs and
+//! left above the floor is used while work remains. Scene: `pool(4000, 11)`, each body 1 % of its size a tick, pairs and
 //! contacts asked for.
 //!
 //! `cargo bench --bench budget [-- --quick]`
@@ -15,7 +15,7 @@ use sweepd::wire::{Demand, Stage};
 
 fn main() {
     let quick = std::env::args().any(|arg| arg == "--quick");
-    let (seed, bodies) = (11, 10_000);
+    let (seed, bodies) = (11, 4_000);
     let ticks = if quick { 60 } else { 400 };
     let mut csv = String::from(
         "machine,commit,compiler,seed,bodies,above_floor_us,ticks,floor_us,overshoot_wall_p50_us,overshoot_wall_p99_us,\

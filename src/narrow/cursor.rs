@@ -155,7 +155,7 @@ impl Cursor {
             counters.queries += 1;
             if let Some(closest) = shape_gap(&one.shape, &other.shape, &pos12, &mut Warm::default())
             {
-                let gap = sound(closest.gap);
+                let gap = sound(closest.gap, one, other, &self.rel);
                 self.certain &= closest.finished || !gap.contains(0.0);
                 if gap.max < self.gap.max {
                     self.witness = Some(witness_of(one, other, &pos12, &closest, places));
@@ -189,7 +189,7 @@ impl Cursor {
     /// Takes over what a finished walk found.
     fn take_walk(&mut self, (a, b): (&Body, &Body), places: (u32, u32), pos12: &Pose) {
         let (one, other) = (&a.shapes[places.0 as usize], &b.shapes[places.1 as usize]);
-        let gap = sound(self.walk.interval());
+        let gap = sound(self.walk.interval(), one, other, &self.rel);
         self.certain &= self.walk.is_certain();
         if let Some(leaf) = self.walk.witness().filter(|_| gap.max < self.gap.max) {
             self.witness = Some(Witness {

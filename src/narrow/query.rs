@@ -1,6 +1,6 @@
 //! Queries of shape pairs without meshes, and the change of frames around them.
 
-use crate::math::{Interval, Pose, relative};
+use crate::math::{Interval, Pose, ROUND, relative};
 use crate::shape::{Geometry, Shape};
 use crate::wire::NO_INDEX;
 use crate::world::{Body, PlacedShape};
@@ -124,14 +124,27 @@ pub(super) fn sphere_bound(a: &PlacedShape, b: &PlacedShape, bodies12: &Pose) ->
     (cb - ca).norm() - ra - rb - 16.0 * f64::EPSILON * magnitude
 }
 
-/// The certificate of an answer, never narrower than its rounding allows and with its ends in order.
-pub(super) fn sound(gap: Interval) -> Interval {
-    if gap.min <= gap.max {
-        gap
-    } else {
-        Interval {
-            min: gap.max.min(gap.min),
-            max: gap.min.max(gap.max),
-        }
+/// The certificate of a shape pair's answer for the bodies: its ends in order, and wider by what composing the poses may
+/// have lost. A shape a kilometre from its body's origin has its place rounded there, which the exact query cannot know.
+pub(super) fn sound(gap: Interval, a: &PlacedShape, b: &PlacedShape, bodies12: &Pose) -> Interval {
+    let ordered = Interval {
+        min: gap.min.min(gap.max),
+        max: gap.max.max(gap.min),
+    };
+    let off = |pose: &Pose| *pose != Pose::identity();
+    if !(off(&a.pose) || off(&b.pose)) {
+        return ordered;
+    }
+    let reach = |pose: &Pose| pose.translation.vector.amax();
+    let magnitude = reach(&a.pose) + reach(&b.pose) + reach(bodies12);
+    let wide = ordered.widened(32.0 * ROUND * magnitude);
+    // A proved overlap stays one: within rounding it touches at least, and touching collides.
+    Interval {
+        min: wide.min,
+        max: if ordered.max <= 0.0 {
+            ordered.max
+        } else {
+            wide.max
+        },
     }
 }

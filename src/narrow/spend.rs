@@ -195,7 +195,7 @@ impl Narrow {
         memo.tested = self.tick;
         memo.tight = closest.finished;
         let answer = Answer {
-            gap: sound(closest.gap),
+            gap: sound(closest.gap, &a.shapes[0], &b.shapes[0], &rel),
             finished: closest.finished,
             witness: Some(witness),
         };

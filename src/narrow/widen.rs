@@ -118,7 +118,8 @@ impl Narrow {
             f64::INFINITY
         } else {
             let spent = self.spent_m[hot.a.index()] + self.spent_m[hot.b.index()];
-            (spent - memo.credit_m).next_up()
+            // Rounded up by what the sums of long paths may have lost, not by an ulp of their small difference.
+            (spent - memo.credit_m) + 4.0 * ROUND * (spent.abs() + memo.credit_m.abs())
         };
         let by_pose = relative_motion(a, b, &memo.rel, &rel);
         let motion_m = by_path.min(by_pose).max(0.0);
