@@ -1,5 +1,10 @@
-//! What shared memory costs a lockstep client: from its send to its receipt of the result, beyond the tick's own
-//! time, by event and by spinning on both sides.
+//! What shared memory costs a lockstep client: from its send to its receipt of the result, beyond the tick's own time.
+//!
+//! * `sleep` - both sides go to sleep at once and are woken by an event each.
+//! * `event` - the default: both look for 50 us, then sleep; frames as fast as the results come.
+//! * `event_1khz` - the default with a frame a millisecond, so that the daemon has gone to sleep.
+//! * `polling` - neither side ever sleeps.
+//! * `socket_echo` - two bare wake-ups of this machine, for comparison: a Unix datagram to another process and back.
 //!
 //! Method: a daemon without geometry in a process of its own (this program again) answers each frame with a tick and
 //! one pair a body; the tick says how long it took from wake-up to the outbox filled, which is taken off. CSV on
@@ -14,8 +19,10 @@
 )]
 
 use std::io::{BufRead, BufReader, Read};
+use std::os::unix::net::UnixDatagram;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use sweepd::time::{Clock, SystemClock};
 use sweepd::transport::Door;
@@ -32,14 +39,68 @@ fn place(root: &str) -> Place {
     Place::new("bench").unwrap().under(root, "swbench_")
 }
 
-/// The daemon's part: until its standard input ends.
-fn serve(root: &str, busy_poll: bool) {
+/// How long both sides look before they sleep; `None`: the default.
+fn spin_ns(how: &str) -> Option<u64> {
+    match how {
+        "sleep" => Some(0),
+        "polling" => Some(u64::MAX),
+        _ => None,
+    }
+}
+
+/// A Unix datagram to another process and back: what two wake-ups cost on this machine.
+fn echo(frames: usize) {
+    let root = std::env::temp_dir().join(format!("swbench_echo_{}", std::process::id()));
+    std::fs::create_dir_all(&root).unwrap();
+    let (here, there) = (root.join("here"), root.join("there"));
+    let socket = UnixDatagram::bind(&here).unwrap();
+    let mut other = Command::new(std::env::current_exe().unwrap())
+        .args(["echo", there.to_str().unwrap(), here.to_str().unwrap()])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    BufReader::new(other.stdout.as_mut().unwrap())
+        .read_line(&mut line)
+        .unwrap();
     let clock = SystemClock;
-    let mut server = Server::open(ServerOptions {
-        busy_poll,
+    let mut byte = [1];
+    let mut latencies_ns: Vec<_> = (0..frames)
+        .map(|_| {
+            let sent_ns = clock.monotonic_ns();
+            socket.send_to(&byte, &there).unwrap();
+            socket.recv(&mut byte).unwrap();
+            clock.monotonic_ns() - sent_ns
+        })
+        .collect();
+    socket.send_to(&[0], &there).unwrap();
+    other.wait().unwrap();
+    let _left = std::fs::remove_dir_all(&root);
+    report("socket_echo", 0, &mut latencies_ns);
+}
+
+/// The other side of [`echo`], until a 0 comes.
+fn echo_back(own: &str, peer: &str) {
+    let socket = UnixDatagram::bind(own).unwrap();
+    println!("READY");
+    let mut byte = [1];
+    while byte[0] != 0 {
+        socket.recv(&mut byte).unwrap();
+        socket.send_to(&byte, peer).unwrap();
+    }
+}
+
+/// The daemon's part: until its standard input ends.
+fn serve(root: &str, how: &str) {
+    let clock = SystemClock;
+    let mut options = ServerOptions {
+        heartbeat_ns: SECOND_NS / 10,
         ..ServerOptions::new(place(root), 7)
-    })
-    .unwrap();
+    };
+    if let Some(spin_ns) = spin_ns(how) {
+        options.spin_ns = spin_ns;
+    }
+    let mut server = Server::open(options).unwrap();
     println!("READY");
     std::thread::spawn(|| {
         let mut nothing = Vec::new();
@@ -101,6 +162,20 @@ fn at(sorted: &[u64], share: f64) -> f64 {
     us
 }
 
+fn report(how: &str, bodies: u64, latencies_ns: &mut [u64]) {
+    latencies_ns.sort_unstable();
+    let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    println!(
+        "{how},{bodies},{},{:.1},{:.1},{:.1},{:.1},{}",
+        latencies_ns.len(),
+        at(latencies_ns, 0.5),
+        at(latencies_ns, 0.9),
+        at(latencies_ns, 0.99),
+        at(latencies_ns, 0.999),
+        load.split(' ').next().unwrap_or("")
+    );
+}
+
 fn measure(how: &str, bodies: u64, frames: usize) {
     let root = std::env::temp_dir().join(format!("swbench_{}", std::process::id()));
     let root = root.to_str().unwrap().to_owned();
@@ -121,7 +196,9 @@ fn measure(how: &str, bodies: u64, frames: usize) {
     }
     .connect()
     .unwrap();
-    client.set_spin(how == "polling");
+    if let Some(spin_ns) = spin_ns(how) {
+        client.set_spin_ns(spin_ns);
+    }
     client
         .subscribe(Topics {
             pairs: true,
@@ -137,6 +214,9 @@ fn measure(how: &str, bodies: u64, frames: usize) {
     let clock = SystemClock;
     let mut latencies_ns = Vec::with_capacity(frames);
     for frame in 0..FRAMES_WARM + frames {
+        if how == "event_1khz" {
+            std::thread::park_timeout(Duration::from_millis(1));
+        }
         let sent_ns = clock.monotonic_ns();
         client
             .step(&FrameInfo::default(), Rows::Poses(&rows), SECOND_NS)
@@ -147,16 +227,7 @@ fn measure(how: &str, bodies: u64, frames: usize) {
             latencies_ns.push(took_ns.saturating_sub(client.view().tick().elapsed_ns));
         }
     }
-    latencies_ns.sort_unstable();
-    let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
-    println!(
-        "{how},{bodies},{frames},{:.1},{:.1},{:.1},{:.1},{}",
-        at(&latencies_ns, 0.5),
-        at(&latencies_ns, 0.9),
-        at(&latencies_ns, 0.99),
-        at(&latencies_ns, 0.999),
-        load.split(' ').next().unwrap_or("")
-    );
+    report(how, bodies, &mut latencies_ns);
     drop(client);
     drop(daemon.stdin.take());
     daemon.wait().unwrap();
@@ -166,14 +237,18 @@ fn measure(how: &str, bodies: u64, frames: usize) {
 fn main() {
     let args: Vec<_> = std::env::args().collect();
     if args.get(1).is_some_and(|arg| arg == "serve") {
-        return serve(&args[2], args[3] == "polling");
+        return serve(&args[2], &args[3]);
+    }
+    if args.get(1).is_some_and(|arg| arg == "echo") {
+        return echo_back(&args[2], &args[3]);
     }
     let frames = args
         .iter()
         .find_map(|arg| arg.parse().ok())
         .unwrap_or(FRAMES_DEFAULT);
     println!("how,bodies,frames,p50_us,p90_us,p99_us,p999_us,load");
-    for how in ["event", "polling"] {
+    echo(frames);
+    for how in ["sleep", "event", "event_1khz", "polling"] {
         for bodies in [1, 100, 1_000, 10_000] {
             measure(
                 how,

@@ -264,7 +264,7 @@ fn a_waker_wakes_the_tick_thread_from_another_thread() {
 fn a_busy_poll_finds_frames_and_ends_at_its_time() {
     let files = Files::new();
     let mut server = Server::open(ServerOptions {
-        busy_poll: true,
+        spin_ns: u64::MAX,
         ..ServerOptions::new(files.place.clone(), 7)
     })
     .unwrap();

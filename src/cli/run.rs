@@ -25,7 +25,12 @@ pub(super) fn run(args: &RunArgs, stop: &AtomicBool) -> Result<bool> {
     let boot_id = crate::transport::client::random_u64()?;
     let mut options = ServerOptions::new(place.clone(), boot_id);
     options.heartbeat_ns = scene.config.heartbeat_ns;
-    options.busy_poll = args.busy_poll;
+    if let Some(spin_ns) = args.spin {
+        options.spin_ns = spin_ns;
+    }
+    if args.busy_poll {
+        options.spin_ns = u64::MAX;
+    }
     let mut server = Server::open(options)?;
     // Dead clients are cleaned up beside the tick, never in it.
     let _cleaner = spawn_cleaner(&place)?;

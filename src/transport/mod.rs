@@ -8,6 +8,7 @@ pub mod client;
 mod hello;
 pub mod iceoryx;
 pub mod memory;
+mod patience;
 mod request;
 
 pub use hello::ICEORYX2_VERSION;
@@ -15,6 +16,15 @@ pub use hello::ICEORYX2_VERSION;
 use crate::error::Result;
 use crate::time::Clock;
 use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow};
+
+/// How long a wait looks before it sleeps where nothing else is said, nanoseconds: on a single core it would only keep the
+/// other side from its work.
+pub(crate) fn spin_default_ns() -> u64 {
+    match std::thread::available_parallelism() {
+        Ok(cores) if cores.get() > 1 => crate::limits::SPIN_US_DEFAULT * 1000,
+        _ => 0,
+    }
+}
 
 /// Why [`Door::wait`] came back. Nothing set: the time was up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,7 +46,7 @@ pub struct RequestToken(pub u64);
 /// One round: `wait`, `receive`, `requests`, then `demand`, the engine's tick, `publish`. A round without a tick ends
 /// in `housekeeping` instead of `publish`.
 pub trait Door {
-    /// Waits until a client has sent something, a signal came, or `timeout_ns` have passed; then drains the notices.
+    /// Waits until a client has sent something, a signal came, or `timeout_ns` have passed.
     ///
     /// # Errors
     /// `Error::Io` when the wake-up port itself is broken; the daemon must then restart.

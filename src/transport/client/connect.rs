@@ -30,7 +30,9 @@ impl ClientOptions {
         let until_ns = clock.monotonic_ns().saturating_add(self.timeout_ns);
         let link = IoxLink::open(&self.place, clock.as_ref(), until_ns)?;
         let left_ns = until_ns.saturating_sub(clock.monotonic_ns());
-        Client::over(Box::new(link), clock, self.source.as_deref(), left_ns)
+        let mut client = Client::over(Box::new(link), clock, self.source.as_deref(), left_ns)?;
+        client.set_spin_ns(crate::transport::spin_default_ns());
+        Ok(client)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Waking up: by the wake-up port, or by spinning.
+//! Waking up: what comes within a short spin is found at once, then the thread sleeps on the wake-up port.
 
 use std::time::Duration;
 
@@ -11,8 +11,11 @@ use crate::time::Clock;
 use crate::transport::Wake;
 use crate::transport::iceoryx::qos::{events, failed};
 
-/// Spins of a busy poll between two looks at the wake-up port, whose socket costs a system call.
-const SPINS_PER_LOOK: u32 = 1024;
+/// Looks between two readings of the clock: as long as one reading takes.
+const LOOKS_PER_READING: u32 = 8;
+/// A thread that finds something in every spin, or never sleeps, still looks at the wake-up port so often, nanoseconds:
+/// it tells who came and left, and costs a system call.
+const LISTEN_EVERY_NS: u64 = 1_000_000;
 
 impl Server {
     fn pending(&self) -> bool {
@@ -22,25 +25,41 @@ impl Server {
             || some(self.answers.has_requests())
     }
 
-    /// Spins until there is something to receive; looks at the wake-up port now and then for who came and left.
-    pub(super) fn spin(&mut self, timeout_ns: u64, clock: &dyn Clock) -> Result<Wake> {
-        let until_ns = clock.monotonic_ns().saturating_add(timeout_ns);
-        loop {
-            for _ in 0..SPINS_PER_LOOK {
-                if self.pending() {
-                    // the notices stay where they are: while they do, neither side pays a system call for more
-                    return Ok(Wake {
-                        notified: true,
-                        ..Wake::default()
-                    });
-                }
+    /// Spins as long as the options say, then sleeps for the rest of the time.
+    ///
+    /// The notices of what a spin has found stay in the port: while they do, neither side pays a system call for more,
+    /// and the next sleep ends at once for nothing.
+    pub(super) fn spin_then_sleep(&mut self, timeout_ns: u64, clock: &dyn Clock) -> Result<Wake> {
+        let mut now_ns = clock.monotonic_ns();
+        let until_ns = now_ns.saturating_add(timeout_ns);
+        let look_ns = self.patience.begin();
+        let looked_ns = now_ns.saturating_add(look_ns).min(until_ns);
+        while now_ns < looked_ns {
+            let found = (0..LOOKS_PER_READING).any(|_| {
                 std::hint::spin_loop();
-            }
-            let wake = self.listen(Duration::ZERO)?;
-            if wake != Wake::default() || clock.monotonic_ns() >= until_ns {
+                self.pending()
+            });
+            let mut wake = self.listen_now_and_then(now_ns)?;
+            wake.notified |= found;
+            if wake != Wake::default() {
+                self.patience.found();
                 return Ok(wake);
             }
+            now_ns = clock.monotonic_ns();
         }
+        if look_ns > 0 && now_ns < until_ns {
+            self.patience.missed();
+        }
+        self.listened_ns = now_ns;
+        self.listen(Duration::from_nanos(until_ns.saturating_sub(now_ns)))
+    }
+
+    fn listen_now_and_then(&mut self, now_ns: u64) -> Result<Wake> {
+        if now_ns.saturating_sub(self.listened_ns) < LISTEN_EVERY_NS {
+            return Ok(Wake::default());
+        }
+        self.listened_ns = now_ns;
+        self.listen(Duration::ZERO)
     }
 
     pub(super) fn listen(&mut self, timeout: Duration) -> Result<Wake> {
