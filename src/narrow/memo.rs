@@ -8,6 +8,7 @@ use crate::wire::{Level, NO_INDEX, Verdict};
 use crate::world::{Body, World};
 
 use super::exact::Warm;
+use super::order::Urgency;
 use super::{NONE, Narrow};
 
 /// What the motion pass reads of a pair.
@@ -272,6 +273,7 @@ impl Narrow {
         while self.hot.len() <= slot.index() {
             self.hot.push(Hot::dead());
             self.memos.push(Memo::new());
+            self.urgencies.push(Urgency::default());
         }
         self.hot[slot.index()] = Hot {
             a,
@@ -323,6 +325,7 @@ impl Narrow {
         } else {
             memo.undecided_since = 0;
         }
+        self.urgencies[slot.index()] = Urgency::of(memo);
         if before == verdict {
             return;
         }

@@ -37,6 +37,7 @@ use crate::world::World;
 
 use cursor::Cursor;
 use memo::{Hot, Memo};
+use order::Urgency;
 
 /// What the narrow phase did in this tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -75,8 +76,10 @@ pub struct Narrow {
     refresh: Vec<PairSlot>,
     cursors: Pool<Cursor>,
     contact_sets: Pool<ContactSet>,
+    /// What the order of work asks of each pair, by `PairSlot`.
+    urgencies: Vec<Urgency>,
     /// Work with its ranks, while it is ordered.
-    keyed: Vec<(u128, PairSlot)>,
+    keyed: Vec<(u64, PairSlot)>,
     /// Contacts of the query at hand.
     found: Vec<Contact>,
     /// The contacts that a set had before, while ids are handed on.

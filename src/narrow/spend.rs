@@ -32,8 +32,7 @@ impl Narrow {
         wanted: Wanted,
         meter: &mut Meter<'_>,
     ) -> bool {
-        let mut work = std::mem::take(&mut self.undecided);
-        self.arrange(&mut work, wanted.order, world, meter);
+        let work = std::mem::take(&mut self.undecided);
         // With no limit the contacts are computed while the answer is at hand; else every verdict comes first.
         let at_once = wanted.order == Order::AsFound && wanted.contacts;
         let goal = if at_once {
@@ -41,23 +40,12 @@ impl Narrow {
         } else {
             Goal::Verdict
         };
-        let mut open = work.len();
-        while open > 0 && meter.open() {
-            let mut left = 0;
-            for at in 0..open {
-                let slot = work[at];
-                let idle = self.hot[slot.index()].verdict != Verdict::Possible;
-                if idle || (meter.open() && self.work(slot, goal, world, meter)) {
-                    self.memos[slot.index()].queued = false;
-                } else {
-                    work[left] = slot;
-                    left += 1;
-                }
-            }
-            open = left;
-        }
-        work.truncate(open);
-        self.undecided = work;
+        self.undecided = self.spend_on(work, wanted.order, world, meter, |narrow, slot, meter| {
+            let idle = narrow.hot[slot.index()].verdict != Verdict::Possible;
+            let done = idle || narrow.work(slot, goal, world, meter);
+            narrow.memos[slot.index()].queued = !done;
+            done
+        });
         self.undecided.is_empty()
     }
 
@@ -72,35 +60,57 @@ impl Narrow {
         if !(wanted.bounds || wanted.contacts) {
             return true;
         }
-        let mut work = std::mem::take(&mut self.refresh);
-        self.arrange(&mut work, wanted.order, world, meter);
         let goal = if wanted.contacts {
             Goal::Contacts
         } else {
             Goal::Gap
         };
-        let mut open = work.len();
-        while open > 0 && meter.open() {
-            let mut left = 0;
-            for at in 0..open {
+        let work = std::mem::take(&mut self.refresh);
+        self.refresh = self.spend_on(work, wanted.order, world, meter, |narrow, slot, meter| {
+            let reported = matches!(
+                narrow.hot[slot.index()].verdict,
+                Verdict::Near | Verdict::Colliding
+            );
+            let idle = !reported || narrow.fresh(slot, wanted.contacts);
+            let done = idle || narrow.work(slot, goal, world, meter);
+            narrow.memos[slot.index()].refreshing = !done;
+            done
+        });
+        self.refresh.is_empty()
+    }
+
+    /// Gives each pair a turn, in order, and those that need more further turns, while the meter is open; returns the
+    /// pairs that are not done.
+    fn spend_on<'m>(
+        &mut self,
+        mut work: Vec<PairSlot>,
+        order: Order,
+        world: &World,
+        meter: &mut Meter<'m>,
+        mut turn: impl FnMut(&mut Self, PairSlot, &mut Meter<'m>) -> bool,
+    ) -> Vec<PairSlot> {
+        if work.is_empty() || !meter.open() {
+            return work;
+        }
+        let mut line = self.line_up(&work, order);
+        while !work.is_empty() && meter.open() {
+            let (mut at, mut left) = (0, 0);
+            while at < work.len() && meter.open() {
+                self.order_next(&mut line, &mut work, at, world, meter);
                 let slot = work[at];
-                let reported = matches!(
-                    self.hot[slot.index()].verdict,
-                    Verdict::Near | Verdict::Colliding
-                );
-                let idle = !reported || self.fresh(slot, wanted.contacts);
-                if idle || (meter.open() && self.work(slot, goal, world, meter)) {
-                    self.memos[slot.index()].refreshing = false;
-                } else {
+                if !turn(self, slot, meter) {
                     work[left] = slot;
                     left += 1;
                 }
+                at += 1;
             }
-            open = left;
+            // Who had no turn keeps its place behind those who had.
+            work.copy_within(at.., left);
+            work.truncate(left + work.len() - at);
+            // Further rounds keep the order of the first.
+            line.ready = work.len();
         }
-        work.truncate(open);
-        self.refresh = work;
-        self.refresh.is_empty()
+        work
     }
 
     /// When somebody begins to listen, pairs at rest owe them what was left out before.

@@ -1,20 +1,13 @@
 //! Rows of `contacts`: manifold points of colliding pairs, closest points of near ones.
 
-use crate::ids::{BodyId, PairSlot};
+use crate::ids::PairSlot;
 use crate::math::{Point, Vec3};
-use crate::narrow::{Contact, Witness};
+use crate::narrow::{Contact, Finding, Witness};
 use crate::wire::{ContactKind, ContactRow, Level, MessageHeader, Outbox, Verdict, contact_flags};
 use crate::world::Body;
 
+use super::pairs::Row;
 use super::{Publisher, View};
-
-/// A pair that may have contact rows.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Rank {
-    ids: (BodyId, BodyId),
-    slot: PairSlot,
-    depth_m: f64,
-}
 
 impl Publisher {
     /// Fills `contacts`; returns how many rows did not fit. Whole pairs are kept, deepest first.
@@ -28,24 +21,18 @@ impl Publisher {
         if !view.demand.contacts {
             return 0;
         }
-        let rows = self.rank_pairs(view);
+        let rows: usize = self.rows.iter().map(|row| row.contacts as usize).sum();
         let most = self.limits.contact_rows;
         if rows > most {
-            self.contact_ranks
-                .sort_unstable_by(|x, y| x.depth_m.total_cmp(&y.depth_m).then(x.ids.cmp(&y.ids)));
-            let mut room = most;
-            self.contact_ranks.retain(|rank| {
-                let count = rows_of(view, rank.slot);
-                let fits = count <= room;
-                room -= if fits { count } else { 0 };
-                fits
-            });
-        }
-        self.contact_ranks.sort_unstable_by_key(|rank| rank.ids);
-        for at in 0..self.contact_ranks.len() {
-            let rank = self.contact_ranks[at];
-            view.narrow.name_contacts(rank.slot, &mut self.next_contact);
-            Self::push_rows(view, rank, out);
+            self.choose_pairs(view, most);
+            for at in 0..self.contact_pairs.len() {
+                let row = self.rows[self.contact_pairs[at].1];
+                self.push_pair(view, row, out);
+            }
+        } else {
+            for at in 0..self.rows.len() {
+                self.push_pair(view, self.rows[at], out);
+            }
         }
         let left_out = rows.saturating_sub(out.contacts.len()) as u64;
         out.contacts_header = MessageHeader {
@@ -55,34 +42,37 @@ impl Publisher {
         left_out
     }
 
-    /// Lists the pairs with contact rows; returns how many rows they have.
-    fn rank_pairs(&mut self, view: &View<'_>) -> usize {
-        self.contact_ranks.clear();
-        let mut rows = 0;
-        for &slot in view.narrow.active() {
-            let Some(finding) = view.narrow.finding(slot) else {
-                continue;
-            };
-            let (Some(a), Some(b)) = (view.world.body(finding.a), view.world.body(finding.b))
-            else {
-                continue;
-            };
-            let count = rows_of(view, slot);
-            if count > 0 {
-                rows += count;
-                let depth_m = finding.witness.map_or(0.0, |witness| witness.best_m);
-                self.contact_ranks.push(Rank {
-                    ids: (a.id, b.id),
-                    slot,
-                    depth_m,
-                });
-            }
-        }
-        rows
+    /// Chooses the pairs whose contacts fit: deepest first, then by ids again.
+    fn choose_pairs(&mut self, view: &View<'_>, most: usize) {
+        let (chosen, rows) = (&mut self.contact_pairs, &self.rows);
+        chosen.clear();
+        let depth_of = |row: &Row| {
+            let witness = view.narrow.finding(row.slot?)?.witness?;
+            Some(witness.best_m)
+        };
+        let pairs = rows.iter().enumerate().filter(|(_, row)| row.contacts > 0);
+        chosen.extend(pairs.map(|(at, row)| (depth_of(row).unwrap_or(0.0), at)));
+        // Rows are ordered by ids, and so are their places.
+        chosen.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        let mut room = most;
+        chosen.retain(|&(_, at)| {
+            let count = rows[at].contacts as usize;
+            let fits = count <= room;
+            room -= if fits { count } else { 0 };
+            fits
+        });
+        chosen.sort_unstable_by_key(|&(_, at)| at);
     }
 
-    fn push_rows(view: &View<'_>, rank: Rank, out: &mut Outbox) {
-        let Some(finding) = view.narrow.finding(rank.slot) else {
+    fn push_pair(&mut self, view: &mut View<'_>, row: Row, out: &mut Outbox) {
+        if let (1.., Some(slot)) = (row.contacts, row.slot) {
+            view.narrow.name_contacts(slot, &mut self.next_contact);
+            Self::push_rows(view, slot, out);
+        }
+    }
+
+    fn push_rows(view: &View<'_>, slot: PairSlot, out: &mut Outbox) {
+        let Some(finding) = view.narrow.finding(slot) else {
             return;
         };
         let (Some(a), Some(b)) = (view.world.body(finding.a), view.world.body(finding.b)) else {
@@ -101,7 +91,7 @@ impl Publisher {
             }
             return;
         }
-        let (contacts, tick) = view.narrow.contacts(rank.slot);
+        let (contacts, tick) = view.narrow.contacts(slot);
         let current = finding.level == Level::Exact && tick >= finding.tested;
         let start = out.contacts.len();
         for contact in contacts {
@@ -121,13 +111,11 @@ impl Publisher {
     }
 }
 
-/// How many contact rows a pair has.
-fn rows_of(view: &View<'_>, slot: PairSlot) -> usize {
-    match view.narrow.finding(slot) {
-        Some(finding) if finding.verdict == Verdict::Colliding => {
-            view.narrow.contacts(slot).0.len()
-        }
-        Some(finding) if finding.verdict == Verdict::Near => usize::from(finding.witness.is_some()),
+/// How many contact rows an active pair has.
+pub(super) fn contacts_of(view: &View<'_>, slot: PairSlot, finding: &Finding<'_>) -> usize {
+    match finding.verdict {
+        Verdict::Colliding => view.narrow.contacts(slot).0.len(),
+        Verdict::Near => usize::from(finding.witness.is_some()),
         _ => 0,
     }
 }

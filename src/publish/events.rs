@@ -61,7 +61,7 @@ impl History {
 pub(super) struct Events {
     /// By `PairSlot`.
     histories: Vec<History>,
-    /// By ids; one entry a pair after [`Events::collect`].
+    /// By ids; one entry a pair after [`Events::merge`].
     waiting: Vec<PairEvent>,
     seq: u64,
     /// Begins and their ends that were both never sent.
@@ -69,8 +69,10 @@ pub(super) struct Events {
 }
 
 impl Events {
-    /// Takes this tick's verdicts and ended pairs, and appends the events they make.
-    pub(super) fn collect(&mut self, tick: u64, world: &World, narrow: &Narrow, delta: &PairDelta) {
+    /// Takes the pairs that ended, and those that were active and are now proved apart.
+    ///
+    /// Then comes [`Events::certify`] for each active pair, and [`Events::merge`].
+    pub(super) fn begin(&mut self, tick: u64, world: &World, narrow: &Narrow, delta: &PairDelta) {
         for ended in &delta.ended {
             if let Some(history) = self.histories.get_mut(ended.slot.index()) {
                 let gone = std::mem::replace(history, History::NONE);
@@ -90,16 +92,11 @@ impl Events {
                 .get(slot.index())
                 .is_some_and(|history| history.tick != 0)
                 && let Some(finding) = narrow.finding(slot)
+                && let (Some(a), Some(b)) = (world.body(finding.a), world.body(finding.b))
             {
-                self.certify(tick, slot, &finding, narrow, world);
+                self.certify(tick, slot, &finding, (a.id, b.id), narrow);
             }
         }
-        for &slot in narrow.active() {
-            if let Some(finding) = narrow.finding(slot) {
-                self.certify(tick, slot, &finding, narrow, world);
-            }
-        }
-        self.merge();
     }
 
     /// The history of a pair.
@@ -121,22 +118,19 @@ impl Events {
     }
 
     /// Takes a pair's verdict of this tick.
-    fn certify(
+    pub(super) fn certify(
         &mut self,
         tick: u64,
         slot: PairSlot,
         finding: &Finding<'_>,
+        ids: Ids,
         narrow: &Narrow,
-        world: &World,
     ) {
-        let (Some(a), Some(b)) = (world.body(finding.a), world.body(finding.b)) else {
-            return;
-        };
         if self.histories.len() <= slot.index() {
             self.histories.resize(slot.index() + 1, History::NONE);
         }
         let mut history = self.histories[slot.index()];
-        history.ids = (a.id, b.id);
+        history.ids = ids;
         // Not active in the tick before: proved apart there by its certificate or by its boxes, unless it is new and a
         // body of it was not in, not known, or not looked for there.
         let unseen = (finding.born == tick)
@@ -194,8 +188,8 @@ impl Events {
         });
     }
 
-    /// One entry a pair: a begin that was never sent and the end that follows it cancel.
-    fn merge(&mut self) {
+    /// One entry a pair, by ids: a begin that was never sent and the end that follows it cancel.
+    pub(super) fn merge(&mut self) {
         self.waiting
             .sort_unstable_by_key(|event| (event.ids, event.seq));
         let cancelled = &mut self.cancelled;

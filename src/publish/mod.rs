@@ -17,6 +17,7 @@ use crate::world::World;
 
 use events::Events;
 use pairs::Row;
+use state::Survey;
 
 pub use state::Worst;
 
@@ -46,8 +47,11 @@ pub struct View<'a> {
 pub struct Publisher {
     limits: Limits,
     events: Events,
+    /// Pairs that rows are made of, by ids.
     rows: Vec<Row>,
-    contact_ranks: Vec<contacts::Rank>,
+    survey: Survey,
+    /// Depth in metres and place in `rows` of the pairs whose contacts are sent, used only when not all fit.
+    contact_pairs: Vec<(f64, usize)>,
     verdicts: Vec<u8>,
     next_contact: u64,
 }
@@ -60,7 +64,8 @@ impl Publisher {
             limits,
             events: Events::default(),
             rows: Vec::new(),
-            contact_ranks: Vec::new(),
+            survey: Survey::default(),
+            contact_pairs: Vec::new(),
             verdicts: Vec::new(),
             next_contact: 1,
         }
@@ -69,14 +74,45 @@ impl Publisher {
     /// Fills every message that is listened to, then the tick's own counts, state and reasons.
     pub fn fill(&mut self, view: &mut View<'_>, out: &mut Outbox) {
         let header = Self::header(view);
-        self.events
-            .collect(view.tick, view.world, view.narrow, view.delta);
-        let pairs_left = self.fill_pairs(view, header, out);
+        self.review(view);
+        // Before the pairs, which leave out of the list what does not fit.
         let contacts_left = self.fill_contacts(view, header, out);
+        let pairs_left = self.fill_pairs(view, header, out);
         let bodies_left = self.fill_bodies(view, header, out);
         Self::fill_names(view, out);
         let left = pairs_left + contacts_left + bodies_left;
         self.fill_tick(view, header, left, out);
+    }
+
+    /// One walk over the active pairs, for the events, the tick's counts and the rows.
+    fn review(&mut self, view: &View<'_>) {
+        self.rows.clear();
+        self.survey = Survey::default();
+        let Self {
+            events,
+            rows,
+            survey,
+            ..
+        } = self;
+        events.begin(view.tick, view.world, view.narrow, view.delta);
+        let listed = view.demand.pairs || view.demand.contacts;
+        for &slot in view.narrow.active() {
+            let Some(finding) = view.narrow.finding(slot) else {
+                continue;
+            };
+            let (Some(a), Some(b)) = (view.world.body(finding.a), view.world.body(finding.b))
+            else {
+                continue;
+            };
+            let ids = (a.id, b.id);
+            events.certify(view.tick, slot, &finding, ids, view.narrow);
+            survey.take(view.tick, ids, &finding);
+            if listed {
+                rows.push(Row::of_active(view, slot, ids, &finding));
+            }
+        }
+        events.merge();
+        rows.sort_unstable_by_key(Row::order);
     }
 
     fn header(view: &View<'_>) -> MessageHeader {

@@ -6,19 +6,61 @@ use crate::narrow::{Finding, Witness};
 use crate::wire::{BodyStatus, Event, Level, MessageHeader, Outbox, PairRow, Verdict, pair_flags};
 use crate::world::Body;
 
-use super::events::PairEvent;
+use super::contacts::contacts_of;
 use super::{Publisher, View};
 
 /// A row to be: where it stands by rank, and what it is made of.
+///
+/// Kept small: a sort moves these, and above 96 bytes it branches at each comparison.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row {
-    ids: (BodyId, BodyId),
+    pub(super) ids: (BodyId, BodyId),
+    /// Deepest first within a class, metres.
+    pub(super) depth_m: f64,
+    /// `None`: the pair is gone.
+    pub(super) slot: Option<PairSlot>,
+    /// Place of its event among those that wait; `NONE`: it has none.
+    event: u32,
+    /// How many contact rows it has.
+    pub(super) contacts: u32,
     /// Events first, then colliding, possible, near.
     class: u8,
-    /// Deepest first within a class, metres.
-    depth_m: f64,
-    slot: Option<PairSlot>,
-    event: Option<PairEvent>,
+}
+
+/// No event.
+const NONE: u32 = u32::MAX;
+
+impl Row {
+    /// The row of an active pair.
+    pub(super) fn of_active(
+        view: &View<'_>,
+        slot: PairSlot,
+        ids: (BodyId, BodyId),
+        finding: &Finding<'_>,
+    ) -> Self {
+        let contacts = if view.demand.contacts {
+            contacts_of(view, slot, finding)
+        } else {
+            0
+        };
+        Self {
+            ids,
+            depth_m: finding.gap.min,
+            slot: Some(slot),
+            event: NONE,
+            contacts: u32::try_from(contacts).unwrap_or(u32::MAX),
+            class: match finding.verdict {
+                Verdict::Colliding => 1,
+                Verdict::Possible => 2,
+                Verdict::Near | Verdict::Apart | Verdict::None => 3,
+            },
+        }
+    }
+
+    /// The order of rows: by ids, the smaller first. One number, so that a comparison does not branch.
+    pub(super) fn order(&self) -> u128 {
+        u128::from(self.ids.0.0) << 64 | u128::from(self.ids.1.0)
+    }
 }
 
 impl Publisher {
@@ -35,8 +77,11 @@ impl Publisher {
             self.events.sent(|_| false);
             return 0;
         }
-        self.gather(view);
+        let late = self.add_events(view);
         let left_out = self.rank();
+        if late > 0 || left_out > 0 {
+            self.rows.sort_unstable_by_key(Row::order);
+        }
         for row in &self.rows {
             out.pairs.push(self.pair_row(view, row));
         }
@@ -54,37 +99,14 @@ impl Publisher {
         left_out
     }
 
-    /// All rows there could be: active pairs, and pairs with events that are not active.
-    fn gather(&mut self, view: &mut View<'_>) {
-        self.rows.clear();
-        for &slot in view.narrow.active() {
-            let Some(finding) = view.narrow.finding(slot) else {
-                continue;
-            };
-            let (Some(a), Some(b)) = (view.world.body(finding.a), view.world.body(finding.b))
-            else {
-                continue;
-            };
-            let class = match finding.verdict {
-                Verdict::Colliding => 1,
-                Verdict::Possible => 2,
-                Verdict::Near | Verdict::Apart | Verdict::None => 3,
-            };
-            let depth_m = finding.gap.min;
-            self.rows.push(Row {
-                ids: (a.id, b.id),
-                class,
-                depth_m,
-                slot: Some(slot),
-                event: None,
-            });
-        }
-        self.rows.sort_unstable_by_key(|row| row.ids);
+    /// Gives the listed pairs their events, and lists those that are not active any more; returns how many these are.
+    fn add_events(&mut self, view: &mut View<'_>) -> usize {
         let active = self.rows.len();
-        for &event in self.events.waiting() {
+        for (at, event) in self.events.waiting().iter().enumerate() {
+            let place = u32::try_from(at).unwrap_or(NONE);
             match self.rows[..active].binary_search_by_key(&event.ids, |row| row.ids) {
                 Ok(at) => {
-                    self.rows[at].event = Some(event);
+                    self.rows[at].event = place;
                     self.rows[at].class = 0;
                 }
                 Err(_) => {
@@ -95,14 +117,16 @@ impl Publisher {
                     }
                     self.rows.push(Row {
                         ids: event.ids,
-                        class: 0,
                         depth_m: 0.0,
                         slot,
-                        event: Some(event),
+                        event: place,
+                        contacts: 0,
+                        class: 0,
                     });
                 }
             }
         }
+        self.rows.len() - active
     }
 
     /// The slot of a pair that is apart but still a candidate.
@@ -111,7 +135,7 @@ impl Publisher {
         view.pairs.find(PairKey::new(a, b))
     }
 
-    /// Leaves out what does not fit, worst rank first, and orders the rest by ids; returns how many were left out.
+    /// Leaves out what does not fit, worst rank first; returns how many were left out.
     fn rank(&mut self) -> u64 {
         let most = self.limits.pair_rows;
         let left_out = self.rows.len().saturating_sub(most);
@@ -123,7 +147,6 @@ impl Publisher {
             });
             self.rows.truncate(most);
         }
-        self.rows.sort_unstable_by_key(|row| row.ids);
         left_out as u64
     }
 
@@ -144,7 +167,7 @@ impl Publisher {
             Some((slot, finding)) => self.describe(view, slot, &finding, &mut out),
             None => out.flags |= pair_flags::GONE,
         }
-        if let Some(event) = row.event {
+        if let Some(event) = self.events.waiting().get(row.event as usize) {
             if let Some((ticks, cause)) = event.end {
                 out.events |= Event::End.bit();
                 out.end_cause = cause.code();

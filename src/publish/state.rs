@@ -1,6 +1,7 @@
 //! The tick in one word, its reasons, its counts, and the worst pair.
 
 use crate::ids::{BodyId, BodySlot};
+use crate::narrow::Finding;
 use crate::wire::{
     BodyStatus, MessageHeader, Outbox, Reason, SOURCES_MAX, SourceRow, State, TickRow, Verdict,
 };
@@ -61,7 +62,7 @@ impl Publisher {
         } else {
             State::Clear
         };
-        let (worst, widest_m, oldest) = self.survey(view);
+        let survey = self.survey;
         out.tick = TickRow {
             header: MessageHeader {
                 truncated,
@@ -77,10 +78,10 @@ impl Publisher {
             near: narrow.count(Verdict::Near),
             ignored: view.world.ignored_pairs_count(),
             cancelled_events: self.events.cancelled,
-            worst_a: worst.ids.0.0,
-            worst_b: worst.ids.1.0,
-            widest_m,
-            oldest_undecided_ticks: oldest,
+            worst_a: survey.worst.ids.0.0,
+            worst_b: survey.worst.ids.1.0,
+            widest_m: survey.widest_m,
+            oldest_undecided_ticks: survey.oldest_ticks,
             reasons,
             sources: sources(view),
             sources_len: u8::try_from(view.world.sources().len()).unwrap_or(u8::MAX),
@@ -98,41 +99,36 @@ impl Publisher {
             };
         }
     }
+}
 
-    /// The worst pair, the widest interval in metres, and for how many ticks the oldest undecided pair has been so.
-    fn survey(&self, view: &View<'_>) -> (Worst, f64, u64) {
-        let mut worst = Worst::default();
-        let (mut widest_m, mut oldest) = (0.0_f64, 0);
-        for &slot in view.narrow.active() {
-            let Some(finding) = view.narrow.finding(slot) else {
-                continue;
-            };
-            widest_m = widest_m.max(finding.gap.width());
-            if finding.undecided_since != 0 {
-                oldest = oldest.max(view.tick - finding.undecided_since + 1);
-            }
-            let depth = -finding
-                .witness
-                .map_or(finding.gap.min, |witness| witness.best_m);
-            let rank = (finding.verdict.code(), depth);
-            let ids = || {
-                Some((
-                    view.world.body(finding.a)?.id,
-                    view.world.body(finding.b)?.id,
-                ))
-            };
-            let order = rank
-                .0
-                .cmp(&worst.rank.0)
-                .then(rank.1.total_cmp(&worst.rank.1));
-            if order.is_ge()
-                && let Some(ids) = ids()
-                && (order.is_gt() || ids < worst.ids || worst.ids.0 == BodyId(0))
-            {
-                worst = Worst { ids, rank };
-            }
+/// What a walk over the active pairs finds out for the tick.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Survey {
+    worst: Worst,
+    /// The widest interval, metres.
+    widest_m: f64,
+    /// For how many ticks the oldest undecided pair has been so.
+    oldest_ticks: u64,
+}
+
+impl Survey {
+    /// Takes an active pair.
+    pub(super) fn take(&mut self, tick: u64, ids: (BodyId, BodyId), finding: &Finding<'_>) {
+        self.widest_m = self.widest_m.max(finding.gap.width());
+        if finding.undecided_since != 0 {
+            self.oldest_ticks = self.oldest_ticks.max(tick - finding.undecided_since + 1);
         }
-        (worst, widest_m, oldest)
+        let depth = -finding
+            .witness
+            .map_or(finding.gap.min, |witness| witness.best_m);
+        let (rank, worst) = ((finding.verdict.code(), depth), self.worst);
+        let order = rank
+            .0
+            .cmp(&worst.rank.0)
+            .then(rank.1.total_cmp(&worst.rank.1));
+        if order.is_gt() || (order.is_eq() && (ids < worst.ids || worst.ids.0 == BodyId(0))) {
+            self.worst = Worst { ids, rank };
+        }
     }
 }
 
