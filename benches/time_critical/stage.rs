@@ -1,0 +1,303 @@
+//! Two hundred pairs of meshes that move, driven through the rooms by hand: world, broad phase, narrow phase.
+
+use std::sync::Arc;
+
+use sweepd::broad::{BroadPhase, Method};
+use sweepd::builtin::Random;
+use sweepd::config::{Config, OnStale};
+use sweepd::ids::{BodyId, PairSlot};
+use sweepd::math::{Point, Pose, Quat, Vec3, relative};
+use sweepd::narrow::Narrow;
+use sweepd::narrow::mesh::{Goal, Walk};
+use sweepd::pairs::{PairDelta, PairSet};
+use sweepd::scene::{BodySpec, PlacedSpec, Scene, SourceSpec};
+use sweepd::shape::{Geometry, Mesh, Shape, ShapeSpec};
+use sweepd::time::{Clock, Meter, SystemClock};
+use sweepd::wire::{FrameHeader, Inbox, WIRE_VERSION, frame_flags, name_bytes};
+use sweepd::world::{PlacedShape, World};
+
+use crate::common::row;
+
+/// Pairs of bodies; each pair stands by itself.
+pub const PAIRS: usize = 200;
+/// Two thirds of them begin in contact.
+const TOUCHING: usize = 133;
+/// Diameter of a body but for its bumps, metres.
+pub const DIAMETER_M: f64 = 2.0;
+
+/// A bumpy sphere of 19,880 triangles.
+fn bumpy(kind: usize) -> Mesh {
+    let (rows, columns) = (71_u32, 142_u32);
+    let (waves, turns) = (
+        [3.0, 5.0, 7.0, 4.0][kind % 4],
+        [4.0, 6.0, 3.0, 5.0][kind % 4],
+    );
+    let mut vertices = vec![Point::new(0.0, 0.0, 1.0), Point::new(0.0, 0.0, -1.0)];
+    for i in 1..rows {
+        let theta = std::f64::consts::PI * f64::from(i) / f64::from(rows);
+        for j in 0..columns {
+            let phi = std::f64::consts::TAU * f64::from(j) / f64::from(columns);
+            let r = 1.0 + 0.06 * (waves * theta).sin() * (turns * phi).cos();
+            let (s, c) = theta.sin_cos();
+            vertices.push(Point::new(r * s * phi.cos(), r * s * phi.sin(), r * c));
+        }
+    }
+    let at = |i: u32, j: u32| 2 + (i - 1) * columns + j % columns;
+    let mut faces = Vec::new();
+    for j in 0..columns {
+        faces.push([0, at(1, j), at(1, j + 1)]);
+        faces.push([1, at(rows - 1, j + 1), at(rows - 1, j)]);
+        for i in 1..rows - 1 {
+            let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+            faces.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    Mesh::new(vertices, faces, None).unwrap()
+}
+
+/// Built once: their trees take a while.
+pub fn shapes() -> Vec<Arc<Shape>> {
+    let shape = |mesh: Mesh| Shape {
+        aabb: mesh.aabb(),
+        centre: mesh.centre(),
+        radius: mesh.radius(),
+        geometry: Geometry::Mesh(mesh),
+    };
+    (0..4).map(|kind| Arc::new(shape(bumpy(kind)))).collect()
+}
+
+/// How one pair moves: B about A, between two distances, turning.
+struct Course {
+    a: Pose,
+    away: Vec3,
+    distance: f64,
+    range: [f64; 2],
+    speed: f64,
+    spin: Vec3,
+    turn: Quat,
+}
+
+/// The scene, its rooms, and its motion.
+pub struct Stage {
+    pub world: World,
+    pub pairs: PairSet,
+    pub narrow: Narrow,
+    pub clock: SystemClock,
+    broad: BroadPhase,
+    delta: PairDelta,
+    inbox: Inbox,
+    courses: Vec<Course>,
+    shapes: Vec<Arc<Shape>>,
+    tick: u64,
+}
+
+impl Stage {
+    /// * `percent` - motion of a surface point a tick, percent of the diameter; each pair 0.2 to 3 times that.
+    pub fn new(shapes: &[Arc<Shape>], percent: f64, seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let courses: Vec<Course> = (0..PAIRS)
+            .map(|k| course(k, percent, &mut random))
+            .collect();
+        let specs = (0..2 * PAIRS).map(|k| body(k as u64 + 1)).collect();
+        let scene = Scene {
+            frame_id: "world".to_owned(),
+            config: Config::default(),
+            sources: vec![SourceSpec {
+                name: "feed".to_owned(),
+                timeout_ns: 1 << 60,
+            }],
+            bodies: specs,
+            ..Scene::default()
+        };
+        let placed: Vec<Arc<[PlacedShape]>> = (0..2 * PAIRS)
+            .map(|k| {
+                let shape = Arc::clone(&shapes[(k / 2 + k % 2) % shapes.len()]);
+                Arc::from(vec![PlacedShape {
+                    shape,
+                    pose: Pose::identity(),
+                }])
+            })
+            .collect();
+        let clock = SystemClock;
+        let world = World::new(&scene, placed, clock.boottime_ns()).unwrap();
+        let mut stage = Self {
+            world,
+            pairs: PairSet::new(1 << 16),
+            narrow: Narrow::new(16),
+            clock,
+            broad: BroadPhase::new(Method::SweepAndPrune),
+            delta: PairDelta::default(),
+            inbox: Inbox::default(),
+            courses,
+            shapes: shapes.to_vec(),
+            tick: 0,
+        };
+        stage.admit();
+        stage
+    }
+
+    /// Moves every pair by one tick and lets the rooms before the narrow phase follow.
+    pub fn advance(&mut self) {
+        for course in &mut self.courses {
+            course.distance += course.speed;
+            if !(course.range[0]..=course.range[1]).contains(&course.distance) {
+                course.speed = -course.speed;
+                course.distance += 2.0 * course.speed;
+            }
+            course.turn = Quat::new_normalize(
+                (Quat::from_scaled_axis(course.spin) * course.turn).into_inner(),
+            );
+        }
+        self.admit();
+    }
+
+    /// Starts the narrow phase of this tick; returns how long its motion pass took, nanoseconds.
+    pub fn begin(&mut self) -> u64 {
+        let from_ns = self.clock.monotonic_ns();
+        self.narrow
+            .begin(self.tick, &self.world, &self.pairs, &self.delta);
+        self.narrow.widen(&self.world, &self.pairs);
+        self.clock.monotonic_ns() - from_ns
+    }
+
+    /// Forgets all that the narrow phase knows: this tick starts cold.
+    pub fn make_cold(&mut self) {
+        self.narrow = Narrow::new(16);
+        self.delta.clear();
+        let slots: Vec<PairSlot> = self.pairs.iter().map(|(slot, _)| slot).collect();
+        self.delta.began.extend(slots);
+    }
+
+    pub fn pose(&self, pair: usize) -> Pose {
+        relative(&self.courses[pair].a, &self.courses[pair].b())
+    }
+
+    pub fn couple(&self, pair: usize) -> [&Shape; 2] {
+        [0, 1].map(|k| &*self.shapes[(pair + k) % self.shapes.len()])
+    }
+
+    /// The pair that a slot of the pair set holds.
+    pub fn pair_of(&self, slot: PairSlot) -> usize {
+        let (low, _) = self.pairs.get(slot).unwrap().slots();
+        let id = self.world.body(low).unwrap().id.0;
+        usize::try_from((id - 1) / 2).unwrap()
+    }
+
+    /// Which pairs truly collide at this tick's poses: walks to the end over the other trees, nothing carried over.
+    pub fn truth(&self, walk: &mut Walk) -> Vec<bool> {
+        (0..PAIRS)
+            .map(|pair| {
+                let [a, b] = self.couple(pair);
+                let mut meter = Meter::unlimited(&self.clock);
+                walk.start(a, b, &self.pose(pair));
+                assert!(walk.advance(a, b, Goal::Verdict, u64::MAX, &mut meter));
+                walk.interval().min <= 0.0
+            })
+            .collect()
+    }
+
+    fn admit(&mut self) {
+        self.tick += 1;
+        self.inbox.clear();
+        let frame = self.inbox.push();
+        frame.header = FrameHeader {
+            session: 1,
+            seq: self.tick,
+            source: name_bytes("feed"),
+            flags: frame_flags::FULL,
+            schema: WIRE_VERSION,
+            ..FrameHeader::default()
+        };
+        frame.received_ns = self.clock.boottime_ns();
+        for (k, course) in (0_u64..).zip(&self.courses) {
+            frame.transforms.push(row(2 * k + 1, &course.a));
+            frame.transforms.push(row(2 * k + 2, &course.b()));
+        }
+        self.world.begin_tick(self.tick);
+        for frame in self.inbox.frames() {
+            self.world.admit(frame, self.clock.boottime_ns());
+        }
+        self.world.age(self.clock.boottime_ns());
+        self.delta.clear();
+        self.broad.update(
+            self.world.changes(),
+            &self.world,
+            self.world.filters(),
+            &mut self.pairs,
+            &mut self.delta,
+        );
+        assert_eq!(self.pairs.len(), PAIRS, "every pair is a candidate");
+    }
+}
+
+impl Course {
+    fn b(&self) -> Pose {
+        let from = self.a.translation.vector;
+        Pose::from_parts((from + self.away * self.distance).into(), self.turn)
+    }
+}
+
+fn course(k: usize, percent: f64, random: &mut Random) -> Course {
+    let mut vector = |size: f64| {
+        Vec3::new(
+            random.range(-size, size),
+            random.range(-size, size),
+            random.range(-size, size),
+        )
+    };
+    #[allow(clippy::cast_precision_loss, reason = "200 pairs")]
+    let home = Vec3::new((k % 15) as f64, (k / 15) as f64, 0.0) * 8.0;
+    let a = Pose::from_parts(
+        (home + vector(0.5)).into(),
+        Quat::from_scaled_axis(vector(3.0)),
+    );
+    // Near a diagonal the boxes overlap wherever the bodies are.
+    let away = (Vec3::new(1.0, 1.0, 1.0) + vector(0.3)).normalize();
+    let turn = Quat::from_scaled_axis(vector(3.0));
+    let spin = vector(1.0).normalize();
+    let range = if k < TOUCHING {
+        [1.4, 2.04]
+    } else {
+        [1.98, 2.25]
+    };
+    let distance = if k < TOUCHING {
+        random.range(1.5, 1.9)
+    } else {
+        random.range(2.01, 2.2)
+    };
+    let pace = percent / 100.0 * DIAMETER_M * (random.range(-1.61, 1.1)).exp();
+    Course {
+        a,
+        away,
+        distance,
+        range,
+        speed: 0.5 * pace,
+        spin: spin * (0.5 * pace),
+        turn,
+    }
+}
+
+fn body(id: u64) -> BodySpec {
+    BodySpec {
+        name: format!("b{id}"),
+        id: BodyId(id),
+        // What is built is handed over beside the scene.
+        shapes: vec![PlacedSpec {
+            shape: ShapeSpec::Sphere { radius: 1.0 },
+            pose: Pose::identity(),
+        }],
+        pose: Pose::identity(),
+        moves: true,
+        continuous: false,
+        source: Some(0),
+        group: u32::MAX,
+        mask: u32::MAX,
+        parent: None,
+        attached_to: None,
+        rigid_group: None,
+        report_within_m: 0.0,
+        max_speed_mps: None,
+        on_stale: OnStale::Unknown,
+        enabled: true,
+    }
+}
