@@ -15,7 +15,7 @@ const BODIES_MIN: usize = 64;
 /// Pairs kept for two axes, a body: beyond it walking them costs more than the swaps that the third axis takes.
 const PARTIAL_PER_BODY: usize = 16;
 // What one step of each kind costs, nanoseconds, measured on an AMD EPYC in the gas of 10,000 bodies of
-// `benches/broad_sap`. Only their ratios matter, and only for the choice between two right ways.
+// `benches/broad`. Only their ratios matter, and only for the choice between two right ways.
 /// A comparison while sorting.
 const SORT_NS: u64 = 1;
 /// A swap, with its share of comparisons of boxes.
