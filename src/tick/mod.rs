@@ -5,6 +5,7 @@
 
 mod floor;
 mod input;
+mod look;
 pub mod pace;
 
 use std::sync::Arc;
@@ -13,7 +14,7 @@ use crate::broad::{BroadPhase, Method};
 use crate::config::Config;
 use crate::error::Result;
 use crate::ids::SourceSlot;
-use crate::narrow::{Counters, Narrow, Order, Wanted};
+use crate::narrow::{Narrow, Order, Wanted};
 use crate::pairs::{PairDelta, PairSet};
 use crate::plan::Plan;
 use crate::publish::{Publisher, View};
@@ -138,54 +139,6 @@ impl Engine {
         }
     }
 
-    /// What became of the edits of the last tick.
-    #[must_use]
-    pub fn outcomes(&self) -> &[EditOutcome] {
-        &self.outcomes
-    }
-
-    /// The bodies, sources and filters.
-    #[must_use]
-    pub fn world(&self) -> &World {
-        &self.world
-    }
-
-    /// The narrow phase's findings.
-    #[must_use]
-    pub fn narrow(&self) -> &Narrow {
-        &self.narrow
-    }
-
-    /// The candidate pairs.
-    #[must_use]
-    pub fn pairs(&self) -> &PairSet {
-        &self.pairs
-    }
-
-    /// What the last tick filled.
-    #[must_use]
-    pub fn outbox(&self) -> &Outbox {
-        &self.out
-    }
-
-    /// The plan in force.
-    #[must_use]
-    pub fn plan(&self) -> &Plan {
-        &self.plan
-    }
-
-    /// What the narrow phase did in the last tick.
-    #[must_use]
-    pub fn counters(&self) -> Counters {
-        self.narrow.counters()
-    }
-
-    /// Ticks so far.
-    #[must_use]
-    pub fn ticks(&self) -> u64 {
-        self.tick
-    }
-
     /// Full structure check of every room that keeps state.
     ///
     /// # Errors
@@ -303,12 +256,13 @@ impl Engine {
             bounds: demand.pairs || demand.contacts,
             order,
         };
-        let deadline_ns = budget.time_ns.map(|time_ns| laps.woke_ns() + time_ns);
-        let deadline_ns = earliest(
-            deadline_ns,
-            self.frames_deadline_ns(input.inbox, laps.woke_ns()),
-        )
-        .map(|deadline_ns| deadline_ns.saturating_sub(self.floor.reserve_ns()));
+        let woke_ns = laps.woke_ns();
+        let own_ns = budget.time_ns.map(|time_ns| woke_ns + time_ns);
+        let end_ns = earliest(own_ns, self.frames_deadline_ns(input.inbox, woke_ns));
+        let deadline_ns = end_ns.map(|end_ns| {
+            let left_ns = end_ns.saturating_sub(self.clock.monotonic_ns());
+            end_ns - self.floor.reserve_ns(left_ns).min(end_ns)
+        });
         let row = self.bare_tick(input);
         let mut quiet = |_: &TickRow| {};
         let pulse: &mut dyn FnMut(&TickRow) = match input.pulse.as_mut() {
