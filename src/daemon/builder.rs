@@ -139,6 +139,7 @@ impl Against {
         Ok(EditBatch {
             token: request.token.0,
             edits,
+            validate: asked.validate,
             warnings,
         })
     }

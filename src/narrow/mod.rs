@@ -113,6 +113,29 @@ impl Narrow {
         }
     }
 
+    /// An empty memory in place of one that did not hold: pairs that begin in tick `tick` may have collided unseen since
+    /// `since`.
+    #[must_use]
+    pub fn renewed(contacts_per_pair: usize, world: &World, since: u64, tick: u64) -> Self {
+        let mut narrow = Self::new(contacts_per_pair);
+        let len = world.slots_len();
+        let unseen = Unseen {
+            first: since,
+            last: tick,
+        };
+        narrow.unseen = vec![unseen; len];
+        narrow.spent_m = vec![f64::INFINITY; len];
+        for (slot, body) in world.bodies() {
+            let known = matches!(body.status, BodyStatus::Known | BodyStatus::Held);
+            if known && body.reach_m == 0.0 {
+                narrow.spent_m[slot.index()] = body.motion.spent_m();
+            } else {
+                narrow.unseen[slot.index()].last = u64::MAX;
+            }
+        }
+        narrow
+    }
+
     /// Lets the memories follow the pair set: ended pairs are forgotten, begun ones start from their boxes.
     pub fn begin(&mut self, tick: u64, world: &World, pairs: &PairSet, delta: &PairDelta) {
         self.tick = tick;

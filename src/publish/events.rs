@@ -3,9 +3,9 @@
 //! Events are about certified collisions only. With less budget a begin comes later; it is never wrong. An event that
 //! does not fit into a message waits here with its range, also after its pair is gone.
 
-use crate::ids::{BodyId, PairSlot};
+use crate::ids::{BodyId, PairKey, PairSlot};
 use crate::narrow::{Finding, Narrow};
-use crate::pairs::PairDelta;
+use crate::pairs::{PairDelta, PairSet};
 use crate::wire::{EndCause, Verdict};
 use crate::world::World;
 
@@ -61,6 +61,8 @@ impl History {
 pub(super) struct Events {
     /// By `PairSlot`.
     histories: Vec<History>,
+    /// Histories whose slots were lost, until they are found again.
+    adrift: Vec<History>,
     /// By ids; one entry a pair after [`Events::merge`].
     waiting: Vec<PairEvent>,
     seq: u64,
@@ -69,6 +71,37 @@ pub(super) struct Events {
 }
 
 impl Events {
+    /// The slots of all pairs are void.
+    pub(super) fn forget_slots(&mut self) {
+        let seen = self.histories.drain(..).filter(|history| history.born != 0);
+        self.adrift.extend(seen);
+    }
+
+    /// Gives the histories whose slots were lost to the same pairs' new slots; where there is no such pair any more, its
+    /// collision has ended.
+    pub(super) fn find_slots(&mut self, tick: u64, world: &World, pairs: &PairSet) {
+        for history in std::mem::take(&mut self.adrift) {
+            let (a, b) = (world.slot_of(history.ids.0), world.slot_of(history.ids.1));
+            let bodies = a.zip(b);
+            if let Some(slot) = bodies.and_then(|(a, b)| pairs.find(PairKey::new(a, b))) {
+                if self.histories.len() <= slot.index() {
+                    self.histories.resize(slot.index() + 1, History::NONE);
+                }
+                self.histories[slot.index()] = history;
+            } else if history.colliding {
+                let cause = match bodies {
+                    Some(_) => EndCause::Separated,
+                    None => EndCause::Removed,
+                };
+                let ticks = Ticks {
+                    first: history.tick + 1,
+                    last: tick,
+                };
+                self.push(history.ids, Some((ticks, cause)), None);
+            }
+        }
+    }
+
     /// Takes the pairs that ended, and those that were active and are now proved apart.
     ///
     /// Then comes [`Events::certify`] for each active pair, and [`Events::merge`].

@@ -71,6 +71,11 @@ impl Publisher {
         }
     }
 
+    /// The pair set was built anew: what is remembered goes on by body ids.
+    pub fn forget_slots(&mut self) {
+        self.events.forget_slots();
+    }
+
     /// Fills every message that is listened to, then the tick's own counts, state and reasons.
     pub fn fill(&mut self, view: &mut View<'_>, out: &mut Outbox) {
         let header = Self::header(view);
@@ -94,6 +99,7 @@ impl Publisher {
             survey,
             ..
         } = self;
+        events.find_slots(view.tick, view.world, view.pairs);
         events.begin(view.tick, view.world, view.narrow, view.delta);
         let listed = view.demand.pairs || view.demand.contacts;
         for &slot in view.narrow.active() {

@@ -19,6 +19,9 @@
 //! ] }
 //! ```
 //!
+//! `{ "validate": true }`, alone or beside `edits`, has the daemon check every structure before the next tick and build
+//! anew what does not hold; the answer's warnings say what that was.
+//!
 //! A blob is `count` rows, `offset` bytes behind the JSON, little-endian: three f64 a vertex, three u32 a face.
 
 use std::path::Path;
@@ -42,6 +45,8 @@ pub const EDITS_MAX: usize = 1 << 17;
 pub struct EditRequest {
     /// In order.
     pub edits: Vec<Edit>,
+    /// Check every structure first, and build anew what does not hold.
+    pub validate: bool,
 }
 
 /// One change of the scene, checked by itself.
@@ -131,7 +136,19 @@ impl BodyDraft {
 }
 
 fn read(json: &[u8], blobs: &[u8]) -> Result<EditRequest, Fault> {
-    let mut table = Table::open(Node::from_json(json)?, "a request", &["edits"])?;
+    let mut table = Table::open(Node::from_json(json)?, "a request", &["edits", "validate"])?;
+    let validate = table.flag("validate")?.unwrap_or(false);
+    if !table.has("edits") {
+        let text = "a request has neither `edits` nor `validate`: add one";
+        return if validate {
+            Ok(EditRequest {
+                edits: Vec::new(),
+                validate,
+            })
+        } else {
+            Err(Fault::new(None, text))
+        };
+    }
     let nodes = list(table.need("edits")?, "edits")?;
     if nodes.is_empty() || nodes.len() > EDITS_MAX {
         let text = format!("edits has {} edits: write 1 to {EDITS_MAX}", nodes.len());
@@ -142,7 +159,7 @@ fn read(json: &[u8], blobs: &[u8]) -> Result<EditRequest, Fault> {
         let edit = read_edit(node, blobs);
         edits.push(edit.map_err(|fault| fault.within(&format!("edit {}", place + 1)))?);
     }
-    Ok(EditRequest { edits })
+    Ok(EditRequest { edits, validate })
 }
 
 const VERBS: &[&str] = &[
@@ -273,128 +290,4 @@ fn read_attach(node: Node) -> Result<Edit, Fault> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::shape::ShapeSpec;
-
-    fn error(json: &str) -> String {
-        EditRequest::parse(json.as_bytes(), &[0; 24]).unwrap_err()
-    }
-
-    #[test]
-    fn every_edit_is_read() {
-        let json = r#"{ "edits": [
-            { "put": { "name": "box", "id": 18446744073709551615, "source": "sim",
-                "shape": { "type": "box", "half_extents": [1, 1, 1] } } },
-            { "remove": "old" },
-            { "enable": { "body": "box", "enabled": false } },
-            { "filter": { "body": "box", "mask": 4294967295 } },
-            { "rule": { "action": "ignore", "a": "box", "b": "part*", "reason": "glued" } },
-            { "drop_rules": { "a": "box", "b": "part" } },
-            { "attach": { "body": "box", "to": "part", "position": [0, 0, 1] } },
-            { "attach": { "body": "box", "to": "part" } },
-            { "detach": "box" },
-            { "reset": { "source": "sim" } },
-            { "reset": {} }
-        ] }"#;
-        let edits = EditRequest::parse(json.as_bytes(), &[]).unwrap().edits;
-        assert_eq!(edits.len(), 11);
-        let Edit::Put(draft) = edits.into_iter().next().unwrap() else {
-            panic!("a put");
-        };
-        let sources = ["other", "sim"].map(|name| SourceSpec {
-            name: name.to_owned(),
-            timeout_ns: 1,
-        });
-        let spec = draft.settle(&sources, Path::new("")).unwrap();
-        assert_eq!((spec.id.0, spec.source), (u64::MAX, Some(1)));
-    }
-
-    #[test]
-    fn blobs_are_read_and_checked_for_their_ends() {
-        let mut blobs = vec![7_u8];
-        for x in [0.0_f64, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0] {
-            blobs.extend(x.to_le_bytes());
-        }
-        for k in [0_u32, 1, 2] {
-            blobs.extend(k.to_le_bytes());
-        }
-        let json = |vertices: u64, offset: u64| {
-            format!(
-                r#"{{"edits": [{{"put": {{"name": "t", "moves": false, "shape": {{"type": "trimesh",
-                "vertices_blob": {{"offset": 1, "count": {vertices}}},
-                "faces_blob": {{"offset": {offset}, "count": 1}} }} }} }}]}}"#
-            )
-        };
-        let request = EditRequest::parse(json(3, 73).as_bytes(), &blobs).unwrap();
-        let [Edit::Put(draft)] = &request.edits[..] else {
-            panic!("one put");
-        };
-        let ShapeSpec::Trimesh {
-            vertices, faces, ..
-        } = &draft.spec.shapes[0].shape
-        else {
-            panic!("a mesh");
-        };
-        assert_eq!(
-            vertices[1].map(f64::to_bits),
-            [1.0_f64, 0.0, 0.0].map(f64::to_bits)
-        );
-        assert_eq!(faces[..], [[0, 1, 2]]);
-        let past = EditRequest::parse(json(3, 74).as_bytes(), &blobs).unwrap_err();
-        assert!(
-            past.contains("edit 1: body \"t\": faces_blob ends at byte 86"),
-            "{past}"
-        );
-        let huge = EditRequest::parse(json(1 << 40, 73).as_bytes(), &blobs).unwrap_err();
-        assert!(huge.contains("count is out of range"), "{huge}");
-    }
-
-    #[test]
-    fn each_mistake_is_one_text_that_names_edit_body_and_mend() {
-        for (json, wanted) in [
-            ("", "this is not JSON"),
-            ("{}", "a request needs `edits`"),
-            (r#"{"edits": []}"#, "write 1 to"),
-            (r#"{"edit": []}"#, "did you mean `edits`?"),
-            (r#"{"edits": [{}]}"#, "edit 1: an edit has one key"),
-            (
-                r#"{"edits": [{"remove": "a", "detach": "a"}]}"#,
-                "this one has 2",
-            ),
-            (r#"{"edits": [{"remov": "a"}]}"#, "did you mean `remove`?"),
-            (
-                r#"{"edits": [{"remove": ""}]}"#,
-                "edit 1: remove: the name has 0 bytes",
-            ),
-            (
-                r#"{"edits": [{"reset": {}}, {"enable": {"body": "a"}}]}"#,
-                "edit 2: enable: `enabled` is missing",
-            ),
-            (
-                r#"{"edits": [{"filter": {"body": "a"}}]}"#,
-                "neither `group` nor `mask`",
-            ),
-            (
-                r#"{"edits": [{"attach": {"body": "a", "to": "a"}}]}"#,
-                "cannot hang on itself",
-            ),
-            (
-                r#"{"edits": [{"put": {"name": "b", "shape": {"type": "sphere", "radius": -1}}}]}"#,
-                "edit 1: body \"b\": radius is -1 m: write a size",
-            ),
-            (
-                r#"{"edits": [{"put": {"name": "b", "shape": {"type": "sphere", "radius": 1e999}}}]}"#,
-                "this is not JSON: number out of range",
-            ),
-            (
-                r#"{"edits": [{"put": {"name": "b", "shape": {"type": "convex", "vertices": [[0, 0, 0]],
-                    "vertices_blob": {"offset": 0, "count": 1}}}}]}"#,
-                "vertices beside vertices_blob: keep one of them",
-            ),
-        ] {
-            let text = error(json);
-            assert!(text.contains(wanted), "{json}: {text}");
-        }
-    }
-}
+mod tests;

@@ -11,6 +11,8 @@ pub struct EditBatch {
     pub token: u64,
     /// The edits, in their order.
     pub edits: Vec<Edit>,
+    /// Check every structure first, and build anew what does not hold: said in the outcome's warnings.
+    pub validate: bool,
     /// Things the asker should know that stop nothing.
     pub warnings: Vec<String>,
 }

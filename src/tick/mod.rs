@@ -7,6 +7,7 @@ mod floor;
 mod input;
 mod look;
 pub mod pace;
+mod repair;
 
 use std::sync::Arc;
 
@@ -35,6 +36,10 @@ pub struct Engine {
     broad: BroadPhase,
     /// The method of `broad`.
     method: Method,
+    /// The broad phase is to be built anew in this tick.
+    renew: bool,
+    /// The last tick that left structures which were checked and held; 0: none was.
+    checked: u64,
     /// All bodies as inserted: how a broad phase of another method begins.
     whole: ChangeSet,
     pairs: PairSet,
@@ -84,6 +89,8 @@ impl Engine {
         Ok(Self {
             broad: BroadPhase::new(plan.method()),
             method: plan.method(),
+            renew: false,
+            checked: 0,
             whole: ChangeSet::default(),
             pairs: PairSet::new(limits.pairs),
             delta: PairDelta::default(),
@@ -139,17 +146,6 @@ impl Engine {
         }
     }
 
-    /// Full structure check of every room that keeps state.
-    ///
-    /// # Errors
-    /// The first thing that does not hold, in words.
-    pub fn validate(&self) -> std::result::Result<(), String> {
-        self.world.validate()?;
-        self.broad
-            .validate(&self.world, self.world.filters(), &self.pairs)?;
-        self.narrow.validate(&self.pairs)
-    }
-
     fn begin(&mut self, input: &TickInput<'_>) -> Laps {
         self.tick += 1;
         self.outcomes.clear();
@@ -160,10 +156,15 @@ impl Engine {
     fn admit(&mut self, input: &TickInput<'_>) {
         let now_ns = self.clock.boottime_ns();
         self.now_ns = now_ns;
+        let asked = input.edits.iter().any(|batch| batch.validate);
+        let fault = asked.then(|| self.repair()).flatten();
         self.world.begin_tick(self.tick);
         for batch in input.edits {
+            let (token, mut warnings) = (batch.token, batch.warnings.clone());
+            if batch.validate {
+                warnings.extend(fault.clone());
+            }
             let result = self.world.apply(&batch.edits);
-            let (token, warnings) = (batch.token, batch.warnings.clone());
             self.outcomes.push(EditOutcome {
                 token,
                 result,
@@ -212,7 +213,7 @@ impl Engine {
     fn find_candidates(&mut self) {
         let (world, filters) = (&self.world, self.world.filters());
         let method = self.plan.method();
-        let anew = self.method != method;
+        let anew = self.method != method || std::mem::take(&mut self.renew);
         if anew {
             self.method = method;
             self.broad = BroadPhase::new(method);

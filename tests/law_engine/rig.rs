@@ -133,6 +133,7 @@ impl Rig {
         let batch = EditBatch {
             token: 1,
             edits,
+            validate: false,
             warnings: Vec::new(),
         };
         self.tick(budget, &[batch], TickCause::Edit);
