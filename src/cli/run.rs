@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 use crate::config::Mode;
-use crate::daemon::{Daemon, build_shapes};
+use crate::daemon::{Daemon, Watchdog, build_shapes};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::time::{Clock, SystemClock};
@@ -12,6 +13,9 @@ use crate::transport::iceoryx::{Place, Server, ServerOptions, spawn_cleaner};
 
 use super::args::{Limit, RunArgs};
 use super::load_scene;
+
+/// Exit code when the watchdog ends the process.
+const EXIT_WATCHDOG: i32 = 5;
 
 /// Runs the daemon until a signal, or for the ticks asked for.
 pub(super) fn run(args: &RunArgs, stop: &AtomicBool) -> Result<bool> {
@@ -36,6 +40,13 @@ pub(super) fn run(args: &RunArgs, stop: &AtomicBool) -> Result<bool> {
     let _cleaner = spawn_cleaner(&place)?;
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
     let mut daemon = Daemon::new(&scene, shapes, boot_id, clock, &mut server)?;
+    let watchdog = match args.watchdog {
+        Limit::None => None,
+        Limit::Of(limit_ns) => Some(Watchdog::start(Duration::from_nanos(limit_ns), give_up)?),
+    };
+    if let Some(watchdog) = &watchdog {
+        daemon.watched_by(watchdog);
+    }
     tracing::info!(
         "instance `{}` runs {}: {} bodies, {} sources",
         args.which.instance,
@@ -46,6 +57,20 @@ pub(super) fn run(args: &RunArgs, stop: &AtomicBool) -> Result<bool> {
     daemon.run(stop, args.ticks)?;
     tracing::info!("ended after {} ticks", daemon.engine().ticks());
     Ok(true)
+}
+
+/// Ends the process for its watchdog. The log may be what the tick thread is stuck in: it gets a second.
+fn give_up() {
+    let told = std::thread::spawn(|| {
+        tracing::error!("the tick thread makes no progress: the daemon ends, start it again");
+    });
+    for _ in 0..100 {
+        if told.is_finished() {
+            break;
+        }
+        std::thread::park_timeout(Duration::from_millis(10));
+    }
+    std::process::exit(EXIT_WATCHDOG);
 }
 
 /// Flags override the scene.

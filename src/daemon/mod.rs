@@ -4,9 +4,10 @@
 
 mod builder;
 mod shapes;
+mod watchdog;
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::config::Config;
 use crate::error::Result;
@@ -20,6 +21,7 @@ use crate::wire::{Answer, Inbox, TickRow};
 use builder::Builder;
 
 pub use shapes::{Shapes, build_shapes};
+pub use watchdog::Watchdog;
 
 /// While a worker builds shapes the loop looks this often whether they are ready, nanoseconds.
 const BUILD_LOOK_NS: u64 = 2_000_000;
@@ -37,6 +39,8 @@ pub struct Daemon<'a> {
     arrived: Inbox,
     due: Inbox,
     ready: Vec<EditBatch>,
+    /// Raised each round, and each heartbeat of a long tick.
+    progress: Arc<AtomicU64>,
 }
 
 impl std::fmt::Debug for Daemon<'_> {
@@ -69,7 +73,13 @@ impl<'a> Daemon<'a> {
             arrived: Inbox::default(),
             due: Inbox::default(),
             ready: Vec::new(),
+            progress: Arc::default(),
         })
+    }
+
+    /// Raises this counter from now on, each round and each heartbeat of a long tick.
+    pub fn watched_by(&mut self, watchdog: &Watchdog) {
+        self.progress = watchdog.progress();
     }
 
     /// Runs until `stop` is raised, or for `ticks` ticks.
@@ -96,6 +106,7 @@ impl<'a> Daemon<'a> {
     /// As [`Daemon::run`].
     pub fn round(&mut self, ticks: Option<u64>) -> Result<bool> {
         let woke_ns = self.clock.monotonic_ns();
+        self.progress.fetch_add(1, Ordering::Relaxed);
         self.receive()?;
         let (now_ns, timeout_ns) = (self.clock.boottime_ns(), self.engine.world().next_timeout());
         let edits = !self.ready.is_empty();
@@ -164,8 +175,9 @@ impl<'a> Daemon<'a> {
             self.config.budget
         };
         let mut broken = None;
-        let door = &mut *self.door;
+        let (door, progress) = (&mut *self.door, &self.progress);
         let mut pulse = |row: &TickRow| {
+            progress.fetch_add(1, Ordering::Relaxed);
             if let Err(error) = door.publish_tick(row) {
                 broken = Some(error);
             }

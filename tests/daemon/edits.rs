@@ -306,3 +306,18 @@ fn a_shape_that_takes_long_to_build_does_not_stop_the_ticks() {
     assert_eq!(status.code(), Some(0), "{}", daemon.stderr());
     assert!(time.as_secs_f64() < 2.0, "{time:?}");
 }
+
+#[test]
+fn a_client_can_ask_for_a_check_of_every_structure_while_its_pairs_go_on() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
+    let answer = client
+        .request(r#"{"validate": true}"#, &[], 30 * SECOND_NS)
+        .unwrap();
+    assert!(answer.ok && answer.warnings.is_empty(), "{answer:?}");
+    step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
+    assert_eq!(state(client.view().tick()), State::Colliding);
+    assert_eq!(client.view().tick().rebuilds, 0);
+}

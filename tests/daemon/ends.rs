@@ -1,12 +1,15 @@
 //! How daemons end and begin: signals, kills, a second one on the same instance.
 
 use rustix::process::Signal;
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::process::CommandExt;
+use std::process::Stdio;
 use std::time::Duration;
 
 use sweepd::transport::client::{FrameInfo, Heard, Rows, StepError};
 use sweepd::wire::{EndCause, Event};
 
-use crate::live::{Desk, SECOND_NS, TWO_SPHERES, at, output, step, tick_until, until};
+use crate::live::{Desk, SECOND_NS, TWO_SPHERES, at, finish, output, step, tick_until, until};
 
 /// What `sweepd list --json` says of an instance.
 fn listed(instance: &str) -> Option<serde_json::Value> {
@@ -159,4 +162,33 @@ fn a_killed_daemon_without_clients_is_not_listed() {
     let next = desk.run(TWO_SPHERES, &[]);
     drop(desk.client(None));
     assert_eq!(next.stdout(), "", "logs go to stderr");
+}
+
+#[test]
+fn a_client_of_another_user_is_refused_with_exit_4_and_told_whose_it_is() {
+    const NOBODY: u32 = 65_534;
+    if !rustix::process::geteuid().is_root() {
+        println!("skipped: only root can run a client as another user");
+        return;
+    }
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    // A copy, because the build folder may be closed to others.
+    let binary = desk.dir.join("sweepd");
+    std::fs::copy(env!("CARGO_BIN_EXE_sweepd"), &binary).unwrap();
+    std::fs::set_permissions(&desk.dir, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let child = std::process::Command::new(&binary)
+        .args(["monitor", "--json", "--instance", &desk.instance])
+        .uid(NOBODY)
+        .gid(NOBODY)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let output = finish(child);
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(4), "{stderr}");
+    assert!(stderr.contains("user id 0"), "{stderr}");
+    assert!(stderr.contains("65534"), "{stderr}");
 }
