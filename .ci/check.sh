@@ -5,5 +5,6 @@ cd "$(dirname "$0")/.."
 
 cargo fmt --all -- --check
 cargo clippy --all-targets -- -D warnings
+cargo clippy --all-targets --no-default-features -- -D warnings
 RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
 for script in launch-free-scripts/*.sh .ci/run .ci/*.sh; do bash -n "$script"; done

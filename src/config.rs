@@ -30,6 +30,30 @@ pub enum OnStale {
     Remove,
 }
 
+/// A source whose poses the ROS 2 node takes from topics of common types.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RosSource {
+    /// What comes on its topics.
+    pub kind: RosKind,
+    /// `tf`: the topic of links; the other kinds have a topic a body.
+    pub topic: String,
+    /// `tf`: the topic of links that never change.
+    pub static_topic: String,
+    /// `tf`: where the stamps of a chain of links lie further apart, the body is unknown, nanoseconds.
+    pub max_skew_ns: u64,
+}
+
+/// What comes on the topics of a ROS 2 source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RosKind {
+    /// `tf2_msgs/TFMessage`: links between frames; each body is a frame.
+    Tf,
+    /// `geometry_msgs/PoseStamped`, a topic a body.
+    Pose,
+    /// `nav_msgs/Odometry`, a topic a body.
+    Odometry,
+}
+
 /// How a daemon runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {

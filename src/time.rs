@@ -25,6 +25,12 @@ pub trait Clock: Send + Sync {
 pub struct SystemClock;
 
 impl SystemClock {
+    /// Nanoseconds since 1970 on `CLOCK_REALTIME`: only for stamps that people and other programs read.
+    #[must_use]
+    pub fn realtime_ns(&self) -> u64 {
+        Self::read(rustix::time::ClockId::Realtime)
+    }
+
     fn read(id: rustix::time::ClockId) -> u64 {
         let now = rustix::time::clock_gettime(id);
         let seconds = u64::try_from(now.tv_sec).unwrap_or(0);

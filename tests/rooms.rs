@@ -42,6 +42,9 @@ const DOORS: &[(&str, &[&str])] = &[
     ("iceoryx2", &["transport/iceoryx", "wire/"]),
     ("parry3d_f64", &["shape/", "narrow/exact"]),
     ("glamx", &["math.rs"]),
+    ("ros2_client", &["transport/ros2"]),
+    ("rustdds", &["transport/ros2"]),
+    ("yaml_rust2", &["transport/ros2"]),
 ];
 
 fn line_of(room: &str) -> usize {

@@ -105,6 +105,7 @@ impl Stage {
             sources: vec![SourceSpec {
                 name: "feed".to_owned(),
                 timeout_ns: 1 << 60,
+                ros2: None,
             }],
             bodies: specs,
             ..Scene::default()
@@ -290,6 +291,8 @@ fn body(id: u64) -> BodySpec {
         moves: true,
         continuous: false,
         source: Some(0),
+        ros_frame: None,
+        ros_topic: None,
         group: u32::MAX,
         mask: u32::MAX,
         parent: None,

@@ -149,6 +149,8 @@ enum {
     SWEEPD_REJECT_REASON_TOO_OLD = 12,
     /* A frame or pose beyond a limit (rows a frame, coordinates). */
     SWEEPD_REJECT_REASON_OVER_LIMIT = 13,
+    /* A chain of ROS 2 frames from the body to the scene's frame that has a loop, or stamps too far apart. */
+    SWEEPD_REJECT_REASON_BAD_CHAIN = 14,
 };
 
 /* Whether a body's place is known. */

@@ -28,7 +28,7 @@ Try it, in three terminals:
   sweepd monitor                                     what touches what
 
 Exit codes: 0 done, 1 a check failed, 2 usage or a bad scene, 3 timed out, 4 refused or could not run, 101 internal error.
-Environment: NO_COLOR switches colours off.";
+Environment: NO_COLOR switches colours off. With --ros2: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY.";
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
@@ -83,6 +83,15 @@ pub(super) struct RunArgs {
     /// End after so many ticks; until a signal otherwise.
     #[arg(long, value_name = "N")]
     pub(super) ticks: Option<u64>,
+    /// Be a ROS 2 node too; on this host only, unless `ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET`.
+    ///
+    /// `--ros-args ... [--]` says so as well: -r FROM:=TO, -p NAME:=VALUE, --params-file FILE, --log-level LEVEL,
+    /// --disable-rosout-logs, as of every ROS 2 node.
+    #[arg(long)]
+    pub(super) ros2: bool,
+    /// DDS domain, 0 to 232; `ROS_DOMAIN_ID` otherwise.
+    #[arg(long, value_name = "N")]
+    pub(super) ros_domain_id: Option<u16>,
 }
 
 #[derive(Debug, Args)]

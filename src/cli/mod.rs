@@ -11,6 +11,7 @@ mod list;
 mod monitor;
 mod out;
 mod query;
+mod ros;
 mod run;
 mod screen;
 
@@ -31,7 +32,8 @@ use out::Out;
 /// Runs the command line of this process; returns its exit code.
 #[must_use]
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let (words, ros_words) = ros::split(std::env::args_os());
+    let cli = match Cli::try_parse_from(words) {
         Ok(cli) => cli,
         Err(error) => {
             // A help text that is cut off by a closed pipe has still been asked for and given.
@@ -41,7 +43,7 @@ pub fn main() -> ExitCode {
     };
     install_panic_line();
     start_log(cli.verbose, cli.quiet);
-    match dispatch(cli.command) {
+    match dispatch(cli.command, ros_words.as_deref()) {
         Ok(code) => code,
         Err(error) => {
             let mut text = error.to_string();
@@ -56,10 +58,14 @@ pub fn main() -> ExitCode {
     }
 }
 
-fn dispatch(command: Command) -> Result<ExitCode> {
+fn dispatch(command: Command, ros_words: Option<&[String]>) -> Result<ExitCode> {
+    if ros_words.is_some() && !matches!(command, Command::Run(_)) {
+        let text = "--ros-args is for `sweepd run`: no other command is a ROS 2 node";
+        return Err(Error::Usage(text.to_owned()));
+    }
     let mut out = Out::stdout();
     let done = match command {
-        Command::Run(args) => run::run(&args, stop()?.as_ref()),
+        Command::Run(args) => run::run(&args, ros_words, stop()?.as_ref()),
         Command::Check(args) => check::check(&args, &mut out),
         Command::Feed(args) => feed::feed(&args, &mut out, stop()?.as_ref()),
         Command::Monitor(args) => monitor::monitor(&args, &mut out, stop()?.as_ref()),

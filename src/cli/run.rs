@@ -10,18 +10,21 @@ use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::time::{Clock, SystemClock};
 use crate::transport::iceoryx::{Place, Server, ServerOptions, spawn_cleaner};
+use crate::transport::{Both, Door};
 
 use super::args::{Limit, RunArgs};
-use super::load_scene;
+use super::{load_scene, ros};
 
 /// Exit code when the watchdog ends the process.
 const EXIT_WATCHDOG: i32 = 5;
 
 /// Runs the daemon until a signal, or for the ticks asked for.
-pub(super) fn run(args: &RunArgs, stop: &AtomicBool) -> Result<bool> {
+pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBool) -> Result<bool> {
     let place = Place::new(&args.which.instance)?;
+    let asked = ros::Asked::read(args, ros_words)?;
     let mut scene = load_scene(&args.scene)?;
     apply(args, &mut scene)?;
+    asked.check(&scene)?;
     let shapes = build_shapes(&scene)?;
     for warning in scene.notes().iter().chain(&shapes.warnings) {
         tracing::warn!("{warning}");
@@ -38,8 +41,17 @@ pub(super) fn run(args: &RunArgs, stop: &AtomicBool) -> Result<bool> {
     let mut server = Server::open(options)?;
     // Dead clients are cleaned up beside the tick, never in it.
     let _cleaner = spawn_cleaner(&place)?;
+    let mut node = asked.open(&scene, &place, boot_id)?;
+    let mut both;
+    let door: &mut dyn Door = match ros::door(&mut node) {
+        Some(node) => {
+            both = Both::new(&mut server, node);
+            &mut both
+        }
+        None => &mut server,
+    };
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
-    let mut daemon = Daemon::new(&scene, shapes, boot_id, clock, &mut server)?;
+    let mut daemon = Daemon::new(&scene, shapes, boot_id, clock, door)?;
     let watchdog = match args.watchdog {
         Limit::None => None,
         Limit::Of(limit_ns) => Some(Watchdog::start(Duration::from_nanos(limit_ns), give_up)?),
@@ -91,6 +103,17 @@ fn apply(args: &RunArgs, scene: &mut Scene) -> Result<()> {
         {
             return Err(Error::Usage(format!(
                 "--mode on_frame={source}: the scene has no source of that name; add a [[source]] or name another"
+            )));
+        }
+        if let Mode::OnFrame(name) = mode
+            && scene
+                .sources
+                .iter()
+                .any(|own| own.name == *name && own.ros2.is_some())
+        {
+            return Err(Error::Usage(format!(
+                "--mode on_frame={name}: {}",
+                crate::scene::no_lockstep(name)
             )));
         }
         scene.config.mode = mode.clone();

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::config::{Config, OnStale};
+use crate::config::{Config, OnStale, RosSource};
 use crate::ids::BodyId;
 use crate::math::Pose;
 use crate::shape::ShapeSpec;
@@ -42,6 +42,8 @@ pub struct SourceSpec {
     pub name: String,
     /// Without a frame for this long it is no longer alive and its bodies are stale, nanoseconds.
     pub timeout_ns: u64,
+    /// Which ROS 2 topics it is; `None`: a client over shared memory or on `~/transforms`.
+    pub ros2: Option<RosSource>,
 }
 
 /// A body.
@@ -62,6 +64,10 @@ pub struct BodySpec {
     /// Place of its source in `Scene::sources`. `None` when it cannot move; an attached body may have none too, and
     /// then no frame moves it after it is detached.
     pub source: Option<usize>,
+    /// Its frame, where its source is of kind `tf`; `None`: its name.
+    pub ros_frame: Option<String>,
+    /// Its topic, where its source is of kind `pose` or `odometry`.
+    pub ros_topic: Option<String>,
     /// Groups it belongs to, one bit each.
     pub group: u32,
     /// Groups it collides with.

@@ -13,6 +13,9 @@ pub const BODY_NAME_BYTES_MAX: usize = 104;
 /// Longest name of a source, bytes.
 pub const SOURCE_NAME_BYTES_MAX: usize = 31;
 
+/// Longest name of a frame or topic of ROS 2, bytes.
+pub(crate) const ROS_NAME_BYTES_MAX: usize = 255;
+
 /// A body as written: checked by itself, its references not yet resolved.
 #[derive(Debug)]
 pub struct BodyDraft {
@@ -30,6 +33,7 @@ pub(crate) struct Places {
     pub(crate) name: Option<usize>,
     pub(crate) id: Option<usize>,
     pub(crate) source: Option<usize>,
+    pub(crate) ros: Option<usize>,
     pub(crate) parent: Option<usize>,
     pub(crate) attached_to: Option<usize>,
     pub(crate) shapes: Vec<Option<usize>>,
@@ -43,6 +47,8 @@ const KEYS: &[&str] = &[
     "moves",
     "continuous",
     "source",
+    "ros_frame",
+    "ros_topic",
     "group",
     "mask",
     "parent",
@@ -73,6 +79,10 @@ pub(crate) fn read_body(node: Node, blobs: Option<&[u8]>) -> Result<BodyDraft, F
         name: table.at("name"),
         id: table.at("id"),
         source: table.at("source"),
+        ros: ["ros_frame", "ros_topic"]
+            .into_iter()
+            .find(|key| table.has(key))
+            .and_then(|key| table.at(key)),
         parent: table.at("parent"),
         attached_to: table.at("attached_to"),
         shapes: Vec::new(),
@@ -99,6 +109,8 @@ pub(crate) fn read_body(node: Node, blobs: Option<&[u8]>) -> Result<BodyDraft, F
         moves,
         continuous: table.flag("continuous")?.unwrap_or(false),
         source: None,
+        ros_frame: table.name("ros_frame", ROS_NAME_BYTES_MAX)?,
+        ros_topic: table.name("ros_topic", ROS_NAME_BYTES_MAX)?,
         group: table.bits("group")?.unwrap_or(1),
         mask: table.bits("mask")?.unwrap_or(u32::MAX),
         parent,

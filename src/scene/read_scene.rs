@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::limits;
 use crate::scene::node::{Fault, Node, Value};
 use crate::scene::read_body::{BodyDraft, SOURCE_NAME_BYTES_MAX, read_body, title};
+use crate::scene::read_ros::{no_lockstep, read_ros};
 use crate::scene::read_rule::read_rule;
 use crate::scene::resolve::resolve;
 use crate::scene::table::{Table, list, mend_name, shortened};
@@ -181,7 +182,7 @@ fn read_sources(node: Option<Node>) -> std::result::Result<Vec<SourceSpec>, Faul
     let mut sources: Vec<SourceSpec> = Vec::new();
     for node in items(node, "source")? {
         let at = node.at;
-        let mut table = Table::open(node, "a source", &["name", "timeout_ms"])?;
+        let mut table = Table::open(node, "a source", &["name", "timeout_ms", "ros2"])?;
         let at_name = table.at("name");
         let Some(name) = table.name("name", SOURCE_NAME_BYTES_MAX)? else {
             return Err(Fault::new(at, "a source needs `name`: add it"));
@@ -201,13 +202,23 @@ fn read_sources(node: Option<Node>) -> std::result::Result<Vec<SourceSpec>, Faul
         let timeout_ns = time_ns(&mut table, "timeout_ms", 1e-3)
             .map_err(|fault| fault.within(&format!("source \"{shown}\"")))?
             .unwrap_or(limits::TIMEOUT_MS_DEFAULT * 1_000_000);
-        sources.push(SourceSpec { name, timeout_ns });
+        let ros2 = read_ros(table.take("ros2"))
+            .map_err(|fault| fault.within(&format!("source \"{shown}\"")))?;
+        sources.push(SourceSpec {
+            name,
+            timeout_ns,
+            ros2,
+        });
     }
     Ok(sources)
 }
 
 /// Milliseconds in the file, nanoseconds inside.
-fn time_ns(table: &mut Table, key: &str, min_ms: f64) -> std::result::Result<Option<u64>, Fault> {
+pub(crate) fn time_ns(
+    table: &mut Table,
+    key: &str,
+    min_ms: f64,
+) -> std::result::Result<Option<u64>, Fault> {
     let ms = table.number_within(key, min_ms, TIME_MS_MAX)?;
     #[allow(
         clippy::cast_possible_truncation,
@@ -298,7 +309,10 @@ fn read_mode(
         return Err(Fault::new(at, text));
     }
     if let Some(name) = table.name("on_frame", SOURCE_NAME_BYTES_MAX)? {
-        if sources.iter().any(|source| source.name == name) {
+        if let Some(source) = sources.iter().find(|source| source.name == name) {
+            if source.ros2.is_some() {
+                return Err(Fault::new(at, no_lockstep(&name)));
+            }
             return Ok(Some(Mode::OnFrame(name)));
         }
         let known: Vec<&str> = sources.iter().map(|s| s.name.as_str()).collect();

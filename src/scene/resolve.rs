@@ -7,6 +7,7 @@ use crate::config::Limits;
 use crate::ids::BodyId;
 use crate::scene::node::Fault;
 use crate::scene::read_body::BodyDraft;
+use crate::scene::read_ros::check_ros;
 use crate::scene::table::{mend_name, shortened};
 use crate::scene::{BodySpec, SourceSpec};
 use crate::shape::ShapeSpec;
@@ -36,14 +37,16 @@ pub(crate) fn resolve(
     drop(by_name);
     settle_ids(&mut drafts)?;
     let mut seen = BTreeSet::new();
+    let mut topics = BTreeMap::new();
     for draft in &mut drafts {
         settle_source(draft, sources)?;
+        check_ros(draft, sources, &mut topics)?;
         check_files(draft, base, &mut seen)?;
     }
     Ok(drafts.into_iter().map(|draft| draft.spec).collect())
 }
 
-fn within(draft: &BodyDraft, at: Option<usize>, text: String) -> Fault {
+pub(crate) fn within(draft: &BodyDraft, at: Option<usize>, text: String) -> Fault {
     Fault::new(at, text).within(&format!("body \"{}\"", shortened(&draft.spec.name)))
 }
 

@@ -4,13 +4,17 @@
 //! Two doors with one surface: [`iceoryx`] for other processes, [`memory`] for threads of this one (tests, the
 //! embedded feed). [`client`] is the other side of both. A door belongs to the thread that opened it.
 
+mod both;
 pub mod client;
 mod hello;
 pub mod iceoryx;
 pub mod memory;
 mod patience;
 mod request;
+#[cfg(feature = "ros2")]
+pub mod ros2;
 
+pub use both::Both;
 pub use hello::ICEORYX2_VERSION;
 
 use crate::error::Result;

@@ -168,6 +168,8 @@ code! {
         TooOld = 12 => "too_old",
         /// A frame or pose beyond a limit (rows a frame, coordinates).
         OverLimit = 13 => "over_limit",
+        /// A chain of ROS 2 frames from the body to the scene's frame that has a loop, or stamps too far apart.
+        BadChain = 14 => "bad_chain",
     }
 }
 
@@ -289,6 +291,6 @@ mod tests {
     fn a_number_without_meaning_is_no_code() {
         assert_eq!(Verdict::from_code(4), Some(Verdict::Colliding));
         assert_eq!(Verdict::from_code(5), None);
-        assert_eq!(RejectReason::ALL.len(), 14);
+        assert_eq!(RejectReason::ALL.len(), 15);
     }
 }

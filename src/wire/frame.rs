@@ -14,6 +14,10 @@ pub struct Frame {
     pub transforms: Vec<TransformRow>,
     /// `[n]` linear and angular velocity, or empty.
     pub velocities: Vec<[f64; 6]>,
+    /// `[n]` the sender's stamp of each pose, nanoseconds, where they differ; or empty: the header's.
+    pub stamps_ns: Vec<u64>,
+    /// Bodies whose newest pose the transport could not make out, and why: they are unknown until a good one comes.
+    pub refused_bodies: Vec<(u64, RejectReason)>,
     /// Whether it waited while the daemon was silent for longer than a heartbeat.
     pub waited: bool,
     /// Why the transport left its rows behind (too many to copy); the frame is refused as a whole.
@@ -62,6 +66,8 @@ impl Inbox {
         frame.refused = None;
         frame.transforms.clear();
         frame.velocities.clear();
+        frame.stamps_ns.clear();
+        frame.refused_bodies.clear();
         frame
     }
 

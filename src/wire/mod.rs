@@ -6,6 +6,8 @@ mod codes;
 mod frame;
 mod outbox;
 mod request;
+#[cfg(feature = "ros2")]
+pub mod ros;
 mod rows;
 
 pub use codes::{

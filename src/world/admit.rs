@@ -161,10 +161,11 @@ impl World {
         let refused_rows = refused_rows + self.take_rows(source, frame, &rows, times);
         self.sources[source.index()].rows = rows;
         let all = u64::try_from(frame.transforms.len()).unwrap_or(u64::MAX);
+        let poses = all.saturating_sub(refused_rows);
         Admission::Admitted {
             source,
-            poses: all.saturating_sub(refused_rows),
-            refused_rows,
+            poses,
+            refused_rows: refused_rows + self.refuse_bodies(source, frame),
         }
     }
 
@@ -210,7 +211,7 @@ impl World {
         refused
     }
 
-    fn may_move(&self, source: SourceSlot, slot: BodySlot) -> Result<(), RejectReason> {
+    pub(super) fn may_move(&self, source: SourceSlot, slot: BodySlot) -> Result<(), RejectReason> {
         let entry = &self.entries[slot.index()];
         match self.body(slot) {
             None => Err(RejectReason::UnknownBody),

@@ -5,10 +5,11 @@
 
 use super::World;
 use super::admit::{NO_BODY, Times};
+use crate::ids::BodyId;
 use crate::ids::{BodySlot, SourceSlot};
 use crate::limits::{COORDINATE_MAX_M, QUATERNION_NORM_TOLERANCE};
 use crate::math::{Pose, pose_from};
-use crate::wire::{BodyStatus, Frame, FrameHeader, RejectReason, TransformRow};
+use crate::wire::{BodyStatus, Frame, RejectReason, TransformRow};
 
 impl World {
     /// Takes the poses of the rows that were found. Of a body that stands there twice no row is taken: which one is
@@ -46,7 +47,9 @@ impl World {
             };
             match checked {
                 Ok(pose) => {
-                    self.renew(slot, &frame.header, velocity.copied(), times);
+                    let stamp_ns = frame.stamps_ns.get(at).copied();
+                    let stamp_ns = stamp_ns.unwrap_or(frame.header.stamp_ns);
+                    self.renew(slot, stamp_ns, velocity.copied(), times);
                     self.accept(slot, pose.map(|pose| (pose, raw)), deadline_ns, young);
                 }
                 Err(reason) => {
@@ -59,17 +62,23 @@ impl World {
         refused
     }
 
+    /// Bodies of this source whose newest pose the transport could not make out.
+    pub(super) fn refuse_bodies(&mut self, source: SourceSlot, frame: &Frame) -> u64 {
+        for &(body, reason) in &frame.refused_bodies {
+            self.note_reject(reason);
+            let slot = self.slot_of(BodyId(body));
+            if let Some(slot) = slot.filter(|slot| self.may_move(source, *slot).is_ok()) {
+                self.refuse_pose(slot, reason);
+            }
+        }
+        u64::try_from(frame.refused_bodies.len()).unwrap_or(u64::MAX)
+    }
+
     /// A good row: its stamp, velocity and age.
-    fn renew(
-        &mut self,
-        slot: BodySlot,
-        header: &FrameHeader,
-        velocity: Option<[f64; 6]>,
-        times: Times,
-    ) {
+    fn renew(&mut self, slot: BodySlot, stamp_ns: u64, velocity: Option<[f64; 6]>, times: Times) {
         if let Some(body) = self.bodies[slot.index()].as_mut() {
             body.velocity = velocity;
-            body.stamp_ns = header.stamp_ns;
+            body.stamp_ns = stamp_ns;
             body.since_ns = Some(times.since_ns);
             body.received_ns = times.received_ns;
         }

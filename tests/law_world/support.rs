@@ -90,6 +90,8 @@ pub(crate) fn moving(name: &str, id: u64) -> BodySpec {
         moves: true,
         continuous: false,
         source: Some(0),
+        ros_frame: None,
+        ros_topic: None,
         group: 1,
         mask: u32::MAX,
         parent: None,
@@ -127,6 +129,7 @@ pub(crate) fn scene(bodies: Vec<BodySpec>, rules: Vec<PairRule>) -> Scene {
     let source = |name: &str| SourceSpec {
         name: name.to_owned(),
         timeout_ns: TIMEOUT_NS,
+        ros2: None,
     };
     Scene {
         frame_id: "world".to_owned(),

@@ -77,6 +77,8 @@ fn any_body(rng: &mut Rng, kind: usize, s: f64, id: u64, group: u32) -> (Body, B
         moves: true,
         continuous: false,
         source: Some(0),
+        ros_frame: None,
+        ros_topic: None,
         group,
         mask: group,
         parent: None,
@@ -220,6 +222,7 @@ pub fn any_scene(rng: &mut Rng, kinds: &[(usize, usize)]) -> (Vec<Couple>, Scene
         sources: vec![SourceSpec {
             name: "feed".to_owned(),
             timeout_ns: 1 << 40,
+            ros2: None,
         }],
         bodies: specs,
         ..Scene::default()

@@ -546,6 +546,8 @@ class RejectReason(IntEnum):
     TOO_OLD = 12
     # A frame or pose beyond a limit (rows a frame, coordinates).
     OVER_LIMIT = 13
+    # A chain of ROS 2 frames from the body to the scene's frame that has a loop, or stamps too far apart.
+    BAD_CHAIN = 14
 
 
 class BodyStatus(IntEnum):

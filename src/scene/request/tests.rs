@@ -31,6 +31,7 @@ fn every_edit_is_read() {
     let sources = ["other", "sim"].map(|name| SourceSpec {
         name: name.to_owned(),
         timeout_ns: 1,
+        ros2: None,
     });
     let spec = draft.settle(&sources, Path::new("")).unwrap();
     assert_eq!((spec.id.0, spec.source), (u64::MAX, Some(1)));

@@ -1,0 +1,192 @@
+//! `sweepd run --ros2`: what was asked of ROS 2, checked, and the node beside the daemon's door.
+//!
+//! A build without the feature `ros2` says so; with it and not asked for, no thread and no socket is there.
+
+use std::ffi::OsString;
+
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+use crate::transport::Door;
+use crate::transport::iceoryx::Place;
+
+use super::args::RunArgs;
+
+#[cfg(feature = "ros2")]
+use crate::transport::ros2::{
+    RosBody, RosNode, RosOptions, RosScene, RosSourceSpec, args::RosArgs, env::Network,
+};
+
+/// The node, where one was asked for.
+#[cfg(feature = "ros2")]
+pub(super) type Node = RosNode;
+/// There is none in this build.
+#[cfg(not(feature = "ros2"))]
+pub(super) type Node = std::convert::Infallible;
+
+/// Takes the sections `--ros-args .. [--]` out of a command line.
+pub(super) fn split(words: impl Iterator<Item = OsString>) -> (Vec<OsString>, Option<Vec<String>>) {
+    let (mut plain, mut ros, mut inside) = (Vec::new(), None::<Vec<String>>, false);
+    for word in words {
+        match (inside, word.to_str()) {
+            (_, Some("--ros-args")) => {
+                inside = true;
+                ros.get_or_insert_default();
+            }
+            (true, Some("--")) => inside = false,
+            (true, _) => ros
+                .get_or_insert_default()
+                .push(word.to_string_lossy().into_owned()),
+            (false, _) => plain.push(word),
+        }
+    }
+    (plain, ros)
+}
+
+/// What was asked of ROS 2.
+#[derive(Debug)]
+pub(super) struct Asked {
+    #[cfg(feature = "ros2")]
+    node: Option<(RosArgs, Network)>,
+}
+
+#[cfg(feature = "ros2")]
+impl Asked {
+    /// Reads flags, ROS arguments and the environment.
+    pub(super) fn read(args: &RunArgs, ros_words: Option<&[String]>) -> Result<Self> {
+        if !args.ros2 && ros_words.is_none() {
+            return match args.ros_domain_id {
+                None => Ok(Self { node: None }),
+                Some(_) => Err(Error::Usage(
+                    "--ros-domain-id is of a ROS 2 node: add --ros2".to_owned(),
+                )),
+            };
+        }
+        let ros_args = RosArgs::parse(ros_words.unwrap_or_default()).map_err(Error::Usage)?;
+        if !ros_args.params.is_empty() {
+            let text = "--ros-args: this node has no parameters: leave out -p and --params-file, and write the scene's [run] table";
+            return Err(Error::Usage(text.to_owned()));
+        }
+        let network = Network::read(args.ros_domain_id, |name| std::env::var(name).ok())
+            .map_err(Error::Usage)?;
+        Ok(Self {
+            node: Some((ros_args, network)),
+        })
+    }
+
+    /// A scene with sources on topics needs the node.
+    pub(super) fn check(&self, scene: &Scene) -> Result<()> {
+        match scene.sources.iter().find(|source| source.ros2.is_some()) {
+            Some(source) if self.node.is_none() => Err(needs_node(&source.name, "add --ros2")),
+            _ => Ok(()),
+        }
+    }
+
+    /// Opens the node.
+    pub(super) fn open(self, scene: &Scene, place: &Place, boot_id: u64) -> Result<Option<Node>> {
+        let Some((args, network)) = self.node else {
+            return Ok(None);
+        };
+        let options = RosOptions {
+            args,
+            network,
+            boot_id,
+            session: crate::transport::client::random_u64()?,
+        };
+        let waker = crate::transport::iceoryx::Waker::new(place)?;
+        RosNode::open(&options, &cast(scene), Box::new(move || waker.wake())).map(Some)
+    }
+}
+
+#[cfg(not(feature = "ros2"))]
+impl Asked {
+    /// Refuses what this build does not have.
+    pub(super) fn read(args: &RunArgs, ros_words: Option<&[String]>) -> Result<Self> {
+        if args.ros2 || args.ros_domain_id.is_some() || ros_words.is_some() {
+            return Err(Error::Usage(
+                "this sweepd was built without ROS 2: build it with the feature `ros2` (it is on by default), or leave out --ros2 and --ros-args"
+                    .to_owned(),
+            ));
+        }
+        Ok(Self {})
+    }
+
+    /// A scene with sources on topics needs the node.
+    pub(super) fn check(&self, scene: &Scene) -> Result<()> {
+        match scene.sources.iter().find(|source| source.ros2.is_some()) {
+            Some(source) => Err(needs_node(
+                &source.name,
+                "run a build with the feature `ros2`",
+            )),
+            None => Ok(()),
+        }
+    }
+
+    /// There is none.
+    pub(super) fn open(self, _scene: &Scene, _place: &Place, _boot: u64) -> Result<Option<Node>> {
+        Ok(None)
+    }
+}
+
+/// What the node needs to know of a scene.
+#[cfg(feature = "ros2")]
+fn cast(scene: &Scene) -> RosScene {
+    let source = |spec: &crate::scene::SourceSpec| RosSourceSpec {
+        name: spec.name.clone(),
+        timeout_ns: spec.timeout_ns,
+        ros2: spec.ros2.clone(),
+    };
+    let body = |spec: &crate::scene::BodySpec| RosBody {
+        id: spec.id.0,
+        name: spec.name.clone(),
+        source: spec.source,
+        frame: spec.ros_frame.as_ref().unwrap_or(&spec.name).clone(),
+        topic: spec.ros_topic.clone().unwrap_or_default(),
+    };
+    RosScene {
+        frame_id: scene.frame_id.clone(),
+        heartbeat_ns: scene.config.heartbeat_ns,
+        sources: scene.sources.iter().map(source).collect(),
+        bodies: scene.bodies.iter().map(body).collect(),
+    }
+}
+
+fn needs_node(source: &str, mend: &str) -> Error {
+    Error::Usage(format!(
+        "source \"{source}\" has poses from ROS 2 topics, and this daemon is no ROS 2 node: {mend}"
+    ))
+}
+
+/// The node as a door.
+#[cfg(feature = "ros2")]
+pub(super) fn door(node: &mut Option<Node>) -> Option<&mut dyn Door> {
+    node.as_mut().map(|node| node as &mut dyn Door)
+}
+
+/// There is none.
+#[cfg(not(feature = "ros2"))]
+pub(super) fn door(_node: &mut Option<Node>) -> Option<&mut dyn Door> {
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sections_are_taken_out_and_closed_by_two_dashes() {
+        let words = |line: &str| -> Vec<String> { line.split(' ').map(str::to_owned).collect() };
+        let cut = |line: &str| {
+            let (plain, ros) = split(words(line).into_iter().map(OsString::from));
+            let plain: Vec<_> = plain
+                .into_iter()
+                .filter_map(|w| w.into_string().ok())
+                .collect();
+            (plain, ros)
+        };
+        let (plain, ros) = cut("sweepd run --ros-args -r a:=b -- scene.toml --ros-args -p x:=1");
+        assert_eq!(plain, words("sweepd run scene.toml"));
+        assert_eq!(ros, Some(words("-r a:=b -p x:=1")));
+        assert_eq!(cut("sweepd list").1, None);
+        assert_eq!(cut("sweepd run --ros-args").1, Some(Vec::new()));
+    }
+}

@@ -1,0 +1,254 @@
+//! `/diagnostics`: how the daemon fares, once a second, in words. In: the newest tick, counters, faults. Out: one
+//! status for the state, the budget, the sources and the node. Pure.
+
+use super::speak::Counts;
+use crate::wire::ros::diagnostic_level::{ERROR, OK, WARN};
+use crate::wire::ros::{DiagnosticArray, DiagnosticStatus, Header, KeyValue, Time};
+use crate::wire::{Reason, RejectReason, SourceRow, State, TickRow, name_str};
+
+/// Seconds of ticks beyond their budget after which a warning becomes an error: a moment of load is none.
+const OVERRUN_ERROR_S: u32 = 3;
+
+/// What was told a second ago, to tell what is new.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Diagnoser {
+    missed: u64,
+    overrun_s: u32,
+    rejects: Vec<u64>,
+    counts: Counts,
+}
+
+impl Diagnoser {
+    /// The statuses of the last second.
+    pub(super) fn diagnose(
+        &mut self,
+        now: Time,
+        node: &str,
+        row: &TickRow,
+        counts: Counts,
+        faults: &[String],
+    ) -> DiagnosticArray {
+        let parts = [
+            ("state", state(row)),
+            ("budget", self.budget(row)),
+            ("sources", self.sources(row)),
+            ("ros2", self.node(counts, faults)),
+        ];
+        let status = parts.map(|(part, (level, message, values))| DiagnosticStatus {
+            level,
+            name: format!("{node}: {part}"),
+            message,
+            hardware_id: "sweepd".to_owned(),
+            values,
+        });
+        DiagnosticArray {
+            header: Header {
+                stamp: now,
+                frame_id: String::new(),
+            },
+            status: status.into(),
+        }
+    }
+
+    fn budget(&mut self, row: &TickRow) -> Finding {
+        let missed = row.missed.saturating_sub(self.missed);
+        self.missed = row.missed;
+        self.overrun_s = if missed > 0 { self.overrun_s + 1 } else { 0 };
+        let (level, message) = match (missed, self.overrun_s) {
+            (0, _) => (OK, "within the budget".to_owned()),
+            (_, s) if s < OVERRUN_ERROR_S => (
+                WARN,
+                format!("{missed} ticks of the last second ended after their budget"),
+            ),
+            (_, s) => (
+                ERROR,
+                format!(
+                    "ticks have ended after their budget for {s} s: raise budget_ms, or lower what is asked"
+                ),
+            ),
+        };
+        let values = vec![
+            value("elapsed_us", row.elapsed_ns / 1000),
+            value("floor_us", row.floor_ns / 1000),
+            value("units", row.units),
+            value("missed", row.missed),
+        ];
+        (level, message, values)
+    }
+
+    fn sources(&mut self, row: &TickRow) -> Finding {
+        let sources = || row.sources.iter().take(usize::from(row.sources_len));
+        let silent: Vec<&str> = sources().filter(|s| s.alive == 0).map(name).collect();
+        let new = RejectReason::ALL.iter().filter_map(|reason| {
+            let place = usize::from(reason.code());
+            let all = row.rejects.get(place).copied().unwrap_or_default();
+            let before = self.rejects.get(place).copied().unwrap_or_default();
+            (all > before).then(|| format!("{} {reason}", all - before))
+        });
+        let new: Vec<String> = new.collect();
+        self.rejects = row.rejects.to_vec();
+        let (level, message) = if !silent.is_empty() {
+            (ERROR, format!("silent: {}", silent.join(", ")))
+        } else if !new.is_empty() {
+            (
+                WARN,
+                format!("refused in the last second: {}", new.join(", ")),
+            )
+        } else {
+            (OK, "all sources send".to_owned())
+        };
+        let age = |source: &SourceRow| match source.age_ns {
+            u64::MAX => value(name(source), "never"),
+            age_ns => value(name(source), format!("{} ms old", age_ns / 1_000_000)),
+        };
+        (level, message, sources().map(age).collect())
+    }
+
+    fn node(&mut self, counts: Counts, faults: &[String]) -> Finding {
+        let unsent = counts
+            .sends_dropped
+            .saturating_sub(self.counts.sends_dropped);
+        let undecodable = counts.undecodable.saturating_sub(self.counts.undecodable);
+        self.counts = counts;
+        let mut said: Vec<String> = faults.to_vec();
+        if undecodable > 0 {
+            said.push(format!(
+                "{undecodable} samples could not be decoded: a wrong type on a topic?"
+            ));
+        }
+        if unsent > 0 {
+            said.push(format!(
+                "{unsent} messages could not be sent in the last second: a reader is too slow"
+            ));
+        }
+        let level = if said.is_empty() { OK } else { WARN };
+        let message = match said.as_slice() {
+            [] => "in order".to_owned(),
+            _ => said.join("; "),
+        };
+        let mut values = vec![
+            value("sends_dropped", counts.sends_dropped),
+            value("receipts_undecodable", counts.undecodable),
+            value("receipts_refused", counts.refused),
+        ];
+        let skew = counts.skew_ns.map(super::poses::seconds);
+        values.extend(skew.map(|skew_s| value("tf_skew_s", format_args!("{skew_s:.4}"))));
+        (level, message, values)
+    }
+}
+
+/// Level, message, figures.
+type Finding = (u8, String, Vec<KeyValue>);
+
+fn state(row: &TickRow) -> Finding {
+    let state = State::from_code(row.header.state).unwrap_or(State::Unknown);
+    let reasons: Vec<String> = Reason::ALL
+        .iter()
+        .filter(|reason| row.reasons & reason.bit() != 0)
+        .map(ToString::to_string)
+        .collect();
+    // A certified collision is an answer; that something is not known is the trouble.
+    let level = match state {
+        State::Unknown => ERROR,
+        State::Possible => WARN,
+        _ if reasons.is_empty() => OK,
+        _ => WARN,
+    };
+    let message = match reasons.as_slice() {
+        [] => state.to_string(),
+        _ => format!("{state}: {}", reasons.join(", ")),
+    };
+    let values = vec![
+        value("bodies", row.bodies),
+        value("unknown", row.unknown),
+        value("colliding", row.colliding),
+        value("possible", row.possible),
+        value("near", row.near),
+        value("ignored", row.ignored),
+    ];
+    (level, message, values)
+}
+
+fn name(source: &SourceRow) -> &str {
+    name_str(&source.name).unwrap_or("?")
+}
+
+#[allow(
+    clippy::needless_pass_by_value,
+    reason = "a number or a piece of text is said by value"
+)]
+fn value(key: &str, value: impl std::fmt::Display) -> KeyValue {
+    KeyValue {
+        key: key.to_owned(),
+        value: value.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::name_bytes;
+
+    fn levels(diagnoser: &mut Diagnoser, row: &TickRow, faults: &[String]) -> Vec<(u8, String)> {
+        let all = diagnoser.diagnose(Time::default(), "sweepd", row, Counts::default(), faults);
+        all.status
+            .into_iter()
+            .map(|s| (s.level, s.message))
+            .collect()
+    }
+
+    #[test]
+    fn a_daemon_in_order_is_ok_in_every_part() {
+        let all = levels(&mut Diagnoser::default(), &TickRow::default(), &[]);
+        assert_eq!(
+            all.iter().map(|(level, _)| *level).collect::<Vec<_>>(),
+            [OK; 4]
+        );
+    }
+
+    #[test]
+    fn overruns_are_a_warning_first_and_then_an_error() {
+        let mut diagnoser = Diagnoser::default();
+        let seen: Vec<u8> = (1..=4)
+            .map(|missed| {
+                let row = TickRow {
+                    missed,
+                    ..TickRow::default()
+                };
+                levels(&mut diagnoser, &row, &[])[1].0
+            })
+            .collect();
+        assert_eq!(seen, [WARN, WARN, ERROR, ERROR]);
+        let row = TickRow {
+            missed: 4,
+            ..TickRow::default()
+        };
+        assert_eq!(levels(&mut diagnoser, &row, &[])[1].0, OK);
+    }
+
+    #[test]
+    fn silence_rejects_reasons_and_faults_are_told_in_words() {
+        let mut diagnoser = Diagnoser::default();
+        let mut row = TickRow {
+            sources_len: 1,
+            ..TickRow::default()
+        };
+        row.sources[0].name = name_bytes("arm");
+        row.header.state = State::Unknown.code();
+        row.reasons = Reason::Stale.bit();
+        row.rejects[1] = 3;
+        let all = levels(&mut diagnoser, &row, &["body a: lost".to_owned()]);
+        assert_eq!(all[0], (ERROR, "unknown: stale".to_owned()));
+        assert_eq!(all[2], (ERROR, "silent: arm".to_owned()));
+        assert_eq!(all[3], (WARN, "body a: lost".to_owned()));
+        row.sources[0].alive = 1;
+        row.rejects[1] = 5;
+        assert_eq!(
+            levels(&mut diagnoser, &row, &[])[2],
+            (
+                WARN,
+                "refused in the last second: 2 bad_quaternion".to_owned()
+            )
+        );
+    }
+}

@@ -1,0 +1,166 @@
+//! The environment variables of ROS 2: honoured, or refused by name with what to do. In: a look-up. Out: domain and
+//! network. Pure: the process's environment is read by whoever calls.
+
+/// Which DDS network the node is in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Network {
+    /// DDS domain.
+    pub domain: u16,
+    /// Whether anything leaves this host.
+    pub range: Range,
+}
+
+/// How far the node reaches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Range {
+    /// Loopback only.
+    Localhost,
+    /// Every network this host is in.
+    Subnet,
+}
+
+/// Greatest domain: beyond it the ports of DDS (7400 + 250 a domain) end.
+const DOMAIN_MAX: u16 = 232;
+
+impl Network {
+    /// Reads the variables; `domain` from the command line beats `ROS_DOMAIN_ID`.
+    ///
+    /// # Errors
+    /// One text that names the variable, what is wrong with it and what to do.
+    pub fn read(
+        domain: Option<u16>,
+        variable: impl Fn(&str) -> Option<String>,
+    ) -> Result<Self, String> {
+        let given = |name: &str| variable(name).filter(|text| !text.is_empty());
+        let domain = match domain {
+            Some(domain) => domain,
+            None => given("ROS_DOMAIN_ID").map_or(Ok(0), |text| {
+                text.trim().parse().map_err(|_| {
+                    format!("ROS_DOMAIN_ID={text} is no domain: write 0 to {DOMAIN_MAX}")
+                })
+            })?,
+        };
+        if domain > DOMAIN_MAX {
+            return Err(format!(
+                "ROS domain {domain}: DDS has ports for 0 to {DOMAIN_MAX}, of which 0 to 101 are safe on Linux"
+            ));
+        }
+        rmw(given("RMW_IMPLEMENTATION").as_deref())?;
+        if let Some(peers) = given("ROS_STATIC_PEERS") {
+            let local = |peer: &str| ["127.0.0.1", "localhost", "::1"].contains(&peer.trim());
+            if !peers.split(';').filter(|p| !p.is_empty()).all(local) {
+                return Err(format!(
+                    "ROS_STATIC_PEERS={peers}: this node finds peers by multicast only: unset it, and set ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET to be found on the network"
+                ));
+            }
+        }
+        let range = range(given("ROS_AUTOMATIC_DISCOVERY_RANGE").as_deref())?;
+        let localhost_only = given("ROS_LOCALHOST_ONLY").is_some_and(|text| text == "1");
+        Ok(Self {
+            domain,
+            range: if localhost_only {
+                Range::Localhost
+            } else {
+                range
+            },
+        })
+    }
+}
+
+fn range(text: Option<&str>) -> Result<Range, String> {
+    match text {
+        None | Some("LOCALHOST" | "SYSTEM_DEFAULT") => Ok(Range::Localhost),
+        Some("SUBNET") => Ok(Range::Subnet),
+        Some("OFF") => Err(
+            "ROS_AUTOMATIC_DISCOVERY_RANGE=OFF: a node that is not to be found needs no --ros2: leave it out, or set LOCALHOST or SUBNET"
+                .to_owned(),
+        ),
+        Some(other) => Err(format!(
+            "ROS_AUTOMATIC_DISCOVERY_RANGE={other}: write LOCALHOST or SUBNET"
+        )),
+    }
+}
+
+/// Every DDS of ROS 2 speaks the protocol of this one.
+fn rmw(text: Option<&str>) -> Result<(), String> {
+    match text {
+        None
+        | Some(
+            "rmw_fastrtps_cpp" | "rmw_fastrtps_dynamic_cpp" | "rmw_cyclonedds_cpp"
+            | "rmw_connextdds",
+        ) => Ok(()),
+        Some("rmw_zenoh_cpp") => Err(
+            "RMW_IMPLEMENTATION=rmw_zenoh_cpp: this node speaks DDS, and nodes on zenoh would not hear it: run the others with rmw_fastrtps_cpp or rmw_cyclonedds_cpp, or unset it here to go on"
+                .to_owned(),
+        ),
+        Some(other) => Err(format!(
+            "RMW_IMPLEMENTATION={other} is not known here: this node speaks DDS, as rmw_fastrtps_cpp and rmw_cyclonedds_cpp do: unset it to go on"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(domain: Option<u16>, variables: &[(&str, &str)]) -> Result<Network, String> {
+        Network::read(domain, |name| {
+            let found = variables.iter().find(|(own, _)| *own == name);
+            found.map(|(_, text)| (*text).to_owned())
+        })
+    }
+
+    #[test]
+    fn without_a_word_the_node_stays_on_this_host() {
+        let network = read(None, &[]).unwrap();
+        assert_eq!(
+            network,
+            Network {
+                domain: 0,
+                range: Range::Localhost
+            }
+        );
+        let network = read(
+            None,
+            &[
+                ("ROS_DOMAIN_ID", "42"),
+                ("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET"),
+            ],
+        );
+        assert_eq!(
+            network,
+            Ok(Network {
+                domain: 42,
+                range: Range::Subnet
+            })
+        );
+    }
+
+    #[test]
+    fn the_command_line_and_the_stricter_variable_win() {
+        assert_eq!(read(Some(7), &[("ROS_DOMAIN_ID", "42")]).unwrap().domain, 7);
+        let both = [
+            ("ROS_LOCALHOST_ONLY", "1"),
+            ("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET"),
+        ];
+        assert_eq!(read(None, &both).unwrap().range, Range::Localhost);
+        assert!(read(None, &[("ROS_STATIC_PEERS", "127.0.0.1;")]).is_ok());
+        assert!(read(None, &[("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")]).is_ok());
+    }
+
+    #[test]
+    fn what_cannot_be_honoured_is_refused_by_name() {
+        for (name, text) in [
+            ("ROS_DOMAIN_ID", "many"),
+            ("ROS_DOMAIN_ID", "233"),
+            ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"),
+            ("ROS_AUTOMATIC_DISCOVERY_RANGE", "subnet"),
+            ("ROS_STATIC_PEERS", "192.168.0.7"),
+            ("RMW_IMPLEMENTATION", "rmw_zenoh_cpp"),
+            ("RMW_IMPLEMENTATION", "rmw_email_cpp"),
+        ] {
+            let error = read(None, &[(name, text)]).unwrap_err();
+            assert!(error.contains(text), "{name}={text}: {error}");
+        }
+    }
+}

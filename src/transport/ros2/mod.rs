@@ -1,0 +1,70 @@
+//! The ROS 2 node: the one door to ros2-client and rustdds. In: topics of anybody in the DDS domain. Out: frames for
+//! the tick thread, and its ticks as topics.
+//!
+//! Four threads, none of which the tick thread waits for: `ros-spin` (parameters and the graph), `ros-rx`
+//! ([`inlet`]: subscriptions, decoding, chains of frames), `ros-tx` ([`outlet`]: messages, publishing), and those of
+//! DDS itself. Between them and the tick stand a shelf of frames ([`shelf`]) and a queue of two parcels ([`parcel`]):
+//! the newest wins, and what gave way is counted. The tick thread never calls into DDS, which may block.
+//!
+//! Order at the end is a promise: the sending and receiving threads first, then the node, which takes its name out of
+//! the graph, then the spinner's thread, then the context; in any other order the name stays in the graph for 50 s.
+
+pub mod args;
+mod diagnose;
+pub mod env;
+mod inlet;
+pub mod names;
+mod node;
+mod outlet;
+pub mod params_file;
+mod parcel;
+mod poses;
+mod shared;
+mod shelf;
+mod sockets;
+mod speak;
+mod tf;
+mod topics;
+
+pub use node::{RosNode, RosOptions};
+
+use crate::config::RosSource;
+
+/// What the node needs to know of a scene.
+#[derive(Clone, Debug, Default)]
+pub struct RosScene {
+    /// The scene's frame.
+    pub frame_id: String,
+    /// The daemon's heartbeat, nanoseconds.
+    pub heartbeat_ns: u64,
+    /// Its sources, in its order.
+    pub sources: Vec<RosSourceSpec>,
+    /// Its bodies.
+    pub bodies: Vec<RosBody>,
+}
+
+/// A source of the scene.
+#[derive(Clone, Debug)]
+pub struct RosSourceSpec {
+    /// Its name.
+    pub name: String,
+    /// Its time-out, nanoseconds.
+    pub timeout_ns: u64,
+    /// Its topics; `None`: it sends whole frames.
+    pub ros2: Option<RosSource>,
+}
+
+/// A body of the scene.
+#[derive(Clone, Debug)]
+pub struct RosBody {
+    /// Its id.
+    pub id: u64,
+    /// Its name.
+    pub name: String,
+    /// Place of its source.
+    pub source: Option<usize>,
+    /// Its frame in `/tf`.
+    pub frame: String,
+    /// Its topic; empty: none.
+    pub topic: String,
+}

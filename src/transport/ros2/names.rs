@@ -1,0 +1,146 @@
+//! Names of topics and services: `~` and relative names made absolute, remap rules applied, collisions found.
+
+use std::collections::BTreeMap;
+
+use super::args::{RosArgs, is_token};
+
+/// Makes full names for one node.
+#[derive(Clone, Debug)]
+pub struct Names {
+    args: RosArgs,
+    node: String,
+    namespace: String,
+    /// Full names given out, and what for.
+    taken: BTreeMap<String, String>,
+}
+
+impl Names {
+    /// Names for the node that the arguments describe.
+    ///
+    /// # Errors
+    /// One text, when node or namespace is no name.
+    pub fn new(args: &RosArgs, default_node: &str) -> Result<Self, String> {
+        let node = args.node_name(default_node)?;
+        let namespace = args.namespace(&node)?;
+        Ok(Self {
+            args: args.clone(),
+            node,
+            namespace,
+            taken: BTreeMap::new(),
+        })
+    }
+
+    /// The node's name.
+    #[must_use]
+    pub fn node(&self) -> &str {
+        &self.node
+    }
+
+    /// The node's namespace.
+    #[must_use]
+    pub fn namespace(&self) -> &str {
+        &self.namespace
+    }
+
+    /// Namespace and name.
+    #[must_use]
+    pub fn full_node(&self) -> String {
+        format!("{}/{}", self.namespace.trim_end_matches('/'), self.node)
+    }
+
+    /// The full name after expansion and remaps, and kept: a second thing of that name is refused.
+    ///
+    /// # Errors
+    /// One text, when it is no name or another thing has it.
+    pub fn claim(&mut self, name: &str) -> Result<String, String> {
+        let full = self.resolve(name)?;
+        if let Some(other) = self.taken.insert(full.clone(), name.to_owned())
+            && other != name
+        {
+            return Err(format!(
+                "--ros-args: `{name}` and `{other}` would both be {full}: remap one of them to another name"
+            ));
+        }
+        Ok(full)
+    }
+
+    /// The full name after expansion and remaps.
+    ///
+    /// # Errors
+    /// One text, when it is no name.
+    pub fn resolve(&self, name: &str) -> Result<String, String> {
+        let full = self.expand(name)?;
+        for rule in self.args.rules(&self.node) {
+            if rule.from.starts_with("__") {
+                continue;
+            }
+            if self.expand(&rule.from)? == full {
+                return self.expand(&rule.to);
+            }
+        }
+        Ok(full)
+    }
+
+    /// `~/x` is in the node, `x` in its namespace, `/x` in the root.
+    fn expand(&self, name: &str) -> Result<String, String> {
+        let root = self.namespace.trim_end_matches('/');
+        let full = match name.strip_prefix('~') {
+            Some(rest) => format!("{root}/{}{rest}", self.node),
+            None if name.starts_with('/') => name.to_owned(),
+            None => format!("{root}/{name}"),
+        };
+        let fine = full
+            .split('/')
+            .skip(1)
+            .all(|t| is_token(t) && !t.contains("__"));
+        if fine {
+            Ok(full)
+        } else {
+            Err(format!(
+                "`{name}` is no name of a topic or service: write letters, digits, _ (one at a time) and / between them"
+            ))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(line: &str) -> Names {
+        let words: Vec<String> = line.split_whitespace().map(str::to_owned).collect();
+        Names::new(&RosArgs::parse(&words).unwrap(), "sweepd").unwrap()
+    }
+
+    #[test]
+    fn names_are_expanded_and_remapped() {
+        let plain = names("");
+        assert_eq!(plain.resolve("~/contacts").unwrap(), "/sweepd/contacts");
+        assert_eq!(plain.full_node(), "/sweepd");
+        let cell = names("-r __ns:=/cell -r ~/contacts:=touch -r /tf:=/other/tf -r x:pairs:=no");
+        assert_eq!(cell.resolve("~/contacts").unwrap(), "/cell/touch");
+        assert_eq!(cell.resolve("~/pairs").unwrap(), "/cell/sweepd/pairs");
+        assert_eq!(cell.resolve("/tf").unwrap(), "/other/tf");
+        assert_eq!(cell.full_node(), "/cell/sweepd");
+    }
+
+    #[test]
+    fn a_remap_that_collides_is_refused_with_both_names() {
+        let mut names = names("-r ~/pairs:=~/contacts");
+        names.claim("~/contacts").unwrap();
+        let error = names.claim("~/pairs").unwrap_err();
+        assert!(
+            error.contains("~/pairs") && error.contains("~/contacts"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn what_is_no_name_is_refused() {
+        let names = names("-r ~/tick:=bad-name");
+        assert!(names.resolve("~/tick").is_err());
+        for bad in ["/", "/a//b", "/9", "/a__b", "a b", ""] {
+            assert!(names.resolve(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,220 @@
+//! The sending thread (`ros-tx`): turns parcels into messages and publishes them, the tick last.
+//!
+//! In: parcels of the tick thread. Out: topics; who listens to them. A message that DDS does not take at once is
+//! counted, not waited for.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use ros2_client::{Context, Node, Publisher};
+use serde::Serialize;
+
+use super::diagnose::Diagnoser;
+use super::names::Names;
+use super::parcel::{Next, Parcel, Parcels};
+use super::shared::Shared;
+use super::speak::{Book, Speaker};
+use super::topics::{Out, publisher};
+use crate::error::{Error, Result};
+use crate::time::{Clock as _, SystemClock};
+use crate::wire::ros;
+use crate::wire::{Demand, NameRow, TickRow};
+
+/// Longest sleep: how soon a new reader is noticed.
+const SLEEP: Duration = Duration::from_millis(100);
+/// Messages of names kept for late joiners: a scene of 100,000 bodies.
+const NAMES_DEPTH: usize = 64;
+/// Between two messages of diagnostics, nanoseconds: what `/diagnostics` is read at.
+const DIAGNOSTICS_NS: u64 = 1_000_000_000;
+/// Bytes of the largest messages.
+const CHUNK_BYTES: usize = 128 << 10;
+
+/// The publishers.
+pub(super) struct Publishers {
+    state: Publisher<ros::State>,
+    tick: Publisher<ros::Tick>,
+    pairs: Publisher<ros::Pairs>,
+    contacts: Publisher<ros::Contacts>,
+    names: Publisher<ros::Names>,
+    diagnostics: Publisher<ros::DiagnosticArray>,
+}
+
+impl Publishers {
+    /// Creates them.
+    ///
+    /// * `reliable` - whether pairs and contacts that were lost are sent again.
+    ///
+    /// # Errors
+    /// `Error::Usage` when remaps collide; `Error::Io` when DDS refuses.
+    pub(super) fn create(
+        node: &mut Node,
+        context: &Context,
+        names: &mut Names,
+        heartbeat_ns: u64,
+        reliable: bool,
+    ) -> Result<Self> {
+        let mut claim = |name: &str| names.claim(name).map_err(Error::Usage);
+        // Silence of the node itself is told by the deadline and by the lease.
+        let watched = Out {
+            deadline: Some(Duration::from_nanos(heartbeat_ns.saturating_mul(2))),
+            ..Out::RELIABLE
+        };
+        let large = Out {
+            reliable,
+            bytes: CHUNK_BYTES,
+            ..Out::RELIABLE
+        };
+        let latched = Out {
+            latched: true,
+            depth: NAMES_DEPTH,
+            ..large
+        };
+        let latched = Out {
+            reliable: true,
+            ..latched
+        };
+        Ok(Self {
+            contacts: publisher(
+                node,
+                context,
+                (&claim("~/contacts")?, ("sweepd_msgs", "Contacts")),
+                large,
+            )?,
+            pairs: publisher(
+                node,
+                context,
+                (&claim("~/pairs")?, ("sweepd_msgs", "Pairs")),
+                large,
+            )?,
+            names: publisher(
+                node,
+                context,
+                (&claim("~/names")?, ("sweepd_msgs", "Names")),
+                latched,
+            )?,
+            diagnostics: publisher(
+                node,
+                context,
+                (
+                    &claim("/diagnostics")?,
+                    ("diagnostic_msgs", "DiagnosticArray"),
+                ),
+                Out {
+                    depth: 10,
+                    ..Out::RELIABLE
+                },
+            )?,
+            state: publisher(
+                node,
+                context,
+                (&claim("~/state")?, ("sweepd_msgs", "State")),
+                watched,
+            )?,
+            tick: publisher(
+                node,
+                context,
+                (&claim("~/tick")?, ("sweepd_msgs", "Tick")),
+                watched,
+            )?,
+        })
+    }
+}
+
+/// The sending thread's own things.
+pub(super) struct Outlet {
+    pub(super) node: Arc<Node>,
+    pub(super) publishers: Publishers,
+    pub(super) parcels: Arc<Parcels>,
+    pub(super) shared: Arc<Shared>,
+    pub(super) speaker: Speaker,
+    pub(super) boot_id: u64,
+    /// The node's full name.
+    pub(super) name: String,
+    pub(super) diagnoser: Diagnoser,
+    /// The newest tick, and when diagnostics were last told, nanoseconds of `CLOCK_BOOTTIME`.
+    pub(super) told: (TickRow, u64),
+}
+
+impl Outlet {
+    /// Runs until the node closes.
+    pub(super) fn run(mut self) {
+        loop {
+            self.look_who_listens();
+            self.diagnose();
+            match self.parcels.next(SLEEP) {
+                Next::Stop => return,
+                Next::Nothing => {}
+                Next::Parcel(parcel, names) => {
+                    if let Some((scene_rev, rows)) = names {
+                        self.take_names(scene_rev, &rows);
+                    }
+                    self.send(&parcel);
+                    self.told.0 = parcel.tick;
+                    self.parcels.give_back(*parcel);
+                }
+            }
+        }
+    }
+
+    fn look_who_listens(&self) {
+        let out = &self.publishers;
+        self.shared.set_demand(Demand {
+            pairs: out.pairs.get_subscription_count(&self.node) > 0,
+            contacts: out.contacts.get_subscription_count(&self.node) > 0,
+            bodies: false,
+            body_verdicts: false,
+        });
+    }
+
+    /// Once a second, where somebody listens.
+    fn diagnose(&mut self) {
+        let now_ns = SystemClock.boottime_ns();
+        let (row, told_ns) = &mut self.told;
+        let to = &self.publishers.diagnostics;
+        let due = now_ns.saturating_sub(*told_ns) >= DIAGNOSTICS_NS && row.header.tick > 0;
+        if !due || to.get_subscription_count(&self.node) == 0 {
+            return;
+        }
+        *told_ns = now_ns;
+        let now = ros::Time::from_ns(SystemClock.realtime_ns());
+        let (counts, faults) = (self.shared.counts(), self.shared.faults());
+        let message = self
+            .diagnoser
+            .diagnose(now, &self.name, row, counts, &faults);
+        self.publish(&self.publishers.diagnostics, message);
+    }
+
+    fn take_names(&mut self, scene_rev: u64, rows: &[NameRow]) {
+        let book = Book::of(rows);
+        self.shared.set_book(Arc::new(book.clone()));
+        self.speaker.book = book;
+        let now = ros::Time::from_ns(SystemClock.realtime_ns());
+        for message in self.speaker.names(now, self.boot_id, scene_rev) {
+            self.publish(&self.publishers.names, message);
+        }
+    }
+
+    /// Contacts and pairs first, the tick last: whoever has the tick has all that belongs to it.
+    fn send(&self, parcel: &Parcel) {
+        let out = &self.publishers;
+        if parcel.holds.contacts {
+            for message in self.speaker.contacts(parcel) {
+                self.publish(&out.contacts, message);
+            }
+        }
+        if parcel.holds.pairs {
+            for message in self.speaker.pairs(parcel) {
+                self.publish(&out.pairs, message);
+            }
+        }
+        self.publish(&out.state, self.speaker.state(&parcel.tick));
+        let tick = self.speaker.tick(&parcel.tick, self.shared.counts());
+        self.publish(&out.tick, tick);
+    }
+
+    fn publish<M: Serialize>(&self, to: &Publisher<M>, message: M) {
+        if to.publish(message).is_err() {
+            self.shared.note_unsent(1);
+        }
+    }
+}

@@ -1,0 +1,301 @@
+//! Parameter files: YAML of `NODE: ros__parameters: NAME: VALUE`. In: text. Out: settings in the file's order, each
+//! with the node pattern it is for.
+
+use yaml_rust2::{Yaml, YamlLoader};
+
+/// A value of a parameter as YAML has it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// true or false.
+    Flag(bool),
+    /// A whole number.
+    Whole(i64),
+    /// A number.
+    Real(f64),
+    /// A text.
+    Text(String),
+    /// A list of values of one kind.
+    List(Vec<Value>),
+}
+
+/// A parameter that somebody set.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// Node pattern: `/**`, `/*`, `/ns/node`, `node`.
+    pub node: String,
+    /// Its name, with dots between levels.
+    pub name: String,
+    /// Its value.
+    pub value: Value,
+    /// Where it was said, for messages.
+    pub said: String,
+}
+
+/// Largest parameter file, bytes: a person wrote it.
+const FILE_BYTES_MAX: usize = 1 << 20;
+/// Deepest table in a file; deeper ones are made to overflow something.
+const DEPTH_MAX: usize = 16;
+
+/// Reads a file's text.
+///
+/// # Errors
+/// One text that names the file, what is wrong and what to write.
+pub fn parse(text: &str, file: &str) -> Result<Vec<Setting>, String> {
+    if text.len() > FILE_BYTES_MAX {
+        return Err(format!(
+            "{file}: the file has {} bytes, more than {FILE_BYTES_MAX}",
+            text.len()
+        ));
+    }
+    let documents =
+        YamlLoader::load_from_str(text).map_err(|e| format!("{file}: this is not YAML: {e}"))?;
+    let mut all = Vec::new();
+    for document in &documents {
+        match document {
+            Yaml::Hash(_) => nodes(document, "", file, &mut all, 0)?,
+            Yaml::Null | Yaml::BadValue => {}
+            _ => return Err(wrong(file, "", "a file of parameters begins with NODE:")),
+        }
+    }
+    if all.is_empty() {
+        return Err(format!(
+            "{file}: there is no parameter in it: write NODE:, then ros__parameters:, then NAME: VALUE, each further in"
+        ));
+    }
+    Ok(all)
+}
+
+/// A value as on a command line.
+///
+/// # Errors
+/// One text, when it is no value.
+pub fn parse_value(text: &str) -> Result<Value, String> {
+    let documents = YamlLoader::load_from_str(text).map_err(|e| format!("`{text}`: {e}"))?;
+    match documents.as_slice() {
+        [] => Ok(Value::Text(String::new())),
+        [one] => value(one).ok_or_else(|| format!("`{text}` is no value of a parameter")),
+        _ => Err(format!("`{text}` is more than one value")),
+    }
+}
+
+/// Walks down namespaces to the tables `ros__parameters`.
+fn nodes(
+    table: &Yaml,
+    path: &str,
+    file: &str,
+    all: &mut Vec<Setting>,
+    depth: usize,
+) -> Result<(), String> {
+    let Yaml::Hash(entries) = table else {
+        return Err(wrong(file, path, "here belongs a table"));
+    };
+    if depth > DEPTH_MAX {
+        return Err(wrong(file, path, "this is too deep"));
+    }
+    for (key, inner) in entries {
+        let key = key
+            .as_str()
+            .ok_or_else(|| wrong(file, path, "a key is no text"))?;
+        if key == "ros__parameters" {
+            if path.is_empty() {
+                return Err(wrong(
+                    file,
+                    path,
+                    "ros__parameters needs a node above it: write /**: or the node's name",
+                ));
+            }
+            settings(inner, path, "", file, all, depth + 1)?;
+        } else {
+            let joined = match path {
+                "" => key.to_owned(),
+                _ => format!(
+                    "{}/{}",
+                    path.trim_end_matches('/'),
+                    key.trim_start_matches('/')
+                ),
+            };
+            nodes(inner, &joined, file, all, depth + 1)?;
+        }
+    }
+    Ok(())
+}
+
+/// Walks down the dots of names to values.
+fn settings(
+    table: &Yaml,
+    node: &str,
+    above: &str,
+    file: &str,
+    all: &mut Vec<Setting>,
+    depth: usize,
+) -> Result<(), String> {
+    let entries = match table {
+        Yaml::Hash(entries) => entries,
+        Yaml::Null => return Ok(()),
+        _ => return Err(wrong(file, node, "here belongs a table of NAME: VALUE")),
+    };
+    if depth > DEPTH_MAX {
+        return Err(wrong(file, node, "this is too deep"));
+    }
+    for (key, inner) in entries {
+        let key = key
+            .as_str()
+            .ok_or_else(|| wrong(file, node, "a parameter's name is no text"))?;
+        let name = match above {
+            "" => key.to_owned(),
+            _ => format!("{above}.{key}"),
+        };
+        if let Yaml::Hash(_) = inner {
+            settings(inner, node, &name, file, all, depth + 1)?;
+            continue;
+        }
+        let value = value(inner).ok_or_else(|| {
+            let why = format!("`{name}` has no value: write true, 1, 1.5, text or [a, list]");
+            wrong(file, node, &why)
+        })?;
+        all.push(Setting {
+            node: node.to_owned(),
+            said: format!("{file}: {name}"),
+            name,
+            value,
+        });
+    }
+    Ok(())
+}
+
+fn value(yaml: &Yaml) -> Option<Value> {
+    match yaml {
+        Yaml::Boolean(flag) => Some(Value::Flag(*flag)),
+        Yaml::Integer(whole) => Some(Value::Whole(*whole)),
+        Yaml::Real(_) => yaml.as_f64().map(Value::Real),
+        // YAML 1.1, which ROS reads, has these too.
+        Yaml::String(text) => Some(match text.as_str() {
+            "yes" | "on" | "True" | "TRUE" => Value::Flag(true),
+            "no" | "off" | "False" | "FALSE" => Value::Flag(false),
+            _ => Value::Text(text.clone()),
+        }),
+        Yaml::Array(list) => list
+            .iter()
+            .map(value)
+            .collect::<Option<_>>()
+            .map(Value::List),
+        _ => None,
+    }
+}
+
+fn wrong(file: &str, place: &str, why: &str) -> String {
+    match place {
+        "" => format!("{file}: {why}"),
+        _ => format!("{file}: under {place}: {why}"),
+    }
+}
+
+impl Setting {
+    /// Whether it is for the node of this full name (`/ns/name`).
+    #[must_use]
+    pub fn is_for(&self, full_name: &str) -> bool {
+        let pattern = self.node.trim_start_matches('/');
+        // A name without a slash is a node's name in the root, or given by `-p NODE:NAME` in any namespace.
+        let last = full_name.rsplit('/').next().unwrap_or_default();
+        let plain = !self.node.contains('/') && !pattern.contains('*');
+        if plain && self.said.starts_with("-p ") {
+            return pattern == last;
+        }
+        let pattern: Vec<&str> = pattern.split('/').collect();
+        let name: Vec<&str> = full_name.trim_start_matches('/').split('/').collect();
+        matches(&pattern, &name)
+    }
+}
+
+/// `*` is one part of a name, `**` any number of them.
+fn matches(pattern: &[&str], name: &[&str]) -> bool {
+    match (pattern, name) {
+        ([], []) => true,
+        (["**", rest @ ..], _) => {
+            (0..=name.len()).any(|at| name.get(at..).is_some_and(|name| matches(rest, name)))
+        }
+        ([one, rest @ ..], [own, others @ ..]) => {
+            (*one == "*" || one == own) && matches(rest, others)
+        }
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_of_several_nodes_is_read_in_order() {
+        let text = "\
+/**:
+  ros__parameters:
+    budget_ms: 1
+    markers: {enabled: yes, rate: 5.5}
+/cell:
+  sweepd:
+    ros__parameters:
+      budget_ms: 2.5
+      list: [1, 2]
+";
+        let all = parse(text, "f.yaml").unwrap();
+        let seen: Vec<_> = all
+            .iter()
+            .map(|s| (s.node.as_str(), s.name.as_str(), &s.value))
+            .collect();
+        assert_eq!(
+            seen,
+            [
+                ("/**", "budget_ms", &Value::Whole(1)),
+                ("/**", "markers.enabled", &Value::Flag(true)),
+                ("/**", "markers.rate", &Value::Real(5.5)),
+                ("/cell/sweepd", "budget_ms", &Value::Real(2.5)),
+                (
+                    "/cell/sweepd",
+                    "list",
+                    &Value::List(vec![Value::Whole(1), Value::Whole(2)])
+                ),
+            ]
+        );
+    }
+
+    #[test]
+    fn patterns_pick_nodes_as_ros_does() {
+        let is_for = |node: &str, name: &str| {
+            let value = Value::Flag(true);
+            Setting {
+                node: node.to_owned(),
+                name: "x".to_owned(),
+                value,
+                said: String::new(),
+            }
+            .is_for(name)
+        };
+        assert!(is_for("/**", "/a/b/sweepd"));
+        assert!(is_for("/**/sweepd", "/sweepd"));
+        assert!(is_for("/*/sweepd", "/a/sweepd"));
+        assert!(!is_for("/*/sweepd", "/sweepd"));
+        assert!(is_for("sweepd", "/sweepd"));
+        assert!(!is_for("sweepd", "/a/sweepd"));
+        assert!(!is_for("/other", "/sweepd"));
+    }
+
+    #[test]
+    fn what_is_no_file_of_parameters_is_refused_with_the_mend() {
+        for (text, word) in [
+            ("a: [", "not YAML"),
+            ("", "no parameter"),
+            ("ros__parameters: {a: 1}", "needs a node above"),
+            ("sweepd: 3", "here belongs a table"),
+            ("sweepd: {ros__parameters: 3}", "NAME: VALUE"),
+            ("sweepd: {ros__parameters: {a: }}", "`a` has no value"),
+            ("- 1", "begins with NODE"),
+        ] {
+            let error = parse(text, "f.yaml").unwrap_err();
+            assert!(
+                error.contains(word) && error.starts_with("f.yaml"),
+                "{text}: {error}"
+            );
+        }
+    }
+}

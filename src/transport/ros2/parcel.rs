@@ -1,0 +1,321 @@
+//! What the tick thread hands to the sending thread: copies of rows, cut to the limits of ROS 2, in a queue of two.
+//! In: an outbox. Out: parcels, the newest kept. No allocation once a parcel has been at its largest.
+
+use std::collections::VecDeque;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use crate::wire::{
+    BodyRow, ContactRow, Demand, Event, MessageHeader, NameRow, Outbox, PairRow, TickRow, Verdict,
+};
+
+/// Parcels that wait: one being sent and one behind it; more would only be older.
+const QUEUE_MAX: usize = 2;
+
+/// Limits of what goes out on ROS 2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Caps {
+    /// Rows of `~/pairs` a tick.
+    pub(super) pairs: usize,
+    /// Rows of `~/contacts` a tick.
+    pub(super) contacts: usize,
+}
+
+/// One tick on its way out.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Parcel {
+    pub(super) tick: TickRow,
+    /// What of the rest was filled.
+    pub(super) holds: Demand,
+    pub(super) pairs_header: MessageHeader,
+    pub(super) pairs: Vec<PairRow>,
+    pub(super) contacts_header: MessageHeader,
+    pub(super) contacts: Vec<ContactRow>,
+    pub(super) bodies: Vec<BodyRow>,
+    pub(super) picker: Picker,
+}
+
+/// Picks the rows of best rank and keeps their order.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Picker {
+    ranks: Vec<(u8, f64, u32)>,
+}
+
+impl Picker {
+    /// Copies the `most` rows of least rank, ties by place; returns how many were left out.
+    ///
+    /// Cost: O(rows), whatever is kept.
+    fn pick<T: Copy>(
+        &mut self,
+        rows: &[T],
+        most: usize,
+        rank: impl Fn(&T) -> (u8, f64),
+        into: &mut Vec<T>,
+    ) -> u64 {
+        into.clear();
+        if rows.len() <= most {
+            into.extend_from_slice(rows);
+            return 0;
+        }
+        self.ranks.clear();
+        self.ranks.extend(rows.iter().zip(0..).map(|(row, at)| {
+            let (class, key) = rank(row);
+            (class, key, at)
+        }));
+        if most > 0 {
+            self.ranks.select_nth_unstable_by(most - 1, |a, b| {
+                a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2))
+            });
+        }
+        self.ranks.truncate(most);
+        self.ranks.sort_unstable_by_key(|(.., at)| *at);
+        let kept = self
+            .ranks
+            .iter()
+            .filter_map(|(.., at)| rows.get(*at as usize));
+        into.extend(kept);
+        u64::try_from(rows.len() - into.len()).unwrap_or(u64::MAX)
+    }
+}
+
+/// Rows with events first, then colliding, possible, near; deepest first.
+fn pair_rank(row: &PairRow) -> (u8, f64) {
+    let told = row.events & !Event::Persist.bit() != 0;
+    let class = match Verdict::from_code(row.verdict) {
+        _ if told => 0,
+        Some(Verdict::Colliding) => 1,
+        Some(Verdict::Possible) => 2,
+        _ => 3,
+    };
+    (class, row.gap_min_m)
+}
+
+impl Parcel {
+    /// Takes what a tick filled.
+    fn fill(&mut self, outbox: &Outbox, demand: Demand, caps: Caps) {
+        self.tick = outbox.tick;
+        self.holds = demand;
+        if demand.pairs {
+            let left_out = self
+                .picker
+                .pick(&outbox.pairs, caps.pairs, pair_rank, &mut self.pairs);
+            self.pairs_header = outbox.pairs_header;
+            self.pairs_header.truncated += left_out;
+        }
+        if demand.contacts {
+            let depth = |row: &ContactRow| (row.kind, row.gap_m);
+            let left_out =
+                self.picker
+                    .pick(&outbox.contacts, caps.contacts, depth, &mut self.contacts);
+            self.contacts_header = outbox.contacts_header;
+            self.contacts_header.truncated += left_out;
+        }
+        if demand.bodies {
+            self.bodies.clear();
+            self.bodies.extend_from_slice(&outbox.bodies);
+        }
+    }
+}
+
+#[derive(Debug, Default)]
+struct Line {
+    ready: VecDeque<Parcel>,
+    spare: Vec<Parcel>,
+    names: Option<(u64, Vec<NameRow>)>,
+    dropped: u64,
+    stop: bool,
+}
+
+/// The queue between the two threads.
+#[derive(Debug, Default)]
+pub(super) struct Parcels {
+    line: Mutex<Line>,
+    bell: Condvar,
+}
+
+/// What the sending thread finds.
+#[derive(Debug)]
+pub(super) enum Next {
+    /// The oldest parcel that waits, and names where they are new, with their scene revision.
+    Parcel(Box<Parcel>, Option<(u64, Vec<NameRow>)>),
+    /// Nothing came in time.
+    Nothing,
+    /// The node closes.
+    Stop,
+}
+
+impl Parcels {
+    fn open(&self) -> MutexGuard<'_, Line> {
+        self.line.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Puts a tick into the queue; the oldest gives way.
+    ///
+    /// * returns - ticks that gave way.
+    pub(super) fn put(&self, outbox: &Outbox, demand: Demand, caps: Caps) -> u64 {
+        let mut parcel = self.take_spare();
+        parcel.fill(outbox, demand, caps);
+        let names = outbox
+            .names_changed
+            .then(|| (outbox.tick.header.scene_rev, outbox.names.clone()));
+        self.push(parcel, names)
+    }
+
+    /// Puts a tick alone.
+    pub(super) fn put_tick(&self, tick: &TickRow) {
+        let mut parcel = self.take_spare();
+        parcel.tick = *tick;
+        parcel.holds = Demand::default();
+        self.push(parcel, None);
+    }
+
+    fn take_spare(&self) -> Parcel {
+        self.open().spare.pop().unwrap_or_default()
+    }
+
+    fn push(&self, parcel: Parcel, names: Option<(u64, Vec<NameRow>)>) -> u64 {
+        let mut line = self.open();
+        let mut gone = 0;
+        if line.ready.len() >= QUEUE_MAX
+            && let Some(oldest) = line.ready.pop_front()
+        {
+            line.spare.push(oldest);
+            line.dropped += 1;
+            gone = 1;
+        }
+        line.ready.push_back(parcel);
+        if names.is_some() {
+            line.names = names;
+        }
+        drop(line);
+        self.bell.notify_one();
+        gone
+    }
+
+    /// Waits for a parcel.
+    pub(super) fn next(&self, wait: Duration) -> Next {
+        let line = self.open();
+        let nothing = |line: &mut Line| line.ready.is_empty() && !line.stop;
+        let waited = self.bell.wait_timeout_while(line, wait, nothing);
+        let (mut line, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        if line.stop {
+            return Next::Stop;
+        }
+        match line.ready.pop_front() {
+            Some(parcel) => Next::Parcel(Box::new(parcel), line.names.take()),
+            None => Next::Nothing,
+        }
+    }
+
+    /// Gives a parcel's memory back.
+    pub(super) fn give_back(&self, parcel: Parcel) {
+        self.open().spare.push(parcel);
+    }
+
+    /// Ticks that gave way to newer ones.
+    #[cfg(test)]
+    pub(super) fn dropped(&self) -> u64 {
+        self.open().dropped
+    }
+
+    /// Ends the wait of the sending thread for good.
+    pub(super) fn stop(&self) {
+        self.open().stop = true;
+        self.bell.notify_one();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAPS: Caps = Caps {
+        pairs: 3,
+        contacts: 2,
+    };
+
+    fn outbox(tick: u64) -> Outbox {
+        let pair = |id, verdict: Verdict, gap_min_m, events| PairRow {
+            body_a: id,
+            verdict: verdict.code(),
+            gap_min_m,
+            events,
+            ..PairRow::default()
+        };
+        let contact = |id, gap_m| ContactRow {
+            id,
+            gap_m,
+            ..ContactRow::default()
+        };
+        let mut outbox = Outbox {
+            pairs: vec![
+                pair(1, Verdict::Near, 0.1, 0),
+                pair(2, Verdict::Colliding, -0.1, Event::Persist.bit()),
+                pair(3, Verdict::Possible, -9.0, 0),
+                pair(4, Verdict::Apart, 1.0, Event::End.bit()),
+                pair(5, Verdict::Colliding, -0.2, Event::Persist.bit()),
+            ],
+            contacts: vec![contact(1, -0.1), contact(2, -0.3), contact(3, -0.2)],
+            ..Outbox::default()
+        };
+        outbox.tick.header.tick = tick;
+        outbox.contacts_header.truncated = 5;
+        outbox
+    }
+
+    fn next(parcels: &Parcels) -> Parcel {
+        match parcels.next(Duration::ZERO) {
+            Next::Parcel(parcel, _) => *parcel,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_rows_of_best_rank_are_kept_in_their_order_and_the_rest_is_counted() {
+        let parcels = Parcels::default();
+        parcels.put(&outbox(1), Demand::ALL, CAPS);
+        let parcel = next(&parcels);
+        let pairs: Vec<_> = parcel.pairs.iter().map(|row| row.body_a).collect();
+        assert_eq!((pairs, parcel.pairs_header.truncated), (vec![2, 4, 5], 2));
+        let contacts: Vec<_> = parcel.contacts.iter().map(|row| row.id).collect();
+        assert_eq!(
+            (contacts, parcel.contacts_header.truncated),
+            (vec![2, 3], 6)
+        );
+    }
+
+    #[test]
+    fn a_cap_of_zero_keeps_nothing_and_says_so() {
+        let parcels = Parcels::default();
+        let caps = Caps {
+            pairs: 0,
+            contacts: 0,
+        };
+        parcels.put(&outbox(1), Demand::ALL, caps);
+        let parcel = next(&parcels);
+        assert_eq!((parcel.pairs.len(), parcel.pairs_header.truncated), (0, 5));
+    }
+
+    #[test]
+    fn the_newest_ticks_win_and_names_are_not_lost_with_the_old() {
+        let parcels = Parcels::default();
+        let mut named = outbox(1);
+        named.names_changed = true;
+        named.names = vec![NameRow::default()];
+        parcels.put(&named, Demand::default(), CAPS);
+        for tick in 2..=4 {
+            parcels.put(&outbox(tick), Demand::default(), CAPS);
+        }
+        assert_eq!(parcels.dropped(), 2);
+        let Next::Parcel(parcel, names) = parcels.next(Duration::ZERO) else {
+            panic!("a parcel waits");
+        };
+        assert_eq!(
+            (parcel.tick.header.tick, names.map(|n| n.1.len())),
+            (3, Some(1))
+        );
+        assert!(parcel.pairs.is_empty());
+        parcels.stop();
+        assert!(matches!(parcels.next(Duration::MAX), Next::Stop));
+    }
+}

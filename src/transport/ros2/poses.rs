@@ -1,0 +1,377 @@
+//! From messages of common types to poses of bodies. In: links of `/tf`, stamped poses, odometry. Out: [`Update`]s
+//! for the bodies concerned, or the reason why a body's place is not known. Pure: no DDS, no clock.
+
+use super::RosScene;
+use super::shelf::Update;
+use super::tf::{Found, Missing, Taken, Tree};
+use crate::config::RosKind;
+use crate::math::{Quat, Vec3, pose_from};
+use crate::wire::ros::{Odometry, PoseStamped, TfMessage};
+use crate::wire::{RejectReason, SOURCE_NAME_LEN, TransformRow, name_bytes};
+
+/// When and how a message came.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Receipt {
+    /// Nanoseconds of `CLOCK_BOOTTIME`.
+    pub(super) now_ns: u64,
+    /// Whether the process stood still before it was read.
+    pub(super) waited: bool,
+}
+
+/// One body of a source of common topics.
+#[derive(Debug)]
+struct Member {
+    body: u64,
+    name: String,
+    /// Number of its frame in the tree (kind `tf`).
+    frame: usize,
+    /// Its topic (other kinds).
+    topic: String,
+    /// Stamp of its newest pose, nanoseconds.
+    stamp_ns: u64,
+    /// What was last handed on of it, to say only what is new: receipt of its newest link, or why it has no pose.
+    last: Option<Result<(u64, u64), Missing>>,
+    /// When it was last handed on, nanoseconds of `CLOCK_BOOTTIME`.
+    told_ns: u64,
+    /// What is wrong with it now, for people.
+    fault: Option<String>,
+}
+
+/// A source of common topics and its bodies.
+#[derive(Debug)]
+pub(super) struct Source {
+    pub(super) kind: RosKind,
+    pub(super) name: [u8; SOURCE_NAME_LEN],
+    pub(super) topic: String,
+    pub(super) static_topic: String,
+    timeout_ns: u64,
+    max_skew_ns: u64,
+    /// The scene's frame, by name and by its number in the tree.
+    root: (String, usize),
+    tree: Tree,
+    members: Vec<Member>,
+    /// Widest skew of a chain at the last look, nanoseconds; `None`: no chain.
+    pub(super) skew_ns: Option<u64>,
+    /// Messages or links that were refused.
+    pub(super) refused: u64,
+}
+
+impl Source {
+    /// The sources of common topics of a scene, in its order.
+    pub(super) fn of(scene: &RosScene) -> Vec<Self> {
+        let mut all = Vec::new();
+        for (place, spec) in scene.sources.iter().enumerate() {
+            let Some(ros) = &spec.ros2 else { continue };
+            let mut tree = Tree::default();
+            let root = tree.id(&scene.frame_id).unwrap_or_default();
+            let bodies = scene.bodies.iter().filter(|b| b.source == Some(place));
+            let members = bodies.map(|body| Member {
+                body: body.id,
+                name: body.name.clone(),
+                frame: tree.id(&body.frame).unwrap_or_default(),
+                topic: body.topic.clone(),
+                stamp_ns: 0,
+                last: None,
+                told_ns: 0,
+                fault: None,
+            });
+            all.push(Self {
+                kind: ros.kind,
+                name: name_bytes(&spec.name),
+                topic: ros.topic.clone(),
+                static_topic: ros.static_topic.clone(),
+                timeout_ns: spec.timeout_ns,
+                max_skew_ns: ros.max_skew_ns,
+                members: members.collect(),
+                root: (scene.frame_id.clone(), root),
+                tree,
+                skew_ns: None,
+                refused: 0,
+            });
+        }
+        all
+    }
+
+    /// Ids of its bodies.
+    pub(super) fn bodies(&self) -> Vec<u64> {
+        self.members.iter().map(|member| member.body).collect()
+    }
+
+    /// The topic of each of its bodies.
+    pub(super) fn topics(&self) -> impl Iterator<Item = &str> {
+        self.members.iter().map(|member| member.topic.as_str())
+    }
+
+    /// What is wrong with its bodies now, at most `most` of them.
+    pub(super) fn faults(&self, most: usize) -> Vec<String> {
+        let faulty = self.members.iter().filter_map(|member| {
+            let fault = member.fault.as_ref()?;
+            Some(format!("body {}: {fault}", member.name))
+        });
+        faulty.take(most).collect()
+    }
+
+    /// The clock of all senders went back.
+    pub(super) fn forget(&mut self) {
+        self.tree.forget();
+        for member in &mut self.members {
+            member.stamp_ns = 0;
+            member.last = None;
+        }
+    }
+
+    /// Takes the links of a message.
+    ///
+    /// * returns - whether the senders' time went back.
+    pub(super) fn take_links(
+        &mut self,
+        message: &TfMessage,
+        fixed: bool,
+        receipt: Receipt,
+    ) -> bool {
+        let mut back = false;
+        for link in &message.transforms {
+            match self.tree.take(link, fixed, receipt.now_ns, self.timeout_ns) {
+                Taken::Newer => {}
+                Taken::Older | Taken::Refused => self.refused += 1,
+                Taken::WentBack => back = true,
+            }
+        }
+        if back {
+            self.members
+                .iter_mut()
+                .for_each(|member| member.last = None);
+        }
+        back
+    }
+
+    /// The poses of bodies whose chains have changed since the last look, or are due for a word.
+    pub(super) fn look(&mut self, receipt: Receipt, updates: &mut Vec<Update>) {
+        if self.kind != RosKind::Tf {
+            return;
+        }
+        let (mut skew_ns, root) = (None, self.root.1);
+        for (place, member) in self.members.iter_mut().enumerate() {
+            let found = self.tree.find(member.frame, root);
+            if let Ok(found) = &found
+                && found.received_ns.is_some()
+            {
+                skew_ns = skew_ns.max(Some(found.skew_ns));
+            }
+            let mark = found
+                .as_ref()
+                .map(|found| {
+                    (
+                        found.received_ns.map_or(0, |(latest, _)| latest),
+                        found.stamp_ns,
+                    )
+                })
+                .map_err(Clone::clone);
+            // A chain that never changes is said again and again, because its source vouches for it.
+            let due = receipt.now_ns.saturating_sub(member.told_ns) >= self.timeout_ns / 3;
+            let renewed = due && matches!(&found, Ok(found) if found.received_ns.is_none());
+            if member.last.as_ref() == Some(&mark) && !renewed {
+                continue;
+            }
+            member.last = Some(mark);
+            let (result, fault) = judge(
+                &found,
+                receipt.now_ns,
+                self.max_skew_ns,
+                self.timeout_ns,
+                &self.root.0,
+            );
+            member.fault = fault;
+            let Some(result) = result else { continue };
+            member.told_ns = receipt.now_ns;
+            updates.push(Update {
+                member: place,
+                result,
+                velocity: None,
+                stamp_ns: found.as_ref().map_or(0, |found| found.stamp_ns),
+                received_ns: receipt.now_ns,
+                waited: receipt.waited,
+            });
+        }
+        self.skew_ns = skew_ns;
+    }
+
+    /// Takes a stamped pose for one of its bodies.
+    ///
+    /// * returns - whether the sender's time went back.
+    pub(super) fn take_pose(
+        &mut self,
+        member: usize,
+        message: &PoseStamped,
+        receipt: Receipt,
+        updates: &mut Vec<Update>,
+    ) -> bool {
+        let row = TransformRow {
+            position: message.pose.position.into(),
+            orientation: message.pose.orientation.into(),
+            ..TransformRow::default()
+        };
+        let stamp_ns = message.header.stamp.to_ns();
+        self.put(
+            member,
+            &message.header.frame_id,
+            stamp_ns,
+            row,
+            None,
+            receipt,
+            updates,
+        )
+    }
+
+    /// Takes odometry for one of its bodies; its twist is in the body's frame.
+    ///
+    /// * returns - whether the sender's time went back.
+    pub(super) fn take_odometry(
+        &mut self,
+        member: usize,
+        message: &Odometry,
+        receipt: Receipt,
+        updates: &mut Vec<Update>,
+    ) -> bool {
+        let pose = &message.pose.pose;
+        let row = TransformRow {
+            position: pose.position.into(),
+            orientation: pose.orientation.into(),
+            ..TransformRow::default()
+        };
+        let turn = pose_from(row.position, row.orientation).map(|pose| pose.rotation);
+        let twist = &message.twist.twist;
+        let velocity = turned(turn, twist.linear.into(), twist.angular.into());
+        let (frame, stamp_ns) = (&message.header.frame_id, message.header.stamp.to_ns());
+        self.put(
+            member,
+            frame,
+            stamp_ns,
+            row,
+            Some(velocity),
+            receipt,
+            updates,
+        )
+    }
+
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "the one place where both kinds of messages meet"
+    )]
+    fn put(
+        &mut self,
+        place: usize,
+        frame: &str,
+        stamp_ns: u64,
+        row: TransformRow,
+        velocity: Option<[f64; 6]>,
+        receipt: Receipt,
+        updates: &mut Vec<Update>,
+    ) -> bool {
+        let Some(member) = self.members.get_mut(place) else {
+            return false;
+        };
+        let mut back = false;
+        if stamp_ns < member.stamp_ns {
+            if member.stamp_ns - stamp_ns <= self.timeout_ns {
+                self.refused += 1;
+                return false;
+            }
+            back = true;
+        }
+        let plain = frame.strip_prefix('/').unwrap_or(frame);
+        let mut result = Ok(row);
+        member.fault = None;
+        if plain != self.root.0 {
+            result = Err(RejectReason::BadChain);
+            member.fault = Some(format!(
+                "its pose is in frame \"{frame}\", not in the scene's \"{}\": send it there, or use a source of type tf",
+                self.root.0
+            ));
+        }
+        if back {
+            self.forget();
+        }
+        if let Some(member) = self.members.get_mut(place) {
+            member.stamp_ns = stamp_ns;
+        }
+        updates.push(Update {
+            member: place,
+            result,
+            velocity,
+            stamp_ns,
+            received_ns: receipt.now_ns,
+            waited: receipt.waited,
+        });
+        back
+    }
+}
+
+/// What a chain says of its body: a pose, a refusal, or nothing yet; and the fault in words.
+fn judge(
+    found: &Result<Found, Missing>,
+    now_ns: u64,
+    max_skew_ns: u64,
+    timeout_ns: u64,
+    root: &str,
+) -> (Option<Result<TransformRow, RejectReason>>, Option<String>) {
+    match found {
+        Ok(found) => {
+            let old = found
+                .received_ns
+                .is_some_and(|(_, earliest)| now_ns.saturating_sub(earliest) > timeout_ns);
+            if found.skew_ns > max_skew_ns || old {
+                let why = if old {
+                    "a link of its chain is older than the source's time-out".to_owned()
+                } else {
+                    format!(
+                        "the stamps of its chain lie {:.3} s apart, more than max_skew {:.3} s",
+                        seconds(found.skew_ns),
+                        seconds(max_skew_ns)
+                    )
+                };
+                return (Some(Err(RejectReason::BadChain)), Some(why));
+            }
+            let row = TransformRow {
+                position: found.position,
+                orientation: found.orientation,
+                ..TransformRow::default()
+            };
+            (Some(Ok(row)), None)
+        }
+        // Nobody has said where it is: it is not received, which is no refusal.
+        Err(Missing::Frame(frame)) => (
+            None,
+            Some(format!(
+                "no link from frame \"{frame}\" towards \"{root}\" has come"
+            )),
+        ),
+        Err(Missing::Loop(frame)) => (
+            Some(Err(RejectReason::BadChain)),
+            Some(format!("the links from frame \"{frame}\" lead in a loop")),
+        ),
+        Err(Missing::Bad(frame, reason)) => (
+            Some(Err(*reason)),
+            Some(format!(
+                "the link of frame \"{frame}\" is no pose: {reason}"
+            )),
+        ),
+    }
+}
+
+/// Nanoseconds as seconds.
+pub(super) fn seconds(ns: u64) -> f64 {
+    std::time::Duration::from_nanos(ns).as_secs_f64()
+}
+
+/// A twist of the body's frame in the scene's frame; of a body without a pose it is no number.
+fn turned(turn: Option<Quat>, linear: [f64; 3], angular: [f64; 3]) -> [f64; 6] {
+    let Some(turn) = turn else {
+        return [f64::NAN; 6];
+    };
+    let (l, a) = (turn * Vec3::from(linear), turn * Vec3::from(angular));
+    [l.x, l.y, l.z, a.x, a.y, a.z]
+}
+
+#[cfg(test)]
+mod tests;

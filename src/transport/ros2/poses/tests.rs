@@ -1,0 +1,190 @@
+//! What becomes of good and bad messages of common types.
+
+#![allow(clippy::float_cmp, reason = "poses are handed on bit by bit")]
+
+use super::*;
+use crate::config::RosSource;
+use crate::transport::ros2::{RosBody, RosSourceSpec};
+use crate::wire::ros::{Header, Time, Transform, TransformStamped};
+
+const MS: u64 = 1_000_000;
+
+/// A source of this kind with one body.
+fn source(kind: RosKind, max_skew_ns: u64, frame: &str) -> Source {
+    let ros2 = RosSource {
+        kind,
+        topic: "/tf".to_owned(),
+        static_topic: "/tf_static".to_owned(),
+        max_skew_ns,
+    };
+    let scene = RosScene {
+        frame_id: "world".to_owned(),
+        heartbeat_ns: 100 * MS,
+        sources: vec![RosSourceSpec {
+            name: "s".to_owned(),
+            timeout_ns: 500 * MS,
+            ros2: Some(ros2),
+        }],
+        bodies: vec![RosBody {
+            id: 1,
+            name: "a".to_owned(),
+            source: Some(0),
+            frame: frame.to_owned(),
+            topic: "/a".to_owned(),
+        }],
+    };
+    Source::of(&scene).remove(0)
+}
+
+fn tf(frame: &str) -> Source {
+    source(RosKind::Tf, 100 * MS, frame)
+}
+
+fn at(now_ns: u64) -> Receipt {
+    Receipt {
+        now_ns,
+        waited: false,
+    }
+}
+
+fn link(parent: &str, child: &str, stamp_ns: u64) -> TfMessage {
+    let transform = Transform {
+        translation: [1.0, 0.0, 0.0].into(),
+        rotation: [0.0, 0.0, 0.0, 1.0].into(),
+    };
+    let header = Header {
+        stamp: Time::from_ns(stamp_ns),
+        frame_id: parent.to_owned(),
+    };
+    TfMessage {
+        transforms: vec![TransformStamped {
+            header,
+            child_frame_id: child.to_owned(),
+            transform,
+        }],
+    }
+}
+
+fn look(source: &mut Source, now_ns: u64) -> Vec<Update> {
+    let mut updates = Vec::new();
+    source.look(at(now_ns), &mut updates);
+    updates
+}
+
+#[test]
+fn a_body_is_said_when_a_link_of_its_chain_comes_and_not_again() {
+    let mut one = tf("tool");
+    assert!(look(&mut one, MS).is_empty());
+    assert!(one.faults(9)[0].contains("no link from frame \"tool\" towards \"world\""));
+    one.take_links(&link("world", "base", MS), false, at(MS));
+    one.take_links(&link("base", "tool", 2 * MS), false, at(2 * MS));
+    let said = look(&mut one, 2 * MS);
+    assert_eq!(said[0].result.unwrap().position, [2.0, 0.0, 0.0]);
+    assert_eq!((said[0].stamp_ns, one.skew_ns), (MS, Some(MS)));
+    assert!(one.faults(9).is_empty() && look(&mut one, 3 * MS).is_empty());
+}
+
+#[test]
+fn stamps_too_far_apart_make_the_body_unknown_and_say_so() {
+    let mut one = source(RosKind::Tf, 50 * MS, "tool");
+    one.take_links(&link("world", "base", 10 * MS), false, at(MS));
+    one.take_links(&link("base", "tool", 90 * MS), false, at(MS));
+    assert_eq!(look(&mut one, MS)[0].result, Err(RejectReason::BadChain));
+    assert!(
+        one.faults(9)[0].contains("0.080 s apart"),
+        "{:?}",
+        one.faults(9)
+    );
+    one.take_links(&link("world", "base", 90 * MS), false, at(2 * MS));
+    assert!(look(&mut one, 2 * MS)[0].result.is_ok());
+}
+
+#[test]
+fn bug_a_link_without_stamps_that_falls_silent_is_noticed_by_its_receipt() {
+    let mut one = tf("tool");
+    one.take_links(&link("world", "base", 0), false, at(MS));
+    one.take_links(&link("base", "tool", 0), false, at(MS));
+    assert!(look(&mut one, MS)[0].result.is_ok());
+    one.take_links(&link("base", "tool", 0), false, at(900 * MS));
+    assert_eq!(
+        look(&mut one, 900 * MS)[0].result,
+        Err(RejectReason::BadChain)
+    );
+}
+
+#[test]
+fn a_loop_and_a_zero_quaternion_refuse_the_body_with_the_reason() {
+    let mut one = tf("a");
+    one.take_links(&link("b", "a", MS), false, at(MS));
+    one.take_links(&link("a", "b", MS), false, at(MS));
+    assert_eq!(look(&mut one, MS)[0].result, Err(RejectReason::BadChain));
+    assert!(one.faults(9)[0].contains("loop"));
+    let mut zero = link("world", "a", 2 * MS);
+    zero.transforms[0].transform.rotation = [0.0; 4].into();
+    one.take_links(&zero, false, at(2 * MS));
+    assert_eq!(
+        look(&mut one, 2 * MS)[0].result,
+        Err(RejectReason::BadQuaternion)
+    );
+}
+
+#[test]
+fn a_chain_that_never_changes_is_vouched_for_again_and_again() {
+    let mut one = tf("a");
+    one.take_links(&link("world", "a", 5 * MS), true, at(MS));
+    assert_eq!(look(&mut one, MS).len(), 1);
+    assert!(look(&mut one, 100 * MS).is_empty());
+    assert_eq!(look(&mut one, 200 * MS).len(), 1);
+}
+
+#[test]
+fn time_that_goes_back_is_told_once_and_small_disorder_is_passed_over() {
+    let mut one = source(RosKind::Pose, 0, "");
+    let mut updates = Vec::new();
+    let mut pose = PoseStamped::default();
+    pose.header.frame_id = "/world".to_owned();
+    pose.pose.orientation.w = 1.0;
+    let mut send = |stamp_ns, updates: &mut Vec<Update>| {
+        pose.header.stamp = Time::from_ns(stamp_ns);
+        one.take_pose(0, &pose, at(MS), updates)
+    };
+    assert!(!send(2000 * MS, &mut updates));
+    assert!(!send(1900 * MS, &mut updates));
+    assert_eq!(updates.len(), 1);
+    assert!(send(10 * MS, &mut updates));
+    assert_eq!(updates.len(), 2);
+}
+
+#[test]
+fn a_pose_in_another_frame_makes_its_body_unknown() {
+    let mut one = source(RosKind::Pose, 0, "");
+    let mut updates = Vec::new();
+    let mut pose = PoseStamped::default();
+    pose.header.frame_id = "map".to_owned();
+    one.take_pose(0, &pose, at(MS), &mut updates);
+    assert_eq!(updates[0].result, Err(RejectReason::BadChain));
+    assert!(one.faults(9)[0].contains("frame \"map\""));
+}
+
+#[test]
+fn odometry_brings_its_velocity_into_the_scenes_frame() {
+    let mut one = source(RosKind::Odometry, 0, "");
+    let text = serde_json::json!({
+        "header": {"stamp": {"sec": 1, "nanosec": 0}, "frame_id": "world"},
+        "child_frame_id": "a",
+        "pose": {"pose": {"position": {"x": 0.0, "y": 0.0, "z": 0.0},
+            "orientation": {"x": 0.0, "y": 0.0, "z": 0.5_f64.sqrt(), "w": 0.5_f64.sqrt()}},
+            "covariance": vec![0.0; 36]},
+        "twist": {"twist": {"linear": {"x": 2.0, "y": 0.0, "z": 0.0},
+            "angular": {"x": 0.0, "y": 0.0, "z": 1.0}}, "covariance": vec![0.0; 36]},
+    });
+    let message: Odometry = serde_json::from_value(text).unwrap();
+    let mut updates = Vec::new();
+    one.take_odometry(0, &message, at(MS), &mut updates);
+    let velocity = updates[0].velocity.unwrap();
+    assert!(
+        (velocity[1] - 2.0).abs() < 1e-12 && velocity[0].abs() < 1e-12,
+        "{velocity:?}"
+    );
+    assert!((velocity[5] - 1.0).abs() < 1e-12);
+}

@@ -1,0 +1,210 @@
+//! What the node's threads share: counters, who listens, names, faults, and the way to `/rosout`. All of it is read
+//! and written in passing; no thread waits for another here.
+
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use ros2_client::log::Log;
+use ros2_client::{Publisher, builtin_interfaces};
+
+use super::parcel::Caps;
+use super::speak::{Book, Counts};
+use crate::time::SystemClock;
+use crate::wire::Demand;
+
+/// No chain of `/tf` has been looked at.
+const NO_SKEW: u64 = u64::MAX;
+
+/// A level of `/rosout` and of the log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Say {
+    /// For the record.
+    Info,
+    /// To be looked at.
+    Warn,
+}
+
+/// Shared by the threads of the node.
+pub(super) struct Shared {
+    pub(super) stop: AtomicBool,
+    undecodable: AtomicU64,
+    refused: AtomicU64,
+    unsent: AtomicU64,
+    skew_ns: AtomicU64,
+    demand: AtomicU8,
+    max_pairs: AtomicUsize,
+    max_contacts: AtomicUsize,
+    book: Mutex<Arc<Book>>,
+    faults: Mutex<Vec<String>>,
+    rosout: Mutex<Option<Arc<Option<Publisher<Log>>>>>,
+    node: String,
+    /// Least level that goes to `/rosout`.
+    least: Say,
+}
+
+impl std::fmt::Debug for Shared {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Shared")
+            .field("counts", &self.counts())
+            .field("demand", &self.demand())
+            .finish_non_exhaustive()
+    }
+}
+
+fn open<T>(lock: &Mutex<T>) -> MutexGuard<'_, T> {
+    lock.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Shared {
+    /// For the node of this name.
+    pub(super) fn new(node: &str, book: Book, caps: Caps, least: Say) -> Self {
+        Self {
+            stop: AtomicBool::new(false),
+            undecodable: AtomicU64::new(0),
+            refused: AtomicU64::new(0),
+            unsent: AtomicU64::new(0),
+            skew_ns: AtomicU64::new(NO_SKEW),
+            demand: AtomicU8::new(0),
+            max_pairs: AtomicUsize::new(caps.pairs),
+            max_contacts: AtomicUsize::new(caps.contacts),
+            book: Mutex::new(Arc::new(book)),
+            faults: Mutex::new(Vec::new()),
+            rosout: Mutex::new(None),
+            node: node.to_owned(),
+            least,
+        }
+    }
+
+    /// Whether the node closes.
+    pub(super) fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// A sample that could not be decoded.
+    pub(super) fn note_undecodable(&self) {
+        self.undecodable.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Samples that were decoded and refused.
+    pub(super) fn note_refused(&self, count: u64) {
+        self.refused.fetch_add(count, Ordering::Relaxed);
+    }
+
+    /// Messages that were not sent.
+    pub(super) fn note_unsent(&self, count: u64) {
+        self.unsent.fetch_add(count, Ordering::Relaxed);
+    }
+
+    /// Widest skew of a chain now.
+    pub(super) fn set_skew(&self, skew_ns: Option<u64>) {
+        self.skew_ns
+            .store(skew_ns.unwrap_or(NO_SKEW), Ordering::Relaxed);
+    }
+
+    /// The counters as of now.
+    pub(super) fn counts(&self) -> Counts {
+        let skew_ns = self.skew_ns.load(Ordering::Relaxed);
+        Counts {
+            sends_dropped: self.unsent.load(Ordering::Relaxed),
+            undecodable: self.undecodable.load(Ordering::Relaxed),
+            refused: self.refused.load(Ordering::Relaxed),
+            skew_ns: (skew_ns != NO_SKEW).then_some(skew_ns),
+        }
+    }
+
+    /// Who listens, as of the last look of the sending thread.
+    pub(super) fn demand(&self) -> Demand {
+        let bits = self.demand.load(Ordering::Relaxed);
+        Demand {
+            pairs: bits & 1 != 0,
+            contacts: bits & 2 != 0,
+            bodies: bits & 4 != 0,
+            body_verdicts: false,
+        }
+    }
+
+    /// Says who listens.
+    pub(super) fn set_demand(&self, demand: Demand) {
+        let bits =
+            u8::from(demand.pairs) | u8::from(demand.contacts) << 1 | u8::from(demand.bodies) << 2;
+        self.demand.store(bits, Ordering::Relaxed);
+    }
+
+    /// Limits of what goes out.
+    pub(super) fn caps(&self) -> Caps {
+        Caps {
+            pairs: self.max_pairs.load(Ordering::Relaxed),
+            contacts: self.max_contacts.load(Ordering::Relaxed),
+        }
+    }
+
+    /// The names in force.
+    pub(super) fn book(&self) -> Arc<Book> {
+        Arc::clone(&open(&self.book))
+    }
+
+    /// New names.
+    pub(super) fn set_book(&self, book: Arc<Book>) {
+        *open(&self.book) = book;
+    }
+
+    /// What is wrong with what comes in, in words.
+    pub(super) fn faults(&self) -> Vec<String> {
+        open(&self.faults).clone()
+    }
+
+    /// Takes what is wrong now and says what is new of it.
+    pub(super) fn set_faults(&self, faults: Vec<String>) {
+        let new: Vec<String> = {
+            let mut old = open(&self.faults);
+            let new = faults.iter().filter(|fault| !old.contains(fault));
+            let new = new.cloned().collect();
+            *old = faults;
+            new
+        };
+        for fault in &new {
+            self.say(Say::Warn, fault);
+        }
+    }
+
+    /// Opens or closes the way to `/rosout`.
+    pub(super) fn set_rosout(&self, writer: Option<Arc<Option<Publisher<Log>>>>) {
+        *open(&self.rosout) = writer;
+    }
+
+    /// Says that a source's time went back.
+    pub(super) fn say_back(&self, source: &str) {
+        let text = format!("the stamps of source {source} went back: its bodies begin anew");
+        self.say(Say::Warn, &text);
+    }
+
+    /// Says it on stderr and on `/rosout`.
+    pub(super) fn say(&self, level: Say, text: &str) {
+        match level {
+            Say::Info => tracing::info!("{text}"),
+            Say::Warn => tracing::warn!("{text}"),
+        }
+        if level < self.least {
+            return;
+        }
+        let Some(writer) = open(&self.rosout).clone() else {
+            return;
+        };
+        if let Some(writer) = writer.as_ref() {
+            let now = crate::wire::ros::Time::from_ns(SystemClock.realtime_ns());
+            let said = writer.publish(Log {
+                stamp: builtin_interfaces::Time::new(now.sec, now.nanosec),
+                level: match level {
+                    Say::Info => Log::INFO,
+                    Say::Warn => Log::WARN,
+                },
+                name: self.node.clone(),
+                msg: text.to_owned(),
+                file: String::new(),
+                function: String::new(),
+                line: 0,
+            });
+            self.note_unsent(u64::from(said.is_err()));
+        }
+    }
+}

@@ -1,0 +1,277 @@
+//! Where frames from ROS 2 wait for the tick thread. In: whole frames of `~/transforms`, poses of common topics, from
+//! the receiving thread. Out: frames in an inbox. Bounded: the newest are kept, what is passed over is counted.
+
+use std::collections::VecDeque;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::limits::FRAMES_PER_DRAIN_MAX;
+use crate::wire::{
+    Frame, FrameHeader, Inbox, RejectReason, SOURCE_NAME_LEN, TransformRow, WIRE_VERSION,
+    frame_flags,
+};
+
+/// A pose of one body that came on a common topic, or why it is none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Update {
+    /// Place of the body among those of its source.
+    pub(super) member: usize,
+    /// Where it is.
+    pub(super) result: Result<TransformRow, RejectReason>,
+    /// Its velocity, scene frame; of every pose of a source or of none.
+    pub(super) velocity: Option<[f64; 6]>,
+    /// Sender's stamp, nanoseconds.
+    pub(super) stamp_ns: u64,
+    /// Receipt, nanoseconds of `CLOCK_BOOTTIME`.
+    pub(super) received_ns: u64,
+    /// Whether it waited while the process stood still.
+    pub(super) waited: bool,
+}
+
+/// The newest poses of one source of common topics; they go out as one partial frame.
+#[derive(Debug)]
+struct Group {
+    name: [u8; SOURCE_NAME_LEN],
+    session: u64,
+    epoch: u64,
+    seq: u64,
+    /// Body ids.
+    bodies: Vec<u64>,
+    /// The newest update of each body since the last frame.
+    newest: Vec<Option<Update>>,
+    /// Members that have one.
+    touched: Vec<usize>,
+}
+
+#[derive(Debug, Default)]
+struct Waiting {
+    frames: VecDeque<Frame>,
+    spare: Vec<Frame>,
+    groups: Vec<Group>,
+}
+
+/// Frames and poses that wait.
+#[derive(Debug, Default)]
+pub(super) struct Shelf {
+    waiting: Mutex<Waiting>,
+    passed_over: AtomicU64,
+}
+
+/// A thread that panicked has been told of; what it left is whole, because every change is a plain move.
+fn open<T>(lock: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    lock.lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
+impl Shelf {
+    /// Adds a source of common topics; groups are numbered in the order they are added.
+    pub(super) fn add_group(&self, name: [u8; SOURCE_NAME_LEN], session: u64, bodies: Vec<u64>) {
+        open(&self.waiting).groups.push(Group {
+            name,
+            session,
+            epoch: 1,
+            seq: 0,
+            newest: vec![None; bodies.len()],
+            touched: Vec::with_capacity(bodies.len()),
+            bodies,
+        });
+    }
+
+    /// An emptied frame whose memory has been used before.
+    pub(super) fn spare(&self) -> Frame {
+        open(&self.waiting).spare.pop().unwrap_or_default()
+    }
+
+    /// Puts a whole frame behind the others; the oldest of its source goes when there are too many.
+    pub(super) fn put(&self, frame: Frame) {
+        let mut waiting = open(&self.waiting);
+        let of_source = |old: &Frame| old.header.source == frame.header.source;
+        if waiting.frames.iter().filter(|old| of_source(old)).count() >= FRAMES_PER_DRAIN_MAX
+            && let Some(at) = waiting.frames.iter().position(of_source)
+            && let Some(oldest) = waiting.frames.remove(at)
+        {
+            waiting.spare.push(oldest);
+            self.passed_over.fetch_add(1, Ordering::Relaxed);
+        }
+        waiting.frames.push_back(frame);
+    }
+
+    /// Puts poses of a group's bodies; the newer one of a body stands for the older.
+    pub(super) fn merge(&self, group: usize, updates: &[Update]) {
+        let mut waiting = open(&self.waiting);
+        let Some(group) = waiting.groups.get_mut(group) else {
+            return;
+        };
+        for update in updates {
+            let Some(slot) = group.newest.get_mut(update.member) else {
+                continue;
+            };
+            if slot.replace(*update).is_none() {
+                group.touched.push(update.member);
+            }
+        }
+    }
+
+    /// The senders' time went back: what is known of the group's bodies is void.
+    pub(super) fn reset(&self, group: usize) {
+        if let Some(group) = open(&self.waiting).groups.get_mut(group) {
+            group.epoch += 1;
+            group.seq = 0;
+            for member in group.touched.drain(..) {
+                if let Some(slot) = group.newest.get_mut(member) {
+                    *slot = None;
+                }
+            }
+        }
+    }
+
+    /// Frames that were passed over for newer ones since the last call.
+    pub(super) fn take_passed_over(&self) -> u64 {
+        self.passed_over.swap(0, Ordering::Relaxed)
+    }
+
+    /// Hands everything to the tick thread.
+    pub(super) fn drain(&self, inbox: &mut Inbox) {
+        let mut waiting = open(&self.waiting);
+        let Waiting {
+            frames,
+            spare,
+            groups,
+        } = &mut *waiting;
+        for mut frame in frames.drain(..) {
+            std::mem::swap(inbox.push(), &mut frame);
+            spare.push(frame);
+        }
+        for group in groups.iter_mut().filter(|group| !group.touched.is_empty()) {
+            group.fill(inbox.push());
+        }
+    }
+}
+
+impl Group {
+    /// One partial frame of what is new; its age is that of its oldest pose.
+    fn fill(&mut self, frame: &mut Frame) {
+        self.seq += 1;
+        let (mut received_ns, mut newest_stamp_ns) = (u64::MAX, 0);
+        for member in self.touched.drain(..) {
+            let body = self.bodies.get(member).copied().unwrap_or_default();
+            let Some(update) = self.newest.get_mut(member).and_then(Option::take) else {
+                continue;
+            };
+            received_ns = received_ns.min(update.received_ns);
+            newest_stamp_ns = newest_stamp_ns.max(update.stamp_ns);
+            frame.waited |= update.waited;
+            match update.result {
+                Ok(row) => {
+                    frame.transforms.push(TransformRow { body, ..row });
+                    frame.stamps_ns.push(update.stamp_ns);
+                    frame.velocities.extend(update.velocity);
+                }
+                Err(reason) => frame.refused_bodies.push((body, reason)),
+            }
+        }
+        frame.received_ns = received_ns;
+        frame.header = FrameHeader {
+            session: self.session,
+            epoch: self.epoch,
+            seq: self.seq,
+            // Frames that waited while the process stood still say nothing of their age.
+            sent_ns: if frame.waited { 0 } else { received_ns },
+            stamp_ns: newest_stamp_ns,
+            source: self.name,
+            flags: frame_flags::PARTIAL,
+            schema: WIRE_VERSION,
+            ..FrameHeader::default()
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::name_bytes;
+
+    fn update(member: usize, x: f64, stamp_ns: u64) -> Update {
+        let row = TransformRow {
+            position: [x, 0.0, 0.0],
+            ..TransformRow::default()
+        };
+        Update {
+            member,
+            result: Ok(row),
+            velocity: None,
+            stamp_ns,
+            received_ns: 100 - stamp_ns,
+            waited: false,
+        }
+    }
+
+    #[test]
+    fn poses_of_a_source_go_out_as_one_partial_frame_with_the_newest_of_each_body() {
+        let shelf = Shelf::default();
+        shelf.add_group(name_bytes("tf"), 9, vec![11, 12, 13]);
+        shelf.merge(0, &[update(2, 1.0, 5), update(0, 1.0, 6)]);
+        let refused = Update {
+            result: Err(RejectReason::BadChain),
+            ..update(1, 0.0, 0)
+        };
+        shelf.merge(0, &[update(2, 2.0, 7), refused]);
+        let mut inbox = Inbox::default();
+        shelf.drain(&mut inbox);
+        let frame = &inbox.frames()[0];
+        let rows: Vec<_> = frame
+            .transforms
+            .iter()
+            .map(|row| (row.body, row.position[0]))
+            .collect();
+        assert_eq!(rows, [(13, 2.0), (11, 1.0)]);
+        assert_eq!(frame.stamps_ns, [7, 6]);
+        assert_eq!(frame.refused_bodies, [(12, RejectReason::BadChain)]);
+        assert_eq!(
+            (frame.received_ns, frame.header.flags),
+            (93, frame_flags::PARTIAL)
+        );
+        inbox.clear();
+        shelf.drain(&mut inbox);
+        assert!(inbox.is_empty());
+    }
+
+    #[test]
+    fn a_flood_of_one_source_keeps_its_newest_frames_and_spares_the_others() {
+        let shelf = Shelf::default();
+        let frame = |source: &str, seq| {
+            let mut frame = shelf.spare();
+            frame.header.source = name_bytes(source);
+            frame.header.seq = seq;
+            frame
+        };
+        shelf.put(frame("quiet", 1));
+        (0..1000).for_each(|seq| shelf.put(frame("flood", seq)));
+        let mut inbox = Inbox::default();
+        shelf.drain(&mut inbox);
+        assert_eq!(inbox.frames().len(), 1 + FRAMES_PER_DRAIN_MAX);
+        assert_eq!(inbox.frames()[FRAMES_PER_DRAIN_MAX].header.seq, 999);
+        assert_eq!(inbox.frames()[0].header.source, name_bytes("quiet"));
+        assert_eq!(shelf.take_passed_over(), 1000 - FRAMES_PER_DRAIN_MAX as u64);
+    }
+
+    #[test]
+    fn time_that_goes_back_raises_the_epoch_and_drops_what_waits() {
+        let shelf = Shelf::default();
+        shelf.add_group(name_bytes("tf"), 9, vec![1]);
+        shelf.merge(0, &[update(0, 1.0, 5)]);
+        shelf.reset(0);
+        shelf.merge(0, &[update(0, 3.0, 1)]);
+        let mut inbox = Inbox::default();
+        shelf.drain(&mut inbox);
+        let frame = &inbox.frames()[0];
+        assert_eq!(
+            (
+                frame.header.epoch,
+                frame.header.seq,
+                frame.transforms[0].position[0]
+            ),
+            (2, 1, 3.0)
+        );
+    }
+}

@@ -1,0 +1,322 @@
+//! From rows to messages: names looked up, ticks of many rows cut into messages of at most 128 KB. Pure.
+
+use std::collections::BTreeMap;
+
+use super::parcel::Parcel;
+use crate::wire::ros::{
+    Contact, Contacts, Header, Name, Names, Pair, Pairs, Source, State, Tick, TickHeader, Time,
+};
+use crate::wire::{
+    self, ContactRow, MessageHeader, NameRow, PairRow, Reason, SourceRow, TickRow, name_str,
+};
+
+/// Bytes of one message: bursts beyond a peer's receive buffer (208 KB by default) are lost and slowly repaired, so
+/// 128 KB with their headers is the most.
+const MESSAGE_BYTES_MAX: usize = 120_000;
+/// Bytes of a row beside its names, with the padding of CDR, rounded up.
+const PAIR_BYTES: usize = 136;
+/// As [`PAIR_BYTES`].
+const CONTACT_BYTES: usize = 248;
+/// As [`PAIR_BYTES`].
+const NAME_BYTES: usize = 40;
+
+/// Names of bodies by id and ids by name, as of one scene revision.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Book {
+    by_id: BTreeMap<u64, NameRow>,
+    by_name: BTreeMap<String, u64>,
+}
+
+impl Book {
+    /// A book of rows.
+    pub(super) fn of(rows: &[NameRow]) -> Self {
+        let mut book = Self::default();
+        for row in rows {
+            book.by_name.insert(name_of(row).to_owned(), row.body);
+            book.by_id.insert(row.body, *row);
+        }
+        book
+    }
+
+    /// The name of a body; empty for one that is not (or no more) in the scene.
+    pub(super) fn name(&self, body: u64) -> &str {
+        self.by_id.get(&body).map_or("", name_of)
+    }
+
+    /// The id of a name.
+    pub(super) fn id(&self, name: &str) -> Option<u64> {
+        self.by_name.get(name).copied()
+    }
+
+    /// The rows, by id.
+    pub(super) fn rows(&self) -> impl Iterator<Item = &NameRow> {
+        self.by_id.values()
+    }
+}
+
+fn name_of(row: &NameRow) -> &str {
+    let len = usize::try_from(row.len).unwrap_or(0).min(row.name.len());
+    row.name
+        .get(..len)
+        .and_then(|bytes| std::str::from_utf8(bytes).ok())
+        .unwrap_or_default()
+}
+
+/// Counters of the node that go out with the tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Counts {
+    /// Messages that were not sent.
+    pub(super) sends_dropped: u64,
+    /// Samples that could not be decoded.
+    pub(super) undecodable: u64,
+    /// Samples that were refused.
+    pub(super) refused: u64,
+    /// Widest skew of a chain, nanoseconds; `None`: no chain.
+    pub(super) skew_ns: Option<u64>,
+}
+
+/// Writes messages in one frame.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Speaker {
+    /// The scene's frame.
+    pub(super) frame_id: String,
+    /// Names in force.
+    pub(super) book: Book,
+}
+
+impl Speaker {
+    /// `header.stamp` is the oldest pose used.
+    fn header(&self, stamp_ns: u64) -> Header {
+        Header {
+            stamp: Time::from_ns(stamp_ns),
+            frame_id: self.frame_id.clone(),
+        }
+    }
+
+    /// `~/state`.
+    pub(super) fn state(&self, row: &TickRow) -> State {
+        let reasons = Reason::ALL
+            .iter()
+            .filter(|reason| row.reasons & reason.bit() != 0);
+        State {
+            header: self.header(row.header.oldest_stamp_ns),
+            tick_header: tick_header(&row.header),
+            word: wire::State::from_code(row.header.state)
+                .map_or("unknown", wire::State::word)
+                .to_owned(),
+            reasons: row.reasons,
+            reason_words: reasons.map(ToString::to_string).collect(),
+            worst_a: row.worst_a,
+            worst_b: row.worst_b,
+            worst_name_a: self.book.name(row.worst_a).to_owned(),
+            worst_name_b: self.book.name(row.worst_b).to_owned(),
+        }
+    }
+
+    /// `~/tick`.
+    pub(super) fn tick(&self, row: &TickRow, counts: Counts) -> Tick {
+        let sources = row.sources.iter().take(usize::from(row.sources_len));
+        Tick {
+            header: self.header(row.header.oldest_stamp_ns),
+            tick_header: tick_header(&row.header),
+            sent_ns: row.sent_ns,
+            elapsed_ns: row.elapsed_ns,
+            budget_ns: row.budget_ns,
+            budget_units: row.budget_units,
+            floor_ns: row.floor_ns,
+            units: row.units,
+            stage_ns: row.stage_ns,
+            rejects: row.rejects,
+            bodies: row.bodies,
+            unknown: row.unknown,
+            candidates: row.candidates,
+            colliding: row.colliding,
+            possible: row.possible,
+            near: row.near,
+            ignored: row.ignored,
+            missed: row.missed,
+            cancelled_events: row.cancelled_events,
+            worst_a: row.worst_a,
+            worst_b: row.worst_b,
+            widest_m: row.widest_m,
+            oldest_undecided_ticks: row.oldest_undecided_ticks,
+            reasons: row.reasons,
+            cause: row.cause,
+            overrun: row.overrun != 0,
+            cause_source: row.cause_source,
+            rebuilds: row.rebuilds,
+            sources: sources.map(source).collect(),
+            sends_dropped: counts.sends_dropped,
+            receipts_undecodable: counts.undecodable,
+            receipts_refused: counts.refused,
+            tf_skew_s: counts.skew_ns.map_or(f64::NAN, super::poses::seconds),
+        }
+    }
+
+    /// `~/pairs`, at least one message.
+    pub(super) fn pairs(&self, parcel: &Parcel) -> Vec<Pairs> {
+        let header = &parcel.pairs_header;
+        let size = |row: &PairRow| self.names_bytes(row.body_a, row.body_b) + PAIR_BYTES;
+        let chunks = cut(&parcel.pairs, size);
+        let count = u32::try_from(chunks.len()).unwrap_or(u32::MAX);
+        let numbered = chunks.into_iter().zip(0..);
+        numbered
+            .map(|(rows, chunk_index)| Pairs {
+                header: self.header(header.oldest_stamp_ns),
+                tick_header: tick_header(header),
+                chunk_index,
+                chunk_count: count,
+                complete: header.truncated == 0,
+                pairs: rows.iter().map(|row| self.pair(row)).collect(),
+            })
+            .collect()
+    }
+
+    /// `~/contacts`, at least one message.
+    pub(super) fn contacts(&self, parcel: &Parcel) -> Vec<Contacts> {
+        let header = &parcel.contacts_header;
+        let size = |row: &ContactRow| self.names_bytes(row.body_a, row.body_b) + CONTACT_BYTES;
+        let chunks = cut(&parcel.contacts, size);
+        let count = u32::try_from(chunks.len()).unwrap_or(u32::MAX);
+        let numbered = chunks.into_iter().zip(0..);
+        numbered
+            .map(|(rows, chunk_index)| Contacts {
+                header: self.header(header.oldest_stamp_ns),
+                tick_header: tick_header(header),
+                chunk_index,
+                chunk_count: count,
+                complete: header.truncated == 0,
+                contacts: rows.iter().map(|row| self.contact(row)).collect(),
+            })
+            .collect()
+    }
+
+    /// `~/names`, at least one message.
+    pub(super) fn names(&self, stamp: Time, boot_id: u64, scene_rev: u64) -> Vec<Names> {
+        let rows: Vec<NameRow> = self.book.rows().copied().collect();
+        let size = |row: &NameRow| usize::try_from(row.len).unwrap_or(0) + NAME_BYTES;
+        let chunks = cut(&rows, size);
+        let count = u32::try_from(chunks.len()).unwrap_or(u32::MAX);
+        let numbered = chunks.into_iter().zip(0..);
+        let name = |row: &NameRow| Name {
+            body: row.body,
+            generation: row.generation,
+            source: row.source,
+            name: name_of(row).to_owned(),
+        };
+        numbered
+            .map(|(rows, chunk_index)| Names {
+                header: Header {
+                    stamp,
+                    frame_id: self.frame_id.clone(),
+                },
+                boot_id,
+                scene_rev,
+                chunk_index,
+                chunk_count: count,
+                names: rows.iter().map(name).collect(),
+            })
+            .collect()
+    }
+
+    fn names_bytes(&self, a: u64, b: u64) -> usize {
+        self.book.name(a).len() + self.book.name(b).len()
+    }
+
+    fn pair(&self, row: &PairRow) -> Pair {
+        Pair {
+            name_a: self.book.name(row.body_a).to_owned(),
+            name_b: self.book.name(row.body_b).to_owned(),
+            body_a: row.body_a,
+            body_b: row.body_b,
+            gap_min_m: row.gap_min_m,
+            gap_max_m: row.gap_max_m,
+            gap_best_m: row.gap_best_m,
+            closing_mps: row.closing_mps,
+            begin_first_tick: row.begin_first_tick,
+            begin_last_tick: row.begin_last_tick,
+            end_first_tick: row.end_first_tick,
+            end_last_tick: row.end_last_tick,
+            certified_tick: row.certified_tick,
+            bound_age_ticks: row.bound_age_ticks,
+            verdict: row.verdict,
+            certified_verdict: row.certified_verdict,
+            events: row.events,
+            end_cause: row.end_cause,
+            level: row.level,
+            flags: row.flags,
+        }
+    }
+
+    fn contact(&self, row: &ContactRow) -> Contact {
+        Contact {
+            id: row.id,
+            name_a: self.book.name(row.body_a).to_owned(),
+            name_b: self.book.name(row.body_b).to_owned(),
+            body_a: row.body_a,
+            body_b: row.body_b,
+            point_a: row.point_a.into(),
+            point_b: row.point_b.into(),
+            point_a_body: row.point_a_body.into(),
+            point_b_body: row.point_b_body.into(),
+            normal: row.normal.into(),
+            gap_m: row.gap_m,
+            gap_min_m: row.gap_min_m,
+            gap_max_m: row.gap_max_m,
+            shape_a: row.shape_a,
+            shape_b: row.shape_b,
+            triangle_a: row.triangle_a,
+            triangle_b: row.triangle_b,
+            flags: row.flags,
+            kind: row.kind,
+        }
+    }
+}
+
+/// The head of a tick as every message repeats it.
+pub(super) fn tick_header(row: &MessageHeader) -> TickHeader {
+    TickHeader {
+        boot_id: row.boot_id,
+        tick: row.tick,
+        scene_rev: row.scene_rev,
+        oldest_stamp_ns: row.oldest_stamp_ns,
+        newest_stamp_ns: row.newest_stamp_ns,
+        truncated: row.truncated,
+        state: row.state,
+    }
+}
+
+fn source(row: &SourceRow) -> Source {
+    Source {
+        name: name_str(&row.name).unwrap_or_default().to_owned(),
+        session: row.session,
+        epoch: row.epoch,
+        seq: row.seq,
+        stamp_ns: row.stamp_ns,
+        clock_id: row.clock_id,
+        age_ns: row.age_ns,
+        frames: row.frames,
+        skipped: row.skipped,
+        refused: row.refused,
+        alive: row.alive != 0,
+        paused: row.paused != 0,
+    }
+}
+
+/// Cuts rows into runs that each fit a message; at least one run, which may be empty.
+fn cut<T>(rows: &[T], size: impl Fn(&T) -> usize) -> Vec<&[T]> {
+    let (mut all, mut from, mut bytes) = (Vec::new(), 0, 0);
+    for (at, row) in rows.iter().enumerate() {
+        let own = size(row);
+        if bytes + own > MESSAGE_BYTES_MAX && at > from {
+            all.push(rows.get(from..at).unwrap_or_default());
+            (from, bytes) = (at, 0);
+        }
+        bytes += own;
+    }
+    all.push(rows.get(from..).unwrap_or_default());
+    all
+}
+
+#[cfg(test)]
+mod tests;

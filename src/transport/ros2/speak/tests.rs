@@ -1,0 +1,92 @@
+//! What messages say, and how large they become.
+
+use super::*;
+
+fn named(body: u64, text: &str) -> NameRow {
+    let mut row = NameRow {
+        body,
+        len: u32::try_from(text.len()).unwrap(),
+        ..NameRow::default()
+    };
+    row.name[..text.len()].copy_from_slice(text.as_bytes());
+    row
+}
+
+#[test]
+fn rows_are_cut_into_messages_that_fit_and_none_is_lost() {
+    let rows: Vec<u64> = (0..1000).collect();
+    let chunks = cut(&rows, |_| 400);
+    assert!(chunks.len() > 3 && chunks.iter().all(|c| c.len() * 400 <= MESSAGE_BYTES_MAX));
+    assert_eq!(chunks.concat(), rows);
+    assert_eq!(cut::<u64>(&[], |_| 400).len(), 1);
+    assert_eq!(cut(&rows[..2], |_| MESSAGE_BYTES_MAX * 2).len(), 2);
+}
+
+#[test]
+fn the_largest_message_stays_below_128_kilobytes_on_the_wire() {
+    let long = "x".repeat(104);
+    let speaker = Speaker {
+        frame_id: "world".to_owned(),
+        book: Book::of(&[named(1, &long), named(2, &long)]),
+    };
+    let contact = ContactRow {
+        body_a: 1,
+        body_b: 2,
+        ..ContactRow::default()
+    };
+    let pair = PairRow {
+        body_a: 1,
+        body_b: 2,
+        ..PairRow::default()
+    };
+    let parcel = Parcel {
+        contacts: vec![contact; 2000],
+        pairs: vec![pair; 2000],
+        ..Parcel::default()
+    };
+    let size = |bytes: Result<Vec<u8>, _>| -> usize {
+        let bytes: Vec<u8> = bytes.unwrap_or_else(|e: String| panic!("{e}"));
+        bytes.len()
+    };
+    let cdr = |message: &Contacts| {
+        cdr_encoding::to_vec::<_, byteorder::LittleEndian>(message).map_err(|e| e.to_string())
+    };
+    let largest = speaker.contacts(&parcel).iter().map(|m| size(cdr(m))).max();
+    assert!(
+        largest.is_some_and(|bytes| bytes <= 128 * 1024),
+        "{largest:?}"
+    );
+}
+
+#[test]
+fn a_state_says_its_reasons_in_words_and_its_worst_pair_by_name() {
+    let speaker = Speaker {
+        frame_id: "cell".to_owned(),
+        book: Book::of(&[named(7, "arm")]),
+    };
+    let mut row = TickRow {
+        worst_a: 7,
+        worst_b: 9,
+        ..TickRow::default()
+    };
+    row.reasons = Reason::Stale.bit() | Reason::NoInput.bit();
+    row.header.state = wire::State::Unknown.code();
+    row.header.oldest_stamp_ns = 3_000_000_001;
+    let state = speaker.state(&row);
+    assert_eq!(
+        (state.word.as_str(), state.reason_words),
+        ("unknown", vec!["stale".to_owned(), "no_input".to_owned()])
+    );
+    assert_eq!(
+        (state.worst_name_a.as_str(), state.worst_name_b.as_str()),
+        ("arm", "")
+    );
+    assert_eq!(
+        (
+            state.header.stamp.sec,
+            state.header.stamp.nanosec,
+            state.header.frame_id.as_str()
+        ),
+        (3, 1, "cell")
+    );
+}

@@ -1,0 +1,21 @@
+//! ROS 2 messages as serde structs in field order, which is what CDR carries: `msgs/sweepd_msgs` and the common
+//! packages, as far as the node speaks them.
+//!
+//! `.msg` files are the contract; these structs are kept equal to them by a test. Units and frames stand there.
+
+mod common;
+mod seen;
+mod sweepd;
+
+pub use common::{
+    Clock, Duration, Header, Odometry, Point, Pose, PoseStamped, PoseWithCovariance, Quaternion,
+    TfMessage, Time, Transform, TransformStamped, Twist, TwistWithCovariance, Vector3,
+};
+pub use seen::{
+    ColorRgba, DiagnosticArray, DiagnosticStatus, KeyValue, Marker, MarkerArray, MeshFile, Texture,
+    UvCoordinate, diagnostic_level, marker_kind,
+};
+pub use sweepd::{
+    BodyTransform, BodyTransforms, Contact, Contacts, Name, Names, Pair, Pairs, Source, State,
+    Tick, TickHeader,
+};
