@@ -35,6 +35,10 @@ pub const EXTENT_MAX_M: f64 = 1e9;
 pub const EXTENT_MIN_M: f64 = 1e-9;
 /// Largest deviation of a frame quaternion's length from 1; beyond it the sender means something else.
 pub const QUATERNION_NORM_TOLERANCE: f64 = 1e-2;
+/// Least and greatest `priority` of a body. Their ratio bounds how long a pair can be passed over for others.
+pub const PRIORITY_MIN: f64 = 0.01;
+/// See [`PRIORITY_MIN`].
+pub const PRIORITY_MAX: f64 = 100.0;
 /// Default heartbeat, milliseconds.
 pub const HEARTBEAT_MS_DEFAULT: u64 = 100;
 /// Default spin of a wait before it sleeps, microseconds: a wake-up costs 10 to 25, so a peer that answers within this

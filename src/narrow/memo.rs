@@ -207,6 +207,19 @@ pub(super) fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f6
     }
 }
 
+/// How far two bodies came nearer between the test's relative pose and this one, metres: along the witness, or along the
+/// line of their centres where there is none. For the order of work, no bound.
+pub(super) fn closing(a: &Body, b: &Body, memo: &Memo, rel: &Pose) -> f64 {
+    let (point, direction) = match memo.witness {
+        Some(witness) => (witness.point_b, witness.normal),
+        None => {
+            let apart = memo.rel * b.centre - a.centre;
+            (b.centre, apart.try_normalize(0.0).unwrap_or_default())
+        }
+    };
+    direction.dot(&(memo.rel * point - rel * point))
+}
+
 fn plane_motion(normal: &Vec3, then: &Pose, now: &Pose, centre: &Point, radius: f64) -> f64 {
     let (from, to) = (then * centre, now * centre);
     let height = normal.dot(&(to - from)).abs();
@@ -325,7 +338,7 @@ impl Narrow {
         } else {
             memo.undecided_since = 0;
         }
-        self.urgencies[slot.index()] = Urgency::of(memo);
+        self.urgencies[slot.index()].settle(memo);
         if before == verdict {
             return;
         }

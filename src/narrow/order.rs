@@ -1,6 +1,7 @@
 //! The order of work: who has a turn first when the budget does not reach for all.
 
 use crate::ids::PairSlot;
+use crate::math::f32_down;
 use crate::time::Meter;
 use crate::world::World;
 
@@ -12,7 +13,8 @@ use super::memo::Memo;
 pub enum Order {
     /// As found: for a budget without limit, where order means nothing.
     AsFound,
-    /// Last tick's contacts, then the longest undecided, then the fastest: for a budget in time.
+    /// Last tick's contacts, then by age, weighted by the bodies' priority and by how fast they come nearer: for a budget
+    /// in time.
     Aged,
     /// As `Aged`, with ties broken by body ids: for a budget in units, so that a run replays bit for bit whatever the
     /// slots are.
@@ -23,42 +25,69 @@ pub enum Order {
 /// time ends after a few queries, most of the list never needs an order.
 const BATCH_FIRST: usize = 64;
 
+/// The fastest approach counts as this many times the age: what comes nearer by much more than its size since it was
+/// last asked is up to four times as urgent as what does not.
+const CLOSING_WEIGHT: f64 = 4.0;
+
 /// What the order of work asks of a pair, side by side for all pairs: the records it comes from are far apart.
-#[derive(Clone, Copy, Debug, Default)]
+///
+/// Urgency is age times weight, so nothing starves: a pair that is undecided comes before every pair that is undecided
+/// for the first time after at most `CLOSING_WEIGHT` times the ratio of the greatest to the least priority, in ticks.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Urgency {
     /// First tick without a verdict; 0: decided.
     since: u64,
-    /// Upper half of how far the pair has moved since its test (positive floats order like their bits).
-    motion_bits: u32,
+    /// Priority times the factor for its approach, positive.
+    weight: f32,
     /// The witness of the last test touched.
     touched: bool,
 }
 
-impl Urgency {
-    pub(super) fn of(memo: &Memo) -> Self {
+impl Default for Urgency {
+    fn default() -> Self {
         Self {
-            since: memo.undecided_since,
-            motion_bits: (memo.widened_m.max(0.0).to_bits() >> 32) as u32,
-            touched: memo.witness.is_some_and(|w| w.best_m <= 0.0),
+            since: 0,
+            weight: 1.0,
+            touched: false,
         }
     }
+}
 
-    /// Place in the order of work, the least first: 1 bit whether it is no contact of last tick, 31 bits for how long it
-    /// has been undecided, the longest first, 32 bits how far it has moved, the farthest first.
+impl Urgency {
+    /// Takes what a look at the pair has found.
+    ///
+    /// * `priority` - the pair's: the greater of its bodies'.
+    /// * `closing_m` - how far the two came nearer since the test, where they are nearest.
+    /// * `size_m` - the radius of the smaller.
+    pub(super) fn weigh(&mut self, priority: f64, closing_m: f64, size_m: f64) {
+        let nearer = closing_m.max(0.0);
+        let share = if nearer > 0.0 {
+            1.0 / (1.0 + size_m / nearer)
+        } else {
+            0.0
+        };
+        self.weight = f32_down(priority * (1.0 + (CLOSING_WEIGHT - 1.0) * share));
+    }
+
+    /// Takes the pair's verdict.
+    pub(super) fn settle(&mut self, memo: &Memo) {
+        self.since = memo.undecided_since;
+        self.touched = memo.witness.is_some_and(|w| w.best_m <= 0.0);
+    }
+
+    /// Place in the order of work, the least first: one bit whether it is no contact of last tick, then age times weight,
+    /// the greatest first (positive floats order like their bits).
     fn rank(self, tick: u64) -> u64 {
         let age = match self.since {
             0 => 0,
             since => tick.saturating_sub(since),
         };
         let fresh_contact = self.touched && age == 0;
-        u64::from(!fresh_contact) << 63
-            | (AGE_MAX - age.min(AGE_MAX)) << 32
-            | u64::from(!self.motion_bits)
+        #[allow(clippy::cast_precision_loss, reason = "an order needs no more bits")]
+        let urgency = (age + 1) as f64 * f64::from(self.weight);
+        u64::from(!fresh_contact) << 63 | (!urgency.to_bits() >> 1)
     }
 }
-
-/// Largest age in ticks that the order tells apart.
-const AGE_MAX: u64 = (1 << 31) - 1;
 
 /// How far a list of work has been put in order.
 #[derive(Debug)]
@@ -154,20 +183,34 @@ mod tests {
     }
 
     #[test]
-    fn last_ticks_contacts_come_first_then_the_oldest_then_the_fastest() {
-        let urgency = |since, motion_m: f64, touched| Urgency {
+    fn last_ticks_contacts_come_first_then_age_times_weight() {
+        let urgency = |since, weight: f32, touched| Urgency {
             since,
-            motion_bits: (motion_m.to_bits() >> 32) as u32,
+            weight,
             touched,
         };
         let order = [
-            urgency(0, 0.1, true),
-            urgency(100, 0.0, true),
-            urgency(90, 0.0, true),
-            urgency(95, 2.0, false),
+            urgency(0, 1.0, true),
+            urgency(100, 0.5, true),
+            urgency(90, 1.0, true),
+            urgency(98, 3.0, false),
             urgency(95, 1.0, false),
-            urgency(0, 3.0, false),
+            urgency(0, 4.0, false),
+            urgency(0, 1.0, false),
         ];
         assert!(order.is_sorted_by_key(|urgency| urgency.rank(100)));
+    }
+
+    #[test]
+    fn what_comes_nearer_is_more_urgent_but_never_by_more_than_the_stated_factor() {
+        let of = |closing_m: f64| {
+            let mut urgency = Urgency::default();
+            urgency.weigh(2.0, closing_m, 0.5);
+            urgency.weight
+        };
+        let weights = [f64::NAN, -1.0, 0.0, 0.1, 0.5, 10.0, 1e300, f64::INFINITY].map(of);
+        assert!(weights.is_sorted(), "{weights:?}");
+        assert!(weights[0] > 1.999 && weights[0] <= 2.0, "{weights:?}");
+        assert!(weights[4] > 4.99 && weights[7] <= 8.0, "{weights:?}");
     }
 }

@@ -6,7 +6,7 @@ use crate::pairs::PairSet;
 use crate::wire::{BodyStatus, Verdict};
 use crate::world::World;
 
-use super::memo::relative_motion;
+use super::memo::{closing, relative_motion};
 use super::{NONE, Narrow};
 
 impl Narrow {
@@ -130,6 +130,12 @@ impl Narrow {
             m if m.is_finite() => memo.gap.widened(m),
             _ => Interval::UNKNOWN,
         };
+        // Where the pair may want work: what its place in the order of work depends on.
+        if memo.now.min <= memo.report_m {
+            let priority = a.priority.max(b.priority);
+            let closing_m = closing(a, b, memo, &rel);
+            self.urgencies[slot.index()].weigh(priority, closing_m, a.radius.min(b.radius));
+        }
         let known = |status| matches!(status, BodyStatus::Known | BodyStatus::Held);
         let still = reach_m == 0.0 && known(a.status) && known(b.status) && by_path.is_finite();
         // The comparison that spares the next visits: gap_min - (spent - credit) > report.

@@ -82,6 +82,8 @@ pub struct BodySpec {
     pub report_within_m: f64,
     /// Greatest speed of any of its surface points, metres a second.
     pub max_speed_mps: Option<f64>,
+    /// Weight of its pairs in the order of work, `limits::PRIORITY_MIN` to `PRIORITY_MAX`; 1: as any other.
+    pub priority: f64,
     /// What happens when it is too old.
     pub on_stale: OnStale,
     /// Whether it takes part.

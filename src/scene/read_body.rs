@@ -2,7 +2,7 @@
 
 use crate::config::OnStale;
 use crate::ids::BodyId;
-use crate::limits::{EXTENT_MAX_M, SHAPES_PER_BODY_MAX};
+use crate::limits::{EXTENT_MAX_M, PRIORITY_MAX, PRIORITY_MIN, SHAPES_PER_BODY_MAX};
 use crate::scene::node::{Fault, Node, Value};
 use crate::scene::read_shape::{read_pose, read_shape};
 use crate::scene::table::{Table, shortened};
@@ -56,6 +56,7 @@ const KEYS: &[&str] = &[
     "rigid_group",
     "report_within_m",
     "max_speed_mps",
+    "priority",
     "on_stale",
     "enabled",
     "shape",
@@ -120,6 +121,9 @@ pub(crate) fn read_body(node: Node, blobs: Option<&[u8]>) -> Result<BodyDraft, F
             .number_within("report_within_m", 0.0, EXTENT_MAX_M)?
             .unwrap_or(0.0),
         max_speed_mps: table.number_within("max_speed_mps", 0.0, EXTENT_MAX_M)?,
+        priority: table
+            .number_within("priority", PRIORITY_MIN, PRIORITY_MAX)?
+            .unwrap_or(1.0),
         on_stale: read_on_stale(&mut table)?.unwrap_or_default(),
         enabled: table.flag("enabled")?.unwrap_or(true),
         shapes: read_shapes(&mut table, at, blobs, &mut places)?,

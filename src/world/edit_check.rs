@@ -9,7 +9,7 @@ use super::edit::Edit;
 use super::edit_rules::is_rule_of;
 use super::rules::sides_of;
 use crate::ids::BodyId;
-use crate::limits::SHAPES_PER_BODY_MAX;
+use crate::limits::{PRIORITY_MAX, PRIORITY_MIN, SHAPES_PER_BODY_MAX};
 use crate::math::Pose;
 use crate::scene::{BodySpec, PairRule};
 use crate::wire::BODY_NAME_LEN;
@@ -131,6 +131,11 @@ impl<'a> Draft<'a> {
         let speed_mps = spec.max_speed_mps.unwrap_or(0.0);
         if spec.report_within_m < 0.0 || !speed_mps.is_finite() || speed_mps < 0.0 {
             return wrong("`report_within_m` and `max_speed_mps` are not negative".to_owned());
+        }
+        if !(PRIORITY_MIN..=PRIORITY_MAX).contains(&spec.priority) {
+            return wrong(format!(
+                "`priority` is from {PRIORITY_MIN} to {PRIORITY_MAX}"
+            ));
         }
         match spec.source {
             Some(source) if source >= self.world.sources.len() => {

@@ -313,6 +313,7 @@ pub(super) fn new_body(
         received_ns: 0,
         report_within_m: spec.report_within_m,
         max_speed_mps: spec.max_speed_mps,
+        priority: spec.priority,
         on_stale: spec.on_stale,
         in_broad: false,
     };

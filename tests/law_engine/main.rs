@@ -20,6 +20,7 @@ mod limits;
 mod motion;
 mod order;
 mod rig;
+mod schedule;
 mod shapes;
 mod state;
 mod verdicts;

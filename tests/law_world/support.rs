@@ -99,6 +99,7 @@ pub(crate) fn moving(name: &str, id: u64) -> BodySpec {
         rigid_group: None,
         report_within_m: 0.0,
         max_speed_mps: None,
+        priority: 1.0,
         on_stale: OnStale::Unknown,
         enabled: true,
     }

@@ -86,6 +86,7 @@ fn any_body(rng: &mut Rng, kind: usize, s: f64, id: u64, group: u32) -> (Body, B
         rigid_group: None,
         report_within_m: if rng.below(3) == 0 { 0.05 * s } else { 0.0 },
         max_speed_mps: None,
+        priority: 1.0,
         on_stale: OnStale::Unknown,
         enabled: true,
     };
