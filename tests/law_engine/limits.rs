@@ -196,3 +196,32 @@ fn law_3_9_one_byte_a_body_is_never_truncated() {
         assert_eq!(row.verdict, *verdict);
     }
 }
+
+#[test]
+fn bug_an_end_that_waited_carries_the_interval_of_this_tick_not_of_its_last_test() {
+    let mut rig = couples("[limits]\npair_rows = 1", 2, |_| -0.1, "");
+    for _ in 0..3 {
+        rig.send(ALL);
+    }
+    // Apart on the diagonal, where the boxes overlap: both stay candidates, with certificates of 0.26 m.
+    let place = |rig: &mut Rig, d: f64| {
+        for k in 1..=2 {
+            let x = 100.0 * k as f64;
+            rig.row(2 * k + 1).position = [x + d, d, 0.0];
+        }
+        rig.send(ALL);
+        let row = rig.out.pairs[0];
+        let gap_m = d.hypot(d) - 2.0;
+        assert!(has(&row, Event::End), "{row:?}");
+        assert!(
+            row.gap_min_m <= gap_m && gap_m <= row.gap_max_m,
+            "{gap_m}: {row:?}"
+        );
+    };
+    place(&mut rig, 1.6);
+    assert_eq!(ids(&rig), [1]);
+    // Moved by less than the certificate: nothing is asked, and the row that waited is sent.
+    place(&mut rig, 1.55);
+    assert_eq!(ids(&rig), [2]);
+    assert_eq!(rig.engine.counters().queries, 0);
+}
