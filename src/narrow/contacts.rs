@@ -1,7 +1,11 @@
 //! Contacts of a pair, and the ids that stay while the contact does.
 
+mod choose;
+
 use crate::ids::PairSlot;
 use crate::math::{Interval, Point, Vec3};
+
+use choose::choose;
 
 use super::{NONE, Narrow};
 
@@ -62,7 +66,7 @@ impl ContactSet {
         self.contacts.clear();
     }
 
-    /// Takes the deepest `most` of `found`; contacts that were there before keep their ids. `before` is scratch memory.
+    /// Takes the deepest of `found` and those that span the most, at most `most`; contacts that were there before keep their ids. `before` is scratch memory.
     pub(super) fn replace(
         &mut self,
         found: &mut [Contact],
@@ -74,7 +78,10 @@ impl ContactSet {
         before.clear();
         before.extend_from_slice(&self.contacts);
         self.contacts.clear();
-        self.contacts.extend(found.iter().take(most));
+        let kept = choose(found, most, radius, |contact| {
+            before.iter().any(|old| old.key() == contact.key())
+        });
+        self.contacts.extend_from_slice(&found[..kept]);
         for contact in &mut self.contacts {
             let heir = before
                 .iter()
