@@ -1,0 +1,230 @@
+"""What leaves the host and what comes in from outside: nothing, in loopback mode. Needs root (name spaces)."""
+
+import os
+import socket
+import struct
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+from conftest import own_network
+from frames import Sender
+from rclpy.serialization import serialize_message
+from scenes import HANDS
+from sweepd_msgs.msg import State, Tick
+
+FAR = {"left": (0, 0, 0), "right": (5, 0, 0)}
+CLOSE = {"left": (0, 0, 0), "right": (0.5, 0, 0)}
+
+pytestmark = pytest.mark.skipif(os.geteuid() != 0, reason="network name spaces need root")
+
+
+def ip(*words):
+    subprocess.run(["ip", *words], check=True)
+
+
+class Lan:
+    """A second host: its own name space on the other end of a cable; a thread lives there."""
+
+    def __init__(self):
+        ready, self._go, self.done = threading.Event(), threading.Event(), threading.Event()
+        self._jobs, self._results = [], []
+
+        def live():
+            own_network()
+            self.tid = threading.get_native_id()
+            ready.set()
+            while True:
+                self._go.wait()
+                self._go.clear()
+                job = self._jobs.pop()
+                if job is None:
+                    return
+                try:
+                    self._results.append(job())
+                finally:
+                    self.done.set()
+
+        self._thread = threading.Thread(target=live, daemon=True)
+        self._thread.start()
+        ready.wait()
+        ip("link", "add", "cable", "type", "veth", "peer", "name", "cable2")
+        ip("link", "set", "cable2", "netns", str(self.tid))
+        ip("addr", "add", "10.77.0.1/24", "dev", "cable")
+        ip("link", "set", "cable", "up")
+        ip("route", "add", "224.0.0.0/4", "dev", "cable")
+        self.run(lambda: ip("addr", "add", "10.77.0.2/24", "dev", "cable2"))
+        self.run(lambda: ip("link", "set", "cable2", "up"))
+        self.run(lambda: ip("route", "add", "default", "dev", "cable2"))
+
+    def run(self, job):
+        """Does it over there."""
+        self.done.clear()
+        self._jobs.append(job)
+        self._go.set()
+        self.done.wait()
+        return self._results.pop()
+
+    def start(self, args, env):
+        return self.run(lambda: subprocess.Popen(args, env=env))
+
+    def close(self):
+        self._jobs.append(None)
+        self._go.set()
+        self._thread.join()
+
+
+class Packets:
+    """Every IPv4 packet that this host sends on the cable, by source port."""
+
+    def __init__(self, device):
+        self.socket = socket.socket(socket.AF_PACKET, socket.SOCK_RAW, socket.ntohs(0x0003))
+        self.socket.bind((device, 0))
+        self.socket.settimeout(0.2)
+        self.sent = []
+        self._run = True
+        self._thread = threading.Thread(target=self._take, daemon=True)
+        self._thread.start()
+
+    def _take(self):
+        while self._run:
+            try:
+                data, where = self.socket.recvfrom(65536)
+            except TimeoutError:
+                continue
+            if where[2] == socket.PACKET_OUTGOING and data[12:14] == b"\x08\x00":
+                start = 14 + 4 * (data[14] & 15)
+                if data[23] == 17:
+                    self.sent.append((struct.unpack(">HH", data[start : start + 4]), data[start + 8 :]))
+
+    def stop(self):
+        self._run = False
+        self._thread.join()
+        self.socket.close()
+        return self.sent
+
+
+def udp_ports(pid):
+    """The ports the process has bound."""
+    inodes = {os.readlink(f"/proc/{pid}/fd/{fd}")[8:-1] for fd in os.listdir(f"/proc/{pid}/fd")
+              if os.readlink(f"/proc/{pid}/fd/{fd}").startswith("socket:")}  # fmt: skip
+    rows = [line.split() for line in open(f"/proc/{pid}/net/udp").readlines()[1:]]
+    return {int(row[1].split(":")[1], 16) for row in rows if row[9] in inodes}
+
+
+@pytest.fixture
+def lan(room):
+    made = Lan()
+    yield made
+    made.close()
+
+
+def test_in_loopback_mode_nothing_leaves_the_host_while_ros_runs_on_another(room, lan):
+    daemon = room.daemon(HANDS)
+    node = room.node()
+    packets = Packets("cable")
+    env = room.env | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", "ROS_STATIC_PEERS": "10.77.0.1"}
+    beside = os.path.join(os.path.dirname(__file__), "peer_echo.py")
+    other = lan.start([sys.executable, beside, "--seconds", "9"], env)
+    states = room.hear(State, "/sweepd/state")
+    sender = Sender(node)
+    room.until(lambda: states and states[-1].word == "clear", "clear", then=lambda: sender.send(FAR))
+    until = time.monotonic() + 8
+    while time.monotonic() < until:
+        sender.send(FAR)
+        room.spin(0.1)
+    other.wait(timeout=15)
+    ours = udp_ports(daemon.pid)
+    sent = packets.stop()
+    from_daemon = [ports for ports, _ in sent if ports[0] in ours]
+    print(f"packets on the cable: {len(sent)} of this host, {len(from_daemon)} of the daemon's ports {sorted(ours)}")
+    assert sent, "the rclpy node of this host is heard on the cable, so the ear works"
+    assert from_daemon == []
+    assert not [data for _, data in sent if b"colliding" in data or b"clear" in data]
+
+
+def rtps_data(guid_prefix, writer, number, payload):
+    """A user sample as RTPS says it, from this writer."""
+    data = struct.pack("<HH", 0, 16) + bytes(4) + writer + struct.pack("<iI", 0, number) + payload
+    submessage = struct.pack("<BBH", 0x15, 0x05, len(data)) + data
+    return b"RTPS\x02\x03\x01\x0f" + guid_prefix + submessage
+
+
+def test_forged_samples_from_another_host_are_not_taken(room, lan):
+    daemon = room.daemon(HANDS)
+    node = room.node()
+    ticks = room.hear(Tick, "/sweepd/tick")
+    states = room.hear(State, "/sweepd/state")
+    sender = Sender(node)
+    room.until(lambda: states and states[-1].word == "clear", "clear", then=lambda: sender.send(FAR))
+    # the real writer's name, as the graph tells it to anybody
+    gid = bytes(node.get_publishers_info_by_topic("/sweepd/transforms")[0].endpoint_gid)
+    forger = Sender(node)
+    forger.session = sender.session
+    forger.seq = sender.seq + 1_000_000
+    payload = bytes(serialize_message(forger.frame(CLOSE)))
+
+    def forge(address):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+            for port in sorted(udp_ports(daemon.pid)):
+                for number in range(1, 41):
+                    try:
+                        out.sendto(rtps_data(gid[:12], gid[12:16], sender.seq + number, payload), (address, port))
+                    except OSError:
+                        pass
+
+    # from this host they are believed, which shows that the forgery is a good one
+    lan.run(lambda: [forge("10.77.0.1") for _ in range(3)])
+    until = time.monotonic() + 3
+    seqs = []
+    while time.monotonic() < until:
+        sender.send(FAR)
+        room.spin(0.05)
+        seqs.append(ticks[-1].sources[0].seq)
+    assert max(seqs) < 1_000_000, "a forged frame was taken"
+    assert "colliding" not in {state.word for state in states}
+    assert seqs[-1] >= sender.seq - 5, "genuine frames go on"
+    forge("127.0.0.1")
+    room.until(lambda: ticks[-1].sources[0].seq > 1_000_000, "the same forgery from this host is taken, so it was a good one")
+
+
+def test_twenty_participants_all_match_and_all_hear(room, lan):
+    room.daemon(HANDS)
+    import rclpy
+    from rclpy.executors import SingleThreadedExecutor
+
+    contexts, heard, spinners, run = [], [], [], [True]
+    for number in range(20):
+        context = rclpy.Context()
+        rclpy.init(context=context, domain_id=room.domain)
+        node = rclpy.create_node(f"reader_{number}", context=context)
+        mine = []
+        node.create_subscription(State, "/sweepd/state", mine.append, 10)
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        contexts.append((context, node, executor))
+        heard.append(mine)
+
+    def spin():
+        while run[0]:
+            for _, _, executor in contexts:
+                executor.spin_once(timeout_sec=0)
+            time.sleep(0.005)
+
+    spinners = threading.Thread(target=spin)
+    start = time.monotonic()
+    spinners.start()
+    try:
+        while not all(heard) and time.monotonic() - start < 20:
+            time.sleep(0.05)
+        print(f"{sum(map(bool, heard))} of 20 after {time.monotonic() - start:.1f} s")
+        assert all(heard)
+    finally:
+        run[0] = False
+        spinners.join()
+        for context, node, executor in contexts:
+            executor.shutdown()
+            node.destroy_node()
+            rclpy.shutdown(context=context)

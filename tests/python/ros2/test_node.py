@@ -1,0 +1,153 @@
+"""The node as ROS 2 users know nodes: its name, its graph, its QoS, remaps, exit."""
+
+import os
+import signal
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from frames import Sender
+from rclpy.duration import Duration
+from rclpy.qos import QoSDurabilityPolicy, QoSReliabilityPolicy
+from scenes import HANDS
+from sweepd_msgs.msg import Pairs, State, Tick
+
+OUT = {"state": "State", "tick": "Tick", "pairs": "Pairs", "contacts": "Contacts", "names": "Names"}
+
+
+def node_names(node):
+    return {(namespace.rstrip("/") + "/" + name) for name, namespace in node.get_node_names_and_namespaces()}
+
+
+def test_the_graph_shows_the_node_its_topics_and_types(room):
+    room.daemon(HANDS)
+    node = room.node()
+    room.until(lambda: "/sweepd" in node_names(node), "the node in the graph")
+
+    def published():
+        return dict(node.get_publisher_names_and_types_by_node("sweepd", "/"))
+
+    def wanted():
+        there = published()
+        return all(there.get(f"/sweepd/{topic}") == [f"sweepd_msgs/msg/{kind}"] for topic, kind in OUT.items())
+
+    room.until(wanted, f"its topics: {published()}")
+    assert published().get("/rosout") == ["rcl_interfaces/msg/Log"]
+    assert published().get("/parameter_events") == ["rcl_interfaces/msg/ParameterEvent"]
+    assert published().get("/diagnostics") == ["diagnostic_msgs/msg/DiagnosticArray"]
+    taken = dict(node.get_subscriber_names_and_types_by_node("sweepd", "/"))
+    assert taken.get("/sweepd/transforms") == ["sweepd_msgs/msg/BodyTransforms"]
+
+
+def test_the_qos_offered_is_what_readers_need(room):
+    room.daemon(HANDS)
+    node = room.node()
+    for topic, kind in OUT.items():
+        # the node's name comes up to a second after its endpoints
+        offers = room.until(lambda: [o for o in node.get_publishers_info_by_topic(f"/sweepd/{topic}") if o.node_name == "sweepd"], topic)
+        (offer,) = offers
+        assert offer.topic_type == f"sweepd_msgs/msg/{kind}"
+        qos = offer.qos_profile
+        assert qos.reliability == QoSReliabilityPolicy.RELIABLE, topic
+        latched = QoSDurabilityPolicy.TRANSIENT_LOCAL if topic == "names" else QoSDurabilityPolicy.VOLATILE
+        assert qos.durability == latched, topic
+        if topic in ("state", "tick"):
+            # a DDS time is a whole number of 2^-32 s
+            assert abs(qos.deadline.nanoseconds - 200_000_000) <= 1, "two heartbeats"
+            assert qos.liveliness_lease_duration == Duration(seconds=3)
+    sub = room.until(lambda: node.get_subscriptions_info_by_topic("/sweepd/transforms"), "transforms")[0]
+    assert sub.qos_profile.reliability == QoSReliabilityPolicy.BEST_EFFORT, "matches both kinds of sender"
+
+
+def test_name_namespace_and_topics_are_remapped(room):
+    room.daemon(HANDS, ros_args=["-r", "__node:=watch", "-r", "__ns:=/cell", "-r", "~/pairs:=/touching"])
+    node = room.node()
+    room.until(lambda: "/cell/watch" in node_names(node), "the remapped node")
+    pairs = room.hear(Pairs, "/touching")
+    ticks = room.hear(Tick, "/cell/watch/tick")
+    sender = Sender(node, topic="/cell/watch/transforms")
+    room.until(lambda: pairs and ticks and ticks[-1].colliding == 1, "a pair",
+               then=lambda: sender.send({"left": (0, 0, 0), "right": (0.5, 0, 0)}))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--enclave", "/x"], ["--enclave"]),
+        (["-r", "~/pairs:=~/contacts"], ["~/pairs", "~/contacts"]),
+        (["-r", "tick"], ["tick"]),
+    ],
+)
+def test_what_cannot_be_honoured_is_refused_at_the_start(room, arguments, words):
+    daemon = room.daemon(HANDS, ros_args=arguments)
+    assert daemon.process.wait(timeout=15) in (2, 4)
+    assert all(word in daemon.log for word in words), daemon.log
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("RMW_IMPLEMENTATION", "rmw_zenoh_cpp"), ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"), ("ROS_DOMAIN_ID", "many")]
+)  # fmt: skip
+def test_an_environment_that_cannot_be_honoured_is_refused_by_name(room, name, value):
+    daemon = room.daemon(HANDS, env={name: value})
+    assert daemon.process.wait(timeout=15) in (2, 4)
+    assert name in daemon.log and value in daemon.log
+
+
+def test_loopback_is_said_at_the_start_with_the_variable_that_opens_it(room):
+    daemon = room.daemon(HANDS)
+    room.node()
+    room.until(lambda: "ROS_AUTOMATIC_DISCOVERY_RANGE" in daemon.log, "the hint")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_at_exit_the_name_leaves_the_graph_at_once_and_nothing_is_left(room, number):
+    daemon = room.daemon(HANDS)
+    node = room.node()
+    ticks = room.hear(Tick, "/sweepd/tick")
+    room.until(lambda: ticks and "/sweepd" in node_names(node), "the node at work")
+    done = {}
+    waiter = threading.Thread(target=lambda: done.update(zip(("code", "seconds"), daemon.stop(number))))
+    start = time.monotonic()
+    waiter.start()
+    room.until(lambda: "/sweepd" not in node_names(node), "the name gone", seconds=4)
+    gone = time.monotonic() - start
+    waiter.join()
+    print(f"exit: code {done['code']} after {done['seconds']:.2f} s, the name gone after {gone:.2f} s")
+    assert done["code"] == 0 and done["seconds"] < 2 and gone < 3
+    assert [path for path in Path("/dev/shm").glob(f"*{room.instance}*")] == []
+
+
+def test_without_the_flag_there_is_no_socket_and_no_thread_of_dds(room):
+    with_node = room.daemon(HANDS)
+    room.node()
+    ticks = room.hear(Tick, "/sweepd/tick")
+    room.until(lambda: ticks, "a node at work")
+
+    def counts(pid):
+        tasks = len(os.listdir(f"/proc/{pid}/task"))
+        links = [os.readlink(f"/proc/{pid}/fd/{fd}") for fd in os.listdir(f"/proc/{pid}/fd")]
+        return tasks, sum(link.startswith("socket:") for link in links)
+
+    plain = room.plain_daemon(HANDS)
+    room.until(lambda: "runs" in plain.log, "the plain daemon")
+    plain_threads, plain_sockets = counts(plain.pid)
+    threads, sockets = counts(with_node.pid)
+    assert sockets >= 5 and threads >= plain_threads + 3
+    # iceoryx2's events are Unix sockets or files; none is of the internet
+    inet = {line.split()[9] for kind in ("udp", "tcp") for line in Path(f"/proc/{plain.pid}/net/{kind}").read_text().splitlines()[1:]}
+    links = [os.readlink(f"/proc/{plain.pid}/fd/{fd}") for fd in os.listdir(f"/proc/{plain.pid}/fd")]
+    assert not [link for link in links if link.startswith("socket:") and link[8:-1] in inet]
+
+
+def test_two_nodes_of_one_name_are_told_to_the_user(room):
+    room.daemon(HANDS)
+    node = room.node()
+    ticks = room.hear(Tick, "/sweepd/tick")
+    room.until(lambda: ticks, "the first node")
+    second = room.daemon(HANDS, instance=room.instance + "_b")
+    room.until(lambda: len({tick.tick_header.boot_id for tick in ticks[-50:]}) == 2, "both publish")
+    logs = room.until(lambda: [d.log for d in (room.daemons[0], second) if "/sweepd" in d.log and "name" in d.log], "a word on it")
+    assert logs and node
+    states = room.hear(State, "/sweepd/state")
+    room.until(lambda: len({state.tick_header.boot_id for state in states}) == 2, "told apart by boot id")
