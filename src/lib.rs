@@ -9,6 +9,7 @@ pub mod error;
 pub mod ids;
 pub mod limits;
 pub mod math;
+pub mod simd;
 pub mod time;
 // walls
 pub mod config;

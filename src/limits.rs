@@ -9,7 +9,7 @@ pub const SOURCES_MAX: usize = 16;
 pub const BODIES_MAX: usize = 1 << 20;
 /// Shapes in one body; contact rows name them by place.
 pub const SHAPES_PER_BODY_MAX: usize = 1 << 16;
-/// Triangles of one mesh. 10 million take about a gigabyte with their tree; refused, never loaded in part.
+/// Triangles of one mesh. 10 million take about two gigabytes with their trees; refused, never loaded in part.
 pub const TRIANGLES_MAX: usize = 8_000_000;
 /// Vertices of a convex hull after building; support functions walk all of them.
 pub const HULL_VERTICES_MAX: usize = 4096;

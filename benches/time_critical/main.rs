@@ -26,7 +26,7 @@ use std::sync::Arc;
 use common::{provenance, quantile, save};
 use restart::Restart;
 use stage::{PAIRS, Stage, shapes};
-use sweepd::narrow::mesh::Walk;
+use sweepd::narrow::mesh::{Search, Walk};
 use sweepd::narrow::{Order, Wanted};
 use sweepd::shape::Shape;
 use sweepd::time::{Clock, Meter, SystemClock};
@@ -45,24 +45,33 @@ const WANTED: Wanted = Wanted {
 
 /// What is measured: the engine's narrow phase, or a baseline.
 enum Subject {
-    Engine,
+    Engine(Search),
     Restart(Box<Restart>),
 }
 
-const SUBJECTS: [&str; 3] = ["engine", "restart", "restart_witness"];
+/// The engine's searches; and walks over the boxes in the bodies' frames, with and without last tick's witness.
+const SUBJECTS: [&str; 6] = [
+    "carried",
+    "restart",
+    "breadth_first",
+    "priority",
+    "walk",
+    "walk_witness",
+];
 
 impl Subject {
     fn new(name: &str) -> Self {
         match name {
-            "restart" => Self::Restart(Box::new(Restart::new(false))),
-            "restart_witness" => Self::Restart(Box::new(Restart::new(true))),
-            _ => Self::Engine,
+            "walk" => Self::Restart(Box::new(Restart::new(false))),
+            "walk_witness" => Self::Restart(Box::new(Restart::new(true))),
+            _ => Self::Engine(*Search::ALL.iter().find(|s| s.name() == name).unwrap()),
         }
     }
 
     fn spend(&mut self, stage: &mut Stage, meter: &mut Meter<'_>) {
         match self {
-            Self::Engine => {
+            Self::Engine(search) => {
+                stage.narrow.set_search(*search);
                 stage.narrow.spend(&stage.world, WANTED, meter);
             }
             Self::Restart(restart) => restart.spend(stage, meter),
@@ -72,7 +81,7 @@ impl Subject {
     /// Verdict of every pair at this tick's poses; `None`: unresolved.
     fn verdicts(&self, stage: &Stage) -> Vec<Option<bool>> {
         match self {
-            Self::Engine => {
+            Self::Engine(_) => {
                 let mut all = vec![None; PAIRS];
                 for (slot, _) in stage.pairs.iter() {
                     let verdict = stage.narrow.finding(slot).unwrap().verdict;

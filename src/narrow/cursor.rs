@@ -13,11 +13,11 @@ use super::exact::Warm;
 use super::memo::Witness;
 use super::mesh::{Goal, Walk};
 use super::query::{
-    add_manifold, is_simple, shape_gap, shape_pose, sound, sphere_bound, witness_of,
+    add_manifold, is_simple, leaf_contact, shape_gap, shape_pose, sound, sphere_bound, witness_of,
 };
 
 /// Units of one turn of a walk over meshes before the next pair has its turn: at 32 the clock costs 2.5 %.
-const SLICE_UNITS: u64 = 32;
+pub(super) const SLICE_UNITS: u64 = 32;
 
 /// A resumable query.
 #[derive(Debug)]
@@ -199,22 +199,9 @@ impl Cursor {
             });
         }
         if self.goal == Goal::Contacts && gap.min <= 0.0 {
-            for leaf in self.walk.contacts() {
-                let seen = witness_of(one, other, pos12, &leaf.closest, places);
-                self.found.push(Contact {
-                    id: 0,
-                    shape_a: places.0,
-                    shape_b: places.1,
-                    triangle_a: leaf.triangle_a,
-                    triangle_b: leaf.triangle_b,
-                    feature: 0,
-                    point_a: seen.point_a,
-                    point_b: seen.point_b,
-                    normal: seen.normal,
-                    gap_m: leaf.closest.best_m,
-                    gap,
-                });
-            }
+            let contacts = self.walk.contacts().iter();
+            let seen = contacts.map(|leaf| leaf_contact((one, other), places, pos12, leaf, gap));
+            self.found.extend(seen);
         }
         self.gap = self.gap.least(gap);
     }

@@ -66,6 +66,7 @@ pub(super) struct Memo {
     pub(super) contacts_tick: u64,
     pub(super) active_at: u32,
     pub(super) cursor: u32,
+    pub(super) front: u32,
     pub(super) contacts: u32,
 }
 
@@ -140,6 +141,7 @@ impl Memo {
             contacts_tick: 0,
             active_at: NONE,
             cursor: NONE,
+            front: NONE,
             contacts: NONE,
         }
     }
@@ -323,6 +325,7 @@ impl Narrow {
         memo.queued = false;
         memo.refreshing = false;
         self.cursors.give(&mut memo.cursor);
+        self.fronts.give(&mut memo.front);
         self.contact_sets.give(&mut memo.contacts);
     }
 
@@ -382,7 +385,6 @@ impl Hot {
 
 impl Witness {
     /// A witness without triangles.
-    #[must_use]
     pub(super) fn of_shapes(shape_a: u32, shape_b: u32) -> Self {
         Self {
             best_m: f64::NAN,

@@ -3,8 +3,12 @@
 //! In: two shapes of which at least one is a mesh, and the pose of B seen from A. Out: a sound interval of their gap
 //! from the first moment on, narrowed by every unit of work, a witness and contacts.
 //!
-//! Every pair of triangles is covered by exactly one entry at any time: on the stack (boxes that may touch), in the
-//! heap (boxes proved apart by so much), or settled (queried, or proved farther than the best distance known).
+//! Two ways:
+//! - [`CarriedFront`] for a pair of single shapes: what was proved at one pose is carried to the next (see `carried`);
+//! - [`Walk`], a query at one pose that can stop: for bodies of several shapes, half-spaces, and queries without an engine.
+//!
+//! Of a walk every pair of triangles is covered by exactly one entry at any time: on the stack (boxes that may touch), in
+//! the heap (boxes proved apart by so much), or settled (queried, or proved farther than the best distance known).
 //! So the least of all entries is a sound lower bound at any interruption. Three stages:
 //! 1. `Surfaces`: the stack, depth first and nearest child first, until two leaves touch or none is left.
 //! 2. `Inside`: where surfaces are apart and a solid takes part, one point of every connected surface is tested
@@ -18,15 +22,18 @@
 use super::exact::Closest;
 
 mod bound;
+mod carried;
 mod contacts;
 mod containment;
 mod front;
 mod half_space;
+mod placed;
 mod retest;
 mod side;
 mod triangle;
 mod walk;
 
+pub use carried::{CarriedFront, Search, has_front};
 pub use contacts::{LEAF_CONTACTS_MAX, LeafContact};
 pub use retest::retest_witness;
 pub use walk::{Goal, Walk};

@@ -17,6 +17,7 @@
 pub mod exact;
 pub mod mesh;
 
+mod carry;
 mod contacts;
 mod cursor;
 mod memo;
@@ -37,6 +38,7 @@ use crate::world::World;
 
 use cursor::Cursor;
 use memo::{Hot, Memo};
+use mesh::{CarriedFront, Search};
 use order::Urgency;
 
 /// What the narrow phase did in this tick.
@@ -75,6 +77,9 @@ pub struct Narrow {
     /// Active pairs whose bounds or contacts are older than their poses.
     refresh: Vec<PairSlot>,
     cursors: Pool<Cursor>,
+    /// What is carried of pairs of single shapes of which one is a mesh.
+    fronts: Pool<CarriedFront>,
+    search: Search,
     contact_sets: Pool<ContactSet>,
     /// What the order of work asks of each pair, by `PairSlot`.
     urgencies: Vec<Urgency>,
@@ -134,6 +139,11 @@ impl Narrow {
             }
         }
         narrow
+    }
+
+    /// How the fronts of mesh pairs go about their work from now on; [`Search::Carried`] unless said otherwise.
+    pub fn set_search(&mut self, search: Search) {
+        self.search = search;
     }
 
     /// Lets the memories follow the pair set: ended pairs are forgotten, begun ones start from their boxes.

@@ -10,7 +10,7 @@ use super::exact::{
     Closest, Manifold, Warm, convex_gap, gap_to_half_space, half_space_gap, manifold,
 };
 use super::memo::Witness;
-use super::mesh::retest_witness;
+use super::mesh::{LeafContact, retest_witness};
 
 /// Whether the pair of shapes is answered by one exact query.
 pub(super) fn is_simple(a: &Shape, b: &Shape) -> bool {
@@ -98,6 +98,30 @@ pub(super) fn add_manifold(
     }
     for p in points.points() {
         found.push(contact(p.point_a, p.point_b, p.gap_m, p.feature));
+    }
+}
+
+/// Two leaves of meshes that touch, as a contact of the bodies.
+pub(super) fn leaf_contact(
+    (one, other): (&PlacedShape, &PlacedShape),
+    places: (u32, u32),
+    pos12: &Pose,
+    leaf: &LeafContact,
+    gap: Interval,
+) -> Contact {
+    let seen = witness_of(one, other, pos12, &leaf.closest, places);
+    Contact {
+        id: 0,
+        shape_a: places.0,
+        shape_b: places.1,
+        triangle_a: leaf.triangle_a,
+        triangle_b: leaf.triangle_b,
+        feature: 0,
+        point_a: seen.point_a,
+        point_b: seen.point_b,
+        normal: seen.normal,
+        gap_m: leaf.closest.best_m,
+        gap,
     }
 }
 

@@ -9,7 +9,7 @@ use crate::world::{Body, World};
 use super::contacts::ContactSet;
 use super::cursor::{Cursor, Turn};
 use super::memo::{Witness, relative_motion};
-use super::mesh::Goal;
+use super::mesh::{Goal, has_front};
 use super::order::Order;
 use super::query::{add_manifold, is_simple, retest, shape_gap, shape_pose, sound, witness_of};
 use super::{NONE, Narrow, Wanted};
@@ -152,6 +152,10 @@ impl Narrow {
         {
             self.query_once(slot, (a, b), goal);
             meter.charge_dear(1);
+        } else if let ([one], [other]) = (&*a.shapes, &*b.shapes)
+            && has_front(&one.shape, &other.shape)
+        {
+            open = self.turn_front(slot, (a, b), goal, meter);
         } else if goal == Goal::Verdict && self.witness_due(slot) {
             self.retest_witness(slot, (a, b));
             meter.charge_dear(1);
@@ -276,7 +280,7 @@ impl Narrow {
     }
 
     /// Whether last tick's contact is worth a look before anything else.
-    fn witness_due(&self, slot: PairSlot) -> bool {
+    pub(super) fn witness_due(&self, slot: PairSlot) -> bool {
         let memo = &self.memos[slot.index()];
         memo.witness.is_some_and(|w| w.best_m <= 0.0) && memo.retested != self.tick && !memo.rest
     }
@@ -331,7 +335,7 @@ impl Narrow {
     }
 
     /// Hands `found` to the pair's contact set; ids go on where the contact does.
-    fn keep_contacts(&mut self, slot: PairSlot, radius: f64) {
+    pub(super) fn keep_contacts(&mut self, slot: PairSlot, radius: f64) {
         let most = self.contacts_per_pair;
         let memo = &mut self.memos[slot.index()];
         if memo.contacts == NONE {

@@ -16,6 +16,7 @@
 mod oracle;
 
 mod extremes;
+mod fronts;
 mod half_space;
 mod laws;
 mod support;

@@ -11,7 +11,8 @@
 
 use nalgebra::Matrix3;
 
-use crate::math::{Point, Pose, ROUND, Vec3};
+use super::placed::Placed;
+use crate::math::{Point, Pose, Vec3};
 use crate::shape::Node;
 
 /// One edge axis: unit direction in A's frame, and what a box of A and one of B extend along it.
@@ -25,26 +26,19 @@ struct Axis {
 /// What is the same for all boxes of a pair: the relative pose, and how much rounding stands behind each number.
 #[derive(Clone, Debug)]
 pub(super) struct Frame {
-    pos12: Pose,
-    /// Rotation of B's frame seen from A.
-    rotation: Matrix3<f64>,
+    pub(super) placed: Placed,
     rotation_abs: Matrix3<f64>,
-    translation: Vec3,
     /// From the origin of A's tree to that of B's, A's frame.
     between: Vec3,
     edges: [Axis; 9],
     edge_count: usize,
-    /// Bound on the rounding of any distance computed between the two, metres.
-    pub(super) slop: f64,
 }
 
 impl Default for Frame {
     fn default() -> Self {
         Self {
-            pos12: Pose::identity(),
-            rotation: Matrix3::identity(),
+            placed: Placed::default(),
             rotation_abs: Matrix3::identity(),
-            translation: Vec3::zeros(),
             between: Vec3::zeros(),
             edges: [Axis {
                 direction: Vec3::zeros(),
@@ -52,7 +46,6 @@ impl Default for Frame {
                 of_b: Vec3::zeros(),
             }; 9],
             edge_count: 0,
-            slop: 0.0,
         }
     }
 }
@@ -65,16 +58,13 @@ impl Frame {
         (origin_a, reach_a): (Point, f64),
         (origin_b, reach_b): (Point, f64),
     ) -> Self {
-        let rotation = *pos12.rotation.to_rotation_matrix().matrix();
-        let translation = pos12.translation.vector;
+        let placed = Placed::new(pos12, reach_a, reach_b);
+        let rotation = placed.rotation;
         let mut frame = Self {
-            pos12: *pos12,
-            rotation,
             rotation_abs: rotation.abs(),
-            translation,
-            between: rotation * origin_b.coords + translation - origin_a.coords,
+            between: placed.to_a(&origin_b) - origin_a,
+            placed,
             edge_count: 0,
-            slop: 32.0 * ROUND * (translation.norm() + reach_a + reach_b),
             ..Self::default()
         };
         for i in 0..3 {
@@ -97,32 +87,12 @@ impl Frame {
         frame
     }
 
-    /// Pose of B seen from A.
-    pub(super) fn pos12(&self) -> &Pose {
-        &self.pos12
-    }
-
-    /// A point of B's frame in A's.
-    pub(super) fn to_a(&self, point: &Point) -> Point {
-        Point::from(self.rotation * point.coords + self.translation)
-    }
-
-    /// A point of A's frame in B's.
-    pub(super) fn to_b(&self, point: &Point) -> Point {
-        Point::from(self.rotation.transpose() * (point.coords - self.translation))
-    }
-
-    /// A direction of A's frame in B's.
-    pub(super) fn turn_to_b(&self, direction: &Vec3) -> Vec3 {
-        self.rotation.transpose() * direction
-    }
-
     /// Unit axes worth a look for the two as wholes, A's frame: those of A, those of B, and the line between them.
     pub(super) fn axes(&self) -> impl Iterator<Item = Vec3> {
-        let rotation = self.rotation;
+        let rotation = self.placed.rotation;
         let of_a = (0..3).map(|k| Vec3::ith(k, 1.0));
         let of_b = (0..3).map(move |k| rotation.column(k).into_owned());
-        let line = self.between.try_normalize(self.slop);
+        let line = self.between.try_normalize(self.placed.slop);
         of_a.chain(of_b).chain(line)
     }
 
@@ -135,12 +105,12 @@ impl Frame {
     /// overlap: minus the least overlap along the axes tried.
     pub(super) fn low(&self, a: &Node, b: &Node) -> f64 {
         let (half_a, half_b) = (a.half(), b.half());
-        let middle = self.between + self.rotation * b.centre() - a.centre();
+        let rotation = &self.placed.rotation;
+        let middle = self.between + rotation * b.centre() - a.centre();
 
         // Along A's axes the boxes' distance is that of two aligned boxes; the same along B's.
         let along_a = middle.abs() - half_a - self.rotation_abs * half_b;
-        let along_b =
-            self.rotation.tr_mul(&middle).abs() - half_b - self.rotation_abs.tr_mul(&half_a);
+        let along_b = rotation.tr_mul(&middle).abs() - half_b - self.rotation_abs.tr_mul(&half_a);
         let mut best = along_a.max().max(along_b.max());
         if best > 0.0 {
             let positive = |v: &Vec3| v.map(|x| x.max(0.0)).norm_squared();
@@ -153,6 +123,6 @@ impl Frame {
                 best = best.max(apart);
             }
         }
-        best - self.slop
+        best - self.placed.slop
     }
 }

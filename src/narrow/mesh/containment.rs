@@ -4,7 +4,7 @@
 //! in both shapes, a way out of it would meet the surface of the one within the other, and a connected surface that
 //! crosses nothing is inside as a whole or not at all.
 
-use super::bound::Frame;
+use super::placed::Placed;
 use super::side::Side;
 use crate::shape::Inside;
 
@@ -48,7 +48,7 @@ impl ShellTests {
     }
 
     /// Tests one node, or moves on to the next test.
-    pub(super) fn step(&mut self, a: Side<'_>, b: Side<'_>, frame: &Frame) {
+    pub(super) fn step(&mut self, a: Side<'_>, b: Side<'_>, at: &Placed) {
         let (of, within) = match self.way {
             0 => (a, b),
             1 => (b, a),
@@ -66,11 +66,18 @@ impl ShellTests {
                 (self.way, self.place) = (self.way + 1, 0);
                 return;
             }
-            let point = of.shell_point(self.place);
-            self.inside.start(if self.way == 0 {
-                frame.to_b(&point)
+            let a_in_b = self.way == 0;
+            // Any point of the surface will do; the one that faces away is mostly out of the other's box.
+            let ahead = if a_in_b {
+                at.pos12.translation.vector
             } else {
-                frame.to_a(&point)
+                at.turn_to_b(&-at.pos12.translation.vector)
+            };
+            let point = of.shell_point(self.place, &-ahead);
+            self.inside.start(if a_in_b {
+                at.to_b(&point)
+            } else {
+                at.to_a(&point)
             });
             self.testing = true;
         }

@@ -1,6 +1,6 @@
 //! Last tick's contact first: one leaf pair, queried again at a new pose.
 
-use super::bound::Frame;
+use super::placed::Placed;
 use super::side::{Side, leaf};
 use crate::math::{Point, Pose};
 use crate::narrow::exact::Closest;
@@ -42,11 +42,10 @@ pub fn retest_witness(
     if !there(side_a, triangle_a) || !there(side_b, triangle_b) {
         return None;
     }
-    let (origin_a, origin_b) = (tree_of(a, side_a).1, tree_of(b, side_b).1);
-    let frame = Frame::new(pos12, (origin_a, reach_of(a)), (origin_b, reach_of(b)));
-    if !frame.slop.is_finite() {
+    let at = Placed::new(pos12, reach_of(a), reach_of(b));
+    if !at.slop.is_finite() {
         return None;
     }
     let (leaf_a, leaf_b) = ((side_a, triangle_a), (side_b, triangle_b));
-    leaf(leaf_a, leaf_b, &frame, f64::INFINITY)
+    leaf(leaf_a, leaf_b, &at, f64::INFINITY)
 }

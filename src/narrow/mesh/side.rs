@@ -2,10 +2,11 @@
 
 use super::Closest;
 use super::bound::Frame;
+use super::placed::Placed;
 use super::triangle;
 use crate::math::{Point, Vec3};
 use crate::narrow::exact::{Warm, convex_gap};
-use crate::shape::{Convex, Geometry, Mesh, Node, Shape};
+use crate::shape::{Convex, Geometry, Mesh, Node, Obb, Shape};
 
 /// A mesh, or a convex shape as a tree of one leaf.
 #[derive(Clone, Copy)]
@@ -35,6 +36,14 @@ impl<'a> Side<'a> {
         }
     }
 
+    /// The box of a convex shape, which is its own only leaf.
+    pub(super) fn whole(self, shape: &Shape) -> Option<Obb> {
+        match self {
+            Self::Mesh(_) => None,
+            Self::Convex(_) => Some(Obb::around(&shape.aabb)),
+        }
+    }
+
     /// The solid mesh that it is; the inside of a convex shape is in its leaf query, a surface has none.
     pub(super) fn solid(self) -> Option<&'a Mesh> {
         match self {
@@ -61,11 +70,12 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// A point of its `place`th connected surface, own frame.
-    pub(super) fn shell_point(self, place: usize) -> Point {
+    /// A point of its `place`th connected surface, own frame; far along `direction` where there is but one surface.
+    pub(super) fn shell_point(self, place: usize, direction: &Vec3) -> Point {
         match self {
+            Self::Mesh(mesh) if mesh.shells().len() == 1 => mesh.outlying(direction),
             Self::Mesh(mesh) => mesh.vertices()[mesh.shells()[place] as usize],
-            Self::Convex(convex) => convex.support(&Vec3::x()),
+            Self::Convex(convex) => convex.support(direction),
         }
     }
 
@@ -84,13 +94,13 @@ pub(super) fn low(a: (Side<'_>, &Point), b: (Side<'_>, &Point), frame: &Frame) -
     let mut best = f64::NEG_INFINITY;
     for axis in frame.axes() {
         let [up_a, down_a] = a.0.extent(&axis, a.1);
-        let [up_b, down_b] = b.0.extent(&frame.turn_to_b(&axis), b.1);
+        let [up_b, down_b] = b.0.extent(&frame.placed.turn_to_b(&axis), b.1);
         let between = axis.dot(&frame.between());
         best = best
             .max(between - up_a - down_b)
             .max(-between - down_a - up_b);
     }
-    best - frame.slop
+    best - frame.placed.slop
 }
 
 /// The gap of one triangle (or convex shape) of A and one of B, in A's frame; `None` when it is proved to exceed
@@ -98,20 +108,20 @@ pub(super) fn low(a: (Side<'_>, &Point), b: (Side<'_>, &Point), frame: &Frame) -
 pub(super) fn leaf(
     a: (Side<'_>, u32),
     b: (Side<'_>, u32),
-    frame: &Frame,
+    at: &Placed,
     beyond: f64,
 ) -> Option<Closest> {
     match (a.0, b.0) {
         (Side::Mesh(mesh_a), Side::Mesh(mesh_b)) => {
-            let in_a = mesh_b.triangle(b.1).map(|p| frame.to_a(&p));
-            triangle::gap(&mesh_a.triangle(a.1), &in_a, frame.slop, beyond)
+            let in_a = mesh_b.triangle(b.1).map(|p| at.to_a(&p));
+            triangle::gap(&mesh_a.triangle(a.1), &in_a, at.slop, beyond)
         }
         (Side::Mesh(mesh), Side::Convex(convex)) => {
             let triangle = Convex::triangle(mesh.triangle(a.1));
             Some(convex_gap(
                 &triangle,
                 convex,
-                frame.pos12(),
+                &at.pos12,
                 &mut Warm::default(),
             ))
         }
@@ -120,10 +130,19 @@ pub(super) fn leaf(
             Some(convex_gap(
                 convex,
                 &triangle,
-                frame.pos12(),
+                &at.pos12,
                 &mut Warm::default(),
             ))
         }
         (Side::Convex(_), Side::Convex(_)) => None,
     }
+}
+
+/// A proof that two leaves are apart, by so many metres at least; `None` where the cheap axes do not tell.
+pub(super) fn parted(a: (Side<'_>, u32), b: (Side<'_>, u32), at: &Placed) -> Option<f64> {
+    let (Side::Mesh(mesh_a), Side::Mesh(mesh_b)) = (a.0, b.0) else {
+        return None;
+    };
+    let in_a = mesh_b.triangle(b.1).map(|p| at.to_a(&p));
+    triangle::parted(&mesh_a.triangle(a.1), &in_a, at.slop)
 }

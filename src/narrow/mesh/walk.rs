@@ -9,7 +9,6 @@ use super::half_space::HalfSpaceWalk;
 use super::retest::{reach_of, tree_of};
 use super::side::{self, Side};
 use crate::math::{Interval, Pose};
-use crate::narrow::exact::Closest;
 use crate::shape::{Below, Geometry, Mesh, Node, Shape};
 use crate::time::Meter;
 
@@ -150,7 +149,7 @@ impl Walk {
     #[must_use]
     pub fn witness(&self) -> Option<Witness> {
         match (self.witness, self.shells.state()) {
-            (Some(witness), Containment::Inside) => Some(self.way_out(&witness)),
+            (Some(witness), Containment::Inside) => Some(witness.way_out(self.interval())),
             (witness, _) => witness,
         }
     }
@@ -168,25 +167,10 @@ impl Walk {
         self.contacts.left_out
     }
 
-    /// Of surfaces that are apart though one shape is within the other: moving B towards A's nearest point leads out.
-    fn way_out(&self, witness: &Witness) -> Witness {
-        let found = witness.closest;
-        let closest = Closest {
-            gap: self.interval(),
-            best_m: (-found.best_m).clamp(self.interval().min, self.interval().max),
-            normal: -found.normal,
-            ..found
-        };
-        LeafContact {
-            closest,
-            ..*witness
-        }
-    }
-
     fn start_surfaces(&mut self, a: (&Shape, Side<'_>), b: (&Shape, Side<'_>), pos12: &Pose) {
         let ((root_a, origin_a), (root_b, origin_b)) = (tree_of(a.0, a.1), tree_of(b.0, b.1));
         self.frame = Frame::new(pos12, (origin_a, reach_of(a.0)), (origin_b, reach_of(b.0)));
-        if !self.frame.slop.is_finite() {
+        if !self.frame.placed.slop.is_finite() {
             return;
         }
         self.one = Some([root_a, root_b]);
@@ -199,7 +183,7 @@ impl Walk {
         };
         self.solids = a.1.solid().or(b.1.solid()).is_some();
         self.floor = if self.solids {
-            low.max(-ball(a.1, &root_a).max(ball(b.1, &root_b)) - self.frame.slop)
+            low.max(-ball(a.1, &root_a).max(ball(b.1, &root_b)) - self.frame.placed.slop)
         } else {
             low
         };
@@ -211,8 +195,9 @@ impl Walk {
         let point_a = a.1.outlying(&ahead);
         let point_b = self
             .frame
-            .to_a(&b.1.outlying(&-self.frame.turn_to_b(&ahead)));
-        self.high = (point_b - point_a).norm() + self.frame.slop;
+            .placed
+            .to_a(&b.1.outlying(&-self.frame.placed.turn_to_b(&ahead)));
+        self.high = (point_b - point_a).norm() + self.frame.placed.slop;
         self.put(Entry { low, a: 0, b: 0 });
         self.stage = Stage::Surfaces;
         self.settle_stage();
@@ -255,7 +240,7 @@ impl Walk {
                 }
             }
             (Stage::Inside, Some(a), Some(b)) => {
-                self.shells.step(a, b, &self.frame);
+                self.shells.step(a, b, &self.frame.placed);
                 meter.charge(1);
             }
             (_, Some(a), Some(b)) => {
@@ -342,7 +327,7 @@ impl Walk {
     }
 
     fn query(&mut self, low: f64, a: (Side<'_>, u32), b: (Side<'_>, u32)) {
-        let Some(closest) = side::leaf(a, b, &self.frame, self.high) else {
+        let Some(closest) = side::leaf(a, b, &self.frame.placed, self.high) else {
             return;
         };
         self.leaf_low = self.leaf_low.min(closest.gap.min.max(low));
@@ -369,7 +354,7 @@ impl Walk {
         }
         if closest.gap.min <= 0.0 {
             // Certified, or zero within its rounding: touching collides.
-            if closest.gap.max <= 8.0 * self.frame.slop || closest.finished {
+            if closest.gap.max <= 8.0 * self.frame.placed.slop || closest.finished {
                 self.touches = true;
                 self.contacts.add(contact);
             } else {

@@ -1,0 +1,96 @@
+//! Pairs of single shapes of which one is a mesh: work on their fronts, and what it says of the bodies.
+//!
+//! A front works at this tick's poses; what it had proved before is carried there. The pair's memory is an interval with
+//! its own certificate, so a pair that has not moved enough is not looked at, and its front is not touched.
+
+use crate::ids::PairSlot;
+use crate::math::{Interval, relative};
+use crate::time::Meter;
+use crate::world::Body;
+
+use super::cursor::SLICE_UNITS;
+use super::memo::Witness;
+use super::mesh::{CarriedFront, Goal};
+use super::query::{leaf_contact, shape_pose, sound, witness_of};
+use super::{NONE, Narrow};
+
+/// What asking the last contact again costs, in tests of a box against a pack: when the clock is to be read.
+const RETEST_COST: u64 = 2;
+
+impl Narrow {
+    /// One turn of a pair on its front; whether there is more to do for `goal`.
+    pub(super) fn turn_front(
+        &mut self,
+        slot: PairSlot,
+        (a, b): (&Body, &Body),
+        goal: Goal,
+        meter: &mut Meter<'_>,
+    ) -> bool {
+        let (one, other) = (&a.shapes[0], &b.shapes[0]);
+        let rel = relative(&a.pose, &b.pose);
+        let pos12 = shape_pose(one, other, &rel);
+        let due = goal == Goal::Verdict && self.witness_due(slot);
+        let memo = &mut self.memos[slot.index()];
+        let fresh = memo.front == NONE;
+        if fresh {
+            memo.front = self.fronts.take(CarriedFront::default);
+        }
+        let Some(front) = self.fronts.get_mut(memo.front) else {
+            return false;
+        };
+        let credit_m = a.motion.credit_m() + b.motion.credit_m();
+        let (one_shape, other_shape) = (&one.shape, &other.shape);
+        if fresh {
+            front.start(one_shape, other_shape, &pos12, self.search);
+        } else if due {
+            memo.retested = self.tick;
+            self.counters.queries += 1;
+            meter.charge_weighted(1, RETEST_COST);
+            if front.still_touches(one_shape, other_shape, &pos12) {
+                // A certified touch at these very poses; the lower end is what motion left of the old one.
+                memo.gap = Interval::new(memo.now.min.min(0.0), 0.0);
+                (memo.rel, memo.credit_m, memo.tested) = (rel, credit_m, self.tick);
+                (memo.finished, memo.tight) = (false, false);
+                return false;
+            }
+        }
+        front.move_to(one_shape, other_shape, &pos12);
+        self.counters.slices += 1;
+        let done = front.advance(one_shape, other_shape, goal, SLICE_UNITS, meter);
+        let found = sound(front.interval(), one, other, &rel);
+        let now = memo.now;
+        if !done && found.min <= now.min && found.max >= now.max {
+            return true;
+        }
+        // What was known before holds at these poses too.
+        memo.gap = found.meet(now);
+        (memo.rel, memo.credit_m, memo.tested) = (rel, credit_m, self.tick);
+        let whole = done && !(goal == Goal::Verdict && memo.gap.max <= 0.0);
+        memo.finished = whole && front.is_certain();
+        memo.tight = whole && goal != Goal::Verdict;
+        if let Some(leaf) = front.witness() {
+            memo.witness = Some(Witness {
+                triangle_a: leaf.triangle_a,
+                triangle_b: leaf.triangle_b,
+                ..witness_of(one, other, &pos12, &leaf.closest, (0, 0))
+            });
+        } else if memo.gap.min > 0.0 && memo.witness.is_some_and(|w| w.best_m <= 0.0) {
+            // Where it touched says nothing of a pair that is apart.
+            memo.witness = None;
+        }
+        if done && goal == Goal::Contacts {
+            let gap = memo.gap;
+            self.found.clear();
+            if gap.min <= 0.0 {
+                let seen = |leaf| leaf_contact((one, other), (0, 0), &pos12, leaf, gap);
+                self.found.extend(front.contacts().iter().map(seen));
+                // Of a shape within another: the way out.
+                let within = self.found.is_empty() && gap.max <= 0.0;
+                self.found
+                    .extend(front.witness().filter(|_| within).as_ref().map(seen));
+            }
+            self.keep_contacts(slot, a.radius.min(b.radius));
+        }
+        !done
+    }
+}

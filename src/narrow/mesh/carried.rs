@@ -1,0 +1,389 @@
+//! The certificate front of a mesh pair: what was proved of it stays proved while the two have moved less than it takes.
+//!
+//! In: two shapes of which at least one is a mesh and none is a half-space, and one pose after the other of B seen from
+//! A. Out: a sound interval of their gap at the pose it works at, a witness, contacts. Stops after any unit, and goes on
+//! at the same pose or at another.
+//!
+//! Every pair of leaves is covered by exactly one entry at any time ([`CarriedFront::covered`] counts them):
+//! - a [`Group`] of pairs of boxes proved apart by `g` when the pair's path was `M`: it holds while the path is less than
+//!   `g + M`, at no cost; the group that expires soonest is on top of a heap, so the heap is at once the front, the
+//!   best-first queue and the bound;
+//! - an open pair of boxes that may touch;
+//! - a group apart at this pose by less than can be carried to another, or a pair of leaves found touching: at the next
+//!   pose it is open again;
+//! - what was lumped together when there was no room: one expiry for all of it, and a new start when that is up.
+//!
+//! The path `S` runs over anchors (poses), and `d` is the displacement from the newest: what is apart by `g` now holds while
+//! `S + d < g + S - d` (DESIGN 4.6; here of the relative pose, so two that move together do not move). An anchor is taken
+//! where the pair goes on away from the last two, and where the bounds are to be exact; so a drift adds up its length, and
+//! a pair that trembles about its place adds nothing.
+//!
+//! Three orders for the three jobs: depth first, deepest overlap first, for a verdict; the heap, best first, for the
+//! bounds; depth first to the end for the contact set. [`Search`] names the others: they are the baselines they are.
+//!
+//! Refused: radii of nodes in place of the body's (the order of a heap would change with the motion); one entry for each
+//! pair of boxes (eight times the memory, and eight boxes are tested at the cost of one and a half).
+
+use super::bound::Frame;
+use super::contacts::{Contacts, LeafContact};
+use super::containment::{Containment, ShellTests};
+use super::placed::Placed;
+use super::retest::{reach_of, tree_of};
+use super::side::{self, Side};
+use super::walk::Goal;
+use crate::math::{Interval, Pose, ROUND};
+use crate::shape::{BoxId, Mesh, Obb, Shape};
+use crate::time::Meter;
+
+mod count;
+mod cover;
+mod drift;
+mod search;
+
+pub use cover::Search;
+use cover::{Group, Open, OpenList};
+use drift::Drift;
+use std::collections::BinaryHeap;
+
+/// Groups of one pair, 32 bytes each; beyond it what is proved apart is lumped together. A pair of 20,000-triangle meshes
+/// some 1 % apart has a few hundred.
+const GROUPS_MAX: usize = 1 << 18;
+/// A front that has split into so many times its fresh size, and [`STALE_MORE`], starts anew: entries only ever split.
+const STALE_TIMES: usize = 3;
+const STALE_MORE: usize = 128;
+/// Length of a path, in sizes of the two, after which expiries are measured anew.
+const PATH_MAX: f64 = 64.0;
+/// Beyond this share of the smaller body's radius between two poses, nothing much would be left of a front.
+const LEAP: f64 = 0.1;
+
+/// The front of one pair. Keeps its memory when it starts over.
+#[derive(Debug, Default)]
+pub struct CarriedFront {
+    search: Search,
+    at: Placed,
+    drift: Drift,
+    heap: BinaryHeap<Group>,
+    open: OpenList,
+    /// Apart at this pose by what stands for the expiry, and by no more than can be told at another.
+    passing: Vec<Group>,
+    /// Leaves found touching at this pose.
+    touching: Vec<(BoxId, BoxId)>,
+    /// When what was lumped together is no longer proved apart; infinite: nothing was.
+    lumped_expiry_m: f64,
+    /// Boxes of a side that is convex.
+    whole: [Option<Obb>; 2],
+    solids: bool,
+    /// Least depth that a solid pair can have, or an open pair of pieces, metres; sound whatever else is known.
+    floor_m: f64,
+    shells: ShellTests,
+    /// Until when the answer of the inside tests holds, as a path, metres.
+    shells_expiry_m: f64,
+    /// Entries when the surfaces were last found apart from a fresh start; 0: not yet.
+    fresh_len: usize,
+    /// Known at this pose.
+    known: Known,
+    /// The leaves that were nearest or touched last.
+    last: Option<(BoxId, BoxId)>,
+    witness: Option<LeafContact>,
+    contacts: Contacts,
+}
+
+/// What is known at the pose worked at.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    /// Least lower end of the leaves queried, and least upper end, metres.
+    leaf_low: f64,
+    high: f64,
+    touches: bool,
+    /// A leaf query near zero could not be finished.
+    blurred: bool,
+    /// The last leaves have been asked at this pose.
+    asked_last: bool,
+    /// Bounds of the wholes at this pose, when they were asked for.
+    floor_m: f64,
+}
+
+impl Default for Known {
+    fn default() -> Self {
+        Self {
+            leaf_low: f64::INFINITY,
+            high: f64::INFINITY,
+            touches: false,
+            blurred: false,
+            asked_last: false,
+            floor_m: f64::NEG_INFINITY,
+        }
+    }
+}
+
+/// Whether a pair of shapes can have a front.
+#[must_use]
+pub fn has_front(a: &Shape, b: &Shape) -> bool {
+    matches!(
+        (Side::of(a), Side::of(b)),
+        (Some(Side::Mesh(_)), Some(_)) | (Some(_), Some(Side::Mesh(_)))
+    )
+}
+
+impl CarriedFront {
+    /// Forgets everything and starts at a pose.
+    ///
+    /// * `pos12` - pose of `b` seen from `a`, finite, unit quaternion; [`has_front`] holds for the two.
+    pub fn start(&mut self, a: &Shape, b: &Shape, pos12: &Pose, search: Search) {
+        self.search = search;
+        self.at = Placed::new(pos12, reach_of(a), reach_of(b));
+        self.last = None;
+        self.start_over(a, b);
+    }
+
+    /// Takes the pair to another pose; what was proved is carried over as far as it holds.
+    pub fn move_to(&mut self, a: &Shape, b: &Shape, pos12: &Pose) {
+        if self.at.pos12 == *pos12 {
+            return;
+        }
+        self.at = Placed::new(pos12, reach_of(a), reach_of(b));
+        self.drift.follow(a, b, pos12);
+        let stale = self.fresh_len > 0 && self.len() > STALE_TIMES * self.fresh_len + STALE_MORE;
+        // Few digits would be left of expiries after a long way.
+        let far = self.drift.path_m > PATH_MAX * (a.radius + b.radius);
+        let lost =
+            self.lumped_expiry_m < f64::INFINITY && self.drift.left_m(self.lumped_expiry_m) <= 0.0;
+        let leap = self.drift.last_m > LEAP * a.radius.min(b.radius);
+        if stale || far || lost || leap || self.search != Search::Carried {
+            self.start_over(a, b);
+            return;
+        }
+        self.known = Known::default();
+        self.witness = None;
+        self.contacts.clear();
+        while let Some((a, b)) = self.touching.pop() {
+            self.open.push(Open { low: 0.0, a, b });
+        }
+        self.heap.extend(self.passing.drain(..).map(Group::expired));
+        if self.drift.left_m(self.shells_expiry_m) <= 0.0 {
+            self.shells.start(self.solids);
+        }
+    }
+
+    /// Takes an anchor at this pose: from here on what is found holds at it to the last digit.
+    fn anchor_here(&mut self) {
+        if self.drift.anchor_here(&self.at.pos12) {
+            for at in (0..self.passing.len()).rev() {
+                let group = self.passing.swap_remove(at);
+                self.keep(group, group.expiry_m);
+            }
+        }
+    }
+
+    /// Whether the leaves that touched last are certain to touch at a pose; nothing else is looked at or changed.
+    #[must_use]
+    pub fn still_touches(&self, a: &Shape, b: &Shape, pos12: &Pose) -> bool {
+        let Some((leaf_a, leaf_b)) = self.last else {
+            return false;
+        };
+        let (Some(Side::Mesh(mesh_a)), Some(Side::Mesh(mesh_b))) = (Side::of(a), Side::of(b))
+        else {
+            return false;
+        };
+        let at = Placed::new(pos12, reach_of(a), reach_of(b));
+        let (Some(i), Some(j)) = (triangle_of(mesh_a, leaf_a), triangle_of(mesh_b, leaf_b)) else {
+            return false;
+        };
+        let in_a = mesh_b.triangle(j).map(|p| at.to_a(&p));
+        super::triangle::surely_crosses(&mesh_a.triangle(i), &in_a, at.slop)
+    }
+
+    /// Goes on at the pose until the goal is reached (true), `slice_units` are spent, or the meter closes.
+    ///
+    /// `a` and `b` are those of [`CarriedFront::start`]. Units: a box against a pack, or two leaves; one each.
+    pub fn advance(
+        &mut self,
+        a: &Shape,
+        b: &Shape,
+        goal: Goal,
+        slice_units: u64,
+        meter: &mut Meter<'_>,
+    ) -> bool {
+        let (Some(side_a), Some(side_b)) = (Side::of(a), Side::of(b)) else {
+            return false;
+        };
+        if goal > Goal::Verdict && self.known.floor_m == f64::NEG_INFINITY {
+            self.measure_wholes((a, side_a), (b, side_b));
+            self.anchor_here();
+        }
+        let end = meter.spent().saturating_add(slice_units);
+        loop {
+            if self.reached(goal) {
+                return true;
+            }
+            if meter.spent() >= end || !meter.open() {
+                return false;
+            }
+            self.step(side_a, side_b, goal, meter);
+        }
+    }
+
+    /// What is known of the gap at this pose, metres: sound at any interruption.
+    #[must_use]
+    pub fn interval(&self) -> Interval {
+        let high = self.known.high;
+        let floor = self.floor_m.max(self.known.floor_m);
+        let surfaces = self.surfaces_low();
+        let (low, high) = match self.containment() {
+            Containment::Open => (floor, high),
+            Containment::Outside => (surfaces.max(floor), high),
+            Containment::Inside => (floor, -surfaces.max(0.0)),
+        };
+        Interval::new(low.min(high), high)
+    }
+
+    /// Whether 0 in the interval of a reached goal means touching (law 3.4).
+    #[must_use]
+    pub fn is_certain(&self) -> bool {
+        self.known.touches || !self.known.blurred
+    }
+
+    /// The leaves with the least gap met at this pose; where one shape is within the other, with the normal that leads out.
+    #[must_use]
+    pub fn witness(&self) -> Option<LeafContact> {
+        let witness = self.witness?;
+        if self.containment() != Containment::Inside {
+            return Some(witness);
+        }
+        let gap = self.interval();
+        // Leaves farther apart than the depth can be are not the way out.
+        (-witness.closest.best_m >= gap.min).then(|| witness.way_out(gap))
+    }
+
+    /// Leaves that touch at this pose, at most [`super::LEAF_CONTACTS_MAX`]; all of them once `Goal::Contacts` is reached.
+    #[must_use]
+    pub fn contacts(&self) -> &[LeafContact] {
+        self.contacts.all()
+    }
+
+    /// Entries held, open or proved.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.heap.len() + self.open.len() + self.passing.len() + self.touching.len()
+    }
+
+    /// Whether it was never started.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Everything from the roots, at the pose it is at.
+    fn start_over(&mut self, a: &Shape, b: &Shape) {
+        let (Some(side_a), Some(side_b)) = (Side::of(a), Side::of(b)) else {
+            return;
+        };
+        self.drift = Drift::at(&self.at.pos12);
+        self.heap.clear();
+        self.passing.clear();
+        self.open.clear(self.search);
+        self.touching.clear();
+        self.contacts.clear();
+        self.lumped_expiry_m = f64::INFINITY;
+        self.fresh_len = 0;
+        self.known = Known::default();
+        self.witness = None;
+        self.whole = [(a, side_a), (b, side_b)].map(|(shape, side)| side.whole(shape));
+        self.solids = side_a.solid().or(side_b.solid()).is_some();
+        // A ball about the deepest point fits into the solid that it is in; pieces part when moved by both radii.
+        let ball = |side: Side<'_>, shape: &Shape| match side {
+            Side::Mesh(mesh) if !mesh.is_solid() => 0.0,
+            _ => shape.aabb.half_extents().min(),
+        };
+        let depth_m = if self.solids {
+            ball(side_a, a).max(ball(side_b, b))
+        } else {
+            a.radius + b.radius
+        };
+        self.floor_m = -(depth_m * (1.0 + 8.0 * ROUND)) - self.at.slop;
+        self.shells.start(self.solids);
+        self.shells_expiry_m = f64::NEG_INFINITY;
+        self.open.push(Open {
+            low: 0.0,
+            a: BoxId::ROOT,
+            b: BoxId::ROOT,
+        });
+    }
+
+    /// Bounds on the gap of the two as wholes: what an overlapping pair's lower end is.
+    fn measure_wholes(&mut self, a: (&Shape, Side<'_>), b: (&Shape, Side<'_>)) {
+        let ((root_a, origin_a), (root_b, origin_b)) = (tree_of(a.0, a.1), tree_of(b.0, b.1));
+        let pos12 = self.at.pos12;
+        let frame = Frame::new(&pos12, (origin_a, reach_of(a.0)), (origin_b, reach_of(b.0)));
+        let wholes = side::low((a.1, &origin_a), (b.1, &origin_b), &frame);
+        self.known.floor_m = frame.low(&root_a, &root_b).max(wholes);
+    }
+
+    /// A lower bound on the distance of the surfaces, metres; minus infinity while they may touch.
+    fn surfaces_low(&self) -> f64 {
+        if !self.open.is_empty() || self.known.touches {
+            return f64::NEG_INFINITY;
+        }
+        if self.known.blurred {
+            return self.known.leaf_low.min(0.0);
+        }
+        let soonest = self.heap.peek().map_or(f64::INFINITY, |g| g.expiry_m);
+        let carried = self.drift.left_m(soonest.min(self.lumped_expiry_m));
+        let passing = self.passing.iter().map(|g| g.expiry_m);
+        let proved = passing.fold(carried, f64::min);
+        if proved > 0.0 {
+            proved.min(self.known.high)
+        } else {
+            f64::NEG_INFINITY
+        }
+    }
+
+    /// What is known of it at this pose.
+    fn containment(&self) -> Containment {
+        if self.known.touches {
+            return Containment::Outside;
+        }
+        self.shells.state()
+    }
+
+    fn reached(&self, goal: Goal) -> bool {
+        if self.known.touches {
+            return goal < Goal::Contacts || (self.open.is_empty() && !self.has_expired());
+        }
+        if !self.open.is_empty() || self.has_expired() {
+            return false;
+        }
+        if self.known.blurred {
+            return true;
+        }
+        match self.shells.state() {
+            Containment::Open => false,
+            // The nearest points lead out: only a contact set wants them.
+            Containment::Inside if goal < Goal::Contacts => true,
+            _ => goal == Goal::Verdict || self.nearest_m() + self.fuzz_m() >= self.known.leaf_low,
+        }
+    }
+
+    /// Whether the soonest group is no longer proved apart.
+    fn has_expired(&self) -> bool {
+        (self.heap.peek()).is_some_and(|g| self.drift.left_m(g.expiry_m) <= 0.0)
+    }
+
+    /// The least bound of what can still be looked into, metres.
+    fn nearest_m(&self) -> f64 {
+        (self.heap.peek()).map_or(f64::INFINITY, |g| self.drift.left_m(g.expiry_m))
+    }
+
+    /// What cannot be told apart at this pose, metres.
+    fn fuzz_m(&self) -> f64 {
+        self.at.slop + 16.0 * ROUND * self.drift.path_m
+    }
+}
+
+/// The triangle of a leaf of a mesh that exists; `None` when it is none.
+fn triangle_of(mesh: &Mesh, leaf: BoxId) -> Option<u32> {
+    match mesh.obb().held(leaf) {
+        crate::shape::Held::Triangle(face) => Some(face),
+        crate::shape::Held::Pack(_) => None,
+    }
+}

@@ -1,0 +1,200 @@
+//! The entries of a front: pairs of boxes that may touch, and groups of pairs proved apart until the pair has moved so far.
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use crate::shape::BoxId;
+
+/// A box of one side against boxes of one pack of the other side, all proved apart.
+///
+/// One expiry stands for up to eight pairs: what tests one of them tests all.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Group {
+    /// Path of the pair at which the proof ends: gap at the test plus the path until then, rounded down, metres.
+    pub(super) expiry_m: f64,
+    /// The single box.
+    pub(super) one: BoxId,
+    /// The pack of the other side.
+    pub(super) pack: u32,
+    /// Which boxes of the pack.
+    pub(super) mask: u8,
+    /// Whether the pack is B's.
+    pub(super) pack_is_b: bool,
+    /// One pair of leaves whose boxes touch and whose triangles do not.
+    pub(super) leaf: bool,
+}
+
+impl Group {
+    /// The same, no longer proved.
+    pub(super) fn expired(self) -> Self {
+        Self {
+            expiry_m: f64::NEG_INFINITY,
+            ..self
+        }
+    }
+
+    /// The pair of one lane, A's box first.
+    pub(super) fn pair(&self, lane: u32) -> (BoxId, BoxId) {
+        let other = BoxId::new(self.pack, lane);
+        if self.pack_is_b {
+            (self.one, other)
+        } else {
+            (other, self.one)
+        }
+    }
+}
+
+/// The lanes of a mask, ascending.
+pub(super) fn lanes(mask: u8) -> impl Iterator<Item = u32> {
+    let mut rest = mask;
+    std::iter::from_fn(move || {
+        let lane = rest.trailing_zeros();
+        rest &= rest.wrapping_sub(1);
+        (lane < 8).then_some(lane)
+    })
+}
+
+impl Ord for Group {
+    /// The soonest expiry is the greatest, so that a heap yields it first; ties by place, for equal replays.
+    fn cmp(&self, other: &Self) -> Ordering {
+        let place = |g: &Self| (g.one.0, g.pack, g.mask, g.pack_is_b);
+        (other.expiry_m.total_cmp(&self.expiry_m)).then_with(|| place(other).cmp(&place(self)))
+    }
+}
+
+impl PartialOrd for Group {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Group {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Group {}
+
+/// A pair of boxes that may touch.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Open {
+    /// About how far the boxes overlap at their test, negative metres: for the order only.
+    pub(super) low: f64,
+    pub(super) a: BoxId,
+    pub(super) b: BoxId,
+}
+
+impl Ord for Open {
+    /// The deepest overlap first, ties by place.
+    fn cmp(&self, other: &Self) -> Ordering {
+        let place = |o: &Self| (o.a.0, o.b.0);
+        (other.low.total_cmp(&self.low)).then_with(|| place(other).cmp(&place(self)))
+    }
+}
+
+impl PartialOrd for Open {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Open {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Open {}
+
+/// How a front goes about a pair.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Search {
+    /// Certificates are carried from pose to pose; depth first, the deepest overlap first.
+    #[default]
+    Carried,
+    /// As `Carried`, but each pose starts from the roots.
+    Restart,
+    /// Each pose starts from the roots, level by level (Hubbard 1996): the baseline.
+    BreadthFirst,
+    /// Each pose starts from the roots, deepest overlap of all first (a plain priority queue): the baseline.
+    Priority,
+}
+
+impl Search {
+    /// All of them.
+    pub const ALL: [Self; 4] = [
+        Self::Carried,
+        Self::Restart,
+        Self::BreadthFirst,
+        Self::Priority,
+    ];
+
+    /// What it is called.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Carried => "carried",
+            Self::Restart => "restart",
+            Self::BreadthFirst => "breadth_first",
+            Self::Priority => "priority",
+        }
+    }
+}
+
+/// The pairs that may touch, in the order of a search.
+#[derive(Debug, Default)]
+pub(super) struct OpenList {
+    search: Search,
+    items: Vec<Open>,
+    /// Breadth first: the next to be taken.
+    head: usize,
+    /// Of a priority queue: the items are here.
+    heap: BinaryHeap<Open>,
+}
+
+impl OpenList {
+    pub(super) fn clear(&mut self, search: Search) {
+        self.search = search;
+        self.items.clear();
+        self.heap.clear();
+        self.head = 0;
+    }
+
+    pub(super) fn push(&mut self, open: Open) {
+        if self.search == Search::Priority {
+            self.heap.push(open);
+        } else {
+            self.items.push(open);
+        }
+    }
+
+    pub(super) fn pop(&mut self) -> Option<Open> {
+        match self.search {
+            Search::Priority => self.heap.pop(),
+            Search::BreadthFirst => {
+                let next = self.items.get(self.head).copied();
+                self.head += usize::from(next.is_some());
+                if self.head == self.items.len() {
+                    self.items.clear();
+                    self.head = 0;
+                }
+                next
+            }
+            Search::Carried | Search::Restart => self.items.pop(),
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.items.is_empty() && self.heap.is_empty()
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.items.len() - self.head + self.heap.len()
+    }
+
+    /// The pairs, in no order.
+    pub(super) fn iter(&self) -> impl Iterator<Item = &Open> {
+        self.items[self.head..].iter().chain(self.heap.iter())
+    }
+}

@@ -1,0 +1,82 @@
+//! How far a pair has moved since its certificates were made: a path over anchors, and what has been gone since the last.
+
+use crate::math::{Pose, ROUND, displacement};
+use crate::shape::Shape;
+
+/// Motion of one shape seen from the other.
+#[derive(Clone, Debug)]
+pub(super) struct Drift {
+    anchor: Pose,
+    /// The anchor before, and how far the two are apart, metres.
+    before: Pose,
+    stride_m: f64,
+    /// `S`: length of the path over all anchors, metres, rounded up.
+    pub(super) path_m: f64,
+    /// `d`: displacement from the anchor, metres, rounded up.
+    offset_m: f64,
+    /// Displacement at the last move, from the anchor of then, metres.
+    pub(super) last_m: f64,
+}
+
+impl Default for Drift {
+    fn default() -> Self {
+        Self::at(&Pose::identity())
+    }
+}
+
+impl Drift {
+    pub(super) fn at(pose: &Pose) -> Self {
+        Self {
+            anchor: *pose,
+            before: *pose,
+            stride_m: 0.0,
+            path_m: 0.0,
+            offset_m: 0.0,
+            last_m: 0.0,
+        }
+    }
+
+    /// Moves to a pose of `b` seen from `a`; takes an anchor where the way leads on from the last two.
+    pub(super) fn follow(&mut self, a: &Shape, b: &Shape, pos12: &Pose) {
+        self.offset_m = moved(a, b, &self.anchor, pos12);
+        self.last_m = self.offset_m;
+        // Back and forth between two places is farther from neither than they are from each other.
+        if moved(a, b, &self.before, pos12) >= self.stride_m + 0.5 * self.offset_m {
+            self.anchor_here(pos12);
+        }
+    }
+
+    /// Takes an anchor at the pose last moved to; whether it was none before.
+    pub(super) fn anchor_here(&mut self, pos12: &Pose) -> bool {
+        if self.offset_m == 0.0 {
+            return false;
+        }
+        let path_m = self.path_m + self.offset_m;
+        self.path_m = path_m + 2.0 * ROUND * path_m;
+        self.before = std::mem::replace(&mut self.anchor, *pos12);
+        self.stride_m = std::mem::take(&mut self.offset_m);
+        true
+    }
+
+    /// The path at which a gap found at this pose is used up, rounded down; `None` where it does not outlast this pose.
+    pub(super) fn expiry(&self, gap: f64) -> Option<f64> {
+        let expiry_m = (self.path_m - self.offset_m) + gap;
+        let expiry_m = expiry_m - 4.0 * ROUND * (self.path_m + self.offset_m + gap);
+        (gap > 0.0 && self.left_m(expiry_m) > 0.0).then_some(expiry_m)
+    }
+
+    /// The gap that an expiry proves at this pose, rounded down; zero or less: none.
+    pub(super) fn left_m(&self, expiry_m: f64) -> f64 {
+        let spent_m = self.path_m + self.offset_m;
+        (expiry_m - spent_m) - 4.0 * ROUND * spent_m
+    }
+}
+
+/// How far any point of the smaller one's surface moves, seen from the other, metres, rounded up.
+fn moved(a: &Shape, b: &Shape, from: &Pose, to: &Pose) -> f64 {
+    if a.radius < b.radius {
+        displacement(&from.inverse(), &to.inverse(), &a.centre, a.radius)
+    } else {
+        displacement(from, to, &b.centre, b.radius)
+    }
+}

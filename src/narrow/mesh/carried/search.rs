@@ -1,0 +1,388 @@
+//! One step of work on a front: a box against a pack, two leaves, or a node of an inside test.
+
+use super::cover::{Group, Open, lanes};
+use super::{BoxId, CarriedFront, Containment, GROUPS_MAX, Goal, LeafContact, Side};
+use crate::math::Interval;
+use crate::narrow::exact::Closest;
+use crate::narrow::mesh::side;
+use crate::shape::{Held, Obb};
+use crate::simd::obb::LANES;
+use crate::time::Meter;
+
+/// What two leaves cost, in tests of a box against a pack: when the clock is to be read again.
+const LEAF_COST: u64 = 4;
+
+impl CarriedFront {
+    pub(super) fn step(&mut self, a: Side<'_>, b: Side<'_>, goal: Goal, meter: &mut Meter<'_>) {
+        let gap_wanted = goal > Goal::Verdict;
+        if gap_wanted && !std::mem::replace(&mut self.known.asked_last, true) {
+            self.bound_by_last(a, b);
+            meter.charge_weighted(1, LEAF_COST);
+        } else if let Some(open) = self.open.pop() {
+            self.expand(&open, (a, b), gap_wanted, meter);
+        } else if self.has_expired() {
+            if let Some(group) = self.heap.pop() {
+                self.retest(&group, (a, b), gap_wanted, meter);
+            }
+        } else if self.shells.state() == Containment::Open {
+            self.shells.step(a, b, &self.at);
+            meter.charge(1);
+        } else {
+            self.refine((a, b), meter);
+        }
+        self.note_apart();
+    }
+
+    /// Where the surfaces are apart, what is known of the insides, and what is asked of them at this pose, holds as long as
+    /// they stay so.
+    fn note_apart(&mut self) {
+        if self.known.touches {
+            // Whatever the next pose is, insides must be asked again.
+            self.shells_expiry_m = f64::NEG_INFINITY;
+            return;
+        }
+        let low = self.surfaces_low();
+        if low <= 0.0 {
+            return;
+        }
+        if self.fresh_len == 0 {
+            self.fresh_len = self.len();
+        }
+        let expiry_m = self.drift.expiry(low).unwrap_or(f64::NEG_INFINITY);
+        self.shells_expiry_m = self.shells_expiry_m.max(expiry_m);
+    }
+
+    /// The leaves that were nearest last are near still: their distance spares most others the question.
+    fn bound_by_last(&mut self, a: Side<'_>, b: Side<'_>) {
+        let Some((leaf_a, leaf_b)) = self.last else {
+            return;
+        };
+        if let (Held::Triangle(i), Held::Triangle(j)) = (a.held(leaf_a), b.held(leaf_b))
+            && let Some(closest) = side::leaf((a, i), (b, j), &self.at, f64::INFINITY)
+        {
+            // No more than the distance of two points: what else it says is said when its entry's turn comes.
+            self.known.high = self.known.high.min(closest.gap.max.max(0.0));
+            self.witness = Some(contact((a, i), (b, j), closest));
+        }
+    }
+
+    /// Replaces an open pair of boxes by smaller ones, or queries two leaves.
+    fn expand(
+        &mut self,
+        open: &Open,
+        (a, b): (Side<'_>, Side<'_>),
+        exact: bool,
+        meter: &mut Meter<'_>,
+    ) {
+        let child = match (a.held(open.a), b.held(open.b)) {
+            (Held::Triangle(_), Held::Triangle(_)) => {
+                self.leaves((open.a, open.b), (a, b), f64::NEG_INFINITY, exact);
+                meter.charge_weighted(1, LEAF_COST);
+                return;
+            }
+            (held_a, held_b) => self.children((open.a, held_a), (open.b, held_b), (a, b)),
+        };
+        self.test(&child, (a, b), f64::NEG_INFINITY);
+        meter.charge(1);
+    }
+
+    /// The box that stays and the pack that takes the other's place: the larger is parted, so that both shrink alike.
+    fn children(
+        &self,
+        (id_a, held_a): (BoxId, Held),
+        (id_b, held_b): (BoxId, Held),
+        (a, b): (Side<'_>, Side<'_>),
+    ) -> Group {
+        let part_b = match (held_a, held_b) {
+            (Held::Pack(_), Held::Pack(_)) => {
+                let size = |obb: Obb| obb.half.iter().map(|h| h * h).sum::<f32>();
+                size(b.obb(id_b, &self.whole[1])) > size(a.obb(id_a, &self.whole[0]))
+            }
+            (held_a, _) => matches!(held_a, Held::Triangle(_)),
+        };
+        let (one, parted, side) = if part_b {
+            (id_a, held_b, b)
+        } else {
+            (id_b, held_a, a)
+        };
+        let pack = match parted {
+            Held::Pack(pack) => pack,
+            // Not reached: of two leaves none is parted.
+            Held::Triangle(_) => 0,
+        };
+        Group {
+            expiry_m: f64::NEG_INFINITY,
+            one,
+            pack,
+            mask: side.pack(pack).map_or(0, |p| p.mask),
+            pack_is_b: part_b,
+            leaf: false,
+        }
+    }
+
+    /// The gaps of a group's pairs at this pose.
+    fn gaps(&self, group: &Group, (a, b): (Side<'_>, Side<'_>)) -> [f64; LANES] {
+        let (one, other) = if group.pack_is_b {
+            (a.obb(group.one, &self.whole[0]), b)
+        } else {
+            (b.obb(group.one, &self.whole[1]), a)
+        };
+        match other.pack(group.pack) {
+            Some(pack) => self.at.gaps(&one, pack, group.pack_is_b),
+            None => [f64::NEG_INFINITY; LANES],
+        }
+    }
+
+    /// Tests a group: what is apart is a group again, what may touch is open, the deepest on top.
+    ///
+    /// * `known_m` - a bound that holds for all of it at this pose.
+    fn test(&mut self, group: &Group, sides: (Side<'_>, Side<'_>), known_m: f64) {
+        let gaps = self.gaps(group, sides);
+        let (mut apart, mut least) = (0_u8, f64::INFINITY);
+        let mut deep = [(0.0, 0_u32); LANES];
+        let mut count = 0;
+        for lane in lanes(group.mask) {
+            let gap = gaps[lane as usize].max(known_m);
+            // What would not outlast this pose is looked into: smaller boxes are farther apart.
+            if known_m > 0.0 || self.drift.expiry(gap).is_some() {
+                apart |= 1 << lane;
+                least = least.min(gap);
+            } else {
+                // Sorted in: the deepest last.
+                let mut at = count;
+                while at > 0 && deep[at - 1].0 < gap {
+                    deep[at] = deep[at - 1];
+                    at -= 1;
+                }
+                deep[at] = (gap, lane);
+                count += 1;
+            }
+        }
+        if apart != 0 {
+            let mask = apart;
+            self.keep(Group { mask, ..*group }, least);
+        }
+        for &(low, lane) in &deep[..count] {
+            let (a, b) = group.pair(lane);
+            self.open.push(Open { low, a, b });
+        }
+    }
+
+    /// Keeps a group that is apart by `gap` at this pose; where there is no room, only its expiry.
+    pub(super) fn keep(&mut self, group: Group, gap: f64) {
+        match self.drift.expiry(gap) {
+            Some(expiry_m) if self.heap.len() < GROUPS_MAX => {
+                self.heap.push(Group { expiry_m, ..group });
+            }
+            Some(expiry_m) => self.lumped_expiry_m = self.lumped_expiry_m.min(expiry_m),
+            None if gap > 0.0 => self.passing.push(Group {
+                expiry_m: gap,
+                ..group
+            }),
+            // Not apart after all: every pair stays covered.
+            None => {
+                for lane in lanes(group.mask) {
+                    let (a, b) = group.pair(lane);
+                    self.open.push(Open { low: gap, a, b });
+                }
+            }
+        }
+    }
+
+    /// Tests a group whose proof has expired.
+    fn retest(
+        &mut self,
+        group: &Group,
+        sides: (Side<'_>, Side<'_>),
+        exact: bool,
+        meter: &mut Meter<'_>,
+    ) {
+        if group.leaf {
+            let pair = group.pair(group.mask.trailing_zeros());
+            self.leaves(pair, sides, f64::NEG_INFINITY, exact);
+            meter.charge_weighted(1, LEAF_COST);
+        } else {
+            self.test(group, sides, f64::NEG_INFINITY);
+            meter.charge(1);
+        }
+    }
+
+    /// Looks into the nearest of all groups: best first.
+    fn refine(&mut self, sides: (Side<'_>, Side<'_>), meter: &mut Meter<'_>) {
+        let Some(group) = self.heap.pop() else { return };
+        // What is stored holds at this pose; a new test may be lower by rounding.
+        let known_m = self.drift.left_m(group.expiry_m);
+        if group.leaf {
+            let pair = group.pair(group.mask.trailing_zeros());
+            self.leaves(pair, sides, known_m, true);
+            meter.charge_weighted(1, LEAF_COST);
+            return;
+        }
+        let gaps = self.gaps(&group, sides).map(|gap| gap.max(known_m));
+        let (mut nearest, mut rest_m) = (group.mask.trailing_zeros(), f64::INFINITY);
+        for lane in lanes(group.mask) {
+            if gaps[lane as usize] < gaps[nearest as usize] {
+                nearest = lane;
+            }
+        }
+        let rest = group.mask & !(1 << nearest);
+        for lane in lanes(rest) {
+            rest_m = rest_m.min(gaps[lane as usize]);
+        }
+        if rest != 0 {
+            self.keep(
+                Group {
+                    mask: rest,
+                    ..group
+                },
+                rest_m,
+            );
+        }
+        let (id_a, id_b) = group.pair(nearest);
+        let known_m = gaps[nearest as usize];
+        match (sides.0.held(id_a), sides.1.held(id_b)) {
+            (Held::Triangle(_), Held::Triangle(_)) => {
+                self.leaves((id_a, id_b), sides, known_m, true);
+                meter.charge_weighted(2, LEAF_COST);
+            }
+            (held_a, held_b) => {
+                let child = self.children((id_a, held_a), (id_b, held_b), sides);
+                self.test(&child, sides, known_m);
+                meter.charge(2);
+            }
+        }
+    }
+
+    /// Queries two leaves.
+    ///
+    /// * `known_m` - a bound on their gap that holds at this pose.
+    /// * `exact` - their distance is wanted; else any proof that they are apart will do.
+    fn leaves(
+        &mut self,
+        (id_a, id_b): (BoxId, BoxId),
+        (a, b): (Side<'_>, Side<'_>),
+        known_m: f64,
+        exact: bool,
+    ) {
+        let (Held::Triangle(i), Held::Triangle(j)) = (a.held(id_a), b.held(id_b)) else {
+            return;
+        };
+        let (leaf_a, leaf_b) = ((a, i), (b, j));
+        // Once the pair touches, only what touches too is of interest.
+        let exact = exact && !self.known.touches;
+        if !exact && let Some(gap) = side::parted(leaf_a, leaf_b, &self.at) {
+            self.keep_leaf(id_a, id_b, gap);
+            return;
+        }
+        let beyond = if exact && self.known.high > 0.0 {
+            self.known.high
+        } else {
+            f64::INFINITY
+        };
+        let Some(closest) = side::leaf(leaf_a, leaf_b, &self.at, beyond) else {
+            // Farther than the nearest known: that is proof enough.
+            self.keep_leaf(id_a, id_b, beyond.max(known_m));
+            return;
+        };
+        let low = closest.gap.min.max(known_m);
+        self.known.leaf_low = self.known.leaf_low.min(low);
+        // A solid's depth is that of a point, and the translation that parts two leaves can be more: of an overlap
+        // their query proves no more than that it is one.
+        let high = if self.solids {
+            closest.gap.max.max(0.0)
+        } else {
+            closest.gap.max
+        };
+        let better = self.known.high > high || self.last.is_none();
+        self.known.high = self.known.high.min(high);
+        let contact = contact(leaf_a, leaf_b, closest);
+        if low > 0.0 {
+            if better {
+                (self.last, self.witness) = (Some((id_a, id_b)), Some(contact));
+            }
+            self.keep_leaf(id_a, id_b, low);
+            return;
+        }
+        // Certified, or zero within its rounding: touching collides.
+        if closest.gap.max <= 8.0 * self.at.slop || closest.finished {
+            let deeper = |w: &LeafContact| closest.best_m < w.closest.best_m;
+            if !self.known.touches || self.witness.as_ref().is_none_or(deeper) {
+                (self.last, self.witness) = (Some((id_a, id_b)), Some(contact));
+            }
+            self.known.touches = true;
+            self.contacts.add(contact);
+        } else {
+            self.known.blurred = true;
+        }
+        self.touching.push((id_a, id_b));
+    }
+
+    fn keep_leaf(&mut self, id_a: BoxId, id_b: BoxId, gap: f64) {
+        let group = Group {
+            expiry_m: 0.0,
+            one: id_a,
+            pack: id_b.pack(),
+            mask: 1 << id_b.lane(),
+            pack_is_b: true,
+            leaf: true,
+        };
+        self.keep(group, gap);
+    }
+}
+
+fn contact(a: (Side<'_>, u32), b: (Side<'_>, u32), closest: Closest) -> LeafContact {
+    LeafContact {
+        closest,
+        triangle_a: a.0.triangle_name(a.1),
+        triangle_b: b.0.triangle_name(b.1),
+    }
+}
+
+impl LeafContact {
+    /// Of surfaces that are apart though one shape is within the other: moving B towards A's nearest point leads out.
+    pub(in crate::narrow::mesh) fn way_out(&self, gap: Interval) -> Self {
+        let found = self.closest;
+        let closest = Closest {
+            gap,
+            best_m: (-found.best_m).clamp(gap.min, gap.max),
+            normal: -found.normal,
+            ..found
+        };
+        Self { closest, ..*self }
+    }
+}
+
+impl<'a> Side<'a> {
+    /// What a box holds; a convex shape is one leaf.
+    pub(super) fn held(self, id: BoxId) -> Held {
+        match self {
+            Self::Mesh(mesh) => mesh.obb().held(id),
+            Self::Convex(_) => Held::Triangle(0),
+        }
+    }
+
+    /// The boxes that share a parent.
+    pub(super) fn pack(self, pack: u32) -> Option<&'a crate::shape::ObbPack> {
+        match self {
+            Self::Mesh(mesh) => mesh.obb().packs().get(pack as usize),
+            Self::Convex(_) => None,
+        }
+    }
+
+    /// A box by itself; that of a convex shape is handed in.
+    fn obb(self, id: BoxId, whole: &Option<Obb>) -> Obb {
+        match (self, whole) {
+            (Self::Mesh(mesh), _) => mesh.obb().get(id),
+            (Self::Convex(_), Some(whole)) => *whole,
+            (Self::Convex(_), None) => Obb::EVERYWHERE,
+        }
+    }
+
+    /// How contacts name a leaf: a convex shape has no triangles.
+    fn triangle_name(self, i: u32) -> u32 {
+        match self {
+            Self::Mesh(_) => i,
+            Self::Convex(_) => u32::MAX,
+        }
+    }
+}

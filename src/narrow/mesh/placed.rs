@@ -1,0 +1,79 @@
+//! Where B stands seen from A, ready for points and boxes, with the rounding that stands behind each number.
+
+use nalgebra::Matrix3;
+
+use crate::math::{Point, Pose, ROUND, Vec3, f32_down};
+use crate::shape::{Obb, ObbPack};
+use crate::simd::obb::{GAP_ROUND, LANES, One, gaps};
+
+/// A relative pose as matrix and vector.
+#[derive(Clone, Debug)]
+pub(super) struct Placed {
+    pub(super) pos12: Pose,
+    /// Rotation of B's frame seen from A.
+    pub(super) rotation: Matrix3<f64>,
+    translation: Vec3,
+    /// Bound on the rounding of any distance computed between the two, metres.
+    pub(super) slop: f64,
+}
+
+impl Default for Placed {
+    fn default() -> Self {
+        Self {
+            pos12: Pose::identity(),
+            rotation: Matrix3::identity(),
+            translation: Vec3::zeros(),
+            slop: 0.0,
+        }
+    }
+}
+
+impl Placed {
+    /// * `reach_a`, `reach_b` - greatest distance of a vertex from the local origin, metres.
+    pub(super) fn new(pos12: &Pose, reach_a: f64, reach_b: f64) -> Self {
+        let translation = pos12.translation.vector;
+        Self {
+            pos12: *pos12,
+            rotation: *pos12.rotation.to_rotation_matrix().matrix(),
+            translation,
+            slop: 32.0 * ROUND * (translation.norm() + reach_a + reach_b),
+        }
+    }
+
+    /// A point of B's frame in A's.
+    pub(super) fn to_a(&self, point: &Point) -> Point {
+        Point::from(self.rotation * point.coords + self.translation)
+    }
+
+    /// A point of A's frame in B's.
+    pub(super) fn to_b(&self, point: &Point) -> Point {
+        Point::from(self.rotation.tr_mul(&(point.coords - self.translation)))
+    }
+
+    /// A direction of A's frame in B's.
+    pub(super) fn turn_to_b(&self, direction: &Vec3) -> Vec3 {
+        self.rotation.tr_mul(direction)
+    }
+
+    /// Sound lower bounds on the gaps of what `one` holds and what each box of `pack` holds, metres; zero or less where they
+    /// may touch, and then of no meaning but for an order. Lanes without a box yield anything.
+    ///
+    /// * `pack_is_b` - the pack is of B and `one` of A, else the other way round.
+    pub(super) fn gaps(&self, one: &Obb, pack: &ObbPack, pack_is_b: bool) -> [f64; LANES] {
+        let (centre, axes) = if pack_is_b {
+            (self.to_b(&one.centre), self.rotation.tr_mul(&one.axes))
+        } else {
+            (self.to_a(&one.centre), self.rotation * one.axes)
+        };
+        let from = centre - pack.origin;
+        let seen = One {
+            centre: [f32_down(from.x), f32_down(from.y), f32_down(from.z)],
+            axes: std::array::from_fn(|k| std::array::from_fn(|row| f32_down(axes[(row, k)]))),
+            half: one.half,
+        };
+        let half = one.half[0] + one.half[1] + one.half[2];
+        let size = from.lp_norm(1) + f64::from(half) + f64::from(pack.reach);
+        let slop = GAP_ROUND * size + self.slop;
+        gaps(&seen, &pack.boxes).map(|gap| f64::from(gap) - slop)
+    }
+}

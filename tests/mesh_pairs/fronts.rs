@@ -1,0 +1,338 @@
+//! Certificate fronts: the invariant, soundness and verdicts, pose after pose, stopped at random.
+
+use crate::oracle::Truth;
+use crate::oracle::meshes;
+use crate::oracle::rng::Rng;
+use crate::support::{CASES, KINDS, any_convex, any_mesh, place, shape, truth_of};
+use sweepd::math::{Pose, Quat, Vec3, relative};
+use sweepd::narrow::mesh::{CarriedFront, Goal, Search, has_front};
+use sweepd::shape::Shape;
+use sweepd::time::{ManualClock, Meter};
+
+/// Poses of a pair.
+const POSES: usize = 12;
+
+/// Every pair of leaves, sorted.
+fn all_leaves(a: &Shape, b: &Shape) -> Vec<(u32, u32)> {
+    let count = |shape: &Shape| match &shape.geometry {
+        sweepd::shape::Geometry::Mesh(mesh) => u32::try_from(mesh.faces().len()).unwrap(),
+        _ => 1,
+    };
+    let (m, n) = (count(a), count(b));
+    (0..m).flat_map(|i| (0..n).map(move |j| (i, j))).collect()
+}
+
+/// One tick of motion: at rest, a little, much, a leap, half a turn, or trembling.
+fn step(rng: &mut Rng, pose: &Pose, home: &Pose, small: f64) -> Pose {
+    let by = |rng: &mut Rng, size: f64| {
+        let turn = Quat::from_scaled_axis(rng.vector(size));
+        let to = pose.translation.vector + rng.vector(size * small);
+        Pose::from_parts(to.into(), turn * pose.rotation)
+    };
+    let mut next = match rng.below(8) {
+        0 => *pose,
+        1 | 2 => by(rng, 1e-3),
+        3 => by(rng, 0.02),
+        4 => by(rng, 0.3),
+        5 => Pose::from_parts(
+            pose.translation,
+            Quat::from_scaled_axis(rng.direction() * std::f64::consts::PI) * pose.rotation,
+        ),
+        6 => *home,
+        _ => by(rng, 1e-9),
+    };
+    next.rotation = Quat::new_normalize(next.rotation.into_inner());
+    next
+}
+
+struct Couple<'a> {
+    a: &'a Shape,
+    b: &'a Shape,
+    pose_a: Pose,
+    pose_b: Pose,
+}
+
+/// Takes a front through poses, stops it at random, and compares it with the truth each time.
+fn drive(rng: &mut Rng, couple: &mut Couple<'_>, search: Search, whole: bool, what: &str) {
+    let (a, b) = (couple.a, couple.b);
+    assert!(has_front(a, b), "{what}");
+    let (size, tolerance) = (a.radius.max(b.radius), 1e-11 * (a.radius + b.radius));
+    let leaves = all_leaves(a, b);
+    let home = couple.pose_b;
+    let clock = ManualClock::new(0);
+    let mut front = CarriedFront::default();
+    for pose in 0..POSES {
+        let at = format!("{what} pose {pose}");
+        let pos12 = relative(&couple.pose_a, &couple.pose_b);
+        let truth = truth_of(a, b, &couple.pose_a, &couple.pose_b);
+        if pose == 0 {
+            front.start(a, b, &pos12, search);
+        } else {
+            if front.still_touches(a, b, &pos12) {
+                assert!(matches!(truth, Truth::Overlap(_)), "{at}: {truth:?}");
+            }
+            front.move_to(a, b, &pos12);
+        }
+        let goal = [Goal::Verdict, Goal::Verdict, Goal::Gap, Goal::Contacts][rng.below(4)];
+        let turns = if whole { usize::MAX } else { rng.below(5) };
+        let mut done = false;
+        let mut turn = 0;
+        let mut last = front.interval();
+        while turn < turns && !done {
+            let units = match rng.below(4) {
+                0 => 0,
+                1 | 2 => 1,
+                _ => rng.bits() % 60,
+            };
+            let mut meter = Meter::new(&clock, None, Some(units + u64::from(whole)));
+            done = front.advance(a, b, goal, u64::MAX, &mut meter);
+            let now = front.interval();
+            match truth {
+                Truth::Apart(d) => assert!(
+                    now.min <= d + tolerance && d - tolerance <= now.max,
+                    "{at}: {now:?} without {d}"
+                ),
+                Truth::Overlap(gap) => assert!(
+                    now.min <= gap + tolerance,
+                    "{at}: {now:?}, but the gap is at most {gap}"
+                ),
+            }
+            // At one pose it never loosens but for what rounding is.
+            assert!(
+                now.min >= last.min - tolerance && now.max <= last.max + tolerance,
+                "{at}: loosened from {last:?} to {now:?}"
+            );
+            last = now;
+            if let Some(covered) = front.covered(a, b) {
+                assert!(
+                    covered == leaves,
+                    "{at}: leaf pairs uncovered or covered twice"
+                );
+            }
+            turn += 1;
+            assert!(turn < 2_000_000, "{at}: no end");
+        }
+        if done {
+            check_end(&front, goal, truth, size, &at);
+        }
+        couple.pose_b = step(rng, &couple.pose_b, &home, a.radius.min(b.radius));
+    }
+}
+
+fn check_end(front: &CarriedFront, goal: Goal, truth: Truth, size: f64, at: &str) {
+    let end = front.interval();
+    match truth {
+        Truth::Apart(d) if d > 1e-9 * size => {
+            assert!(end.min > 0.0, "{at}: {end:?} for {d}");
+            if goal != Goal::Verdict {
+                assert!(end.width() <= 1e-9 * size, "{at}: {end:?} for {d}");
+            }
+        }
+        Truth::Overlap(gap) => {
+            assert!(end.min <= 0.0, "{at}: {end:?} for {gap}");
+            if gap < -1e-9 * size {
+                assert!(end.max <= 1e-12 * size, "{at}: {end:?} for {gap}");
+            }
+        }
+        Truth::Apart(_) => {}
+    }
+    if let Some(w) = front.witness() {
+        let across = w.closest.point_b - w.closest.point_a;
+        let along = (across - w.closest.normal * w.closest.best_m).norm();
+        assert!(along < 1e-9 * size, "{at}: off by {along}");
+    }
+    if goal == Goal::Contacts && end.max > 0.0 {
+        assert_eq!(front.contacts().is_empty(), end.min > 0.0, "{at} {end:?}");
+    }
+}
+
+fn cases(seed: u64, count: u64, search: Search, whole: bool) {
+    for case in 0..count {
+        let mut rng = Rng::new(seed + case);
+        let (kind_a, kind_b) = (rng.below(KINDS), rng.below(KINDS));
+        let (a, name_a) = any_mesh(&mut rng, kind_a);
+        let (b, name_b) = if rng.below(4) == 0 {
+            any_convex(&mut rng)
+        } else {
+            any_mesh(&mut rng, kind_b)
+        };
+        let how = usize::try_from(case % 3).unwrap();
+        let (mut pose_a, mut pose_b) = place(&mut rng, &a, &b, how);
+        if rng.below(5) == 0 {
+            let far = rng.vector(1e7);
+            for pose in [&mut pose_a, &mut pose_b] {
+                pose.translation.vector += far;
+            }
+        }
+        let what = format!("seed {} {name_a} - {name_b} {search:?}", seed + case);
+        let (a, b, pose_a, pose_b) = if rng.below(2) == 0 {
+            (&a, &b, pose_a, pose_b)
+        } else {
+            (&b, &a, pose_b, pose_a)
+        };
+        let mut couple = Couple {
+            a,
+            b,
+            pose_a,
+            pose_b,
+        };
+        drive(&mut rng, &mut couple, search, whole, &what);
+    }
+}
+
+#[test]
+fn law_1_a_front_stopped_at_random_covers_every_pair_once_and_holds_the_truth() {
+    for round in 0..3 {
+        cases(20_000_000 + 10_000 * round, CASES, Search::Carried, false);
+    }
+}
+
+#[test]
+fn law_3_4_a_front_that_ends_has_the_right_verdict_at_every_pose() {
+    cases(21_000_000, CASES, Search::Carried, true);
+}
+
+#[test]
+fn the_baselines_are_as_sound_as_the_front() {
+    for (k, search) in (0..).zip([Search::Restart, Search::BreadthFirst, Search::Priority]) {
+        cases(22_000_000 + 10_000 * k, CASES / 4, search, k % 2 == 0);
+    }
+}
+
+#[test]
+fn law_1_size_ratios_of_a_million_slivers_and_needles_hold_the_truth() {
+    let one = Vec3::new(1.0, 1.0, 1.0);
+    for case in 0..CASES {
+        let mut rng = Rng::new(23_000_000 + case);
+        let (a, b, reach) = match rng.below(3) {
+            0 => (
+                shape(&meshes::cuboid(one * 500.0), None),
+                shape(&meshes::bumpy_sphere(5, 6, 0.1).scaled(one * 5e-4), None),
+                500.0 + 6e-4,
+            ),
+            1 => {
+                let thin = Vec3::new(1.0, 1e-7, 10.0_f64.powf(rng.range(-9.0, -3.0)));
+                (
+                    shape(&meshes::cuboid(thin), None),
+                    shape(&meshes::slivers(&mut rng), None),
+                    0.3,
+                )
+            }
+            _ => (
+                shape(&meshes::cuboid(one), None),
+                shape(&meshes::cuboid(one * 0.5), None),
+                1.5,
+            ),
+        };
+        let pose_a = Pose::from_parts(rng.vector(3.0).into(), rng.rotation());
+        let gap = [1e-6, 0.0, -1e-4, 1e-3][rng.below(4)] * b.radius;
+        let flat = rng.below(2) == 0;
+        let turn = if flat {
+            Quat::identity()
+        } else {
+            rng.rotation()
+        };
+        let local = Pose::from_parts(Vec3::new(0.1, 0.2, reach + gap).into(), turn);
+        let mut couple = Couple {
+            a: &a,
+            b: &b,
+            pose_a,
+            pose_b: pose_a * local,
+        };
+        let what = format!("extreme {case}");
+        let whole = rng.below(2) == 0;
+        drive(&mut rng, &mut couple, Search::Carried, whole, &what);
+    }
+}
+
+#[test]
+fn law_3_3_a_front_keeps_what_is_inside_apart_from_what_is_outside() {
+    let one = Vec3::new(1.0, 1.0, 1.0);
+    let small = shape(&meshes::cuboid(one * 0.3), None);
+    let torus = shape(&meshes::torus(1.0, 0.3, 12, 8), None);
+    let rod = shape(&meshes::cuboid(Vec3::new(0.2, 0.2, 3.0)), None);
+    let hollow = shape(
+        &meshes::cuboid(one).and(meshes::cuboid(one * 0.7).inverted()),
+        None,
+    );
+    let nested = shape(&meshes::cuboid(one).and(meshes::cuboid(one * 0.7)), None);
+    for case in 0..CASES {
+        let mut rng = Rng::new(24_000_000 + case);
+        let (a, b) = [
+            (&torus, &rod),
+            (&hollow, &small),
+            (&nested, &small),
+            (&small, &nested),
+        ][rng.below(4)];
+        let pose_a = Pose::from_parts(rng.vector(0.1).into(), rng.rotation());
+        let local = Pose::from_parts(rng.vector(0.1).into(), Quat::identity());
+        let mut couple = Couple {
+            a,
+            b,
+            pose_a,
+            pose_b: pose_a * local,
+        };
+        drive(
+            &mut rng,
+            &mut couple,
+            Search::Carried,
+            case % 2 == 0,
+            &format!("inside {case}"),
+        );
+    }
+}
+
+#[test]
+fn a_front_used_again_answers_as_a_new_one() {
+    let clock = ManualClock::new(0);
+    let mut old = CarriedFront::default();
+    for case in 0..CASES {
+        let mut rng = Rng::new(25_000_000 + case);
+        let (kind_a, kind_b) = (rng.below(KINDS), rng.below(KINDS));
+        let ((a, _), (b, _)) = (any_mesh(&mut rng, kind_a), any_mesh(&mut rng, kind_b));
+        let (pose_a, pose_b) = place(&mut rng, &a, &b, usize::try_from(case % 3).unwrap());
+        let pos12 = relative(&pose_a, &pose_b);
+        let mut new = CarriedFront::default();
+        let spent = [&mut old, &mut new].map(|front| {
+            let mut meter = Meter::unlimited(&clock);
+            front.start(&a, &b, &pos12, Search::Carried);
+            assert!(front.advance(&a, &b, Goal::Contacts, u64::MAX, &mut meter));
+            meter.spent()
+        });
+        assert_eq!(spent[0], spent[1]);
+        assert_eq!(old.interval(), new.interval());
+        assert_eq!(old.contacts().len(), new.contacts().len());
+    }
+}
+
+#[test]
+fn a_coherent_front_costs_a_fraction_of_starting_again() {
+    let a = shape(&meshes::bumpy_sphere(24, 30, 0.1), None);
+    let b = shape(&meshes::torus(1.0, 0.3, 24, 16), None);
+    let clock = ManualClock::new(0);
+    let mut spent = [0, 0];
+    for (search, spent) in [Search::Carried, Search::Restart]
+        .into_iter()
+        .zip(&mut spent)
+    {
+        let mut front = CarriedFront::default();
+        for tick in 0..200 {
+            let at = 2.35 + 0.002 * f64::from(tick % 20);
+            let pose = Pose::new(Vec3::new(at, 0.1, 0.2), Vec3::new(0.3, 0.2, 0.1));
+            if tick == 0 {
+                front.start(&a, &b, &pose, search);
+            } else {
+                front.move_to(&a, &b, &pose);
+            }
+            let mut meter = Meter::unlimited(&clock);
+            assert!(front.advance(&a, &b, Goal::Verdict, u64::MAX, &mut meter));
+            *spent += meter.spent();
+        }
+    }
+    assert!(
+        spent[0] * 4 < spent[1],
+        "carried {} restart {}",
+        spent[0],
+        spent[1]
+    );
+}
