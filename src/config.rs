@@ -17,6 +17,38 @@ pub enum Mode {
     Rate(f64),
 }
 
+impl Mode {
+    /// `on_all`, `on_frame=SOURCE` or `rate=HZ`, as flags and parameters say it.
+    ///
+    /// # Errors
+    /// One text that says what to write.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        match text.split_once('=') {
+            None if text == "on_all" => Ok(Self::OnAll),
+            Some(("on_frame", source)) if !source.is_empty() => {
+                Ok(Self::OnFrame(source.to_owned()))
+            }
+            Some(("rate", hertz)) => match hertz.parse::<f64>() {
+                Ok(hertz) if hertz > 0.0 && hertz <= 1e6 => Ok(Self::Rate(hertz)),
+                _ => Err(format!(
+                    "`{hertz}` is no rate: write hertz above 0, such as rate=100"
+                )),
+            },
+            _ => Err("write on_all, on_frame=SOURCE or rate=HZ".to_owned()),
+        }
+    }
+}
+
+impl std::fmt::Display for Mode {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::OnFrame(source) => write!(f, "on_frame={source}"),
+            Self::OnAll => f.write_str("on_all"),
+            Self::Rate(hertz) => write!(f, "rate={hertz}"),
+        }
+    }
+}
+
 /// What happens to a body that is too old.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -238,18 +238,7 @@ fn nanoseconds(text: &str) -> Result<u64, String> {
 }
 
 fn mode(text: &str) -> Result<crate::config::Mode, String> {
-    use crate::config::Mode;
-    match text.split_once('=') {
-        None if text == "on_all" => Ok(Mode::OnAll),
-        Some(("on_frame", source)) if !source.is_empty() => Ok(Mode::OnFrame(source.to_owned())),
-        Some(("rate", hertz)) => match hertz.parse::<f64>() {
-            Ok(hertz) if hertz > 0.0 && hertz <= 1e6 => Ok(Mode::Rate(hertz)),
-            _ => Err(format!(
-                "`{hertz}` is no rate: write hertz above 0, such as rate=100"
-            )),
-        },
-        _ => Err("write on_all, on_frame=SOURCE or rate=HZ".to_owned()),
-    }
+    crate::config::Mode::parse(text)
 }
 
 #[cfg(test)]

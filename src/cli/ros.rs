@@ -4,6 +4,10 @@
 
 use std::ffi::OsString;
 
+#[cfg(feature = "ros2")]
+use std::sync::Arc;
+
+use crate::daemon::Shapes;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::transport::Door;
@@ -15,6 +19,8 @@ use super::args::RunArgs;
 use crate::transport::ros2::{
     RosBody, RosNode, RosOptions, RosScene, RosSourceSpec, args::RosArgs, env::Network,
 };
+#[cfg(feature = "ros2")]
+use crate::world::PlacedShape;
 
 /// The node, where one was asked for.
 #[cfg(feature = "ros2")]
@@ -62,10 +68,6 @@ impl Asked {
             };
         }
         let ros_args = RosArgs::parse(ros_words.unwrap_or_default()).map_err(Error::Usage)?;
-        if !ros_args.params.is_empty() {
-            let text = "--ros-args: this node has no parameters: leave out -p and --params-file, and write the scene's [run] table";
-            return Err(Error::Usage(text.to_owned()));
-        }
         let network = Network::read(args.ros_domain_id, |name| std::env::var(name).ok())
             .map_err(Error::Usage)?;
         Ok(Self {
@@ -82,7 +84,13 @@ impl Asked {
     }
 
     /// Opens the node.
-    pub(super) fn open(self, scene: &Scene, place: &Place, boot_id: u64) -> Result<Option<Node>> {
+    pub(super) fn open(
+        self,
+        scene: &Scene,
+        shapes: &Shapes,
+        place: &Place,
+        boot_id: u64,
+    ) -> Result<Option<Node>> {
         let Some((args, network)) = self.node else {
             return Ok(None);
         };
@@ -93,7 +101,12 @@ impl Asked {
             session: crate::transport::client::random_u64()?,
         };
         let waker = crate::transport::iceoryx::Waker::new(place)?;
-        RosNode::open(&options, &cast(scene), Box::new(move || waker.wake())).map(Some)
+        RosNode::open(
+            &options,
+            &cast(scene, shapes),
+            Box::new(move || waker.wake()),
+        )
+        .map(Some)
     }
 }
 
@@ -122,32 +135,43 @@ impl Asked {
     }
 
     /// There is none.
-    pub(super) fn open(self, _scene: &Scene, _place: &Place, _boot: u64) -> Result<Option<Node>> {
+    pub(super) fn open(self, _: &Scene, _: &Shapes, _: &Place, _: u64) -> Result<Option<Node>> {
         Ok(None)
     }
 }
 
 /// What the node needs to know of a scene.
 #[cfg(feature = "ros2")]
-fn cast(scene: &Scene) -> RosScene {
+fn cast(scene: &Scene, shapes: &Shapes) -> RosScene {
     let source = |spec: &crate::scene::SourceSpec| RosSourceSpec {
         name: spec.name.clone(),
         timeout_ns: spec.timeout_ns,
         ros2: spec.ros2.clone(),
     };
-    let body = |spec: &crate::scene::BodySpec| RosBody {
+    let body = |(spec, placed): (&crate::scene::BodySpec, &Arc<[PlacedShape]>)| RosBody {
         id: spec.id.0,
         name: spec.name.clone(),
         source: spec.source,
         frame: spec.ros_frame.as_ref().unwrap_or(&spec.name).clone(),
         topic: spec.ros_topic.clone().unwrap_or_default(),
+        bounds: bounds(placed),
     };
     RosScene {
         frame_id: scene.frame_id.clone(),
-        heartbeat_ns: scene.config.heartbeat_ns,
+        config: scene.config.clone(),
         sources: scene.sources.iter().map(source).collect(),
-        bodies: scene.bodies.iter().map(body).collect(),
+        bodies: scene.bodies.iter().zip(&shapes.bodies).map(body).collect(),
     }
+}
+
+/// Centre and half extents of a body's box in its own frame; `None`: it has no end.
+#[cfg(feature = "ros2")]
+fn bounds(placed: &[PlacedShape]) -> Option<([f64; 3], [f64; 3])> {
+    let boxes = placed.iter().map(|p| p.shape.aabb_at(&p.pose));
+    let whole = boxes.reduce(|a, b| a.merged(&b))?;
+    let (centre, half) = (whole.centre(), whole.half_extents());
+    let finite = half.iter().all(|x| x.is_finite());
+    finite.then(|| ([centre.x, centre.y, centre.z], [half.x, half.y, half.z]))
 }
 
 fn needs_node(source: &str, mend: &str) -> Error {

@@ -41,7 +41,7 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     let mut server = Server::open(options)?;
     // Dead clients are cleaned up beside the tick, never in it.
     let _cleaner = spawn_cleaner(&place)?;
-    let mut node = asked.open(&scene, &place, boot_id)?;
+    let mut node = asked.open(&scene, &shapes, &place, boot_id)?;
     let mut both;
     let door: &mut dyn Door = match ros::door(&mut node) {
         Some(node) => {

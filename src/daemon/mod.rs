@@ -3,6 +3,7 @@
 //! In: a scene, a [`Door`], a stop flag. Out: ticks, until told to stop.
 
 mod builder;
+mod settings;
 mod shapes;
 mod watchdog;
 
@@ -39,6 +40,8 @@ pub struct Daemon<'a> {
     arrived: Inbox,
     due: Inbox,
     ready: Vec<EditBatch>,
+    /// A tick is wanted at once.
+    tick_asked: bool,
     /// Raised each round, and each heartbeat of a long tick.
     progress: Arc<AtomicU64>,
 }
@@ -73,6 +76,7 @@ impl<'a> Daemon<'a> {
             arrived: Inbox::default(),
             due: Inbox::default(),
             ready: Vec::new(),
+            tick_asked: false,
             progress: Arc::default(),
         })
     }
@@ -108,8 +112,9 @@ impl<'a> Daemon<'a> {
         let woke_ns = self.clock.monotonic_ns();
         self.progress.fetch_add(1, Ordering::Relaxed);
         self.receive()?;
+        self.apply_settings();
         let (now_ns, timeout_ns) = (self.clock.boottime_ns(), self.engine.world().next_timeout());
-        let edits = !self.ready.is_empty();
+        let edits = std::mem::take(&mut self.tick_asked) || !self.ready.is_empty();
         match self.pacer.due(now_ns, edits, timeout_ns, &mut self.due) {
             Some(due) => self.tick(due, woke_ns)?,
             None => self.door.housekeeping(),

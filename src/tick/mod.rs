@@ -138,6 +138,11 @@ impl Engine {
         self.out.plan_changed = false;
     }
 
+    /// Sets the time-out of a source, by its place; it holds from its next frame on.
+    pub fn set_timeout(&mut self, source: usize, timeout_ns: u64) {
+        self.world.set_timeout(source, timeout_ns);
+    }
+
     /// Frames of a source that were passed over for newer ones; `None`: of no source of the scene.
     pub fn note_skipped(&mut self, source: Option<SourceSlot>, frames: u64) {
         match source {

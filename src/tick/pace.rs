@@ -78,20 +78,8 @@ impl Pacer {
     /// # Errors
     /// `Error::Usage` when the mode names no source of the scene, or its rate is no positive number.
     pub fn new(config: &Config, sources: &[SourceSpec]) -> Result<Self> {
-        let beat = match &config.mode {
-            Mode::OnFrame(name) => {
-                let place = sources.iter().position(|s| s.name == *name);
-                Beat::OnFrame(place.ok_or_else(|| no_such_source(name, sources))?)
-            }
-            Mode::OnAll => Beat::OnAll {
-                since_ns: None,
-                late_ns: config.late_ns,
-            },
-            Mode::Rate(hz) => Beat::Rate {
-                period_ns: period_ns(*hz)?,
-                next_ns: None,
-            },
-        };
+        let names: Vec<&str> = sources.iter().map(|s| &*s.name).collect();
+        let beat = beat_of(config, &names)?;
         let source = |spec: &SourceSpec| Source {
             name: name_bytes(&spec.name),
             timeout_ns: spec.timeout_ns,
@@ -110,6 +98,24 @@ impl Pacer {
             passed_of_none: 0,
             last_tick_ns: None,
         })
+    }
+
+    /// Changes the mode; frames that wait are kept for the next tick.
+    ///
+    /// # Errors
+    /// As [`Pacer::new`]; the mode then stays as it is.
+    pub fn set_mode(&mut self, config: &Config) -> Result<()> {
+        let names = self.sources.iter();
+        let names: Vec<&str> = names.map(|s| name_str(&s.name).unwrap_or("")).collect();
+        self.beat = beat_of(config, &names)?;
+        Ok(())
+    }
+
+    /// Sets the time-out of a source, by its place.
+    pub fn set_timeout(&mut self, source: usize, timeout_ns: u64) {
+        if let Some(source) = self.sources.get_mut(source) {
+            source.timeout_ns = timeout_ns;
+        }
     }
 
     /// Takes everything out of an inbox and leaves it empty.
@@ -326,12 +332,28 @@ fn slot(place: usize) -> SourceSlot {
     SourceSlot(u32::try_from(place).unwrap_or(u32::MAX))
 }
 
-fn no_such_source(name: &str, sources: &[SourceSpec]) -> Error {
-    let names: Vec<&str> = sources.iter().map(|s| &*s.name).collect();
-    let names = if names.is_empty() {
+fn beat_of(config: &Config, sources: &[&str]) -> Result<Beat> {
+    Ok(match &config.mode {
+        Mode::OnFrame(name) => {
+            let place = sources.iter().position(|own| own == name);
+            Beat::OnFrame(place.ok_or_else(|| no_such_source(name, sources))?)
+        }
+        Mode::OnAll => Beat::OnAll {
+            since_ns: None,
+            late_ns: config.late_ns,
+        },
+        Mode::Rate(hz) => Beat::Rate {
+            period_ns: period_ns(*hz)?,
+            next_ns: None,
+        },
+    })
+}
+
+fn no_such_source(name: &str, sources: &[&str]) -> Error {
+    let names = if sources.is_empty() {
         "none".to_owned()
     } else {
-        names.join(", ")
+        sources.join(", ")
     };
     Error::Usage(format!(
         "mode `on_frame`: the scene has no source `{name}`; it has {names}"

@@ -1,6 +1,6 @@
 //! Two doors as one: the one that is waited on, and one beside it whose threads wake the first.
 
-use super::{Door, RequestToken, Wake};
+use super::{Door, RequestToken, Setting, Wake};
 use crate::error::Result;
 use crate::time::Clock;
 use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow};
@@ -70,6 +70,11 @@ impl Door for Both<'_> {
             self.beside
                 .answer(RequestToken(token.0 & !BESIDE), ok, json)
         }
+    }
+
+    fn settings(&mut self, take: &mut dyn FnMut(Setting)) {
+        self.first.settings(take);
+        self.beside.settings(take);
     }
 
     fn housekeeping(&mut self) {

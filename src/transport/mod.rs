@@ -17,6 +17,7 @@ pub mod ros2;
 pub use both::Both;
 pub use hello::ICEORYX2_VERSION;
 
+use crate::config::Mode;
 use crate::error::Result;
 use crate::time::Clock;
 use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow};
@@ -44,6 +45,28 @@ pub struct Wake {
 /// A request that waits for its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct RequestToken(pub u64);
+
+/// What an operator set while the daemon runs; applied between two ticks.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Setting {
+    /// Time a tick may take, nanoseconds; `None`: no limit.
+    BudgetTime(Option<u64>),
+    /// Work units a tick may take; `None`: no limit.
+    BudgetUnits(Option<u64>),
+    /// What makes a tick.
+    Mode(Mode),
+    /// Time-out of a source, by its place.
+    Timeout {
+        /// Place of the source in the scene.
+        source: usize,
+        /// Nanoseconds.
+        timeout_ns: u64,
+    },
+    /// A tick at once.
+    TickNow,
+    /// Time went back for all: every pair ends, bodies that move are not received again.
+    Reset,
+}
 
 /// The daemon's side of a transport.
 ///
@@ -88,6 +111,9 @@ pub trait Door {
     /// # Errors
     /// `Error::Io` when the answer could not be handed over.
     fn answer(&mut self, token: RequestToken, ok: bool, json: &str) -> Result<()>;
+
+    /// Hands over what was set since the last call; a door without an operator has nothing.
+    fn settings(&mut self, _take: &mut dyn FnMut(Setting)) {}
 
     /// Lets late joiners have the newest state, forgets requests of clients that left. Cheap; each idle round.
     fn housekeeping(&mut self);

@@ -108,6 +108,15 @@ impl SourceState {
     }
 }
 
+impl super::World {
+    /// Sets the time-out of a source; the ages of what it has sent already are judged by the old one.
+    pub fn set_timeout(&mut self, source: usize, timeout_ns: u64) {
+        if let Some(state) = self.sources.get_mut(source) {
+            state.timeout_ns = timeout_ns;
+        }
+    }
+}
+
 /// What a frame's session and number mean for its source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Standing {

@@ -5,18 +5,21 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use ros2_client::{Gid, MessageInfo, Subscription};
-use rustdds::mio1::{Events, Interest, Poll, Token, Waker};
+use ros2_client::{MessageInfo, Subscription};
+use rustdds::mio1::{Events, Poll, Token, Waker};
 use serde::de::DeserializeOwned;
 
+use super::lines::{Feeder, Line};
 use super::poses::{Receipt, Source};
+use super::services::Services;
 use super::shared::Shared;
 use super::shelf::{Shelf, Update};
 use super::speak::Book;
 use crate::error::{Error, Result};
 use crate::limits::FRAME_ROWS_MAX;
 use crate::time::{Clock as _, SystemClock};
-use crate::wire::ros::{BodyTransforms, Odometry, PoseStamped, TfMessage, Twist};
+use crate::transport::Setting;
+use crate::wire::ros::{BodyTransforms, Twist};
 use crate::wire::{Frame, FrameHeader, RejectReason, TransformRow, WIRE_VERSION, name_bytes};
 
 /// Longest sleep: how soon the end, and chains that never change, are seen.
@@ -34,77 +37,19 @@ const FAULTS_MAX: usize = 10;
 /// Token of the waker.
 const WAKE: Token = Token(usize::MAX);
 
-/// A subscription and where its messages go.
-pub(super) enum Line {
-    /// `~/transforms`.
-    Transforms(Subscription<BodyTransforms>),
-    /// Links, for these sources.
-    Links {
-        /// The subscription.
-        from: Subscription<TfMessage>,
-        /// Whether they never change.
-        fixed: bool,
-        /// Places of the sources.
-        sources: Vec<usize>,
-    },
-    /// Poses of one body.
-    Pose(Subscription<PoseStamped>, Feeder),
-    /// Odometry of one body.
-    Odometry(Subscription<Odometry>, Feeder),
-}
-
-/// Whose topic it is, and who sends on it.
-#[derive(Clone, Debug)]
-pub(super) struct Feeder {
-    /// Place of the source.
-    pub(super) source: usize,
-    /// Place of the body among those of its source.
-    pub(super) member: usize,
-    /// The topic's full name.
-    pub(super) topic: String,
-    /// The two publishers last heard, and when, nanoseconds of `CLOCK_BOOTTIME`.
-    pub(super) heard: [Option<(Gid, u64)>; 2],
-}
-
-impl Feeder {
-    fn hear(&mut self, info: &MessageInfo, now_ns: u64) {
-        let gid = info.publisher_gid();
-        let [first, second] = &mut self.heard;
-        match first {
-            Some((own, at)) if *own == gid => *at = now_ns,
-            _ => {
-                *second = first.take();
-                *first = Some((gid, now_ns));
-            }
-        }
-    }
-
-    /// Two publishers within a second: the body would jump between them.
-    fn fault(&self, now_ns: u64) -> Option<String> {
-        let fresh = |heard: &Option<(Gid, u64)>| {
-            heard.is_some_and(|(_, at)| now_ns.saturating_sub(at) < 1_000_000_000)
-        };
-        self.heard.iter().all(fresh).then(|| {
-            format!(
-                "topic {}: two publishers send poses of one body: stop one of them",
-                self.topic
-            )
-        })
-    }
-}
-
 /// The receiving thread's own things.
 pub(super) struct Inlet {
-    pub(super) lines: Vec<Line>,
-    pub(super) sources: Vec<Source>,
-    pub(super) shelf: Arc<Shelf>,
-    pub(super) shared: Arc<Shared>,
+    lines: Vec<Line>,
+    services: Services,
+    sources: Vec<Source>,
+    shelf: Arc<Shelf>,
+    shared: Arc<Shared>,
     /// Wakes the tick thread.
-    pub(super) wake: Box<dyn Fn() + Send>,
+    wake: Box<dyn Fn() + Send>,
     /// The scene's frame.
-    pub(super) frame_id: String,
+    frame_id: String,
     /// The daemon's heartbeat: a longer silence of this loop means that the process stood still, nanoseconds.
-    pub(super) heartbeat_ns: u64,
+    heartbeat_ns: u64,
     poll: Poll,
     updates: Vec<Update>,
     looked_ns: u64,
@@ -119,7 +64,7 @@ impl Inlet {
     /// # Errors
     /// `Error::Io` when there is no descriptor left.
     pub(super) fn new(
-        mut lines: Vec<Line>,
+        (mut lines, mut services): (Vec<Line>, Services),
         sources: Vec<Source>,
         shelf: Arc<Shelf>,
         shared: Arc<Shared>,
@@ -130,17 +75,14 @@ impl Inlet {
         let poll = Poll::new().map_err(failed)?;
         let waker = Waker::new(poll.registry(), WAKE).map_err(failed)?;
         for (at, line) in lines.iter_mut().enumerate() {
-            let (registry, token) = (poll.registry(), Token(at));
-            match line {
-                Line::Transforms(from) => registry.register(from, token, Interest::READABLE),
-                Line::Links { from, .. } => registry.register(from, token, Interest::READABLE),
-                Line::Pose(from, _) => registry.register(from, token, Interest::READABLE),
-                Line::Odometry(from, _) => registry.register(from, token, Interest::READABLE),
-            }
-            .map_err(failed)?;
+            line.register(poll.registry(), Token(at)).map_err(failed)?;
         }
+        services
+            .register(poll.registry(), Token(lines.len()))
+            .map_err(failed)?;
         let inlet = Self {
             lines,
+            services,
             sources,
             shelf,
             shared,
@@ -181,6 +123,10 @@ impl Inlet {
 
     /// Takes what is there; whether there may be more.
     fn round(&mut self, receipt: Receipt) -> bool {
+        for source in &mut self.sources {
+            let timeout_ns = self.shared.timeout_ns(source.place);
+            source.set_limits(timeout_ns, self.shared.max_skew_ns());
+        }
         let (mut came, mut more) = (false, false);
         for at in 0..self.lines.len() {
             let (some, rest) = self.take(at, receipt);
@@ -188,6 +134,7 @@ impl Inlet {
             more |= rest;
         }
         came |= self.look(receipt);
+        came |= self.services.round(&self.shared.desk, &self.shared);
         if came {
             (self.wake)();
         }
@@ -206,31 +153,35 @@ impl Inlet {
             shelf,
             shared,
             frame_id,
-            updates,
             frame_fault,
             ..
         } = self;
         let Some(line) = lines.get_mut(at) else {
             return (false, false);
         };
-        updates.clear();
         match line {
+            Line::Clock(from) => {
+                let mut back = false;
+                let taken = drain(from, shared, |message, _| {
+                    back |= shared.tick_clock(message.clock)
+                });
+                if back {
+                    for (place, source) in sources.iter_mut().enumerate() {
+                        source.forget();
+                        shelf.reset(place);
+                    }
+                    shared.set(Setting::Reset);
+                }
+                taken
+            }
             Line::Transforms(from) => {
                 let book = shared.book();
                 drain(from, shared, |message, _| {
-                    let foreign = !message.header.frame_id.is_empty()
-                        && message.header.frame_id.trim_start_matches('/') != frame_id;
-                    if foreign {
-                        let text = format!(
-                            "frames of source {} are in \"{}\", not in the scene's frame \"{frame_id}\": they are refused",
-                            message.source, message.header.frame_id
-                        );
-                        shared.note_refused(1);
-                        *frame_fault = Some((text, receipt.now_ns));
-                    }
                     let mut frame = shelf.spare();
                     fill(&mut frame, &message, &book, receipt);
-                    if foreign {
+                    if let Some(fault) = foreign(&message, frame_id) {
+                        shared.note_refused(1);
+                        *frame_fault = Some((fault, receipt.now_ns));
                         frame.refused = Some(RejectReason::BadChain);
                     }
                     shelf.put(frame);
@@ -252,27 +203,15 @@ impl Inlet {
             }),
             Line::Pose(from, feeder) => drain(from, shared, |message, info| {
                 feeder.hear(info, receipt.now_ns);
-                let Some(source) = sources.get_mut(feeder.source) else {
-                    return;
-                };
-                updates.clear();
-                if source.take_pose(feeder.member, &message, receipt, updates) {
-                    shelf.reset(feeder.source);
-                    shared.say_back(&source_name(source));
-                }
-                shelf.merge(feeder.source, updates);
+                take_one(sources, shelf, shared, feeder, |source, updates| {
+                    source.take_pose(feeder.member, &message, receipt, updates)
+                });
             }),
             Line::Odometry(from, feeder) => drain(from, shared, |message, info| {
                 feeder.hear(info, receipt.now_ns);
-                let Some(source) = sources.get_mut(feeder.source) else {
-                    return;
-                };
-                updates.clear();
-                if source.take_odometry(feeder.member, &message, receipt, updates) {
-                    shelf.reset(feeder.source);
-                    shared.say_back(&source_name(source));
-                }
-                shelf.merge(feeder.source, updates);
+                take_one(sources, shelf, shared, feeder, |source, updates| {
+                    source.take_odometry(feeder.member, &message, receipt, updates)
+                });
             }),
         }
     }
@@ -301,17 +240,44 @@ impl Inlet {
         let fresh = |(_, at): &(String, u64)| now_ns.saturating_sub(*at) < 4 * FAULTS_NS;
         all.extend(self.frame_fault.take_if(|fault| !fresh(fault)).and(None));
         all.extend(self.frame_fault.as_ref().map(|(text, _)| text.clone()));
-        for line in &self.lines {
-            if let Line::Pose(_, feeder) | Line::Odometry(_, feeder) = line {
-                all.extend(feeder.fault(now_ns));
-            }
-        }
+        let feeders = self.lines.iter().filter_map(Line::feeder);
+        all.extend(feeders.filter_map(|feeder| feeder.fault(now_ns)));
         for source in &self.sources {
             all.extend(source.faults(FAULTS_MAX));
         }
         all.truncate(FAULTS_MAX);
         self.shared.set_faults(all);
     }
+}
+
+/// What is wrong with a frame that is not in the scene's frame.
+fn foreign(message: &BodyTransforms, frame_id: &str) -> Option<String> {
+    let given = message.header.frame_id.trim_start_matches('/');
+    (!given.is_empty() && given != frame_id).then(|| {
+        format!(
+            "frames of source {} are in \"{given}\", not in the scene's frame \"{frame_id}\": they are refused",
+            message.source
+        )
+    })
+}
+
+/// Takes a message of one body.
+fn take_one(
+    sources: &mut [Source],
+    shelf: &Shelf,
+    shared: &Shared,
+    feeder: &Feeder,
+    take: impl FnOnce(&mut Source, &mut Vec<Update>) -> bool,
+) {
+    let Some(source) = sources.get_mut(feeder.source) else {
+        return;
+    };
+    let mut updates = Vec::new();
+    if take(source, &mut updates) {
+        shelf.reset(feeder.source);
+        shared.say_back(&source_name(source));
+    }
+    shelf.merge(feeder.source, &updates);
 }
 
 fn source_name(source: &Source) -> String {

@@ -13,12 +13,16 @@ pub mod args;
 mod diagnose;
 pub mod env;
 mod inlet;
+mod lines;
+mod markers;
 pub mod names;
 mod node;
 mod outlet;
+mod params;
 pub mod params_file;
 mod parcel;
 mod poses;
+mod services;
 mod shared;
 mod shelf;
 mod sockets;
@@ -28,15 +32,15 @@ mod topics;
 
 pub use node::{RosNode, RosOptions};
 
-use crate::config::RosSource;
+use crate::config::{Config, RosSource};
 
 /// What the node needs to know of a scene.
 #[derive(Clone, Debug, Default)]
 pub struct RosScene {
     /// The scene's frame.
     pub frame_id: String,
-    /// The daemon's heartbeat, nanoseconds.
-    pub heartbeat_ns: u64,
+    /// How the daemon runs at the start.
+    pub config: Config,
     /// Its sources, in its order.
     pub sources: Vec<RosSourceSpec>,
     /// Its bodies.
@@ -67,4 +71,6 @@ pub struct RosBody {
     pub frame: String,
     /// Its topic; empty: none.
     pub topic: String,
+    /// Centre and half extents of its box in its own frame, metres; `None`: it has no end.
+    pub bounds: Option<([f64; 3], [f64; 3])>,
 }

@@ -1,43 +1,41 @@
 //! The node as the daemon sees it: opened on the daemon's thread, a [`Door`] beside the one of shared memory, closed
 //! in the order that takes its name out of the graph at once.
 
-use std::net::Ipv4Addr;
+mod make;
+
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 
-use ros2_client::{Context, Node, NodeName, NodeOptions, RosoutRaw as _};
-use rustdds::DomainParticipantBuilder;
+use make::{join, make, namesakes, said};
+use ros2_client::{Context, Node, RosoutRaw as _, Spinner};
 use rustdds::mio1::Waker;
 
 use super::args::RosArgs;
 use super::diagnose::Diagnoser;
 use super::env::{Network, Range};
-use super::inlet::{Feeder, Inlet, Line};
+use super::inlet::Inlet;
+use super::lines::subscribe;
 use super::names::Names;
-use super::outlet::{Outlet, Publishers};
-use super::parcel::{Caps, Parcels};
+use super::outlet::{Outlet, Publishers, Read};
+use super::params::Table;
+use super::parcel::Parcels;
 use super::poses::Source;
+use super::services::{Services, open};
 use super::shared::{Say, Shared};
 use super::shelf::Shelf;
 use super::sockets;
 use super::speak::{Book, Speaker};
-use super::topics::{In, TypeName, subscription};
 use super::{RosBody, RosScene};
-use crate::config::RosKind;
 use crate::error::{Error, Result};
 use crate::time::Clock;
-use crate::transport::{Door, RequestToken, Wake};
-use crate::wire::{BODY_NAME_LEN, Demand, Inbox, NameRow, Outbox, RequestHeader, TickRow};
+use crate::transport::{Door, RequestToken, Setting as Applied, Wake};
+use crate::wire::{
+    Answer, BODY_NAME_LEN, Demand, Inbox, NameRow, Outbox, RequestHeader, TickRow, WIRE_VERSION,
+};
 
 /// The node's name where nobody says another.
 const NODE_NAME: &str = "sweepd";
-/// Rows a tick: two messages of contacts, a tenth of what two cores can send at 100 Hz.
-const CAPS: Caps = Caps {
-    pairs: 1000,
-    contacts: 500,
-};
-
 /// How the node opens.
 #[derive(Clone, Debug)]
 pub struct RosOptions {
@@ -64,6 +62,8 @@ pub struct RosNode {
     sending: Option<JoinHandle<()>>,
     spinning: Option<JoinHandle<()>>,
     demand: Demand,
+    /// Who waits for the next tick.
+    ticks_asked: Vec<u64>,
 }
 
 impl std::fmt::Debug for RosNode {
@@ -88,49 +88,50 @@ impl RosNode {
         wake: Box<dyn Fn() + Send>,
     ) -> Result<Self> {
         let mut names = Names::new(&options.args, NODE_NAME).map_err(Error::Usage)?;
-        let context = join(options.network)?;
-        let name = NodeName::new(names.namespace(), names.node())
-            .map_err(|e| Error::Usage(format!("--ros-args: {}: {e}", names.full_node())))?;
-        let rosout = options.args.rosout != Some(false);
-        let mut node = context
-            .new_node(name, NodeOptions::new().enable_rosout(rosout))
-            .map_err(|e| {
-                Error::io(
-                    format!("ROS 2: node {} cannot be made", names.full_node()),
-                    e,
-                )
-            })?;
+        let mut table = Table::of(scene);
+        let unknown = table
+            .start(&said(&options.args)?, &names.full_node())
+            .map_err(Error::Usage)?;
+        let table = Arc::new(table);
+        let least = match options.args.log_level.as_deref() {
+            None | Some("debug" | "info") => Say::Info,
+            Some(_) => Say::Warn,
+        };
+        let book = Book::of(&first_names(scene));
+        let timeouts_ns: Vec<u64> = scene.sources.iter().map(|s| s.timeout_ns).collect();
+        let shared = Arc::new(Shared::new(names.node(), book.clone(), &timeouts_ns, least));
 
+        let context = join(options.network)?;
+        let mut node = make(options, &context, &names, &table, &shared)?;
         let sources = Source::of(scene);
         let shelf = Arc::new(Shelf::default());
         for source in &sources {
             shelf.add_group(source.name, options.session, source.bodies());
         }
-        let book = Book::of(&first_names(scene));
-        let least = match options.args.log_level.as_deref() {
-            None | Some("debug" | "info") => Say::Info,
-            Some(_) => Say::Warn,
-        };
-        let shared = Arc::new(Shared::new(names.node(), book.clone(), CAPS, least));
-        let heartbeat_ns = scene.heartbeat_ns;
-        let publishers = Publishers::create(&mut node, &context, &mut names, heartbeat_ns, true)?;
+        let heartbeat_ns = scene.config.heartbeat_ns;
+        let reliable = table.is_word("out_reliability", "reliable");
+        let publishers =
+            Publishers::create(&mut node, &context, &mut names, heartbeat_ns, reliable)?;
         let lines = subscribe(&mut node, &context, &mut names, &sources)?;
+        let services = Services::create(&mut node, &mut names, table.flag("ros.allow_edits"))?;
         shared.set_rosout(Some(node.rosout_writer()));
         let spinner = node
             .spinner()
             .map_err(|e| Error::io("ROS 2: the node cannot spin", e))?;
+        let namesakes = namesakes(&node, &context);
+        table.run();
 
         let node = Arc::new(node);
         let parcels = Arc::new(Parcels::default());
-        let place = (scene.frame_id.clone(), heartbeat_ns);
         let (inlet, waker) = Inlet::new(
-            lines,
+            (lines, services),
             sources,
             Arc::clone(&shelf),
             Arc::clone(&shared),
             wake,
-            place,
+            (scene.frame_id.clone(), heartbeat_ns),
         )?;
+        let boxes = scene.bodies.iter();
         let outlet = Outlet {
             node: Arc::clone(&node),
             publishers,
@@ -144,6 +145,10 @@ impl RosNode {
             name: names.full_node(),
             diagnoser: Diagnoser::default(),
             told: (TickRow::default(), 0),
+            shown_ns: 0,
+            boxes: boxes.filter_map(|b| Some((b.id, b.bounds?))).collect(),
+            read: Read::default(),
+            namesakes,
         };
         let mut open = Self {
             shelf,
@@ -156,16 +161,25 @@ impl RosNode {
             sending: None,
             spinning: None,
             demand: Demand::default(),
+            ticks_asked: Vec::new(),
         };
-        open.spinning = Some(thread("ros-spin", move || {
+        open.start(spinner, inlet, outlet)?;
+        open.greet(options.network, &names);
+        for text in unknown {
+            open.shared.say(Say::Warn, &text);
+        }
+        Ok(open)
+    }
+
+    fn start(&mut self, spinner: Spinner, inlet: Inlet, outlet: Outlet) -> Result<()> {
+        self.spinning = Some(thread("ros-spin", move || {
             if let Err(e) = futures_executor::block_on(spinner.spin()) {
                 tracing::error!("ROS 2: parameters are not answered any more: {e}");
             }
         })?);
-        open.sending = Some(thread("ros-tx", move || outlet.run())?);
-        open.receiving = Some(thread("ros-rx", move || inlet.run())?);
-        open.greet(options.network, &names);
-        Ok(open)
+        self.sending = Some(thread("ros-tx", move || outlet.run())?);
+        self.receiving = Some(thread("ros-rx", move || inlet.run())?);
+        Ok(())
     }
 
     /// Says where the node is, and what opens it.
@@ -220,30 +234,6 @@ impl Drop for RosNode {
     }
 }
 
-/// Joins the DDS domain, on this host or on all its networks.
-fn join(network: Network) -> Result<Context> {
-    let failed = |e: &dyn std::fmt::Display| {
-        Error::Refused(format!(
-            "ROS 2: domain {} cannot be joined: {e}",
-            network.domain
-        ))
-    };
-    let builder = DomainParticipantBuilder::new(network.domain);
-    let builder = match network.range {
-        Range::Localhost => builder.with_only_networks([Ipv4Addr::LOCALHOST]),
-        Range::Subnet => builder,
-    };
-    let participant = builder.build().map_err(|e| failed(&e))?;
-    if network.range == Range::Localhost {
-        sockets::bind_to_loopback().map_err(|why| {
-            Error::Refused(format!(
-                "ROS 2: the node cannot be kept on this host: {why}; set ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET to let it onto the network"
-            ))
-        })?;
-    }
-    Context::from_domain_participant(participant).map_err(|e| failed(&e))
-}
-
 /// The names before the first tick says them.
 fn first_names(scene: &RosScene) -> Vec<NameRow> {
     let row = |body: &RosBody| {
@@ -259,82 +249,6 @@ fn first_names(scene: &RosScene) -> Vec<NameRow> {
         }
     };
     scene.bodies.iter().map(row).collect()
-}
-
-/// Frames of a client: lockstep wants each of them.
-const FRAMES: In = In {
-    reliable: false,
-    latched: false,
-    depth: 16,
-};
-const LINKS: In = In {
-    reliable: false,
-    latched: false,
-    depth: 100,
-};
-const FIXED_LINKS: In = In {
-    reliable: true,
-    latched: true,
-    depth: 100,
-};
-const POSES: In = In {
-    reliable: false,
-    latched: false,
-    depth: 1,
-};
-const TF: TypeName = ("tf2_msgs", "TFMessage");
-
-/// Subscribes to what the scene needs, each topic once.
-fn subscribe(
-    node: &mut Node,
-    context: &Context,
-    names: &mut Names,
-    sources: &[Source],
-) -> Result<Vec<Line>> {
-    let own = names.claim("~/transforms").map_err(Error::Usage)?;
-    let kind = ("sweepd_msgs", "BodyTransforms");
-    let own = subscription(node, context, (&own, kind), FRAMES)?;
-    let mut lines = vec![Line::Transforms(own)];
-    let mut trees: Vec<(String, bool, Vec<usize>)> = Vec::new();
-    for (place, source) in sources.iter().enumerate() {
-        let topic = |full: &str| names.resolve(full).map_err(Error::Usage);
-        if source.kind == RosKind::Tf {
-            for (given, fixed) in [(&source.topic, false), (&source.static_topic, true)] {
-                let full = topic(given)?;
-                match trees.iter_mut().find(|(known, ..)| *known == full) {
-                    Some((.., places)) => places.push(place),
-                    None => trees.push((full, fixed, vec![place])),
-                }
-            }
-            continue;
-        }
-        for (member, given) in source.topics().enumerate() {
-            let feeder = Feeder {
-                source: place,
-                member,
-                topic: topic(given)?,
-                heard: [None, None],
-            };
-            let full = feeder.topic.clone();
-            lines.push(if source.kind == RosKind::Pose {
-                let kind = ("geometry_msgs", "PoseStamped");
-                Line::Pose(subscription(node, context, (&full, kind), POSES)?, feeder)
-            } else {
-                let kind = ("nav_msgs", "Odometry");
-                Line::Odometry(subscription(node, context, (&full, kind), POSES)?, feeder)
-            });
-        }
-    }
-    for (full, fixed, sources) in trees {
-        let quality = if fixed { FIXED_LINKS } else { LINKS };
-        let from = subscription(node, context, (&full, TF), quality)?;
-        lines.push(Line::Links {
-            from,
-            fixed,
-            sources,
-        });
-    }
-    Ok(lines)
 }
 
 fn thread(name: &str, work: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>> {
@@ -362,6 +276,12 @@ impl Door for RosNode {
     fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
         let gone = self.parcels.put(outbox, self.demand, self.shared.caps());
         self.shared.note_unsent(gone);
+        if !self.ticks_asked.is_empty() {
+            let header = outbox.tick.header;
+            let ticked = self.ticks_asked.drain(..).map(|token| (token, header));
+            open(&self.shared.desk.ticked).extend(ticked);
+            let _gone_already = self.waker.wake();
+        }
         Ok(gone)
     }
 
@@ -370,10 +290,34 @@ impl Door for RosNode {
         Ok(())
     }
 
-    fn requests(&mut self, _take: &mut dyn FnMut(RequestToken, RequestHeader, &[u8])) {}
+    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, &[u8])) {
+        for (token, json) in std::mem::take(&mut *open(&self.shared.desk.asked)) {
+            let header = RequestHeader {
+                json_len: json.len() as u64,
+                request: token,
+                schema: WIRE_VERSION,
+                reserved: 0,
+            };
+            take(RequestToken(token), header, &json);
+        }
+    }
 
-    fn answer(&mut self, _token: RequestToken, _ok: bool, _json: &str) -> Result<()> {
-        Ok(())
+    fn answer(&mut self, token: RequestToken, _ok: bool, json: &str) -> Result<()> {
+        let answer: Answer = serde_json::from_str(json)
+            .map_err(|e| Error::io("ROS 2: an answer cannot be read", e))?;
+        open(&self.shared.desk.answered).push((token.0, answer));
+        self.waker
+            .wake()
+            .map_err(|e| Error::io("ROS 2: an answer cannot be handed over", e))
+    }
+
+    fn settings(&mut self, take: &mut dyn FnMut(Applied)) {
+        self.shared.take_settings().into_iter().for_each(&mut *take);
+        let asked = std::mem::take(&mut *open(&self.shared.desk.ticks));
+        if !asked.is_empty() {
+            self.ticks_asked.extend(asked);
+            take(Applied::TickNow);
+        }
     }
 
     fn housekeeping(&mut self) {}

@@ -10,9 +10,10 @@ use ros2_client::{Context, Node, Publisher};
 use serde::Serialize;
 
 use super::diagnose::Diagnoser;
+use super::markers::{Boxes, collisions, markers};
 use super::names::Names;
 use super::parcel::{Next, Parcel, Parcels};
-use super::shared::Shared;
+use super::shared::{Say, Shared};
 use super::speak::{Book, Speaker};
 use super::topics::{Out, publisher};
 use crate::error::{Error, Result};
@@ -37,6 +38,8 @@ pub(super) struct Publishers {
     contacts: Publisher<ros::Contacts>,
     names: Publisher<ros::Names>,
     diagnostics: Publisher<ros::DiagnosticArray>,
+    markers: Publisher<ros::MarkerArray>,
+    collisions: Publisher<ros::GzContacts>,
 }
 
 impl Publishers {
@@ -92,6 +95,21 @@ impl Publishers {
                 (&claim("~/names")?, ("sweepd_msgs", "Names")),
                 latched,
             )?,
+            markers: publisher(
+                node,
+                context,
+                (&claim("~/markers")?, ("visualization_msgs", "MarkerArray")),
+                Out {
+                    bytes: CHUNK_BYTES,
+                    ..Out::RELIABLE
+                },
+            )?,
+            collisions: publisher(
+                node,
+                context,
+                (&claim("~/collisions")?, ("ros_gz_interfaces", "Contacts")),
+                large,
+            )?,
             diagnostics: publisher(
                 node,
                 context,
@@ -133,6 +151,19 @@ pub(super) struct Outlet {
     pub(super) diagnoser: Diagnoser,
     /// The newest tick, and when diagnostics were last told, nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) told: (TickRow, u64),
+    /// When markers were last sent, nanoseconds of `CLOCK_BOOTTIME`.
+    pub(super) shown_ns: u64,
+    pub(super) boxes: Boxes,
+    pub(super) read: Read,
+    /// Tells of another node of this one's name.
+    pub(super) namesakes: Box<dyn FnMut() -> Option<String> + Send>,
+}
+
+/// What of the extras somebody listens to.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Read {
+    markers: bool,
+    collisions: bool,
 }
 
 impl Outlet {
@@ -141,6 +172,9 @@ impl Outlet {
         loop {
             self.look_who_listens();
             self.diagnose();
+            if let Some(text) = (self.namesakes)() {
+                self.shared.say(Say::Warn, &text);
+            }
             match self.parcels.next(SLEEP) {
                 Next::Stop => return,
                 Next::Nothing => {}
@@ -149,6 +183,7 @@ impl Outlet {
                         self.take_names(scene_rev, &rows);
                     }
                     self.send(&parcel);
+                    self.show(&parcel);
                     self.told.0 = parcel.tick;
                     self.parcels.give_back(*parcel);
                 }
@@ -156,14 +191,43 @@ impl Outlet {
         }
     }
 
-    fn look_who_listens(&self) {
+    fn look_who_listens(&mut self) {
         let out = &self.publishers;
+        let markers = self.shared.markers_period_ns().is_some()
+            && out.markers.get_subscription_count(&self.node) > 0;
+        let collisions =
+            self.shared.collisions() && out.collisions.get_subscription_count(&self.node) > 0;
+        let contacts = out.contacts.get_subscription_count(&self.node) > 0;
         self.shared.set_demand(Demand {
-            pairs: out.pairs.get_subscription_count(&self.node) > 0,
-            contacts: out.contacts.get_subscription_count(&self.node) > 0,
-            bodies: false,
+            pairs: markers || out.pairs.get_subscription_count(&self.node) > 0,
+            contacts: markers || collisions || contacts,
+            bodies: markers,
             body_verdicts: false,
         });
+        self.read = Read {
+            markers,
+            collisions,
+        };
+    }
+
+    /// Markers at their own rate, collisions each tick; where somebody listens.
+    fn show(&mut self, parcel: &Parcel) {
+        let out = &self.publishers;
+        if self.read.collisions && parcel.holds.contacts {
+            let header = self.speaker.header(parcel.tick.header.oldest_stamp_ns);
+            let message = collisions(header, &self.speaker.book, parcel);
+            self.publish(&out.collisions, message);
+        }
+        let Some(period_ns) = self.shared.markers_period_ns() else {
+            return;
+        };
+        let now_ns = SystemClock.boottime_ns();
+        let due = now_ns.saturating_sub(self.shown_ns) >= period_ns;
+        if self.read.markers && parcel.holds.bodies && due {
+            self.shown_ns = now_ns;
+            let message = markers(&self.speaker, parcel, &self.boxes, period_ns);
+            self.publish(&self.publishers.markers, message);
+        }
     }
 
     /// Once a second, where somebody listens.
@@ -176,7 +240,7 @@ impl Outlet {
             return;
         }
         *told_ns = now_ns;
-        let now = ros::Time::from_ns(SystemClock.realtime_ns());
+        let now = self.shared.now();
         let (counts, faults) = (self.shared.counts(), self.shared.faults());
         let message = self
             .diagnoser
@@ -188,7 +252,7 @@ impl Outlet {
         let book = Book::of(rows);
         self.shared.set_book(Arc::new(book.clone()));
         self.speaker.book = book;
-        let now = ros::Time::from_ns(SystemClock.realtime_ns());
+        let now = self.shared.now();
         for message in self.speaker.names(now, self.boot_id, scene_rev) {
             self.publish(&self.publishers.names, message);
         }
@@ -197,12 +261,12 @@ impl Outlet {
     /// Contacts and pairs first, the tick last: whoever has the tick has all that belongs to it.
     fn send(&self, parcel: &Parcel) {
         let out = &self.publishers;
-        if parcel.holds.contacts {
+        if parcel.holds.contacts && out.contacts.get_subscription_count(&self.node) > 0 {
             for message in self.speaker.contacts(parcel) {
                 self.publish(&out.contacts, message);
             }
         }
-        if parcel.holds.pairs {
+        if parcel.holds.pairs && out.pairs.get_subscription_count(&self.node) > 0 {
             for message in self.speaker.pairs(parcel) {
                 self.publish(&out.pairs, message);
             }

@@ -44,8 +44,12 @@ pub(super) struct Source {
     pub(super) name: [u8; SOURCE_NAME_LEN],
     pub(super) topic: String,
     pub(super) static_topic: String,
+    /// Its place in the scene.
+    pub(super) place: usize,
     timeout_ns: u64,
     max_skew_ns: u64,
+    /// `max_skew_ns` as the scene says it.
+    scene_skew_ns: u64,
     /// The scene's frame, by name and by its number in the tree.
     root: (String, usize),
     tree: Tree,
@@ -80,8 +84,10 @@ impl Source {
                 name: name_bytes(&spec.name),
                 topic: ros.topic.clone(),
                 static_topic: ros.static_topic.clone(),
+                place,
                 timeout_ns: spec.timeout_ns,
                 max_skew_ns: ros.max_skew_ns,
+                scene_skew_ns: ros.max_skew_ns,
                 members: members.collect(),
                 root: (scene.frame_id.clone(), root),
                 tree,
@@ -109,6 +115,12 @@ impl Source {
             Some(format!("body {}: {fault}", member.name))
         });
         faulty.take(most).collect()
+    }
+
+    /// Sets its time-out, and the widest skew of a chain (`None`: as the scene says).
+    pub(super) fn set_limits(&mut self, timeout_ns: u64, max_skew_ns: Option<u64>) {
+        self.timeout_ns = timeout_ns;
+        self.max_skew_ns = max_skew_ns.unwrap_or(self.scene_skew_ns);
     }
 
     /// The clock of all senders went back.

@@ -2,18 +2,22 @@
 //! and written in passing; no thread waits for another here.
 
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 use ros2_client::log::Log;
 use ros2_client::{Publisher, builtin_interfaces};
 
+use super::params::{Effect, Own};
 use super::parcel::Caps;
+use super::services::{Desk, open};
 use super::speak::{Book, Counts};
 use crate::time::SystemClock;
+use crate::transport::Setting;
 use crate::wire::Demand;
+use crate::wire::ros::Time;
 
-/// No chain of `/tf` has been looked at.
-const NO_SKEW: u64 = u64::MAX;
+/// Stands for no value.
+const NONE: u64 = u64::MAX;
 
 /// A level of `/rosout` and of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -34,6 +38,18 @@ pub(super) struct Shared {
     demand: AtomicU8,
     max_pairs: AtomicUsize,
     max_contacts: AtomicUsize,
+    max_skew_ns: AtomicU64,
+    /// Of each source of the scene, nanoseconds.
+    timeouts_ns: Vec<AtomicU64>,
+    markers: AtomicBool,
+    markers_period_ns: AtomicU64,
+    collisions: AtomicBool,
+    sim_time: AtomicBool,
+    /// The newest of `/clock`, nanoseconds; 0: none yet.
+    pub(super) sim_now_ns: AtomicU64,
+    /// For the tick thread.
+    settings: Mutex<Vec<Setting>>,
+    pub(super) desk: Desk,
     book: Mutex<Arc<Book>>,
     faults: Mutex<Vec<String>>,
     rosout: Mutex<Option<Arc<Option<Publisher<Log>>>>>,
@@ -51,28 +67,119 @@ impl std::fmt::Debug for Shared {
     }
 }
 
-fn open<T>(lock: &Mutex<T>) -> MutexGuard<'_, T> {
-    lock.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 impl Shared {
     /// For the node of this name.
-    pub(super) fn new(node: &str, book: Book, caps: Caps, least: Say) -> Self {
+    ///
+    /// * `timeouts_ns` - of each source of the scene.
+    pub(super) fn new(node: &str, book: Book, timeouts_ns: &[u64], least: Say) -> Self {
         Self {
             stop: AtomicBool::new(false),
             undecodable: AtomicU64::new(0),
             refused: AtomicU64::new(0),
             unsent: AtomicU64::new(0),
-            skew_ns: AtomicU64::new(NO_SKEW),
+            skew_ns: AtomicU64::new(NONE),
             demand: AtomicU8::new(0),
-            max_pairs: AtomicUsize::new(caps.pairs),
-            max_contacts: AtomicUsize::new(caps.contacts),
+            max_pairs: AtomicUsize::new(0),
+            max_contacts: AtomicUsize::new(0),
+            max_skew_ns: AtomicU64::new(NONE),
+            timeouts_ns: timeouts_ns.iter().map(|ns| AtomicU64::new(*ns)).collect(),
+            markers: AtomicBool::new(false),
+            markers_period_ns: AtomicU64::new(0),
+            collisions: AtomicBool::new(false),
+            sim_time: AtomicBool::new(false),
+            sim_now_ns: AtomicU64::new(0),
+            settings: Mutex::new(Vec::new()),
+            desk: Desk::default(),
             book: Mutex::new(Arc::new(book)),
             faults: Mutex::new(Vec::new()),
             rosout: Mutex::new(None),
             node: node.to_owned(),
             least,
         }
+    }
+
+    /// Does what a parameter says.
+    pub(super) fn take(&self, effect: Effect) {
+        match effect {
+            Effect::Tick(setting) => open(&self.settings).push(setting),
+            Effect::Timeout(source, timeout_ns) => {
+                if let Some(slot) = self.timeouts_ns.get(source) {
+                    slot.store(timeout_ns, Ordering::Relaxed);
+                }
+                open(&self.settings).push(Setting::Timeout { source, timeout_ns });
+            }
+            Effect::Own(own) => match own {
+                Own::MaxPairs(rows) => self.max_pairs.store(rows, Ordering::Relaxed),
+                Own::MaxContacts(rows) => self.max_contacts.store(rows, Ordering::Relaxed),
+                Own::MaxSkew(ns) => self
+                    .max_skew_ns
+                    .store(ns.unwrap_or(NONE), Ordering::Relaxed),
+                Own::Markers(on) => self.markers.store(on, Ordering::Relaxed),
+                Own::MarkersPeriod(ns) => self.markers_period_ns.store(ns, Ordering::Relaxed),
+                Own::Collisions(on) => self.collisions.store(on, Ordering::Relaxed),
+                Own::SimTime(on) => self.sim_time.store(on, Ordering::Relaxed),
+            },
+            Effect::None => {}
+        }
+    }
+
+    /// A setting of the node itself for the tick thread.
+    pub(super) fn set(&self, setting: Setting) {
+        open(&self.settings).push(setting);
+    }
+
+    /// What was set since the last call.
+    pub(super) fn take_settings(&self) -> Vec<Setting> {
+        std::mem::take(&mut *open(&self.settings))
+    }
+
+    /// The time-out of a source of the scene, nanoseconds.
+    pub(super) fn timeout_ns(&self, source: usize) -> u64 {
+        let slot = self.timeouts_ns.get(source);
+        slot.map_or(u64::MAX, |slot| slot.load(Ordering::Relaxed))
+    }
+
+    /// The widest skew of a chain; `None`: as the scene says.
+    pub(super) fn max_skew_ns(&self) -> Option<u64> {
+        let ns = self.max_skew_ns.load(Ordering::Relaxed);
+        (ns != NONE).then_some(ns)
+    }
+
+    /// Between two messages of markers, nanoseconds; `None`: none are published.
+    pub(super) fn markers_period_ns(&self) -> Option<u64> {
+        let on = self.markers.load(Ordering::Relaxed);
+        on.then(|| self.markers_period_ns.load(Ordering::Relaxed))
+    }
+
+    /// Whether `~/collisions` is published.
+    pub(super) fn collisions(&self) -> bool {
+        self.collisions.load(Ordering::Relaxed)
+    }
+
+    /// Whether time is that of `/clock`.
+    pub(super) fn sim_time(&self) -> bool {
+        self.sim_time.load(Ordering::Relaxed)
+    }
+
+    /// The clock says a time; whether it went back, where time is that of `/clock`.
+    pub(super) fn tick_clock(&self, clock: Time) -> bool {
+        let now_ns = clock.to_ns();
+        let before_ns = self.sim_now_ns.swap(now_ns, Ordering::Relaxed);
+        let back = self.sim_time() && now_ns < before_ns;
+        if back {
+            let text = "/clock went back: every pair ends, and bodies are not received until their next poses";
+            self.say(Say::Warn, text);
+        }
+        back
+    }
+
+    /// The node's time, for stamps of what is not about poses.
+    pub(super) fn now(&self) -> Time {
+        Time::from_ns(if self.sim_time() {
+            self.sim_now_ns.load(Ordering::Relaxed)
+        } else {
+            SystemClock.realtime_ns()
+        })
     }
 
     /// Whether the node closes.
@@ -98,7 +205,7 @@ impl Shared {
     /// Widest skew of a chain now.
     pub(super) fn set_skew(&self, skew_ns: Option<u64>) {
         self.skew_ns
-            .store(skew_ns.unwrap_or(NO_SKEW), Ordering::Relaxed);
+            .store(skew_ns.unwrap_or(NONE), Ordering::Relaxed);
     }
 
     /// The counters as of now.
@@ -108,7 +215,7 @@ impl Shared {
             sends_dropped: self.unsent.load(Ordering::Relaxed),
             undecodable: self.undecodable.load(Ordering::Relaxed),
             refused: self.refused.load(Ordering::Relaxed),
-            skew_ns: (skew_ns != NO_SKEW).then_some(skew_ns),
+            skew_ns: (skew_ns != NONE).then_some(skew_ns),
         }
     }
 
@@ -191,7 +298,7 @@ impl Shared {
             return;
         };
         if let Some(writer) = writer.as_ref() {
-            let now = crate::wire::ros::Time::from_ns(SystemClock.realtime_ns());
+            let now = self.now();
             let said = writer.publish(Log {
                 stamp: builtin_interfaces::Time::new(now.sec, now.nanosec),
                 level: match level {

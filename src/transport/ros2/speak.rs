@@ -86,7 +86,7 @@ pub(super) struct Speaker {
 
 impl Speaker {
     /// `header.stamp` is the oldest pose used.
-    fn header(&self, stamp_ns: u64) -> Header {
+    pub(super) fn header(&self, stamp_ns: u64) -> Header {
         Header {
             stamp: Time::from_ns(stamp_ns),
             frame_id: self.frame_id.clone(),

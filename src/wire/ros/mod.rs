@@ -3,10 +3,13 @@
 //!
 //! `.msg` files are the contract; these structs are kept equal to them by a test. Units and frames stand there.
 
+mod collisions;
 mod common;
 mod seen;
+mod services;
 mod sweepd;
 
+pub use collisions::{GzContact, GzContacts, GzEntity, JointWrench, Wrench};
 pub use common::{
     Clock, Duration, Header, Odometry, Point, Pose, PoseStamped, PoseWithCovariance, Quaternion,
     TfMessage, Time, Transform, TransformStamped, Twist, TwistWithCovariance, Vector3,
@@ -14,6 +17,10 @@ pub use common::{
 pub use seen::{
     ColorRgba, DiagnosticArray, DiagnosticStatus, KeyValue, Marker, MarkerArray, MeshFile, Texture,
     UvCoordinate, diagnostic_level, marker_kind,
+};
+pub use services::{
+    AttachBody, Edited, EnableBody, Mesh, MeshTriangle, Point32, PutBody, RemoveBody, Reset,
+    SetFilter, SolidPrimitive, TickNow, Ticked,
 };
 pub use sweepd::{
     BodyTransform, BodyTransforms, Contact, Contacts, Name, Names, Pair, Pairs, Source, State,

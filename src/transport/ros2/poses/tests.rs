@@ -19,7 +19,6 @@ fn source(kind: RosKind, max_skew_ns: u64, frame: &str) -> Source {
     };
     let scene = RosScene {
         frame_id: "world".to_owned(),
-        heartbeat_ns: 100 * MS,
         sources: vec![RosSourceSpec {
             name: "s".to_owned(),
             timeout_ns: 500 * MS,
@@ -31,7 +30,9 @@ fn source(kind: RosKind, max_skew_ns: u64, frame: &str) -> Source {
             source: Some(0),
             frame: frame.to_owned(),
             topic: "/a".to_owned(),
+            bounds: None,
         }],
+        ..RosScene::default()
     };
     Source::of(&scene).remove(0)
 }

@@ -1,0 +1,178 @@
+//! Subscriptions: which topics a scene needs, each once, and who sends on them. In: sources, names. Out: [`Line`]s.
+
+use ros2_client::{Context, Gid, MessageInfo, Node, Subscription};
+use rustdds::mio1::{Interest, Registry, Token};
+
+use super::names::Names;
+use super::poses::Source;
+use super::topics::{In, TypeName, subscription};
+use crate::config::RosKind;
+use crate::error::{Error, Result};
+use crate::wire::ros::{BodyTransforms, Clock, Odometry, PoseStamped, TfMessage};
+
+/// Frames of a client: lockstep wants each of them.
+const FRAMES: In = In {
+    reliable: false,
+    latched: false,
+    depth: 16,
+};
+/// Links that change.
+const LINKS: In = In {
+    depth: 100,
+    ..FRAMES
+};
+/// Links that never change: said once, perhaps long ago.
+const FIXED_LINKS: In = In {
+    reliable: true,
+    latched: true,
+    depth: 100,
+};
+/// The newest is all that counts.
+const NEWEST: In = In { depth: 1, ..FRAMES };
+const TF: TypeName = ("tf2_msgs", "TFMessage");
+
+/// A subscription and where its messages go.
+pub(super) enum Line {
+    /// `~/transforms`.
+    Transforms(Subscription<BodyTransforms>),
+    /// Links, for these sources.
+    Links {
+        /// The subscription.
+        from: Subscription<TfMessage>,
+        /// Whether they never change.
+        fixed: bool,
+        /// Places of the sources.
+        sources: Vec<usize>,
+    },
+    /// Poses of one body.
+    Pose(Subscription<PoseStamped>, Feeder),
+    /// Odometry of one body.
+    Odometry(Subscription<Odometry>, Feeder),
+    /// Simulated time.
+    Clock(Subscription<Clock>),
+}
+
+impl Line {
+    /// Lets a poll wake for it.
+    pub(super) fn register(&mut self, registry: &Registry, token: Token) -> std::io::Result<()> {
+        let wanted = Interest::READABLE;
+        match self {
+            Self::Transforms(from) => registry.register(from, token, wanted),
+            Self::Links { from, .. } => registry.register(from, token, wanted),
+            Self::Pose(from, _) => registry.register(from, token, wanted),
+            Self::Odometry(from, _) => registry.register(from, token, wanted),
+            Self::Clock(from) => registry.register(from, token, wanted),
+        }
+    }
+
+    /// Whose topic it is, where it is one body's.
+    pub(super) fn feeder(&self) -> Option<&Feeder> {
+        match self {
+            Self::Pose(_, feeder) | Self::Odometry(_, feeder) => Some(feeder),
+            _ => None,
+        }
+    }
+}
+
+/// Whose topic it is, and who sends on it.
+#[derive(Clone, Debug)]
+pub(super) struct Feeder {
+    /// Place of the source.
+    pub(super) source: usize,
+    /// Place of the body among those of its source.
+    pub(super) member: usize,
+    /// The topic's full name.
+    topic: String,
+    /// The two publishers last heard, and when, nanoseconds of `CLOCK_BOOTTIME`.
+    heard: [Option<(Gid, u64)>; 2],
+}
+
+/// Two publishers within this time make a body jump between them, nanoseconds.
+const TOGETHER_NS: u64 = 1_000_000_000;
+
+impl Feeder {
+    /// A message came.
+    pub(super) fn hear(&mut self, info: &MessageInfo, now_ns: u64) {
+        let gid = info.publisher_gid();
+        let [first, second] = &mut self.heard;
+        match first {
+            Some((own, at)) if *own == gid => *at = now_ns,
+            _ => {
+                *second = first.take();
+                *first = Some((gid, now_ns));
+            }
+        }
+    }
+
+    /// What is wrong with who sends.
+    pub(super) fn fault(&self, now_ns: u64) -> Option<String> {
+        let fresh = |heard: &Option<(Gid, u64)>| {
+            heard.is_some_and(|(_, at)| now_ns.saturating_sub(at) < TOGETHER_NS)
+        };
+        self.heard.iter().all(fresh).then(|| {
+            format!(
+                "topic {}: two publishers send poses of one body: stop one of them",
+                self.topic
+            )
+        })
+    }
+}
+
+/// Subscribes to what the scene needs, each topic once.
+///
+/// # Errors
+/// `Error::Usage` when a name is none; `Error::Io` when DDS refuses.
+pub(super) fn subscribe(
+    node: &mut Node,
+    context: &Context,
+    names: &mut Names,
+    sources: &[Source],
+) -> Result<Vec<Line>> {
+    let own = names.claim("~/transforms").map_err(Error::Usage)?;
+    let kind = ("sweepd_msgs", "BodyTransforms");
+    let own = subscription(node, context, (&own, kind), FRAMES)?;
+    let clock = names.claim("/clock").map_err(Error::Usage)?;
+    let kind = ("rosgraph_msgs", "Clock");
+    let clock = subscription(node, context, (&clock, kind), NEWEST)?;
+    let mut lines = vec![Line::Transforms(own), Line::Clock(clock)];
+    let mut trees: Vec<(String, bool, Vec<usize>)> = Vec::new();
+    for (place, source) in sources.iter().enumerate() {
+        let topic = |full: &str| names.resolve(full).map_err(Error::Usage);
+        if source.kind == RosKind::Tf {
+            for (given, fixed) in [(&source.topic, false), (&source.static_topic, true)] {
+                let full = topic(given)?;
+                match trees.iter_mut().find(|(known, ..)| *known == full) {
+                    Some((.., places)) => places.push(place),
+                    None => trees.push((full, fixed, vec![place])),
+                }
+            }
+            continue;
+        }
+        for (member, given) in source.topics().enumerate() {
+            let full = topic(given)?;
+            let feeder = Feeder {
+                source: place,
+                member,
+                topic: full.clone(),
+                heard: [None, None],
+            };
+            lines.push(if source.kind == RosKind::Pose {
+                let kind = ("geometry_msgs", "PoseStamped");
+                Line::Pose(subscription(node, context, (&full, kind), NEWEST)?, feeder)
+            } else {
+                let kind = ("nav_msgs", "Odometry");
+                Line::Odometry(subscription(node, context, (&full, kind), NEWEST)?, feeder)
+            });
+        }
+    }
+    for (full, fixed, sources) in trees {
+        let quality = if fixed { FIXED_LINKS } else { LINKS };
+        let from = subscription(node, context, (&full, TF), quality)?;
+        lines.push(Line::Links {
+            from,
+            fixed,
+            sources,
+        });
+    }
+    Ok(lines)
+}

@@ -1,0 +1,116 @@
+//! What comes before topics: the DDS domain, the node with its parameters, other nodes of its name.
+
+use std::net::Ipv4Addr;
+use std::sync::Arc;
+
+use ros2_client::{Context, Gid, Node, NodeEvent, NodeName, NodeOptions};
+use rustdds::{DomainParticipantBuilder, RTPSEntity as _};
+
+use super::super::args::{Params, RosArgs};
+use super::super::env::{Network, Range};
+use super::super::names::Names;
+use super::super::params::{self, Table};
+use super::super::params_file::{self, Setting};
+use super::super::shared::{Say, Shared};
+use super::super::sockets;
+use super::RosOptions;
+use crate::error::{Error, Result};
+
+/// The parameters that were said, files read, in their order.
+pub(super) fn said(args: &RosArgs) -> Result<Vec<Setting>> {
+    let mut all = Vec::new();
+    for params in &args.params {
+        match params {
+            Params::One(setting) => all.push(setting.clone()),
+            Params::File(path) => {
+                let shown = path.display().to_string();
+                let text = std::fs::read_to_string(path).map_err(|e| {
+                    Error::Usage(format!("--params-file {shown}: it cannot be read: {e}"))
+                })?;
+                all.extend(params_file::parse(&text, &shown).map_err(Error::Usage)?);
+            }
+        }
+    }
+    Ok(all)
+}
+
+/// Makes the node with its parameters, whose values take effect as they are declared.
+pub(super) fn make(
+    options: &RosOptions,
+    context: &Context,
+    names: &Names,
+    table: &Arc<Table>,
+    shared: &Arc<Shared>,
+) -> Result<Node> {
+    let name = NodeName::new(names.namespace(), names.node())
+        .map_err(|e| Error::Usage(format!("--ros-args: {}: {e}", names.full_node())))?;
+    let mut declared = NodeOptions::new().enable_rosout(options.args.rosout != Some(false));
+    for spec in table.specs() {
+        declared = declared.declare_parameter(&spec.name, params::declared(&spec.value));
+    }
+    let (checked, taken, shared) = (Arc::clone(table), Arc::clone(table), Arc::clone(shared));
+    declared = declared
+        .parameter_validator(Box::new(move |name, value| checked.check(name, value)))
+        .parameter_set_action(Box::new(move |name, value| {
+            let effect = taken.effect(name, value);
+            if taken.is_running() {
+                shared.say(Say::Info, &format!("parameter {name} is now {value:?}"));
+            }
+            shared.take(effect);
+            Ok(())
+        }));
+    context.new_node(name, declared).map_err(|e| {
+        let text = format!("ROS 2: node {} cannot be made", names.full_node());
+        Error::io(text, e)
+    })
+}
+
+/// Tells, when asked, of another node that has this one's name.
+pub(super) fn namesakes(
+    node: &Node,
+    context: &Context,
+) -> Box<dyn FnMut() -> Option<String> + Send> {
+    let (events, own) = (node.status_receiver(), node.fully_qualified_name());
+    let own_gid = Gid::from(context.domain_participant().guid());
+    Box::new(move || {
+        let mut found = None;
+        while let Some(Ok(event)) = events.as_ref().map(|events| events.try_recv()) {
+            if let NodeEvent::ParticipantEntities(info) = event
+                && info.gid() != own_gid
+                && info
+                    .nodes()
+                    .iter()
+                    .any(|node| node.fully_qualified_name() == own)
+            {
+                found = Some(format!(
+                    "another node is named {own}, too: give one of them another name with -r __node:=NAME"
+                ));
+            }
+        }
+        found
+    })
+}
+
+/// Joins the DDS domain, on this host or on all its networks.
+pub(super) fn join(network: Network) -> Result<Context> {
+    let failed = |e: &dyn std::fmt::Display| {
+        Error::Refused(format!(
+            "ROS 2: domain {} cannot be joined: {e}",
+            network.domain
+        ))
+    };
+    let builder = DomainParticipantBuilder::new(network.domain);
+    let builder = match network.range {
+        Range::Localhost => builder.with_only_networks([Ipv4Addr::LOCALHOST]),
+        Range::Subnet => builder,
+    };
+    let participant = builder.build().map_err(|e| failed(&e))?;
+    if network.range == Range::Localhost {
+        sockets::bind_to_loopback().map_err(|why| {
+            Error::Refused(format!(
+                "ROS 2: the node cannot be kept on this host: {why}; set ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET to let it onto the network"
+            ))
+        })?;
+    }
+    Context::from_domain_participant(participant).map_err(|e| failed(&e))
+}

@@ -1,0 +1,150 @@
+//! Which values parameters take, when, and what they do.
+
+use super::*;
+use crate::transport::ros2::RosSourceSpec;
+
+fn table() -> Table {
+    let source = |name: &str| RosSourceSpec {
+        name: name.to_owned(),
+        timeout_ns: 500_000_000,
+        ros2: None,
+    };
+    let scene = RosScene {
+        sources: vec![source("sim"), source("arm")],
+        ..RosScene::default()
+    };
+    Table::of(&scene)
+}
+
+fn said(name: &str, value: Value) -> Said {
+    Said {
+        node: "/**".to_owned(),
+        name: name.to_owned(),
+        value,
+        said: format!("-p {name}"),
+    }
+}
+
+#[test]
+fn what_is_said_at_the_start_is_taken_in_order_and_whole_numbers_stand_for_numbers() {
+    let mut table = table();
+    let all = [
+        said("budget_ms", Value::Real(3.0)),
+        said("budget_ms", Value::Whole(1)),
+        said("ros.allow_edits", Value::Flag(true)),
+        said("out_reliability", Value::Text("best_effort".to_owned())),
+        said("colour", Value::Whole(1)),
+    ];
+    let unknown = table.start(&all, "/sweepd").unwrap();
+    assert!(unknown.len() == 1 && unknown[0].contains("no parameter `colour`"));
+    assert_eq!(table.specs()[0].value, Value::Real(1.0));
+    assert!(table.flag("ros.allow_edits") && table.is_word("out_reliability", "best_effort"));
+    let wrong = table.start(&[said("budget_ms", Value::Real(-2.0))], "/sweepd");
+    assert!(wrong.unwrap_err().contains("or -1 for no limit"));
+}
+
+#[test]
+fn each_value_out_of_range_has_its_reason() {
+    let table = table();
+    for (name, value, word) in [
+        ("budget_ms", ParameterValue::Double(-2.0), "from 0 to"),
+        ("budget_ms", ParameterValue::Double(f64::NAN), "from 0 to"),
+        (
+            "budget_ms",
+            ParameterValue::String("x".to_owned()),
+            "a number",
+        ),
+        (
+            "ros_max_contacts",
+            ParameterValue::Integer(-1),
+            "from 0 to 100000",
+        ),
+        (
+            "ros_max_contacts",
+            ParameterValue::Double(1.0),
+            "a whole number",
+        ),
+        (
+            "markers_rate_hz",
+            ParameterValue::Double(0.0),
+            "from 0.1 to 100",
+        ),
+        ("timeout_ms.arm", ParameterValue::Double(0.0), "from 1 to"),
+        (
+            "mode",
+            ParameterValue::String("on_frame=leg".to_owned()),
+            "no source `leg`",
+        ),
+        ("mode", ParameterValue::String("fast".to_owned()), "rate=HZ"),
+        (
+            "publish_markers",
+            ParameterValue::Integer(1),
+            "true or false",
+        ),
+        (
+            "budget_ms",
+            ParameterValue::DoubleArray(vec![1.0]),
+            "no such value",
+        ),
+    ] {
+        let why = table.check(name, &value).unwrap_err();
+        assert!(why.contains(word), "{name}: {why}");
+    }
+}
+
+#[test]
+fn what_touches_safety_needs_leave_while_running() {
+    let mut locked = table();
+    let value = ParameterValue::Double(2.0);
+    assert!(locked.check("budget_ms", &value).is_ok());
+    locked.run();
+    assert!(
+        locked
+            .check("budget_ms", &value)
+            .unwrap_err()
+            .contains("ros.allow_edits")
+    );
+    assert!(
+        locked
+            .check("ros_max_pairs", &ParameterValue::Integer(7))
+            .is_ok()
+    );
+    let best = ParameterValue::String("best_effort".to_owned());
+    assert!(
+        locked
+            .check("out_reliability", &best)
+            .unwrap_err()
+            .contains("at the start only")
+    );
+    locked
+        .start(&[said("ros.allow_edits", Value::Flag(true))], "/sweepd")
+        .unwrap();
+    assert!(locked.check("budget_ms", &value).is_ok());
+}
+
+#[test]
+fn a_value_does_what_its_name_says() {
+    let table = table();
+    let real = ParameterValue::Double;
+    assert_eq!(
+        table.effect("budget_ms", &real(2.5)),
+        Effect::Tick(Setting::BudgetTime(Some(2_500_000)))
+    );
+    assert_eq!(
+        table.effect("budget_ms", &real(-1.0)),
+        Effect::Tick(Setting::BudgetTime(None))
+    );
+    assert_eq!(
+        table.effect("timeout_ms.arm", &real(20.0)),
+        Effect::Timeout(1, 20_000_000)
+    );
+    assert_eq!(
+        table.effect("markers_rate_hz", &real(10.0)),
+        Effect::Own(Own::MarkersPeriod(100_000_000))
+    );
+    let mode = ParameterValue::String("rate=50".to_owned());
+    assert_eq!(
+        table.effect("mode", &mode),
+        Effect::Tick(Setting::Mode(Mode::Rate(50.0)))
+    );
+}

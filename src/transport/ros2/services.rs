@@ -1,0 +1,287 @@
+//! The node's services: scene edits as requests of the daemon, answered when the tick has applied them; a tick at once.
+//!
+//! In: requests of anybody in the domain, on the receiving thread. Out: the JSON of an edit request, as shared memory
+//! carries it, so that both have one reader; responses.
+
+mod edits;
+
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
+use ros2_client::qos::{History, QosProfile, WhenFull};
+use ros2_client::{Message, Name, Node, RmwRequestId, Server, ServiceMapping, ServiceTypeName};
+use rustdds::mio1::event::Source as _;
+use rustdds::mio1::{Interest, Registry, Token};
+use serde_json::{Value, json};
+
+use edits::{attach, filter, put, short};
+
+use super::names::Names;
+use super::shared::{Say, Shared};
+use super::topics::failed;
+use crate::error::{Error, Result};
+use crate::wire::ros::{
+    AttachBody, Edited, EnableBody, PutBody, RemoveBody, Reset, SetFilter, TickNow, Ticked,
+};
+use crate::wire::{self, Answer, MessageHeader};
+
+/// Requests that wait for their tick; more are refused at once.
+const OPEN_MAX: usize = 64;
+
+impl Message for AttachBody {}
+impl Message for Edited {}
+impl Message for EnableBody {}
+impl Message for PutBody {}
+impl Message for RemoveBody {}
+impl Message for Reset {}
+impl Message for SetFilter {}
+impl Message for TickNow {}
+impl Message for Ticked {}
+
+/// The verbs of scene edits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Verb {
+    Put,
+    Remove,
+    Enable,
+    Attach,
+    Filter,
+    Reset,
+}
+
+/// What stands between the receiving thread and the tick thread.
+#[derive(Debug, Default)]
+pub(super) struct Desk {
+    /// Edits that the tick thread has not taken: token, JSON.
+    pub(super) asked: Mutex<Vec<(u64, Vec<u8>)>>,
+    /// Ticks at once that it has not taken: tokens.
+    pub(super) ticks: Mutex<Vec<u64>>,
+    /// Answers that the receiving thread has not taken.
+    pub(super) answered: Mutex<Vec<(u64, Answer)>>,
+    /// Ticks that were asked for.
+    pub(super) ticked: Mutex<Vec<(u64, MessageHeader)>>,
+}
+
+/// A lock whose holder panicked still holds whole values: each change is one move.
+pub(super) fn open<T>(lock: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    lock.lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner)
+}
+
+/// The servers, on the receiving thread.
+pub(super) struct Services {
+    put: Server<PutBody, Edited>,
+    remove: Server<RemoveBody, Edited>,
+    enable: Server<EnableBody, Edited>,
+    attach: Server<AttachBody, Edited>,
+    filter: Server<SetFilter, Edited>,
+    reset: Server<Reset, Edited>,
+    tick: Server<TickNow, Ticked>,
+    pending: BTreeMap<u64, (Verb, RmwRequestId)>,
+    ticks: BTreeMap<u64, RmwRequestId>,
+    next: u64,
+    allowed: bool,
+}
+
+impl Services {
+    /// Creates them.
+    ///
+    /// * `allowed` - whether edits are done.
+    ///
+    /// # Errors
+    /// `Error::Usage` when remaps collide; `Error::Io` when DDS refuses.
+    pub(super) fn create(node: &mut Node, names: &mut Names, allowed: bool) -> Result<Self> {
+        Ok(Self {
+            put: server(node, names, "~/put_body", "PutBody")?,
+            remove: server(node, names, "~/remove_body", "RemoveBody")?,
+            enable: server(node, names, "~/enable_body", "EnableBody")?,
+            attach: server(node, names, "~/attach_body", "AttachBody")?,
+            filter: server(node, names, "~/set_filter", "SetFilter")?,
+            reset: server(node, names, "~/reset", "Reset")?,
+            tick: server(node, names, "~/tick_now", "TickNow")?,
+            pending: BTreeMap::new(),
+            ticks: BTreeMap::new(),
+            next: 1,
+            allowed,
+        })
+    }
+
+    /// Registers them behind the subscriptions.
+    pub(super) fn register(&mut self, registry: &Registry, token: Token) -> std::io::Result<()> {
+        let wanted = Interest::READABLE;
+        self.put.register(registry, token, wanted)?;
+        self.remove.register(registry, token, wanted)?;
+        self.enable.register(registry, token, wanted)?;
+        self.attach.register(registry, token, wanted)?;
+        self.filter.register(registry, token, wanted)?;
+        self.reset.register(registry, token, wanted)?;
+        self.tick.register(registry, token, wanted)
+    }
+
+    /// Takes requests and sends responses; whether the tick thread has something to do.
+    pub(super) fn round(&mut self, desk: &Desk, shared: &Shared) -> bool {
+        self.respond(desk, shared);
+        let mut asked = Vec::new();
+        receive(&self.put, shared, |id, r| {
+            asked.push((Verb::Put, id, put(&r)))
+        });
+        receive(&self.remove, shared, |id, r| {
+            asked.push((Verb::Remove, id, Ok(json!({ "remove": r.name }))));
+        });
+        receive(&self.enable, shared, |id, r| {
+            let edit = json!({ "enable": { "body": r.name, "enabled": r.enabled } });
+            asked.push((Verb::Enable, id, Ok(edit)));
+        });
+        receive(&self.attach, shared, |id, r| {
+            asked.push((Verb::Attach, id, Ok(attach(&r))))
+        });
+        receive(&self.filter, shared, |id, r| {
+            asked.push((Verb::Filter, id, filter(&r)))
+        });
+        receive(&self.reset, shared, |id, r| {
+            let edit = match r.source.as_str() {
+                "" => json!({ "reset": {} }),
+                source => json!({ "reset": { "source": source } }),
+            };
+            asked.push((Verb::Reset, id, Ok(edit)));
+        });
+        let mut came = !asked.is_empty();
+        for (verb, id, edit) in asked {
+            self.ask(verb, id, edit, desk, shared);
+        }
+        let mut ticks = Vec::new();
+        receive(&self.tick, shared, |id, _| ticks.push(id));
+        for id in ticks.into_iter().take(OPEN_MAX) {
+            came = true;
+            let token = self.token();
+            self.ticks.insert(token, id);
+            open(&desk.ticks).push(token);
+        }
+        came
+    }
+
+    fn token(&mut self) -> u64 {
+        self.next += 1;
+        self.next
+    }
+
+    fn ask(
+        &mut self,
+        verb: Verb,
+        id: RmwRequestId,
+        edit: std::result::Result<Value, String>,
+        desk: &Desk,
+        shared: &Shared,
+    ) {
+        let refusal = match edit {
+            _ if !self.allowed => {
+                "edits are refused: start the node with -p ros.allow_edits:=true".to_owned()
+            }
+            _ if self.pending.len() >= OPEN_MAX => {
+                format!("{OPEN_MAX} edits wait for their tick: ask again later")
+            }
+            Err(why) => why,
+            Ok(edit) => {
+                let body = edit
+                    .as_object()
+                    .and_then(|e| e.values().next())
+                    .and_then(|v| v.get("name"));
+                let what = edit.as_object().and_then(|e| e.keys().next()).cloned();
+                shared.say(
+                    Say::Info,
+                    &format!(
+                        "edit over ROS 2: {} {}",
+                        what.unwrap_or_default(),
+                        body.map_or_else(|| short(&edit), ToString::to_string)
+                    ),
+                );
+                let token = self.token();
+                self.pending.insert(token, (verb, id));
+                let json = json!({ "edits": [edit] }).to_string().into_bytes();
+                open(&desk.asked).push((token, json));
+                return;
+            }
+        };
+        shared.say(
+            Say::Warn,
+            &format!("an edit over ROS 2 was refused: {refusal}"),
+        );
+        let answer = Edited {
+            message: refusal,
+            ..Edited::default()
+        };
+        self.send(verb, id, answer, shared);
+    }
+
+    fn respond(&mut self, desk: &Desk, shared: &Shared) {
+        for (token, answer) in std::mem::take(&mut *open(&desk.answered)) {
+            let Some((verb, id)) = self.pending.remove(&token) else {
+                continue;
+            };
+            let response = Edited {
+                success: answer.ok,
+                message: answer.error.unwrap_or_default(),
+                warnings: answer.warnings,
+                scene_rev: answer.scene_rev,
+            };
+            self.send(verb, id, response, shared);
+        }
+        for (token, header) in std::mem::take(&mut *open(&desk.ticked)) {
+            let Some(id) = self.ticks.remove(&token) else {
+                continue;
+            };
+            let response = Ticked {
+                success: true,
+                message: String::new(),
+                tick_header: super::speak::tick_header(&header),
+                word: wire::State::from_code(header.state)
+                    .map_or("unknown", wire::State::word)
+                    .to_owned(),
+            };
+            let sent = self.tick.send_response(id, response);
+            shared.note_unsent(u64::from(sent.is_err()));
+        }
+    }
+
+    fn send(&self, verb: Verb, id: RmwRequestId, response: Edited, shared: &Shared) {
+        let sent = match verb {
+            Verb::Put => self.put.send_response(id, response),
+            Verb::Remove => self.remove.send_response(id, response),
+            Verb::Enable => self.enable.send_response(id, response),
+            Verb::Attach => self.attach.send_response(id, response),
+            Verb::Filter => self.filter.send_response(id, response),
+            Verb::Reset => self.reset.send_response(id, response),
+        };
+        shared.note_unsent(u64::from(sent.is_err()));
+    }
+}
+
+fn server<Q: Message + Clone + 'static, R: Message + 'static>(
+    node: &mut Node,
+    names: &mut Names,
+    name: &str,
+    kind: &str,
+) -> Result<Server<Q, R>> {
+    let full = names.claim(name).map_err(Error::Usage)?;
+    let parsed = Name::parse(&full).map_err(|e| Error::Usage(format!("{full}: {e}")))?;
+    let qos = QosProfile::publisher_default()
+        .history(History::KeepLast { depth: 10 })
+        .reliability_reliable(WhenFull::Fail);
+    let kind = ServiceTypeName::new("sweepd_msgs", kind);
+    node.create_server(ServiceMapping::Enhanced, &parsed, &kind, qos.clone(), qos)
+        .map_err(|e| failed(&full, e))
+}
+
+fn receive<Q: Message + 'static, R: Message + 'static>(
+    server: &Server<Q, R>,
+    shared: &Shared,
+    mut each: impl FnMut(RmwRequestId, Q),
+) {
+    for _ in 0..OPEN_MAX {
+        match server.receive_request() {
+            Ok(Some((id, request))) => each(id, request),
+            Ok(None) => return,
+            Err(_) => shared.note_undecodable(),
+        }
+    }
+}
