@@ -5,7 +5,7 @@
 //! 500 us: unresolved pairs, pairs whose last verdict is not the truth, the oldest pair without a verdict, contacts that
 //! were reported late, overshoot. The time starts after the motion pass, which is told beside it. Truth: walks to the end over the other trees.
 //!
-//! `cargo bench --bench time_critical [-- --quick]`
+//! `cargo bench --bench time_critical [-- --quick] [--cold] [METHOD..]`
 
 #![allow(
     clippy::cast_precision_loss,
@@ -36,6 +36,23 @@ const SEED: u64 = 17;
 /// Budgets of the cold profile, microseconds, and about what they buy in work units.
 const PROFILE_US: [u64; 9] = [50, 100, 200, 300, 500, 750, 1_000, 1_500, 2_000];
 const PROFILE_UNITS: [u64; 8] = [500, 1_000, 2_000, 4_000, 8_000, 16_000, 32_000, 64_000];
+
+/// Limits in motion: none, microseconds, or work units (which no other load disturbs).
+#[derive(Clone, Copy)]
+enum Limit {
+    None,
+    Us(u64),
+    Units(u64),
+}
+
+const LIMITS: [Limit; 6] = [
+    Limit::None,
+    Limit::Us(200),
+    Limit::Us(500),
+    Limit::Units(500),
+    Limit::Units(1_000),
+    Limit::Units(2_000),
+];
 
 const WANTED: Wanted = Wanted {
     contacts: false,
@@ -107,6 +124,7 @@ struct Tally {
     guess_errors: u64,
     oldest: u64,
     spent_ns: Vec<u64>,
+    spent_cpu_ns: Vec<u64>,
     motion_ns: Vec<u64>,
     units: Vec<u64>,
     over_wall_ns: Vec<u64>,
@@ -171,7 +189,7 @@ fn main() {
     let shapes = shapes();
     let from = provenance();
     let mut csv = String::from(
-        "machine,commit,compiler,seed,method,case,motion_percent,budget,ticks,pairs,spent_p50_us,spent_p99_us,motion_pass_p50_us,\
+        "machine,commit,compiler,seed,method,case,motion_percent,budget,ticks,pairs,spent_p50_us,spent_p99_us,spent_cpu_p50_us,motion_pass_p50_us,\
          units_p50,unresolved_percent,unconfirmed_percent,guess_error_percent,oldest_ticks,wrong,onset_p50_ticks,onset_p99_ticks,\
          overshoot_wall_p99_us,overshoot_cpu_p99_us,area\n",
     );
@@ -184,12 +202,15 @@ fn main() {
             csv += &format!("{from},{SEED},{name},{line}\n");
         };
         println!(
-            "{name}: case,motion,budget,ticks,pairs,spent p50,p99,motion pass,units,unresolved %,unconfirmed %,guess %,oldest,wrong,onset p50,p99,over wall,cpu,area"
+            "{name}: case,motion,budget,ticks,pairs,spent p50,p99,cpu p50,motion pass,units,unresolved %,unconfirmed %,guess %,oldest,wrong,onset p50,p99,over wall,cpu,area"
         );
         cold(name, &shapes, if quick { 3 } else { 15 }, &mut add);
+        if std::env::args().any(|arg| arg == "--cold") {
+            continue;
+        }
         for percent in [0.1, 0.5, 2.0] {
-            for budget_us in [None, Some(200), Some(500)] {
-                add(moving(name, &shapes, percent, budget_us, ticks));
+            for limit in LIMITS {
+                add(moving(name, &shapes, percent, limit, ticks));
             }
         }
     }
@@ -217,7 +238,7 @@ fn cold(name: &str, shapes: &[Arc<Shape>], rounds: usize, add: &mut impl FnMut(S
     let line =
         |case: &str, budget: String, times: &mut [u64], units: u64, tally: &Tally, area: &str| {
             format!(
-                "{case},0,{budget},{},{PAIRS},{:.1},{:.1},,{units},{:.2},{:.2},,,{},,,,,{area}",
+                "{case},0,{budget},{},{PAIRS},{:.1},{:.1},,,{units},{:.2},{:.2},,,{},,,,,{area}",
                 times.len(),
                 us(quantile(times, 0.5)),
                 us(quantile(times, 0.99)),
@@ -280,13 +301,7 @@ fn cold(name: &str, shapes: &[Arc<Shape>], rounds: usize, add: &mut impl FnMut(S
 }
 
 /// Coherent motion, the first tick cold.
-fn moving(
-    name: &str,
-    shapes: &[Arc<Shape>],
-    percent: f64,
-    budget_us: Option<u64>,
-    ticks: u64,
-) -> String {
+fn moving(name: &str, shapes: &[Arc<Shape>], percent: f64, limit: Limit, ticks: u64) -> String {
     let mut stage = Stage::new(shapes, percent, SEED);
     let mut subject = Subject::new(name);
     let mut tally = Tally::new();
@@ -294,8 +309,13 @@ fn moving(
     for tick in 1..=ticks {
         let motion_ns = stage.begin();
         let (from_ns, cpu_ns) = (clock.monotonic_ns(), clock.thread_cpu_ns());
-        let deadline_ns = budget_us.map(|us| from_ns + us * 1_000);
-        let mut meter = Meter::new(&clock, deadline_ns, None);
+        let (limit_ns, units) = match limit {
+            Limit::None => (None, None),
+            Limit::Us(us) => (Some(us * 1_000), None),
+            Limit::Units(units) => (None, Some(units)),
+        };
+        let deadline_ns = limit_ns.map(|ns| from_ns + ns);
+        let mut meter = Meter::new(&clock, deadline_ns, units);
         subject.spend(&mut stage, &mut meter);
         let spent_ns = clock.monotonic_ns() - from_ns;
         let spent_cpu_ns = clock.thread_cpu_ns() - cpu_ns;
@@ -303,9 +323,10 @@ fn moving(
         // The first tick is cold, and told by the cold figures.
         if tick > 1 {
             tally.spent_ns.push(spent_ns);
+            tally.spent_cpu_ns.push(spent_cpu_ns);
             tally.motion_ns.push(motion_ns);
             tally.units.push(units);
-            let limit_ns = budget_us.map_or(u64::MAX, |us| us * 1_000);
+            let limit_ns = limit_ns.unwrap_or(u64::MAX);
             tally.over_wall_ns.push(spent_ns.saturating_sub(limit_ns));
             tally
                 .over_cpu_ns
@@ -322,10 +343,15 @@ fn moving(
     };
     let (onset_p50, onset_p99) = (delay(&mut tally, 0.5), delay(&mut tally, 0.99));
     format!(
-        "moving,{percent},{},{ticks},{PAIRS},{:.1},{:.1},{:.1},{},{:.2},{:.2},{:.2},{},{},{},{},{:.1},{:.1},",
-        budget_us.map_or("none".to_owned(), |us| format!("{us}us")),
+        "moving,{percent},{},{ticks},{PAIRS},{:.1},{:.1},{:.1},{:.1},{},{:.2},{:.2},{:.2},{},{},{},{},{:.1},{:.1},",
+        match limit {
+            Limit::None => "none".to_owned(),
+            Limit::Us(us) => format!("{us}us"),
+            Limit::Units(units) => format!("{units}units"),
+        },
         us(quantile(&mut tally.spent_ns, 0.5)),
         us(quantile(&mut tally.spent_ns, 0.99)),
+        us(quantile(&mut tally.spent_cpu_ns, 0.5)),
         us(quantile(&mut tally.motion_ns, 0.5)),
         quantile(&mut tally.units, 0.5),
         percent_of(tally.unresolved, tally.pair_ticks),

@@ -75,6 +75,9 @@ fn gaps_avx2(one: &One, pack: &Pack) -> [f32; LANES] {
 }
 
 /// Eight numbers that go through every operation side by side.
+///
+/// Plain loops over indices: closures handed to `array::map` are not inlined into a function compiled for more than the
+/// rest, and cost ten times as much (measured).
 #[derive(Clone, Copy)]
 struct Wide(Lanes);
 
@@ -85,47 +88,69 @@ impl Wide {
     }
 
     #[inline(always)]
-    fn each(self, other: Self, of: impl Fn(f32, f32) -> f32) -> Self {
-        Self(std::array::from_fn(|k| of(self.0[k], other.0[k])))
+    fn abs(mut self) -> Self {
+        for x in &mut self.0 {
+            *x = x.abs();
+        }
+        self
     }
 
     #[inline(always)]
-    fn abs(self) -> Self {
-        Self(self.0.map(f32::abs))
+    fn max(mut self, other: Self) -> Self {
+        for (x, y) in self.0.iter_mut().zip(&other.0) {
+            *x = greater(*x, *y);
+        }
+        self
     }
 
     #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        self.each(other, greater)
+    fn sqrt(mut self) -> Self {
+        for x in &mut self.0 {
+            *x = x.sqrt();
+        }
+        self
     }
 
+    /// `other` where this is positive, else this.
     #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self(self.0.map(f32::sqrt))
+    fn or_where_positive(mut self, other: Self) -> Self {
+        for (x, y) in self.0.iter_mut().zip(&other.0) {
+            *x = if *x > 0.0 { *y } else { *x };
+        }
+        self
     }
 }
 
 impl std::ops::Add for Wide {
     type Output = Self;
     #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self.each(other, |x, y| x + y)
+    fn add(mut self, other: Self) -> Self {
+        for (x, y) in self.0.iter_mut().zip(&other.0) {
+            *x += *y;
+        }
+        self
     }
 }
 
 impl std::ops::Sub for Wide {
     type Output = Self;
     #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self.each(other, |x, y| x - y)
+    fn sub(mut self, other: Self) -> Self {
+        for (x, y) in self.0.iter_mut().zip(&other.0) {
+            *x -= *y;
+        }
+        self
     }
 }
 
 impl std::ops::Mul for Wide {
     type Output = Self;
     #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self.each(other, |x, y| x * y)
+    fn mul(mut self, other: Self) -> Self {
+        for (x, y) in self.0.iter_mut().zip(&other.0) {
+            *x *= *y;
+        }
+        self
     }
 }
 
@@ -137,49 +162,55 @@ fn greater(x: f32, y: f32) -> f32 {
 
 /// Three products of lanes, summed from the left.
 #[inline(always)]
-fn dot(u: [Wide; 3], v: [Wide; 3]) -> Wide {
+fn dot(u: &[Wide; 3], v: &[Wide; 3]) -> Wide {
     u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
 }
 
 #[inline(always)]
+fn spread(x: [f32; 3]) -> [Wide; 3] {
+    [Wide::of(x[0]), Wide::of(x[1]), Wide::of(x[2])]
+}
+
+#[inline(always)]
+fn column(rows: &[Lanes; 3]) -> [Wide; 3] {
+    [Wide(rows[0]), Wide(rows[1]), Wide(rows[2])]
+}
+
+#[inline(always)]
 fn lanes(one: &One, pack: &Pack) -> [f32; LANES] {
-    let column = |rows: &[Lanes; 3]| rows.map(Wide);
-    let axes_a = one.axes.map(|axis| axis.map(Wide::of));
-    let half_a = one.half.map(Wide::of);
-    let axes_b = [
-        column(&pack.axes[0]),
-        column(&pack.axes[1]),
-        column(&pack.axes[2]),
-    ];
+    let zero = Wide::of(0.0);
+    let half_a = spread(one.half);
     let half_b = column(&pack.half);
-    let centre = column(&pack.centre);
-    let between: [Wide; 3] = std::array::from_fn(|k| centre[k] - Wide::of(one.centre[k]));
+    let (to, from) = (column(&pack.centre), spread(one.centre));
+    let between = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
 
     // Cosines between the axes of the two, and the way between the centres along each.
-    let cosine = axes_a.map(|u| axes_b.map(|v| dot(u, v)));
-    let abs = cosine.map(|row| row.map(Wide::abs));
-    let along_a = axes_a.map(|u| dot(u, between));
-    let along_b = axes_b.map(|v| dot(v, between));
+    let (mut cosine, mut abs) = ([[zero; 3]; 3], [[zero; 3]; 3]);
+    let (mut along_a, mut along_b) = ([zero; 3], [zero; 3]);
+    for i in 0..3 {
+        let axis_a = spread(one.axes[i]);
+        along_a[i] = dot(&axis_a, &between);
+        for j in 0..3 {
+            cosine[i][j] = dot(&axis_a, &column(&pack.axes[j]));
+            abs[i][j] = cosine[i][j].abs();
+        }
+        along_b[i] = dot(&column(&pack.axes[i]), &between);
+    }
 
-    let zero = Wide::of(0.0);
     let mut most = Wide::of(f32::NEG_INFINITY);
     let (mut square_a, mut square_b) = (zero, zero);
     for k in 0..3 {
-        let gap_a = along_a[k].abs() - (half_a[k] + dot(abs[k], half_b));
-        let gap_b = along_b[k].abs() - (half_b[k] + dot([abs[0][k], abs[1][k], abs[2][k]], half_a));
+        let gap_a = along_a[k].abs() - (half_a[k] + dot(&abs[k], &half_b));
+        let seen = [abs[0][k], abs[1][k], abs[2][k]];
+        let gap_b = along_b[k].abs() - (half_b[k] + dot(&seen, &half_a));
         most = most.max(gap_a).max(gap_b);
         let (over_a, over_b) = (gap_a.max(zero), gap_b.max(zero));
         square_a = square_a + over_a * over_a;
         square_b = square_b + over_b * over_b;
     }
-    let distance = square_a.max(square_b).sqrt();
     // Where a face parts them the distance is at least each single separation but for rounding.
-    let mut best = most.each(
-        distance,
-        |most, distance| {
-            if most > 0.0 { distance } else { most }
-        },
-    );
+    let distance = square_a.max(square_b).sqrt();
+    let mut best = most.or_where_positive(distance);
     for i in 0..3 {
         let (i1, i2) = ((i + 1) % 3, (i + 2) % 3);
         for j in 0..3 {

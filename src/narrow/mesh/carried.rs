@@ -30,9 +30,10 @@ use super::containment::{Containment, ShellTests};
 use super::placed::Placed;
 use super::retest::{reach_of, tree_of};
 use super::side::{self, Side};
+use super::triangle::{Triangle, surely_crosses};
 use super::walk::Goal;
 use crate::math::{Interval, Pose, ROUND};
-use crate::shape::{BoxId, Mesh, Obb, Shape};
+use crate::shape::{BoxId, Obb, Shape};
 use crate::time::Meter;
 
 mod count;
@@ -51,6 +52,9 @@ const GROUPS_MAX: usize = 1 << 18;
 /// A front that has split into so many times its fresh size, and [`STALE_MORE`], starts anew: entries only ever split.
 const STALE_TIMES: usize = 3;
 const STALE_MORE: usize = 128;
+/// A front starts anew when so many times its used-up groups exceed the steps that a fresh start took: at 2 % of the
+/// diameter a tick 6,400 units in place of 14,800, at 0.1 % no difference (`benches/time_critical`; 1 and 4 were tried).
+const WORN_TIMES: usize = 2;
 /// Length of a path, in sizes of the two, after which expiries are measured anew.
 const PATH_MAX: f64 = 64.0;
 /// Beyond this share of the smaller body's radius between two poses, nothing much would be left of a front.
@@ -66,6 +70,8 @@ pub struct CarriedFront {
     open: OpenList,
     /// Apart at this pose by what stands for the expiry, and by no more than can be told at another.
     passing: Vec<Group>,
+    /// The least gap of them, metres; infinite: there are none.
+    passing_m: f64,
     /// Leaves found touching at this pose.
     touching: Vec<(BoxId, BoxId)>,
     /// When what was lumped together is no longer proved apart; infinite: nothing was.
@@ -80,11 +86,16 @@ pub struct CarriedFront {
     shells_expiry_m: f64,
     /// Entries when the surfaces were last found apart from a fresh start; 0: not yet.
     fresh_len: usize,
+    /// Steps since the last fresh start, and until the surfaces were found apart from it.
+    steps: usize,
+    fresh_steps: usize,
     /// Known at this pose.
     known: Known,
     /// The leaves that were nearest or touched last.
     last: Option<(BoxId, BoxId)>,
     witness: Option<LeafContact>,
+    /// Corners of the triangles that touched last, each in its own frame: to ask them again costs no look into the meshes.
+    crossing: Option<[Triangle; 2]>,
     contacts: Contacts,
 }
 
@@ -132,7 +143,7 @@ impl CarriedFront {
     pub fn start(&mut self, a: &Shape, b: &Shape, pos12: &Pose, search: Search) {
         self.search = search;
         self.at = Placed::new(pos12, reach_of(a), reach_of(b));
-        self.last = None;
+        (self.last, self.crossing) = (None, None);
         self.start_over(a, b);
     }
 
@@ -149,7 +160,11 @@ impl CarriedFront {
         let lost =
             self.lumped_expiry_m < f64::INFINITY && self.drift.left_m(self.lumped_expiry_m) <= 0.0;
         let leap = self.drift.last_m > LEAP * a.radius.min(b.radius);
-        if stale || far || lost || leap || self.search != Search::Carried {
+        // Where most is used up, the roots are the shorter way: large boxes tell more than many small ones.
+        let gone = |g: &&Group| self.drift.left_m(g.expiry_m) <= 0.0;
+        let worn = self.fresh_len > 0
+            && WORN_TIMES * self.heap.iter().filter(gone).count() > self.fresh_steps;
+        if worn || stale || far || lost || leap || self.search != Search::Carried {
             self.start_over(a, b);
             return;
         }
@@ -160,6 +175,7 @@ impl CarriedFront {
             self.open.push(Open { low: 0.0, a, b });
         }
         self.heap.extend(self.passing.drain(..).map(Group::expired));
+        self.passing_m = f64::INFINITY;
         if self.drift.left_m(self.shells_expiry_m) <= 0.0 {
             self.shells.start(self.solids);
         }
@@ -168,6 +184,7 @@ impl CarriedFront {
     /// Takes an anchor at this pose: from here on what is found holds at it to the last digit.
     fn anchor_here(&mut self) {
         if self.drift.anchor_here(&self.at.pos12) {
+            self.passing_m = f64::INFINITY;
             for at in (0..self.passing.len()).rev() {
                 let group = self.passing.swap_remove(at);
                 self.keep(group, group.expiry_m);
@@ -178,19 +195,11 @@ impl CarriedFront {
     /// Whether the leaves that touched last are certain to touch at a pose; nothing else is looked at or changed.
     #[must_use]
     pub fn still_touches(&self, a: &Shape, b: &Shape, pos12: &Pose) -> bool {
-        let Some((leaf_a, leaf_b)) = self.last else {
-            return false;
-        };
-        let (Some(Side::Mesh(mesh_a)), Some(Side::Mesh(mesh_b))) = (Side::of(a), Side::of(b))
-        else {
+        let Some([of_a, of_b]) = &self.crossing else {
             return false;
         };
         let at = Placed::new(pos12, reach_of(a), reach_of(b));
-        let (Some(i), Some(j)) = (triangle_of(mesh_a, leaf_a), triangle_of(mesh_b, leaf_b)) else {
-            return false;
-        };
-        let in_a = mesh_b.triangle(j).map(|p| at.to_a(&p));
-        super::triangle::surely_crosses(&mesh_a.triangle(i), &in_a, at.slop)
+        surely_crosses(of_a, &of_b.map(|p| at.to_a(&p)), at.slop)
     }
 
     /// Goes on at the pose until the goal is reached (true), `slice_units` are spent, or the meter closes.
@@ -281,11 +290,12 @@ impl CarriedFront {
         self.drift = Drift::at(&self.at.pos12);
         self.heap.clear();
         self.passing.clear();
+        self.passing_m = f64::INFINITY;
         self.open.clear(self.search);
         self.touching.clear();
         self.contacts.clear();
         self.lumped_expiry_m = f64::INFINITY;
-        self.fresh_len = 0;
+        (self.fresh_len, self.steps) = (0, 0);
         self.known = Known::default();
         self.witness = None;
         self.whole = [(a, side_a), (b, side_b)].map(|(shape, side)| side.whole(shape));
@@ -329,8 +339,7 @@ impl CarriedFront {
         }
         let soonest = self.heap.peek().map_or(f64::INFINITY, |g| g.expiry_m);
         let carried = self.drift.left_m(soonest.min(self.lumped_expiry_m));
-        let passing = self.passing.iter().map(|g| g.expiry_m);
-        let proved = passing.fold(carried, f64::min);
+        let proved = carried.min(self.passing_m);
         if proved > 0.0 {
             proved.min(self.known.high)
         } else {
@@ -377,13 +386,5 @@ impl CarriedFront {
     /// What cannot be told apart at this pose, metres.
     fn fuzz_m(&self) -> f64 {
         self.at.slop + 16.0 * ROUND * self.drift.path_m
-    }
-}
-
-/// The triangle of a leaf of a mesh that exists; `None` when it is none.
-fn triangle_of(mesh: &Mesh, leaf: BoxId) -> Option<u32> {
-    match mesh.obb().held(leaf) {
-        crate::shape::Held::Triangle(face) => Some(face),
-        crate::shape::Held::Pack(_) => None,
     }
 }

@@ -66,14 +66,22 @@ impl Placed {
             (self.to_a(&one.centre), self.rotation * one.axes)
         };
         let from = centre - pack.origin;
+        let axis = |k: usize| {
+            let column = axes.column(k);
+            [f32_down(column.x), f32_down(column.y), f32_down(column.z)]
+        };
         let seen = One {
             centre: [f32_down(from.x), f32_down(from.y), f32_down(from.z)],
-            axes: std::array::from_fn(|k| std::array::from_fn(|row| f32_down(axes[(row, k)]))),
+            axes: [axis(0), axis(1), axis(2)],
             half: one.half,
         };
         let half = one.half[0] + one.half[1] + one.half[2];
         let size = from.lp_norm(1) + f64::from(half) + f64::from(pack.reach);
         let slop = GAP_ROUND * size + self.slop;
-        gaps(&seen, &pack.boxes).map(|gap| f64::from(gap) - slop)
+        let mut low = [0.0; LANES];
+        for (low, gap) in low.iter_mut().zip(gaps(&seen, &pack.boxes)) {
+            *low = f64::from(gap) - slop;
+        }
+        low
     }
 }

@@ -3,7 +3,7 @@
 use super::Closest;
 use super::bound::Frame;
 use super::placed::Placed;
-use super::triangle;
+use super::triangle::{self, Triangle};
 use crate::math::{Point, Vec3};
 use crate::narrow::exact::{Warm, convex_gap};
 use crate::shape::{Convex, Geometry, Mesh, Node, Obb, Shape};
@@ -145,4 +145,14 @@ pub(super) fn parted(a: (Side<'_>, u32), b: (Side<'_>, u32), at: &Placed) -> Opt
     };
     let in_a = mesh_b.triangle(b.1).map(|p| at.to_a(&p));
     triangle::parted(&mesh_a.triangle(a.1), &in_a, at.slop)
+}
+
+/// The corners of two leaves that are triangles, each in its own frame.
+pub(super) fn triangles(a: (Side<'_>, u32), b: (Side<'_>, u32)) -> Option<[Triangle; 2]> {
+    match (a.0, b.0) {
+        (Side::Mesh(mesh_a), Side::Mesh(mesh_b)) => {
+            Some([mesh_a.triangle(a.1), mesh_b.triangle(b.1)])
+        }
+        _ => None,
+    }
 }

@@ -15,6 +15,7 @@ const LEAF_COST: u64 = 4;
 impl CarriedFront {
     pub(super) fn step(&mut self, a: Side<'_>, b: Side<'_>, goal: Goal, meter: &mut Meter<'_>) {
         let gap_wanted = goal > Goal::Verdict;
+        self.steps += 1;
         if gap_wanted && !std::mem::replace(&mut self.known.asked_last, true) {
             self.bound_by_last(a, b);
             meter.charge_weighted(1, LEAF_COST);
@@ -47,6 +48,7 @@ impl CarriedFront {
         }
         if self.fresh_len == 0 {
             self.fresh_len = self.len();
+            self.fresh_steps = self.steps;
         }
         let expiry_m = self.drift.expiry(low).unwrap_or(f64::NEG_INFINITY);
         self.shells_expiry_m = self.shells_expiry_m.max(expiry_m);
@@ -175,10 +177,13 @@ impl CarriedFront {
                 self.heap.push(Group { expiry_m, ..group });
             }
             Some(expiry_m) => self.lumped_expiry_m = self.lumped_expiry_m.min(expiry_m),
-            None if gap > 0.0 => self.passing.push(Group {
-                expiry_m: gap,
-                ..group
-            }),
+            None if gap > 0.0 => {
+                self.passing_m = self.passing_m.min(gap);
+                self.passing.push(Group {
+                    expiry_m: gap,
+                    ..group
+                });
+            }
             // Not apart after all: every pair stays covered.
             None => {
                 for lane in lanes(group.mask) {
@@ -218,7 +223,10 @@ impl CarriedFront {
             meter.charge_weighted(1, LEAF_COST);
             return;
         }
-        let gaps = self.gaps(&group, sides).map(|gap| gap.max(known_m));
+        let mut gaps = self.gaps(&group, sides);
+        for gap in &mut gaps {
+            *gap = gap.max(known_m);
+        }
         let (mut nearest, mut rest_m) = (group.mask.trailing_zeros(), f64::INFINITY);
         for lane in lanes(group.mask) {
             if gaps[lane as usize] < gaps[nearest as usize] {
@@ -308,6 +316,7 @@ impl CarriedFront {
             let deeper = |w: &LeafContact| closest.best_m < w.closest.best_m;
             if !self.known.touches || self.witness.as_ref().is_none_or(deeper) {
                 (self.last, self.witness) = (Some((id_a, id_b)), Some(contact));
+                self.crossing = side::triangles(leaf_a, leaf_b);
             }
             self.known.touches = true;
             self.contacts.add(contact);
