@@ -17,6 +17,10 @@ use super::{NONE, Narrow};
 /// What asking the last contact again costs, in tests of a box against a pack: when the clock is to be read.
 const RETEST_COST: u64 = 2;
 
+/// A pair's turn doubles with each tick it waits for its verdict, up to so many times: what motion undoes in a tick may be
+/// more than a plain turn, and then equal turns for all would decide it never.
+const SLICE_DOUBLINGS_MAX: u64 = 6;
+
 impl Narrow {
     /// One turn of a pair on its front; whether there is more to do for `goal`.
     pub(super) fn turn_front(
@@ -31,6 +35,11 @@ impl Narrow {
         let pos12 = shape_pose(one, other, &rel);
         let due = goal == Goal::Verdict && self.witness_due(slot);
         let memo = &mut self.memos[slot.index()];
+        // Ticks without a verdict; none of a pair that is decided and asked for more.
+        let waited = match memo.undecided_since {
+            0 => 0,
+            since => self.tick.saturating_sub(since),
+        };
         let fresh = memo.front == NONE;
         if fresh {
             memo.front = self.fronts.take(CarriedFront::default);
@@ -56,7 +65,8 @@ impl Narrow {
         }
         front.move_to(one_shape, other_shape, &pos12);
         self.counters.slices += 1;
-        let done = front.advance(one_shape, other_shape, goal, SLICE_UNITS, meter);
+        let slice_units = SLICE_UNITS << waited.min(SLICE_DOUBLINGS_MAX);
+        let done = front.advance(one_shape, other_shape, goal, slice_units, meter);
         let found = sound(front.interval(), one, other, &rel);
         let now = memo.now;
         if !done && found.min <= now.min && found.max >= now.max {

@@ -340,3 +340,6 @@ fn corner(
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
