@@ -29,6 +29,7 @@ mod sockets;
 mod speak;
 mod tf;
 mod topics;
+mod wheel;
 
 pub use node::{RosNode, RosOptions};
 

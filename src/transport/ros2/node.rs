@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 
 use make::{join, make, namesakes, said};
-use ros2_client::{Context, Node, RosoutRaw as _, Spinner};
+use ros2_client::{Context, RosoutRaw as _, Spinner};
 use rustdds::mio1::Waker;
 
 use super::args::RosArgs;
@@ -55,8 +55,6 @@ pub struct RosNode {
     shared: Arc<Shared>,
     parcels: Arc<Parcels>,
     waker: Waker,
-    /// Last user of the node beside the sending thread.
-    node: Option<Arc<Node>>,
     context: Option<Context>,
     receiving: Option<JoinHandle<()>>,
     sending: Option<JoinHandle<()>>,
@@ -121,7 +119,6 @@ impl RosNode {
         let namesakes = namesakes(&node, &context);
         table.run();
 
-        let node = Arc::new(node);
         let parcels = Arc::new(Parcels::default());
         let (inlet, waker) = Inlet::new(
             (lines, services),
@@ -133,7 +130,8 @@ impl RosNode {
         )?;
         let boxes = scene.bodies.iter();
         let outlet = Outlet {
-            node: Arc::clone(&node),
+            node,
+            context: context.clone(),
             publishers,
             parcels: Arc::clone(&parcels),
             shared: Arc::clone(&shared),
@@ -155,7 +153,6 @@ impl RosNode {
             shared,
             parcels,
             waker,
-            node: Some(node),
             context: Some(context),
             receiving: None,
             sending: None,
@@ -215,13 +212,10 @@ impl RosNode {
         self.shared.stop.store(true, Ordering::Relaxed);
         self.parcels.stop();
         let _gone_already = self.waker.wake();
-        for thread in [self.sending.take(), self.receiving.take()] {
-            let _told_by_its_panic = thread.map(JoinHandle::join);
-        }
+        // The way to /rosout goes before the node does, and the node goes with the sending thread.
         self.shared.set_rosout(None);
-        if let Some(node) = self.node.take() {
-            node.stop_spinner();
-            drop(node);
+        for thread in [self.receiving.take(), self.sending.take()] {
+            let _told_by_its_panic = thread.map(JoinHandle::join);
         }
         let _told_by_its_panic = self.spinning.take().map(JoinHandle::join);
         drop(self.context.take());

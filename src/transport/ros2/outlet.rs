@@ -16,6 +16,7 @@ use super::parcel::{Next, Parcel, Parcels};
 use super::shared::{Say, Shared};
 use super::speak::{Book, Speaker};
 use super::topics::{Out, publisher};
+use super::wheel::{Sent, Wheel};
 use crate::error::{Error, Result};
 use crate::time::{Clock as _, SystemClock};
 use crate::wire::ros;
@@ -27,6 +28,11 @@ const SLEEP: Duration = Duration::from_millis(100);
 const NAMES_DEPTH: usize = 64;
 /// Between two messages of diagnostics, nanoseconds: what `/diagnostics` is read at.
 const DIAGNOSTICS_NS: u64 = 1_000_000_000;
+/// Bytes of a state, and of a tick of a few sources: a reader that has stopped may hold 16 and 8 thousand of them, at
+/// 400 Hz for the 20 s until its lease ends. These topics keep one writer, because a new one would look like a new node.
+const STATE_BYTES: usize = 512;
+/// As [`STATE_BYTES`].
+const TICK_BYTES: usize = 1024;
 /// Bytes of the largest messages.
 const CHUNK_BYTES: usize = 128 << 10;
 
@@ -34,12 +40,12 @@ const CHUNK_BYTES: usize = 128 << 10;
 pub(super) struct Publishers {
     state: Publisher<ros::State>,
     tick: Publisher<ros::Tick>,
-    pairs: Publisher<ros::Pairs>,
-    contacts: Publisher<ros::Contacts>,
+    pairs: Wheel<ros::Pairs>,
+    contacts: Wheel<ros::Contacts>,
     names: Publisher<ros::Names>,
     diagnostics: Publisher<ros::DiagnosticArray>,
-    markers: Publisher<ros::MarkerArray>,
-    collisions: Publisher<ros::GzContacts>,
+    markers: Wheel<ros::MarkerArray>,
+    collisions: Wheel<ros::GzContacts>,
 }
 
 impl Publishers {
@@ -58,8 +64,9 @@ impl Publishers {
     ) -> Result<Self> {
         let mut claim = |name: &str| names.claim(name).map_err(Error::Usage);
         // Silence of the node itself is told by the deadline and by the lease.
-        let watched = Out {
+        let watched = |bytes| Out {
             deadline: Some(Duration::from_nanos(heartbeat_ns.saturating_mul(2))),
+            bytes,
             ..Out::RELIABLE
         };
         let large = Out {
@@ -77,13 +84,13 @@ impl Publishers {
             ..latched
         };
         Ok(Self {
-            contacts: publisher(
+            contacts: Wheel::new(
                 node,
                 context,
                 (&claim("~/contacts")?, ("sweepd_msgs", "Contacts")),
                 large,
             )?,
-            pairs: publisher(
+            pairs: Wheel::new(
                 node,
                 context,
                 (&claim("~/pairs")?, ("sweepd_msgs", "Pairs")),
@@ -95,7 +102,7 @@ impl Publishers {
                 (&claim("~/names")?, ("sweepd_msgs", "Names")),
                 latched,
             )?,
-            markers: publisher(
+            markers: Wheel::new(
                 node,
                 context,
                 (&claim("~/markers")?, ("visualization_msgs", "MarkerArray")),
@@ -104,7 +111,7 @@ impl Publishers {
                     ..Out::RELIABLE
                 },
             )?,
-            collisions: publisher(
+            collisions: Wheel::new(
                 node,
                 context,
                 (&claim("~/collisions")?, ("ros_gz_interfaces", "Contacts")),
@@ -126,13 +133,13 @@ impl Publishers {
                 node,
                 context,
                 (&claim("~/state")?, ("sweepd_msgs", "State")),
-                watched,
+                watched(STATE_BYTES),
             )?,
             tick: publisher(
                 node,
                 context,
                 (&claim("~/tick")?, ("sweepd_msgs", "Tick")),
-                watched,
+                watched(TICK_BYTES),
             )?,
         })
     }
@@ -140,7 +147,8 @@ impl Publishers {
 
 /// The sending thread's own things.
 pub(super) struct Outlet {
-    pub(super) node: Arc<Node>,
+    pub(super) node: Node,
+    pub(super) context: Context,
     pub(super) publishers: Publishers,
     pub(super) parcels: Arc<Parcels>,
     pub(super) shared: Arc<Shared>,
@@ -159,15 +167,21 @@ pub(super) struct Outlet {
     pub(super) namesakes: Box<dyn FnMut() -> Option<String> + Send>,
 }
 
-/// What of the extras somebody listens to.
+/// What somebody listens to, as of the last look.
 #[derive(Clone, Copy, Debug, Default)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "one independent switch a topic"
+)]
 pub(super) struct Read {
     markers: bool,
     collisions: bool,
+    pairs: bool,
+    contacts: bool,
 }
 
 impl Outlet {
-    /// Runs until the node closes.
+    /// Runs until the node closes; then the node leaves the graph.
     pub(super) fn run(mut self) {
         loop {
             self.look_who_listens();
@@ -176,7 +190,7 @@ impl Outlet {
                 self.shared.say(Say::Warn, &text);
             }
             match self.parcels.next(SLEEP) {
-                Next::Stop => return,
+                Next::Stop => break,
                 Next::Nothing => {}
                 Next::Parcel(parcel, names) => {
                     if let Some((scene_rev, rows)) = names {
@@ -189,44 +203,43 @@ impl Outlet {
                 }
             }
         }
+        self.node.stop_spinner();
     }
 
     fn look_who_listens(&mut self) {
-        let out = &self.publishers;
-        let markers = self.shared.markers_period_ns().is_some()
-            && out.markers.get_subscription_count(&self.node) > 0;
-        let collisions =
-            self.shared.collisions() && out.collisions.get_subscription_count(&self.node) > 0;
-        let contacts = out.contacts.get_subscription_count(&self.node) > 0;
-        self.shared.set_demand(Demand {
-            pairs: markers || out.pairs.get_subscription_count(&self.node) > 0,
-            contacts: markers || collisions || contacts,
-            bodies: markers,
-            body_verdicts: false,
-        });
+        let (out, node) = (&self.publishers, &self.node);
+        let markers = self.shared.markers_period_ns().is_some() && out.markers.is_read(node);
+        let collisions = self.shared.collisions() && out.collisions.is_read(node);
         self.read = Read {
             markers,
             collisions,
+            pairs: out.pairs.is_read(node),
+            contacts: out.contacts.is_read(node),
         };
+        self.shared.set_demand(Demand {
+            pairs: markers || self.read.pairs,
+            contacts: markers || collisions || self.read.contacts,
+            bodies: markers,
+            body_verdicts: false,
+        });
     }
 
     /// Markers at their own rate, collisions each tick; where somebody listens.
     fn show(&mut self, parcel: &Parcel) {
-        let out = &self.publishers;
+        let mut pen = Pen::of(&mut self.node, &self.context, &self.shared);
         if self.read.collisions && parcel.holds.contacts {
             let header = self.speaker.header(parcel.tick.header.oldest_stamp_ns);
             let message = collisions(header, &self.speaker.book, parcel);
-            self.publish(&out.collisions, message);
+            pen.write(&mut self.publishers.collisions, message);
         }
         let Some(period_ns) = self.shared.markers_period_ns() else {
             return;
         };
-        let now_ns = SystemClock.boottime_ns();
-        let due = now_ns.saturating_sub(self.shown_ns) >= period_ns;
+        let due = pen.now_ns.saturating_sub(self.shown_ns) >= period_ns;
         if self.read.markers && parcel.holds.bodies && due {
-            self.shown_ns = now_ns;
+            self.shown_ns = pen.now_ns;
             let message = markers(&self.speaker, parcel, &self.boxes, period_ns);
-            self.publish(&self.publishers.markers, message);
+            pen.write(&mut self.publishers.markers, message);
         }
     }
 
@@ -259,26 +272,56 @@ impl Outlet {
     }
 
     /// Contacts and pairs first, the tick last: whoever has the tick has all that belongs to it.
-    fn send(&self, parcel: &Parcel) {
-        let out = &self.publishers;
-        if parcel.holds.contacts && out.contacts.get_subscription_count(&self.node) > 0 {
+    fn send(&mut self, parcel: &Parcel) {
+        let out = &mut self.publishers;
+        let mut pen = Pen::of(&mut self.node, &self.context, &self.shared);
+        if parcel.holds.contacts && self.read.contacts {
             for message in self.speaker.contacts(parcel) {
-                self.publish(&out.contacts, message);
+                pen.write(&mut out.contacts, message);
             }
         }
-        if parcel.holds.pairs && out.pairs.get_subscription_count(&self.node) > 0 {
+        if parcel.holds.pairs && self.read.pairs {
             for message in self.speaker.pairs(parcel) {
-                self.publish(&out.pairs, message);
+                pen.write(&mut out.pairs, message);
             }
         }
-        self.publish(&out.state, self.speaker.state(&parcel.tick));
+        self.publish(&self.publishers.state, self.speaker.state(&parcel.tick));
         let tick = self.speaker.tick(&parcel.tick, self.shared.counts());
-        self.publish(&out.tick, tick);
+        self.publish(&self.publishers.tick, tick);
     }
 
     fn publish<M: Serialize>(&self, to: &Publisher<M>, message: M) {
         if to.publish(message).is_err() {
             self.shared.note_unsent(1);
+        }
+    }
+}
+
+/// What it takes to publish on a [`Wheel`].
+struct Pen<'a> {
+    node: &'a mut Node,
+    context: &'a Context,
+    shared: &'a Shared,
+    now_ns: u64,
+}
+
+impl<'a> Pen<'a> {
+    fn of(node: &'a mut Node, context: &'a Context, shared: &'a Shared) -> Self {
+        Self {
+            node,
+            context,
+            shared,
+            now_ns: SystemClock.boottime_ns(),
+        }
+    }
+
+    fn write<M: Serialize>(&mut self, to: &mut Wheel<M>, message: M) {
+        match to.publish(self.node, self.context, message, self.now_ns) {
+            Sent::Yes => {}
+            Sent::Turned => {
+                tracing::debug!("ROS 2: a reader does not acknowledge; a new writer goes on")
+            }
+            Sent::No => self.shared.note_unsent(1),
         }
     }
 }

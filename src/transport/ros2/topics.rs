@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 /// lease after 20 s, and until then must cost no more than this.
 const UNACKED_BYTES_MAX: usize = 8 << 20;
 /// Unacknowledged messages that one topic may keep, however small.
-const UNACKED_MAX: usize = 4096;
+const UNACKED_MAX: usize = 1 << 14;
 /// Lease of liveliness, offered where silence must be told: shorter ones flap, because the crate asserts once a second.
 const LEASE: Duration = Duration::from_secs(3);
 
@@ -69,7 +69,7 @@ impl Out {
     }
 
     /// Messages that may wait for acknowledgement.
-    fn window(self) -> usize {
+    pub(super) fn window(self) -> usize {
         (UNACKED_BYTES_MAX / self.bytes.max(1)).clamp(self.depth.max(16), UNACKED_MAX)
     }
 }
