@@ -17,14 +17,14 @@ use super::args::RunArgs;
 
 #[cfg(feature = "ros2")]
 use crate::transport::ros2::{
-    RosBody, RosNode, RosOptions, RosScene, RosSourceSpec, args::RosArgs, env::Network,
+    LastingNode, RosBody, RosNode, RosOptions, RosScene, RosSourceSpec, args::RosArgs, env::Network,
 };
 #[cfg(feature = "ros2")]
 use crate::world::PlacedShape;
 
 /// The node, where one was asked for.
 #[cfg(feature = "ros2")]
-pub(super) type Node = RosNode;
+pub(super) type Node = LastingNode;
 /// There is none in this build.
 #[cfg(not(feature = "ros2"))]
 pub(super) type Node = std::convert::Infallible;
@@ -94,19 +94,19 @@ impl Asked {
         let Some((args, network)) = self.node else {
             return Ok(None);
         };
-        let options = RosOptions {
-            args,
-            network,
-            boot_id,
-            session: crate::transport::client::random_u64()?,
+        let (scene, place) = (cast(scene, shapes), place.clone());
+        let opener = move || {
+            let options = RosOptions {
+                args: args.clone(),
+                network,
+                boot_id,
+                // Each node counts its frames anew.
+                session: crate::transport::client::random_u64()?,
+            };
+            let waker = crate::transport::iceoryx::Waker::new(&place)?;
+            RosNode::open(&options, &scene, Box::new(move || waker.wake()))
         };
-        let waker = crate::transport::iceoryx::Waker::new(place)?;
-        RosNode::open(
-            &options,
-            &cast(scene, shapes),
-            Box::new(move || waker.wake()),
-        )
-        .map(Some)
+        LastingNode::open(Box::new(opener)).map(Some)
     }
 }
 

@@ -15,6 +15,7 @@ pub mod env;
 mod inlet;
 mod lines;
 mod markers;
+mod mend;
 pub mod names;
 mod node;
 mod outlet;
@@ -31,6 +32,7 @@ mod tf;
 mod topics;
 mod wheel;
 
+pub use mend::LastingNode;
 pub use node::{RosNode, RosOptions};
 
 use crate::config::{Config, RosSource};

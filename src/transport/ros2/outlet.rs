@@ -6,7 +6,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use ros2_client::{Context, Node, Publisher};
+use ros2_client::{Context, Node, ParameterValue, Publisher};
 use serde::Serialize;
 
 use super::diagnose::Diagnoser;
@@ -185,6 +185,10 @@ impl Outlet {
     pub(super) fn run(mut self) {
         loop {
             self.look_who_listens();
+            // The crate keeps this parameter to itself: its set action is never called.
+            let sim_time = self.node.get_parameter("use_sim_time");
+            self.shared
+                .set_sim_time(matches!(sim_time, Some(ParameterValue::Boolean(true))));
             self.diagnose();
             if let Some(text) = (self.namesakes)() {
                 self.shared.say(Say::Warn, &text);

@@ -120,8 +120,6 @@ pub(super) enum Own {
     MarkersPeriod(u64),
     /// Whether `~/collisions` is published.
     Collisions(bool),
-    /// Whether time is that of `/clock`.
-    SimTime(bool),
 }
 
 /// What setting a parameter does.
@@ -285,7 +283,6 @@ impl Table {
                 Effect::Own(Own::MarkersPeriod(some_ns(1e3 / hz).unwrap_or(0)))
             }
             ("publish_collisions", Some(Value::Flag(on))) => Effect::Own(Own::Collisions(on)),
-            ("use_sim_time", Some(Value::Flag(on))) => Effect::Own(Own::SimTime(on)),
             (name, Some(Value::Real(ms))) => {
                 let source = name.strip_prefix("timeout_ms.").and_then(place);
                 match (source, some_ns(ms)) {

@@ -117,7 +117,6 @@ impl Shared {
                 Own::Markers(on) => self.markers.store(on, Ordering::Relaxed),
                 Own::MarkersPeriod(ns) => self.markers_period_ns.store(ns, Ordering::Relaxed),
                 Own::Collisions(on) => self.collisions.store(on, Ordering::Relaxed),
-                Own::SimTime(on) => self.sim_time.store(on, Ordering::Relaxed),
             },
             Effect::None => {}
         }
@@ -154,6 +153,11 @@ impl Shared {
     /// Whether `~/collisions` is published.
     pub(super) fn collisions(&self) -> bool {
         self.collisions.load(Ordering::Relaxed)
+    }
+
+    /// Takes whether time is that of `/clock`.
+    pub(super) fn set_sim_time(&self, on: bool) {
+        self.sim_time.store(on, Ordering::Relaxed);
     }
 
     /// Whether time is that of `/clock`.

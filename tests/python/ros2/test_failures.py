@@ -9,7 +9,7 @@ import time
 
 import pytest
 import rclpy
-from conftest import RELIABLE
+from conftest import LATCHED, RELIABLE
 from frames import Sender
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -17,7 +17,7 @@ from rclpy.qos import QoSLivelinessPolicy, QoSProfile, QoSReliabilityPolicy
 from rclpy.serialization import serialize_message
 from scenes import HANDS
 from std_msgs.msg import String
-from sweepd_msgs.msg import Pairs, State, Tick
+from sweepd_msgs.msg import Names, Pairs, State, Tick
 
 HEARTBEAT_S = 0.1
 FAR = {"left": (0, 0, 0), "right": (5, 0, 0)}
@@ -92,6 +92,30 @@ def test_running_peers_go_on_with_a_restarted_daemon(room):
         first = states[-1].tick_header.boot_id
         room.until(lambda: pairs and pairs[-1].tick_header.boot_id == first and pairs[-1].pairs, "its pairs", then=lambda: sender.send(CLOSE))
     assert len({state.tick_header.boot_id for state in states}) == 3
+
+
+def test_a_daemon_that_was_stopped_and_continued_is_heard_again_and_the_gap_is_told(room):
+    """DDS's own threads may not survive it: then the node is opened anew, with the boot id as it was."""
+    daemon = room.daemon(HANDS)
+    node = room.node()
+    ticks = room.hear(Tick, "/sweepd/tick")
+    sender = Sender(node)
+    room.until(lambda: ticks and ticks[-1].sources[0].frames > 3, "frames", then=lambda: sender.send(FAR))
+    daemon.send(signal.SIGSTOP)
+    room.spin(1.0)
+    daemon.send(signal.SIGCONT)
+    stopped = ticks[-1].sent_ns
+    room.until(lambda: ticks[-1].sent_ns > stopped and ticks[-1].sources[0].frames > 10, "ticks and frames again", seconds=20,
+               then=lambda: sender.send(FAR))  # fmt: skip
+    assert len({tick.tick_header.boot_id for tick in ticks}) == 1
+    numbers = [tick.tick_header.tick for tick in ticks]
+    assert numbers == sorted(set(numbers)), "none repeated"
+    gaps = [b.sent_ns - a.sent_ns for a, b in zip(ticks, ticks[1:])]
+    print(f"heard again after {max(gaps) / 1e9:.2f} s; ticks not heard meanwhile: {numbers[-1] - numbers[0] + 1 - len(numbers)}")
+    assert max(gaps) > 900_000_000
+    late = room.node("late")
+    names = room.hear(Names, "/sweepd/names", LATCHED, node=late)
+    room.until(lambda: names and len(names[-1].names) == 3, "the names, too")
 
 
 def test_a_restarted_sender_is_a_new_session_and_its_pairs_end(room):

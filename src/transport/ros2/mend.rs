@@ -1,0 +1,236 @@
+//! The node, opened anew where DDS's own threads have ended.
+//!
+//! In: how to open a node. Out: a door that goes on with another node. Each thread of rustdds 0.15 ends for good when
+//! its wait is interrupted, which a stop and a continue of the process does (SIGSTOP and SIGCONT, a debugger); the node
+//! would then be deaf and mute while the daemon ticks on. Seen by `tests/python/ros2`. A thread of this file looks once
+//! a second, and opening and closing are its work, so that the tick never waits for them; peers find the new
+//! participant as they find a restarted daemon, with the boot id as it was.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use super::RosNode;
+use crate::error::{Error, Result};
+use crate::time::Clock;
+use crate::transport::{Door, RequestToken, Setting, Wake};
+use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow};
+
+/// How often it is looked whether DDS lives: silence is told by the lease after 3 s.
+const LOOK: Duration = Duration::from_secs(1);
+/// Names of DDS's threads, as far as the system keeps them.
+const DDS_THREADS: [&str; 2] = ["RustDDS Partici", "RustDDS discove"];
+/// Requests of one node are told from those of the next by their upper bits; the uppermost is the daemon's.
+const NODE_SHIFT: u32 = 40;
+
+/// Opens the node.
+type Opener = Box<dyn Fn() -> Result<RosNode> + Send>;
+
+/// A node that is opened anew when DDS has died beneath it.
+pub struct LastingNode {
+    /// `None` while it is opened anew.
+    live: Option<RosNode>,
+    /// Which node it is, from 0.
+    number: u64,
+    /// Whether the node must be told all names, because it did not hear them before.
+    tell_names: bool,
+    dead: Arc<AtomicBool>,
+    ended: Arc<AtomicBool>,
+    broken: Option<Sender<RosNode>>,
+    mended: Receiver<RosNode>,
+    watcher: Option<JoinHandle<()>>,
+}
+
+impl std::fmt::Debug for LastingNode {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("LastingNode")
+            .field("number", &self.number)
+            .finish_non_exhaustive()
+    }
+}
+
+impl LastingNode {
+    /// Opens the node for the first time.
+    ///
+    /// # Errors
+    /// Those of [`RosNode::open`].
+    pub fn open(opener: Box<dyn Fn() -> Result<RosNode> + Send>) -> Result<Self> {
+        let live = opener()?;
+        let (broken, to_mend) = channel();
+        let (give, mended) = channel();
+        let dead = Arc::new(AtomicBool::new(false));
+        let ended = Arc::new(AtomicBool::new(false));
+        let flags = (Arc::clone(&dead), Arc::clone(&ended));
+        let watcher = std::thread::Builder::new()
+            .name("ros-watch".to_owned())
+            .spawn(move || watch(&opener, &flags, &to_mend, &give))
+            .map_err(|e| Error::io("cannot start the thread ros-watch", e))?;
+        Ok(Self {
+            live: Some(live),
+            number: 0,
+            tell_names: false,
+            dead,
+            ended,
+            broken: Some(broken),
+            mended,
+            watcher: Some(watcher),
+        })
+    }
+
+    /// Gives a dead node away, takes the new one.
+    fn exchange(&mut self) {
+        if self.live.is_some() && self.dead.load(Ordering::Acquire) {
+            if let (Some(node), Some(broken)) = (self.live.take(), &self.broken) {
+                // A watcher that is gone drops it: there is nobody to mend it.
+                let _gone = broken.send(node);
+            }
+        } else if self.live.is_none()
+            && let Ok(node) = self.mended.try_recv()
+        {
+            self.live = Some(node);
+            self.number += 1;
+            self.tell_names = true;
+        }
+    }
+}
+
+impl Drop for LastingNode {
+    fn drop(&mut self) {
+        self.ended.store(true, Ordering::Release);
+        self.broken = None;
+        if let Some(watcher) = self.watcher.take() {
+            watcher.thread().unpark();
+            let _told_by_its_panic = watcher.join();
+        }
+    }
+}
+
+/// Looks, and opens the node anew where it must.
+fn watch(
+    opener: &Opener,
+    (dead, ended): &(Arc<AtomicBool>, Arc<AtomicBool>),
+    to_mend: &Receiver<RosNode>,
+    give: &Sender<RosNode>,
+) {
+    let pause = || {
+        std::thread::park_timeout(LOOK);
+        ended.load(Ordering::Acquire)
+    };
+    while !pause() {
+        if dds_lives() {
+            continue;
+        }
+        tracing::error!(
+            "ROS 2: a thread of DDS has ended (SIGSTOP and SIGCONT, or a debugger, do that): the node is opened anew"
+        );
+        dead.store(true, Ordering::Release);
+        let Ok(broken) = to_mend.recv() else { return };
+        drop(broken);
+        let mut told = false;
+        let node = loop {
+            match opener() {
+                Ok(node) => break node,
+                Err(e) if !told => {
+                    told = true;
+                    tracing::error!("ROS 2: {e}; it is tried again each second");
+                }
+                Err(_) => {}
+            }
+            if pause() {
+                return;
+            }
+        };
+        dead.store(false, Ordering::Release);
+        if give.send(node).is_err() {
+            return;
+        }
+    }
+}
+
+/// Whether each of DDS's threads is there. A system without /proc says nothing, and then they are.
+fn dds_lives() -> bool {
+    let Ok(tasks) = std::fs::read_dir("/proc/self/task") else {
+        return true;
+    };
+    let mut seen = [false; DDS_THREADS.len()];
+    for task in tasks.flatten() {
+        let name = std::fs::read_to_string(task.path().join("comm")).unwrap_or_default();
+        for (seen, wanted) in seen.iter_mut().zip(DDS_THREADS) {
+            *seen |= name.trim_end() == wanted;
+        }
+    }
+    seen == [true; DDS_THREADS.len()]
+}
+
+impl Door for LastingNode {
+    fn wait(&mut self, timeout_ns: u64, clock: &dyn Clock) -> Result<Wake> {
+        match &mut self.live {
+            Some(node) => node.wait(timeout_ns, clock),
+            None => Ok(Wake::default()),
+        }
+    }
+
+    fn receive(&mut self, inbox: &mut Inbox, clock: &dyn Clock) {
+        self.exchange();
+        if let Some(node) = &mut self.live {
+            node.receive(inbox, clock);
+        }
+    }
+
+    fn demand(&mut self) -> Demand {
+        self.live.as_mut().map(Door::demand).unwrap_or_default()
+    }
+
+    fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
+        let Some(node) = &mut self.live else {
+            return Ok(0);
+        };
+        if std::mem::take(&mut self.tell_names) && !outbox.names_changed {
+            let mut whole = outbox.clone();
+            whole.names_changed = true;
+            return node.publish(&whole);
+        }
+        node.publish(outbox)
+    }
+
+    fn publish_tick(&mut self, tick: &TickRow) -> Result<()> {
+        match &mut self.live {
+            Some(node) => node.publish_tick(tick),
+            None => Ok(()),
+        }
+    }
+
+    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, &[u8])) {
+        let number = self.number << NODE_SHIFT;
+        if let Some(node) = &mut self.live {
+            node.requests(&mut |token, header, payload| {
+                take(RequestToken(token.0 | number), header, payload);
+            });
+        }
+    }
+
+    fn answer(&mut self, token: RequestToken, ok: bool, json: &str) -> Result<()> {
+        match &mut self.live {
+            Some(node) if token.0 >> NODE_SHIFT == self.number => {
+                let token = RequestToken(token.0 & ((1 << NODE_SHIFT) - 1));
+                node.answer(token, ok, json)
+            }
+            // Who asked has left with the node.
+            _ => Ok(()),
+        }
+    }
+
+    fn settings(&mut self, take: &mut dyn FnMut(Setting)) {
+        if let Some(node) = &mut self.live {
+            node.settings(take);
+        }
+    }
+
+    fn housekeeping(&mut self) {
+        if let Some(node) = &mut self.live {
+            node.housekeeping();
+        }
+    }
+}

@@ -1,0 +1,160 @@
+"""Parameters: given at the start, read and set by others while the node runs, refused with a reason; simulated time."""
+
+import pytest
+from conftest import RELIABLE
+from frames import Sender
+from rcl_interfaces.msg import Log, Parameter, ParameterEvent, ParameterType, ParameterValue
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters, SetParametersAtomically
+from rosgraph_msgs.msg import Clock
+from scenes import HANDS, cloud
+from sweepd_msgs.msg import Contacts, Pairs, State, Tick
+
+EDITS = ["-p", "ros.allow_edits:=true"]
+FAR = {"left": (0, 0, 0), "right": (5, 0, 0)}
+CLOSE = {"left": (0, 0, 0), "right": (0.5, 0, 0)}
+
+
+def value(thing):
+    """A parameter's value as ROS 2 sends it."""
+    if isinstance(thing, bool):
+        return ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=thing)
+    if isinstance(thing, int):
+        return ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=thing)
+    if isinstance(thing, float):
+        return ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=thing)
+    return ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=thing)
+
+
+def get(room, *names):
+    answer = room.call(GetParameters, "/sweepd/get_parameters", GetParameters.Request(names=names))
+    picked = {1: "bool_value", 2: "integer_value", 3: "double_value", 4: "string_value"}
+    return [getattr(one, picked[one.type]) if one.type else None for one in answer.values]
+
+
+def put(room, **values):
+    parameters = [Parameter(name=name.replace("__", "."), value=value(one)) for name, one in values.items()]
+    answer = room.call(SetParameters, "/sweepd/set_parameters", SetParameters.Request(parameters=parameters))
+    return [(result.successful, result.reason) for result in answer.results]
+
+
+def test_parameters_are_listed_described_and_read(room):
+    room.daemon(HANDS, "--budget", "3ms")
+    room.node()
+    names = set(room.call(ListParameters, "/sweepd/list_parameters").result.names)
+    wanted = {"budget_ms", "budget_units", "mode", "ros_max_pairs", "ros_max_contacts", "markers_rate_hz", "out_reliability",
+              "publish_markers", "publish_collisions", "ros.allow_edits", "use_sim_time", "timeout_ms.sim"}  # fmt: skip
+    assert wanted <= names, wanted - names
+    assert get(room, "budget_ms", "mode", "ros_max_contacts", "timeout_ms.sim", "nothing") == [3.0, "on_frame=sim", 500, 500.0, None]
+    described = room.call(DescribeParameters, "/sweepd/describe_parameters", DescribeParameters.Request(names=["budget_ms"]))
+    assert described.descriptors[0].type == ParameterType.PARAMETER_DOUBLE
+
+
+def test_safety_parameters_are_refused_unless_edits_are_allowed(room):
+    room.daemon(HANDS)
+    room.node()
+    for name, one in [("budget_ms", 1.0), ("mode", "rate=10"), ("timeout_ms.sim", 100.0)]:
+        ((done, reason),) = put(room, **{name.replace(".", "__"): one})
+        assert not done and "allow_edits" in reason, (name, reason)
+    assert put(room, ros__allow_edits=True)[0][0] is False
+    assert put(room, ros_max_contacts=10) == [(True, "")]
+    assert get(room, "budget_ms", "ros_max_contacts") == [-1.0, 10]
+
+
+def test_wrong_values_are_refused_with_a_reason_and_atomic_sets_are_all_or_nothing(room):
+    room.daemon(HANDS, ros_args=EDITS)
+    room.node()
+    for name, one in [("budget_ms", -2.0), ("ros_max_contacts", -1), ("markers_rate_hz", 0.0), ("mode", "fast"),
+                      ("mode", "on_frame=nobody"), ("publish_markers", "yes"), ("out_reliability", "best_effort"),
+                      ("no_such_parameter", 1)]:  # fmt: skip
+        ((done, reason),) = put(room, **{name: one})
+        assert not done and reason, (name, one)
+    both = [Parameter(name="ros_max_contacts", value=value(7)), Parameter(name="budget_ms", value=value(-5.0))]
+    answer = room.call(SetParametersAtomically, "/sweepd/set_parameters_atomically", SetParametersAtomically.Request(parameters=both))
+    assert not answer.result.successful and answer.result.reason
+    assert get(room, "budget_ms") == [-1.0]
+
+
+def test_what_is_set_takes_effect_and_is_told(room):
+    room.daemon(HANDS, ros_args=EDITS)
+    node = room.node()
+    ticks = room.hear(Tick, "/sweepd/tick")
+    events = room.hear(ParameterEvent, "/parameter_events")
+    logs = room.hear(Log, "/rosout")
+    sender = Sender(node)
+    room.until(lambda: ticks and ticks[-1].budget_ns == Tick.UNLIMITED, "no budget", then=lambda: sender.send(FAR))
+    assert put(room, budget_ms=4.0) == [(True, "")]
+    room.until(lambda: ticks[-1].budget_ns == 4_000_000, "the budget in the tick", then=lambda: sender.send(FAR))
+    assert put(room, mode="rate=20") == [(True, "")]
+    start = len(ticks)
+    room.until(lambda: len(ticks) > start + 20, "ticks without frames", seconds=5)
+    room.until(lambda: any("budget_ms" in str(event) for event in events), "a parameter event")
+    room.until(lambda: any("budget_ms" in log.msg for log in logs), "a line on /rosout")
+
+
+def test_parameter_files_and_arguments_are_taken_in_order(room):
+    first, second = room.folder / "a.yaml", room.folder / "b.yaml"
+    first.write_text("/**:\n  ros__parameters:\n    budget_ms: 7\n    ros_max_contacts: 11\n    ros:\n      allow_edits: true\n")
+    second.write_text("/cell:\n  sweepd:\n    ros__parameters:\n      ros_max_contacts: 12\nother:\n  ros__parameters:\n    budget_ms: 1\n")
+    room.daemon(HANDS, ros_args=["-r", "__ns:=/cell", "--params-file", str(first), "--params-file", str(second), "-p", "ros_max_pairs:=13"])
+    room.node()
+    names = ["budget_ms", "ros_max_contacts", "ros_max_pairs", "ros.allow_edits"]
+    answer = room.call(GetParameters, "/cell/sweepd/get_parameters", GetParameters.Request(names=names))
+    budget, contacts, pairs, edits = answer.values
+    assert (budget.double_value, contacts.integer_value, pairs.integer_value, edits.bool_value) == (7.0, 12, 13, True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["-p", "ros_max_contacts:=-1"], "ros_max_contacts"),
+        (["-p", "budget_ms:=soon"], "budget_ms"),
+        (["--params-file", "/nowhere.yaml"], "/nowhere.yaml"),
+    ],
+)
+def test_a_value_that_cannot_be_meant_is_refused_at_the_start(room, arguments, word):
+    daemon = room.daemon(HANDS, ros_args=arguments)
+    assert daemon.process.wait(timeout=15) in (2, 4)
+    assert word in daemon.log, daemon.log
+
+
+def test_an_unknown_parameter_is_told(room):
+    daemon = room.daemon(HANDS, ros_args=["-p", "no_such_parameter:=1"])
+    room.node()
+    room.until(lambda: "no_such_parameter" in daemon.log and "ros_max_contacts" in daemon.log, "a word on it, and what there is")
+
+
+def test_limits_of_rows_are_parameters(room):
+    room.daemon(cloud(30), ros_args=["-p", "ros_max_contacts:=20000"])
+    node = room.node()
+    contacts = room.hear(Contacts, "/sweepd/contacts")
+    sender = Sender(node)
+    together = {f"b{n:04}": (0.001 * n, 0, 0) for n in range(30)}
+    room.until(lambda: contacts and contacts[-1].complete and contacts[-1].contacts, "all of them", then=lambda: sender.send(together))
+    put(room, ros_max_contacts=5)
+    cut = room.until(lambda: not contacts[-1].complete and contacts[-1], "cut", then=lambda: sender.send(together))
+    assert len(cut.contacts) == 5 and cut.tick_header.truncated == 30 * 29 // 2 - 5
+
+
+def test_simulated_time_is_that_of_the_clock_topic_and_a_jump_back_ends_every_pair(room):
+    room.daemon(HANDS, ros_args=["-p", "use_sim_time:=true"])
+    node = room.node()
+    clock = node.create_publisher(Clock, "/clock", RELIABLE)
+    pairs = room.hear(Pairs, "/sweepd/pairs")
+    states = room.hear(State, "/sweepd/state")
+    sender = Sender(node)
+    now = [1_000.0]
+
+    def step():
+        now[0] += 0.02
+        message = Clock()
+        message.clock.sec, message.clock.nanosec = int(now[0]), int((now[0] % 1) * 1e9)
+        clock.publish(message)
+        sender.send(CLOSE, stamp_ns=int(now[0] * 1e9))
+
+    room.until(lambda: states and states[-1].word == "colliding", "a collision", then=step)
+    room.spin(0.2)
+    start = len(pairs)
+    now[0] = 10.0
+    room.until(lambda: any(p.events & p.END and p.end_cause == p.END_RESET for m in pairs[start:] for p in m.pairs),
+               "an end with cause reset", then=step)  # fmt: skip
+    room.until(lambda: states[-1].word == "colliding", "and it goes on", then=step)
