@@ -12,6 +12,7 @@ pub struct GzEntity {
     /// Body name.
     pub name: String,
     /// 5: a collision.
+    #[serde(rename = "type")]
     pub kind: u8,
 }
 

@@ -113,6 +113,7 @@ pub struct Marker {
     /// Unique within its layer; stays with what it shows.
     pub id: i32,
     /// See [`marker_kind`].
+    #[serde(rename = "type")]
     pub kind: i32,
     /// See [`marker_kind`].
     pub action: i32,

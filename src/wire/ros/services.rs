@@ -20,6 +20,7 @@ pub struct Point32 {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SolidPrimitive {
     /// 1 box, 2 sphere, 3 cylinder, 4 cone, 5 prism.
+    #[serde(rename = "type")]
     pub kind: u8,
     /// Metres, by kind.
     pub dimensions: Vec<f64>,

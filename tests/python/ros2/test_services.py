@@ -1,0 +1,121 @@
+"""Scene edits and questions over ROS 2 services."""
+
+import json
+
+import pytest
+from conftest import LATCHED
+from frames import Sender, pose
+from scenes import HANDS
+from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
+from geometry_msgs.msg import Point
+from sweepd_msgs.msg import Names, Pairs, State
+from sweepd_msgs.srv import AttachBody, EnableBody, PutBody, RemoveBody, Reset, SetFilter, TickNow
+
+CLOSE = {"left": (0, 0, 0), "right": (0.5, 0, 0)}
+FAR = {"left": (0, 0, 0), "right": (5, 0, 0)}
+
+
+@pytest.fixture
+def scene(room):
+    room.daemon(HANDS, ros_args=["-p", "ros.allow_edits:=true"])
+    node = room.node()
+    states = room.hear(State, "/sweepd/state")
+    sender = Sender(node)
+    room.until(lambda: states and states[-1].word == "colliding", "a collision", then=lambda: sender.send(CLOSE))
+    return room, sender, states
+
+
+def still(x, **more):
+    box = SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[0.4, 0.4, 0.4])
+    return PutBody.Request(moves=False, pose=pose((x, 0, 0)), primitives=[box], primitive_poses=[pose((0, 0, 0))], **more)
+
+
+def test_edits_are_refused_unless_the_scene_allows_them(room):
+    room.daemon(HANDS)
+    room.node()
+    for kind, request in [
+        (PutBody, still(0, name="crate")), (RemoveBody, RemoveBody.Request(name="left")),
+        (EnableBody, EnableBody.Request(name="left")), (AttachBody, AttachBody.Request(name="left", to="right")),
+        (SetFilter, SetFilter.Request(action=SetFilter.Request.IGNORE, a="left", b="right")), (Reset, Reset.Request()),
+    ]:  # fmt: skip
+        name = "".join(("_" if c.isupper() else "") + c.lower() for c in kind.__name__).lstrip("_")
+        answer = room.call(kind, f"/sweepd/{name}", request)
+        assert not answer.success and "allow_edits" in answer.message, name
+
+
+def test_bodies_are_put_disabled_attached_and_removed(scene):
+    room, sender, states = scene
+    names = room.hear(Names, "/sweepd/names", LATCHED)
+    # 0.6 away from the left hand's surface
+    answer = room.call(PutBody, "/sweepd/put_body", still(-1.3, name="crate", options_json=json.dumps({"report_within_m": 0.7})))
+    assert answer.success, answer.message
+    room.until(lambda: names and "crate" in {n.name for n in names[-1].names}, "the name of the new body", then=lambda: sender.send(FAR))
+    state = room.until(lambda: states[-1].word == "near" and states[-1], "near the crate", then=lambda: sender.send(FAR))
+    assert {state.worst_name_a, state.worst_name_b} == {"crate", "left"}
+    assert room.call(EnableBody, "/sweepd/enable_body", EnableBody.Request(name="crate", enabled=False)).success
+    room.until(lambda: states[-1].word == "clear", "clear without it", then=lambda: sender.send(FAR))
+    assert room.call(EnableBody, "/sweepd/enable_body", EnableBody.Request(name="crate", enabled=True)).success
+    room.until(lambda: states[-1].word == "near", "near again", then=lambda: sender.send(FAR))
+    hung = AttachBody.Request(name="crate", to="right", pose=pose((0, 0, 2)))
+    answer = room.call(AttachBody, "/sweepd/attach_body", hung)
+    assert answer.success, answer.message
+    assert room.call(RemoveBody, "/sweepd/remove_body", RemoveBody.Request(name="crate")).success
+    room.until(lambda: "crate" not in {n.name for n in names[-1].names}, "the name gone", then=lambda: sender.send(FAR))
+    answer = room.call(RemoveBody, "/sweepd/remove_body", RemoveBody.Request(name="crate"))
+    assert not answer.success and "crate" in answer.message
+
+
+def test_a_mesh_is_put_and_wrong_shapes_are_refused_with_the_reason(scene):
+    room, sender, states = scene
+    corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    faces = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+    mesh = Mesh(vertices=[Point(x=float(x), y=float(y), z=float(z)) for x, y, z in corners],
+                triangles=[MeshTriangle(vertex_indices=face) for face in faces])  # fmt: skip
+    request = PutBody.Request(name="wedge", moves=False, pose=pose((4.7, 0, -0.2)), meshes=[mesh], mesh_poses=[pose((0, 0, 0))])
+    answer = room.call(PutBody, "/sweepd/put_body", request)
+    assert answer.success, answer.message
+    room.until(lambda: states[-1].word == "colliding" and {states[-1].worst_name_a, states[-1].worst_name_b} == {"right", "wedge"},
+               "the wedge is met", then=lambda: sender.send(FAR))  # fmt: skip
+    bad = [
+        (dict(primitives=[SolidPrimitive(type=SolidPrimitive.BOX, dimensions=[1.0, 2.0])], primitive_poses=[pose((0, 0, 0))]), "dimensions"),
+        (dict(primitives=[SolidPrimitive(type=SolidPrimitive.PRISM, dimensions=[1.0])], primitive_poses=[pose((0, 0, 0))]), "prism"),
+        (dict(primitives=[SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[1.0])]), "primitive_poses"),
+        (dict(), "shape"),
+        (dict(options_json="{"), "options_json"),
+        (dict(options_json='{"name": "x"}'), "name"),
+    ]
+    for fields, word in bad:
+        answer = room.call(PutBody, "/sweepd/put_body", PutBody.Request(name="bad", moves=False, **fields))
+        assert not answer.success and word in answer.message.lower(), (fields, answer.message)
+
+
+def test_filters_and_reset_end_pairs_with_their_causes(scene):
+    room, sender, states = scene
+    pairs = room.hear(Pairs, "/sweepd/pairs")
+    room.until(lambda: pairs and pairs[-1].pairs, "the pair", then=lambda: sender.send(CLOSE))
+    ignore = SetFilter.Request(action=SetFilter.Request.IGNORE, a="left", b="right", reason="test")
+    assert room.call(SetFilter, "/sweepd/set_filter", ignore).success
+    room.until(lambda: any(p.end_cause == p.END_FILTERED for m in pairs for p in m.pairs), "an end with cause filtered",
+               then=lambda: sender.send(CLOSE))  # fmt: skip
+    room.until(lambda: states[-1].word == "clear", "clear", then=lambda: sender.send(CLOSE))
+    drop = SetFilter.Request(action=SetFilter.Request.DROP, a="left", b="right")
+    assert room.call(SetFilter, "/sweepd/set_filter", drop).success
+    room.until(lambda: states[-1].word == "colliding", "colliding again", then=lambda: sender.send(CLOSE))
+    masks = SetFilter.Request(action=SetFilter.Request.MASKS, a="left", group=2, mask=2)
+    assert room.call(SetFilter, "/sweepd/set_filter", masks).success
+    room.until(lambda: states[-1].word == "clear", "clear by masks", then=lambda: sender.send(CLOSE))
+    masks.group, masks.mask = 1, 2**32 - 1
+    assert room.call(SetFilter, "/sweepd/set_filter", masks).success
+    room.until(lambda: states[-1].word == "colliding", "colliding again", then=lambda: sender.send(CLOSE))
+    assert room.call(Reset, "/sweepd/reset", Reset.Request(source="sim")).success
+    room.until(lambda: any(p.end_cause == p.END_RESET for m in pairs for p in m.pairs), "an end with cause reset")
+    assert not room.call(Reset, "/sweepd/reset", Reset.Request(source="nobody")).success
+
+
+def test_a_tick_is_made_and_answered_at_once(scene):
+    room, _, states = scene
+    first = room.call(TickNow, "/sweepd/tick_now")
+    second = room.call(TickNow, "/sweepd/tick_now")
+    assert first.success and second.tick_header.tick > first.tick_header.tick
+    assert second.word in ("colliding", "unknown")
+    room.until(lambda: any(s.tick_header.tick == second.tick_header.tick for s in states), "that tick is published too")

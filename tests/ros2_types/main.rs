@@ -1,0 +1,261 @@
+//! Goal: the Rust structs and codes are those of the ROS 2 interfaces: field names, types, order, constants.
+//! Method: `data/ros2_types.txt` has every type as rosidl's JSON type descriptions say (a ROS 2 test holds it against the
+//! generator); each struct is traced through serde, as CDR reads it, and compared with it. Constants are read from the
+//! `.msg` files and compared with the codes of the wire.
+#![cfg(feature = "ros2")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "tests"
+)]
+
+mod trace;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use sweepd::wire::ros;
+use sweepd::wire::{
+    ContactKind, EndCause, Event, Level, Reason, RejectReason, Stage, State, TickCause, Verdict,
+    contact_flags, frame_flags, pair_flags,
+};
+use trace::{Kind, trace};
+
+/// The constants of a `.msg` file, by name.
+fn constants(message: &str) -> BTreeMap<String, u64> {
+    let path = format!("msgs/sweepd_msgs/msg/{message}.msg");
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap();
+    let mut all = BTreeMap::new();
+    for line in text.lines() {
+        let code = line.split('#').next().unwrap();
+        if let Some((left, value)) = code.split_once('=') {
+            let name = left.split_whitespace().nth(1).unwrap();
+            all.insert(name.to_owned(), value.trim().parse().unwrap());
+        }
+    }
+    all
+}
+
+/// Words of codes as constants: `source lost` is `SOURCE_LOST`.
+fn named<'a>(
+    prefix: &'a str,
+    codes: impl Iterator<Item = (&'static str, u64)> + 'a,
+) -> impl Iterator<Item = (String, u64)> + 'a {
+    codes.map(move |(word, value)| {
+        let name = word.to_ascii_uppercase().replace(' ', "_");
+        (format!("{prefix}{name}"), value)
+    })
+}
+
+macro_rules! codes {
+    ($code:ident) => {
+        $code::ALL.iter().map(|c| (c.word(), u64::from(c.code())))
+    };
+}
+
+#[test]
+fn the_constants_of_the_messages_are_the_codes_of_the_wire() {
+    let bits = |words: &'static [(&'static str, u64)]| words.iter().copied();
+    let wanted: Vec<(&str, BTreeMap<String, u64>)> = vec![
+        ("TickHeader", named("", codes!(State)).collect()),
+        (
+            "State",
+            named(
+                "",
+                Reason::ALL.iter().map(|r| (r.word(), u64::from(r.bit()))),
+            )
+            .collect(),
+        ),
+        (
+            "Pair",
+            named("", codes!(Verdict))
+                .chain(named(
+                    "",
+                    Event::ALL.iter().map(|e| (e.word(), u64::from(e.bit()))),
+                ))
+                .chain(named("END_", codes!(EndCause)))
+                .chain(named("", codes!(Level)))
+                .chain(named(
+                    "",
+                    [
+                        ("touching", u64::from(pair_flags::TOUCHING)),
+                        ("estimate", u64::from(pair_flags::ESTIMATE)),
+                        ("unknown_body", u64::from(pair_flags::UNKNOWN_BODY)),
+                        ("held_body", u64::from(pair_flags::HELD_BODY)),
+                        ("gone", u64::from(pair_flags::GONE)),
+                    ]
+                    .into_iter(),
+                ))
+                .collect(),
+        ),
+        (
+            "Contact",
+            named("", codes!(ContactKind))
+                .chain(named(
+                    "",
+                    [("estimate", u64::from(contact_flags::ESTIMATE))].into_iter(),
+                ))
+                .chain(named("", bits(&[("no_triangle", u32::MAX as u64)])))
+                .collect(),
+        ),
+        (
+            "Tick",
+            named("", codes!(TickCause))
+                .chain(named("STAGE_", codes!(Stage)))
+                .chain(named("REJECT_", codes!(RejectReason)))
+                .chain(named(
+                    "",
+                    bits(&[("no_source", 255), ("unlimited", u64::MAX)]),
+                ))
+                .collect(),
+        ),
+        (
+            "BodyTransforms",
+            named(
+                "",
+                [
+                    ("full", u64::from(frame_flags::FULL)),
+                    ("partial", u64::from(frame_flags::PARTIAL)),
+                    ("paused", u64::from(frame_flags::PAUSED)),
+                ]
+                .into_iter(),
+            )
+            .collect(),
+        ),
+        (
+            "Name",
+            named("", bits(&[("no_source", u32::MAX as u64)])).collect(),
+        ),
+        ("Source", named("", bits(&[("never", u64::MAX)])).collect()),
+    ];
+    for (message, wanted) in wanted {
+        assert_eq!(constants(message), wanted, "{message}.msg");
+    }
+}
+
+/// A type by its name: fields with their types, in order.
+type Described = BTreeMap<String, Vec<(String, String)>>;
+
+fn described() -> Described {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/ros2_types.txt");
+    let mut all = Described::new();
+    let mut last = String::new();
+    for line in std::fs::read_to_string(path).unwrap().lines() {
+        let (left, right) = line.trim().split_once(' ').unwrap();
+        if line.starts_with(' ') {
+            let field = (left.to_owned(), right.to_owned());
+            all.get_mut(&last).unwrap().push(field);
+        } else {
+            left.clone_into(&mut last);
+            all.insert(last.clone(), Vec::new());
+        }
+    }
+    all
+}
+
+/// How a traced kind differs from the type of this name; empty: not at all.
+fn differences(types: &Described, path: &str, wanted: &str, kind: &Kind) -> Vec<String> {
+    let differs = || vec![format!("{path}: {wanted} in ROS 2, {kind:?} in Rust")];
+    if let Some(element) = wanted.strip_suffix(']') {
+        let (element, count) = element.split_once('[').unwrap();
+        let path = format!("{path}[]");
+        return match (kind, count) {
+            (Kind::Array(len, inside), count) if count == len.to_string() => {
+                differences(types, &path, element, inside)
+            }
+            // A bound is a matter of the sender; on the wire it is a sequence.
+            (Kind::Sequence(inside), count) if count.is_empty() || count.starts_with("<=") => {
+                differences(types, &path, element, inside)
+            }
+            _ => differs(),
+        };
+    }
+    let Kind::Fields(fields) = kind else {
+        // A struct of one field is that field on the wire.
+        if let Some([(_, only)]) = types.get(wanted).map(Vec::as_slice) {
+            return differences(types, path, only, kind);
+        }
+        // A byte is eight bits, whatever it is called.
+        let wanted_word = if wanted == "byte" { "uint8" } else { wanted };
+        let same = matches!(kind, Kind::Word(word) if *word == wanted_word);
+        return if same { Vec::new() } else { differs() };
+    };
+    let Some(described) = types.get(wanted) else {
+        return differs();
+    };
+    let names: Vec<&str> = fields.iter().map(|field| field.0).collect();
+    let wanted_names: Vec<&str> = described.iter().map(|field| field.0.as_str()).collect();
+    if names != wanted_names {
+        return vec![format!(
+            "{path} ({wanted}): {wanted_names:?} in ROS 2, {names:?} in Rust"
+        )];
+    }
+    let pairs = fields.iter().zip(described);
+    pairs
+        .flat_map(|((name, kind), (_, wanted))| {
+            differences(types, &format!("{path}.{name}"), wanted, kind)
+        })
+        .collect()
+}
+
+macro_rules! compare {
+    ($($wanted:literal $rust:ty,)+) => {{
+        let types = described();
+        let mut found = Vec::new();
+        $(found.extend(differences(&types, stringify!($rust), $wanted, &trace::<$rust>()));)+
+        found
+    }};
+}
+
+#[test]
+fn the_structs_are_the_types_of_ros_2() {
+    let found = compare! {
+        "sweepd_msgs/msg/BodyTransforms" ros::BodyTransforms,
+        "sweepd_msgs/msg/Contacts" ros::Contacts,
+        "sweepd_msgs/msg/Names" ros::Names,
+        "sweepd_msgs/msg/Pairs" ros::Pairs,
+        "sweepd_msgs/msg/State" ros::State,
+        "sweepd_msgs/msg/Tick" ros::Tick,
+        "tf2_msgs/msg/TFMessage" ros::TfMessage,
+        "geometry_msgs/msg/PoseStamped" ros::PoseStamped,
+        "nav_msgs/msg/Odometry" ros::Odometry,
+        "rosgraph_msgs/msg/Clock" ros::Clock,
+        "visualization_msgs/msg/MarkerArray" ros::MarkerArray,
+        "diagnostic_msgs/msg/DiagnosticArray" ros::DiagnosticArray,
+        "sweepd_msgs/srv/PutBody_Request" ros::PutBody,
+        "sweepd_msgs/srv/PutBody_Response" ros::Edited,
+        "sweepd_msgs/srv/RemoveBody_Request" ros::RemoveBody,
+        "sweepd_msgs/srv/RemoveBody_Response" ros::Edited,
+        "sweepd_msgs/srv/EnableBody_Request" ros::EnableBody,
+        "sweepd_msgs/srv/EnableBody_Response" ros::Edited,
+        "sweepd_msgs/srv/AttachBody_Request" ros::AttachBody,
+        "sweepd_msgs/srv/AttachBody_Response" ros::Edited,
+        "sweepd_msgs/srv/SetFilter_Request" ros::SetFilter,
+        "sweepd_msgs/srv/SetFilter_Response" ros::Edited,
+        "sweepd_msgs/srv/Reset_Request" ros::Reset,
+        "sweepd_msgs/srv/Reset_Response" ros::Edited,
+        "sweepd_msgs/srv/TickNow_Request" ros::TickNow,
+        "sweepd_msgs/srv/TickNow_Response" ros::Ticked,
+        "ros_gz_interfaces/msg/Contacts" ros::GzContacts,
+    };
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+#[test]
+fn a_struct_that_differs_is_named_with_the_field() {
+    let types = described();
+    let kind = trace::<ros::Pairs>();
+    let found = differences(&types, "Pairs", "sweepd_msgs/msg/Contacts", &kind);
+    assert!(
+        found[0].contains("\"contacts\"") && found[0].contains("\"pairs\""),
+        "{found:?}"
+    );
+    let found = differences(
+        &types,
+        "x",
+        "uint8[4]",
+        &Kind::Array(3, Box::new(Kind::Word("uint8"))),
+    );
+    assert_eq!(found.len(), 1);
+}
