@@ -1,0 +1,185 @@
+"""Latency from an rclpy publisher through the daemon back to an rclpy subscriber, beside a plain rclpy echo.
+
+    python=$(./launch-free-scripts/ros2_env.sh)
+    $python benches/ros2_latency.py [--bodies 100] [--samples 3000] [--csv benches/results/ros2_latency.csv]
+
+One frame at a time, 5 ms apart, daemon and echo in turn in one run. `beyond_tick` is the time from publish() to the pairs
+message in the callback, less the time that the tick itself took (`elapsed_ns`). The echo is a second rclpy process that
+sends the same bytes back, without decoding them. Nothing else should run: the figures are those of an idle machine.
+"""
+
+import argparse
+import csv
+import os
+import platform
+import random
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import rclpy
+from geometry_msgs.msg import Pose
+from rclpy.executors import SingleThreadedExecutor
+from sweepd_msgs.msg import BodyTransform, BodyTransforms, Pairs, Tick
+
+ROOT = Path(__file__).resolve().parents[1]
+SEED = 23
+PAUSE_S = 0.005
+
+ECHO = """
+import rclpy, sys
+from rclpy.executors import SingleThreadedExecutor
+from sweepd_msgs.msg import BodyTransforms
+rclpy.init()
+node = rclpy.create_node("echo")
+out = node.create_publisher(BodyTransforms, "/echo/out", 10)
+node.create_subscription(BodyTransforms, "/echo/in", out.publish, 10, raw=True)
+executor = SingleThreadedExecutor()
+executor.add_node(node)
+try:
+    executor.spin()
+except BaseException:
+    pass
+"""
+
+
+def scene(bodies):
+    shapes = "".join(f"[[body]]\nname = 'b{n}'\nshape = {{ type = 'sphere', radius = 0.3 }}\n" for n in range(bodies))
+    return f"[run]\non_frame = 'sim'\n[[source]]\nname = 'sim'\ntimeout_ms = 5000\n{shapes}"
+
+
+def machine():
+    fields = {}
+    for line in Path("/proc/cpuinfo").read_text().splitlines():
+        key, _, value = line.partition(":")
+        fields.setdefault(key.strip(), value.strip())
+    return f"{fields['model name'].split(' ')[0]} {fields['model name'].split(' ')[1]} family {fields['cpu family']} model {fields['model']} {os.cpu_count()} cores"
+
+
+def percentile(values, share):
+    return sorted(values)[min(len(values) - 1, int(share * len(values)))]
+
+
+class Bench:
+    """Sends frames and takes the answers' times."""
+
+    def __init__(self, bodies):
+        self.node = rclpy.create_node("latency")
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
+        self.to_daemon = self.node.create_publisher(BodyTransforms, "/sweepd/transforms", 10)
+        self.to_echo = self.node.create_publisher(BodyTransforms, "/echo/in", 10)
+        self.pairs_at, self.tick, self.echo_at = {}, {}, {}
+        self.node.create_subscription(Pairs, "/sweepd/pairs", self.pairs, 10)
+        self.node.create_subscription(Tick, "/sweepd/tick", self.ticked, 10)
+        self.node.create_subscription(BodyTransforms, "/echo/out", self.echoed, 10)
+        dice = random.Random(SEED)
+        self.at = [[dice.uniform(0, 4) for _ in range(3)] for _ in range(bodies)]
+        self.frame = BodyTransforms(source="sim", session=dice.getrandbits(60), flags=BodyTransforms.FULL)
+        self.frame.header.frame_id = "world"
+        self.frame.transforms = [BodyTransform(name=f"b{n}", pose=Pose()) for n in range(bodies)]
+        self.dice = dice
+
+    def pairs(self, message):
+        self.pairs_at[message.tick_header.newest_stamp_ns] = (time.perf_counter_ns(), len(message.pairs))
+
+    def ticked(self, message):
+        if message.cause == Tick.FRAME:
+            self.tick[message.tick_header.newest_stamp_ns] = message.elapsed_ns
+
+    def echoed(self, message):
+        self.echo_at[message.seq] = time.perf_counter_ns()
+
+    def next_frame(self):
+        """The next frame, each body moved by some millimetres; its stamp is its number."""
+        self.frame.seq += 1
+        self.frame.header.stamp.sec, self.frame.header.stamp.nanosec = 1, self.frame.seq
+        for body, at in zip(self.frame.transforms, self.at):
+            for axis in range(3):
+                at[axis] += self.dice.uniform(-5e-3, 5e-3)
+            body.pose.position.x, body.pose.position.y, body.pose.position.z = at
+
+    def wait(self, condition, seconds):
+        until = time.monotonic() + seconds
+        while not condition() and time.monotonic() < until:
+            self.executor.spin_once(timeout_sec=0.05)
+        return condition()
+
+    def sample(self, publisher, there):
+        """Publishes the next frame; nanoseconds of publish() and whether the answer came."""
+        self.next_frame()
+        start = time.perf_counter_ns()
+        publisher.publish(self.frame)
+        return start, self.wait(lambda: there(self.frame.seq), 2.0)
+
+
+def measure(bench, samples):
+    """Round trips in microseconds: through the daemon, beyond the tick, the tick, the echo; and pairs a tick."""
+    stamp = lambda seq: 1_000_000_000 + seq  # noqa: E731
+    both = lambda seq: stamp(seq) in bench.pairs_at and stamp(seq) in bench.tick  # noqa: E731
+    if not bench.wait(lambda: bench.sample(bench.to_daemon, both)[1], 20):
+        raise SystemExit("the daemon does not answer")
+    if not bench.wait(lambda: bench.sample(bench.to_echo, lambda seq: seq in bench.echo_at)[1], 20):
+        raise SystemExit("the echo does not answer")
+    through, beyond, ticks, echo, lost, rows = [], [], [], [], 0, []
+    for number in range(samples + 100):
+        start, came = bench.sample(bench.to_daemon, both)
+        at = stamp(bench.frame.seq)
+        time.sleep(PAUSE_S)
+        echo_start, echo_came = bench.sample(bench.to_echo, lambda seq: seq in bench.echo_at)
+        time.sleep(PAUSE_S)
+        if number < 100:
+            continue
+        lost += (not came) + (not echo_came)
+        if came:
+            arrived, count = bench.pairs_at[at]
+            through.append((arrived - start) / 1e3)
+            ticks.append(bench.tick[at] / 1e3)
+            beyond.append(through[-1] - ticks[-1])
+            rows.append(count)
+        if echo_came:
+            echo.append((bench.echo_at[bench.frame.seq] - echo_start) / 1e3)
+    return {"through": through, "beyond_tick": beyond, "tick": ticks, "echo": echo}, lost, sum(rows) / len(rows)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--bodies", type=int, default=100)
+    parser.add_argument("--samples", type=int, default=3000)
+    parser.add_argument("--csv", type=Path)
+    args = parser.parse_args()
+    sweepd = os.environ.get("SWEEPD", str(ROOT / "target/release/sweepd"))
+    rclpy.init()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "scene.toml"
+        path.write_text(scene(args.bodies))
+        daemon = subprocess.Popen([sweepd, "--quiet", "run", str(path), "--instance", f"lat_{os.getpid()}", "--ros2"])
+        echo = subprocess.Popen([sys.executable, "-c", ECHO])
+        try:
+            found, lost, pairs = measure(Bench(args.bodies), args.samples)
+        finally:
+            daemon.terminate()
+            echo.terminate()
+            daemon.wait()
+            echo.wait()
+    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False)
+    row = {"machine": machine(), "commit": commit.stdout.strip(), "compiler": f"Python {platform.python_version()}", "seed": SEED,
+           "bodies": args.bodies, "samples": args.samples, "lost": lost, "pairs_mean": round(pairs, 1)}  # fmt: skip
+    for name, values in found.items():
+        row[f"{name}_p50_us"] = round(percentile(values, 0.5), 1)
+        row[f"{name}_p99_us"] = round(percentile(values, 0.99), 1)
+        print(f"{name:12} p50 {row[f'{name}_p50_us']:8.1f} us   p99 {row[f'{name}_p99_us']:8.1f} us")
+    print(f"{args.bodies} bodies, {pairs:.0f} pairs a tick, {lost} of {2 * args.samples} answers lost")
+    if args.csv:
+        new = not args.csv.exists()
+        with args.csv.open("a", newline="") as file:
+            writer = csv.DictWriter(file, row)
+            if new:
+                writer.writeheader()
+            writer.writerow(row)
+
+
+if __name__ == "__main__":
+    main()
