@@ -32,6 +32,8 @@ const TAKES_MAX: usize = 256;
 const ERRORS_MAX: usize = 64;
 /// How often faults are looked for, nanoseconds.
 const FAULTS_NS: u64 = 500_000_000;
+/// After the start nothing is told for so long, nanoseconds: what others have not sent yet is no fault.
+const QUIET_NS: u64 = 1_000_000_000;
 /// Faults told at a time; a thousand bodies without frames have one cause.
 const FAULTS_MAX: usize = 10;
 /// Token of the waker.
@@ -91,7 +93,7 @@ impl Inlet {
             heartbeat_ns,
             poll,
             updates: Vec::new(),
-            looked_ns: 0,
+            looked_ns: SystemClock.boottime_ns() + QUIET_NS,
             frame_fault: None,
         };
         Ok((inlet, waker))

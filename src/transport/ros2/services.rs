@@ -218,6 +218,9 @@ impl Services {
             let Some((verb, id)) = self.pending.remove(&token) else {
                 continue;
             };
+            if let Some(why) = &answer.error {
+                shared.say(Say::Warn, &format!("an edit over ROS 2 was refused: {why}"));
+            }
             let response = Edited {
                 success: answer.ok,
                 message: answer.error.unwrap_or_default(),
