@@ -1,11 +1,14 @@
 """Load: many bodies, many contacts, readers that are slow or stopped. Minutes long ones run with SWEEPD_CI_SLOW=1."""
 
+import signal
+import statistics
+import threading
 import time
 
 import pytest
 from motion import Cloud
 from scenes import HANDS, cloud
-from sweepd_msgs.msg import Pairs, Tick
+from sweepd_msgs.msg import Contacts, Pairs, Tick
 
 BODIES = 500
 
@@ -29,7 +32,8 @@ def run_cloud(room, seconds):
 def check_cloud(room, seconds):
     ticks, pairs, frames = run_cloud(room, seconds)
     numbers = [tick[0] for tick in ticks]
-    gaps = sum(b != a + 1 for a, b in zip(numbers, numbers[1:]))
+    missing_ticks = numbers[-1] - numbers[0] + 1 - len(numbers)
+    dropped = ticks[-1][4]
     framed = [tick for tick in ticks if tick[1] == Tick.FRAME]
     used = [tick[2] for tick in framed]
     skipped = framed[-1][3] - framed[0][3]
@@ -39,13 +43,14 @@ def check_cloud(room, seconds):
         chunks.setdefault(tick, {})[place] = (count, some)
     whole = {tick: [row for place in sorted(parts) for row in parts[place][1]]
              for tick, parts in chunks.items() if len(parts) == parts[min(parts)][0]}  # fmt: skip
-    print(f"{len(ticks)} ticks heard, {gaps} gaps in their numbers; {len(framed)} of {frames} frames made a tick, {told} did not, "
-          f"{skipped} of them told as skipped; sends dropped {ticks[-1][4]}, undecodable {ticks[-1][5]}")  # fmt: skip
-    assert gaps == 0, "a tick was lost or repeated"
-    assert used == sorted(set(used)) and told <= skipped, "each frame has one tick, or it is told that it was passed over"
+    print(f"{len(ticks)} ticks heard, {missing_ticks} not; {len(framed)} of {frames} frames made a tick, {told} did not, "
+          f"{skipped} of them told as skipped; sends told as dropped {dropped}, undecodable {ticks[-1][5]}")  # fmt: skip
+    # on a machine without a core to spare the sender may fall behind: the newest wins, and what gave way is counted
+    assert numbers == sorted(set(numbers)) and missing_ticks <= dropped, "a tick was repeated, or lost without a word"
+    assert used == sorted(set(used)) and told <= skipped + missing_ticks, "each frame has one tick, or it is told that it has none"
     assert len(framed) > 0.9 * frames and ticks[-1][5] == 0
     missing = [tick for tick, cause, *_ in framed if tick not in whole]
-    assert len(missing) <= ticks[-1][4], "a tick whose pairs did not come is counted as dropped"
+    assert len(missing) <= dropped, "a tick whose pairs did not come is counted as dropped"
     # the same frames over shared memory, by a daemon of its own
     room.plain_daemon(cloud(BODIES))
     paths = Cloud(BODIES)
@@ -75,6 +80,85 @@ def test_pairs_of_five_hundred_bodies_are_those_of_shared_memory(room):
 @pytest.mark.slow
 def test_pairs_of_five_hundred_bodies_are_those_of_shared_memory_for_a_minute(room):
     check_cloud(room, 60)
+
+
+# 37 x 37 boxes have some 20,900 contacts.
+SIDE = 37
+
+
+def grid_scene():
+    """Boxes in a square, each overlapping its eight neighbours."""
+    bodies = "".join(
+        f'[[body]]\nname = "g{n:04}"\nshape = {{ type = "box", half_extents = [0.51, 0.51, 0.2] }}\n' for n in range(SIDE * SIDE)
+    )
+    return f'[run]\nrate = 30\n[[source]]\nname = "sim"\ntimeout_ms = 5000\n{bodies}'
+
+
+class GridFeed(threading.Thread):
+    """Sends the grid over shared memory, 30 times a second, trembling a little."""
+
+    def __init__(self, client):
+        super().__init__(daemon=True)
+        self.client, self.run_on = client, True
+
+    def run(self):
+        ids = sorted(self.client.names.values())
+        places = [(float(n % SIDE), 1.004 * (n // SIDE), 0.0) for n in range(SIDE * SIDE)]
+        frame = self.client.rows((ids, places, [(0, 0, 0, 1)] * len(ids)))
+        height, step = frame["position"][:, 2].copy(), 0
+        while self.run_on:
+            step += 1
+            frame["position"][:, 2] = height + 1e-3 * (step % 7) * (1 + frame["body"] % 3)
+            self.client.send(frame)
+            time.sleep(1 / 30)
+
+
+def load(room, seconds):
+    daemon = room.daemon(grid_scene())
+    room.node()
+    ticks = room.hear(Tick, "/sweepd/tick", keep=lambda t: (t.tick_header.tick, t.elapsed_ns, t.sends_dropped, t.colliding))
+    feed = GridFeed(room.client("sim", listen=()))
+    feed.start()
+    healthy = room.hear(Contacts, "/sweepd/contacts", keep=lambda m: (m.tick_header.tick, m.chunk_count, len(m.contacts), m.tick_header.truncated))
+    room.until(lambda: healthy and healthy[-1][2] and ticks, "contacts")
+    room.spin(seconds / 4)
+    start = len(ticks)
+    alone = statistics.median(tick[1] for tick in ticks[-30:])
+    memory = [daemon.memory_kb()]
+    slow = room.python("peer_echo.py", "--seconds", 3600, "--pause", 0.3)
+    stopped = room.python("peer_echo.py", "--seconds", 3600)
+    room.spin(4)
+    stopped.send_signal(signal.SIGSTOP)
+    begin = len(healthy)
+    for _ in range(10):
+        room.spin(seconds / 10)
+        memory.append(daemon.memory_kb())
+    feed.run_on = False
+    beside = statistics.median(tick[1] for tick in ticks[start:])
+    got = {}
+    for tick, count, *_ in healthy[begin:]:
+        got.setdefault(tick, [0, count])[0] += 1
+    span = range(min(got), max(got) + 1)
+    complete = sum(tick in got and got[tick][0] == got[tick][1] for tick in span) / len(span)
+    contacts = healthy[-1][2] + healthy[-1][3]
+    print(f"{contacts} contacts a tick, {len(span)} ticks: the healthy reader has {100 * complete:.2f} % whole; memory {memory[0]} KiB, then "
+          f"{memory[1:]}; tick {alone / 1e6:.2f} ms alone, {beside / 1e6:.2f} ms beside the others; dropped {ticks[-1][2]}")  # fmt: skip
+    assert slow.poll() is None
+    return contacts, complete, memory, alone, beside, ticks[-1]
+
+
+def test_a_slow_and_a_stopped_reader_do_not_hurt_the_healthy_one(room):
+    contacts, complete, memory, _, _, _ = load(room, 8)
+    assert contacts > 20_000 and complete > 0.95
+    assert max(memory) - memory[0] <= 32 * 1024
+
+
+@pytest.mark.slow
+def test_a_slow_and_a_stopped_reader_do_not_hurt_the_healthy_one_for_a_minute(room):
+    contacts, complete, memory, alone, beside, _ = load(room, 60)
+    assert contacts > 20_000 and complete >= 0.99
+    assert max(memory) - memory[0] <= 32 * 1024 and max(memory[5:]) - min(memory[5:]) <= 4 * 1024
+    print(f"tick time beside / alone: {beside / alone:.3f}")
 
 
 def test_an_idle_node_is_small(room):
