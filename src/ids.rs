@@ -62,6 +62,12 @@ impl PairKey {
         Self(u64::from(low.0) << 32 | u64::from(high.0))
     }
 
+    /// As one number.
+    #[must_use]
+    pub(crate) fn bits(self) -> u64 {
+        self.0
+    }
+
     /// The two slots, the lower first.
     #[must_use]
     pub fn slots(self) -> (BodySlot, BodySlot) {

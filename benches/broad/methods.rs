@@ -32,7 +32,7 @@ pub trait Runner {
 }
 
 /// The runners of a full run; `brute` can be asked for too.
-pub const NAMES: &[&str] = &["limit", "sap", "parry", "rapier"];
+pub const NAMES: &[&str] = &["limit", "order", "sap", "parry", "rapier"];
 
 pub fn runner(name: &str, scene: &Scene) -> Option<Box<dyn Runner>> {
     Some(match name {
@@ -45,6 +45,7 @@ pub fn runner(name: &str, scene: &Scene) -> Option<Box<dyn Runner>> {
 
 fn method(name: &str) -> Option<Method> {
     Some(match name {
+        "order" => Method::Order,
         "sap" => Method::SweepAndPrune,
         "brute" => Method::BruteForce,
         _ => return None,

@@ -12,12 +12,11 @@ use crate::wire::EndCause;
 ///
 /// Cost: O(n^2 + k).
 pub(super) fn update(
-    judge: &Judge<'_, impl PairPolicy>,
-    proxies: &impl Proxies,
+    judge: &Judge<'_, impl Proxies, impl PairPolicy>,
     pairs: &mut PairSet,
     found: &mut Found,
 ) {
-    let (members, policy) = (judge.members, judge.policy);
+    let (members, proxies, policy) = (judge.members, judge.proxies, judge.policy);
     let touches = |key: PairKey| {
         let (low, high) = key.slots();
         let without = [low, high].map(|slot| members.has(slot, UNBOUNDED));

@@ -4,6 +4,7 @@
 //! end has a cause. Out: the pair set changed and the delta filled, both in the order of body ids. Slots of pairs
 //! therefore depend neither on the method nor on the slots of bodies.
 
+use super::Proxies;
 use super::forced::Forced;
 use super::members::{IN, Members, UNBOUNDED};
 use crate::ids::{BodyId, BodySlot, PairKey, PairSlot};
@@ -31,16 +32,18 @@ pub(super) struct Found {
 
 /// What decides on a pair.
 #[derive(Debug)]
-pub(super) struct Judge<'a, P> {
-    /// Boxes and kinds.
+pub(super) struct Judge<'a, X, P> {
+    /// Who is in, and kinds.
     pub(super) members: &'a Members,
+    /// Boxes.
+    pub(super) proxies: &'a X,
     /// Pairs that need no overlap.
     pub(super) forced: &'a Forced,
     /// Filters.
     pub(super) policy: &'a P,
 }
 
-impl<P: PairPolicy> Judge<'_, P> {
+impl<X: Proxies, P: PairPolicy> Judge<'_, X, P> {
     /// Whether something else than the boxes keeps the pair a candidate: a rule, or a body without a box.
     fn is_unconditional(&self, key: PairKey) -> bool {
         let (low, high) = key.slots();
@@ -58,7 +61,7 @@ impl<P: PairPolicy> Judge<'_, P> {
         let (low, high) = key.slots();
         self.members.is_bounded(low)
             && self.members.is_bounded(high)
-            && self.members.bounds(low).overlaps(self.members.bounds(high))
+            && self.proxies.aabb(low).overlaps(self.proxies.aabb(high))
     }
 
     /// Whether a pair that is not stored must be.
@@ -106,10 +109,27 @@ impl Found {
         }
     }
 
+    /// Takes out the stored pairs of boxes that parted, unless something else keeps them.
+    pub(super) fn part(
+        &mut self,
+        parted: &[PairKey],
+        judge: &Judge<'_, impl Proxies, impl PairPolicy>,
+        pairs: &mut PairSet,
+    ) {
+        for key in parted {
+            let Some(slot) = pairs.find(*key) else {
+                continue;
+            };
+            if let Some(cause) = judge.ends(*key, false) {
+                self.end(slot, cause, judge.members, pairs);
+            }
+        }
+    }
+
     /// Stores what begins and fills the delta.
     pub(super) fn commit(
         &mut self,
-        judge: &Judge<'_, impl PairPolicy>,
+        judge: &Judge<'_, impl Proxies, impl PairPolicy>,
         pairs: &mut PairSet,
         delta: &mut PairDelta,
     ) {
@@ -134,7 +154,7 @@ impl Found {
     }
 
     /// Of the suggestions those that must be stored and are not, in the order of ids.
-    fn select(&mut self, judge: &Judge<'_, impl PairPolicy>, pairs: &PairSet) {
+    fn select(&mut self, judge: &Judge<'_, impl Proxies, impl PairPolicy>, pairs: &PairSet) {
         self.fresh.clear();
         self.began.sort_unstable();
         self.began.dedup();

@@ -56,17 +56,13 @@ impl Bounds {
         // `&`, not `&&`: two loads that wait for each other cost more than a compare too many.
         (self.min[axis] <= other.max[axis]) & (other.min[axis] <= self.max[axis])
     }
-
-    /// Whether the closed boxes meet.
-    #[inline]
-    pub(super) fn overlaps(&self, other: &Self) -> bool {
-        self.meets(other, 0) & self.meets(other, 1) & self.meets(other, 2)
-    }
 }
 
 /// The bodies in the broad phase.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Members {
+    /// Whether boxes are copied: not for a method that reads them where they are.
+    with_bounds: bool,
     bounds: Vec<Bounds>,
     ids: Vec<BodyId>,
     flags: Vec<u8>,
@@ -79,6 +75,14 @@ pub(super) struct Members {
 }
 
 impl Members {
+    /// Without bodies.
+    pub(super) fn new(with_bounds: bool) -> Self {
+        Self {
+            with_bounds,
+            ..Self::default()
+        }
+    }
+
     /// Begins a tick: no body is touched.
     pub(super) fn open_tick(&mut self) {
         for slot in self.touched.drain(..) {
@@ -113,7 +117,9 @@ impl Members {
         }
         let at = slot.index();
         if self.flags.len() <= at {
-            self.bounds.resize(at + 1, Bounds::EMPTY);
+            if self.with_bounds {
+                self.bounds.resize(at + 1, Bounds::EMPTY);
+            }
             self.ids.resize(at + 1, BodyId(0));
             self.flags.resize(at + 1, 0);
             self.place.resize(at + 1, 0);
@@ -121,15 +127,20 @@ impl Members {
         self.ids[at] = proxies.id(slot);
         let list = if proxies.unbounded(slot) {
             self.flags[at] |= IN | UNBOUNDED;
-            self.bounds[at] = Bounds::EMPTY;
             &mut self.unbounded
         } else {
             self.flags[at] |= IN;
-            self.bounds[at] = Bounds::of(proxies.aabb(slot));
             &mut self.bounded
         };
         self.place[at] = small(list.len());
         list.push(slot);
+        if self.with_bounds {
+            self.bounds[at] = if self.is_bounded(slot) {
+                Bounds::of(proxies.aabb(slot))
+            } else {
+                Bounds::EMPTY
+            };
+        }
         self.touch(slot, ASKED | CAME);
         true
     }
@@ -137,7 +148,9 @@ impl Members {
     /// Takes the new box of a body that is in and has one.
     pub(super) fn moved(&mut self, slot: BodySlot, proxies: &impl Proxies) {
         if self.is_bounded(slot) {
-            self.bounds[slot.index()] = Bounds::of(proxies.aabb(slot));
+            if self.with_bounds {
+                self.bounds[slot.index()] = Bounds::of(proxies.aabb(slot));
+            }
             self.touch(slot, MOVED);
         }
     }
@@ -220,7 +233,8 @@ impl Members {
                 if self.ids[at] != proxies.id(*slot) {
                     return Err(format!("{slot:?} has another id than its body"));
                 }
-                if flags == IN && self.bounds[at] != Bounds::of(proxies.aabb(*slot)) {
+                let copied = flags == IN && self.with_bounds;
+                if copied && self.bounds[at] != Bounds::of(proxies.aabb(*slot)) {
                     return Err(format!("the box of {slot:?} is not that of its body"));
                 }
             }

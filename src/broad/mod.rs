@@ -3,17 +3,18 @@
 //! In: a [`ChangeSet`] (who left, came, moved, must be asked again), the boxes ([`Proxies`]), the filters
 //! ([`PairPolicy`]). Out: the [`PairSet`], of which this room is the only writer, and a [`PairDelta`].
 //!
-//! Two methods behind one door. [`Method::BruteForce`] looks at every pair: the twin, for ever.
-//! [`Method::SweepAndPrune`] keeps sorted lists of box ends (see `sap`). A method only suggests pairs; what is stored
-//! is decided in one place (`commit`), so both give the same pairs in the same slots, and the same delta.
+//! Three methods behind one door. [`Method::BruteForce`] looks at every pair: the twin, for ever. [`Method::Order`] keeps
+//! blocks of fat boxes and their candidates (see `order`). [`Method::SweepAndPrune`], which the plan takes, keeps
+//! sorted lists of box ends (see `sap`). A method only suggests pairs; what is stored is decided in one place
+//! (`commit`), so all give the same pairs in the same slots, and the same delta.
 //!
-//! Boxes are f64 here, where other structures round out to f32: the sort compares ends and never computes with them,
-//! so f64 costs memory alone, and a scene at 1e7 m, or bodies of 1 cm spread over 1e7 m, has exactly the candidates
-//! of its f64 boxes (an f32 has a spacing of 1 m there: all neighbours would overlap).
+//! The pairs are those of the f64 boxes, at any offset: what rounds boxes to f32 asks the f64 boxes where rounding
+//! could tell otherwise.
 
 use crate::ids::{BodyId, BodySlot, PairKey};
 use crate::math::Aabb;
 use crate::pairs::{PairDelta, PairPolicy, PairSet};
+use crate::simd::boxes::Level;
 use crate::wire::EndCause;
 use crate::world::ChangeSet;
 
@@ -22,12 +23,14 @@ mod commit;
 mod forced;
 mod members;
 mod of_world;
+mod order;
 mod sap;
 mod touched;
 
 use commit::{Found, Judge};
 use forced::Forced;
 use members::{ASKED, IN, Members, REFILTERED};
+use order::{Order, Tick};
 use sap::Sap;
 
 /// The boxes, as the world has them.
@@ -47,11 +50,13 @@ pub enum Method {
     BruteForce,
     /// Sorted ends of boxes on the axes, kept across ticks.
     SweepAndPrune,
+    /// Blocks of boxes in the order of a space-filling curve, fat boxes and candidates kept across ticks.
+    Order,
 }
 
 impl Method {
     /// Every method.
-    pub const ALL: &'static [Self] = &[Self::BruteForce, Self::SweepAndPrune];
+    pub const ALL: &'static [Self] = &[Self::BruteForce, Self::SweepAndPrune, Self::Order];
 }
 
 /// What the last update did; all counted, nothing timed.
@@ -67,6 +72,8 @@ pub struct Work {
     pub partial: u64,
     /// Axes kept sorted: x, y, z.
     pub axes: [bool; 3],
+    /// Bodies that got a new fat box.
+    pub renewed: u64,
 }
 
 /// The method at work.
@@ -74,6 +81,7 @@ pub struct Work {
 enum Engine {
     Brute,
     Sap(Box<Sap>),
+    Order(Box<Order>),
 }
 
 /// The broad phase.
@@ -87,6 +95,8 @@ pub struct BroadPhase {
     causes: Vec<EndCause>,
     /// Bodies with a box that left in this update.
     left: Vec<BodySlot>,
+    /// Pairs whose boxes parted in this update.
+    parted: Vec<PairKey>,
     work: Work,
 }
 
@@ -97,15 +107,24 @@ impl BroadPhase {
         let engine = match method {
             Method::BruteForce => Engine::Brute,
             Method::SweepAndPrune => Engine::Sap(Box::default()),
+            Method::Order => Engine::Order(Box::default()),
         };
         Self {
             engine,
-            members: Members::default(),
+            members: Members::new(matches!(method, Method::SweepAndPrune)),
             forced: Forced::default(),
             found: Found::default(),
             causes: Vec::new(),
             left: Vec::new(),
+            parted: Vec::new(),
             work: Work::default(),
+        }
+    }
+
+    /// Sets which vector instructions the order uses; all give the same bits. Without it: the best there are.
+    pub fn use_level(&mut self, level: Level) {
+        if let Engine::Order(order) = &mut self.engine {
+            order.use_level(level);
         }
     }
 
@@ -159,14 +178,29 @@ impl BroadPhase {
         self.mark(changes, proxies, pairs);
         let judge = Judge {
             members: &self.members,
+            proxies,
             forced: &self.forced,
             policy,
         };
         match &mut self.engine {
-            Engine::Brute => brute::update(&judge, proxies, pairs, &mut self.found),
+            Engine::Brute => brute::update(&judge, pairs, &mut self.found),
             Engine::Sap(sap) => {
                 touched::end(&judge, pairs, &mut self.found);
                 sap.update(&self.members, &mut self.found.began, &mut self.work);
+                touched::begin(&judge, &mut self.found);
+            }
+            Engine::Order(order) => {
+                touched::end(&judge, pairs, &mut self.found);
+                self.parted.clear();
+                let tick = Tick {
+                    members: &self.members,
+                    proxies,
+                    moved: &changes.moved,
+                    began: &mut self.found.began,
+                    parted: &mut self.parted,
+                };
+                order.update(tick, &mut self.work);
+                self.found.part(&self.parted, &judge, pairs);
                 touched::begin(&judge, &mut self.found);
             }
         }
@@ -204,8 +238,10 @@ impl BroadPhase {
                 *cause = EndCause::None;
             }
         }
-        if let Engine::Sap(sap) = &mut self.engine {
-            sap.leave(&self.left, &self.members);
+        match &mut self.engine {
+            Engine::Brute => {}
+            Engine::Sap(sap) => sap.leave(&self.left, &self.members),
+            Engine::Order(order) => order.leave(&self.left),
         }
     }
 
@@ -218,8 +254,11 @@ impl BroadPhase {
 
     /// Takes the new boxes and notes whom to ask again.
     fn mark(&mut self, changes: &ChangeSet, proxies: &impl Proxies, pairs: &PairSet) {
-        for slot in &changes.moved {
-            self.members.moved(*slot, proxies);
+        // The order keeps the difference itself: it reads the list of the moved and marks nobody.
+        if !matches!(self.engine, Engine::Order(_)) {
+            for slot in &changes.moved {
+                self.members.moved(*slot, proxies);
+            }
         }
         for slot in &changes.requery {
             if self.members.has(*slot, IN) {
@@ -246,11 +285,14 @@ impl BroadPhase {
     ) -> Result<(), String> {
         pairs.validate()?;
         self.members.validate(proxies)?;
-        if let Engine::Sap(sap) = &self.engine {
-            sap.validate(&self.members)?;
+        match &self.engine {
+            Engine::Brute => {}
+            Engine::Sap(sap) => sap.validate(&self.members)?,
+            Engine::Order(order) => order.check(&self.members, proxies)?,
         }
         let judge = Judge {
             members: &self.members,
+            proxies,
             forced: &self.forced,
             policy,
         };

@@ -1,6 +1,7 @@
 //! What a change of a body tells without any list: which of its stored pairs end, and which pairs of rules and of
 //! unbounded bodies it gets. Used by every method that looks only at what changed.
 
+use super::Proxies;
 use super::commit::{Found, Judge};
 use super::members::{ASKED, IN, MOVED, REFILTERED, UNBOUNDED};
 use crate::ids::PairKey;
@@ -9,7 +10,11 @@ use crate::pairs::{PairPolicy, PairSet};
 /// Ends the pairs of moved and asked bodies whose boxes parted or whose filters changed.
 ///
 /// Cost: the stored pairs of those bodies.
-pub(super) fn end(judge: &Judge<'_, impl PairPolicy>, pairs: &mut PairSet, found: &mut Found) {
+pub(super) fn end(
+    judge: &Judge<'_, impl Proxies, impl PairPolicy>,
+    pairs: &mut PairSet,
+    found: &mut Found,
+) {
     let members = judge.members;
     let mut doomed = std::mem::take(&mut found.doomed);
     for slot in members.touched() {
@@ -39,7 +44,7 @@ pub(super) fn end(judge: &Judge<'_, impl PairPolicy>, pairs: &mut PairSet, found
 }
 
 /// Suggests the pairs that no box decides: forced ones and those of unbounded bodies.
-pub(super) fn begin(judge: &Judge<'_, impl PairPolicy>, found: &mut Found) {
+pub(super) fn begin(judge: &Judge<'_, impl Proxies, impl PairPolicy>, found: &mut Found) {
     let members = judge.members;
     found.began.extend_from_slice(judge.forced.changed());
     for slot in members.touched() {

@@ -1,5 +1,6 @@
 //! The set itself: dense slots, and for each body the list of its pairs.
 
+use super::index::Index;
 use crate::ids::{BodySlot, PairKey, PairSlot};
 
 /// No pair.
@@ -42,6 +43,7 @@ struct Head {
 pub struct PairSet {
     nodes: Vec<Node>,
     heads: Vec<Head>,
+    index: Index,
     free: Vec<u32>,
     /// Freed since the last `open_tick`: not to be reused yet.
     resting: Vec<u32>,
@@ -62,6 +64,7 @@ impl PairSet {
         Self {
             nodes: Vec::new(),
             heads: Vec::new(),
+            index: Index::default(),
             free: Vec::new(),
             resting: Vec::new(),
             len: 0,
@@ -124,19 +127,11 @@ impl PairSet {
         node.live.then_some(node.key)
     }
 
-    /// Where the pair of two bodies is.
-    ///
-    /// Cost: the length of the shorter of the two bodies' lists.
+    /// Where the pair of two bodies is. Cost: one probe or two.
     #[must_use]
     pub fn find(&self, key: PairKey) -> Option<PairSlot> {
-        let (low, high) = key.slots();
-        let shorter = if self.pairs_len(low) <= self.pairs_len(high) {
-            low
-        } else {
-            high
-        };
-        self.pairs_of(shorter)
-            .find(|slot| self.nodes[slot.index()].key == key)
+        let key_of = |at: u32| self.nodes[at as usize].key;
+        self.index.find(key, key_of).map(PairSlot)
     }
 
     /// How many pairs a body has.
@@ -218,6 +213,10 @@ impl PairSet {
             }
         }
         self.nodes[at as usize] = node;
+        let nodes = &self.nodes;
+        let places = nodes.capacity();
+        self.index
+            .insert(key, at, places, |at| nodes[at as usize].key);
         self.len += 1;
         Some(PairSlot(at))
     }
@@ -241,6 +240,8 @@ impl PairSet {
                 after.prev[its_side] = prev;
             }
         }
+        let nodes = &self.nodes;
+        self.index.remove(node.key, |at| nodes[at as usize].key);
         self.nodes[slot.index()].live = false;
         self.resting.push(slot.0);
         self.len -= 1;
@@ -257,6 +258,7 @@ impl PairSet {
     pub(crate) fn clear(&mut self) {
         self.nodes.clear();
         self.heads.clear();
+        self.index.clear();
         self.free.clear();
         self.resting.clear();
         self.len = 0;
@@ -326,6 +328,10 @@ impl PairSet {
         }
         if seen != 2 * self.len {
             return Err(format!("{seen} list entries for {} pairs", self.len));
+        }
+        self.index.validate(self.len)?;
+        if self.iter().any(|(slot, key)| self.find(key) != Some(slot)) {
+            return Err("a pair is not found by its key".into());
         }
         let marked = self.is_truncated.iter().filter(|m| **m).count();
         if marked != self.truncated.len() || self.truncated.iter().any(|b| !self.is_truncated(*b)) {

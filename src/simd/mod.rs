@@ -4,4 +4,5 @@
 //! family; what is called is ordinary safe code in every case. No kernel multiplies and adds in one rounding, so the
 //! same bits come out on every machine.
 
+pub mod boxes;
 pub mod obb;

@@ -309,7 +309,8 @@ impl Bench {
             let here: Vec<_> = rig.pairs.iter().collect();
             assert_eq!(slots.get_or_insert(here.clone()), &here, "{name}: slots");
         }
-        let work = self.rigs.last().unwrap().broad.work();
+        let sap = |rig: &&Rig| rig.method == Method::SweepAndPrune;
+        let work = self.rigs.iter().find(sap).unwrap().broad.work();
         self.seen.swaps += work.swaps;
         self.seen.rebuilds += work.rebuilds;
         self.seen.skipped += u64::from(work.axes.contains(&false));

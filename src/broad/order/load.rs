@@ -1,0 +1,165 @@
+//! Takes the new boxes of moved bodies and finds who left its fat box.
+
+use super::fatten::HORIZON;
+use super::{BodySlot, NONE, Order, Proxies, Tick, ones, parts, small};
+use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch};
+
+/// Lanes that moved and have lived for half a round are renewed at their block's turn, or with a lane of their block that
+/// must be: the walk down the tree is then shared, and they would be next.
+const ALONG_AGE: u32 = HORIZON / 2;
+
+/// How many blocks ahead boxes are asked for: a block takes some 100 ns, memory about as long.
+const AHEAD: usize = 2;
+
+impl Order {
+    /// Takes boxes; notes who must be renewed in `renewing` and `worklist`.
+    pub(super) fn load<P: Proxies>(&mut self, tick: &Tick<'_, P>, many: bool) {
+        self.worklist.clear();
+        if many {
+            if tick.moved.len() >= self.len {
+                // As good as all: a box that did not change is taken again.
+                self.dirty.copy_from_slice(&self.live);
+            } else {
+                for slot in tick.moved {
+                    let rank = self.rank_of.get(slot.index()).copied().unwrap_or(NONE);
+                    if rank != NONE {
+                        let (block, lane) = parts(rank);
+                        self.dirty[block] |= 1 << lane;
+                    }
+                }
+            }
+            let level = self.level;
+            level.run(LoadBlocks { order: self, tick });
+        } else {
+            let level = self.level;
+            level.run(LoadBodies { order: self, tick });
+        }
+    }
+
+    /// Notes lanes to renew.
+    #[inline(always)]
+    pub(super) fn mark(&mut self, block: usize, lanes: u16) {
+        if self.renewing[block] == 0 && lanes != 0 {
+            self.worklist.push(small(block));
+        }
+        self.renewing[block] |= lanes;
+    }
+
+    /// Ticks until it is a block's turn. While many move, each tick renews one stretch of the order, so that all ticks cost
+    /// the same, and most neighbours are renewed together: then one of two asks for both.
+    #[inline(always)]
+    fn until_turn(&self, block: usize) -> u32 {
+        let turn = small(block * HORIZON as usize / self.live.len());
+        (turn + HORIZON - self.tick % HORIZON) % HORIZON
+    }
+
+    /// Ticks that a fat box made now is to last: until its block's turn, or the one after.
+    #[inline(always)]
+    pub(super) fn horizon(&self, block: usize) -> u32 {
+        let left = self.until_turn(block);
+        // One more, for the box of the tick at hand must be left after the turn only.
+        left + 1 + if left < ALONG_AGE { HORIZON } else { 0 }
+    }
+
+    /// Of the moved lanes of a block those old enough to be renewed along, that will leave within a round.
+    #[inline(always)]
+    fn along<L: Lanes>(&self, lanes: L, block: usize, moved: u16) -> u16 {
+        let mut chosen = 0;
+        for lane in ones(moved) {
+            let rank = block * WIDTH + lane;
+            let (gait, now, held) = (&self.gaits[rank], &self.exact[rank], &self.held[rank]);
+            let leaves = gait.age(self.tick) >= ALONG_AGE
+                && gait.leaves(lanes, now, held, self.tick, HORIZON);
+            chosen |= u16::from(leaves) << lane;
+        }
+        chosen
+    }
+
+    /// Writes the box of a lane; returns whether its fat box still holds it.
+    #[inline(always)]
+    pub(super) fn take<L: Lanes, P: Proxies>(
+        &mut self,
+        lanes: L,
+        proxies: &P,
+        slot: BodySlot,
+        rank: usize,
+    ) -> bool {
+        let aabb = proxies.aabb(slot);
+        let corners = [aabb.min.coords.as_ref(), aabb.max.coords.as_ref()];
+        lanes.take(
+            corners,
+            &self.origin,
+            &self.held[rank],
+            &mut self.exact[rank],
+        )
+    }
+}
+
+/// Block by block, the dirty lanes of each.
+struct LoadBlocks<'a, 'b, P> {
+    order: &'a mut Order,
+    tick: &'a Tick<'b, P>,
+}
+
+impl<P: Proxies> Work for LoadBlocks<'_, '_, P> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let (order, tick) = (self.order, self.tick);
+        for block in 0..order.live.len() {
+            let moved = std::mem::take(&mut order.dirty[block]);
+            if moved == 0 {
+                continue;
+            }
+            // The boxes of the world stand in another order: the next blocks' are asked for while this one is taken.
+            if let Some(ahead) = order.slot_of[block * WIDTH..]
+                .chunks_exact(WIDTH)
+                .nth(AHEAD)
+            {
+                for slot in ahead.iter().filter(|slot| **slot != NONE) {
+                    prefetch(tick.proxies.aabb(BodySlot(*slot)));
+                }
+            }
+            let mut out = 0;
+            for lane in ones(moved) {
+                let rank = block * WIDTH + lane;
+                let slot = BodySlot(order.slot_of[rank]);
+                let holds = order.take(lanes, tick.proxies, slot, rank);
+                out |= u16::from(!holds) << lane;
+            }
+            let due = order.until_turn(block) == 0;
+            if due || out != 0 {
+                let along = order.along(lanes, block, moved);
+                order.mark(block, out | along);
+            }
+        }
+    }
+}
+
+/// Body by body.
+struct LoadBodies<'a, 'b, P> {
+    order: &'a mut Order,
+    tick: &'a Tick<'b, P>,
+}
+
+impl<P: Proxies> Work for LoadBodies<'_, '_, P> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let (order, tick) = (self.order, self.tick);
+        for slot in tick.moved {
+            let rank = order.rank_of.get(slot.index()).copied().unwrap_or(NONE);
+            if rank == NONE {
+                continue;
+            }
+            let (block, lane) = parts(rank);
+            if !order.take(lanes, tick.proxies, *slot, rank as usize) {
+                order.mark(block, 1 << lane);
+            }
+        }
+        // Blocks in ascending order: the tree is refitted in it.
+        order.worklist.sort_unstable();
+    }
+}

@@ -1,0 +1,282 @@
+//! Compares the boxes of candidates and reports the pairs that began and parted.
+//!
+//! When many bodies move, the candidates are gone through as a flat list, in memory order, without a branch that one
+//! could guess wrong; the list is mended as bodies are renewed, by new entries at its end and by ages that tell the old
+//! ones dead. When few move, their bits in the matrices are looked up, and the list is let go.
+
+use super::links::Matrix;
+use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, column, ones, parts, small};
+use crate::ids::PairKey;
+use crate::simd::boxes::{Down, LANES, Lanes, WIDTH, Work, prefetch};
+
+/// A candidate, as four words that are read and written whole.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(16))]
+pub(super) struct Entry {
+    /// Ranks, the lower first.
+    ranks: [u32; 2],
+    record: u32,
+    /// Ages of the two lanes when it was listed, one byte each: with another age it is dead. Then whether the boxes
+    /// overlapped at the last look.
+    state: u32,
+}
+
+/// The bit of [`Entry::state`] that says whether the boxes overlapped.
+const HIT: u32 = 1 << 16;
+
+/// Ages as they stand in [`Entry::state`].
+#[inline(always)]
+fn state(first: u8, second: u8) -> u32 {
+    u32::from(first) | u32::from(second) << 8
+}
+
+/// What a look at an entry found; the place of the entry, and:
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Found {
+    at: u32,
+    /// Whether they overlap now; `None` where rounding leaves it open.
+    now: Option<bool>,
+}
+
+/// Entries ahead whose boxes are asked for.
+const AHEAD: usize = 24;
+
+impl Order {
+    /// Looks at every candidate, by the flat list.
+    pub(super) fn look_at_all<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
+        if !self.listed {
+            self.list_all();
+        }
+        done.tests += self.entries.len() as u64;
+        let mut found = std::mem::take(&mut self.found);
+        found.clear();
+        self.level.run(Look {
+            exact: &self.exact,
+            ages: &self.ages,
+            entries: &mut self.entries,
+            found: &mut found,
+        });
+        for one in &found {
+            let entry = self.entries[one.at as usize];
+            let slots = entry
+                .ranks
+                .map(|rank| BodySlot(self.slot_of[rank as usize]));
+            let now = one.now.unwrap_or_else(|| {
+                let [a, b] = slots.map(|slot| tick.proxies.aabb(slot));
+                a.overlaps(b)
+            });
+            let state = &mut self.entries[one.at as usize].state;
+            *state = (*state & !HIT) | if now { HIT } else { 0 };
+            let (row, lane) = (parts(entry.ranks[0]).1, parts(entry.ranks[1]).1);
+            let hit = &mut self.links.bits_mut(entry.record).hit[row];
+            // The matrix holds the truth: a pair that changed its lanes was restored there.
+            if now == (*hit >> lane & 1 == 1) {
+                continue;
+            }
+            *hit ^= 1 << lane;
+            let key = PairKey::new(slots[0], slots[1]);
+            if now {
+                tick.began.push(key);
+            } else {
+                tick.parted.push(key);
+            }
+        }
+        self.found = found;
+    }
+
+    /// Lists every candidate.
+    fn list_all(&mut self) {
+        self.listed = true;
+        self.entries.clear();
+        for record in 0..self.links.len() {
+            if self.links.blocks(record)[0] != NONE {
+                let chosen = self.links.bits(record).cand;
+                self.list_bits(record, &chosen);
+            }
+        }
+    }
+
+    /// Lists some candidates of a record.
+    #[inline(always)]
+    pub(super) fn list_bits(&mut self, record: u32, chosen: &Matrix) {
+        let [a, b] = self.links.blocks(record).map(|block| block * LANES);
+        let hit = &self.links.bits(record).hit;
+        // Four rows at a time, so that empty ones are passed over together.
+        for (four, rows) in chosen.chunks_exact(4).enumerate() {
+            let mut word = 0;
+            for (k, row) in rows.iter().enumerate() {
+                word |= u64::from(*row) << (16 * k);
+            }
+            while word != 0 {
+                let at = word.trailing_zeros();
+                word &= word - 1;
+                let (row, lane) = (small(four * 4) + at / 16, at % 16);
+                let ranks = [a + row, b + lane];
+                let ages = state(self.ages[ranks[0] as usize], self.ages[ranks[1] as usize]);
+                self.entries.push(Entry {
+                    ranks,
+                    record,
+                    state: ages | u32::from(hit[row as usize] >> lane & 1) << 16,
+                });
+            }
+        }
+    }
+
+    /// Looks at the candidates of moved bodies, one by one.
+    pub(super) fn look_at_moved<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
+        self.listed = false;
+        self.entries.clear();
+        for at in 0..tick.moved.len() {
+            let slot = tick.moved[at];
+            if let Some(rank) = self.rank(slot) {
+                self.look_at(rank, tick, done);
+            }
+        }
+        for at in 0..self.homeless.len() {
+            if let Some(rank) = self.rank(self.homeless[at]) {
+                self.look_at(rank, tick, done);
+            }
+        }
+    }
+
+    /// Looks at the candidates of one body by its f64 box: for so few pairs the list would not pay.
+    fn look_at<P: Proxies>(&mut self, rank: u32, tick: &mut Tick<'_, P>, done: &mut Done) {
+        let (block, lane) = parts(rank);
+        let mut rows = std::mem::take(&mut self.rows);
+        rows.clear();
+        for (other, record) in self.links.of(small(block)) {
+            let bits = self.links.bits(record);
+            let first = self.links.blocks(record)[0] as usize == block;
+            if first && bits.cand[lane] != 0 {
+                rows.push((record, lane, bits.cand[lane]));
+            }
+            if !first || other as usize == block {
+                for row in ones(column(&bits.cand, lane)) {
+                    rows.push((record, row, 1 << lane));
+                }
+            }
+        }
+        for (record, row, lanes) in &rows {
+            done.tests += u64::from(lanes.count_ones());
+            self.look_at_row(*record, *row, *lanes, tick);
+        }
+        self.rows = rows;
+    }
+
+    /// Compares the f64 boxes of a row with some lanes; flips the bits that changed and reports their pairs.
+    fn look_at_row<P: Proxies>(
+        &mut self,
+        record: u32,
+        row: usize,
+        lanes: u16,
+        tick: &mut Tick<'_, P>,
+    ) {
+        let [a, b] = self.links.blocks(record);
+        let one = BodySlot(self.slot_of[a as usize * WIDTH + row]);
+        let mine = tick.proxies.aabb(one);
+        let hit = self.links.bits(record).hit[row];
+        let mut flips = 0;
+        for lane in ones(lanes) {
+            let other = BodySlot(self.slot_of[b as usize * WIDTH + lane]);
+            let now = mine.overlaps(tick.proxies.aabb(other));
+            if now == (hit >> lane & 1 == 1) {
+                continue;
+            }
+            flips |= 1 << lane;
+            let key = PairKey::new(one, other);
+            if now {
+                tick.began.push(key);
+            } else {
+                tick.parted.push(key);
+            }
+        }
+        if flips != 0 {
+            self.links.bits_mut(record).hit[row] ^= flips;
+        }
+    }
+
+    /// Every live entry is a candidate with its state, and every candidate is listed once; while the list is kept.
+    pub(super) fn check_list(&self) -> Result<(), String> {
+        if !self.listed {
+            return Ok(());
+        }
+        let mut seen: Vec<[u32; 2]> = Vec::new();
+        for entry in &self.entries {
+            let [first, second] = entry.ranks.map(|rank| self.ages[rank as usize]);
+            if state(first, second) != entry.state & !HIT {
+                continue;
+            }
+            let ((a, row), (b, lane)) = (parts(entry.ranks[0]), parts(entry.ranks[1]));
+            let bits = self.links.bits(entry.record);
+            let blocks = self.links.blocks(entry.record).map(|block| block as usize);
+            let bit = (
+                bits.cand[row] >> lane & 1 == 1,
+                bits.hit[row] >> lane & 1 == 1,
+            );
+            if blocks != [a, b] || bit != (true, entry.state & HIT != 0) {
+                return Err(format!("{entry:?} is listed, the matrix has {bit:?}"));
+            }
+            seen.push(entry.ranks);
+        }
+        let listed = seen.len();
+        seen.sort_unstable();
+        seen.dedup();
+        let mut wanted = 0;
+        for record in 0..self.links.len() {
+            if self.links.blocks(record)[0] != NONE {
+                let cand = self.links.bits(record).cand;
+                wanted += cand
+                    .iter()
+                    .map(|row| row.count_ones() as usize)
+                    .sum::<usize>();
+            }
+        }
+        if listed != seen.len() || listed != wanted {
+            return Err(format!(
+                "{listed} listed, {} different, {wanted} candidates",
+                seen.len()
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// One pass over the list: drops the dead, finds what changed.
+struct Look<'a> {
+    exact: &'a [Down],
+    ages: &'a [u8],
+    entries: &'a mut Vec<Entry>,
+    found: &'a mut Vec<Found>,
+}
+
+impl Work for Look<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let mut kept = 0;
+        for at in 0..self.entries.len() {
+            if let Some(next) = self.entries.get(at + AHEAD) {
+                prefetch(&self.exact[next.ranks[0] as usize]);
+                prefetch(&self.exact[next.ranks[1] as usize]);
+            }
+            let entry = self.entries[at];
+            let (a, b) = (entry.ranks[0] as usize, entry.ranks[1] as usize);
+            let alive = state(self.ages[a], self.ages[b]) == entry.state & !HIT;
+            self.entries[kept] = entry;
+            let (apart, sure) = lanes.parts(&self.exact[a], &self.exact[b]);
+            // Without a branch on the state: it is as good as random.
+            let hit = entry.state & HIT != 0;
+            let as_before = (hit & sure) | (!hit & apart);
+            if alive & !as_before {
+                let now = if apart | sure { Some(sure) } else { None };
+                self.found.push(Found {
+                    at: small(kept),
+                    now,
+                });
+            }
+            kept += usize::from(alive);
+        }
+        self.entries.truncate(kept);
+    }
+}

@@ -1,0 +1,310 @@
+//! Sort-and-sweep along a space-filling order, kept across ticks: the main method.
+//!
+//! In: which bodies left, came, moved. Out: pairs of boxes that began to overlap and pairs that parted.
+//!
+//! * **Order.** Bodies stand in blocks of sixteen, in Morton order within classes of size, largest first (`place`).
+//!   No axis is privileged, so a floor, a sheet or a tower needs no special case, and a huge body beside tiny ones
+//!   stretches no block but its own. An implicit tree stands over the blocks (`tree`).
+//! * **Fat boxes** (`fatten`): a body inside its own costs one containment test.
+//! * **Candidates** (`links`): for each two blocks that come near one another a matrix of 16 by 16 bits. They change
+//!   only where a body left its fat box (`renew`), a few blocks in each tick rather than all at once.
+//! * **The look** (`look`): candidates of moved bodies are compared with sixteen lanes at once; begin and end are
+//!   differences of bits. Cost in proportion to what moved: few moved bodies are looked at one by one.
+//! * **Exact.** Boxes are f32, rounded outward, relative to an f64 origin amid the scene; where rounding could tell
+//!   otherwise than the f64 boxes, those are asked. So the pairs are those of the f64 boxes at any offset.
+//! * **Modes** (few or many moved; renewal or sorting anew) are chosen by counted work with weights that were measured
+//!   once, so that a replay chooses alike. They decide about cost alone: pairs, slots and events are the same.
+//!
+//! Refused: three lists of sorted ends (see `sap`: exponent 1.5 to 2 as soon as motion is incoherent); lists of
+//! candidate pairs (each renewal inserts, removes and looks up single pairs; matrices are overwritten); a renewal of all
+//! boxes at once (cheaper by a fifth, but each eighth tick takes five times the others).
+//!
+//! Sources: Terdiman, "Box pruning revisited" (2017), for sorted copies in structure-of-arrays form; Verlet lists
+//! (Verlet 1967) for candidates that outlive a step; Morton 1966 for the order.
+
+use super::Proxies;
+use super::Work;
+use super::members::{ASKED, CAME, Members};
+use crate::ids::{BodySlot, PairKey};
+use crate::simd::boxes::{Boxes16, Down, Level, WIDTH};
+
+mod fatten;
+mod links;
+mod load;
+mod look;
+mod place;
+mod renew;
+mod sort;
+mod tree;
+mod validate;
+
+use fatten::Gait;
+use links::{Links, small};
+use tree::Tree;
+
+/// No index.
+const NONE: u32 = u32::MAX;
+/// One moved body in so many, and they are looked at block by block rather than one by one. A single look costs
+/// about 80 ns, a body of a block about 8.
+const MANY_MOVED: usize = 10;
+/// ... and so few, that the list of candidates is let go.
+const STILL_MANY: usize = 14;
+/// So many inserted among all, and everything is sorted anew rather than each put into a free lane.
+const MANY_CAME: usize = 8;
+
+/// What one update is told, and where its results go.
+pub(super) struct Tick<'a, P> {
+    pub(super) members: &'a Members,
+    pub(super) proxies: &'a P,
+    pub(super) moved: &'a [BodySlot],
+    /// Pairs whose boxes may have begun to overlap.
+    pub(super) began: &'a mut Vec<PairKey>,
+    /// Pairs whose boxes parted.
+    pub(super) parted: &'a mut Vec<PairKey>,
+}
+
+/// The structure.
+#[derive(Clone, Debug)]
+pub(super) struct Order {
+    level: Level,
+    /// Where the f32 boxes are measured from, metres.
+    origin: [f64; 3],
+    tick: u32,
+    /// By body slot: block and lane as one number, or `NONE`.
+    rank_of: Vec<u32>,
+    /// By rank: the body slot, or `NONE`.
+    slot_of: Vec<u32>,
+    /// By block: lanes in use.
+    live: Vec<u16>,
+    /// By rank: the box, rounded outward.
+    exact: Vec<Down>,
+    /// By rank: the fat box; and the same by block, to be asked sixteen at a time.
+    held: Vec<Down>,
+    fat: Vec<Boxes16>,
+    /// By rank: how often the lane was given a fat box or lost its body, around the clock.
+    ages: Vec<u8>,
+    /// By rank: what the body learned of its motion.
+    gaits: Vec<Gait>,
+    tree: Tree,
+    links: Links,
+    sorter: sort::Sorter,
+    /// By block: the least key that was sorted into it.
+    keys: Vec<u64>,
+    /// Blocks that were sorted; those beyond take what finds no free lane.
+    sorted: usize,
+    /// Bodies in it.
+    len: usize,
+    /// By block: lanes that moved, while boxes are taken.
+    dirty: Vec<u16>,
+    /// By block: lanes to renew in this tick, and the blocks that have any.
+    renewing: Vec<u16>,
+    worklist: Vec<u32>,
+    /// Bodies without a lane that are to get one.
+    homeless: Vec<BodySlot>,
+    /// Pairs whose boxes overlapped when one of them lost its lane.
+    carried: Vec<(u32, u32)>,
+    scratch: renew::Scratch,
+    /// Boxes to be sorted, records of a body, records without candidates: memory kept over calls.
+    boxes: Vec<[f32; 6]>,
+    former: Vec<Gait>,
+    touched_records: Vec<u32>,
+    emptied: Vec<u32>,
+    /// The candidates as a flat list, while it is kept (`look`).
+    entries: Vec<look::Entry>,
+    listed: bool,
+    found: Vec<look::Found>,
+    rows: Vec<(u32, usize, u16)>,
+    /// Blocks met by queries since the last sort beyond what they met right after it.
+    excess: u64,
+    /// Blocks met by a query right after the last sort, in sixteenths.
+    usual: u64,
+}
+
+impl Default for Order {
+    fn default() -> Self {
+        Self::new(Level::best())
+    }
+}
+
+impl Order {
+    /// Without bodies.
+    pub(super) fn new(level: Level) -> Self {
+        Self {
+            level,
+            origin: [0.0; 3],
+            tick: 0,
+            rank_of: Vec::new(),
+            slot_of: Vec::new(),
+            live: Vec::new(),
+            exact: Vec::new(),
+            held: Vec::new(),
+            ages: Vec::new(),
+            fat: Vec::new(),
+            gaits: Vec::new(),
+            tree: Tree::default(),
+            links: Links::default(),
+            sorter: sort::Sorter::default(),
+            keys: Vec::new(),
+            sorted: 0,
+            len: 0,
+            dirty: Vec::new(),
+            renewing: Vec::new(),
+            worklist: Vec::new(),
+            homeless: Vec::new(),
+            carried: Vec::new(),
+            scratch: renew::Scratch::default(),
+            boxes: Vec::new(),
+            former: Vec::new(),
+            touched_records: Vec::new(),
+            emptied: Vec::new(),
+            entries: Vec::new(),
+            listed: false,
+            found: Vec::new(),
+            rows: Vec::new(),
+            excess: 0,
+            usual: 0,
+        }
+    }
+
+    /// Bodies with a box left (and may be about to come again). Their pairs are ended by the caller.
+    pub(super) fn leave(&mut self, left: &[BodySlot]) {
+        for slot in left {
+            self.evict(*slot, false);
+        }
+    }
+
+    /// Brings boxes and candidates up to date and reports what began and parted.
+    pub(super) fn update<P: Proxies>(&mut self, mut tick: Tick<'_, P>, work: &mut Work) {
+        self.tick = self.tick.wrapping_add(1);
+        self.homeless.clear();
+        let came = tick.members.touched().iter().copied();
+        let came = came.filter(|s| tick.members.has(*s, CAME) && tick.members.is_bounded(*s));
+        self.homeless.extend(came);
+        let anew = self.homeless.len() * MANY_CAME > tick.members.bounded().len();
+        // With hysteresis: to list all candidates again costs as much as some ticks.
+        let share = if self.listed { STILL_MANY } else { MANY_MOVED };
+        let many = tick.moved.len() * share > self.len;
+        self.listed &= many;
+        if !anew {
+            self.load(&tick, many);
+            self.rehome();
+        }
+        if anew || self.is_worn() || !self.settle(&tick) {
+            self.listed = false;
+            self.sort_anew(&mut tick, work);
+            self.look_at_all(&mut tick, work);
+        } else {
+            self.renew(&mut tick, work);
+            self.restore(&mut tick);
+            if many {
+                self.look_at_all(&mut tick, work);
+            } else {
+                self.look_at_moved(&mut tick, work);
+            }
+        }
+        self.tell_asked(&mut tick);
+        self.close();
+    }
+
+    /// Reports every overlap of bodies whose pairs must be looked for, whatever moved.
+    fn tell_asked<P: Proxies>(&mut self, tick: &mut Tick<'_, P>) {
+        let members = tick.members;
+        for slot in members.touched() {
+            if !members.has(*slot, ASKED) || members.has(*slot, CAME) {
+                continue;
+            }
+            let Some(rank) = self.rank(*slot) else {
+                continue;
+            };
+            let began = &mut *tick.began;
+            self.each_bit(
+                rank,
+                |bits| bits.hit,
+                |other| {
+                    began.push(PairKey::new(*slot, BodySlot(other)));
+                },
+            );
+        }
+    }
+
+    /// Forgets what was true for this tick alone.
+    fn close(&mut self) {
+        // The list names what was marked: nothing else is touched.
+        for block in self.worklist.drain(..) {
+            self.renewing[block as usize] = 0;
+        }
+        self.carried.clear();
+    }
+
+    /// Block and lane of a body.
+    fn rank(&self, slot: BodySlot) -> Option<u32> {
+        let rank = *self.rank_of.get(slot.index())?;
+        (rank != NONE).then_some(rank)
+    }
+
+    /// Calls with the slot of each body that shares a bit of a matrix with the body at a rank.
+    fn each_bit(
+        &self,
+        rank: u32,
+        matrix: impl Fn(&links::Bits) -> links::Matrix,
+        mut with: impl FnMut(u32),
+    ) {
+        let (block, lane) = parts(rank);
+        for (other, record) in self.links.of(small(block)) {
+            let matrix = matrix(self.links.bits(record));
+            let row = self.links.blocks(record)[0] as usize == block;
+            let mut bits = if row { matrix[lane] } else { 0 };
+            if !row || other as usize == block {
+                bits |= column(&matrix, lane);
+            }
+            for lane in ones(bits) {
+                with(self.slot_of[other as usize * WIDTH + lane]);
+            }
+        }
+    }
+
+    /// Sets which level of instructions is used; for tests.
+    pub(super) fn use_level(&mut self, level: Level) {
+        self.level = level;
+    }
+}
+
+/// Block and lane.
+#[inline(always)]
+fn parts(rank: u32) -> (usize, usize) {
+    (rank as usize / WIDTH, rank as usize % WIDTH)
+}
+
+/// Bit `lane` of each row, as bits.
+#[inline(always)]
+fn column(matrix: &links::Matrix, lane: usize) -> u16 {
+    let mut bits = 0;
+    for (row, line) in matrix.iter().enumerate() {
+        bits |= (line >> lane & 1) << row;
+    }
+    bits
+}
+
+/// The places of the ones, lowest first.
+#[inline(always)]
+fn ones(bits: u16) -> Ones {
+    Ones(bits)
+}
+
+/// See [`ones`].
+#[derive(Clone, Copy, Debug)]
+struct Ones(u16);
+
+impl Iterator for Ones {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        if self.0 == 0 {
+            return None;
+        }
+        let at = self.0.trailing_zeros() as usize;
+        self.0 &= self.0 - 1;
+        Some(at)
+    }
+}

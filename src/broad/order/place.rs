@@ -1,0 +1,314 @@
+//! Who stands where: lanes are given up and taken, and from time to time everything is sorted anew.
+
+use super::fatten::{Gait, outward};
+use super::links::{room, small};
+use super::sort::{CLASSES_MAX, FILL, Sorter};
+use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, ones, parts};
+use crate::math::Aabb;
+use crate::simd::boxes::{Boxes16, Down, Portable, WIDTH};
+
+/// Blocks met by queries beyond what is usual that cost as much as sorting one body anew: a block met costs about 8 ns,
+/// sorting and asking anew about 50 ns a body. Sorting when the excess has cost as much as a sort is at most twice as
+/// dear as the best plan.
+const WORN_PER_BODY: u64 = 2;
+/// One block in so many stays empty after a sort, for bodies that find no free lane where they belong.
+const ATTIC: usize = 16;
+/// How far from its place on the curve a body may find a free lane, blocks.
+const STRAY: usize = 20;
+
+impl Order {
+    /// Takes a body's lane away.
+    ///
+    /// * `carry` - whether its overlaps are remembered: it gets another lane in this tick.
+    pub(super) fn evict(&mut self, slot: BodySlot, carry: bool) {
+        let Some(rank) = self.rank(slot) else { return };
+        let (block, lane) = parts(rank);
+        if carry {
+            let mut carried = std::mem::take(&mut self.carried);
+            self.each_bit(rank, |bits| bits.hit, |other| carried.push((slot.0, other)));
+            self.carried = carried;
+        }
+        let mut empty = std::mem::take(&mut self.emptied);
+        let mut records = std::mem::take(&mut self.touched_records);
+        records.extend(self.links.of(small(block)).map(|(_, record)| record));
+        for record in records.drain(..) {
+            let [a, b] = self.links.blocks(record).map(|block| block as usize);
+            let bits = self.links.bits_mut(record);
+            let mut any = 0;
+            for row in 0..WIDTH {
+                let mine = if a == block && row == lane {
+                    0
+                } else {
+                    u16::MAX
+                };
+                let theirs = if b == block { !(1 << lane) } else { u16::MAX };
+                bits.cand[row] &= mine & theirs;
+                bits.hit[row] &= mine & theirs;
+                any |= bits.cand[row];
+            }
+            if any == 0 {
+                empty.push(record);
+            }
+        }
+        for record in empty.drain(..) {
+            self.links.remove(record);
+        }
+        self.emptied = empty;
+        self.touched_records = records;
+        self.rank_of[slot.index()] = NONE;
+        self.slot_of[rank as usize] = NONE;
+        self.live[block] &= !(1 << lane);
+        self.renewing[block] &= !(1 << lane);
+        self.fat[block].set(lane, &[f32::NAN; 6]);
+        let rank = rank as usize;
+        self.exact[rank] = Down::EMPTY;
+        self.held[rank] = Down::EMPTY;
+        self.ages[rank] = self.ages[rank].wrapping_add(1);
+        self.len -= 1;
+    }
+
+    /// Bodies that jumped clear of their block's bound give up their lanes, to stand where they belong.
+    pub(super) fn rehome(&mut self) {
+        for at in 0..self.worklist.len() {
+            let block = self.worklist[at] as usize;
+            let bound = *self.tree.bound(block);
+            for lane in ones(self.renewing[block]) {
+                let one = self.exact[block * WIDTH + lane].corners();
+                let meets = (0..3).all(|k| one[k] <= bound[k + 3] && bound[k] <= one[k + 3]);
+                if !meets {
+                    let slot = BodySlot(self.slot_of[block * WIDTH + lane]);
+                    self.evict(slot, true);
+                    self.homeless.push(slot);
+                }
+            }
+        }
+    }
+
+    /// Whether the order has cost more than sorting anew would.
+    pub(super) fn is_worn(&self) -> bool {
+        self.excess > WORN_PER_BODY * self.len as u64
+    }
+
+    /// Gives every homeless body a lane; `false` when one finds none.
+    pub(super) fn settle<P: Proxies>(&mut self, tick: &Tick<'_, P>) -> bool {
+        for at in 0..self.homeless.len() {
+            let slot = self.homeless[at];
+            let one = outward(Portable, tick.proxies.aabb(slot), &self.origin);
+            let Some(rank) = self.free_lane(&one.corners()) else {
+                return false;
+            };
+            let (block, lane) = parts(rank);
+            grow(&mut self.rank_of, slot.index(), NONE);
+            self.rank_of[slot.index()] = rank;
+            // How it got here says nothing of where it goes.
+            self.gaits[rank as usize] = Gait::NEW;
+            self.slot_of[rank as usize] = slot.0;
+            self.live[block] |= 1 << lane;
+            self.len += 1;
+            self.exact[rank as usize] = one;
+            self.mark(block, 1 << lane);
+        }
+        true
+    }
+
+    /// A free lane near a box's place on the curve, in the block whose middle is nearest; or in the attic.
+    fn free_lane(&mut self, one: &[f32; 6]) -> Option<u32> {
+        let key = self.sorter.key(one);
+        let sorted = &self.keys[..self.sorted];
+        let home = sorted.partition_point(|first| *first <= key);
+        let mut best = (f32::INFINITY, None);
+        for block in home.saturating_sub(STRAY)..(home + STRAY).min(self.sorted) {
+            let fits = self.live[block] != u16::MAX
+                && Sorter::class_of(self.keys[block]) == Sorter::class_of(key);
+            if fits {
+                let far = distance(one, self.tree.bound(block));
+                if far < best.0 {
+                    best = (far, Some(block));
+                }
+            }
+        }
+        let block = best.1.or_else(|| {
+            let mut attic = self.sorted..self.live.len();
+            attic.find(|block| self.live[*block] != u16::MAX)
+        })?;
+        let lane = (!self.live[block]).trailing_zeros() as usize;
+        Some(small(block * WIDTH + lane))
+    }
+
+    /// Sorts everything anew: every body, the homeless too, gets a lane and a fat box, and all candidates are found.
+    pub(super) fn sort_anew<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
+        done.rebuilds += 1;
+        self.carry_all();
+        let bodies = tick.members.bounded();
+        self.origin = middle(bodies.iter().map(|slot| tick.proxies.aabb(*slot)));
+        let mut boxes = std::mem::take(&mut self.boxes);
+        boxes.clear();
+        boxes.extend(
+            bodies
+                .iter()
+                .map(|slot| outward(Portable, tick.proxies.aabb(*slot), &self.origin).corners()),
+        );
+        self.sorter.frame(&boxes);
+        self.lay_out(bodies, &boxes);
+        self.boxes = boxes;
+        for rank in 0..self.slot_of.len() {
+            if self.slot_of[rank] != NONE {
+                _ = self.take(Portable, tick.proxies, BodySlot(self.slot_of[rank]), rank);
+            }
+        }
+        self.tree.reset(self.live.len());
+        self.links.reset(self.live.len());
+        self.renew_all(tick, done);
+        self.restore(tick);
+        self.reserve(tick);
+    }
+
+    /// Room for what the ticks until the next sort may need: growth belongs to a sort, not to any tick.
+    fn reserve<P>(&mut self, tick: &mut Tick<'_, P>) {
+        let (bodies, blocks) = (self.len, self.live.len());
+        self.links.reserve();
+        let entries = self.entries.len().max(self.carried.len()) * 2 + 4 * bodies;
+        room(&mut self.entries, entries);
+        room(&mut self.carried, entries);
+        for list in [
+            &mut self.worklist,
+            &mut self.touched_records,
+            &mut self.emptied,
+        ] {
+            room(list, 2 * blocks + bodies);
+        }
+        room(&mut self.homeless, bodies);
+        room(&mut self.found, bodies);
+        room(&mut self.rows, 2 * blocks + bodies);
+        room(tick.began, bodies);
+        room(tick.parted, bodies);
+        self.tree.reserve();
+    }
+
+    /// Remembers every overlap.
+    fn carry_all(&mut self) {
+        for block in 0..small(self.live.len()) {
+            let (links, slot_of, carried) = (&self.links, &self.slot_of, &mut self.carried);
+            for (other, record) in links.of(block) {
+                if other < block {
+                    continue;
+                }
+                for (row, bits) in links.bits(record).hit.into_iter().enumerate() {
+                    for lane in ones(bits) {
+                        let one = slot_of[block as usize * WIDTH + row];
+                        carried.push((one, slot_of[other as usize * WIDTH + lane]));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Deals the sorted bodies to blocks; a class begins with a block of its own.
+    fn lay_out(&mut self, bodies: &[BodySlot], boxes: &[[f32; 6]]) {
+        self.keys.clear();
+        self.live.clear();
+        self.slot_of.clear();
+        // How many blocks there are hangs on how many classes begin one: room for the most there can be.
+        let most = bodies.len() / FILL + CLASSES_MAX;
+        let most = most + most / ATTIC + 1;
+        for list in [&mut self.live, &mut self.dirty, &mut self.renewing] {
+            room(list, most);
+        }
+        for list in [&mut self.exact, &mut self.held] {
+            room(list, most * WIDTH);
+        }
+        room(&mut self.keys, most);
+        room(&mut self.fat, most);
+        room(&mut self.slot_of, most * WIDTH);
+        room(&mut self.gaits, most * WIDTH);
+        room(&mut self.ages, most * WIDTH);
+        self.links.reserve_blocks(most);
+        self.tree.reserve_blocks(most);
+        self.scratch.reserve(most);
+        self.former.clear();
+        for slot in bodies {
+            grow(&mut self.rank_of, slot.index(), NONE);
+            let rank = self.rank_of[slot.index()] as usize;
+            self.former
+                .push(self.gaits.get(rank).copied().unwrap_or(Gait::NEW));
+        }
+        self.gaits.clear();
+        let order = self.sorter.sort(boxes);
+        for (key, index) in order {
+            let starts = self.keys.last().is_none_or(|first| {
+                let full = self
+                    .live
+                    .last()
+                    .is_none_or(|live| live.count_ones() as usize == FILL);
+                full || Sorter::class_of(*first) != Sorter::class_of(*key)
+            });
+            if starts {
+                self.keys.push(*key);
+                self.live.push(0);
+                self.slot_of.resize(self.live.len() * WIDTH, NONE);
+                self.gaits.resize(self.live.len() * WIDTH, Gait::NEW);
+            }
+            let block = self.live.len() - 1;
+            let lane = self.live[block].trailing_ones() as usize;
+            self.live[block] |= 1 << lane;
+            let (rank, body) = (block * WIDTH + lane, bodies[*index as usize]);
+            self.slot_of[rank] = body.0;
+            self.rank_of[body.index()] = small(rank);
+            self.gaits[rank] = self.former[*index as usize];
+        }
+        self.sorted = self.live.len();
+        let blocks = self.sorted + self.sorted / ATTIC + 1;
+        self.live.resize(blocks, 0);
+        self.slot_of.resize(blocks * WIDTH, NONE);
+        self.gaits.resize(blocks * WIDTH, Gait::NEW);
+        self.len = bodies.len();
+        for list in [&mut self.dirty, &mut self.renewing] {
+            list.clear();
+            list.resize(blocks, 0);
+        }
+        self.fat.clear();
+        self.fat.resize(blocks, Boxes16::EMPTY);
+        for list in [&mut self.exact, &mut self.held] {
+            list.clear();
+            list.resize(blocks * WIDTH, Down::EMPTY);
+        }
+        self.ages.clear();
+        self.ages.resize(blocks * WIDTH, 0);
+    }
+}
+
+/// A measure of how far the middles of two boxes are apart.
+fn distance(one: &[f32; 6], other: &[f32; 6]) -> f32 {
+    let mut sum = 0.0;
+    for k in 0..3 {
+        let apart = (one[k] + one[k + 3]) - (other[k] + other[k + 3]);
+        sum += apart * apart;
+    }
+    sum
+}
+
+/// Grows a list by body so that it has an entry for one.
+fn grow<T: Clone>(list: &mut Vec<T>, index: usize, value: T) {
+    if list.len() <= index {
+        list.resize(index + 1, value);
+    }
+}
+
+/// The middle of the boxes' finite corners.
+fn middle<'a>(boxes: impl Iterator<Item = &'a Aabb>) -> [f64; 3] {
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for aabb in boxes {
+        for k in 0..3 {
+            for face in [aabb.min[k], aabb.max[k]] {
+                if face.is_finite() {
+                    low[k] = low[k].min(face);
+                    high[k] = high[k].max(face);
+                }
+            }
+        }
+    }
+    std::array::from_fn(|k| {
+        let middle = low[k] * 0.5 + high[k] * 0.5;
+        if middle.is_finite() { middle } else { 0.0 }
+    })
+}

@@ -1,0 +1,379 @@
+//! New fat boxes for bodies that left theirs, and the candidates that follow.
+//!
+//! First all fat boxes of the tick are written and the tree is refitted; then each block asks once, with the box around
+//! its renewed lanes, and overwrites their rows and columns. So of two bodies that leave their boxes in one tick each
+//! sees the other's new box, and since a row is written, not added to, no pair is there twice.
+
+use super::links::{Bits, Matrix, room};
+use super::{BodySlot, NONE, Order, PairKey, Proxies, Tick, Work as Done, ones, parts, small};
+use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch};
+
+/// Memory of the queries, kept over ticks.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scratch {
+    /// Blocks that a query found.
+    near: Vec<u32>,
+    /// Those of them that are looked into.
+    close: Vec<Close>,
+    /// Records of the block at hand: the other block, the record.
+    have: Vec<(u32, u32)>,
+    /// By block: the stamp of the query that met it last, and its record with the asking block.
+    mark: Vec<(u32, u32)>,
+    stamp: u32,
+}
+
+impl Scratch {
+    /// Room for a query that meets every block.
+    pub(super) fn reserve(&mut self, blocks: usize) {
+        room(&mut self.near, blocks);
+        room(&mut self.close, blocks);
+        room(&mut self.have, blocks);
+        room(&mut self.mark, blocks);
+    }
+}
+
+/// A block to be looked into.
+#[derive(Clone, Copy, Debug)]
+struct Close {
+    block: u32,
+    /// Its record with the asking block, or `NONE`.
+    record: u32,
+    /// Renewed lanes of the asking block that meet its bound.
+    lanes: u16,
+}
+
+impl Order {
+    /// Renews the lanes noted in `renewing`.
+    pub(super) fn renew<P>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
+        self.worklist.sort_unstable();
+        self.worklist.dedup();
+        if self.worklist.is_empty() {
+            return;
+        }
+        let level = self.level;
+        let met = level.run(Renew {
+            order: self,
+            parted: tick.parted,
+            done,
+        });
+        let asked = self.worklist.len() as u64;
+        self.excess += (met * 16).saturating_sub(asked * self.usual) / 16;
+    }
+
+    /// Renews every lane, after a sort; what a query meets now is what is usual.
+    pub(super) fn renew_all<P>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
+        self.worklist.clear();
+        for block in 0..self.live.len() {
+            self.renewing[block] = 0;
+            self.mark(block, self.live[block]);
+        }
+        let level = self.level;
+        let met = level.run(Renew {
+            order: self,
+            parted: tick.parted,
+            done,
+        });
+        self.usual = met * 16 / (self.worklist.len() as u64).max(1);
+        self.excess = 0;
+    }
+
+    /// Gives pairs that lost their lanes while their boxes overlapped their bits back; those whose boxes do not overlap
+    /// now have parted. After it a bit that the list does not know of stands for boxes that overlap, so the look finds
+    /// it.
+    pub(super) fn restore<P: Proxies>(&mut self, tick: &mut Tick<'_, P>) {
+        for at in 0..self.carried.len() {
+            let (one, other) = self.carried[at];
+            let (one, other) = (BodySlot(one), BodySlot(other));
+            let (Some(first), Some(second)) = (self.rank(one), self.rank(other)) else {
+                continue;
+            };
+            if !tick.proxies.aabb(one).overlaps(tick.proxies.aabb(other)) {
+                tick.parted.push(PairKey::new(one, other));
+                continue;
+            }
+            let ((a, row), (b, lane)) = (parts(first.min(second)), parts(first.max(second)));
+            let record = self.links.find(small(a), small(b));
+            debug_assert!(record.is_some(), "boxes that overlap are candidates");
+            if let Some(record) = record {
+                self.links.bits_mut(record).hit[row] |= 1 << lane;
+            }
+        }
+    }
+
+    /// Reports the pairs of some bits.
+    fn tell_parted(&self, blocks: [u32; 2], gone: &Matrix, parted: &mut Vec<PairKey>) {
+        let [a, b] = blocks.map(|block| block as usize * WIDTH);
+        for (row, lanes) in gone.iter().enumerate() {
+            for lane in ones(*lanes) {
+                let (one, other) = (self.slot_of[a + row], self.slot_of[b + lane]);
+                parted.push(PairKey::new(BodySlot(one), BodySlot(other)));
+            }
+        }
+    }
+}
+
+struct Renew<'a> {
+    order: &'a mut Order,
+    parted: &'a mut Vec<PairKey>,
+    done: &'a mut Done,
+}
+
+impl Work for Renew<'_> {
+    type Out = u64;
+
+    /// Returns the blocks that all queries met.
+    #[inline(always)]
+    fn run<L: Lanes>(mut self, lanes: L) -> u64 {
+        for at in 0..self.order.worklist.len() {
+            let block = self.order.worklist[at] as usize;
+            self.fatten(lanes, block);
+        }
+        self.order.tree.refit(lanes);
+        let mut met = 0;
+        let mut scratch = std::mem::take(&mut self.order.scratch);
+        scratch.mark.resize(self.order.live.len(), (0, NONE));
+        for at in 0..self.order.worklist.len() {
+            let block = self.order.worklist[at];
+            if self.order.renewing[block as usize] != 0 {
+                met += self.ask(lanes, &mut scratch, block);
+            }
+        }
+        self.order.scratch = scratch;
+        met
+    }
+}
+
+impl Renew<'_> {
+    /// Writes the fat boxes of the renewed lanes of a block, and its bound.
+    #[inline(always)]
+    fn fatten<L: Lanes>(&mut self, lanes: L, block: usize) {
+        let order = &mut *self.order;
+        let renewing = order.renewing[block];
+        let horizon = order.horizon(block);
+        for lane in ones(renewing) {
+            let rank = block * WIDTH + lane;
+            let now = order.exact[rank];
+            let fat = order.gaits[rank].renew(&now, order.tick, horizon, &order.held[rank]);
+            order.held[rank] = fat;
+            order.fat[block].set(lane, &fat.corners());
+            order.ages[rank] = order.ages[rank].wrapping_add(1);
+        }
+        self.done.renewed += u64::from(renewing.count_ones());
+        let bound = lanes.bound(&order.fat[block], u16::MAX);
+        order.tree.set(block, bound);
+    }
+
+    /// Overwrites the candidates of the renewed lanes of a block; returns how many blocks it met.
+    #[inline(always)]
+    fn ask<L: Lanes>(&mut self, lanes: L, scratch: &mut Scratch, block: u32) -> u64 {
+        let order = &mut *self.order;
+        let renewing = order.renewing[block as usize];
+        let around = lanes.bound(&order.fat[block as usize], renewing);
+        // Two stamps a query: one for blocks with a record, one for those of them that were met.
+        scratch.stamp = scratch.stamp.wrapping_add(2);
+        let stamp = scratch.stamp;
+        scratch.have.clear();
+        let (have, mark) = (&mut scratch.have, &mut scratch.mark);
+        for (other, record) in order.links.of(block) {
+            have.push((other, record));
+            prefetch(order.links.bits(record));
+            mark[other as usize] = (stamp, record);
+        }
+        scratch.near.clear();
+        order.tree.query(lanes, &around, &mut scratch.near);
+        let met = scratch.near.len() as u64;
+        self.sift(lanes, scratch, block);
+        for at in 0..scratch.close.len() {
+            if let Some(next) = scratch.close.get(at + 2) {
+                prefetch(&self.order.fat[next.block as usize]);
+            }
+            self.pair(lanes, block, scratch.close[at], renewing);
+        }
+        for at in 0..scratch.have.len() {
+            let (other, record) = scratch.have[at];
+            if scratch.mark[other as usize].0 == stamp {
+                self.part(block, other, record, renewing);
+            }
+        }
+        met
+    }
+
+    /// Of the blocks near a block those with anything near a renewed lane, or with a record to be mended. Most have
+    /// neither; no branch is taken on it here.
+    #[inline(always)]
+    fn sift<L: Lanes>(&mut self, lanes: L, scratch: &mut Scratch, block: u32) {
+        let order = &*self.order;
+        let (mine, renewing) = (&order.fat[block as usize], order.renewing[block as usize]);
+        scratch.close.clear();
+        let none = Close {
+            block: 0,
+            record: NONE,
+            lanes: 0,
+        };
+        scratch.close.resize(scratch.near.len(), none);
+        let mut kept = 0;
+        for other in &scratch.near {
+            let at = *other as usize;
+            let known = &mut scratch.mark[at];
+            let record = if known.0 == scratch.stamp {
+                known.1
+            } else {
+                NONE
+            };
+            *known = (scratch.stamp + 1, NONE);
+            // Both are in this tick's renewal, and the other has asked already.
+            let asked = (*other < block) & (order.renewing[at] == order.live[at]);
+            let close = lanes.meets(mine, order.tree.bound(at)) & renewing;
+            scratch.close[kept] = Close {
+                block: *other,
+                record,
+                lanes: close,
+            };
+            kept += usize::from(!asked & ((close != 0) | (record != NONE)));
+        }
+        scratch.close.truncate(kept);
+        self.done.tests += scratch.near.len() as u64;
+    }
+
+    /// Finds the candidates between the renewed lanes of a block and another block, or within it.
+    #[inline(always)]
+    fn pair<L: Lanes>(&mut self, lanes: L, block: u32, close: Close, renewing: u16) {
+        let order = &*self.order;
+        let (other, record, sifted) = (close.block, close.record, close.lanes);
+        let (mine, theirs) = (&order.fat[block as usize], &order.fat[other as usize]);
+        self.done.tests += u64::from(sifted.count_ones());
+        let mut cand: Matrix = if record == NONE {
+            [0; WIDTH]
+        } else {
+            order.links.bits(record).cand
+        };
+        if block == other {
+            for lane in ones(renewing) {
+                let meets = lanes.meets(mine, &mine.get(lane)) & !(1 << lane);
+                set_column(&mut cand, lane, meets & below(lane));
+                cand[lane] = meets & !below(lane);
+            }
+        } else if block < other {
+            clear(&mut cand, renewing, u16::MAX);
+            for lane in ones(sifted) {
+                cand[lane] = lanes.meets(theirs, &mine.get(lane));
+            }
+        } else {
+            clear(&mut cand, u16::MAX, renewing);
+            for lane in ones(sifted) {
+                let meets = lanes.meets(theirs, &mine.get(lane));
+                if meets != 0 {
+                    set_column(&mut cand, lane, meets);
+                }
+            }
+        }
+        self.write(block, other, record, &cand, renewing);
+    }
+
+    /// The renewed lanes of a block have no candidate in another any more.
+    #[inline(always)]
+    fn part(&mut self, block: u32, other: u32, record: u32, renewing: u16) {
+        let mut cand = self.order.links.bits(record).cand;
+        if block < other {
+            clear(&mut cand, renewing, u16::MAX);
+        } else {
+            clear(&mut cand, u16::MAX, renewing);
+        }
+        self.write(block, other, record, &cand, renewing);
+    }
+
+    /// Writes a matrix of candidates, and lists those of renewed lanes; what overlapped and is no candidate any more has
+    /// parted.
+    #[inline(always)]
+    fn write(&mut self, block: u32, other: u32, record: u32, cand: &Matrix, renewing: u16) {
+        let (a, b) = (block.min(other), block.max(other));
+        let any = cand.iter().fold(0, |all, row| all | row) != 0;
+        let order = &mut *self.order;
+        let record = if record == NONE {
+            if !any {
+                return;
+            }
+            let bits = Bits {
+                cand: *cand,
+                hit: [0; WIDTH],
+            };
+            order.links.add(a, b, bits)
+        } else {
+            // Whole matrices at a time, in and out of locals: the compiler keeps each in one wide register.
+            let bits = order.links.bits_mut(record);
+            let hit = bits.hit;
+            let gone = zip(&hit, cand, |hit, cand| hit & !cand);
+            bits.hit = zip(&hit, cand, |hit, cand| hit & cand);
+            bits.cand = *cand;
+            let lost = gone.iter().fold(0, |all, row| all | row);
+            if lost != 0 {
+                order.tell_parted([a, b], &gone, self.parted);
+            }
+            if !any {
+                order.links.remove(record);
+                return;
+            }
+            record
+        };
+        if order.listed {
+            let mut chosen = *cand;
+            if a == b {
+                keep_either(&mut chosen, renewing);
+            } else if block < other {
+                clear(&mut chosen, !renewing, u16::MAX);
+            } else {
+                // Of two lanes that are both renewed the lower block lists the pair.
+                let theirs = order.renewing[other as usize];
+                clear(&mut chosen, theirs, u16::MAX);
+                clear(&mut chosen, u16::MAX, !renewing);
+            }
+            order.list_bits(record, &chosen);
+        }
+    }
+}
+
+/// Row by row.
+#[inline(always)]
+fn zip(one: &Matrix, other: &Matrix, with: impl Fn(u16, u16) -> u16) -> Matrix {
+    let mut out = [0; WIDTH];
+    for row in 0..WIDTH {
+        out[row] = with(one[row], other[row]);
+    }
+    out
+}
+
+/// All ones in the rows named by some bits.
+#[inline(always)]
+fn spread(rows: u16) -> Matrix {
+    let mut out = [0; WIDTH];
+    for (row, line) in out.iter_mut().enumerate() {
+        // A compare with a constant a row: wide on every level.
+        *line = if rows & (1 << row) != 0 { u16::MAX } else { 0 };
+    }
+    out
+}
+
+/// Clears the bits that lie in any of some rows and in any of some columns.
+#[inline(always)]
+fn clear(matrix: &mut Matrix, rows: u16, columns: u16) {
+    *matrix = zip(matrix, &spread(rows), |line, row| line & !(row & columns));
+}
+
+/// Keeps the bits that lie in any of some rows or in any of the same columns.
+#[inline(always)]
+fn keep_either(matrix: &mut Matrix, lanes: u16) {
+    *matrix = zip(matrix, &spread(lanes), |line, row| line & (lanes | row));
+}
+
+/// Bits below a lane.
+#[inline(always)]
+fn below(lane: usize) -> u16 {
+    (1_u16 << lane).wrapping_sub(1)
+}
+
+/// Sets bit `lane` of each row.
+#[inline(always)]
+fn set_column(matrix: &mut Matrix, lane: usize, bits: u16) {
+    let mask = 1 << lane;
+    *matrix = zip(matrix, &spread(bits), |line, row| line & !mask | row & mask);
+}

@@ -1,0 +1,280 @@
+//! The order: classes of size, largest first, and within a class the Morton curve.
+
+use crate::simd::boxes::WIDTH;
+
+/// Bits of the curve on each axis. A cell is then an eighth of a block's side at a million bodies.
+const AXIS_BITS: u32 = 10;
+/// Bits of a place on the curve.
+const CURVE_BITS: u32 = 3 * AXIS_BITS;
+/// Bits of a body's index in the sorted words: `limits::BODIES_MAX` and some.
+const INDEX_BITS: u32 = 28;
+/// Octaves of size: the longest sides from 2^-32 to 2^31 metres, all others at the ends.
+const OCTAVES: usize = 64;
+/// Octaves that share a class. Boxes of a block then differ by a factor of 4 at most, and scenes whose sizes lie about a
+/// power of two are not torn in two.
+const OCTAVES_A_CLASS: usize = 2;
+/// Most classes: the bits left in a sorted word.
+pub(super) const CLASSES_MAX: usize = 1 << (64 - CURVE_BITS - INDEX_BITS);
+/// Bits that one pass of the radix sort takes.
+const DIGIT_BITS: u32 = 11;
+
+/// The frame of the curve and the memory of the sort.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sorter {
+    low: [f32; 3],
+    scale: [f32; 3],
+    /// By octave: its class.
+    classes: Vec<u8>,
+    words: Vec<u64>,
+    spare: Vec<u64>,
+    counts: Vec<u32>,
+    order: Vec<(u64, u32)>,
+    middles: Vec<([f32; 3], u32)>,
+}
+
+impl Sorter {
+    /// Looks at the boxes and lays classes and the frame of the curve.
+    pub(super) fn frame(&mut self, boxes: &[[f32; 6]]) {
+        let mut seen = [0_u32; OCTAVES];
+        let (mut count, mut sum, mut squares) = (0_u32, [0.0_f64; 3], [0.0_f64; 3]);
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for one in boxes {
+            seen[octave(one)] += 1;
+            let centre = centre(one).map(f64::from);
+            count += 1;
+            for k in 0..3 {
+                sum[k] += centre[k];
+                squares[k] += centre[k] * centre[k];
+                low[k] = low[k].min(centre[k]);
+                high[k] = high[k].max(centre[k]);
+            }
+        }
+        // Few bodies far away must not make the cells coarse for all: four deviations, the rest at the edge.
+        let cells = f64::from(1_u32 << AXIS_BITS);
+        for k in 0..3 {
+            let mean = sum[k] / f64::from(count.max(1));
+            let reach = 4.0
+                * (squares[k] / f64::from(count.max(1)) - mean * mean)
+                    .max(0.0)
+                    .sqrt();
+            let (from, to) = (low[k].max(mean - reach), high[k].min(mean + reach));
+            #[allow(
+                clippy::cast_possible_truncation,
+                reason = "a place on a curve, not a bound"
+            )]
+            {
+                self.low[k] = from as f32;
+                self.scale[k] = (cells / (to - from).max(f64::from(f32::MIN_POSITIVE))) as f32;
+            }
+        }
+        self.lay_classes(&seen);
+    }
+
+    /// From the largest size down, each class begins at the next octave that has any body.
+    fn lay_classes(&mut self, seen: &[u32; OCTAVES]) {
+        self.classes.clear();
+        self.classes.resize(OCTAVES, 0);
+        let (mut class, mut left) = (0_usize, 0);
+        let mut begun = false;
+        for octave in (0..OCTAVES).rev() {
+            if left == 0 && seen[octave] != 0 {
+                class += usize::from(begun);
+                begun = true;
+                left = OCTAVES_A_CLASS;
+            }
+            left = left.saturating_sub(1);
+            #[allow(clippy::cast_possible_truncation, reason = "at most CLASSES_MAX")]
+            let name = class.min(CLASSES_MAX - 1) as u8;
+            self.classes[octave] = name;
+        }
+    }
+
+    /// Where a box belongs: its class above its place on the curve.
+    pub(super) fn key(&self, one: &[f32; 6]) -> u64 {
+        let class = self.classes.get(octave(one)).copied().unwrap_or(0);
+        let centre = centre(one);
+        let mut key = u64::from(class) << CURVE_BITS;
+        for (k, centre) in centre.into_iter().enumerate() {
+            let cell = (centre - self.low[k]) * self.scale[k];
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "the cast saturates, NaN becomes 0: a place on a curve, not a bound"
+            )]
+            let cell = (cell as u32).min((1 << AXIS_BITS) - 1);
+            key |= u64::from(spread(cell)) << k;
+        }
+        key
+    }
+
+    /// The class in a key.
+    pub(super) fn class_of(key: u64) -> u64 {
+        key >> CURVE_BITS
+    }
+
+    /// Sorts; yields for each box, block by block, a key and its index. Keys ascend; all blocks of a stretch share one.
+    pub(super) fn sort(&mut self, boxes: &[[f32; 6]]) -> &[(u64, u32)] {
+        let mut words = std::mem::take(&mut self.words);
+        words.clear();
+        let all = boxes.iter().enumerate();
+        words.extend(all.map(|(index, one)| self.key(one) << INDEX_BITS | index as u64));
+        self.words = words;
+        let used = self.words.iter().fold(0, |all, word| all | word);
+        let top = u64::BITS - used.leading_zeros();
+        let mut shift = INDEX_BITS;
+        while shift < top {
+            self.pass(shift);
+            shift += DIGIT_BITS;
+        }
+        let index = |word: u64| u32::try_from(word & ((1 << INDEX_BITS) - 1)).unwrap_or(0);
+        self.order.clear();
+        self.order.extend(
+            self.words
+                .iter()
+                .map(|word| (word >> INDEX_BITS, index(*word))),
+        );
+        let mut from = 0;
+        while from < self.order.len() {
+            let class = Self::class_of(self.order[from].0);
+            let most = &self.order[from..(from + STRETCH).min(self.order.len())];
+            let len = most.partition_point(|(key, _)| Self::class_of(*key) == class);
+            let stretch = &mut self.order[from..from + len];
+            let first = stretch[0].0;
+            self.middles.clear();
+            for (key, index) in stretch.iter_mut() {
+                *key = first;
+                let middle = centre(&boxes[*index as usize]);
+                self.middles.push((middle, *index));
+            }
+            split(&mut self.middles);
+            for ((_, index), (_, sorted)) in stretch.iter_mut().zip(&self.middles) {
+                *index = *sorted;
+            }
+            from += len;
+        }
+        &self.order
+    }
+
+    /// One pass, stable.
+    fn pass(&mut self, shift: u32) {
+        let digits = 1_usize << DIGIT_BITS;
+        let digit = |word: u64| usize::try_from(word >> shift).unwrap_or(0) & (digits - 1);
+        self.counts.clear();
+        self.counts.resize(digits, 0);
+        for word in &self.words {
+            self.counts[digit(*word)] += 1;
+        }
+        let mut at = 0;
+        for count in &mut self.counts {
+            at += std::mem::replace(count, at);
+        }
+        self.spare.clear();
+        self.spare.resize(self.words.len(), 0);
+        for word in &self.words {
+            let place = &mut self.counts[digit(*word)];
+            self.spare[*place as usize] = *word;
+            *place += 1;
+        }
+        std::mem::swap(&mut self.words, &mut self.spare);
+    }
+}
+
+/// Bodies put in a block by a sort: one lane stays free for who comes later.
+pub(super) const FILL: usize = WIDTH - 1;
+
+/// Bodies that are split into blocks together: as many blocks as a node of the tree has children.
+const STRETCH: usize = FILL * WIDTH;
+
+/// Orders a stretch so that each block of it is compact: halves by the middle along the longest axis, and so on. The
+/// curve alone gives blocks that meet twice as many others.
+fn split(middles: &mut [([f32; 3], u32)]) {
+    if middles.len() <= FILL {
+        return;
+    }
+    let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for (middle, _) in &*middles {
+        for k in 0..3 {
+            low[k] = low[k].min(middle[k]);
+            high[k] = high[k].max(middle[k]);
+        }
+    }
+    let side = |k: &usize| high[*k] - low[*k];
+    let axis = (0..3)
+        .max_by(|a, b| side(a).total_cmp(&side(b)))
+        .unwrap_or(0);
+    let half = middles.len().div_ceil(FILL).div_ceil(2) * FILL;
+    if half >= middles.len() {
+        return;
+    }
+    // Ties by index, so that equal scenes are laid out equally.
+    let by = |a: &([f32; 3], u32), b: &([f32; 3], u32)| {
+        a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1))
+    };
+    middles.select_nth_unstable_by(half, by);
+    let (one, other) = middles.split_at_mut(half);
+    split(one);
+    split(other);
+}
+
+/// The octave of the longest side.
+fn octave(one: &[f32; 6]) -> usize {
+    let side = (one[3] - one[0]).max(one[4] - one[1]).max(one[5] - one[2]);
+    // The exponent of an f32 is its upper bits; NaN and what is beyond the octaves go to the ends.
+    let exponent = (side.to_bits() >> 23) & 0xFF;
+    (exponent.clamp(127 - 32, 127 + 31) - (127 - 32)) as usize
+}
+
+/// The middle of a box; of an infinite one, anything.
+fn centre(one: &[f32; 6]) -> [f32; 3] {
+    std::array::from_fn(|k| {
+        let middle = one[k] * 0.5 + one[k + 3] * 0.5;
+        if middle.is_finite() { middle } else { 0.0 }
+    })
+}
+
+/// Two zeros between any two bits (Morton 1966).
+fn spread(cell: u32) -> u32 {
+    let mut bits = cell & 0x3FF;
+    bits = (bits | bits << 16) & 0x0300_00FF;
+    bits = (bits | bits << 8) & 0x0300_F00F;
+    bits = (bits | bits << 4) & 0x030C_30C3;
+    (bits | bits << 2) & 0x0924_9249
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cube(at: [f32; 3], side: f32) -> [f32; 6] {
+        std::array::from_fn(|k| if k < 3 { at[k] } else { at[k - 3] + side })
+    }
+
+    #[test]
+    fn the_largest_come_first_and_neighbours_stand_together() {
+        let mut boxes = vec![cube([0.0; 3], 1000.0)];
+        for i in 0..64_u8 {
+            let at = [i & 1, i >> 1 & 1, i >> 2 & 1].map(f32::from);
+            let side = if i % 2 == 0 { 0.9 } else { 1.1 };
+            boxes.push(cube(at.map(|v| v * 100.0 + f32::from(i)), side));
+        }
+        let mut sorter = Sorter::default();
+        sorter.frame(&boxes);
+        let order = sorter.sort(&boxes).to_vec();
+        assert_eq!(order[0].1, 0);
+        assert!(order.is_sorted_by_key(|(key, _)| *key));
+        let classes: Vec<u64> = order
+            .iter()
+            .map(|(key, _)| Sorter::class_of(*key))
+            .collect();
+        assert!(classes[0] == 0 && classes[1..].iter().all(|class| *class == 1));
+        let mut seen: Vec<u32> = order.iter().map(|(_, index)| *index).collect();
+        seen.sort_unstable();
+        assert_eq!(seen, (0..65).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn bits_are_spread_by_three() {
+        assert_eq!(spread(0b11), 0b1001);
+        assert_eq!(spread(0x3FF), 0x0924_9249);
+    }
+}

@@ -1,0 +1,171 @@
+//! The implicit tree over blocks: each node holds the bounds of its sixteen children, the lowest nodes those of
+//! sixteen blocks. No pointers: child `i` of node `n` is node `16 n + i` one level down.
+
+use crate::simd::boxes::{Boxes16, LANES, Lanes, Portable, WIDTH};
+
+/// Levels a tree can have: sixteen blocks, 256, ... far more than `limits::BODIES_MAX` bodies fill.
+const LEVELS_MAX: usize = 8;
+
+/// Bounds of blocks, and of what holds them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tree {
+    /// By block: its bound, lower and upper corner; upside down where it holds no box.
+    bounds: Vec<[f32; 6]>,
+    /// From the lowest nodes to the root; `height` of them are in use.
+    levels: Vec<Vec<Boxes16>>,
+    height: usize,
+    /// Nodes of the level at hand whose bounds have changed, ascending.
+    dirty: Vec<u32>,
+    /// Nodes still to be looked at in a query: level, node.
+    stack: Vec<(u8, u32)>,
+}
+
+impl Tree {
+    /// Makes room for so many blocks, all empty.
+    pub(super) fn reset(&mut self, blocks: usize) {
+        self.bounds.clear();
+        let none = [f32::INFINITY, f32::INFINITY, f32::INFINITY];
+        let none = [none, none.map(|v| -v)].concat();
+        let none: [f32; 6] = std::array::from_fn(|k| none[k]);
+        self.bounds.resize(blocks, none);
+        let (mut level, mut len) = (0, blocks);
+        loop {
+            len = len.div_ceil(WIDTH).max(1);
+            if self.levels.len() == level {
+                self.levels.push(Vec::new());
+            }
+            self.levels[level].clear();
+            self.levels[level].resize(len, Boxes16::EMPTY);
+            level += 1;
+            if len == 1 {
+                break;
+            }
+        }
+        debug_assert!(level <= LEVELS_MAX);
+        // Levels that this many blocks do not need keep their memory out of sight.
+        self.height = level;
+        self.dirty.clear();
+    }
+
+    /// Room for so many blocks.
+    pub(super) fn reserve_blocks(&mut self, blocks: usize) {
+        self.bounds
+            .reserve(blocks.saturating_sub(self.bounds.len()));
+        let (mut level, mut len) = (0, blocks);
+        while len > 1 || level == 0 {
+            len = len.div_ceil(WIDTH);
+            if self.levels.len() == level {
+                self.levels.push(Vec::new());
+            }
+            let nodes = &mut self.levels[level];
+            nodes.reserve(len.saturating_sub(nodes.len()));
+            level += 1;
+        }
+    }
+
+    /// Room for a query that descends into every node.
+    pub(super) fn reserve(&mut self) {
+        let nodes = self.bounds.len() / WIDTH + WIDTH * LEVELS_MAX;
+        self.stack.reserve(nodes.saturating_sub(self.stack.len()));
+        self.dirty.reserve(nodes.saturating_sub(self.dirty.len()));
+    }
+
+    /// The bound of a block.
+    #[inline(always)]
+    pub(super) fn bound(&self, block: usize) -> &[f32; 6] {
+        &self.bounds[block]
+    }
+
+    /// Sets the bound of a block. To be called in ascending order of blocks, then [`Tree::refit`].
+    #[inline(always)]
+    pub(super) fn set(&mut self, block: usize, bound: [f32; 6]) {
+        self.bounds[block] = bound;
+        let parent = block / WIDTH;
+        write(&mut self.levels[0][parent], block % WIDTH, &bound);
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "a node of at most 2^20 / 16"
+        )]
+        let parent = parent as u32;
+        if self.dirty.last() != Some(&parent) {
+            self.dirty.push(parent);
+        }
+    }
+
+    /// Brings the nodes above changed blocks up to date.
+    ///
+    /// Cost: the changed nodes of each level.
+    #[inline(always)]
+    pub(super) fn refit<L: Lanes>(&mut self, lanes: L) {
+        for level in 1..self.height {
+            let (below, above) = self.levels.split_at_mut(level);
+            let (below, above) = (&below[level - 1], &mut above[0]);
+            let mut kept = 0;
+            for at in 0..self.dirty.len() {
+                let node = self.dirty[at] as usize;
+                let bound = lanes.bound(&below[node], u16::MAX);
+                write(&mut above[node / WIDTH], node % WIDTH, &bound);
+                let parent = self.dirty[at] / LANES;
+                if kept == 0 || self.dirty[kept - 1] != parent {
+                    self.dirty[kept] = parent;
+                    kept += 1;
+                }
+            }
+            self.dirty.truncate(kept);
+        }
+        self.dirty.clear();
+    }
+
+    /// Appends the blocks whose bound meets a box.
+    #[inline(always)]
+    pub(super) fn query<L: Lanes>(&mut self, lanes: L, one: &[f32; 6], found: &mut Vec<u32>) {
+        self.stack.clear();
+        #[allow(clippy::cast_possible_truncation, reason = "at most LEVELS_MAX levels")]
+        self.stack.push(((self.height - 1) as u8, 0));
+        while let Some((level, node)) = self.stack.pop() {
+            let mut hits = lanes.meets(&self.levels[usize::from(level)][node as usize], one);
+            while hits != 0 {
+                let child = node * LANES + hits.trailing_zeros();
+                hits &= hits - 1;
+                if level == 0 {
+                    found.push(child);
+                } else {
+                    self.stack.push((level - 1, child));
+                }
+            }
+        }
+    }
+
+    /// Checks every node against the blocks' boxes.
+    pub(super) fn validate(&self, boxes: &[Boxes16]) -> Result<(), String> {
+        for (block, lanes) in boxes.iter().enumerate() {
+            let (tight, held) = (Portable.bound(lanes, u16::MAX), &self.bounds[block]);
+            let empty = tight[0] > tight[3];
+            if !empty && (0..3).any(|k| held[k] > tight[k] || held[k + 3] < tight[k + 3]) {
+                return Err(format!(
+                    "the bound of block {block} does not hold its boxes"
+                ));
+            }
+            let mut at = block;
+            for level in &self.levels[..self.height] {
+                let node = level[at / WIDTH].get(at % WIDTH);
+                let holds = (0..3).all(|k| node[k] <= held[k] && held[k + 3] <= node[k + 3]);
+                if !empty && !holds {
+                    return Err(format!("a node above block {block} does not hold it"));
+                }
+                at /= WIDTH;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Writes a bound into a node; an empty one becomes an empty lane.
+#[inline(always)]
+fn write(node: &mut Boxes16, lane: usize, bound: &[f32; 6]) {
+    if bound[0] <= bound[3] {
+        node.set(lane, bound);
+    } else {
+        node.set(lane, &[f32::NAN; 6]);
+    }
+}

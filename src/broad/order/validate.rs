@@ -1,0 +1,104 @@
+//! Checks the whole structure against the boxes of the world.
+
+use super::{NONE, Order, Proxies, ones, parts};
+use crate::broad::members::Members;
+use crate::broad::order::fatten::outward;
+use crate::ids::BodySlot;
+use crate::simd::boxes::{Portable, WIDTH};
+
+impl Order {
+    /// Lanes and bodies name each other, boxes are stored and held by their fat boxes, the tree holds the fat boxes, and
+    /// the candidates and overlaps of each block are all there.
+    pub(in crate::broad) fn check<P: Proxies>(
+        &self,
+        members: &Members,
+        proxies: &P,
+    ) -> Result<(), String> {
+        let bodies = members.bounded();
+        if bodies.len() != self.len {
+            return Err(format!(
+                "{} bodies have lanes, {} boxes are in",
+                self.len,
+                bodies.len()
+            ));
+        }
+        for slot in bodies {
+            let rank = self
+                .rank(*slot)
+                .ok_or_else(|| format!("{slot:?} has no lane"))?;
+            let (block, lane) = parts(rank);
+            if self.slot_of[rank as usize] != slot.0 || self.live[block] >> lane & 1 == 0 {
+                return Err(format!("the lane of {slot:?} is not its own"));
+            }
+            let (exact, fat) = (
+                self.exact[rank as usize].corners(),
+                self.fat[block].get(lane),
+            );
+            let stored = outward(Portable, proxies.aabb(*slot), &self.origin);
+            let stored = stored.corners().map(f32::to_bits);
+            if exact.map(f32::to_bits) != stored {
+                return Err(format!("the stored box of {slot:?} is not its box"));
+            }
+            if (0..3).any(|k| fat[k] > exact[k] || fat[k + 3] < exact[k + 3]) {
+                return Err(format!("{slot:?} has left its fat box"));
+            }
+            if self.held[rank as usize].corners().map(f32::to_bits) != fat.map(f32::to_bits) {
+                return Err(format!("the two fat boxes of {slot:?} differ"));
+            }
+        }
+        let lanes: u32 = self.live.iter().map(|live| live.count_ones()).sum();
+        let named = self.slot_of.iter().filter(|slot| **slot != NONE).count();
+        if lanes as usize != self.len || named != self.len {
+            return Err(format!(
+                "{lanes} lanes live, {named} named, {} bodies",
+                self.len
+            ));
+        }
+        if self
+            .dirty
+            .iter()
+            .chain(&self.renewing)
+            .any(|lanes| *lanes != 0)
+        {
+            return Err("a lane is marked beyond its tick".into());
+        }
+        self.tree.validate(&self.fat)?;
+        self.links.validate(&self.live)?;
+        self.check_list()?;
+        self.check_bits(proxies)
+    }
+
+    /// Every bit of a candidate and of an overlap, against the boxes; few bodies only, for it looks at every pair.
+    fn check_bits<P: Proxies>(&self, proxies: &P) -> Result<(), String> {
+        if self.len > 300 {
+            return Ok(());
+        }
+        let ranks: Vec<usize> = (0..self.slot_of.len())
+            .filter(|rank| self.slot_of[*rank] != NONE)
+            .collect();
+        for (at, low) in ranks.iter().enumerate() {
+            for high in &ranks[at + 1..] {
+                let ((a, row), (b, lane)) =
+                    ((low / WIDTH, low % WIDTH), (high / WIDTH, high % WIDTH));
+                let record = u32::try_from(a).ok().zip(u32::try_from(b).ok());
+                let record = record.and_then(|(a, b)| self.links.find(a, b));
+                let bits = record
+                    .map(|record| *self.links.bits(record))
+                    .unwrap_or_default();
+                let (one, other) = (self.fat[a].get(row), self.fat[b].get(lane));
+                let near = (0..3).all(|k| one[k] <= other[k + 3] && other[k] <= one[k + 3]);
+                let slots = [*low, *high].map(|rank| BodySlot(self.slot_of[rank]));
+                let hit = proxies.aabb(slots[0]).overlaps(proxies.aabb(slots[1]));
+                let stored =
+                    [bits.cand[row], bits.hit[row]].map(|bits| ones(bits).any(|l| l == lane));
+                if stored != [near, hit] {
+                    return Err(format!(
+                        "the bits of {slots:?} are {stored:?}, not {:?}",
+                        [near, hit]
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+}

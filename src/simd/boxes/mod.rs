@@ -1,0 +1,127 @@
+//! Kernels over sixteen boxes at a time.
+//!
+//! In: blocks of sixteen boxes as a structure of arrays ([`Boxes16`]), single boxes ([`Down`]). Out: masks of sixteen bits, one a
+//! lane, and plain answers. [`Portable`] is the safe twin in plain Rust; every other set of [`Lanes`] gives the same bits, which tests
+//! compare. Which one runs is decided once, by what the processor says ([`Level::best`]).
+//!
+//! How: a caller writes its loop once as a [`Work`], generic over [`Lanes`], all of it `#[inline(always)]`;
+//! [`Level::run`] compiles it once a level inside a function that has the level's instructions switched on, so that
+//! the whole loop, not only a kernel, is built for them. AVX2 is the main path, AVX-512 halves its instructions. On
+//! aarch64 NEON is part of every target, and the compiler builds the twin with it.
+//!
+//! Why `std::arch` and not a crate: three kernels need a compare that ends in a mask of bits, which no portable layer
+//! gives without a detour on AVX2; everything else here the compiler turns into vector code by itself.
+
+#![allow(
+    unsafe_code,
+    reason = "instructions that only some processors have; each block names what it relies on"
+)]
+
+mod lanes;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+pub(crate) use lanes::{Boxes16, Down, LANES, Lanes, Portable, SLACK, WIDTH};
+
+/// A loop that is built once for each set of lanes.
+pub(crate) trait Work {
+    /// What it yields.
+    type Out;
+    /// Runs it. To be marked `#[inline(always)]`, like what it calls in its hot part.
+    fn run<L: Lanes>(self, lanes: L) -> Self::Out;
+}
+
+/// Which instructions are used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Level {
+    /// Plain Rust.
+    Portable,
+    /// Eight lanes at a time, x86-64 with AVX2.
+    Avx2,
+    /// Sixteen lanes at a time, x86-64 with AVX-512 F, BW, DQ and VL.
+    Avx512,
+}
+
+impl Level {
+    /// The best that this processor has.
+    #[must_use]
+    pub fn best() -> Self {
+        let mut all = Self::available();
+        all.pop().unwrap_or(Self::Portable)
+    }
+
+    /// Every level that this processor has, the best last.
+    #[must_use]
+    pub fn available() -> Vec<Self> {
+        let mut levels = vec![Self::Portable];
+        #[cfg(target_arch = "x86_64")]
+        {
+            let avx2 = is_x86_feature_detected!("avx2")
+                && is_x86_feature_detected!("bmi1")
+                && is_x86_feature_detected!("bmi2")
+                && is_x86_feature_detected!("lzcnt")
+                && is_x86_feature_detected!("popcnt");
+            let avx512 = is_x86_feature_detected!("avx512f")
+                && is_x86_feature_detected!("avx512bw")
+                && is_x86_feature_detected!("avx512dq")
+                && is_x86_feature_detected!("avx512vl");
+            levels.extend(avx2.then_some(Self::Avx2));
+            levels.extend((avx2 && avx512).then_some(Self::Avx512));
+        }
+        levels
+    }
+
+    /// Runs a loop with these instructions; those that the processor lacks are never used.
+    pub(crate) fn run<W: Work>(self, work: W) -> W::Out {
+        #[cfg(target_arch = "x86_64")]
+        {
+            // SAFETY, both calls: `checked` has asked the processor for each feature that the function is built with.
+            match self.checked() {
+                Self::Avx512 => return unsafe { x86::run_avx512(work) },
+                Self::Avx2 => return unsafe { x86::run_avx2(work) },
+                Self::Portable => {}
+            }
+        }
+        work.run(Portable)
+    }
+
+    /// The level itself where the processor has it, else the best it has: a level can be written down by anyone.
+    #[cfg(target_arch = "x86_64")]
+    fn checked(self) -> Self {
+        // The standard library keeps the answers in one word; asking costs a load.
+        let avx512 = is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512bw")
+            && is_x86_feature_detected!("avx512dq")
+            && is_x86_feature_detected!("avx512vl");
+        let avx2 = is_x86_feature_detected!("avx2")
+            && is_x86_feature_detected!("bmi1")
+            && is_x86_feature_detected!("bmi2")
+            && is_x86_feature_detected!("lzcnt")
+            && is_x86_feature_detected!("popcnt");
+        match self {
+            Self::Avx512 if avx512 && avx2 => Self::Avx512,
+            Self::Avx512 | Self::Avx2 if avx2 => Self::Avx2,
+            _ => Self::Portable,
+        }
+    }
+}
+
+/// Asks for what lies at a place to be brought near: what a loop reads a few steps later. A hint, without effect on
+/// what is computed.
+#[inline(always)]
+pub(crate) fn prefetch<T>(place: &T) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        let first = std::ptr::from_ref(place).cast::<i8>();
+        for at in (0..size_of::<T>()).step_by(64) {
+            // SAFETY: a prefetch faults on no address, and this one lies inside `place`; SSE is part of x86-64.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(first.add(at)) };
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = place;
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,171 @@
+//! Every level gives the bits of the safe twin, on boxes that touch, miss by one step, hold nothing, are infinite.
+
+#![allow(clippy::float_cmp, reason = "the same numbers, not near ones")]
+
+use super::*;
+
+/// Asks one block everything and notes the answers.
+struct Everything<'a>(&'a Boxes16, &'a [f32; 6], &'a Down, &'a Down);
+
+impl Work for Everything<'_> {
+    type Out = (u16, (bool, bool), bool);
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> Self::Out {
+        let Self(block, one, a, b) = self;
+        (
+            lanes.meets(block, one),
+            lanes.parts(a, b),
+            lanes.holds(a, b),
+        )
+    }
+}
+
+/// A small generator of its own: the room names no other.
+fn next(state: &mut u64) -> u64 {
+    *state = state
+        .wrapping_mul(6_364_136_223_846_793_005)
+        .wrapping_add(1_442_695_040_888_963_407);
+    *state >> 33
+}
+
+fn value(state: &mut u64) -> f32 {
+    let grid = [-2.0_f32, -1.0, -0.0, 0.0, 1.0, 2.0];
+    let at = grid[usize::try_from(next(state) % 6).unwrap()];
+    match next(state) % 12 {
+        0 => f32::NAN,
+        1 => f32::INFINITY,
+        2 => f32::NEG_INFINITY,
+        3 => at.next_up(),
+        4 => at.next_down(),
+        5 => at * 1e-42,
+        _ => at,
+    }
+}
+
+fn block(state: &mut u64) -> Boxes16 {
+    let mut boxes = Boxes16::EMPTY;
+    for lane in 0..WIDTH {
+        let one = std::array::from_fn(|_| value(state));
+        boxes.set(lane, &one);
+    }
+    boxes
+}
+
+#[test]
+fn every_level_gives_the_bits_of_the_safe_twin() {
+    // Miri runs the twin alone; a few rounds show it sound.
+    let rounds = if cfg!(miri) { 20 } else { 20_000 };
+    for seed in 0..rounds {
+        let state = &mut (seed + 1);
+        let boxes = block(state);
+        let one = std::array::from_fn(|_| value(state));
+        let mut down = || Down {
+            faces: std::array::from_fn(|_| value(state)),
+        };
+        let (mut a, b) = (down(), down());
+        a.faces[SLACK] = [0.0, 1e-6, 1.0, f32::INFINITY][usize::try_from(next(state) % 4).unwrap()];
+        let wanted = Everything(&boxes, &one, &a, &b).run(Portable);
+        for level in Level::available() {
+            let got = level.run(Everything(&boxes, &one, &a, &b));
+            assert_eq!(got, wanted, "seed {seed}, {level:?}");
+        }
+    }
+}
+
+/// Rounds a box.
+struct Rounded<'a>(&'a [f64; 3], &'a [f64; 3], &'a [f64; 3]);
+
+impl Work for Rounded<'_> {
+    type Out = [u32; 8];
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> [u32; 8] {
+        lanes
+            .outward(self.0, self.1, self.2)
+            .faces
+            .map(f32::to_bits)
+    }
+}
+
+#[test]
+fn every_level_rounds_boxes_outward_to_the_same_bits() {
+    let rounds = if cfg!(miri) { 20 } else { 20_000 };
+    for seed in 0..rounds {
+        let state = &mut (seed + 1);
+        let mut number = || {
+            #[allow(clippy::cast_precision_loss, reason = "any number will do")]
+            let unit = next(state) as f64 / 2.0_f64.powi(31) - 0.5;
+            let scale = [0.0, 1e-44, 1e-9, 1.0, 1e7, 1e12, f64::INFINITY];
+            let scale = scale[usize::try_from(next(state) % 7).unwrap()];
+            if scale.is_finite() {
+                unit * scale
+            } else {
+                scale
+            }
+        };
+        let origin = [0.1, 1e7 + 0.3, -3.0];
+        let low = std::array::from_fn(|_| -number().abs());
+        let high = std::array::from_fn(|_| number().abs());
+        let wanted = Rounded(&low, &high, &origin).run(Portable);
+        for k in 0..3 {
+            let (min, max) = (f32::from_bits(wanted[k]), -f32::from_bits(wanted[k + 4]));
+            let (own_min, own_max) = (low[k] - origin[k], high[k] - origin[k]);
+            assert!(
+                f64::from(min) <= own_min && own_max <= f64::from(max),
+                "seed {seed}"
+            );
+        }
+        for level in Level::available() {
+            assert_eq!(
+                level.run(Rounded(&low, &high, &origin)),
+                wanted,
+                "seed {seed}, {level:?}"
+            );
+        }
+    }
+}
+
+/// Bounds a block.
+struct Bounded<'a>(&'a Boxes16, u16);
+
+impl Work for Bounded<'_> {
+    type Out = [f32; 6];
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> [f32; 6] {
+        lanes.bound(self.0, self.1)
+    }
+}
+
+#[test]
+fn every_level_bounds_blocks_alike() {
+    let rounds = if cfg!(miri) { 20 } else { 20_000 };
+    for seed in 0..rounds {
+        let state = &mut (seed + 1);
+        let boxes = block(state);
+        let chosen = u16::try_from(next(state) % 65_536).unwrap();
+        let wanted = Bounded(&boxes, chosen).run(Portable);
+        for level in Level::available() {
+            // A zero of either sign bounds alike.
+            let got = level.run(Bounded(&boxes, chosen));
+            assert!(
+                got.iter().zip(&wanted).all(|(a, b)| a == b),
+                "seed {seed}, {level:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_bound_holds_the_chosen_lanes_and_empty_ones_count_for_nothing() {
+    let mut boxes = Boxes16::EMPTY;
+    let none = Portable.bound(&boxes, u16::MAX);
+    assert!(none[0] > none[3]);
+    boxes.set(3, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+    boxes.set(4, &[-9.0, -9.0, -9.0, 99.0, 99.0, 99.0]);
+    boxes.set(15, &[-1.0, 1.5, -2.0, 0.0, 9.0, 5.0]);
+    let bound = Portable.bound(&boxes, !(1 << 4));
+    assert_eq!(bound, [-1.0, 1.0, -2.0, 3.0, 9.0, 5.0]);
+    assert_eq!(boxes.get(3), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+}

@@ -1,0 +1,298 @@
+//! The kernels in AVX2 and AVX-512. Only compares, subtractions and maxima, in the order of the twin, so that every
+//! bit is the twin's.
+
+use std::arch::x86_64::{
+    __m128, __m256, __m256d, __m512, _CMP_GT_OQ, _CMP_LE_OQ, _mm_andnot_ps, _mm_blend_ps,
+    _mm_cvtss_f32, _mm_max_ps, _mm_max_ss, _mm_movehl_ps, _mm_set1_ps, _mm_setzero_ps,
+    _mm_shuffle_ps, _mm256_add_pd, _mm256_add_ps, _mm256_and_ps, _mm256_and_si256,
+    _mm256_andnot_pd, _mm256_blendv_ps, _mm256_castps256_ps128, _mm256_castsi256_ps, _mm256_cmp_ps,
+    _mm256_cmpeq_epi32, _mm256_cvtpd_ps, _mm256_extractf128_ps, _mm256_load_ps, _mm256_loadu_ps,
+    _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_pd, _mm256_permute_ps, _mm256_permute2f128_ps,
+    _mm256_set_m128, _mm256_set_pd, _mm256_set1_epi32, _mm256_set1_pd, _mm256_set1_ps,
+    _mm256_setr_epi32, _mm256_setzero_ps, _mm256_slli_epi32, _mm256_store_ps, _mm256_sub_pd,
+    _mm256_xor_ps, _mm512_cmp_ps_mask, _mm512_loadu_ps, _mm512_set1_ps,
+};
+
+use super::Work;
+use super::lanes::{Boxes16, Down, LEAST, Lanes, STEP, WIDTH, slack};
+
+/// Two halves of eight lanes. Only [`run_avx2`] makes one, so where one is, AVX2 is.
+#[derive(Clone, Copy)]
+pub(super) struct Avx2(());
+
+/// Sixteen lanes. Only [`run_avx512`] makes one.
+#[derive(Clone, Copy)]
+pub(super) struct Avx512(());
+
+/// Runs a loop built for AVX2.
+#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
+pub(super) fn run_avx2<W: Work>(work: W) -> W::Out {
+    work.run(Avx2(()))
+}
+
+/// Runs a loop built for AVX-512.
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi1,bmi2,lzcnt,popcnt")]
+pub(super) fn run_avx512<W: Work>(work: W) -> W::Out {
+    work.run(Avx512(()))
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn half(face: &[f32; WIDTH], at: usize) -> __m256 {
+    debug_assert!(at + 8 <= WIDTH);
+    // SAFETY: `at` is 0 or 8, so eight floats from there lie inside the array.
+    unsafe { _mm256_loadu_ps(face.as_ptr().add(at)) }
+}
+
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn all(face: &[f32; WIDTH]) -> __m512 {
+    // SAFETY: the array holds sixteen floats.
+    unsafe { _mm512_loadu_ps(face.as_ptr()) }
+}
+
+/// The sign bits of two halves as sixteen bits.
+#[inline]
+#[target_feature(enable = "avx2")]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "movemask of eight lanes yields eight bits"
+)]
+fn bits(low: __m256, high: __m256) -> u16 {
+    _mm256_movemask_ps(low) as u16 | (_mm256_movemask_ps(high) as u16) << 8
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn meets_half(block: &Boxes16, one: &[f32; 6], at: usize) -> __m256 {
+    let f = &block.faces;
+    // `face[k] <= one[k + 3]` on the lower faces, `one[k] <= face[k + 3]` on the upper ones.
+    let low = |k: usize| _mm256_cmp_ps::<_CMP_LE_OQ>(half(&f[k], at), _mm256_set1_ps(one[k + 3]));
+    let high = |k: usize| _mm256_cmp_ps::<_CMP_LE_OQ>(_mm256_set1_ps(one[k]), half(&f[k + 3], at));
+    // A tree of independent compares: a chain would wait for each.
+    let x = _mm256_and_ps(low(0), high(0));
+    let y = _mm256_and_ps(low(1), high(1));
+    let z = _mm256_and_ps(low(2), high(2));
+    _mm256_and_ps(_mm256_and_ps(x, y), z)
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn meets_avx2(block: &Boxes16, one: &[f32; 6]) -> u16 {
+    bits(meets_half(block, one, 0), meets_half(block, one, 8))
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn one(down: &Down) -> __m256 {
+    // SAFETY: a `Down` is eight floats, aligned to their size.
+    unsafe { _mm256_load_ps(down.faces.as_ptr()) }
+}
+
+/// Four faces, of which the last is none.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn below(face: __m256d) -> __m128 {
+    let far = _mm256_andnot_pd(_mm256_set1_pd(-0.0), face);
+    let off = _mm256_add_pd(
+        _mm256_mul_pd(far, _mm256_set1_pd(STEP)),
+        _mm256_set1_pd(LEAST),
+    );
+    _mm256_cvtpd_ps(_mm256_sub_pd(face, off))
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn outward_avx2(min: &[f64; 3], max: &[f64; 3], origin: &[f64; 3]) -> __m256 {
+    let corner = |p: &[f64; 3]| _mm256_set_pd(0.0, p[2], p[1], p[0]);
+    let from = corner(origin);
+    let low = below(_mm256_sub_pd(corner(min), from));
+    let high = below(_mm256_sub_pd(from, corner(max)));
+    // The largest of all lanes; the spare ones hold next to nothing.
+    let far = |faces| _mm_andnot_ps(_mm_set1_ps(-0.0), faces);
+    let both = _mm_max_ps(far(low), far(high));
+    let half = _mm_max_ps(both, _mm_movehl_ps(both, both));
+    let all = _mm_max_ss(half, _mm_shuffle_ps::<1>(half, half));
+    let slack = _mm_set1_ps(slack(_mm_cvtss_f32(all)));
+    let low = _mm_blend_ps::<8>(low, slack);
+    let high = _mm_blend_ps::<8>(high, _mm_setzero_ps());
+    _mm256_set_m128(high, low)
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn store(faces: __m256, place: &mut Down) {
+    // SAFETY: a `Down` is eight floats, aligned to their size.
+    unsafe { _mm256_store_ps(place.faces.as_mut_ptr(), faces) };
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn take_avx2(corners: [&[f64; 3]; 2], origin: &[f64; 3], outer: &Down, place: &mut Down) -> bool {
+    // Compared from the register: to read back what was just written in halves would wait for both.
+    let faces = outward_avx2(corners[0], corners[1], origin);
+    store(faces, place);
+    _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(one(outer), faces)) == 0xFF
+}
+
+/// The lanes that are faces.
+const FACES: i32 = 0x77;
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn parts_avx2(a: &Down, b: &Down) -> (bool, bool) {
+    let (a, b) = (one(a), one(b));
+    // The halves of `b` change places: lower faces meet upper ones.
+    let gap = _mm256_add_ps(a, _mm256_permute2f128_ps::<1>(b, b));
+    // The slack, in the last lane of the lower half, on all lanes.
+    let low = _mm256_permute2f128_ps::<0>(a, a);
+    let slack = _mm256_permute_ps::<0xFF>(low);
+    let least = _mm256_xor_ps(slack, _mm256_set1_ps(-0.0));
+    let apart = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(gap, _mm256_setzero_ps()));
+    let sure = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(gap, least));
+    (apart & FACES != 0, sure & FACES == FACES)
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn holds_avx2(outer: &Down, inner: &Down) -> bool {
+    _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(one(outer), one(inner))) == 0xFF
+}
+
+/// The greatest of the chosen lanes; minus infinity where there is none. `set` is all ones in those lanes.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn greatest(low: __m256, high: __m256, set: [__m256; 2]) -> f32 {
+    let none = _mm256_set1_ps(f32::NEG_INFINITY);
+    // A maximum with NaN first yields the second: empty lanes fall away.
+    let low = _mm256_max_ps(_mm256_blendv_ps(none, low, set[0]), none);
+    let high = _mm256_max_ps(_mm256_blendv_ps(none, high, set[1]), none);
+    let eight = _mm256_max_ps(low, high);
+    let four = _mm_max_ps(
+        _mm256_castps256_ps128(eight),
+        _mm256_extractf128_ps::<1>(eight),
+    );
+    let two = _mm_max_ps(four, _mm_movehl_ps(four, four));
+    _mm_cvtss_f32(_mm_max_ss(two, _mm_shuffle_ps::<1>(two, two)))
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn bound_avx2(block: &Boxes16, chosen: u16) -> [f32; 6] {
+    // Bit k of the mask to all of lane k.
+    let bits = _mm256_set1_epi32(i32::from(chosen));
+    let places = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+    let set = |bits, places| {
+        _mm256_castsi256_ps(_mm256_cmpeq_epi32(_mm256_and_si256(bits, places), places))
+    };
+    let set = [set(bits, places), set(bits, _mm256_slli_epi32::<8>(places))];
+    let turn = _mm256_set1_ps(-0.0);
+    let mut bound = [0.0; 6];
+    for (k, face) in block.faces.iter().enumerate() {
+        let (low, high) = (half(face, 0), half(face, 8));
+        bound[k] = if k < 3 {
+            -greatest(_mm256_xor_ps(low, turn), _mm256_xor_ps(high, turn), set)
+        } else {
+            greatest(low, high, set)
+        };
+    }
+    bound
+}
+
+impl Lanes for Avx2 {
+    #[inline(always)]
+    fn meets(self, block: &Boxes16, one: &[f32; 6]) -> u16 {
+        // SAFETY, here and below: an `Avx2` is made only where AVX2 is.
+        unsafe { meets_avx2(block, one) }
+    }
+
+    #[inline(always)]
+    fn bound(self, block: &Boxes16, chosen: u16) -> [f32; 6] {
+        // SAFETY: as above.
+        unsafe { bound_avx2(block, chosen) }
+    }
+
+    #[inline(always)]
+    fn outward(self, min: &[f64; 3], max: &[f64; 3], origin: &[f64; 3]) -> Down {
+        let mut down = Down { faces: [0.0; 8] };
+        // SAFETY: as above.
+        unsafe { store(outward_avx2(min, max, origin), &mut down) };
+        down
+    }
+
+    #[inline(always)]
+    fn take(
+        self,
+        corners: [&[f64; 3]; 2],
+        origin: &[f64; 3],
+        outer: &Down,
+        place: &mut Down,
+    ) -> bool {
+        // SAFETY: as above.
+        unsafe { take_avx2(corners, origin, outer, place) }
+    }
+
+    #[inline(always)]
+    fn parts(self, a: &Down, b: &Down) -> (bool, bool) {
+        unsafe { parts_avx2(a, b) }
+    }
+
+    #[inline(always)]
+    fn holds(self, outer: &Down, inner: &Down) -> bool {
+        unsafe { holds_avx2(outer, inner) }
+    }
+}
+
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn meets_avx512(block: &Boxes16, one: &[f32; 6]) -> u16 {
+    let f = &block.faces;
+    let low = |k: usize| _mm512_cmp_ps_mask::<_CMP_LE_OQ>(all(&f[k]), _mm512_set1_ps(one[k + 3]));
+    let high = |k: usize| _mm512_cmp_ps_mask::<_CMP_LE_OQ>(_mm512_set1_ps(one[k]), all(&f[k + 3]));
+    (low(0) & high(0)) & (low(1) & high(1)) & (low(2) & high(2))
+}
+
+impl Lanes for Avx512 {
+    #[inline(always)]
+    fn meets(self, block: &Boxes16, one: &[f32; 6]) -> u16 {
+        // SAFETY, here and below: an `Avx512` is made only where AVX-512 F and AVX2 are.
+        unsafe { meets_avx512(block, one) }
+    }
+
+    #[inline(always)]
+    fn bound(self, block: &Boxes16, chosen: u16) -> [f32; 6] {
+        // SAFETY: as above.
+        unsafe { bound_avx2(block, chosen) }
+    }
+
+    #[inline(always)]
+    fn outward(self, min: &[f64; 3], max: &[f64; 3], origin: &[f64; 3]) -> Down {
+        let mut down = Down { faces: [0.0; 8] };
+        // SAFETY: as above.
+        unsafe { store(outward_avx2(min, max, origin), &mut down) };
+        down
+    }
+
+    #[inline(always)]
+    fn take(
+        self,
+        corners: [&[f64; 3]; 2],
+        origin: &[f64; 3],
+        outer: &Down,
+        place: &mut Down,
+    ) -> bool {
+        // SAFETY: as above.
+        unsafe { take_avx2(corners, origin, outer, place) }
+    }
+
+    #[inline(always)]
+    fn parts(self, a: &Down, b: &Down) -> (bool, bool) {
+        unsafe { parts_avx2(a, b) }
+    }
+
+    #[inline(always)]
+    fn holds(self, outer: &Down, inner: &Down) -> bool {
+        unsafe { holds_avx2(outer, inner) }
+    }
+}

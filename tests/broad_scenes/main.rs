@@ -1,0 +1,236 @@
+//! Goal: the main broad phase gives the exact pairs and events in every scene class of the bench, with every set of
+//! vector instructions, through churn of everything, and in the two cases that once gave double pairs.
+//!
+//! Method: the bench's scenes at 2,000 bodies; in each frame the pair set is compared with an exact set found another
+//! way (strips and a sweep), and the events with the difference of two such sets. 2,000 frames a scene in release, 60
+//! otherwise; `SWEEPD_FRAMES` sets another number. The soak runs 20 minutes: `cargo test --release --test broad_scenes
+//! -- --ignored`, `SWEEPD_SOAK_S` sets its seconds.
+
+#![allow(
+    missing_docs,
+    missing_debug_implementations,
+    unreachable_pub,
+    dead_code,
+    clippy::unwrap_used,
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::approx_constant,
+    reason = "a test stops at the first surprise, and shares the bench's scenes"
+)]
+
+#[path = "../common/mod.rs"]
+mod common;
+#[path = "../../benches/broad/exact.rs"]
+mod exact;
+mod rig;
+#[path = "../../benches/broad/scenes.rs"]
+mod scenes;
+
+use common::Rng;
+use rig::{Rig, at};
+use scenes::{Kind, Scene};
+use sweepd::simd::boxes::Level;
+
+fn frames() -> usize {
+    let told = std::env::var("SWEEPD_FRAMES").ok();
+    let usual = if cfg!(debug_assertions) { 60 } else { 2000 };
+    told.map_or(usual, |frames| frames.parse().unwrap())
+}
+
+/// One rig a level of instructions over one scene; every frame exact in all.
+fn run(kind: Kind, bodies: usize, frames: usize) {
+    let mut scene = Scene::new(kind, bodies, 11);
+    let mut rigs: Vec<Rig> = Level::available()
+        .into_iter()
+        .map(|level| Rig::new(level, bodies, kind == Kind::Far))
+        .collect();
+    for rig in &mut rigs {
+        rig.start(&scene.boxes);
+    }
+    for frame in 0..frames {
+        scene.step();
+        let wanted = exact::pairs(&scene.boxes);
+        for rig in &mut rigs {
+            rig.take(&scene);
+            rig.tick(&wanted, &format!("{kind:?}, frame {frame}"));
+        }
+        let (first, others) = rigs.split_first().unwrap();
+        for other in others {
+            assert_eq!(
+                first.delta.began, other.delta.began,
+                "{kind:?}, frame {frame}"
+            );
+            assert_eq!(
+                first.delta.ended, other.delta.ended,
+                "{kind:?}, frame {frame}"
+            );
+        }
+        if frame % 200 == 7 {
+            rigs.iter().for_each(Rig::validate);
+        }
+    }
+}
+
+macro_rules! scenes_are_exact {
+    ($($test:ident $kind:ident $bodies:literal,)+) => {
+        $(#[test]
+        fn $test() {
+            run(Kind::$kind, $bodies, frames());
+        })+
+    };
+}
+
+scenes_are_exact! {
+    a_gas_is_exact Gas 2000,
+    one_percent_moving_is_exact OnePercent 2000,
+    a_pile_is_exact Pile 2000,
+    mixed_sizes_are_exact Mixed 2000,
+    a_galaxy_is_exact Galaxy 2000,
+    teleports_are_exact Teleport 2000,
+    churn_is_exact Churn 2000,
+    a_sheet_is_exact Sheet 2000,
+    fast_bodies_are_exact Fast 2000,
+    tumbling_rods_are_exact Tumble 2000,
+    velocities_drawn_anew_are_exact Redraw 2000,
+    another_percent_each_frame_is_exact Rove 2000,
+    a_dense_gas_is_exact Dense 1000,
+    bodies_through_a_field_are_exact Field 2000,
+    a_gas_far_from_the_origin_is_exact Far 2000,
+}
+
+#[test]
+fn a_heap_is_exact() {
+    // Every body of the heap meets every other: few frames show all there is.
+    run(Kind::Heap, 400, frames() / 10 + 10);
+}
+
+#[test]
+fn two_bodies_that_leave_their_fat_boxes_in_one_tick_are_one_pair() {
+    let mut rig = Rig::new(Level::best(), 40, false);
+    let mut boxes: Vec<_> = (0..40)
+        .map(|i| at([i as f32 * 3.0, 0.0, 0.0], 0.5))
+        .collect();
+    rig.start(&boxes);
+    let mut rng = Rng::new(5);
+    for tick in 0..400 {
+        // Two bodies jump to one place, near or far, and apart again.
+        let (a, b) = (rng.below(40), rng.below(40));
+        let place = [rng.between(0.0, 120.0) as f32, 0.0, 0.0];
+        boxes[a] = at(place, 0.5);
+        boxes[b] = at(place.map(|x| x + 0.3), 0.5);
+        rig.put(&boxes, &[a as u32, b as u32], &[]);
+        rig.tick(&exact::pairs(&boxes), &format!("tick {tick}"));
+        rig.validate();
+    }
+}
+
+#[test]
+fn a_slot_that_another_body_takes_in_the_same_tick_keeps_no_pair() {
+    let mut rig = Rig::new(Level::best(), 60, false);
+    let mut rng = Rng::new(6);
+    let mut place = || std::array::from_fn(|_| rng.between(0.0, 4.0) as f32);
+    let mut boxes: Vec<_> = (0..60).map(|_| at(place(), 0.5)).collect();
+    rig.start(&boxes);
+    for tick in 0..400_u32 {
+        // Four leave; into their slots, and so into their lanes, come others; two of them to the same place.
+        let churned: Vec<u32> = (0..4).map(|k| (tick * 7 + k * 13) % 60).collect();
+        for (k, body) in churned.iter().enumerate() {
+            if k > 1 {
+                boxes[*body as usize] = at(place(), 0.5);
+            }
+        }
+        rig.put(&boxes, &[], &churned);
+        rig.tick(&exact::pairs(&boxes), &format!("tick {tick}"));
+        rig.validate();
+    }
+}
+
+#[test]
+fn motions_mixed_while_bodies_come_and_go_stay_exact() {
+    soak(frames() / 4, 1500, 17);
+}
+
+#[test]
+#[ignore = "takes 20 minutes; run by hand in release"]
+fn soak_for_twenty_minutes() {
+    let seconds = std::env::var("SWEEPD_SOAK_S").map_or(1200, |s| s.parse().unwrap());
+    let clock = sweepd::time::SystemClock;
+    let now = || sweepd::time::Clock::monotonic_ns(&clock);
+    let (start, mut seed) = (now(), 0);
+    while now() - start < seconds * 1_000_000_000 {
+        soak(600, 100_000, seed);
+        seed += 1;
+    }
+}
+
+/// Bodies come up to `most` and go to none, each round moving in another way; every tick is exact.
+fn soak(ticks: usize, most: usize, seed: u64) {
+    let mut rig = Rig::new(Level::best(), most, false);
+    let mut rng = Rng::new(seed);
+    let reach = (most as f64 / 0.7).cbrt();
+    let mut boxes = vec![at([0.0; 3], 0.5); most];
+    let mut inside = vec![false; most];
+    let mut ways = vec![[0.0_f32; 3]; most];
+    for tick in 0..ticks {
+        let phase = tick * 8 / ticks;
+        let growing = phase.is_multiple_of(2);
+        let step = most * 10 / ticks.max(1) + 1;
+        let (mut came, mut left, mut moved) = (Vec::new(), Vec::new(), Vec::new());
+        for _ in 0..step {
+            let body = rng.below(most);
+            if growing && !inside[body] {
+                let place = std::array::from_fn(|_| rng.between(0.0, reach) as f32);
+                boxes[body] = at(place, 0.05 * 20.0_f64.powf(rng.unit()) as f32);
+                inside[body] = true;
+                came.push(body as u32);
+            } else if !growing && inside[body] && !came.contains(&(body as u32)) {
+                inside[body] = false;
+                left.push(body as u32);
+            }
+        }
+        // Seven ways to move: none, few, few others, all, all anew, all far, jumps.
+        let way = tick / 9 % 7;
+        for body in (0..most).filter(|body| inside[*body] && way != 0) {
+            let mine = match way {
+                1 => body.is_multiple_of(100),
+                2 => body % 100 == tick % 100,
+                6 => rng.once_in(20),
+                _ => true,
+            };
+            if !mine || came.contains(&(body as u32)) {
+                continue;
+            }
+            let far = [0.0, 0.03, 0.03, 0.03, 0.03, 0.5, reach][way];
+            if way != 3 || rng.once_in(50) {
+                ways[body] = std::array::from_fn(|_| rng.between(-far, far) as f32);
+            }
+            for corner in &mut boxes[body] {
+                for (x, v) in corner.iter_mut().zip(ways[body]) {
+                    *x += v;
+                }
+            }
+            moved.push(body as u32);
+        }
+        if phase == 7 && tick.is_multiple_of(5) {
+            // To none at all, and up again.
+            left.extend(
+                (0..most as u32).filter(|body| inside[*body as usize] && !came.contains(body)),
+            );
+            left.iter().for_each(|body| inside[*body as usize] = false);
+            moved.clear();
+        }
+        rig.change(&boxes, &moved, &left, &came);
+        // Bodies that are out stand far away, each by itself.
+        let mut seen = boxes.clone();
+        for (body, inside) in inside.iter().enumerate() {
+            if !inside {
+                seen[body] = at([1e6 + body as f32 * 4.0, 0.0, 0.0], 0.5);
+            }
+        }
+        rig.tick(&exact::pairs(&seen), &format!("seed {seed}, tick {tick}"));
+        if tick.is_multiple_of(50) {
+            rig.validate();
+        }
+    }
+}

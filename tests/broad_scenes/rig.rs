@@ -1,0 +1,166 @@
+//! One broad phase with its pair set, fed with the boxes of a scene, and compared frame by frame.
+
+use std::collections::BTreeSet;
+
+use sweepd::broad::{BroadPhase, Method, Proxies};
+use sweepd::ids::{BodyId, BodySlot, PairKey};
+use sweepd::math::{Aabb, Point};
+use sweepd::pairs::{PairDelta, PairPolicy, PairSet};
+use sweepd::simd::boxes::Level;
+use sweepd::wire::EndCause;
+use sweepd::world::{ChangeSet, Removed};
+
+use crate::common::Rng;
+use crate::exact::Pair;
+use crate::scenes::{Box3, Scene};
+
+pub struct Bodies {
+    boxes: Vec<Aabb>,
+    /// Shuffled, so that nothing hangs on slots being in the order of ids.
+    ids: Vec<u64>,
+    offset_m: f64,
+}
+
+impl Proxies for Bodies {
+    fn aabb(&self, slot: BodySlot) -> &Aabb {
+        &self.boxes[slot.index()]
+    }
+    fn unbounded(&self, _: BodySlot) -> bool {
+        false
+    }
+    fn id(&self, slot: BodySlot) -> BodyId {
+        BodyId(self.ids[slot.index()])
+    }
+}
+
+pub struct Everything;
+
+impl PairPolicy for Everything {
+    fn allows(&self, _: BodySlot, _: BodySlot) -> bool {
+        true
+    }
+}
+
+pub fn at(place: [f32; 3], half: f32) -> Box3 {
+    [place.map(|x| x - half), place.map(|x| x + half)]
+}
+
+pub struct Rig {
+    level: Level,
+    broad: BroadPhase,
+    bodies: Bodies,
+    changes: ChangeSet,
+    pairs: PairSet,
+    pub delta: PairDelta,
+    /// Pairs as the events tell them.
+    told: BTreeSet<Pair>,
+}
+
+impl Rig {
+    pub fn new(level: Level, bodies: usize, far: bool) -> Self {
+        let mut rng = Rng::new(bodies as u64);
+        let mut ids: Vec<u64> = (1..=bodies as u64).collect();
+        for i in (1..bodies).rev() {
+            ids.swap(i, rng.below(i + 1));
+        }
+        let mut broad = BroadPhase::new(Method::Order);
+        broad.use_level(level);
+        Self {
+            level,
+            broad,
+            bodies: Bodies {
+                boxes: vec![Aabb::empty(); bodies],
+                ids,
+                offset_m: if far { 1e7 } else { 0.0 },
+            },
+            changes: ChangeSet::default(),
+            pairs: PairSet::new(1 << 24),
+            delta: PairDelta::default(),
+            told: BTreeSet::new(),
+        }
+    }
+
+    /// All bodies come.
+    pub fn start(&mut self, boxes: &[Box3]) {
+        let all: Vec<u32> = (0..boxes.len() as u32).collect();
+        self.change(boxes, &[], &[], &all);
+        self.tick(&crate::exact::pairs(boxes), "start");
+    }
+
+    /// What a scene changed.
+    pub fn take(&mut self, scene: &Scene) {
+        self.put(&scene.boxes, &scene.moved, &scene.churned);
+    }
+
+    /// Bodies that moved, and bodies that left while another took their slot.
+    pub fn put(&mut self, boxes: &[Box3], moved: &[u32], churned: &[u32]) {
+        self.change(boxes, moved, churned, churned);
+    }
+
+    pub fn change(&mut self, boxes: &[Box3], moved: &[u32], left: &[u32], came: &[u32]) {
+        self.changes.clear();
+        let cause = EndCause::Removed;
+        let slots = left.iter().map(|body| BodySlot(*body));
+        self.changes
+            .removed
+            .extend(slots.map(|slot| Removed { slot, cause }));
+        for body in moved.iter().chain(came) {
+            let offset_m = self.bodies.offset_m;
+            let point = |p: [f32; 3]| Point::from(p.map(|v| f64::from(v) + offset_m));
+            let [min, max] = boxes[*body as usize];
+            self.bodies.boxes[*body as usize] = Aabb {
+                min: point(min),
+                max: point(max),
+            };
+        }
+        self.changes
+            .moved
+            .extend(moved.iter().map(|body| BodySlot(*body)));
+        self.changes
+            .inserted
+            .extend(came.iter().map(|body| BodySlot(*body)));
+    }
+
+    /// One update; pairs and events must be those of the exact set.
+    pub fn tick(&mut self, wanted: &[Pair], what: &str) {
+        self.broad.update(
+            &self.changes,
+            &self.bodies,
+            &Everything,
+            &mut self.pairs,
+            &mut self.delta,
+        );
+        let pair = |key: PairKey| {
+            let (a, b) = key.slots();
+            (a.0, b.0)
+        };
+        for ended in &self.delta.ended {
+            assert!(
+                self.told.remove(&pair(ended.key)),
+                "{what}, {:?}: {ended:?}",
+                self.level
+            );
+        }
+        for began in &self.delta.began {
+            let key = pair(self.pairs.get(*began).unwrap());
+            assert!(
+                self.told.insert(key),
+                "{what}, {:?}: {key:?} began twice",
+                self.level
+            );
+        }
+        let mut held: Vec<Pair> = self.pairs.iter().map(|(_, key)| pair(key)).collect();
+        held.sort_unstable();
+        assert!(held == wanted, "{what}, {:?}: pairs differ", self.level);
+        assert!(
+            self.told.iter().eq(wanted),
+            "{what}, {:?}: events differ",
+            self.level
+        );
+    }
+
+    pub fn validate(&self) {
+        let valid = self.broad.validate(&self.bodies, &Everything, &self.pairs);
+        assert_eq!(valid, Ok(()), "{:?}", self.level);
+    }
+}
