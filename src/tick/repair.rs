@@ -157,13 +157,12 @@ mod tests {
         assert_eq!(rig.tick(false), [(1, 2, Event::Begin.bit(), 1)]);
         assert!(rig.tick(true).is_empty());
         assert!(rig.engine.outcomes()[0].warnings.is_empty());
-        // The lists of another scene: the ball that comes now is not seen.
-        rig.engine.broad = BroadPhase::new(rig.engine.method);
-        rig.x_m[2] = 1.8;
         assert!(rig.tick(false).is_empty());
+        // As if it had lost every body since the last check.
+        rig.engine.broad = BroadPhase::new(rig.engine.method);
         assert!(rig.engine.validate().is_err());
-        rig.x_m[3] = 2.7;
-        // What was missed is told, with every tick since the last good check in its range.
+        (rig.x_m[2], rig.x_m[3]) = (1.8, 2.7);
+        // What it may have missed is told with every tick since the last good check in its range.
         let begun = Event::Begin.bit();
         assert_eq!(rig.tick(true), [(2, 3, begun, 2), (3, 4, begun, 2)]);
         assert_eq!(rig.engine.outbox().tick.rebuilds, 1);
