@@ -1,11 +1,11 @@
 //! Kernels over sixteen boxes at a time.
 //!
-//! In: blocks of sixteen boxes as a structure of arrays ([`Boxes16`]), single boxes ([`Down`]). Out: masks of sixteen bits, one a
-//! lane, and plain answers. [`Portable`] is the safe twin in plain Rust; every other set of [`Lanes`] gives the same bits, which tests
-//! compare. Which one runs is decided once, by what the processor says ([`Level::best`]).
+//! In: blocks of sixteen boxes as a structure of arrays (`Boxes16`), single boxes (`Down`). Out: masks of sixteen bits, one a
+//! lane, and plain answers. `Portable` is the safe twin in plain Rust; every other set of `Lanes` gives the same bits, which tests
+//! compare. Which one runs is decided once, by what the processor says (`Level::best`).
 //!
-//! How: a caller writes its loop once as a [`Work`], generic over [`Lanes`], all of it `#[inline(always)]`;
-//! [`Level::run`] compiles it once a level inside a function that has the level's instructions switched on, so that
+//! How: a caller writes its loop once as a `Work`, generic over `Lanes`, all of it `#[inline(always)]`;
+//! `Level::run` compiles it once a level inside a function that has the level's instructions switched on, so that
 //! the whole loop, not only a kernel, is built for them. AVX2 is the main path, AVX-512 halves its instructions. On
 //! aarch64 NEON is part of every target, and the compiler builds the twin with it.
 //!
