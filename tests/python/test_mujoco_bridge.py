@@ -570,7 +570,14 @@ def faulty_poses(poses, fault):
 def test_live_a_signal_ends_bridge_and_daemon(tmp_path, how, code):
     instance = f"signal_{os.getpid()}_{int(how)}"
     command = bridge(SCRIPTS / "models" / "robot.xml", "--instance", instance, "--realtime", "--json")
-    running = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    # Where the tests themselves run in the background, a child would be born with SIGINT ignored.
+    running = subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     deadline = time.monotonic() + 30
     while not daemons_of(instance):
         assert time.monotonic() < deadline, running.communicate()
