@@ -17,6 +17,8 @@ mod bad_input;
 mod edits;
 #[path = "daemon/ends.rs"]
 mod ends;
+#[path = "daemon/gaps.rs"]
+mod gaps;
 #[path = "daemon/silence.rs"]
 mod silence;
 #[path = "daemon/steps.rs"]

@@ -1,5 +1,5 @@
-//! The worker that turns requests into edits with built shapes, off the tick's thread: a mesh of a million triangles
-//! takes a second to build, and no tick waits for it.
+//! The worker that turns requests into edits with built shapes, and answers questions, off the tick's thread: a mesh of a
+//! million triangles takes a second to build, and no tick waits for it.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
@@ -9,10 +9,13 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 use crate::error::{Error, Result};
-use crate::scene::{Edit as Asking, EditRequest, Scene, SourceSpec};
+use crate::query::GapQuestion;
+use crate::scene::{Edit as Asking, EditRequest, Request, Scene, SourceSpec};
 use crate::shape::Library;
 use crate::tick::EditBatch;
+use crate::time::Clock;
 use crate::transport::RequestToken;
+use crate::wire::GapFound;
 use crate::world::Edit;
 
 use super::shapes::place;
@@ -21,15 +24,28 @@ use super::shapes::place;
 const INTERNAL: &str =
     "an internal error of the daemon while it read the request: nothing was changed; see its log";
 
-/// A request on its way to the worker.
-struct Asked {
-    token: RequestToken,
-    json_len: usize,
-    payload: Vec<u8>,
+/// What is on its way to the worker, and who waits for it.
+struct Asked(RequestToken, Work);
+
+enum Work {
+    /// A request to be read: its payload, of which so many bytes are JSON.
+    Read(usize, Vec<u8>),
+    /// A question, with the bodies it is about.
+    Measure(Box<GapQuestion>),
 }
 
-/// A batch, or what to change.
-type Built = (RequestToken, std::result::Result<EditBatch, String>);
+/// What the worker made of a request.
+pub(super) enum Done {
+    /// Edits for the next tick.
+    Batch(EditBatch),
+    /// The bodies are to be looked up: names of A and B.
+    Gap(String, String),
+    /// An answer, and what is odd about it.
+    Found(Box<GapFound>, Vec<String>),
+}
+
+/// That, or what to change.
+type Built = (RequestToken, std::result::Result<Done, String>);
 
 /// The worker's handle.
 pub(super) struct Builder {
@@ -42,25 +58,25 @@ pub(super) struct Builder {
 
 impl Builder {
     /// Starts the worker with the shapes that are built already.
-    pub(super) fn start(library: Library, scene: &Scene) -> Result<Self> {
+    pub(super) fn start(library: Library, scene: &Scene, clock: Arc<dyn Clock>) -> Result<Self> {
         let (asked, requests) = channel::<Asked>();
         let (answers, built) = channel::<Built>();
         let mut against = Against {
             sources: scene.sources.clone(),
             base: scene.origin.base.clone(),
             library,
+            clock,
         };
         let ended = Arc::new(AtomicBool::new(false));
         let told = Arc::clone(&ended);
         let work = move || {
-            for request in requests {
+            for Asked(token, work) in requests {
                 // What still waits at the end is not built any more.
                 if told.load(Ordering::Relaxed) {
                     return;
                 }
-                let token = request.token;
                 // Whatever goes wrong, its asker gets an answer and the next request is built.
-                let answer = catch_unwind(AssertUnwindSafe(|| against.build(&request)))
+                let answer = catch_unwind(AssertUnwindSafe(|| against.work(token, work)))
                     .unwrap_or_else(|_| Err(INTERNAL.to_owned()));
                 if answers.send((token, answer)).is_err() {
                     return;
@@ -82,13 +98,18 @@ impl Builder {
 
     /// Hands over a request.
     pub(super) fn ask(&mut self, token: RequestToken, json_len: usize, payload: &[u8]) {
-        let request = Asked {
-            token,
-            json_len,
-            payload: payload.to_vec(),
-        };
+        self.hand(token, Work::Read(json_len, payload.to_vec()));
+    }
+
+    /// Hands over a question.
+    pub(super) fn measure(&mut self, token: RequestToken, question: GapQuestion) {
+        self.hand(token, Work::Measure(Box::new(question)));
+    }
+
+    fn hand(&mut self, token: RequestToken, work: Work) {
         let asked = self.asked.as_ref();
-        self.open += usize::from(asked.is_some_and(|asked| asked.send(request).is_ok()));
+        let sent = asked.is_some_and(|asked| asked.send(Asked(token, work)).is_ok());
+        self.open += usize::from(sent);
     }
 
     /// Whether a request is being worked on.
@@ -122,14 +143,32 @@ struct Against {
     sources: Vec<SourceSpec>,
     base: PathBuf,
     library: Library,
+    clock: Arc<dyn Clock>,
 }
 
 impl Against {
-    /// Reads a request and builds its shapes.
-    fn build(&mut self, request: &Asked) -> std::result::Result<EditBatch, String> {
-        let cut = request.payload.split_at_checked(request.json_len);
+    fn work(&mut self, token: RequestToken, work: Work) -> std::result::Result<Done, String> {
+        let (json_len, payload) = match work {
+            Work::Read(json_len, payload) => (json_len, payload),
+            Work::Measure(question) => {
+                let found = Box::new(question.answer(self.clock.as_ref()));
+                return Ok(Done::Found(found, question.warnings));
+            }
+        };
+        let cut = payload.split_at_checked(json_len);
         let (json, blobs) = cut.ok_or("the request is shorter than its header says")?;
-        let asked = EditRequest::parse(json, blobs)?;
+        match Request::parse(json, blobs)? {
+            Request::Edits(asked) => self.build(token, asked).map(Done::Batch),
+            Request::Gap { a, b } => Ok(Done::Gap(a, b)),
+        }
+    }
+
+    /// Builds the shapes of a request.
+    fn build(
+        &mut self,
+        token: RequestToken,
+        asked: EditRequest,
+    ) -> std::result::Result<EditBatch, String> {
         let mut warnings = Vec::new();
         let mut edits = Vec::with_capacity(asked.edits.len());
         for edit in asked.edits {
@@ -137,7 +176,7 @@ impl Against {
         }
         self.library.prune();
         Ok(EditBatch {
-            token: request.token.0,
+            token: token.0,
             edits,
             validate: asked.validate,
             warnings,

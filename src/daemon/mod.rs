@@ -12,6 +12,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::config::Config;
 use crate::error::Result;
+use crate::query::GapQuestion;
 use crate::scene::Scene;
 use crate::tick::pace::{Due, Pacer};
 use crate::tick::{EditBatch, Engine, TickInput};
@@ -19,7 +20,7 @@ use crate::time::{Budget, Clock};
 use crate::transport::{Door, RequestToken};
 use crate::wire::{Answer, Inbox, TickRow};
 
-use builder::Builder;
+use builder::{Builder, Done};
 
 pub use shapes::{Shapes, build_shapes};
 pub use watchdog::Watchdog;
@@ -67,7 +68,7 @@ impl<'a> Daemon<'a> {
         door: &'a mut dyn Door,
     ) -> Result<Self> {
         Ok(Self {
-            builder: Builder::start(shapes.library, scene)?,
+            builder: Builder::start(shapes.library, scene, Arc::clone(&clock))?,
             engine: Engine::new(scene, shapes.bodies, boot_id, Arc::clone(&clock))?,
             pacer: Pacer::new(&scene.config, &scene.sources)?,
             config: scene.config.clone(),
@@ -151,18 +152,50 @@ impl<'a> Daemon<'a> {
             builder.ask(token, json_len, payload);
         });
         while let Some((token, built)) = self.builder.finished() {
-            match built {
-                Ok(batch) => self.ready.push(batch),
-                Err(error) => {
-                    let answer = Answer {
-                        error: Some(error),
-                        ..Answer::default()
-                    };
-                    self.answer(token, &answer);
-                }
+            if let Some(answer) = self.take_built(token, built) {
+                self.answer(token, &answer);
             }
         }
         Ok(())
+    }
+
+    /// Takes what the worker made of a request; its answer, where there is one already.
+    fn take_built(
+        &mut self,
+        token: RequestToken,
+        built: std::result::Result<Done, String>,
+    ) -> Option<Answer> {
+        let refusal = match built {
+            Ok(Done::Batch(batch)) => {
+                self.ready.push(batch);
+                return None;
+            }
+            Ok(Done::Found(gap, warnings)) => {
+                return Some(Answer {
+                    ok: true,
+                    scene_rev: gap.tick_header.scene_rev,
+                    warnings,
+                    gap: Some(*gap),
+                    ..Answer::default()
+                });
+            }
+            Ok(Done::Gap(a, b)) => {
+                // The bodies as the last tick left them.
+                let header = self.engine.outbox().tick.header;
+                match GapQuestion::new(self.engine.world(), header, &a, &b) {
+                    Ok(question) => {
+                        self.builder.measure(token, question);
+                        return None;
+                    }
+                    Err(why) => why,
+                }
+            }
+            Err(why) => why,
+        };
+        Some(Answer {
+            error: Some(refusal),
+            ..Answer::default()
+        })
     }
 
     /// Runs one tick and sends what it filled.
@@ -225,8 +258,8 @@ impl<'a> Daemon<'a> {
                 Ok(applied) => Answer {
                     ok: true,
                     scene_rev: applied.scene_rev,
-                    error: None,
                     warnings,
+                    ..Answer::default()
                 },
                 Err(error) => Answer {
                     error: Some(error.clone()),

@@ -17,6 +17,7 @@
 pub mod exact;
 pub mod mesh;
 
+mod ask;
 mod carry;
 mod contacts;
 mod cursor;
@@ -26,6 +27,7 @@ mod query;
 mod spend;
 mod widen;
 
+pub use ask::{Asked, gap_between};
 pub use contacts::{Contact, ContactSet};
 pub use memo::{Finding, Witness};
 pub use order::Order;

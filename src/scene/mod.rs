@@ -22,4 +22,4 @@ pub use model::{BodySpec, Origin, PairAction, PairRule, PlacedSpec, Scene, Sourc
 pub use pattern::{is_pattern, pattern_matches};
 pub use read_body::{BODY_NAME_BYTES_MAX, BodyDraft, SOURCE_NAME_BYTES_MAX};
 pub(crate) use read_ros::no_lockstep;
-pub use request::{EDITS_MAX, Edit, EditRequest};
+pub use request::{EDITS_MAX, Edit, EditRequest, Request};

@@ -22,6 +22,8 @@
 //! `{ "validate": true }`, alone or beside `edits`, has the daemon check every structure before the next tick and build
 //! anew what does not hold; the answer's warnings say what that was.
 //!
+//! `{ "gap": { "a": "box", "b": "part" } }`, alone, asks for the gap of two bodies and changes nothing.
+//!
 //! A blob is `count` rows, `offset` bytes behind the JSON, little-endian: three f64 a vertex, three u32 a face.
 
 use std::path::Path;
@@ -39,6 +41,20 @@ use crate::scene::{BodySpec, PairRule, SourceSpec};
 
 /// Edits in one request; more are to be sent in several.
 pub const EDITS_MAX: usize = 1 << 17;
+
+/// What a client asks of a running daemon.
+#[derive(Debug)]
+pub enum Request {
+    /// To change the scene.
+    Edits(EditRequest),
+    /// For the gap of two bodies.
+    Gap {
+        /// Name of the one.
+        a: String,
+        /// Name of the other.
+        b: String,
+    },
+}
 
 /// Several edits that are done together or not at all.
 #[derive(Debug)]
@@ -100,7 +116,7 @@ pub enum Edit {
     },
 }
 
-impl EditRequest {
+impl Request {
     /// Reads a request.
     ///
     /// * `json` - the JSON at the front of the payload.
@@ -135,16 +151,25 @@ impl BodyDraft {
     }
 }
 
-fn read(json: &[u8], blobs: &[u8]) -> Result<EditRequest, Fault> {
-    let mut table = Table::open(Node::from_json(json)?, "a request", &["edits", "validate"])?;
+fn read(json: &[u8], blobs: &[u8]) -> Result<Request, Fault> {
+    let keys = &["edits", "validate", "gap"];
+    let mut table = Table::open(Node::from_json(json)?, "a request", keys)?;
+    if table.has("gap") {
+        if table.has("edits") || table.has("validate") {
+            let text =
+                "`gap` stands beside `edits` or `validate`: ask for it in a request of its own";
+            return Err(Fault::new(None, text));
+        }
+        return read_gap(table.need("gap")?).map_err(|fault| fault.within("gap"));
+    }
     let validate = table.flag("validate")?.unwrap_or(false);
     if !table.has("edits") {
-        let text = "a request has neither `edits` nor `validate`: add one";
+        let text = "a request has none of `edits`, `validate` and `gap`: add one";
         return if validate {
-            Ok(EditRequest {
+            Ok(Request::Edits(EditRequest {
                 edits: Vec::new(),
                 validate,
-            })
+            }))
         } else {
             Err(Fault::new(None, text))
         };
@@ -159,7 +184,15 @@ fn read(json: &[u8], blobs: &[u8]) -> Result<EditRequest, Fault> {
         let edit = read_edit(node, blobs);
         edits.push(edit.map_err(|fault| fault.within(&format!("edit {}", place + 1)))?);
     }
-    Ok(EditRequest { edits, validate })
+    Ok(Request::Edits(EditRequest { edits, validate }))
+}
+
+fn read_gap(node: Node) -> Result<Request, Fault> {
+    let mut table = Table::open(node, "this question", &["a", "b"])?;
+    Ok(Request::Gap {
+        a: need_name(&mut table, "a")?,
+        b: need_name(&mut table, "b")?,
+    })
 }
 
 const VERBS: &[&str] = &[

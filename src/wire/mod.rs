@@ -16,7 +16,7 @@ pub use codes::{
 };
 pub use frame::{Frame, Inbox, name_bytes, name_str};
 pub use outbox::{Demand, Outbox};
-pub use request::{Answer, AnswerHeader, RequestHeader};
+pub use request::{Answer, AnswerHeader, GapFound, RequestHeader};
 pub use rows::{
     BODY_NAME_LEN, BodyRow, ContactRow, FrameHeader, Hello, MessageHeader, NameRow, PairRow,
     REJECTS_LEN, SOURCE_NAME_LEN, SOURCES_MAX, STAGES_LEN, SourceRow, TickRow, TransformRow,

@@ -3,6 +3,8 @@
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
+use super::MessageHeader;
+
 /// User header of a request; the payload is `json_len` bytes of JSON, then the blobs it names by offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
 #[repr(C)]
@@ -34,7 +36,7 @@ pub struct AnswerHeader {
 }
 
 /// The JSON of an answer.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     /// Whether everything in the request was done; if not, nothing was.
     pub ok: bool,
@@ -46,4 +48,30 @@ pub struct Answer {
     /// Things to know that did not stop it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
+    /// What was asked for, where a gap was.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gap: Option<GapFound>,
+}
+
+/// The gap of two bodies that a request asked for. Metres, scene frame; A and B as the request names them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GapFound {
+    /// Header of the tick whose poses were used.
+    pub tick_header: MessageHeader,
+    /// `Verdict`.
+    pub verdict: u8,
+    /// Whether the query was finished, with 0 inside its rounding interval.
+    pub touching: bool,
+    /// Proved lower end of the gap, signed; `None`: nothing is known.
+    pub gap_min_m: Option<f64>,
+    /// Proved upper end of the gap, signed; `None`: nothing is known.
+    pub gap_max_m: Option<f64>,
+    /// Best estimate of the gap, signed; `None`: none.
+    pub gap_best_m: Option<f64>,
+    /// Closest or deepest point on A; `None`: none.
+    pub point_a: Option<[f64; 3]>,
+    /// Closest or deepest point on B; `None`: none.
+    pub point_b: Option<[f64; 3]>,
+    /// Unit, from A to B; `None`: none.
+    pub normal: Option<[f64; 3]>,
 }

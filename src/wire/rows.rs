@@ -78,7 +78,9 @@ pub struct TransformVelRow {
 }
 
 /// User header of every message the daemon publishes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend, serde::Serialize, serde::Deserialize,
+)]
 #[repr(C)]
 #[type_name("sweepd.v1.MessageHeader")]
 pub struct MessageHeader {

@@ -14,6 +14,7 @@
 #[path = "../oracle/mod.rs"]
 mod oracle;
 
+mod ask;
 mod edits;
 mod events;
 mod limits;

@@ -235,6 +235,8 @@ fn the_structs_are_the_types_of_ros_2() {
         "sweepd_msgs/srv/SetFilter_Response" ros::Edited,
         "sweepd_msgs/srv/Reset_Request" ros::Reset,
         "sweepd_msgs/srv/Reset_Response" ros::Edited,
+        "sweepd_msgs/srv/Gap_Request" ros::Gap,
+        "sweepd_msgs/srv/Gap_Response" ros::GapTold,
         "sweepd_msgs/srv/TickNow_Request" ros::TickNow,
         "sweepd_msgs/srv/TickNow_Response" ros::Ticked,
         "ros_gz_interfaces/msg/Contacts" ros::GzContacts,

@@ -4,7 +4,14 @@ use super::*;
 use crate::shape::ShapeSpec;
 
 fn error(json: &str) -> String {
-    EditRequest::parse(json.as_bytes(), &[0; 24]).unwrap_err()
+    Request::parse(json.as_bytes(), &[0; 24]).unwrap_err()
+}
+
+fn edits(json: &str, blobs: &[u8]) -> Result<EditRequest, String> {
+    match Request::parse(json.as_bytes(), blobs)? {
+        Request::Edits(edits) => Ok(edits),
+        Request::Gap { .. } => panic!("edits"),
+    }
 }
 
 #[test]
@@ -23,7 +30,7 @@ fn every_edit_is_read() {
         { "reset": { "source": "sim" } },
         { "reset": {} }
     ] }"#;
-    let edits = EditRequest::parse(json.as_bytes(), &[]).unwrap().edits;
+    let edits = edits(json, &[]).unwrap().edits;
     assert_eq!(edits.len(), 11);
     let Edit::Put(draft) = edits.into_iter().next().unwrap() else {
         panic!("a put");
@@ -53,7 +60,7 @@ fn blobs_are_read_and_checked_for_their_ends() {
             "faces_blob": {{"offset": {offset}, "count": 1}} }} }} }}]}}"#
         )
     };
-    let request = EditRequest::parse(json(3, 73).as_bytes(), &blobs).unwrap();
+    let request = edits(&json(3, 73), &blobs).unwrap();
     let [Edit::Put(draft)] = &request.edits[..] else {
         panic!("one put");
     };
@@ -68,12 +75,12 @@ fn blobs_are_read_and_checked_for_their_ends() {
         [1.0_f64, 0.0, 0.0].map(f64::to_bits)
     );
     assert_eq!(faces[..], [[0, 1, 2]]);
-    let past = EditRequest::parse(json(3, 74).as_bytes(), &blobs).unwrap_err();
+    let past = edits(&json(3, 74), &blobs).unwrap_err();
     assert!(
         past.contains("edit 1: body \"t\": faces_blob ends at byte 86"),
         "{past}"
     );
-    let huge = EditRequest::parse(json(1 << 40, 73).as_bytes(), &blobs).unwrap_err();
+    let huge = edits(&json(1 << 40, 73), &blobs).unwrap_err();
     assert!(huge.contains("count is out of range"), "{huge}");
 }
 
@@ -81,8 +88,14 @@ fn blobs_are_read_and_checked_for_their_ends() {
 fn each_mistake_is_one_text_that_names_edit_body_and_mend() {
     for (json, wanted) in [
         ("", "this is not JSON"),
-        ("{}", "a request has neither `edits` nor `validate`"),
+        ("{}", "a request has none of `edits`, `validate` and `gap`"),
         (r#"{"validate": 1}"#, "validate"),
+        (r#"{"gap": {"a": "x"}}"#, "gap: `b` is missing"),
+        (r#"{"gap": {"a": "x", "b": ""}}"#, "gap: "),
+        (
+            r#"{"gap": {"a": "x", "b": "y"}, "validate": true}"#,
+            "a request of its own",
+        ),
         (r#"{"edits": []}"#, "write 1 to"),
         (r#"{"edit": []}"#, "did you mean `edits`?"),
         (r#"{"edits": [{}]}"#, "edit 1: an edit has one key"),
@@ -128,6 +141,15 @@ fn each_mistake_is_one_text_that_names_edit_body_and_mend() {
 
 #[test]
 fn a_request_may_ask_for_a_check_alone() {
-    let request = EditRequest::parse(br#"{"validate": true}"#, &[]).unwrap();
+    let request = edits(r#"{"validate": true}"#, &[]).unwrap();
     assert!(request.validate && request.edits.is_empty());
+}
+
+#[test]
+fn a_request_may_ask_for_a_gap() {
+    let asked = Request::parse(br#"{"gap": {"a": "x", "b": "y"}}"#, &[]).unwrap();
+    let Request::Gap { a, b } = asked else {
+        panic!("a gap");
+    };
+    assert_eq!((a.as_str(), b.as_str()), ("x", "y"));
 }

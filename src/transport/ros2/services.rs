@@ -1,9 +1,11 @@
-//! The node's services: scene edits as requests of the daemon, answered when the tick has applied them; a tick at once.
+//! The node's services: scene edits as requests of the daemon, answered when the tick has applied them; the gap of two
+//! bodies; a tick at once.
 //!
-//! In: requests of anybody in the domain, on the receiving thread. Out: the JSON of an edit request, as shared memory
-//! carries it, so that both have one reader; responses.
+//! In: requests of anybody in the domain, on the receiving thread. Out: the JSON of a request, as shared memory carries
+//! it, so that both have one reader; responses.
 
 mod edits;
+mod gap;
 
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -15,22 +17,26 @@ use rustdds::mio1::{Interest, Registry, Token};
 use serde_json::{Value, json};
 
 use edits::{attach, filter, put, short};
+use gap::told;
 
 use super::names::Names;
 use super::shared::{Say, Shared};
 use super::topics::failed;
 use crate::error::{Error, Result};
 use crate::wire::ros::{
-    AttachBody, Edited, EnableBody, PutBody, RemoveBody, Reset, SetFilter, TickNow, Ticked,
+    AttachBody, Edited, EnableBody, Gap, GapTold, PutBody, RemoveBody, Reset, SetFilter, TickNow,
+    Ticked,
 };
 use crate::wire::{self, Answer, MessageHeader};
 
-/// Requests that wait for their tick; more are refused at once.
+/// Requests that wait for their answer; more are refused at once.
 const OPEN_MAX: usize = 64;
 
 impl Message for AttachBody {}
 impl Message for Edited {}
 impl Message for EnableBody {}
+impl Message for Gap {}
+impl Message for GapTold {}
 impl Message for PutBody {}
 impl Message for RemoveBody {}
 impl Message for Reset {}
@@ -38,9 +44,10 @@ impl Message for SetFilter {}
 impl Message for TickNow {}
 impl Message for Ticked {}
 
-/// The verbs of scene edits.
+/// What is asked of the daemon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Verb {
+    Gap,
     Put,
     Remove,
     Enable,
@@ -52,7 +59,7 @@ enum Verb {
 /// What stands between the receiving thread and the tick thread.
 #[derive(Debug, Default)]
 pub(super) struct Desk {
-    /// Edits that the tick thread has not taken: token, JSON.
+    /// Requests that the tick thread has not taken: token, JSON.
     pub(super) asked: Mutex<Vec<(u64, Vec<u8>)>>,
     /// Ticks at once that it has not taken: tokens.
     pub(super) ticks: Mutex<Vec<u64>>,
@@ -76,6 +83,7 @@ pub(super) struct Services {
     attach: Server<AttachBody, Edited>,
     filter: Server<SetFilter, Edited>,
     reset: Server<Reset, Edited>,
+    gap: Server<Gap, GapTold>,
     tick: Server<TickNow, Ticked>,
     pending: BTreeMap<u64, (Verb, RmwRequestId)>,
     ticks: BTreeMap<u64, RmwRequestId>,
@@ -98,6 +106,7 @@ impl Services {
             attach: server(node, names, "~/attach_body", "AttachBody")?,
             filter: server(node, names, "~/set_filter", "SetFilter")?,
             reset: server(node, names, "~/reset", "Reset")?,
+            gap: server(node, names, "~/gap", "Gap")?,
             tick: server(node, names, "~/tick_now", "TickNow")?,
             pending: BTreeMap::new(),
             ticks: BTreeMap::new(),
@@ -115,6 +124,7 @@ impl Services {
         self.attach.register(registry, token, wanted)?;
         self.filter.register(registry, token, wanted)?;
         self.reset.register(registry, token, wanted)?;
+        self.gap.register(registry, token, wanted)?;
         self.tick.register(registry, token, wanted)
     }
 
@@ -145,9 +155,13 @@ impl Services {
             };
             asked.push((Verb::Reset, id, Ok(edit)));
         });
+        receive(&self.gap, shared, |id, r| {
+            let names = json!({ "gap": { "a": r.name_a, "b": r.name_b } });
+            asked.push((Verb::Gap, id, Ok(names)));
+        });
         let mut came = !asked.is_empty();
-        for (verb, id, edit) in asked {
-            self.ask(verb, id, edit, desk, shared);
+        for (verb, id, what) in asked {
+            self.ask(verb, id, what, desk, shared);
         }
         let mut ticks = Vec::new();
         receive(&self.tick, shared, |id, _| ticks.push(id));
@@ -169,46 +183,34 @@ impl Services {
         &mut self,
         verb: Verb,
         id: RmwRequestId,
-        edit: std::result::Result<Value, String>,
+        what: std::result::Result<Value, String>,
         desk: &Desk,
         shared: &Shared,
     ) {
-        let refusal = match edit {
-            _ if !self.allowed => {
+        let refusal = match what {
+            _ if verb != Verb::Gap && !self.allowed => {
                 "edits are refused: start the node with -p ros.allow_edits:=true".to_owned()
             }
             _ if self.pending.len() >= OPEN_MAX => {
-                format!("{OPEN_MAX} edits wait for their tick: ask again later")
+                format!("{OPEN_MAX} requests wait for their answers: ask again later")
             }
             Err(why) => why,
-            Ok(edit) => {
-                let body = edit
-                    .as_object()
-                    .and_then(|e| e.values().next())
-                    .and_then(|v| v.get("name"));
-                let what = edit.as_object().and_then(|e| e.keys().next()).cloned();
-                shared.say(
-                    Say::Info,
-                    &format!(
-                        "edit over ROS 2: {} {}",
-                        what.unwrap_or_default(),
-                        body.map_or_else(|| short(&edit), ToString::to_string)
-                    ),
-                );
+            Ok(what) => {
+                let request = if verb == Verb::Gap {
+                    what
+                } else {
+                    shared.say(Say::Info, &in_words(&what));
+                    json!({ "edits": [what] })
+                };
                 let token = self.token();
                 self.pending.insert(token, (verb, id));
-                let json = json!({ "edits": [edit] }).to_string().into_bytes();
-                open(&desk.asked).push((token, json));
+                open(&desk.asked).push((token, request.to_string().into_bytes()));
                 return;
             }
         };
-        shared.say(
-            Say::Warn,
-            &format!("an edit over ROS 2 was refused: {refusal}"),
-        );
-        let answer = Edited {
-            message: refusal,
-            ..Edited::default()
+        let answer = Answer {
+            error: Some(refusal),
+            ..Answer::default()
         };
         self.send(verb, id, answer, shared);
     }
@@ -218,16 +220,7 @@ impl Services {
             let Some((verb, id)) = self.pending.remove(&token) else {
                 continue;
             };
-            if let Some(why) = &answer.error {
-                shared.say(Say::Warn, &format!("an edit over ROS 2 was refused: {why}"));
-            }
-            let response = Edited {
-                success: answer.ok,
-                message: answer.error.unwrap_or_default(),
-                warnings: answer.warnings,
-                scene_rev: answer.scene_rev,
-            };
-            self.send(verb, id, response, shared);
+            self.send(verb, id, answer, shared);
         }
         for (token, header) in std::mem::take(&mut *open(&desk.ticked)) {
             let Some(id) = self.ticks.remove(&token) else {
@@ -246,17 +239,39 @@ impl Services {
         }
     }
 
-    fn send(&self, verb: Verb, id: RmwRequestId, response: Edited, shared: &Shared) {
+    fn send(&self, verb: Verb, id: RmwRequestId, answer: Answer, shared: &Shared) {
+        if let (Some(why), true) = (&answer.error, verb != Verb::Gap) {
+            shared.say(Say::Warn, &format!("an edit over ROS 2 was refused: {why}"));
+        }
         let sent = match verb {
-            Verb::Put => self.put.send_response(id, response),
-            Verb::Remove => self.remove.send_response(id, response),
-            Verb::Enable => self.enable.send_response(id, response),
-            Verb::Attach => self.attach.send_response(id, response),
-            Verb::Filter => self.filter.send_response(id, response),
-            Verb::Reset => self.reset.send_response(id, response),
+            Verb::Gap => self.gap.send_response(id, told(answer)),
+            Verb::Put => self.put.send_response(id, edited(answer)),
+            Verb::Remove => self.remove.send_response(id, edited(answer)),
+            Verb::Enable => self.enable.send_response(id, edited(answer)),
+            Verb::Attach => self.attach.send_response(id, edited(answer)),
+            Verb::Filter => self.filter.send_response(id, edited(answer)),
+            Verb::Reset => self.reset.send_response(id, edited(answer)),
         };
         shared.note_unsent(u64::from(sent.is_err()));
     }
+}
+
+fn edited(answer: Answer) -> Edited {
+    Edited {
+        success: answer.ok,
+        message: answer.error.unwrap_or_default(),
+        warnings: answer.warnings,
+        scene_rev: answer.scene_rev,
+    }
+}
+
+/// An edit for the log: its verb, and the body it names.
+fn in_words(edit: &Value) -> String {
+    let entry = edit.as_object().and_then(|edit| edit.iter().next());
+    let verb = entry.map_or("", |(verb, _)| verb.as_str());
+    let body = entry.and_then(|(_, what)| what.get("name"));
+    let body = body.map_or_else(|| short(edit), ToString::to_string);
+    format!("edit over ROS 2: {verb} {body}")
 }
 
 fn server<Q: Message + Clone + 'static, R: Message + 'static>(

@@ -19,8 +19,8 @@ pub use seen::{
     UvCoordinate, diagnostic_level, marker_kind,
 };
 pub use services::{
-    AttachBody, Edited, EnableBody, Mesh, MeshTriangle, Point32, PutBody, RemoveBody, Reset,
-    SetFilter, SolidPrimitive, TickNow, Ticked,
+    AttachBody, Edited, EnableBody, Gap, GapTold, Mesh, MeshTriangle, Point32, PutBody, RemoveBody,
+    Reset, SetFilter, SolidPrimitive, TickNow, Ticked,
 };
 pub use sweepd::{
     BodyTransform, BodyTransforms, Contact, Contacts, Name, Names, Pair, Pairs, Source, State,

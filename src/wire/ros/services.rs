@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::common::{Point, Pose};
+use super::common::{Point, Pose, Vector3};
 use super::sweepd::TickHeader;
 
 /// `geometry_msgs/Point32`.
@@ -151,4 +151,40 @@ pub struct Ticked {
     pub tick_header: TickHeader,
     /// Its state as a word.
     pub word: String,
+}
+
+/// `sweepd_msgs/srv/Gap`, request.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Gap {
+    /// Name of A.
+    pub name_a: String,
+    /// Name of B.
+    pub name_b: String,
+}
+
+/// `sweepd_msgs/srv/Gap`, response.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GapTold {
+    /// Whether there is an answer.
+    pub success: bool,
+    /// If not, why; if so, what is odd about it.
+    pub message: String,
+    /// The tick whose poses were used.
+    pub tick_header: TickHeader,
+    /// `Verdict`; 0: there is no answer.
+    pub verdict: u8,
+    /// Finished, with 0 inside the rounding interval.
+    pub touching: bool,
+    /// Proved lower end, metres.
+    pub gap_min_m: f64,
+    /// Proved upper end, metres.
+    pub gap_max_m: f64,
+    /// Best estimate, metres; NaN: none.
+    pub gap_best_m: f64,
+    /// On A, scene frame, metres; NaN: none.
+    pub point_a: Point,
+    /// On B, scene frame, metres; NaN: none.
+    pub point_b: Point,
+    /// Unit, scene frame, from A to B; NaN: none.
+    pub normal: Vector3,
 }

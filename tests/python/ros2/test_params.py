@@ -3,8 +3,9 @@
 import pytest
 from conftest import RELIABLE
 from frames import Sender
-from rcl_interfaces.msg import Log, Parameter, ParameterEvent, ParameterType, ParameterValue
-from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters, SetParametersAtomically
+from parameters import put, value
+from rcl_interfaces.msg import Log, Parameter, ParameterEvent, ParameterType
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParametersAtomically
 from rosgraph_msgs.msg import Clock
 from scenes import HANDS, cloud
 from sweepd_msgs.msg import Contacts, Pairs, State, Tick
@@ -14,27 +15,10 @@ FAR = {"left": (0, 0, 0), "right": (5, 0, 0)}
 CLOSE = {"left": (0, 0, 0), "right": (0.5, 0, 0)}
 
 
-def value(thing):
-    """A parameter's value as ROS 2 sends it."""
-    if isinstance(thing, bool):
-        return ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=thing)
-    if isinstance(thing, int):
-        return ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=thing)
-    if isinstance(thing, float):
-        return ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=thing)
-    return ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=thing)
-
-
 def get(room, *names):
     answer = room.call(GetParameters, "/sweepd/get_parameters", GetParameters.Request(names=names))
     picked = {1: "bool_value", 2: "integer_value", 3: "double_value", 4: "string_value"}
     return [getattr(one, picked[one.type]) if one.type else None for one in answer.values]
-
-
-def put(room, **values):
-    parameters = [Parameter(name=name.replace("__", "."), value=value(one)) for name, one in values.items()]
-    answer = room.call(SetParameters, "/sweepd/set_parameters", SetParameters.Request(parameters=parameters))
-    return [(result.successful, result.reason) for result in answer.results]
 
 
 def test_parameters_are_listed_described_and_read(room):

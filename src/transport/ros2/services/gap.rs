@@ -1,0 +1,35 @@
+//! From the answer of a question for a gap to the response of `~/gap`. Pure.
+
+use super::super::speak::tick_header;
+use crate::wire::Answer;
+use crate::wire::ros::GapTold;
+
+/// The response; what is not known is no number.
+pub(super) fn told(answer: Answer) -> GapTold {
+    let none = [f64::NAN; 3];
+    let Some(gap) = answer.gap else {
+        return GapTold {
+            message: answer.error.unwrap_or_default(),
+            gap_min_m: f64::NEG_INFINITY,
+            gap_max_m: f64::INFINITY,
+            gap_best_m: f64::NAN,
+            point_a: none.into(),
+            point_b: none.into(),
+            normal: none.into(),
+            ..GapTold::default()
+        };
+    };
+    GapTold {
+        success: answer.ok,
+        message: answer.warnings.join("; "),
+        tick_header: tick_header(&gap.tick_header),
+        verdict: gap.verdict,
+        touching: gap.touching,
+        gap_min_m: gap.gap_min_m.unwrap_or(f64::NEG_INFINITY),
+        gap_max_m: gap.gap_max_m.unwrap_or(f64::INFINITY),
+        gap_best_m: gap.gap_best_m.unwrap_or(f64::NAN),
+        point_a: gap.point_a.unwrap_or(none).into(),
+        point_b: gap.point_b.unwrap_or(none).into(),
+        normal: gap.normal.unwrap_or(none).into(),
+    }
+}
