@@ -4,10 +4,9 @@
 
 use std::ffi::OsString;
 
-#[cfg(feature = "ros2")]
-use std::sync::Arc;
-
 use crate::daemon::Shapes;
+#[cfg(feature = "ros2")]
+use crate::daemon::body_note;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::transport::Door;
@@ -17,10 +16,8 @@ use super::args::RunArgs;
 
 #[cfg(feature = "ros2")]
 use crate::transport::ros2::{
-    LastingNode, RosBody, RosNode, RosOptions, RosScene, RosSourceSpec, args::RosArgs, env::Network,
+    LastingNode, RosNode, RosOptions, RosScene, RosSourceSpec, args::RosArgs, env::Network,
 };
-#[cfg(feature = "ros2")]
-use crate::world::PlacedShape;
 
 /// The node, where one was asked for.
 #[cfg(feature = "ros2")]
@@ -95,7 +92,7 @@ impl Asked {
             return Ok(None);
         };
         let (scene, place) = (cast(scene, shapes), place.clone());
-        let opener = move || {
+        let opener = move |scene: &RosScene| {
             let options = RosOptions {
                 args: args.clone(),
                 network,
@@ -104,9 +101,9 @@ impl Asked {
                 session: crate::transport::client::random_u64()?,
             };
             let waker = crate::transport::iceoryx::Waker::new(&place)?;
-            RosNode::open(&options, &scene, Box::new(move || waker.wake()))
+            RosNode::open(&options, scene, Box::new(move || waker.wake()))
         };
-        LastingNode::open(Box::new(opener)).map(Some)
+        LastingNode::open(scene, Box::new(opener)).map(Some)
     }
 }
 
@@ -148,30 +145,14 @@ fn cast(scene: &Scene, shapes: &Shapes) -> RosScene {
         timeout_ns: spec.timeout_ns,
         ros2: spec.ros2.clone(),
     };
-    let body = |(spec, placed): (&crate::scene::BodySpec, &Arc<[PlacedShape]>)| RosBody {
-        id: spec.id.0,
-        name: spec.name.clone(),
-        source: spec.source,
-        frame: spec.ros_frame.as_ref().unwrap_or(&spec.name).clone(),
-        topic: spec.ros_topic.clone().unwrap_or_default(),
-        bounds: bounds(placed),
-    };
     RosScene {
         frame_id: scene.frame_id.clone(),
         config: scene.config.clone(),
         sources: scene.sources.iter().map(source).collect(),
-        bodies: scene.bodies.iter().zip(&shapes.bodies).map(body).collect(),
+        bodies: (scene.bodies.iter().zip(&shapes.bodies))
+            .map(|(spec, placed)| body_note(spec, spec.id, placed))
+            .collect(),
     }
-}
-
-/// Centre and half extents of a body's box in its own frame; `None`: it has no end.
-#[cfg(feature = "ros2")]
-fn bounds(placed: &[PlacedShape]) -> Option<([f64; 3], [f64; 3])> {
-    let boxes = placed.iter().map(|p| p.shape.aabb_at(&p.pose));
-    let whole = boxes.reduce(|a, b| a.merged(&b))?;
-    let (centre, half) = (whole.centre(), whole.half_extents());
-    let finite = half.iter().all(|x| x.is_finite());
-    finite.then(|| ([centre.x, centre.y, centre.z], [half.x, half.y, half.z]))
 }
 
 fn needs_node(source: &str, mend: &str) -> Error {

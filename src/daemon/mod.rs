@@ -17,12 +17,13 @@ use crate::scene::Scene;
 use crate::tick::pace::{Due, Pacer};
 use crate::tick::{EditBatch, Engine, TickInput};
 use crate::time::{Budget, Clock};
-use crate::transport::{Door, RequestToken};
+use crate::transport::{BodyChange, Door, RequestToken};
 use crate::wire::{Answer, Inbox, TickRow};
+use crate::world::Edit;
 
 use builder::{Builder, Done};
 
-pub use shapes::{Shapes, build_shapes};
+pub use shapes::{Shapes, body_note, build_shapes};
 pub use watchdog::Watchdog;
 
 /// While a worker builds shapes the loop looks this often whether they are ready, nanoseconds.
@@ -250,6 +251,7 @@ impl<'a> Daemon<'a> {
 
     /// Answers the requests whose edits the last tick applied or refused.
     fn settle_edits(&mut self) {
+        self.tell_bodies();
         self.ready.clear();
         for at in 0..self.engine.outcomes().len() {
             let outcome = &self.engine.outcomes()[at];
@@ -268,6 +270,28 @@ impl<'a> Daemon<'a> {
                 },
             };
             self.answer(token, &answer);
+        }
+    }
+
+    /// Tells the doors what the edits of the last tick did to bodies.
+    fn tell_bodies(&mut self) {
+        let world = self.engine.world();
+        let done = self.ready.iter().zip(self.engine.outcomes());
+        let edits = done.filter(|(_, outcome)| outcome.result.is_ok());
+        let change = |edit: &Edit| match edit {
+            Edit::Put { body, shapes } => {
+                // A later edit of the same request may have taken it out again: then that edit speaks for it.
+                let placed = world.body(world.slot_named(&body.name)?)?;
+                Some(BodyChange::Put(body_note(body, placed.id, shapes)))
+            }
+            Edit::Remove { name } => Some(BodyChange::Removed(name.clone())),
+            _ => None,
+        };
+        let changes: Vec<_> = edits
+            .flat_map(|(batch, _)| batch.edits.iter().filter_map(change))
+            .collect();
+        if !changes.is_empty() {
+            self.door.bodies(&changes);
         }
     }
 

@@ -44,3 +44,114 @@ impl Daemon<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use super::super::{Daemon, build_shapes};
+    use crate::config::Mode;
+    use crate::error::Result;
+    use crate::scene::Scene;
+    use crate::time::{Clock, ManualClock};
+    use crate::transport::{Door, RequestToken, Setting, Wake};
+    use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickCause, TickRow};
+
+    const SCENE: &str = "[run]\nmode = \"on_all\"\n[[source]]\nname = \"sim\"\ntimeout_ms = 500\n\
+        [[body]]\nname = \"a\"\nshape = { type = \"sphere\", radius = 1.0 }\n";
+
+    /// A door through which only settings come; it keeps the ticks.
+    #[derive(Default)]
+    struct Panel {
+        settings: Vec<Setting>,
+        ticks: Vec<TickRow>,
+    }
+
+    impl Door for Panel {
+        fn wait(&mut self, _: u64, _: &dyn Clock) -> Result<Wake> {
+            Ok(Wake::default())
+        }
+        fn receive(&mut self, _: &mut Inbox, _: &dyn Clock) {}
+        fn demand(&mut self) -> Demand {
+            Demand::default()
+        }
+        fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
+            self.ticks.push(outbox.tick);
+            Ok(0)
+        }
+        fn publish_tick(&mut self, _: &TickRow) -> Result<()> {
+            Ok(())
+        }
+        fn requests(&mut self, _: &mut dyn FnMut(RequestToken, RequestHeader, &[u8])) {}
+        fn answer(&mut self, _: RequestToken, _: bool, _: &str) -> Result<()> {
+            Ok(())
+        }
+        fn settings(&mut self, take: &mut dyn FnMut(Setting)) {
+            self.settings.drain(..).for_each(take);
+        }
+        fn housekeeping(&mut self) {}
+    }
+
+    /// One setting, then rounds over 100 ms of time; the ticks that came of it.
+    fn after(settings: Vec<Setting>) -> Vec<TickRow> {
+        let scene = Scene::parse(SCENE, "s.toml", Path::new("")).unwrap();
+        let shapes = build_shapes(&scene).unwrap();
+        let clock = Arc::new(ManualClock::new(1_000_000_000));
+        let mut panel = Panel {
+            settings,
+            ..Panel::default()
+        };
+        let shared: Arc<dyn Clock> = Arc::clone(&clock) as _;
+        let mut daemon = Daemon::new(&scene, shapes, 7, shared, &mut panel).unwrap();
+        for _ in 0..100 {
+            daemon.round(None).unwrap();
+            clock.advance(1_000_000);
+        }
+        drop(daemon);
+        panel.ticks
+    }
+
+    fn causes(ticks: &[TickRow], cause: TickCause) -> usize {
+        ticks.iter().filter(|t| t.cause == cause.code()).count()
+    }
+
+    #[test]
+    fn budgets_are_those_of_the_next_tick() {
+        let ticks = after(vec![
+            Setting::BudgetTime(Some(3_000_000)),
+            Setting::BudgetUnits(Some(9)),
+            Setting::TickNow,
+        ]);
+        assert_eq!((ticks[0].budget_ns, ticks[0].budget_units), (3_000_000, 9));
+        let ticks = after(vec![Setting::BudgetTime(None), Setting::TickNow]);
+        assert_eq!(
+            (ticks[0].budget_ns, ticks[0].budget_units),
+            (u64::MAX, u64::MAX)
+        );
+    }
+
+    #[test]
+    fn a_tick_at_once_is_one_tick_and_of_its_own_cause() {
+        let quiet = after(Vec::new());
+        let asked = after(vec![Setting::TickNow]);
+        assert_eq!(causes(&quiet, TickCause::Edit), 0);
+        assert_eq!(causes(&asked, TickCause::Edit), 1);
+    }
+
+    #[test]
+    fn a_mode_is_followed_and_one_that_cannot_be_changes_nothing() {
+        let fast = after(vec![Setting::Mode(Mode::Rate(100.0))]);
+        assert!(fast.len() >= 9, "{} ticks in 100 ms at 100 Hz", fast.len());
+        let before = after(Vec::new()).len();
+        let nobody = Setting::Mode(Mode::OnFrame("nobody".to_owned()));
+        assert_eq!(after(vec![nobody]).len(), before);
+    }
+
+    #[test]
+    fn a_reset_is_an_edit_that_nobody_waits_for() {
+        let ticks = after(vec![Setting::Reset]);
+        assert_eq!(causes(&ticks, TickCause::Edit), 1);
+        assert!(ticks[0].header.scene_rev >= 1);
+    }
+}

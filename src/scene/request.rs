@@ -33,6 +33,7 @@ use crate::scene::node::{Fault, Node, Value};
 use crate::scene::read_body::{
     BODY_NAME_BYTES_MAX, BodyDraft, SOURCE_NAME_BYTES_MAX, read_body, title,
 };
+use crate::scene::read_ros::check_ros;
 use crate::scene::read_rule::read_rule;
 use crate::scene::read_shape::read_pose;
 use crate::scene::resolve::{check_files, settle_source};
@@ -139,6 +140,7 @@ impl BodyDraft {
     /// One text that names the body, what is wrong and what to change.
     pub fn settle(mut self, sources: &[SourceSpec], base: &Path) -> Result<BodySpec, String> {
         settle_source(&mut self, sources)
+            .and_then(|()| check_ros(&self, sources, &mut std::collections::BTreeMap::new()))
             .and_then(|()| check_files(&self, base, &mut std::collections::BTreeSet::new()))
             .map_err(|fault| fault.text)?;
         Ok(self.spec)

@@ -68,6 +68,32 @@ pub enum Setting {
     Reset,
 }
 
+/// What a door needs to know of a body to take its poses from elsewhere, and to show it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BodyNote {
+    /// Its id.
+    pub id: u64,
+    /// Its name.
+    pub name: String,
+    /// Place of its source in the scene.
+    pub source: Option<usize>,
+    /// Its frame in `/tf`.
+    pub frame: String,
+    /// Its topic; empty: none.
+    pub topic: String,
+    /// Centre and half extents of its box in its own frame, metres; `None`: it has no end.
+    pub bounds: Option<([f64; 3], [f64; 3])>,
+}
+
+/// What an edit did to a body.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BodyChange {
+    /// It came, or is another now.
+    Put(BodyNote),
+    /// It left: its name.
+    Removed(String),
+}
+
 /// The daemon's side of a transport.
 ///
 /// One round: `wait`, `receive`, `requests`, then `demand`, the engine's tick, `publish`. A round without a tick ends
@@ -114,6 +140,9 @@ pub trait Door {
 
     /// Hands over what was set since the last call; a door without an operator has nothing.
     fn settings(&mut self, _take: &mut dyn FnMut(Setting)) {}
+
+    /// Says what edits did to bodies, after the tick that applied them; a door whose frames name bodies has no use for it.
+    fn bodies(&mut self, _changes: &[BodyChange]) {}
 
     /// Lets late joiners have the newest state, forgets requests of clients that left. Cheap; each idle round.
     fn housekeeping(&mut self);

@@ -2,6 +2,8 @@
 //!
 //! In: samples of anybody in the DDS domain. Out: frames for the tick thread, which is woken; faults in words.
 
+mod roster;
+
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -117,6 +119,7 @@ impl Inlet {
             let receipt = Receipt {
                 now_ns,
                 waited: now_ns.saturating_sub(round_ns) > silence_ns.max(self.heartbeat_ns * 3 / 2),
+                ros_now_ns: self.shared.now().to_ns(),
             };
             round_ns = now_ns;
             more = self.round(receipt);
@@ -129,6 +132,7 @@ impl Inlet {
             let timeout_ns = self.shared.timeout_ns(source.place);
             source.set_limits(timeout_ns, self.shared.max_skew_ns());
         }
+        self.follow_edits();
         let (mut came, mut more) = (false, false);
         for at in 0..self.lines.len() {
             let (some, rest) = self.take(at, receipt);
@@ -244,8 +248,9 @@ impl Inlet {
         all.extend(self.frame_fault.as_ref().map(|(text, _)| text.clone()));
         let feeders = self.lines.iter().filter_map(Line::feeder);
         all.extend(feeders.filter_map(|feeder| feeder.fault(now_ns)));
+        all.extend(self.shared_topics());
         for source in &self.sources {
-            all.extend(source.faults(FAULTS_MAX));
+            all.extend(source.faults(FAULTS_MAX, now_ns));
         }
         all.truncate(FAULTS_MAX);
         self.shared.set_faults(all);

@@ -8,6 +8,7 @@ use super::poses::Source;
 use super::topics::{In, TypeName, subscription};
 use crate::config::RosKind;
 use crate::error::{Error, Result};
+use crate::transport::BodyChange;
 use crate::wire::ros::{BodyTransforms, Clock, Odometry, PoseStamped, TfMessage};
 
 /// Frames of a client: lockstep wants each of them.
@@ -65,6 +66,13 @@ impl Line {
         }
     }
 
+    /// Gives it to a body: place of its source, and its own among those of the source.
+    pub(super) fn feed(&mut self, source: usize, member: usize) {
+        if let Self::Pose(_, feeder) | Self::Odometry(_, feeder) = self {
+            (feeder.source, feeder.member) = (source, member);
+        }
+    }
+
     /// Whose topic it is, where it is one body's.
     pub(super) fn feeder(&self) -> Option<&Feeder> {
         match self {
@@ -82,7 +90,7 @@ pub(super) struct Feeder {
     /// Place of the body among those of its source.
     pub(super) member: usize,
     /// The topic's full name.
-    topic: String,
+    pub(super) topic: String,
     /// The two publishers last heard, and when, nanoseconds of `CLOCK_BOOTTIME`.
     heard: [Option<(Gid, u64)>; 2],
 }
@@ -118,6 +126,39 @@ impl Feeder {
     }
 }
 
+/// What an edit did to a body, and the subscription that it needs, where it needs one of its own.
+pub(super) struct Arrival {
+    /// What was done.
+    pub(super) change: BodyChange,
+    /// Of a body that came.
+    pub(super) line: Option<Line>,
+}
+
+/// Subscribes to the topic of one body.
+///
+/// # Errors
+/// `Error::Io` when DDS refuses.
+pub(super) fn of_body(
+    node: &mut Node,
+    context: &Context,
+    kind: RosKind,
+    topic: &str,
+) -> Result<Line> {
+    let feeder = Feeder {
+        source: usize::MAX,
+        member: usize::MAX,
+        topic: topic.to_owned(),
+        heard: [None, None],
+    };
+    Ok(if kind == RosKind::Pose {
+        let kind = ("geometry_msgs", "PoseStamped");
+        Line::Pose(subscription(node, context, (topic, kind), NEWEST)?, feeder)
+    } else {
+        let kind = ("nav_msgs", "Odometry");
+        Line::Odometry(subscription(node, context, (topic, kind), NEWEST)?, feeder)
+    })
+}
+
 /// Subscribes to what the scene needs, each topic once.
 ///
 /// # Errors
@@ -149,20 +190,9 @@ pub(super) fn subscribe(
             continue;
         }
         for (member, given) in source.topics().enumerate() {
-            let full = topic(given)?;
-            let feeder = Feeder {
-                source: place,
-                member,
-                topic: full.clone(),
-                heard: [None, None],
-            };
-            lines.push(if source.kind == RosKind::Pose {
-                let kind = ("geometry_msgs", "PoseStamped");
-                Line::Pose(subscription(node, context, (&full, kind), NEWEST)?, feeder)
-            } else {
-                let kind = ("nav_msgs", "Odometry");
-                Line::Odometry(subscription(node, context, (&full, kind), NEWEST)?, feeder)
-            });
+            let mut line = of_body(node, context, source.kind, &topic(given)?)?;
+            line.feed(place, member);
+            lines.push(line);
         }
     }
     for (full, fixed, sources) in trees {

@@ -6,16 +6,17 @@
 //! a second, and opening and closing are its work, so that the tick never waits for them; peers find the new
 //! participant as they find a restarted daemon, with the boot id as it was.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use super::RosNode;
+use super::services::open;
+use super::{RosNode, RosScene};
 use crate::error::{Error, Result};
 use crate::time::Clock;
-use crate::transport::{Door, RequestToken, Setting, Wake};
+use crate::transport::{BodyChange, Door, RequestToken, Setting, Wake};
 use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow};
 
 /// How often it is looked whether DDS lives: silence is told by the lease after 3 s.
@@ -25,8 +26,8 @@ const DDS_THREADS: [&str; 2] = ["RustDDS Partici", "RustDDS discove"];
 /// Requests of one node are told from those of the next by their upper bits; the uppermost is the daemon's.
 const NODE_SHIFT: u32 = 40;
 
-/// Opens the node.
-type Opener = Box<dyn Fn() -> Result<RosNode> + Send>;
+/// Opens the node for a scene.
+pub type Opener = Box<dyn Fn(&RosScene) -> Result<RosNode> + Send>;
 
 /// A node that is opened anew when DDS has died beneath it.
 pub struct LastingNode {
@@ -36,6 +37,10 @@ pub struct LastingNode {
     number: u64,
     /// Whether the node must be told all names, because it did not hear them before.
     tell_names: bool,
+    /// The scene as edits have left it.
+    scene: Arc<Mutex<RosScene>>,
+    /// What edits did while there was no node; the next one may have been opened before them.
+    missed: Vec<BodyChange>,
     dead: Arc<AtomicBool>,
     ended: Arc<AtomicBool>,
     broken: Option<Sender<RosNode>>,
@@ -56,8 +61,10 @@ impl LastingNode {
     ///
     /// # Errors
     /// Those of [`RosNode::open`].
-    pub fn open(opener: Box<dyn Fn() -> Result<RosNode> + Send>) -> Result<Self> {
-        let live = opener()?;
+    pub fn open(scene: RosScene, opener: Opener) -> Result<Self> {
+        let live = opener(&scene)?;
+        let scene = Arc::new(Mutex::new(scene));
+        let watched = Arc::clone(&scene);
         let (broken, to_mend) = channel();
         let (give, mended) = channel();
         let dead = Arc::new(AtomicBool::new(false));
@@ -65,12 +72,14 @@ impl LastingNode {
         let flags = (Arc::clone(&dead), Arc::clone(&ended));
         let watcher = std::thread::Builder::new()
             .name("ros-watch".to_owned())
-            .spawn(move || watch(&opener, &flags, &to_mend, &give))
+            .spawn(move || watch((&opener, &watched), &flags, &to_mend, &give))
             .map_err(|e| Error::io("cannot start the thread ros-watch", e))?;
         Ok(Self {
             live: Some(live),
             number: 0,
             tell_names: false,
+            scene,
+            missed: Vec::new(),
             dead,
             ended,
             broken: Some(broken),
@@ -87,8 +96,9 @@ impl LastingNode {
                 let _gone = broken.send(node);
             }
         } else if self.live.is_none()
-            && let Ok(node) = self.mended.try_recv()
+            && let Ok(mut node) = self.mended.try_recv()
         {
+            node.bodies(&std::mem::take(&mut self.missed));
             self.live = Some(node);
             self.number += 1;
             self.tell_names = true;
@@ -109,7 +119,7 @@ impl Drop for LastingNode {
 
 /// Looks, and opens the node anew where it must.
 fn watch(
-    opener: &Opener,
+    (opener, scene): (&Opener, &Mutex<RosScene>),
     (dead, ended): &(Arc<AtomicBool>, Arc<AtomicBool>),
     to_mend: &Receiver<RosNode>,
     give: &Sender<RosNode>,
@@ -130,7 +140,8 @@ fn watch(
         drop(broken);
         let mut told = false;
         let node = loop {
-            match opener() {
+            let scene = open(scene).clone();
+            match opener(&scene) {
                 Ok(node) => break node,
                 Err(e) if !told => {
                     told = true;
@@ -225,6 +236,16 @@ impl Door for LastingNode {
     fn settings(&mut self, take: &mut dyn FnMut(Setting)) {
         if let Some(node) = &mut self.live {
             node.settings(take);
+        }
+    }
+
+    fn bodies(&mut self, changes: &[BodyChange]) {
+        let mut scene = open(&self.scene);
+        changes.iter().for_each(|change| scene.follow(change));
+        drop(scene);
+        match &mut self.live {
+            Some(node) => node.bodies(changes),
+            None => self.missed.extend_from_slice(changes),
         }
     }
 

@@ -32,9 +32,10 @@ mod tf;
 mod topics;
 mod wheel;
 
-pub use mend::LastingNode;
+pub use mend::{LastingNode, Opener};
 pub use node::{RosNode, RosOptions};
 
+use super::{BodyChange, BodyNote};
 use crate::config::{Config, RosSource};
 
 /// What the node needs to know of a scene.
@@ -47,7 +48,7 @@ pub struct RosScene {
     /// Its sources, in its order.
     pub sources: Vec<RosSourceSpec>,
     /// Its bodies.
-    pub bodies: Vec<RosBody>,
+    pub bodies: Vec<BodyNote>,
 }
 
 /// A source of the scene.
@@ -61,19 +62,13 @@ pub struct RosSourceSpec {
     pub ros2: Option<RosSource>,
 }
 
-/// A body of the scene.
-#[derive(Clone, Debug)]
-pub struct RosBody {
-    /// Its id.
-    pub id: u64,
-    /// Its name.
-    pub name: String,
-    /// Place of its source.
-    pub source: Option<usize>,
-    /// Its frame in `/tf`.
-    pub frame: String,
-    /// Its topic; empty: none.
-    pub topic: String,
-    /// Centre and half extents of its box in its own frame, metres; `None`: it has no end.
-    pub bounds: Option<([f64; 3], [f64; 3])>,
+impl RosScene {
+    /// Follows an edit.
+    fn follow(&mut self, change: &BodyChange) {
+        let (BodyChange::Put(BodyNote { name, .. }) | BodyChange::Removed(name)) = change;
+        self.bodies.retain(|body| body.name != *name);
+        if let BodyChange::Put(body) = change {
+            self.bodies.push(body.clone());
+        }
+    }
 }

@@ -7,15 +7,18 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 
-use make::{join, make, namesakes, said};
+pub(super) use make::join;
+use make::{make, namesakes, said};
 use ros2_client::{Context, RosoutRaw as _, Spinner};
 use rustdds::mio1::Waker;
 
+use super::RosScene;
 use super::args::RosArgs;
 use super::diagnose::Diagnoser;
 use super::env::{Network, Range};
 use super::inlet::Inlet;
 use super::lines::subscribe;
+use super::markers::Boxes;
 use super::names::Names;
 use super::outlet::{Outlet, Publishers, Read};
 use super::params::Table;
@@ -26,10 +29,9 @@ use super::shared::{Say, Shared};
 use super::shelf::Shelf;
 use super::sockets;
 use super::speak::{Book, Speaker};
-use super::{RosBody, RosScene};
 use crate::error::{Error, Result};
 use crate::time::Clock;
-use crate::transport::{Door, RequestToken, Setting as Applied, Wake};
+use crate::transport::{BodyChange, BodyNote, Door, RequestToken, Setting as Applied, Wake};
 use crate::wire::{
     Answer, BODY_NAME_LEN, Demand, Inbox, NameRow, Outbox, RequestHeader, TickRow, WIRE_VERSION,
 };
@@ -128,7 +130,6 @@ impl RosNode {
             wake,
             (scene.frame_id.clone(), heartbeat_ns),
         )?;
-        let boxes = scene.bodies.iter();
         let outlet = Outlet {
             node,
             context: context.clone(),
@@ -144,9 +145,11 @@ impl RosNode {
             diagnoser: Diagnoser::default(),
             told: (TickRow::default(), 0),
             shown_ns: 0,
-            boxes: boxes.filter_map(|b| Some((b.id, b.bounds?))).collect(),
+            boxes: boxes(scene),
             read: Read::default(),
             namesakes,
+            names: names.clone(),
+            sources: scene.sources.clone(),
         };
         let mut open = Self {
             shelf,
@@ -228,9 +231,15 @@ impl Drop for RosNode {
     }
 }
 
+/// The boxes of bodies that have an end.
+fn boxes(scene: &RosScene) -> Boxes {
+    let bodies = scene.bodies.iter();
+    bodies.filter_map(|b| Some((b.id, b.bounds?))).collect()
+}
+
 /// The names before the first tick says them.
 fn first_names(scene: &RosScene) -> Vec<NameRow> {
-    let row = |body: &RosBody| {
+    let row = |body: &BodyNote| {
         let mut name = [0; BODY_NAME_LEN];
         for (to, from) in name.iter_mut().zip(body.name.bytes()) {
             *to = from;
@@ -312,6 +321,10 @@ impl Door for RosNode {
             self.ticks_asked.extend(asked);
             take(Applied::TickNow);
         }
+    }
+
+    fn bodies(&mut self, changes: &[BodyChange]) {
+        open(&self.shared.changes).extend_from_slice(changes);
     }
 
     fn housekeeping(&mut self) {}

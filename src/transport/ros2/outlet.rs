@@ -9,16 +9,21 @@ use std::time::Duration;
 use ros2_client::{Context, Node, ParameterValue, Publisher};
 use serde::Serialize;
 
+use super::RosSourceSpec;
 use super::diagnose::Diagnoser;
+use super::lines::{Arrival, Line, of_body};
 use super::markers::{Boxes, collisions, markers};
 use super::names::Names;
 use super::parcel::{Next, Parcel, Parcels};
+use super::services::open;
 use super::shared::{Say, Shared};
 use super::speak::{Book, Speaker};
 use super::topics::{Out, publisher};
 use super::wheel::{Sent, Wheel};
+use crate::config::RosKind;
 use crate::error::{Error, Result};
 use crate::time::{Clock as _, SystemClock};
+use crate::transport::{BodyChange, BodyNote};
 use crate::wire::ros;
 use crate::wire::{Demand, NameRow, TickRow};
 
@@ -165,6 +170,9 @@ pub(super) struct Outlet {
     pub(super) read: Read,
     /// Tells of another node of this one's name.
     pub(super) namesakes: Box<dyn FnMut() -> Option<String> + Send>,
+    /// Makes full names of the topics of bodies that come.
+    pub(super) names: Names,
+    pub(super) sources: Vec<RosSourceSpec>,
 }
 
 /// What somebody listens to, as of the last look.
@@ -184,6 +192,7 @@ impl Outlet {
     /// Runs until the node closes; then the node leaves the graph.
     pub(super) fn run(mut self) {
         loop {
+            self.follow_edits();
             self.look_who_listens();
             // The crate keeps this parameter to itself: its set action is never called.
             let sim_time = self.node.get_parameter("use_sim_time");
@@ -208,6 +217,37 @@ impl Outlet {
             }
         }
         self.node.stop_spinner();
+    }
+
+    /// Boxes and subscriptions of bodies that edits put: only this thread has the node.
+    fn follow_edits(&mut self) {
+        let changes = std::mem::take(&mut *open(&self.shared.changes));
+        for change in changes {
+            let line = match &change {
+                BodyChange::Put(body) => self.meet(body),
+                BodyChange::Removed(_) => None,
+            };
+            open(&self.shared.arrivals).push(Arrival { change, line });
+        }
+    }
+
+    /// Takes a body that came; the subscription it needs, if it needs one.
+    fn meet(&mut self, body: &BodyNote) -> Option<Line> {
+        match body.bounds {
+            Some(bounds) => self.boxes.insert(body.id, bounds),
+            None => self.boxes.remove(&body.id),
+        };
+        let kind = self.sources.get(body.source?)?.ros2.as_ref()?.kind;
+        if kind == RosKind::Tf {
+            return None;
+        }
+        let topic = self.names.resolve(&body.topic).map_err(Error::Usage);
+        let line = topic.and_then(|topic| of_body(&mut self.node, &self.context, kind, &topic));
+        line.map_err(|e| {
+            let text = format!("body {}: no poses of it can come: {e}", body.name);
+            self.shared.say(Say::Warn, &text);
+        })
+        .ok()
     }
 
     fn look_who_listens(&mut self) {
@@ -269,6 +309,8 @@ impl Outlet {
         let book = Book::of(rows);
         self.shared.set_book(Arc::new(book.clone()));
         self.speaker.book = book;
+        let book = &self.speaker.book;
+        self.boxes.retain(|id, _| !book.name(*id).is_empty());
         let now = self.shared.now();
         for message in self.speaker.names(now, self.boot_id, scene_rev) {
             self.publish(&self.publishers.names, message);

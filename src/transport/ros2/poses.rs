@@ -1,9 +1,16 @@
 //! From messages of common types to poses of bodies. In: links of `/tf`, stamped poses, odometry. Out: [`Update`]s
 //! for the bodies concerned, or the reason why a body's place is not known. Pure: no DDS, no clock.
 
+mod judge;
+mod roster;
+mod stamps;
+
+use judge::judge;
+use stamps::{off, older};
+
 use super::RosScene;
 use super::shelf::Update;
-use super::tf::{Found, Missing, Taken, Tree};
+use super::tf::{Missing, Taken, Tree};
 use crate::config::RosKind;
 use crate::math::{Quat, Vec3, pose_from};
 use crate::wire::ros::{Odometry, PoseStamped, TfMessage};
@@ -16,7 +23,12 @@ pub(super) struct Receipt {
     pub(super) now_ns: u64,
     /// Whether the process stood still before it was read.
     pub(super) waited: bool,
+    /// The node's time, which is what senders stamp with, nanoseconds; 0: not known.
+    pub(super) ros_now_ns: u64,
 }
+
+/// In place of the id of a body that has left: no body has it.
+const NOBODY: u64 = 0;
 
 /// One body of a source of common topics.
 #[derive(Debug)]
@@ -58,6 +70,8 @@ pub(super) struct Source {
     pub(super) skew_ns: Option<u64>,
     /// Messages or links that were refused.
     pub(super) refused: u64,
+    /// What was last wrong with a stamp, and when, nanoseconds of `CLOCK_BOOTTIME`.
+    passing: Option<(String, u64)>,
 }
 
 impl Source {
@@ -69,16 +83,7 @@ impl Source {
             let mut tree = Tree::default();
             let root = tree.id(&scene.frame_id).unwrap_or_default();
             let bodies = scene.bodies.iter().filter(|b| b.source == Some(place));
-            let members = bodies.map(|body| Member {
-                body: body.id,
-                name: body.name.clone(),
-                frame: tree.id(&body.frame).unwrap_or_default(),
-                topic: body.topic.clone(),
-                stamp_ns: 0,
-                last: None,
-                told_ns: 0,
-                fault: None,
-            });
+            let members = bodies.map(|body| Member::of(body, &mut tree)).collect();
             all.push(Self {
                 kind: ros.kind,
                 name: name_bytes(&spec.name),
@@ -88,11 +93,12 @@ impl Source {
                 timeout_ns: spec.timeout_ns,
                 max_skew_ns: ros.max_skew_ns,
                 scene_skew_ns: ros.max_skew_ns,
-                members: members.collect(),
+                members,
                 root: (scene.frame_id.clone(), root),
                 tree,
                 skew_ns: None,
                 refused: 0,
+                passing: None,
             });
         }
         all
@@ -109,12 +115,12 @@ impl Source {
     }
 
     /// What is wrong with its bodies now, at most `most` of them.
-    pub(super) fn faults(&self, most: usize) -> Vec<String> {
+    pub(super) fn faults(&self, most: usize, now_ns: u64) -> Vec<String> {
         let faulty = self.members.iter().filter_map(|member| {
             let fault = member.fault.as_ref()?;
             Some(format!("body {}: {fault}", member.name))
         });
-        faulty.take(most).collect()
+        faulty.chain(self.passing(now_ns)).take(most).collect()
     }
 
     /// Sets its time-out, and the widest skew of a chain (`None`: as the scene says).
@@ -143,11 +149,17 @@ impl Source {
     ) -> bool {
         let mut back = false;
         for link in &message.transforms {
-            match self.tree.take(link, fixed, receipt.now_ns, self.timeout_ns) {
-                Taken::Newer => {}
-                Taken::Older | Taken::Refused => self.refused += 1,
-                Taken::WentBack => back = true,
-            }
+            let what = ("frame", link.child_frame_id.as_str());
+            let stamp_ns = link.header.stamp.to_ns();
+            let taken = self.tree.take(link, fixed, receipt.now_ns, self.timeout_ns);
+            let odd = match taken {
+                Taken::Newer if !fixed => off(what, stamp_ns, receipt, self.timeout_ns),
+                Taken::Older(by_ns) => Some(older(what, by_ns)),
+                Taken::Newer | Taken::Refused | Taken::WentBack => None,
+            };
+            back |= taken == Taken::WentBack;
+            self.refused += u64::from(matches!(taken, Taken::Older(_) | Taken::Refused));
+            self.tell(odd, receipt);
         }
         if back {
             self.members
@@ -163,7 +175,8 @@ impl Source {
             return;
         }
         let (mut skew_ns, root) = (None, self.root.1);
-        for (place, member) in self.members.iter_mut().enumerate() {
+        let members = self.members.iter_mut().enumerate();
+        for (place, member) in members.filter(|(_, member)| member.body != NOBODY) {
             let found = self.tree.find(member.frame, root);
             if let Ok(found) = &found
                 && found.received_ns.is_some()
@@ -285,12 +298,16 @@ impl Source {
         };
         let mut back = false;
         if stamp_ns < member.stamp_ns {
-            if member.stamp_ns - stamp_ns <= self.timeout_ns {
+            let by_ns = member.stamp_ns - stamp_ns;
+            if by_ns <= self.timeout_ns {
+                let odd = older(("body", &member.name), by_ns);
                 self.refused += 1;
+                self.tell(Some(odd), receipt);
                 return false;
             }
             back = true;
         }
+        let odd = off(("body", &member.name), stamp_ns, receipt, self.timeout_ns);
         let plain = frame.strip_prefix('/').unwrap_or(frame);
         let mut result = Ok(row);
         member.fault = None;
@@ -304,6 +321,7 @@ impl Source {
         if back {
             self.forget();
         }
+        self.tell(odd, receipt);
         if let Some(member) = self.members.get_mut(place) {
             member.stamp_ns = stamp_ns;
         }
@@ -319,67 +337,15 @@ impl Source {
     }
 }
 
-/// What a chain says of its body: a pose, a refusal, or nothing yet; and the fault in words.
-fn judge(
-    found: &Result<Found, Missing>,
-    now_ns: u64,
-    max_skew_ns: u64,
-    timeout_ns: u64,
-    root: &str,
-) -> (Option<Result<TransformRow, RejectReason>>, Option<String>) {
-    match found {
-        Ok(found) => {
-            let old = found
-                .received_ns
-                .is_some_and(|(_, earliest)| now_ns.saturating_sub(earliest) > timeout_ns);
-            if found.skew_ns > max_skew_ns || old {
-                let why = if old {
-                    "a link of its chain is older than the source's time-out".to_owned()
-                } else {
-                    format!(
-                        "the stamps of its chain lie {:.3} s apart, more than max_skew {:.3} s",
-                        seconds(found.skew_ns),
-                        seconds(max_skew_ns)
-                    )
-                };
-                return (Some(Err(RejectReason::BadChain)), Some(why));
-            }
-            let row = TransformRow {
-                position: found.position,
-                orientation: found.orientation,
-                ..TransformRow::default()
-            };
-            (Some(Ok(row)), None)
-        }
-        // Nobody has said where it is: it is not received, which is no refusal.
-        Err(Missing::Frame(frame)) => (
-            None,
-            Some(format!(
-                "no link from frame \"{frame}\" towards \"{root}\" has come"
-            )),
-        ),
-        Err(Missing::Loop(frame)) => (
-            Some(Err(RejectReason::BadChain)),
-            Some(format!("the links from frame \"{frame}\" lead in a loop")),
-        ),
-        Err(Missing::Bad(frame, reason)) => (
-            Some(Err(*reason)),
-            Some(format!(
-                "the link of frame \"{frame}\" is no pose: {reason}"
-            )),
-        ),
-    }
-}
-
 /// Nanoseconds as seconds.
 pub(super) fn seconds(ns: u64) -> f64 {
     std::time::Duration::from_nanos(ns).as_secs_f64()
 }
 
-/// A twist of the body's frame in the scene's frame; of a body without a pose it is no number.
+/// A twist of the body's frame in the scene's frame; zeros beside a pose that is none, which is refused for itself.
 fn turned(turn: Option<Quat>, linear: [f64; 3], angular: [f64; 3]) -> [f64; 6] {
     let Some(turn) = turn else {
-        return [f64::NAN; 6];
+        return [0.0; 6];
     };
     let (l, a) = (turn * Vec3::from(linear), turn * Vec3::from(angular));
     [l.x, l.y, l.z, a.x, a.y, a.z]

@@ -7,12 +7,13 @@ use std::sync::{Arc, Mutex};
 use ros2_client::log::Log;
 use ros2_client::{Publisher, builtin_interfaces};
 
+use super::lines::Arrival;
 use super::params::{Effect, Own};
 use super::parcel::Caps;
 use super::services::{Desk, open};
 use super::speak::{Book, Counts};
 use crate::time::SystemClock;
-use crate::transport::Setting;
+use crate::transport::{BodyChange, Setting};
 use crate::wire::Demand;
 use crate::wire::ros::Time;
 
@@ -50,6 +51,10 @@ pub(super) struct Shared {
     /// For the tick thread.
     settings: Mutex<Vec<Setting>>,
     pub(super) desk: Desk,
+    /// What edits did to bodies, for the sending thread, which has the node.
+    pub(super) changes: Mutex<Vec<BodyChange>>,
+    /// The same, with the new subscriptions, for the receiving thread.
+    pub(super) arrivals: Mutex<Vec<Arrival>>,
     book: Mutex<Arc<Book>>,
     faults: Mutex<Vec<String>>,
     rosout: Mutex<Option<Arc<Option<Publisher<Log>>>>>,
@@ -90,6 +95,8 @@ impl Shared {
             sim_now_ns: AtomicU64::new(0),
             settings: Mutex::new(Vec::new()),
             desk: Desk::default(),
+            changes: Mutex::default(),
+            arrivals: Mutex::default(),
             book: Mutex::new(Arc::new(book)),
             faults: Mutex::new(Vec::new()),
             rosout: Mutex::new(None),

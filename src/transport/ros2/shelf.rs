@@ -77,6 +77,25 @@ impl Shelf {
         });
     }
 
+    /// Gives a place of a group to a body, or to nobody (id 0); what waits there is dropped.
+    pub(super) fn set_member(&self, group: usize, member: usize, body: u64) {
+        let mut waiting = open(&self.waiting);
+        let Some(group) = waiting.groups.get_mut(group) else {
+            return;
+        };
+        if member >= group.bodies.len() {
+            group.bodies.resize(member + 1, 0);
+            group.newest.resize(member + 1, None);
+        }
+        if let (Some(id), Some(newest)) =
+            (group.bodies.get_mut(member), group.newest.get_mut(member))
+        {
+            *id = body;
+            *newest = None;
+            group.touched.retain(|&touched| touched != member);
+        }
+    }
+
     /// An emptied frame whose memory has been used before.
     pub(super) fn spare(&self) -> Frame {
         open(&self.waiting).spare.pop().unwrap_or_default()

@@ -35,8 +35,8 @@ struct Link {
 pub(super) enum Taken {
     /// It is the newest of its frame.
     Newer,
-    /// One with a later stamp is there already; it is passed over.
-    Older,
+    /// One with a stamp later by so much is there already, nanoseconds; it is passed over.
+    Older(u64),
     /// It is so much older than the one that is there that time has gone back.
     WentBack,
     /// A frame without a name, hung on itself, or one too many.
@@ -133,7 +133,7 @@ impl Tree {
             && stamp_ns < old.stamp_ns
         {
             if old.stamp_ns - stamp_ns <= back_ns {
-                return Taken::Older;
+                return Taken::Older(old.stamp_ns - stamp_ns);
             }
             taken = Taken::WentBack;
             self.forget();
@@ -306,7 +306,7 @@ mod tests {
         tree.take(&link("world", "b", 1.0, 2000), false, 1, BACK_NS);
         assert_eq!(
             tree.take(&link("world", "a", 2.0, 1900), false, 2, BACK_NS),
-            Taken::Older
+            Taken::Older(100)
         );
         assert_eq!(find(&mut tree, "a").unwrap().position[0], 1.0);
         assert_eq!(

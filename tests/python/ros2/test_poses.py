@@ -1,117 +1,14 @@
 """Poses from topics of common types: /tf, PoseStamped, Odometry; what they may do wrong is told."""
 
 import math
-import time
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from conftest import LATCHED
 from frames import Sender, pose
-from geometry_msgs.msg import PoseStamped, TransformStamped
-from nav_msgs.msg import Odometry
+from geometry_msgs.msg import PoseStamped
 from sweepd_msgs.msg import BodyTransforms, State, Tick
 from tf2_msgs.msg import TFMessage
-
-SCENE = """
-frame_id = "world"
-[run]
-rate = 50
-[[source]]
-name = "tf"
-timeout_ms = 500
-ros2 = { type = "tf", max_skew_ms = 200 }
-[[source]]
-name = "poses"
-timeout_ms = 500
-ros2 = { type = "pose" }
-[[source]]
-name = "odom"
-timeout_ms = 500
-ros2 = { type = "odometry" }
-[[source]]
-name = "sim"
-timeout_ms = 500
-[[body]]
-name = "base"
-source = "tf"
-shape = { type = "sphere", radius = 0.1 }
-[[body]]
-name = "hand"
-source = "tf"
-ros_frame = "arm_tip"
-shape = { type = "sphere", radius = 0.1 }
-[[body]]
-name = "person"
-source = "poses"
-ros_topic = "/tracker/person"
-shape = { type = "sphere", radius = 0.1 }
-[[body]]
-name = "cart"
-source = "odom"
-ros_topic = "/cart/odom"
-shape = { type = "sphere", radius = 0.1 }
-[[body]]
-name = "box"
-source = "sim"
-shape = { type = "sphere", radius = 0.1 }
-"""
-
-
-def ns(clock):
-    return clock.sec * 10**9 + clock.nanosec
-
-
-class Feeder:
-    """Sends a set of poses on all four kinds of topics; each can be bent or left out."""
-
-    def __init__(self, room, node):
-        self.room, self.node = room, node
-        self.tf = node.create_publisher(TFMessage, "/tf", 10)
-        self.fixed = node.create_publisher(TFMessage, "/tf_static", LATCHED)
-        self.person = node.create_publisher(PoseStamped, "/tracker/person", 10)
-        self.cart = node.create_publisher(Odometry, "/cart/odom", 10)
-        self.sim = Sender(node)
-        self.x = {"base": 0.0, "person": 2.0, "cart": 3.0, "box": 4.0}
-        self.skip = set()
-        self.shift_ns = {}
-        self.fixed.publish(TFMessage(transforms=[self.link("mount", "base", (0.0, 0.0, 0.5), stamp_ns=0),
-                                                 self.link("arm_tip", "elbow", (0.5, 0.0, 0.0), stamp_ns=0)]))  # fmt: skip
-
-    def link(self, child, parent, at, turn=(0.0, 0.0, 0.0, 1.0), stamp_ns=None):
-        out = TransformStamped(child_frame_id=child)
-        out.header.frame_id = parent
-        self.stamp(out.header, child, stamp_ns)
-        placed = pose(at, turn)
-        out.transform.translation.x, out.transform.translation.y, out.transform.translation.z = at
-        out.transform.rotation = placed.orientation
-        return out
-
-    def stamp(self, header, who, stamp_ns=None):
-        stamp_ns = time.time_ns() + self.shift_ns.get(who, 0) if stamp_ns is None else stamp_ns
-        header.stamp.sec, header.stamp.nanosec = divmod(stamp_ns, 10**9)
-
-    def __call__(self):
-        half = math.sqrt(0.5)
-        links = [
-            self.link("base", "world", (self.x["base"], 0.0, 0.0)),
-            self.link("elbow", "mount", (0.0, 0.0, 0.5), (0.0, 0.0, half, half)),
-        ]
-        self.tf.publish(TFMessage(transforms=[one for one in links if one.child_frame_id not in self.skip]))
-        if "person" not in self.skip:
-            message = PoseStamped(pose=pose((self.x["person"], 0.0, 0.0)))
-            message.header.frame_id = "world"
-            self.stamp(message.header, "person")
-            self.person.publish(message)
-        if "cart" not in self.skip:
-            message = Odometry(child_frame_id="cart_link")
-            message.header.frame_id = "world"
-            message.pose.pose = pose((self.x["cart"], 0.0, 0.0))
-            message.twist.twist.linear.x = 1.5
-            self.stamp(message.header, "cart")
-            self.cart.publish(message)
-        if "box" not in self.skip:
-            self.sim.send({"box": (self.x["box"], 0.0, 0.0)})
-
+from topics import SCENE, Feeder
 
 @pytest.fixture
 def fed(room):
@@ -174,50 +71,6 @@ def test_stamps_too_far_apart_along_a_chain_make_the_body_unknown_and_are_publis
     room.until(lambda: states[-1].word == "clear", "clear again", then=feeder)
 
 
-def test_a_loop_in_tf_makes_the_body_unknown_and_is_told(fed):
-    room, feeder, states = fed
-    said = room.hear(DiagnosticArray, "/diagnostics")
-    feeder.skip = {"elbow"}
-
-    def looped():
-        feeder()
-        feeder.tf.publish(TFMessage(transforms=[feeder.link("elbow", "arm_tip", (0.0, 0.0, 0.5))]))
-
-    room.until(lambda: states[-1].word == "unknown", "unknown", then=looped)
-    room.until(lambda: any("loop" in str(message) for message in said[-3:]), "a word on the loop", then=looped)
-    feeder.skip = set()
-    room.until(lambda: states[-1].word == "clear", "clear again", then=feeder)
-
-
-def test_a_frame_that_never_appears_is_told(room):
-    room.daemon(SCENE)
-    node = room.node()
-    states = room.hear(State, "/sweepd/state")
-    said = room.hear(DiagnosticArray, "/diagnostics")
-    feeder = Feeder(room, node)
-    feeder.skip = {"elbow"}
-    room.until(lambda: any("hand" in str(m) or "arm_tip" in str(m) for m in said), "a word on the missing frame", then=feeder)
-    assert "clear" not in {state.word for state in states} and "not_received" in states[-1].reason_words
-
-
-def test_a_quaternion_of_zeros_is_refused_and_the_body_unknown(fed):
-    room, feeder, states = fed
-    ticks = room.hear(Tick, "/sweepd/tick")
-    feeder.skip = {"person"}
-
-    def bent():
-        feeder()
-        message = PoseStamped(pose=pose((2, 0, 0), (0, 0, 0, 0)))
-        message.header.frame_id = "world"
-        feeder.stamp(message.header, "person")
-        feeder.person.publish(message)
-
-    room.until(lambda: states[-1].word == "unknown" and "rejected" in states[-1].reason_words, "unknown: rejected", then=bent)
-    room.until(lambda: ticks and ticks[-1].rejects[Tick.REJECT_BAD_QUATERNION], "counted by its reason", then=bent)
-    feeder.skip = set()
-    room.until(lambda: states[-1].word == "clear", "clear again", then=feeder)
-
-
 def test_a_pose_in_another_frame_than_the_scenes_is_refused_and_told(fed):
     room, feeder, states = fed
     said = room.hear(DiagnosticArray, "/diagnostics")
@@ -232,23 +85,6 @@ def test_a_pose_in_another_frame_than_the_scenes_is_refused_and_told(fed):
 
     room.until(lambda: states[-1].word == "unknown", "unknown", then=lost)
     room.until(lambda: any("somewhere" in str(message) for message in said), "a word on the frame", then=lost)
-
-
-def test_a_body_fed_by_two_topics_is_told_and_its_own_source_wins(fed):
-    room, feeder, states = fed
-    ticks = room.hear(Tick, "/sweepd/tick")
-    other = Sender(feeder.node)
-
-    def both():
-        feeder()
-        other.session = feeder.sim.session
-        other.seq = feeder.sim.seq
-        feeder.sim.seq += 1
-        other.send({"person": (4.0, 0.0, 0.0)}, flags=BodyTransforms.PARTIAL)
-
-    before = ticks[-1].rejects[Tick.REJECT_WRONG_SOURCE] if ticks else 0
-    room.until(lambda: ticks and ticks[-1].rejects[Tick.REJECT_WRONG_SOURCE] > before, "refused: wrong source", then=both)
-    assert states[-1].word == "clear"
 
 
 @pytest.mark.parametrize("run", ['on_frame = "tf"', 'on_frame = "poses"'])

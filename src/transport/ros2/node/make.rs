@@ -92,7 +92,7 @@ pub(super) fn namesakes(
 }
 
 /// Joins the DDS domain, on this host or on all its networks.
-pub(super) fn join(network: Network) -> Result<Context> {
+pub(in super::super) fn join(network: Network) -> Result<Context> {
     let failed = |e: &dyn std::fmt::Display| {
         Error::Refused(format!(
             "ROS 2: domain {} cannot be joined: {e}",

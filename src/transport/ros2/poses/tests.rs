@@ -4,7 +4,8 @@
 
 use super::*;
 use crate::config::RosSource;
-use crate::transport::ros2::{RosBody, RosSourceSpec};
+use crate::transport::BodyNote;
+use crate::transport::ros2::RosSourceSpec;
 use crate::wire::ros::{Header, Time, Transform, TransformStamped};
 
 const MS: u64 = 1_000_000;
@@ -24,7 +25,7 @@ fn source(kind: RosKind, max_skew_ns: u64, frame: &str) -> Source {
             timeout_ns: 500 * MS,
             ros2: Some(ros2),
         }],
-        bodies: vec![RosBody {
+        bodies: vec![BodyNote {
             id: 1,
             name: "a".to_owned(),
             source: Some(0),
@@ -45,6 +46,7 @@ fn at(now_ns: u64) -> Receipt {
     Receipt {
         now_ns,
         waited: false,
+        ros_now_ns: 0,
     }
 }
 
@@ -76,13 +78,13 @@ fn look(source: &mut Source, now_ns: u64) -> Vec<Update> {
 fn a_body_is_said_when_a_link_of_its_chain_comes_and_not_again() {
     let mut one = tf("tool");
     assert!(look(&mut one, MS).is_empty());
-    assert!(one.faults(9)[0].contains("no link from frame \"tool\" towards \"world\""));
+    assert!(one.faults(9, 0)[0].contains("no link from frame \"tool\" towards \"world\""));
     one.take_links(&link("world", "base", MS), false, at(MS));
     one.take_links(&link("base", "tool", 2 * MS), false, at(2 * MS));
     let said = look(&mut one, 2 * MS);
     assert_eq!(said[0].result.unwrap().position, [2.0, 0.0, 0.0]);
     assert_eq!((said[0].stamp_ns, one.skew_ns), (MS, Some(MS)));
-    assert!(one.faults(9).is_empty() && look(&mut one, 3 * MS).is_empty());
+    assert!(one.faults(9, 0).is_empty() && look(&mut one, 3 * MS).is_empty());
 }
 
 #[test]
@@ -92,9 +94,9 @@ fn stamps_too_far_apart_make_the_body_unknown_and_say_so() {
     one.take_links(&link("base", "tool", 90 * MS), false, at(MS));
     assert_eq!(look(&mut one, MS)[0].result, Err(RejectReason::BadChain));
     assert!(
-        one.faults(9)[0].contains("0.080 s apart"),
+        one.faults(9, 0)[0].contains("0.080 s apart"),
         "{:?}",
-        one.faults(9)
+        one.faults(9, 0)
     );
     one.take_links(&link("world", "base", 90 * MS), false, at(2 * MS));
     assert!(look(&mut one, 2 * MS)[0].result.is_ok());
@@ -119,7 +121,7 @@ fn a_loop_and_a_zero_quaternion_refuse_the_body_with_the_reason() {
     one.take_links(&link("b", "a", MS), false, at(MS));
     one.take_links(&link("a", "b", MS), false, at(MS));
     assert_eq!(look(&mut one, MS)[0].result, Err(RejectReason::BadChain));
-    assert!(one.faults(9)[0].contains("loop"));
+    assert!(one.faults(9, 0)[0].contains("loop"));
     let mut zero = link("world", "a", 2 * MS);
     zero.transforms[0].transform.rotation = [0.0; 4].into();
     one.take_links(&zero, false, at(2 * MS));
@@ -164,7 +166,7 @@ fn a_pose_in_another_frame_makes_its_body_unknown() {
     pose.header.frame_id = "map".to_owned();
     one.take_pose(0, &pose, at(MS), &mut updates);
     assert_eq!(updates[0].result, Err(RejectReason::BadChain));
-    assert!(one.faults(9)[0].contains("frame \"map\""));
+    assert!(one.faults(9, 0)[0].contains("frame \"map\""));
 }
 
 #[test]

@@ -1,0 +1,57 @@
+//! What a chain of links says of its body. Pure.
+
+use super::super::tf::{Found, Missing};
+use super::seconds;
+use crate::wire::{RejectReason, TransformRow};
+
+/// What a chain says of its body: a pose, a refusal, or nothing yet; and the fault in words.
+pub(super) fn judge(
+    found: &Result<Found, Missing>,
+    now_ns: u64,
+    max_skew_ns: u64,
+    timeout_ns: u64,
+    root: &str,
+) -> (Option<Result<TransformRow, RejectReason>>, Option<String>) {
+    match found {
+        Ok(found) => {
+            let old = found
+                .received_ns
+                .is_some_and(|(_, earliest)| now_ns.saturating_sub(earliest) > timeout_ns);
+            if found.skew_ns > max_skew_ns || old {
+                let why = if old {
+                    "a link of its chain is older than the source's time-out".to_owned()
+                } else {
+                    format!(
+                        "the stamps of its chain lie {:.3} s apart, more than max_skew {:.3} s",
+                        seconds(found.skew_ns),
+                        seconds(max_skew_ns)
+                    )
+                };
+                return (Some(Err(RejectReason::BadChain)), Some(why));
+            }
+            let row = TransformRow {
+                position: found.position,
+                orientation: found.orientation,
+                ..TransformRow::default()
+            };
+            (Some(Ok(row)), None)
+        }
+        // Nobody has said where it is: it is not received, which is no refusal.
+        Err(Missing::Frame(frame)) => (
+            None,
+            Some(format!(
+                "no link from frame \"{frame}\" towards \"{root}\" has come"
+            )),
+        ),
+        Err(Missing::Loop(frame)) => (
+            Some(Err(RejectReason::BadChain)),
+            Some(format!("the links from frame \"{frame}\" lead in a loop")),
+        ),
+        Err(Missing::Bad(frame, reason)) => (
+            Some(Err(*reason)),
+            Some(format!(
+                "the link of frame \"{frame}\" is no pose: {reason}"
+            )),
+        ),
+    }
+}

@@ -1,0 +1,50 @@
+//! Which bodies a source of common topics has: those of the scene, and what edits make of them while the node runs.
+
+use super::super::tf::Tree;
+use super::{Member, NOBODY, Source};
+use crate::transport::BodyNote;
+
+impl Member {
+    pub(super) fn of(body: &BodyNote, tree: &mut Tree) -> Self {
+        Self {
+            body: body.id,
+            name: body.name.clone(),
+            frame: tree.id(&body.frame).unwrap_or_default(),
+            topic: body.topic.clone(),
+            stamp_ns: 0,
+            last: None,
+            told_ns: 0,
+            fault: None,
+        }
+    }
+}
+
+impl Source {
+    /// Takes a body, in the place of one that has left or behind the others; returns its place.
+    pub(in super::super) fn put_body(&mut self, body: &BodyNote) -> usize {
+        let member = Member::of(body, &mut self.tree);
+        let mut members = self.members.iter();
+        let free = members.position(|member| member.body == NOBODY);
+        let place = free.unwrap_or(self.members.len());
+        match self.members.get_mut(place) {
+            Some(slot) => *slot = member,
+            None => self.members.push(member),
+        }
+        place
+    }
+
+    /// Lets a body go; the place it had, if it had one.
+    pub(in super::super) fn remove_body(&mut self, name: &str) -> Option<usize> {
+        let place = self.place_of(name)?;
+        let member = self.members.get_mut(place)?;
+        member.body = NOBODY;
+        member.fault = None;
+        member.last = None;
+        Some(place)
+    }
+
+    fn place_of(&self, name: &str) -> Option<usize> {
+        let mut members = self.members.iter();
+        members.position(|member| member.body != NOBODY && member.name == name)
+    }
+}

@@ -1,0 +1,94 @@
+//! Stamps that cannot be right, in words: out of order, or far from the node's own time.
+//!
+//! Stamps are carried and never trusted for ages (law 4.8), so none of this changes a pose; whoever sends them is told.
+
+use super::{Receipt, Source, seconds};
+
+/// How long something that passes is told of, nanoseconds: as long as it takes a person to look.
+const TOLD_NS: u64 = 3_000_000_000;
+/// Clocks and paths of one robot differ by less, nanoseconds.
+const OFF_NS: u64 = 1_000_000_000;
+
+impl Source {
+    /// Takes what is wrong with a stamp, if anything is.
+    pub(super) fn tell(&mut self, text: Option<String>, receipt: Receipt) {
+        if let Some(text) = text {
+            self.passing = Some((text, receipt.now_ns));
+        }
+    }
+
+    /// What was wrong with stamps a moment ago.
+    pub(super) fn passing(&self, now_ns: u64) -> Option<String> {
+        let fresh = |(_, at): &&(String, u64)| now_ns.saturating_sub(*at) < TOLD_NS;
+        let passing = self.passing.as_ref().filter(fresh);
+        passing.map(|(text, _)| text.clone())
+    }
+}
+
+/// A stamp lies before the newest one of the same body or link: the message is passed over.
+pub(super) fn older((kind, name): (&str, &str), by_ns: u64) -> String {
+    format!(
+        "{kind} {name}: a stamp lies {:.3} s before the one that was there: it is passed over; do two senders write it?",
+        seconds(by_ns)
+    )
+}
+
+/// What is wrong with a stamp that is not near the node's time; a stamp of 0 says nothing.
+pub(super) fn off(
+    (kind, name): (&str, &str),
+    stamp_ns: u64,
+    receipt: Receipt,
+    timeout_ns: u64,
+) -> Option<String> {
+    let now_ns = receipt.ros_now_ns;
+    let (ahead, behind) = (
+        stamp_ns.saturating_sub(now_ns),
+        now_ns.saturating_sub(stamp_ns),
+    );
+    let side = match stamp_ns {
+        _ if stamp_ns == 0 || now_ns == 0 => return None,
+        _ if ahead > OFF_NS => "in the future",
+        _ if behind > OFF_NS.max(timeout_ns) => "in the past",
+        _ => return None,
+    };
+    Some(format!(
+        "{kind} {name}: its stamp lies {:.3} s {side} of this node's clock: look at the clocks of both hosts, and at use_sim_time on both sides",
+        seconds(ahead.max(behind))
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stamp_far_from_the_nodes_time_is_told_on_which_side_and_by_how_much() {
+        const S: u64 = 1_000_000_000;
+        let receipt = |ros_now_ns| Receipt {
+            now_ns: 5,
+            waited: false,
+            ros_now_ns,
+        };
+        let said = |stamp_ns, now_ns| off(("body", "b"), stamp_ns, receipt(now_ns), S / 2);
+        assert!(
+            said(103 * S, 100 * S)
+                .unwrap()
+                .contains("3.000 s in the future")
+        );
+        assert!(
+            said(98 * S, 100 * S)
+                .unwrap()
+                .contains("2.000 s in the past")
+        );
+        for (stamp_ns, now_ns) in [
+            (0, 100 * S),
+            (100 * S, 0),
+            (101 * S, 100 * S),
+            (99 * S, 100 * S),
+        ] {
+            assert_eq!(said(stamp_ns, now_ns), None);
+        }
+        // A source that may be silent for long may be late by as much.
+        assert_eq!(off(("body", "b"), 97 * S, receipt(100 * S), 5 * S), None);
+    }
+}
