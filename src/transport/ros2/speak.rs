@@ -157,15 +157,12 @@ impl Speaker {
     pub(super) fn pairs(&self, parcel: &Parcel) -> Vec<Pairs> {
         let header = &parcel.pairs_header;
         let size = |row: &PairRow| self.names_bytes(row.body_a, row.body_b) + PAIR_BYTES;
-        let chunks = cut(&parcel.pairs, size);
-        let count = u32::try_from(chunks.len()).unwrap_or(u32::MAX);
-        let numbered = chunks.into_iter().zip(0..);
-        numbered
-            .map(|(rows, chunk_index)| Pairs {
+        cut(&parcel.pairs, size)
+            .map(|(rows, chunk_index, chunk_count)| Pairs {
                 header: self.header(header.oldest_stamp_ns),
                 tick_header: tick_header(header),
                 chunk_index,
-                chunk_count: count,
+                chunk_count,
                 complete: header.truncated == 0,
                 pairs: rows.iter().map(|row| self.pair(row)).collect(),
             })
@@ -176,15 +173,12 @@ impl Speaker {
     pub(super) fn contacts(&self, parcel: &Parcel) -> Vec<Contacts> {
         let header = &parcel.contacts_header;
         let size = |row: &ContactRow| self.names_bytes(row.body_a, row.body_b) + CONTACT_BYTES;
-        let chunks = cut(&parcel.contacts, size);
-        let count = u32::try_from(chunks.len()).unwrap_or(u32::MAX);
-        let numbered = chunks.into_iter().zip(0..);
-        numbered
-            .map(|(rows, chunk_index)| Contacts {
+        cut(&parcel.contacts, size)
+            .map(|(rows, chunk_index, chunk_count)| Contacts {
                 header: self.header(header.oldest_stamp_ns),
                 tick_header: tick_header(header),
                 chunk_index,
-                chunk_count: count,
+                chunk_count,
                 complete: header.truncated == 0,
                 contacts: rows.iter().map(|row| self.contact(row)).collect(),
             })
@@ -195,17 +189,14 @@ impl Speaker {
     pub(super) fn names(&self, stamp: Time, boot_id: u64, scene_rev: u64) -> Vec<Names> {
         let rows: Vec<NameRow> = self.book.rows().copied().collect();
         let size = |row: &NameRow| usize::try_from(row.len).unwrap_or(0) + NAME_BYTES;
-        let chunks = cut(&rows, size);
-        let count = u32::try_from(chunks.len()).unwrap_or(u32::MAX);
-        let numbered = chunks.into_iter().zip(0..);
         let name = |row: &NameRow| Name {
             body: row.body,
             generation: row.generation,
             source: row.source,
             name: name_of(row).to_owned(),
         };
-        numbered
-            .map(|(rows, chunk_index)| Names {
+        cut(&rows, size)
+            .map(|(rows, chunk_index, chunk_count)| Names {
                 header: Header {
                     stamp,
                     frame_id: self.frame_id.clone(),
@@ -213,7 +204,7 @@ impl Speaker {
                 boot_id,
                 scene_rev,
                 chunk_index,
-                chunk_count: count,
+                chunk_count,
                 names: rows.iter().map(name).collect(),
             })
             .collect()
@@ -304,7 +295,9 @@ fn source(row: &SourceRow) -> Source {
 }
 
 /// Cuts rows into runs that each fit a message; at least one run, which may be empty.
-fn cut<T>(rows: &[T], size: impl Fn(&T) -> usize) -> Vec<&[T]> {
+///
+/// * returns - each run, its place among them, and how many there are.
+fn cut<T>(rows: &[T], size: impl Fn(&T) -> usize) -> impl Iterator<Item = (&[T], u32, u32)> {
     let (mut all, mut from, mut bytes) = (Vec::new(), 0, 0);
     for (at, row) in rows.iter().enumerate() {
         let own = size(row);
@@ -315,7 +308,10 @@ fn cut<T>(rows: &[T], size: impl Fn(&T) -> usize) -> Vec<&[T]> {
         bytes += own;
     }
     all.push(rows.get(from..).unwrap_or_default());
-    all
+    let count = u32::try_from(all.len()).unwrap_or(u32::MAX);
+    all.into_iter()
+        .zip(0..)
+        .map(move |(run, at)| (run, at, count))
 }
 
 #[cfg(test)]

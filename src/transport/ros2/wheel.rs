@@ -124,3 +124,150 @@ impl<M: Serialize> Wheel<M> {
         publisher(node, context, topic, self.out).ok()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(
+        clippy::disallowed_methods,
+        reason = "real DDS and a real process need real time"
+    )]
+
+    use std::process::{Child, Command};
+    use std::time::{Duration, Instant};
+
+    use ros2_client::{NodeName, NodeOptions, Subscription};
+    use rustix::process::{Pid, Signal, kill_process};
+
+    use super::super::env::{Network, Range};
+    use super::super::node::join;
+    use super::super::topics::{In, subscription};
+    use super::*;
+    use crate::wire::ros::State;
+
+    const TOPIC: (&str, TypeName) = ("/wheel", ("sweepd_msgs", "State"));
+    /// Says to the reader's process which domain it is to join.
+    const DOMAIN: &str = "SWEEPD_TEST_WHEEL_DOMAIN";
+    /// Between two messages.
+    const STEP: Duration = Duration::from_millis(40);
+
+    fn peer(domain: u16, name: &str) -> (Context, Node) {
+        let network = Network {
+            domain,
+            range: Range::Localhost,
+        };
+        let context = join(network).unwrap();
+        let name = NodeName::new("/", name).unwrap();
+        let mut node = context.new_node(name, NodeOptions::new()).unwrap();
+        // Who listens is known to a node that is spun only.
+        let spinner = node.spinner().unwrap();
+        std::thread::spawn(move || futures_executor::block_on(spinner.spin()));
+        (context, node)
+    }
+
+    fn reader(context: &Context, node: &mut Node) -> Subscription<State> {
+        let quality = In {
+            reliable: true,
+            latched: false,
+            depth: 1,
+        };
+        subscription(node, context, TOPIC, quality).unwrap()
+    }
+
+    /// The process that is stopped: no test unless another one starts it.
+    #[test]
+    fn a_reader_in_a_process_of_its_own() {
+        let Some(domain) = std::env::var(DOMAIN).ok().and_then(|d| d.parse().ok()) else {
+            return;
+        };
+        let (context, mut node) = peer(domain, "stopped");
+        let from = reader(&context, &mut node);
+        let end = Instant::now() + Duration::from_secs(60);
+        while Instant::now() < end {
+            let _passed_over = from.take();
+            std::thread::sleep(STEP / 4);
+        }
+    }
+
+    struct Killed(Child);
+
+    impl Drop for Killed {
+        fn drop(&mut self) {
+            let _gone = self.0.kill();
+            let _reaped = self.0.wait();
+        }
+    }
+
+    #[test]
+    fn a_reader_that_stops_turns_the_writer_and_the_others_go_on() {
+        let domain = 101 + u16::try_from(std::process::id() % 100).unwrap();
+        let (context, mut node) = peer(domain, "writer");
+        let (other, mut healthy) = peer(domain, "healthy");
+        // A window of 16 messages: with 40 ms between them a stopped reader fills it in 0.6 s.
+        let out = Out {
+            bytes: 1 << 20,
+            ..Out::RELIABLE
+        };
+        let mut wheel = Wheel::<State>::new(&mut node, &context, TOPIC, out).unwrap();
+        let from = reader(&other, &mut healthy);
+        let child = Command::new(std::env::current_exe().unwrap())
+            .args([
+                "transport::ros2::wheel::tests::a_reader_in_a_process_of_its_own",
+                "--exact",
+            ])
+            .env(DOMAIN, domain.to_string())
+            .stdout(std::process::Stdio::null())
+            .spawn()
+            .unwrap();
+        let child = Killed(child);
+        let (mut next, mut heard) = (0_u64, Vec::new());
+        let mut step = |wheel: &mut Wheel<State>, node: &mut Node| {
+            next += 1;
+            let message = State {
+                worst_a: next,
+                ..State::default()
+            };
+            // Time enough for a turn, as far as the wheel knows.
+            let sent = wheel.publish(node, &context, message, next * 2 * TURN_NS);
+            std::thread::sleep(STEP);
+            while let Ok(Some((message, _))) = from.take() {
+                heard.push(message.worst_a);
+            }
+            (next, sent, heard.last().copied())
+        };
+        let end = Instant::now() + Duration::from_secs(30);
+        while wheel.current.get_subscription_count(&node) < 2 {
+            assert!(Instant::now() < end, "both readers are found");
+            std::thread::sleep(STEP);
+        }
+        for _ in 0..50 {
+            assert_eq!(
+                step(&mut wheel, &mut node).1,
+                Sent::Yes,
+                "everybody acknowledges"
+            );
+        }
+        kill_process(Pid::from_child(&child.0), Signal::STOP).unwrap();
+        let (mut turned, mut lost) = (0, 0);
+        for _ in 0..150 {
+            match step(&mut wheel, &mut node).1 {
+                Sent::Yes => {}
+                Sent::Turned => turned += 1,
+                Sent::No => lost += 1,
+            }
+        }
+        assert!(turned >= 3, "{turned} turns");
+        assert_eq!(lost, 0, "a writer with room was there for every message");
+        // The healthy one goes on, also by the writer that is new by now.
+        let end = Instant::now() + Duration::from_secs(10);
+        let (number, ..) = step(&mut wheel, &mut node);
+        while step(&mut wheel, &mut node)
+            .2
+            .is_none_or(|last| last < number)
+        {
+            assert!(Instant::now() < end, "the healthy reader goes on");
+        }
+        let after = heard.iter().filter(|n| **n > 50).count();
+        assert!(after >= 75, "{after} of 150 came to the healthy reader");
+        assert!(heard.is_sorted(), "in their order");
+    }
+}
