@@ -3,12 +3,12 @@
     python move_robots.py [--seconds N] [--node NAME]
 """
 
-import argparse
 import math
 import secrets
 import time
 
 import rclpy
+from arguments import arguments
 from geometry_msgs.msg import TransformStamped
 from sweepd_msgs.msg import BodyTransform, BodyTransforms
 from tf2_msgs.msg import TFMessage
@@ -50,10 +50,7 @@ def write(pose_position, pose_orientation, at, turn):
 
 
 def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--seconds", type=float, default=60)
-    parser.add_argument("--node", default="sweepd", help="name of sweepd's node")
-    args = parser.parse_args()
+    args = arguments()
     rclpy.init()
     node = rclpy.create_node("move_robots")
     frames = node.create_publisher(BodyTransforms, f"/{args.node}/transforms", 1)

@@ -5,10 +5,10 @@
 Exits 0 when at least one collision began and ended, 1 when not.
 """
 
-import argparse
 import time
 
 import rclpy
+from arguments import arguments
 from rclpy.executors import SingleThreadedExecutor
 from sweepd_msgs.msg import Pair, Pairs, State
 
@@ -45,10 +45,7 @@ class Printer:
 
 
 def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--seconds", type=float, default=60)
-    parser.add_argument("--node", default="sweepd", help="name of sweepd's node")
-    args = parser.parse_args()
+    args = arguments()
     rclpy.init()
     node = rclpy.create_node("print_pairs")
     printer = Printer(node, args.node)

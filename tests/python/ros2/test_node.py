@@ -138,16 +138,3 @@ def test_without_the_flag_there_is_no_socket_and_no_thread_of_dds(room):
     inet = {line.split()[9] for kind in ("udp", "tcp") for line in Path(f"/proc/{plain.pid}/net/{kind}").read_text().splitlines()[1:]}
     links = [os.readlink(f"/proc/{plain.pid}/fd/{fd}") for fd in os.listdir(f"/proc/{plain.pid}/fd")]
     assert not [link for link in links if link.startswith("socket:") and link[8:-1] in inet]
-
-
-def test_two_nodes_of_one_name_are_told_to_the_user(room):
-    room.daemon(HANDS)
-    node = room.node()
-    ticks = room.hear(Tick, "/sweepd/tick")
-    room.until(lambda: ticks, "the first node")
-    second = room.daemon(HANDS, instance=room.instance + "_b")
-    room.until(lambda: len({tick.tick_header.boot_id for tick in ticks[-50:]}) == 2, "both publish")
-    logs = room.until(lambda: [d.log for d in (room.daemons[0], second) if "/sweepd" in d.log and "name" in d.log], "a word on it")
-    assert logs and node
-    states = room.hear(State, "/sweepd/state")
-    room.until(lambda: len({state.tick_header.boot_id for state in states}) == 2, "told apart by boot id")
