@@ -4,12 +4,19 @@
     $python benches/ros2_latency.py [--bodies 100] [--samples 3000] [--csv benches/results/ros2_latency.csv]
 
 One frame at a time, 5 ms apart, daemon and echo in turn in one run. `beyond_tick` is the time from publish() to the pairs
-message in the callback, less the time that the tick itself took (`elapsed_ns`). The echo is a second rclpy process that
-sends the same bytes back, without decoding them. Nothing else should run: the figures are those of an idle machine.
+message in the callback, less the time that the tick itself took (`elapsed_ns`). It has two parts, told apart by the daemon's
+own stamps on the clock that both share: `inbound` from publish() to the frame's admission (rclpy's encoding, DDS, the
+daemon's reader), `outbound` from the tick's end to the callback (the daemon's writer, DDS, rclpy's decoding). The echo is a
+second rclpy process that sends the same bytes back, without decoding them. Nothing else should run: the figures are those
+of an idle machine.
+
+`cyclone` is the same way with a peer that costs little: Cyclone DDS (a C library under a thin Python binding) publishes
+bytes that were encoded before, and takes the pairs without decoding them.
 """
 
 import argparse
 import csv
+import json
 import os
 import platform
 import random
@@ -83,11 +90,13 @@ class Bench:
         self.dice = dice
 
     def pairs(self, message):
-        self.pairs_at[message.tick_header.newest_stamp_ns] = (time.perf_counter_ns(), len(message.pairs))
+        arrived = time.perf_counter_ns(), time.clock_gettime_ns(time.CLOCK_BOOTTIME)
+        self.pairs_at[message.tick_header.newest_stamp_ns] = (*arrived, len(message.pairs))
 
     def ticked(self, message):
         if message.cause == Tick.FRAME:
-            self.tick[message.tick_header.newest_stamp_ns] = message.elapsed_ns
+            # Age and send time are both of CLOCK_BOOTTIME: the frame was admitted when the tick began to count ages.
+            self.tick[message.tick_header.newest_stamp_ns] = (message.elapsed_ns, message.sources[0].age_ns, message.sent_ns)
 
     def echoed(self, message):
         self.echo_at[message.seq] = time.perf_counter_ns()
@@ -110,6 +119,7 @@ class Bench:
     def sample(self, publisher, there):
         """Publishes the next frame; nanoseconds of publish() and whether the answer came."""
         self.next_frame()
+        self.frame.sent_ns = time.clock_gettime_ns(time.CLOCK_BOOTTIME)
         start = time.perf_counter_ns()
         publisher.publish(self.frame)
         return start, self.wait(lambda: there(self.frame.seq), 2.0)
@@ -123,7 +133,7 @@ def measure(bench, samples):
         raise SystemExit("the daemon does not answer")
     if not bench.wait(lambda: bench.sample(bench.to_echo, lambda seq: seq in bench.echo_at)[1], 20):
         raise SystemExit("the echo does not answer")
-    through, beyond, ticks, echo, lost, rows = [], [], [], [], 0, []
+    through, beyond, ticks, echo, lost, rows, inbound, outbound = [], [], [], [], 0, [], [], []
     for number in range(samples + 100):
         start, came = bench.sample(bench.to_daemon, both)
         at = stamp(bench.frame.seq)
@@ -134,14 +144,18 @@ def measure(bench, samples):
             continue
         lost += (not came) + (not echo_came)
         if came:
-            arrived, count = bench.pairs_at[at]
+            arrived, arrived_boot, count = bench.pairs_at[at]
+            elapsed, age, sent = bench.tick[at]
             through.append((arrived - start) / 1e3)
-            ticks.append(bench.tick[at] / 1e3)
+            ticks.append(elapsed / 1e3)
             beyond.append(through[-1] - ticks[-1])
+            inbound.append(age / 1e3)
+            outbound.append((arrived_boot - sent) / 1e3)
             rows.append(count)
         if echo_came:
             echo.append((bench.echo_at[bench.frame.seq] - echo_start) / 1e3)
-    return {"through": through, "beyond_tick": beyond, "tick": ticks, "echo": echo}, lost, sum(rows) / len(rows)
+    found = {"through": through, "beyond_tick": beyond, "inbound": inbound, "outbound": outbound, "tick": ticks, "echo": echo}
+    return found, lost, sum(rows) / len(rows)
 
 
 def main():
@@ -152,6 +166,7 @@ def main():
     args = parser.parse_args()
     sweepd = os.environ.get("SWEEPD", str(ROOT / "target/release/sweepd"))
     rclpy.init()
+    domain = rclpy.get_default_context().get_domain_id()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.toml"
         path.write_text(scene(args.bodies))
@@ -159,11 +174,18 @@ def main():
         echo = subprocess.Popen([sys.executable, "-c", ECHO])
         try:
             found, lost, pairs = measure(Bench(args.bodies), args.samples)
+            rclpy.shutdown()
+            # Its session of the source ends with its time-out; then the other peer's begins.
+            time.sleep(6)
+            cheap = [sys.executable, str(ROOT / "benches/ros2_latency_cyclone.py"), str(domain), str(args.bodies), str(args.samples)]
+            cyclone = json.loads(subprocess.run(cheap, capture_output=True, text=True, check=True).stdout)
         finally:
             daemon.terminate()
             echo.terminate()
             daemon.wait()
             echo.wait()
+    lost += cyclone.count(None)
+    found["cyclone"] = [value for value in cyclone if value is not None]
     commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False)
     row = {"machine": machine(), "commit": commit.stdout.strip(), "compiler": f"Python {platform.python_version()}", "seed": SEED,
            "bodies": args.bodies, "samples": args.samples, "lost": lost, "pairs_mean": round(pairs, 1)}  # fmt: skip
@@ -171,7 +193,7 @@ def main():
         row[f"{name}_p50_us"] = round(percentile(values, 0.5), 1)
         row[f"{name}_p99_us"] = round(percentile(values, 0.99), 1)
         print(f"{name:12} p50 {row[f'{name}_p50_us']:8.1f} us   p99 {row[f'{name}_p99_us']:8.1f} us")
-    print(f"{args.bodies} bodies, {pairs:.0f} pairs a tick, {lost} of {2 * args.samples} answers lost")
+    print(f"{args.bodies} bodies, {pairs:.0f} pairs a tick, {lost} of {3 * args.samples} answers lost")
     if args.csv:
         new = not args.csv.exists()
         with args.csv.open("a", newline="") as file:
