@@ -52,6 +52,11 @@ except BaseException:
 """
 
 
+# The daemon is on loopback; so is the peer, which finds it without multicast.
+ON_LOOPBACK = """<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="lo"/></Interfaces><AllowMulticast>false</AllowMulticast>
+</General><Discovery><ParticipantIndex>auto</ParticipantIndex><Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>"""
+
+
 def scene(bodies):
     shapes = "".join(f"[[body]]\nname = 'b{n}'\nshape = {{ type = 'sphere', radius = 0.3 }}\n" for n in range(bodies))
     return f"[run]\non_frame = 'sim'\n[[source]]\nname = 'sim'\ntimeout_ms = 5000\n{shapes}"
@@ -178,7 +183,7 @@ def main():
             # Its session of the source ends with its time-out; then the other peer's begins.
             time.sleep(6)
             cheap = [sys.executable, str(ROOT / "benches/ros2_latency_cyclone.py"), str(domain), str(args.bodies), str(args.samples)]
-            cyclone = json.loads(subprocess.run(cheap, capture_output=True, text=True, check=True).stdout)
+            cyclone = json.loads(subprocess.run(cheap, stdout=subprocess.PIPE, text=True, check=True, env=os.environ | {"CYCLONEDDS_URI": ON_LOOPBACK}).stdout)
         finally:
             daemon.terminate()
             echo.terminate()

@@ -136,12 +136,19 @@ impl Inlet {
         let (mut came, mut more) = (false, false);
         for at in 0..self.lines.len() {
             let (some, rest) = self.take(at, receipt);
-            came |= some;
             more |= rest;
+            // A whole frame waits for nothing else: each look at a quiet subscription or server is a call into the system.
+            if some && self.lines.get(at).is_some_and(Line::is_whole) {
+                (self.wake)();
+            } else {
+                came |= some;
+            }
         }
         came |= self.look(receipt);
-        came |= self.services.round(&self.shared.desk, &self.shared);
         if came {
+            (self.wake)();
+        }
+        if self.services.round(&self.shared.desk, &self.shared) {
             (self.wake)();
         }
         if receipt.now_ns.saturating_sub(self.looked_ns) >= FAULTS_NS {

@@ -66,6 +66,11 @@ impl Line {
         }
     }
 
+    /// Whether its messages are whole frames, which need no look at anything else.
+    pub(super) fn is_whole(&self) -> bool {
+        matches!(self, Self::Transforms(_))
+    }
+
     /// Gives it to a body: place of its source, and its own among those of the source.
     pub(super) fn feed(&mut self, source: usize, member: usize) {
         if let Self::Pose(_, feeder) | Self::Odometry(_, feeder) = self {
