@@ -218,7 +218,9 @@ impl Engine {
     fn find_candidates(&mut self) {
         let (world, filters) = (&self.world, self.world.filters());
         let method = self.plan.method();
-        let anew = self.method != method || std::mem::take(&mut self.renew);
+        // Taken whatever the method does: else a tick in which both hold would be followed by a second renewal.
+        let renew = std::mem::take(&mut self.renew);
+        let anew = renew || self.method != method;
         if anew {
             self.method = method;
             self.broad = BroadPhase::new(method);

@@ -58,7 +58,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::broad::BroadPhase;
+    use crate::broad::{BroadPhase, Method};
     use crate::daemon::build_shapes;
     use crate::scene::Scene;
     use crate::tick::{EditBatch, TickInput};
@@ -183,5 +183,18 @@ mod tests {
         let row = rig.engine.outbox().pairs[0];
         assert_eq!((row.end_first_tick, row.end_last_tick), (2, 2));
         assert_eq!(rig.engine.outbox().tick.colliding, 0);
+    }
+
+    #[test]
+    fn bug_a_repair_in_a_tick_of_another_method_was_done_twice() {
+        let mut rig = Rig::new();
+        rig.tick(false);
+        // As if the plan had chosen another method in the tick of the repair.
+        rig.engine.method = Method::SweepAndPrune;
+        rig.engine.broad = BroadPhase::new(rig.engine.method);
+        assert!(rig.tick(true).is_empty());
+        assert_eq!(rig.engine.outbox().tick.rebuilds, 1);
+        assert!(!rig.engine.renew && rig.engine.method == rig.engine.plan.method());
+        rig.engine.validate().unwrap();
     }
 }

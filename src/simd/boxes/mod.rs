@@ -43,17 +43,38 @@ pub enum Level {
 }
 
 impl Level {
+    /// Every level, the best last.
+    const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
+
     /// The best that this processor has.
     #[must_use]
     pub fn best() -> Self {
-        let mut all = Self::available();
-        all.pop().unwrap_or(Self::Portable)
+        Self::Avx512.checked()
     }
 
     /// Every level that this processor has, the best last.
     #[must_use]
     pub fn available() -> Vec<Self> {
-        let mut levels = vec![Self::Portable];
+        let all = Self::ALL.into_iter();
+        all.filter(|level| level.checked() == *level).collect()
+    }
+
+    /// Runs a loop with these instructions; those that the processor lacks are never used.
+    pub(crate) fn run<W: Work>(self, work: W) -> W::Out {
+        match self.checked() {
+            // SAFETY: `checked` has asked the processor for each feature that the function is built with.
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => unsafe { x86::run_avx512(work) },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => unsafe { x86::run_avx2(work) },
+            _ => work.run(Portable),
+        }
+    }
+
+    /// The level itself where the processor has it, else the best it has: a level can be written down by anyone. The
+    /// standard library keeps what the processor answered in one word; asking costs a load.
+    fn checked(self) -> Self {
         #[cfg(target_arch = "x86_64")]
         {
             let avx2 = is_x86_feature_detected!("avx2")
@@ -65,44 +86,13 @@ impl Level {
                 && is_x86_feature_detected!("avx512bw")
                 && is_x86_feature_detected!("avx512dq")
                 && is_x86_feature_detected!("avx512vl");
-            levels.extend(avx2.then_some(Self::Avx2));
-            levels.extend((avx2 && avx512).then_some(Self::Avx512));
-        }
-        levels
-    }
-
-    /// Runs a loop with these instructions; those that the processor lacks are never used.
-    pub(crate) fn run<W: Work>(self, work: W) -> W::Out {
-        #[cfg(target_arch = "x86_64")]
-        {
-            // SAFETY, both calls: `checked` has asked the processor for each feature that the function is built with.
-            match self.checked() {
-                Self::Avx512 => return unsafe { x86::run_avx512(work) },
-                Self::Avx2 => return unsafe { x86::run_avx2(work) },
-                Self::Portable => {}
+            match self {
+                Self::Avx512 if avx2 && avx512 => return self,
+                Self::Avx512 | Self::Avx2 if avx2 => return Self::Avx2,
+                _ => {}
             }
         }
-        work.run(Portable)
-    }
-
-    /// The level itself where the processor has it, else the best it has: a level can be written down by anyone.
-    #[cfg(target_arch = "x86_64")]
-    fn checked(self) -> Self {
-        // The standard library keeps the answers in one word; asking costs a load.
-        let avx512 = is_x86_feature_detected!("avx512f")
-            && is_x86_feature_detected!("avx512bw")
-            && is_x86_feature_detected!("avx512dq")
-            && is_x86_feature_detected!("avx512vl");
-        let avx2 = is_x86_feature_detected!("avx2")
-            && is_x86_feature_detected!("bmi1")
-            && is_x86_feature_detected!("bmi2")
-            && is_x86_feature_detected!("lzcnt")
-            && is_x86_feature_detected!("popcnt");
-        match self {
-            Self::Avx512 if avx512 && avx2 => Self::Avx512,
-            Self::Avx512 | Self::Avx2 if avx2 => Self::Avx2,
-            _ => Self::Portable,
-        }
+        Self::Portable
     }
 }
 

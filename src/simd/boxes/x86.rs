@@ -16,24 +16,21 @@ use std::arch::x86_64::{
 use super::Work;
 use super::lanes::{Boxes16, Down, LEAST, Lanes, STEP, WIDTH, slack};
 
-/// Two halves of eight lanes. Only [`run_avx2`] makes one, so where one is, AVX2 is.
+/// Two halves of eight lanes or, where `WIDE`, sixteen at once for what gains by it. Only [`run_avx2`] and
+/// [`run_avx512`] make one: where one is, AVX2 is, and where a wide one is, AVX-512 F too.
 #[derive(Clone, Copy)]
-pub(super) struct Avx2(());
-
-/// Sixteen lanes. Only [`run_avx512`] makes one.
-#[derive(Clone, Copy)]
-pub(super) struct Avx512(());
+struct Vectors<const WIDE: bool>(());
 
 /// Runs a loop built for AVX2.
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt,popcnt")]
 pub(super) fn run_avx2<W: Work>(work: W) -> W::Out {
-    work.run(Avx2(()))
+    work.run(Vectors::<false>(()))
 }
 
 /// Runs a loop built for AVX-512.
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,bmi1,bmi2,lzcnt,popcnt")]
 pub(super) fn run_avx512<W: Work>(work: W) -> W::Out {
-    work.run(Avx512(()))
+    work.run(Vectors::<true>(()))
 }
 
 #[inline]
@@ -81,6 +78,15 @@ fn meets_half(block: &Boxes16, one: &[f32; 6], at: usize) -> __m256 {
 #[target_feature(enable = "avx2")]
 fn meets_avx2(block: &Boxes16, one: &[f32; 6]) -> u16 {
     bits(meets_half(block, one, 0), meets_half(block, one, 8))
+}
+
+#[inline]
+#[target_feature(enable = "avx512f")]
+fn meets_avx512(block: &Boxes16, one: &[f32; 6]) -> u16 {
+    let f = &block.faces;
+    let low = |k: usize| _mm512_cmp_ps_mask::<_CMP_LE_OQ>(all(&f[k]), _mm512_set1_ps(one[k + 3]));
+    let high = |k: usize| _mm512_cmp_ps_mask::<_CMP_LE_OQ>(_mm512_set1_ps(one[k]), all(&f[k + 3]));
+    (low(0) & high(0)) & (low(1) & high(1)) & (low(2) & high(2))
 }
 
 #[inline]
@@ -200,23 +206,28 @@ fn bound_avx2(block: &Boxes16, chosen: u16) -> [f32; 6] {
     bound
 }
 
-impl Lanes for Avx2 {
+impl<const WIDE: bool> Lanes for Vectors<WIDE> {
     #[inline(always)]
     fn meets(self, block: &Boxes16, one: &[f32; 6]) -> u16 {
-        // SAFETY, here and below: an `Avx2` is made only where AVX2 is.
-        unsafe { meets_avx2(block, one) }
+        if WIDE {
+            // SAFETY: a wide one is made only where AVX-512 F is.
+            unsafe { meets_avx512(block, one) }
+        } else {
+            // SAFETY: a `Vectors` is made only where AVX2 is.
+            unsafe { meets_avx2(block, one) }
+        }
     }
 
     #[inline(always)]
     fn bound(self, block: &Boxes16, chosen: u16) -> [f32; 6] {
-        // SAFETY: as above.
+        // SAFETY: a `Vectors` is made only where AVX2 is.
         unsafe { bound_avx2(block, chosen) }
     }
 
     #[inline(always)]
     fn outward(self, min: &[f64; 3], max: &[f64; 3], origin: &[f64; 3]) -> Down {
         let mut down = Down { faces: [0.0; 8] };
-        // SAFETY: as above.
+        // SAFETY: a `Vectors` is made only where AVX2 is.
         unsafe { store(outward_avx2(min, max, origin), &mut down) };
         down
     }
@@ -229,70 +240,19 @@ impl Lanes for Avx2 {
         outer: &Down,
         place: &mut Down,
     ) -> bool {
-        // SAFETY: as above.
+        // SAFETY: a `Vectors` is made only where AVX2 is.
         unsafe { take_avx2(corners, origin, outer, place) }
     }
 
     #[inline(always)]
     fn parts(self, a: &Down, b: &Down) -> (bool, bool) {
+        // SAFETY: a `Vectors` is made only where AVX2 is.
         unsafe { parts_avx2(a, b) }
     }
 
     #[inline(always)]
     fn holds(self, outer: &Down, inner: &Down) -> bool {
-        unsafe { holds_avx2(outer, inner) }
-    }
-}
-
-#[inline]
-#[target_feature(enable = "avx512f")]
-fn meets_avx512(block: &Boxes16, one: &[f32; 6]) -> u16 {
-    let f = &block.faces;
-    let low = |k: usize| _mm512_cmp_ps_mask::<_CMP_LE_OQ>(all(&f[k]), _mm512_set1_ps(one[k + 3]));
-    let high = |k: usize| _mm512_cmp_ps_mask::<_CMP_LE_OQ>(_mm512_set1_ps(one[k]), all(&f[k + 3]));
-    (low(0) & high(0)) & (low(1) & high(1)) & (low(2) & high(2))
-}
-
-impl Lanes for Avx512 {
-    #[inline(always)]
-    fn meets(self, block: &Boxes16, one: &[f32; 6]) -> u16 {
-        // SAFETY, here and below: an `Avx512` is made only where AVX-512 F and AVX2 are.
-        unsafe { meets_avx512(block, one) }
-    }
-
-    #[inline(always)]
-    fn bound(self, block: &Boxes16, chosen: u16) -> [f32; 6] {
-        // SAFETY: as above.
-        unsafe { bound_avx2(block, chosen) }
-    }
-
-    #[inline(always)]
-    fn outward(self, min: &[f64; 3], max: &[f64; 3], origin: &[f64; 3]) -> Down {
-        let mut down = Down { faces: [0.0; 8] };
-        // SAFETY: as above.
-        unsafe { store(outward_avx2(min, max, origin), &mut down) };
-        down
-    }
-
-    #[inline(always)]
-    fn take(
-        self,
-        corners: [&[f64; 3]; 2],
-        origin: &[f64; 3],
-        outer: &Down,
-        place: &mut Down,
-    ) -> bool {
-        // SAFETY: as above.
-        unsafe { take_avx2(corners, origin, outer, place) }
-    }
-
-    #[inline(always)]
-    fn parts(self, a: &Down, b: &Down) -> (bool, bool) {
-        unsafe { parts_avx2(a, b) }
-    }
-
-    #[inline(always)]
-    fn holds(self, outer: &Down, inner: &Down) -> bool {
+        // SAFETY: a `Vectors` is made only where AVX2 is.
         unsafe { holds_avx2(outer, inner) }
     }
 }
