@@ -50,6 +50,12 @@ impl Bounds {
         }
     }
 
+    /// The longest side, metres.
+    pub(super) fn side(&self) -> f64 {
+        let side = |k: usize| self.max[k] - self.min[k];
+        side(0).max(side(1)).max(side(2))
+    }
+
     /// Whether the closed intervals on one axis meet.
     #[inline]
     pub(super) fn meets(&self, other: &Self, axis: usize) -> bool {

@@ -3,10 +3,11 @@
 //! In: a [`ChangeSet`] (who left, came, moved, must be asked again), the boxes ([`Proxies`]), the filters
 //! ([`PairPolicy`]). Out: the [`PairSet`], of which this room is the only writer, and a [`PairDelta`].
 //!
-//! Three methods behind one door. [`Method::BruteForce`] looks at every pair: the twin, for ever. [`Method::Order`] keeps
-//! blocks of fat boxes and their candidates (see `order`). [`Method::SweepAndPrune`], which the plan takes, keeps
-//! sorted lists of box ends (see `sap`). A method only suggests pairs; what is stored is decided in one place
-//! (`commit`), so all give the same pairs in the same slots, and the same delta.
+//! Six methods behind one door. [`Method::BruteForce`] looks at every pair: the twin, for ever. [`Method::Order`] keeps
+//! blocks of fat boxes and their candidates (see `order`). [`Method::SweepAndPrune`] keeps sorted lists of box ends (see
+//! `sap`). [`Method::UniformGrid`], [`Method::SpatialHash`] and [`Method::HierarchicalGrid`] keep bodies in cells (see
+//! `grid`). A method only suggests pairs; what is stored is decided in one place (`commit`), so all give the same pairs
+//! in the same slots, and the same delta.
 //!
 //! The pairs are those of the f64 boxes, at any offset: what rounds boxes to f32 asks the f64 boxes where rounding
 //! could tell otherwise.
@@ -21,6 +22,7 @@ use crate::world::ChangeSet;
 mod brute;
 mod commit;
 mod forced;
+mod grid;
 mod members;
 mod of_world;
 mod order;
@@ -29,6 +31,7 @@ mod touched;
 
 use commit::{Found, Judge};
 use forced::Forced;
+use grid::{Grid, Kind};
 use members::{ASKED, IN, Members, REFILTERED};
 use order::{Order, Tick};
 use sap::Sap;
@@ -52,11 +55,31 @@ pub enum Method {
     SweepAndPrune,
     /// Blocks of boxes in the order of a space-filling curve, fat boxes and candidates kept across ticks.
     Order,
+    /// Cells as large as the largest box, in an array around the scene.
+    UniformGrid,
+    /// Cells as large as the largest box, only those with a body, in a table.
+    SpatialHash,
+    /// Cells on levels by size, a factor of two between levels, in a table.
+    HierarchicalGrid,
 }
 
 impl Method {
-    /// Every method.
-    pub const ALL: &'static [Self] = &[Self::BruteForce, Self::SweepAndPrune, Self::Order];
+    /// Every method, with the name that it is chosen by.
+    pub const NAMED: &'static [(Self, &'static str)] = &[
+        (Self::BruteForce, "brute"),
+        (Self::SweepAndPrune, "sap"),
+        (Self::Order, "order"),
+        (Self::UniformGrid, "grid"),
+        (Self::SpatialHash, "hash"),
+        (Self::HierarchicalGrid, "hgrid"),
+    ];
+
+    /// The method of a name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        let found = Self::NAMED.iter().find(|(_, known)| *known == name);
+        found.map(|(method, _)| *method)
+    }
 }
 
 /// What the last update did; all counted, nothing timed.
@@ -74,6 +97,8 @@ pub struct Work {
     pub axes: [bool; 3],
     /// Bodies that got a new fat box.
     pub renewed: u64,
+    /// Cells that bodies were put in.
+    pub cells: u64,
 }
 
 /// The method at work.
@@ -82,6 +107,7 @@ enum Engine {
     Brute,
     Sap(Box<Sap>),
     Order(Box<Order>),
+    Grid(Box<Grid>),
 }
 
 /// The broad phase.
@@ -108,10 +134,14 @@ impl BroadPhase {
             Method::BruteForce => Engine::Brute,
             Method::SweepAndPrune => Engine::Sap(Box::default()),
             Method::Order => Engine::Order(Box::default()),
+            Method::UniformGrid => Engine::Grid(Box::new(Grid::new(Kind::Uniform))),
+            Method::SpatialHash => Engine::Grid(Box::new(Grid::new(Kind::Hash))),
+            Method::HierarchicalGrid => Engine::Grid(Box::new(Grid::new(Kind::Levels))),
         };
+        let with_bounds = matches!(engine, Engine::Sap(_) | Engine::Grid(_));
         Self {
             engine,
-            members: Members::new(matches!(method, Method::SweepAndPrune)),
+            members: Members::new(with_bounds),
             forced: Forced::default(),
             found: Found::default(),
             causes: Vec::new(),
@@ -189,6 +219,11 @@ impl BroadPhase {
                 sap.update(&self.members, &mut self.found.began, &mut self.work);
                 touched::begin(&judge, &mut self.found);
             }
+            Engine::Grid(grid) => {
+                touched::end(&judge, pairs, &mut self.found);
+                grid.update(&self.members, &mut self.found.began, &mut self.work);
+                touched::begin(&judge, &mut self.found);
+            }
             Engine::Order(order) => {
                 touched::end(&judge, pairs, &mut self.found);
                 self.parted.clear();
@@ -242,6 +277,7 @@ impl BroadPhase {
             Engine::Brute => {}
             Engine::Sap(sap) => sap.leave(&self.left, &self.members),
             Engine::Order(order) => order.leave(&self.left),
+            Engine::Grid(grid) => grid.leave(&self.left),
         }
     }
 
@@ -289,6 +325,7 @@ impl BroadPhase {
             Engine::Brute => {}
             Engine::Sap(sap) => sap.validate(&self.members)?,
             Engine::Order(order) => order.check(&self.members, proxies)?,
+            Engine::Grid(grid) => grid.validate(&self.members)?,
         }
         let judge = Judge {
             members: &self.members,

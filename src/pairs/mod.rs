@@ -11,6 +11,7 @@ use crate::wire::EndCause;
 mod index;
 mod set;
 
+pub(crate) use index::Index;
 pub use set::PairSet;
 
 /// Which pairs may be stored. Asked before a pair is ever stored, and again for the bodies of `ChangeSet::requery`.

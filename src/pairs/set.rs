@@ -130,8 +130,8 @@ impl PairSet {
     /// Where the pair of two bodies is. Cost: one probe or two.
     #[must_use]
     pub fn find(&self, key: PairKey) -> Option<PairSlot> {
-        let key_of = |at: u32| self.nodes[at as usize].key;
-        self.index.find(key, key_of).map(PairSlot)
+        let is_it = |at: u32| self.nodes[at as usize].key == key;
+        self.index.find(key.bits(), is_it).map(PairSlot)
     }
 
     /// How many pairs a body has.
@@ -215,8 +215,8 @@ impl PairSet {
         self.nodes[at as usize] = node;
         let nodes = &self.nodes;
         let places = nodes.capacity();
-        self.index
-            .insert(key, at, places, |at| nodes[at as usize].key);
+        let hash_of = |at: u32| nodes[at as usize].key.bits();
+        self.index.insert(key.bits(), at, places, hash_of);
         self.len += 1;
         Some(PairSlot(at))
     }
@@ -241,7 +241,8 @@ impl PairSet {
             }
         }
         let nodes = &self.nodes;
-        self.index.remove(node.key, |at| nodes[at as usize].key);
+        let hash_of = |at: u32| nodes[at as usize].key.bits();
+        self.index.remove(node.key.bits(), slot.0, hash_of);
         self.nodes[slot.index()].live = false;
         self.resting.push(slot.0);
         self.len -= 1;

@@ -280,7 +280,10 @@ impl Bench {
             delta: PairDelta::default(),
         };
         Self {
-            rigs: Method::ALL.iter().copied().map(rig).collect(),
+            rigs: Method::NAMED
+                .iter()
+                .map(|(method, _)| rig(*method))
+                .collect(),
             oracle: Oracle::default(),
             limit,
             seen: Summary::default(),

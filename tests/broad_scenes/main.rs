@@ -1,5 +1,5 @@
-//! Goal: the main broad phase gives the exact pairs and events in every scene class of the bench, with every set of
-//! vector instructions, through churn of everything, and in the two cases that once gave double pairs.
+//! Goal: every broad phase gives the exact pairs and events in every scene class of the bench, the main one with every
+//! set of vector instructions, through churn of everything, and in the two cases that once gave double pairs.
 //!
 //! Method: the bench's scenes at 2,000 bodies; in each frame the pair set is compared with an exact set found another
 //! way (strips and a sweep), and the events with the difference of two such sets. 2,000 frames a scene in release, 60
@@ -30,6 +30,7 @@ mod scenes;
 use common::Rng;
 use rig::{Rig, at};
 use scenes::{Kind, Scene};
+use sweepd::broad::Method;
 use sweepd::simd::boxes::Level;
 
 fn frames() -> usize {
@@ -38,13 +39,16 @@ fn frames() -> usize {
     told.map_or(usual, |frames| frames.parse().unwrap())
 }
 
-/// One rig a level of instructions over one scene; every frame exact in all.
+/// One rig a level of instructions, and one a method, over one scene; every frame exact in all.
 fn run(kind: Kind, bodies: usize, frames: usize) {
     let mut scene = Scene::new(kind, bodies, 11);
     let mut rigs: Vec<Rig> = Level::available()
         .into_iter()
         .map(|level| Rig::new(level, bodies, kind == Kind::Far))
         .collect();
+    let others = Method::NAMED.iter().map(|(method, _)| *method);
+    let others = others.filter(|method| !matches!(method, Method::Order | Method::BruteForce));
+    rigs.extend(others.map(|method| Rig::of(method, bodies, kind == Kind::Far)));
     for rig in &mut rigs {
         rig.start(&scene.boxes);
     }
@@ -57,14 +61,9 @@ fn run(kind: Kind, bodies: usize, frames: usize) {
         }
         let (first, others) = rigs.split_first().unwrap();
         for other in others {
-            assert_eq!(
-                first.delta.began, other.delta.began,
-                "{kind:?}, frame {frame}"
-            );
-            assert_eq!(
-                first.delta.ended, other.delta.ended,
-                "{kind:?}, frame {frame}"
-            );
+            let what = || format!("{kind:?}, frame {frame}, {}", other.name);
+            assert_eq!(first.delta.began, other.delta.began, "{}", what());
+            assert_eq!(first.delta.ended, other.delta.ended, "{}", what());
         }
         if frame % 200 == 7 {
             rigs.iter().for_each(Rig::validate);

@@ -46,7 +46,7 @@ pub fn at(place: [f32; 3], half: f32) -> Box3 {
 }
 
 pub struct Rig {
-    level: Level,
+    pub name: String,
     broad: BroadPhase,
     bodies: Bodies,
     changes: ChangeSet,
@@ -57,17 +57,24 @@ pub struct Rig {
 }
 
 impl Rig {
+    /// The main method with a level of instructions.
     pub fn new(level: Level, bodies: usize, far: bool) -> Self {
+        let mut rig = Self::of(Method::Order, bodies, far);
+        rig.broad.use_level(level);
+        rig.name = format!("{level:?}");
+        rig
+    }
+
+    /// Any method.
+    pub fn of(method: Method, bodies: usize, far: bool) -> Self {
         let mut rng = Rng::new(bodies as u64);
         let mut ids: Vec<u64> = (1..=bodies as u64).collect();
         for i in (1..bodies).rev() {
             ids.swap(i, rng.below(i + 1));
         }
-        let mut broad = BroadPhase::new(Method::Order);
-        broad.use_level(level);
         Self {
-            level,
-            broad,
+            name: format!("{method:?}"),
+            broad: BroadPhase::new(method),
             bodies: Bodies {
                 boxes: vec![Aabb::empty(); bodies],
                 ids,
@@ -137,30 +144,30 @@ impl Rig {
         for ended in &self.delta.ended {
             assert!(
                 self.told.remove(&pair(ended.key)),
-                "{what}, {:?}: {ended:?}",
-                self.level
+                "{what}, {}: {ended:?}",
+                self.name
             );
         }
         for began in &self.delta.began {
             let key = pair(self.pairs.get(*began).unwrap());
             assert!(
                 self.told.insert(key),
-                "{what}, {:?}: {key:?} began twice",
-                self.level
+                "{what}, {}: {key:?} began twice",
+                self.name
             );
         }
         let mut held: Vec<Pair> = self.pairs.iter().map(|(_, key)| pair(key)).collect();
         held.sort_unstable();
-        assert!(held == wanted, "{what}, {:?}: pairs differ", self.level);
+        assert!(held == wanted, "{what}, {}: pairs differ", self.name);
         assert!(
             self.told.iter().eq(wanted),
-            "{what}, {:?}: events differ",
-            self.level
+            "{what}, {}: events differ",
+            self.name
         );
     }
 
     pub fn validate(&self) {
         let valid = self.broad.validate(&self.bodies, &Everything, &self.pairs);
-        assert_eq!(valid, Ok(()), "{:?}", self.level);
+        assert_eq!(valid, Ok(()), "{}", self.name);
     }
 }

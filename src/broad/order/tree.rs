@@ -6,6 +6,12 @@ use crate::simd::boxes::{Boxes16, LANES, Lanes, Portable, WIDTH};
 /// Levels a tree can have: sixteen blocks, 256, ... far more than `limits::BODIES_MAX` bodies fill.
 const LEVELS_MAX: usize = 8;
 
+/// The bound of nothing: upside down.
+const NO_BOUND: [f32; 6] = {
+    let (low, high) = (f32::INFINITY, f32::NEG_INFINITY);
+    [low, low, low, high, high, high]
+};
+
 /// Bounds of blocks, and of what holds them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tree {
@@ -24,10 +30,7 @@ impl Tree {
     /// Makes room for so many blocks, all empty.
     pub(super) fn reset(&mut self, blocks: usize) {
         self.bounds.clear();
-        let none = [f32::INFINITY, f32::INFINITY, f32::INFINITY];
-        let none = [none, none.map(|v| -v)].concat();
-        let none: [f32; 6] = std::array::from_fn(|k| none[k]);
-        self.bounds.resize(blocks, none);
+        self.bounds.resize(blocks, NO_BOUND);
         let (mut level, mut len) = (0, blocks);
         loop {
             len = len.div_ceil(WIDTH).max(1);
