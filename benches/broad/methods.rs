@@ -70,7 +70,9 @@ struct Ours {
     pairs: PairSet,
     delta: PairDelta,
     offset_m: f64,
-    work: Work,
+    /// What all frames did, summed.
+    work: [u64; 5],
+    frames: u64,
 }
 
 impl Ours {
@@ -83,7 +85,8 @@ impl Ours {
             delta: PairDelta::default(),
             // Far from the origin we get the far boxes, the peers the same ones near: f32 would spoil theirs.
             offset_m: if scene.kind == Kind::Far { 1e7 } else { 0.0 },
-            work: Work::default(),
+            work: [0; 5],
+            frames: 0,
         }
     }
 
@@ -125,7 +128,19 @@ impl Runner for Ours {
                 &mut self.delta,
             );
         });
-        self.work = self.broad.work();
+        let Work {
+            swaps,
+            tests,
+            renewed,
+            cells,
+            rebuilds,
+            ..
+        } = self.broad.work();
+        let done = [swaps, tests, renewed, cells, rebuilds];
+        for (sum, done) in self.work.iter_mut().zip(done) {
+            *sum += done;
+        }
+        self.frames += 1;
         ns
     }
 
@@ -138,7 +153,15 @@ impl Runner for Ours {
     }
 
     fn told(&self) -> String {
-        format!("{:?}", self.work).replace(',', ";")
+        let [swaps, tests, renewed, cells, rebuilds] = self.work;
+        let mean = |sum: u64| sum / self.frames.max(1);
+        format!(
+            "a frame: swaps {}; tests {}; renewed {}; cells {}; in all: rebuilds {rebuilds}",
+            mean(swaps),
+            mean(tests),
+            mean(renewed),
+            mean(cells)
+        )
     }
 }
 

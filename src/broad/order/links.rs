@@ -71,13 +71,13 @@ impl Links {
 
     /// Room for half as many records again, so that none is made in the ticks until the next sort.
     pub(super) fn reserve(&mut self) {
-        let records = self.ends.len() * 2 + self.heads.len();
-        let pieces = self.pieces.len() * 2 + self.heads.len();
-        room(&mut self.ends, records);
-        room(&mut self.bits, records);
-        room(&mut self.free, records);
-        room(&mut self.pieces, pieces);
-        room(&mut self.free_pieces, pieces);
+        let blocks = self.heads.len();
+        let (records, pieces) = (self.ends.len(), self.pieces.len());
+        spare(&mut self.ends, records, blocks);
+        spare(&mut self.bits, records, blocks);
+        spare(&mut self.free, records, blocks);
+        spare(&mut self.pieces, pieces, blocks);
+        spare(&mut self.free_pieces, pieces, blocks);
     }
 
     /// Room for the lists of so many blocks.
@@ -284,6 +284,14 @@ impl Iterator for Listed<'_> {
 /// Makes room in a list for so many entries in all.
 pub(super) fn room<T>(list: &mut Vec<T>, len: usize) {
     list.reserve(len.saturating_sub(list.len()));
+}
+
+/// Room for what a list of so many entries may grow to until the next sort: half as many again, and as many as `some`. What
+/// is missing is made in twice that measure, so that a sort which finds a few more entries than the last one makes none.
+pub(super) fn spare<T>(list: &mut Vec<T>, len: usize, some: usize) {
+    if list.capacity() < len + len / 2 + some {
+        room(list, 2 * len + 2 * some);
+    }
 }
 
 /// An index as the 32 bits it is stored in.

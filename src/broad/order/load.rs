@@ -53,6 +53,11 @@ impl Order {
         (turn + HORIZON - self.tick % HORIZON) % HORIZON
     }
 
+    /// Whether it is a block's turn.
+    pub(super) fn is_due(&self, block: usize) -> bool {
+        self.until_turn(block) == 0
+    }
+
     /// Ticks that a fat box made now is to last: until its block's turn, or the one after.
     #[inline(always)]
     pub(super) fn horizon(&self, block: usize) -> u32 {
@@ -128,8 +133,7 @@ impl<P: Proxies> Work for LoadBlocks<'_, '_, P> {
                 let holds = order.take(lanes, tick.proxies, slot, rank);
                 out |= u16::from(!holds) << lane;
             }
-            let due = order.until_turn(block) == 0;
-            if due || out != 0 {
+            if order.is_due(block) || out != 0 {
                 let along = order.along(lanes, block, moved);
                 order.mark(block, out | along);
             }

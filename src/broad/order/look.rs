@@ -2,12 +2,13 @@
 //!
 //! When many bodies move, the candidates are gone through as a flat list, in memory order, without a branch that one
 //! could guess wrong; the list is mended as bodies are renewed, by new entries at its end and by ages that tell the old
-//! ones dead. When few move, their bits in the matrices are looked up, and the list is let go.
+//! ones dead. Pairs that are sure for as long as both bodies keep to their holds are not listed. When few move, their
+//! bits in the matrices are looked up, and the list is let go.
 
 use super::links::Matrix;
 use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, column, ones, parts, small};
 use crate::ids::PairKey;
-use crate::simd::boxes::{Down, LANES, Lanes, WIDTH, Work, prefetch};
+use crate::simd::boxes::{Down, LANES, Lanes, Portable, WIDTH, Work, prefetch};
 
 /// A candidate, as four words that are read and written whole.
 #[derive(Clone, Copy, Debug)]
@@ -45,7 +46,11 @@ impl Order {
     /// Looks at every candidate, by the flat list.
     pub(super) fn look_at_all<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
         if !self.listed {
-            self.list_all();
+            let level = self.level;
+            level.run(ListAll {
+                order: self,
+                began: tick.began,
+            });
         }
         done.tests += self.entries.len() as u64;
         let mut found = std::mem::take(&mut self.found);
@@ -84,39 +89,40 @@ impl Order {
         self.found = found;
     }
 
-    /// Lists every candidate.
-    fn list_all(&mut self) {
-        self.listed = true;
-        self.entries.clear();
-        for record in 0..self.links.len() {
-            if self.links.blocks(record)[0] != NONE {
-                let chosen = self.links.bits(record).cand;
-                self.list_bits(record, &chosen);
-            }
-        }
-    }
-
-    /// Lists some candidates of a record.
+    /// Lists some candidates of a record; those that are sure now overlap, and are told if they did not.
     #[inline(always)]
-    pub(super) fn list_bits(&mut self, record: u32, chosen: &Matrix) {
-        let [a, b] = self.links.blocks(record).map(|block| block * LANES);
-        let hit = &self.links.bits(record).hit;
-        // Four rows at a time, so that empty ones are passed over together.
-        for (four, rows) in chosen.chunks_exact(4).enumerate() {
-            let mut word = 0;
-            for (k, row) in rows.iter().enumerate() {
-                word |= u64::from(*row) << (16 * k);
+    pub(super) fn list_bits<L: Lanes>(
+        &mut self,
+        lanes: L,
+        record: u32,
+        chosen: &Matrix,
+        began: &mut Vec<PairKey>,
+    ) {
+        let blocks = self.links.blocks(record);
+        let [a, b] = blocks.map(|block| block * LANES);
+        let (one, other) = (
+            &self.sure[blocks[0] as usize],
+            &self.sure[blocks[1] as usize],
+        );
+        let hit = &mut self.links.bits_mut(record).hit;
+        for (row, hits) in hit.iter_mut().enumerate() {
+            if chosen[row] == 0 {
+                continue;
             }
-            while word != 0 {
-                let at = word.trailing_zeros();
-                word &= word - 1;
-                let (row, lane) = (small(four * 4) + at / 16, at % 16);
-                let ranks = [a + row, b + lane];
+            let sure = lanes.meets(other, &one.get(row)) & chosen[row];
+            let first = a + small(row);
+            for lane in ones(sure & !*hits) {
+                let slot = |rank: u32| BodySlot(self.slot_of[rank as usize]);
+                began.push(PairKey::new(slot(first), slot(b + small(lane))));
+            }
+            *hits |= sure;
+            for lane in ones(chosen[row] & !sure) {
+                let ranks = [first, b + small(lane)];
                 let ages = state(self.ages[ranks[0] as usize], self.ages[ranks[1] as usize]);
                 self.entries.push(Entry {
                     ranks,
                     record,
-                    state: ages | u32::from(hit[row as usize] >> lane & 1) << 16,
+                    state: ages | u32::from(*hits >> lane & 1) << 16,
                 });
             }
         }
@@ -195,7 +201,8 @@ impl Order {
         }
     }
 
-    /// Every live entry is a candidate with its state, and every candidate is listed once; while the list is kept.
+    /// Every live entry is a candidate with its state, and every candidate that is not sure is listed once; while the
+    /// list is kept.
     pub(super) fn check_list(&self) -> Result<(), String> {
         if !self.listed {
             return Ok(());
@@ -224,11 +231,17 @@ impl Order {
         let mut wanted = 0;
         for record in 0..self.links.len() {
             if self.links.blocks(record)[0] != NONE {
-                let cand = self.links.bits(record).cand;
-                wanted += cand
-                    .iter()
-                    .map(|row| row.count_ones() as usize)
-                    .sum::<usize>();
+                let [a, b] = self.links.blocks(record).map(|block| block as usize);
+                let bits = self.links.bits(record);
+                for row in 0..WIDTH {
+                    let sure = Portable.meets(&self.sure[b], &self.sure[a].get(row));
+                    if sure & bits.cand[row] & !bits.hit[row] != 0 {
+                        return Err(format!(
+                            "row {row} of {record} holds sure pairs without a hit"
+                        ));
+                    }
+                    wanted += (bits.cand[row] & !sure).count_ones() as usize;
+                }
             }
         }
         if listed != seen.len() || listed != wanted {
@@ -238,6 +251,29 @@ impl Order {
             ));
         }
         Ok(())
+    }
+}
+
+/// Lists every candidate.
+struct ListAll<'a> {
+    order: &'a mut Order,
+    began: &'a mut Vec<PairKey>,
+}
+
+impl Work for ListAll<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let order = self.order;
+        order.listed = true;
+        order.entries.clear();
+        for record in 0..order.links.len() {
+            if order.links.blocks(record)[0] != NONE {
+                let chosen = order.links.bits(record).cand;
+                order.list_bits(lanes, record, &chosen, self.began);
+            }
+        }
     }
 }
 

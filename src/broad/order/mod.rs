@@ -26,7 +26,7 @@ use super::Proxies;
 use super::Work;
 use super::members::{ASKED, CAME, Members};
 use crate::ids::{BodySlot, PairKey};
-use crate::simd::boxes::{Boxes16, Down, Level, WIDTH};
+use crate::simd::boxes::{Boxes16, Down, Hold, Level, WIDTH};
 
 mod fatten;
 mod links;
@@ -78,9 +78,11 @@ pub(super) struct Order {
     live: Vec<u16>,
     /// By rank: the box, rounded outward.
     exact: Vec<Down>,
-    /// By rank: the fat box; and the same by block, to be asked sixteen at a time.
-    held: Vec<Down>,
+    /// By rank: the fat box and the core; and by block, to be asked sixteen at a time, the fat boxes and what is sure of
+    /// the cores.
+    held: Vec<Hold>,
     fat: Vec<Boxes16>,
+    sure: Vec<Boxes16>,
     /// By rank: how often the lane was given a fat box or lost its body, around the clock.
     ages: Vec<u8>,
     /// By rank: what the body learned of its motion.
@@ -90,6 +92,8 @@ pub(super) struct Order {
     sorter: sort::Sorter,
     /// By block: the least key that was sorted into it.
     keys: Vec<u64>,
+    /// By block: the part of space that its bodies' middles filled after the sort; nothing in the attic.
+    homes: Vec<[f32; 6]>,
     /// Blocks that were sorted; those beyond take what finds no free lane.
     sorted: usize,
     /// Bodies in it.
@@ -140,11 +144,13 @@ impl Order {
             held: Vec::new(),
             ages: Vec::new(),
             fat: Vec::new(),
+            sure: Vec::new(),
             gaits: Vec::new(),
             tree: Tree::default(),
             links: Links::default(),
             sorter: sort::Sorter::default(),
             keys: Vec::new(),
+            homes: Vec::new(),
             sorted: 0,
             len: 0,
             dirty: Vec::new(),

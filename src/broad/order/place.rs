@@ -1,11 +1,12 @@
 //! Who stands where: lanes are given up and taken, and from time to time everything is sorted anew.
 
 use super::fatten::{Gait, outward};
-use super::links::{room, small};
+use super::links::{room, small, spare};
 use super::sort::{CLASSES_MAX, FILL, Sorter};
+use super::tree::NO_BOUND;
 use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, ones, parts};
 use crate::math::Aabb;
-use crate::simd::boxes::{Boxes16, Down, Portable, WIDTH};
+use crate::simd::boxes::{Boxes16, Down, Hold, Portable, WIDTH};
 
 /// Blocks met by queries beyond what is usual that cost as much as sorting one body anew: a block met costs about 8 ns,
 /// sorting and asking anew about 50 ns a body. Sorting when the excess has cost as much as a sort is at most twice as
@@ -13,6 +14,10 @@ use crate::simd::boxes::{Boxes16, Down, Portable, WIDTH};
 const WORN_PER_BODY: u64 = 2;
 /// One block in so many stays empty after a sort, for bodies that find no free lane where they belong.
 const ATTIC: usize = 16;
+/// A body farther outside its block's part of space than so many of its mean sides looks for another block, ...
+const DRIFT_SIDES: f32 = 0.5;
+/// ... which must be so many times nearer, squared: a lane changed costs about a microsecond.
+const NEARER: f32 = 4.0;
 /// How far from its place on the curve a body may find a free lane, blocks.
 const STRAY: usize = 20;
 
@@ -60,17 +65,23 @@ impl Order {
         self.live[block] &= !(1 << lane);
         self.renewing[block] &= !(1 << lane);
         self.fat[block].set(lane, &[f32::NAN; 6]);
+        self.sure[block].set(lane, &[f32::NAN; 6]);
         let rank = rank as usize;
         self.exact[rank] = Down::EMPTY;
-        self.held[rank] = Down::EMPTY;
+        self.held[rank] = Hold::EMPTY;
         self.ages[rank] = self.ages[rank].wrapping_add(1);
         self.len -= 1;
     }
 
-    /// Bodies that jumped clear of their block's bound give up their lanes, to stand where they belong.
+    /// Bodies that jumped clear of their block's bound give up their lanes, to stand where they belong. Those that have
+    /// drifted out of their block's part of space move to a block nearer by, if it has a lane: a few in each tick, at
+    /// their block's turn, so that the order wears slowly and is seldom sorted anew.
     pub(super) fn rehome(&mut self) {
         for at in 0..self.worklist.len() {
             let block = self.worklist[at] as usize;
+            if self.is_due(block) {
+                self.drift(block);
+            }
             let bound = *self.tree.bound(block);
             for lane in ones(self.renewing[block]) {
                 let one = self.exact[block * WIDTH + lane].corners();
@@ -84,6 +95,32 @@ impl Order {
         }
     }
 
+    /// Moves the bodies of a block that another, with a free lane, is much nearer to.
+    fn drift(&mut self, block: usize) {
+        for lane in ones(self.live[block]) {
+            let from = block * WIDTH + lane;
+            let boxed = self.exact[from];
+            let one = boxed.corners();
+            let far = far_from(&one, &self.homes[block]);
+            let side: f32 = (0..3).map(|k| one[k + 3] - one[k]).sum::<f32>() / 3.0;
+            if far <= side * side * DRIFT_SIDES * DRIFT_SIDES {
+                continue;
+            }
+            let Some((near, to)) = self.lane_near(&one) else {
+                continue;
+            };
+            if near * NEARER >= far {
+                continue;
+            }
+            let slot = BodySlot(self.slot_of[from]);
+            let (gait, held) = (self.gaits[from], self.held[from]);
+            self.evict(slot, true);
+            self.seat(slot, to, boxed);
+            let to = to as usize;
+            (self.gaits[to], self.held[to]) = (gait, held);
+        }
+    }
+
     /// Whether the order has cost more than sorting anew would.
     pub(super) fn is_worn(&self) -> bool {
         self.excess > WORN_PER_BODY * self.len as u64
@@ -94,25 +131,40 @@ impl Order {
         for at in 0..self.homeless.len() {
             let slot = self.homeless[at];
             let one = outward(Portable, tick.proxies.aabb(slot), &self.origin);
-            let Some(rank) = self.free_lane(&one.corners()) else {
+            let near = self.lane_near(&one.corners());
+            let Some(rank) = near.map(|(_, rank)| rank).or_else(|| self.lane_in_attic()) else {
                 return false;
             };
-            let (block, lane) = parts(rank);
-            grow(&mut self.rank_of, slot.index(), NONE);
-            self.rank_of[slot.index()] = rank;
             // How it got here says nothing of where it goes.
             self.gaits[rank as usize] = Gait::NEW;
-            self.slot_of[rank as usize] = slot.0;
-            self.live[block] |= 1 << lane;
-            self.len += 1;
-            self.exact[rank as usize] = one;
-            self.mark(block, 1 << lane);
+            self.seat(slot, rank, one);
         }
         true
     }
 
-    /// A free lane near a box's place on the curve, in the block whose middle is nearest; or in the attic.
-    fn free_lane(&mut self, one: &[f32; 6]) -> Option<u32> {
+    /// Gives a body a free lane.
+    fn seat(&mut self, slot: BodySlot, rank: u32, one: Down) {
+        let (block, lane) = parts(rank);
+        grow(&mut self.rank_of, slot.index(), NONE);
+        self.rank_of[slot.index()] = rank;
+        self.slot_of[rank as usize] = slot.0;
+        self.live[block] |= 1 << lane;
+        self.len += 1;
+        self.exact[rank as usize] = one;
+        self.mark(block, 1 << lane);
+    }
+
+    /// A free lane in an attic block.
+    fn lane_in_attic(&self) -> Option<u32> {
+        let mut attic = self.sorted..self.live.len();
+        let block = attic.find(|block| self.live[*block] != u16::MAX)?;
+        let lane = (!self.live[block]).trailing_zeros() as usize;
+        Some(small(block * WIDTH + lane))
+    }
+
+    /// A free lane near a box's place on the curve, in the block whose part of space is nearest; and how far that is,
+    /// squared.
+    fn lane_near(&self, one: &[f32; 6]) -> Option<(f32, u32)> {
         let key = self.sorter.key(one);
         let sorted = &self.keys[..self.sorted];
         let home = sorted.partition_point(|first| *first <= key);
@@ -121,18 +173,15 @@ impl Order {
             let fits = self.live[block] != u16::MAX
                 && Sorter::class_of(self.keys[block]) == Sorter::class_of(key);
             if fits {
-                let far = distance(one, self.tree.bound(block));
+                let far = far_from(one, &self.homes[block]);
                 if far < best.0 {
                     best = (far, Some(block));
                 }
             }
         }
-        let block = best.1.or_else(|| {
-            let mut attic = self.sorted..self.live.len();
-            attic.find(|block| self.live[*block] != u16::MAX)
-        })?;
+        let block = best.1?;
         let lane = (!self.live[block]).trailing_zeros() as usize;
-        Some(small(block * WIDTH + lane))
+        Some((best.0, small(block * WIDTH + lane)))
     }
 
     /// Sorts everything anew: every body, the homeless too, gets a lane and a fat box, and all candidates are found.
@@ -167,9 +216,9 @@ impl Order {
     fn reserve<P>(&mut self, tick: &mut Tick<'_, P>) {
         let (bodies, blocks) = (self.len, self.live.len());
         self.links.reserve();
-        let entries = self.entries.len().max(self.carried.len()) * 2 + 4 * bodies;
-        room(&mut self.entries, entries);
-        room(&mut self.carried, entries);
+        let (entries, carried) = (self.entries.len(), self.carried.len());
+        spare(&mut self.entries, entries, 2 * bodies);
+        spare(&mut self.carried, carried, 2 * bodies);
         for list in [
             &mut self.worklist,
             &mut self.touched_records,
@@ -206,6 +255,7 @@ impl Order {
     /// Deals the sorted bodies to blocks; a class begins with a block of its own.
     fn lay_out(&mut self, bodies: &[BodySlot], boxes: &[[f32; 6]]) {
         self.keys.clear();
+        self.homes.clear();
         self.live.clear();
         self.slot_of.clear();
         // How many blocks there are hangs on how many classes begin one: room for the most there can be.
@@ -214,11 +264,12 @@ impl Order {
         for list in [&mut self.live, &mut self.dirty, &mut self.renewing] {
             room(list, most);
         }
-        for list in [&mut self.exact, &mut self.held] {
-            room(list, most * WIDTH);
-        }
+        room(&mut self.exact, most * WIDTH);
+        room(&mut self.held, most * WIDTH);
         room(&mut self.keys, most);
+        room(&mut self.homes, most);
         room(&mut self.fat, most);
+        room(&mut self.sure, most);
         room(&mut self.slot_of, most * WIDTH);
         room(&mut self.gaits, most * WIDTH);
         room(&mut self.ages, most * WIDTH);
@@ -245,6 +296,7 @@ impl Order {
             if starts {
                 self.keys.push(*key);
                 self.live.push(0);
+                self.homes.push(NO_BOUND);
                 self.slot_of.resize(self.live.len() * WIDTH, NONE);
                 self.gaits.resize(self.live.len() * WIDTH, Gait::NEW);
             }
@@ -254,11 +306,18 @@ impl Order {
             let (rank, body) = (block * WIDTH + lane, bodies[*index as usize]);
             self.slot_of[rank] = body.0;
             self.rank_of[body.index()] = small(rank);
+            let (home, one) = (&mut self.homes[block], &boxes[*index as usize]);
+            for k in 0..3 {
+                let middle = one[k] * 0.5 + one[k + 3] * 0.5;
+                home[k] = home[k].min(middle);
+                home[k + 3] = home[k + 3].max(middle);
+            }
             self.gaits[rank] = self.former[*index as usize];
         }
         self.sorted = self.live.len();
         let blocks = self.sorted + self.sorted / ATTIC + 1;
         self.live.resize(blocks, 0);
+        self.homes.resize(blocks, NO_BOUND);
         self.slot_of.resize(blocks * WIDTH, NONE);
         self.gaits.resize(blocks * WIDTH, Gait::NEW);
         self.len = bodies.len();
@@ -266,22 +325,25 @@ impl Order {
             list.clear();
             list.resize(blocks, 0);
         }
-        self.fat.clear();
-        self.fat.resize(blocks, Boxes16::EMPTY);
-        for list in [&mut self.exact, &mut self.held] {
+        for list in [&mut self.fat, &mut self.sure] {
             list.clear();
-            list.resize(blocks * WIDTH, Down::EMPTY);
+            list.resize(blocks, Boxes16::EMPTY);
         }
+        self.exact.clear();
+        self.exact.resize(blocks * WIDTH, Down::EMPTY);
+        self.held.clear();
+        self.held.resize(blocks * WIDTH, Hold::EMPTY);
         self.ages.clear();
         self.ages.resize(blocks * WIDTH, 0);
     }
 }
 
-/// A measure of how far the middles of two boxes are apart.
-fn distance(one: &[f32; 6], other: &[f32; 6]) -> f32 {
+/// How far the middle of a box is from a part of space, squared; infinite where that is empty, or the box has no end.
+fn far_from(one: &[f32; 6], home: &[f32; 6]) -> f32 {
     let mut sum = 0.0;
     for k in 0..3 {
-        let apart = (one[k] + one[k + 3]) - (other[k] + other[k + 3]);
+        let middle = one[k] * 0.5 + one[k + 3] * 0.5;
+        let apart = (home[k] - middle).max(middle - home[k + 3]).max(0.0);
         sum += apart * apart;
     }
     sum

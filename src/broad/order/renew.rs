@@ -4,6 +4,7 @@
 //! its renewed lanes, and overwrites their rows and columns. So of two bodies that leave their boxes in one tick each
 //! sees the other's new box, and since a row is written, not added to, no pair is there twice.
 
+use super::fatten::sure;
 use super::links::{Bits, Matrix, room};
 use super::{BodySlot, NONE, Order, PairKey, Proxies, Tick, Work as Done, ones, parts, small};
 use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch};
@@ -53,6 +54,7 @@ impl Order {
         let level = self.level;
         let met = level.run(Renew {
             order: self,
+            began: tick.began,
             parted: tick.parted,
             done,
         });
@@ -70,6 +72,7 @@ impl Order {
         let level = self.level;
         let met = level.run(Renew {
             order: self,
+            began: tick.began,
             parted: tick.parted,
             done,
         });
@@ -114,6 +117,7 @@ impl Order {
 
 struct Renew<'a> {
     order: &'a mut Order,
+    began: &'a mut Vec<PairKey>,
     parted: &'a mut Vec<PairKey>,
     done: &'a mut Done,
 }
@@ -153,9 +157,10 @@ impl Renew<'_> {
         for lane in ones(renewing) {
             let rank = block * WIDTH + lane;
             let now = order.exact[rank];
-            let fat = order.gaits[rank].renew(&now, order.tick, horizon, &order.held[rank]);
-            order.held[rank] = fat;
-            order.fat[block].set(lane, &fat.corners());
+            let hold = order.gaits[rank].renew(&now, order.tick, horizon, &order.held[rank]);
+            order.held[rank] = hold;
+            order.fat[block].set(lane, &hold.fat.corners());
+            order.sure[block].set(lane, &sure(&hold));
             order.ages[rank] = order.ages[rank].wrapping_add(1);
         }
         self.done.renewed += u64::from(renewing.count_ones());
@@ -192,7 +197,7 @@ impl Renew<'_> {
         for at in 0..scratch.have.len() {
             let (other, record) = scratch.have[at];
             if scratch.mark[other as usize].0 == stamp {
-                self.part(block, other, record, renewing);
+                self.part(lanes, block, other, record, renewing);
             }
         }
         met
@@ -267,25 +272,33 @@ impl Renew<'_> {
                 }
             }
         }
-        self.write(block, other, record, &cand, renewing);
+        self.write(lanes, block, other, record, &cand, renewing);
     }
 
     /// The renewed lanes of a block have no candidate in another any more.
     #[inline(always)]
-    fn part(&mut self, block: u32, other: u32, record: u32, renewing: u16) {
+    fn part<L: Lanes>(&mut self, lanes: L, block: u32, other: u32, record: u32, renewing: u16) {
         let mut cand = self.order.links.bits(record).cand;
         if block < other {
             clear(&mut cand, renewing, u16::MAX);
         } else {
             clear(&mut cand, u16::MAX, renewing);
         }
-        self.write(block, other, record, &cand, renewing);
+        self.write(lanes, block, other, record, &cand, renewing);
     }
 
     /// Writes a matrix of candidates, and lists those of renewed lanes; what overlapped and is no candidate any more has
     /// parted.
     #[inline(always)]
-    fn write(&mut self, block: u32, other: u32, record: u32, cand: &Matrix, renewing: u16) {
+    fn write<L: Lanes>(
+        &mut self,
+        lanes: L,
+        block: u32,
+        other: u32,
+        record: u32,
+        cand: &Matrix,
+        renewing: u16,
+    ) {
         let (a, b) = (block.min(other), block.max(other));
         let any = cand.iter().fold(0, |all, row| all | row) != 0;
         let order = &mut *self.order;
@@ -327,7 +340,7 @@ impl Renew<'_> {
                 clear(&mut chosen, theirs, u16::MAX);
                 clear(&mut chosen, u16::MAX, !renewing);
             }
-            order.list_bits(record, &chosen);
+            order.list_bits(lanes, record, &chosen, self.began);
         }
     }
 }

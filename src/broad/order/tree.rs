@@ -7,7 +7,7 @@ use crate::simd::boxes::{Boxes16, LANES, Lanes, Portable, WIDTH};
 const LEVELS_MAX: usize = 8;
 
 /// The bound of nothing: upside down.
-const NO_BOUND: [f32; 6] = {
+pub(super) const NO_BOUND: [f32; 6] = {
     let (low, high) = (f32::INFINITY, f32::NEG_INFINITY);
     [low, low, low, high, high, high]
 };

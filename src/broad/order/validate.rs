@@ -4,7 +4,7 @@ use super::{NONE, Order, Proxies, ones, parts};
 use crate::broad::members::Members;
 use crate::broad::order::fatten::outward;
 use crate::ids::BodySlot;
-use crate::simd::boxes::{Portable, WIDTH};
+use crate::simd::boxes::{Lanes, Portable, WIDTH};
 
 impl Order {
     /// Lanes and bodies name each other, boxes are stored and held by their fat boxes, the tree holds the fat boxes, and
@@ -42,8 +42,13 @@ impl Order {
             if (0..3).any(|k| fat[k] > exact[k] || fat[k + 3] < exact[k + 3]) {
                 return Err(format!("{slot:?} has left its fat box"));
             }
-            if self.held[rank as usize].corners().map(f32::to_bits) != fat.map(f32::to_bits) {
+            let hold = &self.held[rank as usize];
+            if hold.fat.corners().map(f32::to_bits) != fat.map(f32::to_bits) {
                 return Err(format!("the two fat boxes of {slot:?} differ"));
+            }
+            let boxed = &self.exact[rank as usize];
+            if !Portable.holds(&hold.fat, boxed) || !Portable.holds(boxed, &hold.core) {
+                return Err(format!("{slot:?} does not keep to its hold"));
             }
         }
         let lanes: u32 = self.live.iter().map(|live| live.count_ones()).sum();

@@ -46,6 +46,24 @@ pub(crate) struct Down {
     pub(crate) faces: [f32; 8],
 }
 
+/// What a box may do without any work: it stays inside `fat` and goes on holding `core`. A cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Hold {
+    /// Holds the box; its spare lanes are minus infinity.
+    pub(crate) fat: Down,
+    /// Is held by the box; infinite, also in its spare lanes: no box fails it.
+    pub(crate) core: Down,
+}
+
+impl Hold {
+    /// Of no box: nothing keeps to it.
+    pub(crate) const EMPTY: Self = Self {
+        fat: Down::EMPTY,
+        core: Down::EMPTY,
+    };
+}
+
 /// The first spare lane of a [`Down`]: how far rounding may have moved the box's faces, and twice as much.
 pub(crate) const SLACK: usize = 3;
 
@@ -73,7 +91,7 @@ pub(super) const LEAST: f64 = f32::MIN_POSITIVE as f64;
 
 /// The slack of a box whose largest face is this far from the origin.
 #[inline(always)]
-pub(super) fn slack(largest: f32) -> f32 {
+pub(crate) fn slack(largest: f32) -> f32 {
     largest * SLACK_SHARE + 8.0 * f32::MIN_POSITIVE
 }
 
@@ -90,12 +108,12 @@ pub(crate) trait Lanes: Copy {
     /// * `min`, `max` - up to 1e38 in magnitude, or infinite outward.
     fn outward(self, min: &[f64; 3], max: &[f64; 3], origin: &[f64; 3]) -> Down;
 
-    /// As `outward`, written to a place; returns whether the box lies inside `outer`, as `holds` tells.
+    /// As `outward`, written to a place; returns whether the box keeps to a hold, as `holds` tells.
     fn take(
         self,
         corners: [&[f64; 3]; 2],
         origin: &[f64; 3],
-        outer: &Down,
+        hold: &Hold,
         place: &mut Down,
     ) -> bool;
 
@@ -182,11 +200,11 @@ impl Lanes for Portable {
         self,
         corners: [&[f64; 3]; 2],
         origin: &[f64; 3],
-        outer: &Down,
+        hold: &Hold,
         place: &mut Down,
     ) -> bool {
         *place = self.outward(corners[0], corners[1], origin);
-        self.holds(outer, place)
+        self.holds(&hold.fat, place) & self.holds(place, &hold.core)
     }
 
     #[inline(always)]

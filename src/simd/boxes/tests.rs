@@ -73,6 +73,59 @@ fn every_level_gives_the_bits_of_the_safe_twin() {
     }
 }
 
+/// Takes a box and tells whether it keeps to a hold.
+struct Taken<'a>([&'a [f64; 3]; 2], &'a [f64; 3], &'a Hold);
+
+impl Work for Taken<'_> {
+    type Out = ([u32; 8], bool);
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> Self::Out {
+        let mut place = Down::EMPTY;
+        let keeps = lanes.take(self.0, self.1, self.2, &mut place);
+        (place.faces.map(f32::to_bits), keeps)
+    }
+}
+
+#[test]
+fn every_level_tells_alike_whether_a_box_keeps_to_its_hold() {
+    let rounds = if cfg!(miri) { 20 } else { 20_000 };
+    let mut kept = 0;
+    for seed in 0..rounds {
+        let state = &mut (seed + 1);
+        let origin = [0.1, 1e7 + 0.3, -3.0];
+        #[allow(clippy::cast_precision_loss, reason = "any number will do")]
+        let mut near = |k: usize| origin[k] + next(state) as f64 / 2.0_f64.powi(31);
+        let low: [f64; 3] = std::array::from_fn(&mut near);
+        let high = std::array::from_fn(|k| near(k).max(low[k]));
+        let now = Portable.outward(&low, &high, &origin);
+        let mut hold = Hold {
+            fat: now,
+            core: now,
+        };
+        // One face in some is a step too tight.
+        for k in 0..8 {
+            match next(state) % 24 {
+                0 => hold.fat.faces[k] = now.faces[k].next_up(),
+                1 => hold.core.faces[k] = now.faces[k].next_down(),
+                2 => hold.fat.faces[k] = f32::NEG_INFINITY,
+                3 => hold.core.faces[k] = f32::INFINITY,
+                _ => {}
+            }
+        }
+        let wanted = Taken([&low, &high], &origin, &hold).run(Portable);
+        let inside = (0..8).all(|k| hold.fat.faces[k] <= now.faces[k]);
+        let around = (0..8).all(|k| now.faces[k] <= hold.core.faces[k]);
+        assert_eq!(wanted.1, inside && around, "seed {seed}");
+        kept += u32::from(wanted.1);
+        for level in Level::available() {
+            let got = level.run(Taken([&low, &high], &origin, &hold));
+            assert_eq!(got, wanted, "seed {seed}, {level:?}");
+        }
+    }
+    assert!(cfg!(miri) || (5000..15_000).contains(&kept), "{kept}");
+}
+
 /// Rounds a box.
 struct Rounded<'a>(&'a [f64; 3], &'a [f64; 3], &'a [f64; 3]);
 

@@ -14,7 +14,7 @@ use std::arch::x86_64::{
 };
 
 use super::Work;
-use super::lanes::{Boxes16, Down, LEAST, Lanes, STEP, WIDTH, slack};
+use super::lanes::{Boxes16, Down, Hold, LEAST, Lanes, STEP, WIDTH, slack};
 
 /// Two halves of eight lanes or, where `WIDE`, sixteen at once for what gains by it. Only [`run_avx2`] and
 /// [`run_avx512`] make one: where one is, AVX2 is, and where a wide one is, AVX-512 F too.
@@ -135,11 +135,13 @@ fn store(faces: __m256, place: &mut Down) {
 
 #[inline]
 #[target_feature(enable = "avx2")]
-fn take_avx2(corners: [&[f64; 3]; 2], origin: &[f64; 3], outer: &Down, place: &mut Down) -> bool {
+fn take_avx2(corners: [&[f64; 3]; 2], origin: &[f64; 3], hold: &Hold, place: &mut Down) -> bool {
     // Compared from the register: to read back what was just written in halves would wait for both.
     let faces = outward_avx2(corners[0], corners[1], origin);
     store(faces, place);
-    _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(one(outer), faces)) == 0xFF
+    let inside = _mm256_cmp_ps::<_CMP_LE_OQ>(one(&hold.fat), faces);
+    let around = _mm256_cmp_ps::<_CMP_LE_OQ>(faces, one(&hold.core));
+    _mm256_movemask_ps(_mm256_and_ps(inside, around)) == 0xFF
 }
 
 /// The lanes that are faces.
@@ -237,11 +239,11 @@ impl<const WIDE: bool> Lanes for Vectors<WIDE> {
         self,
         corners: [&[f64; 3]; 2],
         origin: &[f64; 3],
-        outer: &Down,
+        hold: &Hold,
         place: &mut Down,
     ) -> bool {
         // SAFETY: a `Vectors` is made only where AVX2 is.
-        unsafe { take_avx2(corners, origin, outer, place) }
+        unsafe { take_avx2(corners, origin, hold, place) }
     }
 
     #[inline(always)]
