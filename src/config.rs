@@ -49,6 +49,42 @@ impl std::fmt::Display for Mode {
     }
 }
 
+/// Which broad phase.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BroadMethod {
+    /// Every pair of bodies, every tick.
+    BruteForce,
+    /// Sorted ends of boxes on the axes, kept across ticks.
+    SweepAndPrune,
+    /// Blocks of boxes in the order of a space-filling curve, fat boxes and candidates kept across ticks.
+    Order,
+    /// Cells as large as the largest box, in an array around the scene.
+    UniformGrid,
+    /// Cells as large as the largest box, only those with a body, in a table.
+    SpatialHash,
+    /// Cells on levels by size, a factor of two between levels, in a table.
+    HierarchicalGrid,
+}
+
+impl BroadMethod {
+    /// Every method, with the name that it is chosen by.
+    pub const NAMED: &'static [(Self, &'static str)] = &[
+        (Self::BruteForce, "brute"),
+        (Self::SweepAndPrune, "sap"),
+        (Self::Order, "order"),
+        (Self::UniformGrid, "grid"),
+        (Self::SpatialHash, "hash"),
+        (Self::HierarchicalGrid, "hgrid"),
+    ];
+
+    /// The method of a name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        let found = Self::NAMED.iter().find(|(_, known)| *known == name);
+        found.map(|(method, _)| *method)
+    }
+}
+
 /// What happens to a body that is too old.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -97,6 +133,8 @@ pub struct Config {
     pub heartbeat_ns: u64,
     /// `on_all`: how long after its first frame a round waits for the others, nanoseconds.
     pub late_ns: u64,
+    /// The broad phase that the scene asks for; `None`: the plan chooses.
+    pub broad_phase: Option<BroadMethod>,
     /// Beyond this reach a stale body makes no new pairs, metres.
     pub stale_reach_m: f64,
     /// Sizes of messages and sets.
@@ -138,6 +176,7 @@ impl Default for Config {
             budget: Budget::UNLIMITED,
             heartbeat_ns: limits::HEARTBEAT_MS_DEFAULT * 1_000_000,
             late_ns: 5_000_000,
+            broad_phase: None,
             stale_reach_m: 1.0,
             limits: Limits::default(),
         }

@@ -87,11 +87,12 @@ impl Plan {
             }) => BRUTE_FORCE_STAY_MAX,
             _ => BRUTE_FORCE_MAX,
         };
-        let method = if facts.boxes <= few {
+        let fitting = if facts.boxes <= few {
             Method::BruteForce
         } else {
-            Method::SweepAndPrune
+            Method::Order
         };
+        let method = config.broad_phase.unwrap_or(fitting);
         Self {
             method,
             bodies: facts.bodies,
@@ -141,17 +142,20 @@ impl Facts {
 }
 
 fn choices(facts: &Facts, method: Method, config: &Config) -> Vec<Choice> {
-    let (chosen, why) = match method {
-        Method::BruteForce => ("every pair of boxes", format!("{} boxes", facts.boxes)),
-        Method::SweepAndPrune => (
-            "sweep-and-prune, sorted ends kept across ticks",
-            format!("{} boxes, {} bodies move", facts.boxes, facts.moving),
-        ),
-        Method::Order => (
-            "sort-and-sweep along a space-filling order, candidates of fat boxes kept across ticks",
-            format!("{} boxes, {} bodies move", facts.boxes, facts.moving),
-        ),
+    let chosen = match method {
+        Method::BruteForce => "every pair of boxes",
+        Method::SweepAndPrune => "sweep-and-prune, sorted ends kept across ticks",
+        Method::Order => {
+            "sort-and-sweep along a space-filling order, candidates of fat boxes kept across ticks"
+        }
+        Method::UniformGrid => "uniform grid, cells of the largest box",
+        Method::SpatialHash => "spatial hash, cells of the largest box",
+        Method::HierarchicalGrid => "hierarchical grid, a level of cells by size",
     };
+    let mut why = format!("{} boxes, {} bodies move", facts.boxes, facts.moving);
+    if config.broad_phase.is_some() {
+        why += "; the scene asks for it";
+    }
     let mut choices = vec![Choice {
         part: "broad phase",
         chosen: chosen.to_owned(),

@@ -1,5 +1,5 @@
 //! Goal: no allocation in a tick after warm-up at constant scene size. Method: a counting allocator around the system's,
-//! armed for the ticks that count.
+//! armed for the ticks that count. `SWEEPD_ALLOC_TRACE=1` prints where each counted one was made.
 
 #![allow(unsafe_code, reason = "a counting allocator has no safe form")]
 #![allow(clippy::unwrap_used, reason = "a test")]
@@ -18,6 +18,7 @@ struct Counting;
 
 thread_local! {
     static ARMED: Cell<bool> = const { Cell::new(false) };
+    static TRACED: Cell<bool> = const { Cell::new(false) };
     static COUNT: Cell<u64> = const { Cell::new(0) };
 }
 
@@ -25,6 +26,12 @@ fn note() {
     ARMED.with(|armed| {
         if armed.get() {
             COUNT.with(|count| count.set(count.get() + 1));
+            if TRACED.with(Cell::get) {
+                // What the trace itself needs does not count.
+                armed.set(false);
+                eprintln!("{}", std::backtrace::Backtrace::force_capture());
+                armed.set(true);
+            }
         }
     });
 }
@@ -72,6 +79,7 @@ fn count(scene: &str, budget: Budget, ticks: u64) -> u64 {
 
 #[test]
 fn a_tick_allocates_nothing_after_warm_up() {
+    TRACED.with(|traced| traced.set(std::env::var_os("SWEEPD_ALLOC_TRACE").is_some()));
     for (name, scene) in [("pool", pool(300, 1)), ("pile", pile(300, 2))] {
         for budget in [
             Budget::UNLIMITED,

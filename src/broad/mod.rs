@@ -29,6 +29,8 @@ mod order;
 mod sap;
 mod touched;
 
+pub use crate::config::BroadMethod as Method;
+
 use commit::{Found, Judge};
 use forced::Forced;
 use grid::{Grid, Kind};
@@ -44,42 +46,6 @@ pub trait Proxies {
     fn unbounded(&self, slot: BodySlot) -> bool;
     /// Its id: the order of results.
     fn id(&self, slot: BodySlot) -> BodyId;
-}
-
-/// Which broad phase.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
-    /// Every pair of bodies, every tick.
-    BruteForce,
-    /// Sorted ends of boxes on the axes, kept across ticks.
-    SweepAndPrune,
-    /// Blocks of boxes in the order of a space-filling curve, fat boxes and candidates kept across ticks.
-    Order,
-    /// Cells as large as the largest box, in an array around the scene.
-    UniformGrid,
-    /// Cells as large as the largest box, only those with a body, in a table.
-    SpatialHash,
-    /// Cells on levels by size, a factor of two between levels, in a table.
-    HierarchicalGrid,
-}
-
-impl Method {
-    /// Every method, with the name that it is chosen by.
-    pub const NAMED: &'static [(Self, &'static str)] = &[
-        (Self::BruteForce, "brute"),
-        (Self::SweepAndPrune, "sap"),
-        (Self::Order, "order"),
-        (Self::UniformGrid, "grid"),
-        (Self::SpatialHash, "hash"),
-        (Self::HierarchicalGrid, "hgrid"),
-    ];
-
-    /// The method of a name.
-    #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
-        let found = Self::NAMED.iter().find(|(_, known)| *known == name);
-        found.map(|(method, _)| *method)
-    }
 }
 
 /// What the last update did; all counted, nothing timed.

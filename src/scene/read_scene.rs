@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use crate::config::{Config, Limits, Mode};
+use crate::config::{BroadMethod, Config, Limits, Mode};
 use crate::error::{Error, Result};
 use crate::limits;
 use crate::scene::node::{Fault, Node, Value};
@@ -35,6 +35,7 @@ const RUN_KEYS: &[&str] = &[
     "heartbeat_ms",
     "late_ms",
     "stale_reach_m",
+    "broad_phase",
 ];
 const LIMIT_KEYS: &[&str] = &[
     "bodies",
@@ -281,7 +282,29 @@ fn read_run(
     if let Some(reach_m) = table.number_within("stale_reach_m", 0.0, limits::EXTENT_MAX_M)? {
         config.stale_reach_m = reach_m;
     }
+    config.broad_phase = read_broad_phase(&mut table)?;
     Ok(config)
+}
+
+/// `broad_phase = "auto"`, or the name of a method.
+fn read_broad_phase(table: &mut Table) -> std::result::Result<Option<BroadMethod>, Fault> {
+    let at = table.at("broad_phase");
+    let Some(word) = table.text("broad_phase")? else {
+        return Ok(None);
+    };
+    if word == "auto" {
+        return Ok(None);
+    }
+    let names = BroadMethod::NAMED.iter().map(|(_, name)| *name);
+    let unknown = || {
+        let text = format!(
+            "broad_phase is \"{}\": write \"auto\" or one of {}",
+            shortened(&word),
+            names.collect::<Vec<_>>().join(", ")
+        );
+        Fault::new(at, text)
+    };
+    BroadMethod::named(&word).map(Some).ok_or_else(unknown)
 }
 
 /// `mode = "on_all"`, `on_frame = "SOURCE"` or `rate = HZ`; one of them.

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use sweepd::builtin::{Motion, Pattern, Random, pool};
+use sweepd::config::BroadMethod;
 use sweepd::ids::BodyId;
 use sweepd::scene::Scene;
 use sweepd::shape::ShapeSpec;
@@ -44,7 +45,8 @@ fn shuffle<T>(items: &mut [T], rng: &mut Rng) {
 }
 
 #[test]
-fn law_4_5_the_same_inputs_in_any_order_give_the_same_bits_at_any_budget_in_units() {
+fn law_4_5_the_same_inputs_in_any_order_and_any_broad_phase_give_the_same_bits_at_any_budget_in_units()
+ {
     let scene = mixed();
     let mut random = Random::new(5);
     let motions: Vec<(u64, Motion)> = (scene.bodies.iter())
@@ -57,9 +59,11 @@ fn law_4_5_the_same_inputs_in_any_order_give_the_same_bits_at_any_budget_in_unit
         .collect();
     for units in [0, 7, 40, 200, 1_000_000] {
         let mut want: Vec<String> = Vec::new();
-        for order in 0..3 {
+        let methods = BroadMethod::NAMED.iter().map(|(method, _)| Some(*method));
+        for (order, method) in (0..).zip([None, None, None].into_iter().chain(methods)) {
             let mut rng = Rng::new(order);
             let mut scene = scene.clone();
+            scene.config.broad_phase = method;
             if order > 0 {
                 shuffle(&mut scene.bodies, &mut rng);
             }
@@ -85,7 +89,7 @@ fn law_4_5_the_same_inputs_in_any_order_give_the_same_bits_at_any_budget_in_unit
                         let at = a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();
                         let from = at.saturating_sub(300);
                         panic!(
-                            "{units} units, tick {tick}:\n{}\n{}",
+                            "{units} units, {method:?}, tick {tick}:\n{}\n{}",
                             &a[from..(at + 100).min(a.len())],
                             &b[from..(at + 100).min(b.len())]
                         );
