@@ -20,8 +20,6 @@ pub(super) struct Found {
     ended: Vec<((BodyId, BodyId), Ended)>,
     /// Pairs to be stored, in the order of the delta.
     fresh: Vec<((BodyId, BodyId), PairKey)>,
-    /// By body: the last group whose lower body is paired with it.
-    stamp: Vec<u32>,
     /// Stored pairs to look at, while some are taken out.
     pub(super) slots: Vec<PairSlot>,
     /// Stored pairs that end, and why.
@@ -158,33 +156,9 @@ impl Found {
         self.fresh.clear();
         self.began.sort_unstable();
         self.began.dedup();
-        for group in self.began.chunk_by(|a, b| a.slots().0 == b.slots().0) {
-            let (low, _) = group[0].slots();
-            // A lookup walks the shorter list. For many lookups with one body it is cheaper to walk its list once.
-            let at_once = group.len() > 2 && !pairs.is_empty();
-            if at_once {
-                for (_, other) in pairs.partners(low) {
-                    if self.stamp.len() <= other.index() {
-                        self.stamp.resize(other.index() + 1, 0);
-                    }
-                    self.stamp[other.index()] = low.0 + 1;
-                }
-            }
-            for key in group {
-                let (_, high) = key.slots();
-                let stored = if at_once {
-                    self.stamp.get(high.index()) == Some(&(low.0 + 1))
-                } else {
-                    pairs.find(*key).is_some()
-                };
-                if !stored && judge.begins(*key) {
-                    self.fresh.push((judge.members.rank(*key), *key));
-                }
-            }
-            if at_once {
-                for (_, other) in pairs.partners(low) {
-                    self.stamp[other.index()] = 0;
-                }
+        for key in &self.began {
+            if pairs.find(*key).is_none() && judge.begins(*key) {
+                self.fresh.push((judge.members.rank(*key), *key));
             }
         }
         self.fresh.sort_unstable_by_key(|(rank, _)| *rank);

@@ -213,10 +213,9 @@ impl PairSet {
             }
         }
         self.nodes[at as usize] = node;
-        let nodes = &self.nodes;
-        let places = nodes.capacity();
-        let hash_of = |at: u32| nodes[at as usize].key.bits();
-        self.index.insert(key.bits(), at, places, hash_of);
+        let (nodes, places) = (&self.nodes, self.nodes.capacity());
+        let hash = |at: u32| nodes[at as usize].key.bits();
+        self.index.insert(key.bits(), at, places, hash);
         self.len += 1;
         Some(PairSlot(at))
     }
@@ -241,8 +240,8 @@ impl PairSet {
             }
         }
         let nodes = &self.nodes;
-        let hash_of = |at: u32| nodes[at as usize].key.bits();
-        self.index.remove(node.key.bits(), slot.0, hash_of);
+        let hash = |at: u32| nodes[at as usize].key.bits();
+        self.index.remove(node.key.bits(), slot.0, hash);
         self.nodes[slot.index()].live = false;
         self.resting.push(slot.0);
         self.len -= 1;

@@ -104,6 +104,36 @@ fn a_heap_is_exact() {
     run(Kind::Heap, 400, frames() / 10 + 10);
 }
 
+/// What the main method does in all frames of a scene: sorts of everything, boxes compared; and the pairs of all frames.
+fn work(kind: Kind, bodies: usize, frames: usize) -> (u64, u64, u64) {
+    let mut scene = Scene::new(kind, bodies, 11);
+    let mut rig = Rig::new(Level::best(), bodies, false);
+    rig.start(&scene.boxes);
+    let mut done = (0, 0, 0);
+    for frame in 0..frames {
+        scene.step();
+        let wanted = exact::pairs(&scene.boxes);
+        rig.take(&scene);
+        rig.tick(&wanted, &format!("{kind:?}, frame {frame}"));
+        done.0 += rig.work().rebuilds;
+        done.1 += rig.work().tests;
+        done.2 += wanted.len() as u64;
+    }
+    done
+}
+
+#[test]
+fn a_gas_is_put_in_order_a_little_in_each_tick_and_not_sorted_anew() {
+    let (sorts, ..) = work(Kind::Gas, 2000, 300);
+    assert!(sorts <= 1, "{sorts} sorts in 300 frames");
+}
+
+#[test]
+fn pairs_that_are_sure_are_not_compared() {
+    let (_, tests, pairs) = work(Kind::Heap, 500, 60);
+    assert!(tests * 4 < pairs, "{tests} comparisons for {pairs} pairs");
+}
+
 #[test]
 fn two_bodies_that_leave_their_fat_boxes_in_one_tick_are_one_pair() {
     let mut rig = Rig::new(Level::best(), 40, false);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use sweepd::broad::{BroadPhase, Method, Proxies};
+use sweepd::broad::{BroadPhase, Method, Proxies, Work};
 use sweepd::ids::{BodyId, BodySlot, PairKey};
 use sweepd::math::{Aabb, Point};
 use sweepd::pairs::{PairDelta, PairPolicy, PairSet};
@@ -164,6 +164,10 @@ impl Rig {
             "{what}, {}: events differ",
             self.name
         );
+    }
+
+    pub fn work(&self) -> Work {
+        self.broad.work()
     }
 
     pub fn validate(&self) {

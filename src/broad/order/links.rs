@@ -103,6 +103,19 @@ impl Links {
         self.ends[record as usize].blocks
     }
 
+    /// Overlaps in all records.
+    pub(super) fn hits(&self) -> usize {
+        let used = self.ends.iter().zip(&self.bits);
+        let used = used.filter(|(ends, _)| ends.blocks[0] != NONE);
+        used.map(|(_, bits)| {
+            bits.hit
+                .iter()
+                .map(|row| row.count_ones() as usize)
+                .sum::<usize>()
+        })
+        .sum()
+    }
+
     /// The records of a block: the other block (or itself), the record.
     #[inline(always)]
     pub(super) fn of(&self, block: u32) -> Listed<'_> {

@@ -8,6 +8,9 @@ use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch};
 /// must be: the walk down the tree is then shared, and they would be next.
 const ALONG_AGE: u32 = HORIZON / 2;
 
+/// Stretches of blocks at least, that the turns go round; a stretch is a quarter at most.
+const STRETCHES: usize = 3 * HORIZON as usize;
+
 /// How many blocks ahead boxes are asked for: a block takes some 100 ns, memory about as long.
 const AHEAD: usize = 2;
 
@@ -45,11 +48,13 @@ impl Order {
         self.renewing[block] |= lanes;
     }
 
-    /// Ticks until it is a block's turn. While many move, each tick renews one stretch of the order, so that all ticks cost
-    /// the same, and most neighbours are renewed together: then one of two asks for both.
+    /// Ticks until it is a block's turn. While many move, each tick renews a few stretches of the order, so that all ticks
+    /// cost the same, wherever large or crowded bodies stand, and most neighbours are renewed together: then one of two
+    /// asks for both.
     #[inline(always)]
     fn until_turn(&self, block: usize) -> u32 {
-        let turn = small(block * HORIZON as usize / self.live.len());
+        let stretch = (self.live.len() / STRETCHES).clamp(1, WIDTH);
+        let turn = small(block / stretch) % HORIZON;
         (turn + HORIZON - self.tick % HORIZON) % HORIZON
     }
 

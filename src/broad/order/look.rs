@@ -79,6 +79,7 @@ impl Order {
                 continue;
             }
             *hit ^= 1 << lane;
+            self.hits = if now { self.hits + 1 } else { self.hits - 1 };
             let key = PairKey::new(slots[0], slots[1]);
             if now {
                 tick.began.push(key);
@@ -115,6 +116,7 @@ impl Order {
                 let slot = |rank: u32| BodySlot(self.slot_of[rank as usize]);
                 began.push(PairKey::new(slot(first), slot(b + small(lane))));
             }
+            self.hits += (sure & !*hits).count_ones() as usize;
             *hits |= sure;
             for lane in ones(chosen[row] & !sure) {
                 let ranks = [first, b + small(lane)];
@@ -189,6 +191,7 @@ impl Order {
                 continue;
             }
             flips |= 1 << lane;
+            self.hits = if now { self.hits + 1 } else { self.hits - 1 };
             let key = PairKey::new(one, other);
             if now {
                 tick.began.push(key);

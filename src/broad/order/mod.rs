@@ -8,16 +8,20 @@
 //! * **Fat boxes** (`fatten`): a body inside its own costs one containment test.
 //! * **Candidates** (`links`): for each two blocks that come near one another a matrix of 16 by 16 bits. They change
 //!   only where a body left its fat box (`renew`), a few blocks in each tick rather than all at once.
-//! * **The look** (`look`): candidates of moved bodies are compared with sixteen lanes at once; begin and end are
-//!   differences of bits. Cost in proportion to what moved: few moved bodies are looked at one by one.
+//! * **The look** (`look`): candidates are compared one after the other, and begin and end are differences of bits.
+//!   Pairs whose cores overlap are sure and not compared. Cost in proportion to what moved: few moved bodies are looked at
+//!   one by one.
+//! * **Mending** (`mend`): while bodies move, a few blocks in each tick are put in order again, so that everything is
+//!   seldom sorted anew.
 //! * **Exact.** Boxes are f32, rounded outward, relative to an f64 origin amid the scene; where rounding could tell
 //!   otherwise than the f64 boxes, those are asked. So the pairs are those of the f64 boxes at any offset.
 //! * **Modes** (few or many moved; renewal or sorting anew) are chosen by counted work with weights that were measured
 //!   once, so that a replay chooses alike. They decide about cost alone: pairs, slots and events are the same.
 //!
-//! Refused: three lists of sorted ends (see `sap`: exponent 1.5 to 2 as soon as motion is incoherent); lists of
-//! candidate pairs (each renewal inserts, removes and looks up single pairs; matrices are overwritten); a renewal of all
-//! boxes at once (cheaper by a fifth, but each eighth tick takes five times the others).
+//! Refused: three lists of sorted ends (see `sap`: exponent 1.5 to 2 as soon as motion is incoherent); a list of pairs as
+//! the one home of candidates (each renewal would insert, remove and look up single pairs; matrices are overwritten, and
+//! the list of the look is only a copy in the order of memory); a renewal of all boxes at once (cheaper by a fifth, but
+//! each eighth tick takes five times the others).
 //!
 //! Sources: Terdiman, "Box pruning revisited" (2017), for sorted copies in structure-of-arrays form; Verlet lists
 //! (Verlet 1967) for candidates that outlive a step; Morton 1966 for the order.
@@ -32,6 +36,7 @@ mod fatten;
 mod links;
 mod load;
 mod look;
+mod mend;
 mod place;
 mod renew;
 mod sort;
@@ -39,7 +44,7 @@ mod tree;
 mod validate;
 
 use fatten::Gait;
-use links::{Links, small};
+use links::{Links, small, spare};
 use tree::Tree;
 
 /// No index.
@@ -92,8 +97,13 @@ pub(super) struct Order {
     sorter: sort::Sorter,
     /// By block: the least key that was sorted into it.
     keys: Vec<u64>,
-    /// By block: the part of space that its bodies' middles filled after the sort; nothing in the attic.
+    /// By block: the part of space that its bodies' middles filled when they were sorted into it; nothing in the attic.
     homes: Vec<[f32; 6]>,
+    /// By sixteen blocks: the part of space that their bodies filled after the last sort of all.
+    quarters: Vec<[f32; 6]>,
+    /// ... and the middle of its bodies at its last turn, or NaN.
+    middles: Vec<[f32; 3]>,
+    mender: mend::Mender,
     /// Blocks that were sorted; those beyond take what finds no free lane.
     sorted: usize,
     /// Bodies in it.
@@ -105,6 +115,8 @@ pub(super) struct Order {
     worklist: Vec<u32>,
     /// Bodies without a lane that are to get one.
     homeless: Vec<BodySlot>,
+    /// Overlaps in all matrices.
+    hits: usize,
     /// Pairs whose boxes overlapped when one of them lost its lane.
     carried: Vec<(u32, u32)>,
     scratch: renew::Scratch,
@@ -151,12 +163,16 @@ impl Order {
             sorter: sort::Sorter::default(),
             keys: Vec::new(),
             homes: Vec::new(),
+            quarters: Vec::new(),
+            middles: Vec::new(),
+            mender: mend::Mender::default(),
             sorted: 0,
             len: 0,
             dirty: Vec::new(),
             renewing: Vec::new(),
             worklist: Vec::new(),
             homeless: Vec::new(),
+            hits: 0,
             carried: Vec::new(),
             scratch: renew::Scratch::default(),
             boxes: Vec::new(),
@@ -194,6 +210,9 @@ impl Order {
         if !anew {
             self.load(&tick, many);
             self.rehome();
+            if many {
+                self.mend();
+            }
         }
         if anew || self.is_worn() || !self.settle(&tick) {
             self.listed = false;
@@ -240,6 +259,8 @@ impl Order {
             self.renewing[block as usize] = 0;
         }
         self.carried.clear();
+        // A sort may come in any tick and carries every overlap: room for that grows when their number does.
+        spare(&mut self.carried, self.hits, self.len);
     }
 
     /// Block and lane of a body.

@@ -2,22 +2,18 @@
 
 use super::fatten::{Gait, outward};
 use super::links::{room, small, spare};
-use super::sort::{CLASSES_MAX, FILL, Sorter};
+use super::sort::{CLASSES_MAX, FILL, Sorter, centre};
 use super::tree::NO_BOUND;
 use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, ones, parts};
 use crate::math::Aabb;
 use crate::simd::boxes::{Boxes16, Down, Hold, Portable, WIDTH};
 
-/// Blocks met by queries beyond what is usual that cost as much as sorting one body anew: a block met costs about 8 ns,
-/// sorting and asking anew about 50 ns a body. Sorting when the excess has cost as much as a sort is at most twice as
-/// dear as the best plan.
-const WORN_PER_BODY: u64 = 2;
+/// Blocks met by queries beyond what is usual that cost as much as sorting one body anew: a block met costs about 15 ns,
+/// sorting, carrying the overlaps and finding all candidates anew some 300 ns a body. Sorting when the excess has cost
+/// as much as a sort is at most twice as dear as the best plan.
+const WORN_PER_BODY: u64 = 20;
 /// One block in so many stays empty after a sort, for bodies that find no free lane where they belong.
 const ATTIC: usize = 16;
-/// A body farther outside its block's part of space than so many of its mean sides looks for another block, ...
-const DRIFT_SIDES: f32 = 0.5;
-/// ... which must be so many times nearer, squared: a lane changed costs about a microsecond.
-const NEARER: f32 = 4.0;
 /// How far from its place on the curve a body may find a free lane, blocks.
 const STRAY: usize = 20;
 
@@ -48,6 +44,7 @@ impl Order {
                 };
                 let theirs = if b == block { !(1 << lane) } else { u16::MAX };
                 bits.cand[row] &= mine & theirs;
+                self.hits -= (bits.hit[row] & !(mine & theirs)).count_ones() as usize;
                 bits.hit[row] &= mine & theirs;
                 any |= bits.cand[row];
             }
@@ -73,54 +70,6 @@ impl Order {
         self.len -= 1;
     }
 
-    /// Bodies that jumped clear of their block's bound give up their lanes, to stand where they belong. Those that have
-    /// drifted out of their block's part of space move to a block nearer by, if it has a lane: a few in each tick, at
-    /// their block's turn, so that the order wears slowly and is seldom sorted anew.
-    pub(super) fn rehome(&mut self) {
-        for at in 0..self.worklist.len() {
-            let block = self.worklist[at] as usize;
-            if self.is_due(block) {
-                self.drift(block);
-            }
-            let bound = *self.tree.bound(block);
-            for lane in ones(self.renewing[block]) {
-                let one = self.exact[block * WIDTH + lane].corners();
-                let meets = (0..3).all(|k| one[k] <= bound[k + 3] && bound[k] <= one[k + 3]);
-                if !meets {
-                    let slot = BodySlot(self.slot_of[block * WIDTH + lane]);
-                    self.evict(slot, true);
-                    self.homeless.push(slot);
-                }
-            }
-        }
-    }
-
-    /// Moves the bodies of a block that another, with a free lane, is much nearer to.
-    fn drift(&mut self, block: usize) {
-        for lane in ones(self.live[block]) {
-            let from = block * WIDTH + lane;
-            let boxed = self.exact[from];
-            let one = boxed.corners();
-            let far = far_from(&one, &self.homes[block]);
-            let side: f32 = (0..3).map(|k| one[k + 3] - one[k]).sum::<f32>() / 3.0;
-            if far <= side * side * DRIFT_SIDES * DRIFT_SIDES {
-                continue;
-            }
-            let Some((near, to)) = self.lane_near(&one) else {
-                continue;
-            };
-            if near * NEARER >= far {
-                continue;
-            }
-            let slot = BodySlot(self.slot_of[from]);
-            let (gait, held) = (self.gaits[from], self.held[from]);
-            self.evict(slot, true);
-            self.seat(slot, to, boxed);
-            let to = to as usize;
-            (self.gaits[to], self.held[to]) = (gait, held);
-        }
-    }
-
     /// Whether the order has cost more than sorting anew would.
     pub(super) fn is_worn(&self) -> bool {
         self.excess > WORN_PER_BODY * self.len as u64
@@ -143,7 +92,7 @@ impl Order {
     }
 
     /// Gives a body a free lane.
-    fn seat(&mut self, slot: BodySlot, rank: u32, one: Down) {
+    pub(super) fn seat(&mut self, slot: BodySlot, rank: u32, one: Down) {
         let (block, lane) = parts(rank);
         grow(&mut self.rank_of, slot.index(), NONE);
         self.rank_of[slot.index()] = rank;
@@ -164,7 +113,7 @@ impl Order {
 
     /// A free lane near a box's place on the curve, in the block whose part of space is nearest; and how far that is,
     /// squared.
-    fn lane_near(&self, one: &[f32; 6]) -> Option<(f32, u32)> {
+    pub(super) fn lane_near(&self, one: &[f32; 6]) -> Option<(f32, u32)> {
         let key = self.sorter.key(one);
         let sorted = &self.keys[..self.sorted];
         let home = sorted.partition_point(|first| *first <= key);
@@ -207,6 +156,7 @@ impl Order {
         }
         self.tree.reset(self.live.len());
         self.links.reset(self.live.len());
+        self.hits = 0;
         self.renew_all(tick, done);
         self.restore(tick);
         self.reserve(tick);
@@ -216,9 +166,8 @@ impl Order {
     fn reserve<P>(&mut self, tick: &mut Tick<'_, P>) {
         let (bodies, blocks) = (self.len, self.live.len());
         self.links.reserve();
-        let (entries, carried) = (self.entries.len(), self.carried.len());
+        let entries = self.entries.len();
         spare(&mut self.entries, entries, 2 * bodies);
-        spare(&mut self.carried, carried, 2 * bodies);
         for list in [
             &mut self.worklist,
             &mut self.touched_records,
@@ -232,6 +181,7 @@ impl Order {
         room(tick.began, bodies);
         room(tick.parted, bodies);
         self.tree.reserve();
+        self.mender.reserve(blocks);
     }
 
     /// Remembers every overlap.
@@ -252,14 +202,10 @@ impl Order {
         }
     }
 
-    /// Deals the sorted bodies to blocks; a class begins with a block of its own.
-    fn lay_out(&mut self, bodies: &[BodySlot], boxes: &[[f32; 6]]) {
-        self.keys.clear();
-        self.homes.clear();
-        self.live.clear();
-        self.slot_of.clear();
+    /// Room for the blocks of so many bodies.
+    fn reserve_blocks(&mut self, bodies: usize) {
         // How many blocks there are hangs on how many classes begin one: room for the most there can be.
-        let most = bodies.len() / FILL + CLASSES_MAX;
+        let most = bodies / FILL + CLASSES_MAX;
         let most = most + most / ATTIC + 1;
         for list in [&mut self.live, &mut self.dirty, &mut self.renewing] {
             room(list, most);
@@ -268,6 +214,8 @@ impl Order {
         room(&mut self.held, most * WIDTH);
         room(&mut self.keys, most);
         room(&mut self.homes, most);
+        room(&mut self.quarters, most / WIDTH + 1);
+        room(&mut self.middles, most / WIDTH + 1);
         room(&mut self.fat, most);
         room(&mut self.sure, most);
         room(&mut self.slot_of, most * WIDTH);
@@ -276,6 +224,17 @@ impl Order {
         self.links.reserve_blocks(most);
         self.tree.reserve_blocks(most);
         self.scratch.reserve(most);
+    }
+
+    /// Deals the sorted bodies to blocks; a class begins with a block of its own.
+    fn lay_out(&mut self, bodies: &[BodySlot], boxes: &[[f32; 6]]) {
+        self.keys.clear();
+        self.homes.clear();
+        self.quarters.clear();
+        self.middles.clear();
+        self.live.clear();
+        self.slot_of.clear();
+        self.reserve_blocks(bodies.len());
         self.former.clear();
         for slot in bodies {
             grow(&mut self.rank_of, slot.index(), NONE);
@@ -297,6 +256,8 @@ impl Order {
                 self.keys.push(*key);
                 self.live.push(0);
                 self.homes.push(NO_BOUND);
+                self.quarters
+                    .resize((self.live.len() - 1) / WIDTH + 1, NO_BOUND);
                 self.slot_of.resize(self.live.len() * WIDTH, NONE);
                 self.gaits.resize(self.live.len() * WIDTH, Gait::NEW);
             }
@@ -306,18 +267,17 @@ impl Order {
             let (rank, body) = (block * WIDTH + lane, bodies[*index as usize]);
             self.slot_of[rank] = body.0;
             self.rank_of[body.index()] = small(rank);
-            let (home, one) = (&mut self.homes[block], &boxes[*index as usize]);
-            for k in 0..3 {
-                let middle = one[k] * 0.5 + one[k + 3] * 0.5;
-                home[k] = home[k].min(middle);
-                home[k + 3] = home[k + 3].max(middle);
-            }
+            let middle = centre(&boxes[*index as usize]);
+            widen(&mut self.homes[block], &middle);
+            widen(&mut self.quarters[block / WIDTH], &middle);
             self.gaits[rank] = self.former[*index as usize];
         }
         self.sorted = self.live.len();
         let blocks = self.sorted + self.sorted / ATTIC + 1;
         self.live.resize(blocks, 0);
         self.homes.resize(blocks, NO_BOUND);
+        self.quarters.resize(blocks.div_ceil(WIDTH), NO_BOUND);
+        self.middles.resize(self.quarters.len(), [f32::NAN; 3]);
         self.slot_of.resize(blocks * WIDTH, NONE);
         self.gaits.resize(blocks * WIDTH, Gait::NEW);
         self.len = bodies.len();
@@ -338,8 +298,16 @@ impl Order {
     }
 }
 
+/// Makes a part of space hold a place.
+pub(super) fn widen(home: &mut [f32; 6], place: &[f32; 3]) {
+    for k in 0..3 {
+        home[k] = home[k].min(place[k]);
+        home[k + 3] = home[k + 3].max(place[k]);
+    }
+}
+
 /// How far the middle of a box is from a part of space, squared; infinite where that is empty, or the box has no end.
-fn far_from(one: &[f32; 6], home: &[f32; 6]) -> f32 {
+pub(super) fn far_from(one: &[f32; 6], home: &[f32; 6]) -> f32 {
     let mut sum = 0.0;
     for k in 0..3 {
         let middle = one[k] * 0.5 + one[k + 3] * 0.5;

@@ -59,7 +59,8 @@ impl Order {
             done,
         });
         let asked = self.worklist.len() as u64;
-        self.excess += (met * 16).saturating_sub(asked * self.usual) / 16;
+        // Below the usual counts too, so that stretches of the order which always meet more are no wear.
+        self.excess = (self.excess + met).saturating_sub(asked * self.usual / 16);
     }
 
     /// Renews every lane, after a sort; what a query meets now is what is usual.
@@ -98,7 +99,9 @@ impl Order {
             let record = self.links.find(small(a), small(b));
             debug_assert!(record.is_some(), "boxes that overlap are candidates");
             if let Some(record) = record {
-                self.links.bits_mut(record).hit[row] |= 1 << lane;
+                let hit = &mut self.links.bits_mut(record).hit[row];
+                self.hits += usize::from(*hit >> lane & 1 == 0);
+                *hit |= 1 << lane;
             }
         }
     }
@@ -320,6 +323,8 @@ impl Renew<'_> {
             bits.cand = *cand;
             let lost = gone.iter().fold(0, |all, row| all | row);
             if lost != 0 {
+                let ones = gone.iter().map(|row| row.count_ones() as usize);
+                order.hits -= ones.sum::<usize>();
                 order.tell_parted([a, b], &gone, self.parted);
             }
             if !any {

@@ -146,7 +146,7 @@ impl Sorter {
                 let middle = centre(&boxes[*index as usize]);
                 self.middles.push((middle, *index));
             }
-            split(&mut self.middles);
+            split(&mut self.middles, FILL);
             for ((_, index), (_, sorted)) in stretch.iter_mut().zip(&self.middles) {
                 *index = *sorted;
             }
@@ -187,8 +187,10 @@ const STRETCH: usize = FILL * WIDTH;
 
 /// Orders a stretch so that each block of it is compact: halves by the middle along the longest axis, and so on. The
 /// curve alone gives blocks that meet twice as many others.
-fn split(middles: &mut [([f32; 3], u32)]) {
-    if middles.len() <= FILL {
+///
+/// * `fill` - bodies of a block.
+pub(super) fn split(middles: &mut [([f32; 3], u32)], fill: usize) {
+    if middles.len() <= fill {
         return;
     }
     let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
@@ -202,7 +204,7 @@ fn split(middles: &mut [([f32; 3], u32)]) {
     let axis = (0..3)
         .max_by(|a, b| side(a).total_cmp(&side(b)))
         .unwrap_or(0);
-    let half = middles.len().div_ceil(FILL).div_ceil(2) * FILL;
+    let half = middles.len().div_ceil(fill).div_ceil(2) * fill;
     if half >= middles.len() {
         return;
     }
@@ -212,8 +214,8 @@ fn split(middles: &mut [([f32; 3], u32)]) {
     };
     middles.select_nth_unstable_by(half, by);
     let (one, other) = middles.split_at_mut(half);
-    split(one);
-    split(other);
+    split(one, fill);
+    split(other, fill);
 }
 
 /// The octave of the longest side.
@@ -225,7 +227,7 @@ fn octave(one: &[f32; 6]) -> usize {
 }
 
 /// The middle of a box; of an infinite one, anything.
-fn centre(one: &[f32; 6]) -> [f32; 3] {
+pub(super) fn centre(one: &[f32; 6]) -> [f32; 3] {
     std::array::from_fn(|k| {
         let middle = one[k] * 0.5 + one[k + 3] * 0.5;
         if middle.is_finite() { middle } else { 0.0 }

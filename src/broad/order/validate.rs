@@ -69,6 +69,10 @@ impl Order {
         }
         self.tree.validate(&self.fat)?;
         self.links.validate(&self.live)?;
+        let hits = self.links.hits();
+        if hits != self.hits {
+            return Err(format!("{hits} overlaps stand, {} are counted", self.hits));
+        }
         self.check_list()?;
         self.check_bits(proxies)
     }

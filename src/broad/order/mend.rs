@@ -1,0 +1,253 @@
+//! Keeps the order good while bodies move, a little in each tick, so that everything is seldom sorted anew.
+//!
+//! Sixteen blocks that stand side by side share a quarter: the part of space that their bodies filled after the last sort
+//! of all. It follows what its bodies do together. A body that has left its quarter moves to a lane in another; within a
+//! quarter the bodies are dealt to the blocks anew when these have spread.
+
+use super::fatten::Gait;
+use super::links::room;
+use super::place::{far_from, widen};
+use super::sort::{Sorter, centre, split};
+use super::tree::NO_BOUND;
+use super::{BodySlot, NONE, Order, ones, small};
+use crate::simd::boxes::{Boxes16, Down, Hold, WIDTH};
+
+/// A body farther outside its quarter than so many of its mean sides looks for another block, ...
+const DRIFT_SIDES: f32 = 0.5;
+/// ... which must be so many times nearer, squared: a lane changed costs about a microsecond.
+const NEARER: f32 = 4.0;
+/// Blocks whose bodies have spread so much over what they were dealt are dealt anew: that costs about as much as renewing
+/// all of them once more, and blocks that are so much longer meet twice as many others.
+const MIXED: f32 = 1.2;
+/// Least bodies of a block that is dealt anew: with fewer the blocks would be many and empty.
+const FILL_LEAST: usize = 8;
+
+/// A body on its way to another lane.
+#[derive(Clone, Copy, Debug)]
+struct Seat {
+    slot: BodySlot,
+    exact: Down,
+    held: Hold,
+    gait: Gait,
+}
+
+/// Memory kept over calls.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Mender {
+    seats: Vec<Seat>,
+    middles: Vec<([f32; 3], u32)>,
+    records: Vec<u32>,
+}
+
+impl Mender {
+    /// Room for the quarters of any tick.
+    pub(super) fn reserve(&mut self, records: usize) {
+        room(&mut self.seats, WIDTH * WIDTH);
+        room(&mut self.middles, WIDTH * WIDTH);
+        room(&mut self.records, records);
+    }
+}
+
+impl Order {
+    /// Bodies that jumped clear of their block's bound give up their lanes, to stand where they belong.
+    pub(super) fn rehome(&mut self) {
+        for at in 0..self.worklist.len() {
+            let block = self.worklist[at] as usize;
+            let bound = *self.tree.bound(block);
+            for lane in ones(self.renewing[block]) {
+                let one = self.exact[block * WIDTH + lane].corners();
+                let meets = (0..3).all(|k| one[k] <= bound[k + 3] && bound[k] <= one[k + 3]);
+                if !meets {
+                    let slot = BodySlot(self.slot_of[block * WIDTH + lane]);
+                    self.evict(slot, true);
+                    self.homeless.push(slot);
+                }
+            }
+        }
+    }
+
+    /// Looks after the quarters whose turn it is: who has left one moves, and those that have got mixed up are dealt anew.
+    pub(super) fn mend(&mut self) {
+        for quarter in 0..self.quarters.len() {
+            let first = quarter * WIDTH;
+            if !self.is_due(first) {
+                continue;
+            }
+            self.follow(quarter);
+            for block in first..(first + WIDTH).min(self.live.len()) {
+                self.drift(block);
+            }
+            // A quarter on the border of two classes is dealt in part.
+            let class = |block: usize| Sorter::class_of(self.keys[block]);
+            let blocks = first..(first + WIDTH).min(self.sorted);
+            let same = blocks.take_while(|block| class(*block) == class(first));
+            let end = first + same.count();
+            if self.is_mixed(first, end) {
+                self.deal(first, end);
+            }
+        }
+    }
+
+    /// Shifts a quarter and its blocks' parts of space along with the middle of its bodies: what all do together mixes
+    /// nothing.
+    fn follow(&mut self, quarter: usize) {
+        let blocks = quarter * WIDTH..(quarter * WIDTH + WIDTH).min(self.live.len());
+        let (mut sum, mut bodies) = ([0.0_f32; 3], 0.0_f32);
+        for block in blocks.clone() {
+            for lane in ones(self.live[block]) {
+                let middle = centre(&self.exact[block * WIDTH + lane].corners());
+                for k in 0..3 {
+                    sum[k] += middle[k];
+                }
+                bodies += 1.0;
+            }
+        }
+        if bodies == 0.0 {
+            return;
+        }
+        let now = sum.map(|sum| sum / bodies);
+        let before = std::mem::replace(&mut self.middles[quarter], now);
+        // Not known after a sort.
+        if before[0].is_nan() {
+            return;
+        }
+        let by: [f32; 3] = std::array::from_fn(|k| now[k] - before[k]);
+        let homes = self.homes[blocks].iter_mut();
+        // An empty part of space is infinite, and stays what it is.
+        for home in homes.chain([&mut self.quarters[quarter]]) {
+            for k in 0..3 {
+                home[k] += by[k];
+                home[k + 3] += by[k];
+            }
+        }
+    }
+
+    /// Moves the bodies of a block that another, with a free lane, is much nearer to than their quarter.
+    fn drift(&mut self, block: usize) {
+        for lane in ones(self.live[block]) {
+            let from = block * WIDTH + lane;
+            let boxed = self.exact[from];
+            let one = boxed.corners();
+            let far = if block < self.sorted {
+                far_from(&one, &self.quarters[block / WIDTH])
+            } else {
+                f32::INFINITY
+            };
+            let side = (0..3).map(|k| one[k + 3] - one[k]).sum::<f32>() / 3.0;
+            if far <= side * side * DRIFT_SIDES * DRIFT_SIDES {
+                continue;
+            }
+            let Some((near, to)) = self.lane_near(&one) else {
+                continue;
+            };
+            if near * NEARER >= far {
+                continue;
+            }
+            let slot = BodySlot(self.slot_of[from]);
+            let (gait, held) = (self.gaits[from], self.held[from]);
+            self.evict(slot, true);
+            self.seat(slot, to, boxed);
+            let to = to as usize;
+            (self.gaits[to], self.held[to]) = (gait, held);
+        }
+    }
+
+    /// Whether the blocks have spread over much more space than when they were dealt.
+    fn is_mixed(&self, from: usize, to: usize) -> bool {
+        let extent = |home: &[f32; 6]| {
+            (0..3)
+                .map(|k| (home[k + 3] - home[k]).max(0.0))
+                .sum::<f32>()
+        };
+        let (mut dealt, mut now) = (0.0, 0.0);
+        for block in from..to {
+            let mut spread = NO_BOUND;
+            for lane in ones(self.live[block]) {
+                widen(
+                    &mut spread,
+                    &centre(&self.exact[block * WIDTH + lane].corners()),
+                );
+            }
+            dealt += extent(&self.homes[block]);
+            now += extent(&spread);
+        }
+        now > dealt * MIXED
+    }
+
+    /// Deals the bodies of some blocks to the same blocks anew, each block compact. Their overlaps are carried.
+    fn deal(&mut self, from: usize, to: usize) {
+        let mut mender = std::mem::take(&mut self.mender);
+        mender.seats.clear();
+        mender.middles.clear();
+        for block in from..to {
+            self.carry_block(block, &mut mender.records);
+            for lane in ones(self.live[block]) {
+                let rank = block * WIDTH + lane;
+                let middle = centre(&self.exact[rank].corners());
+                mender.middles.push((middle, small(mender.seats.len())));
+                mender.seats.push(Seat {
+                    slot: BodySlot(self.slot_of[rank]),
+                    exact: self.exact[rank],
+                    held: self.held[rank],
+                    gait: self.gaits[rank],
+                });
+            }
+            self.vacate(block);
+        }
+        let bodies = mender.seats.len();
+        let fill = bodies.div_ceil(to - from).max(FILL_LEAST);
+        split(&mut mender.middles, fill);
+        for (block, group) in (from..to).zip(mender.middles.chunks(fill)) {
+            for (lane, (middle, index)) in group.iter().enumerate() {
+                let seat = &mender.seats[*index as usize];
+                let rank = block * WIDTH + lane;
+                self.seat(seat.slot, small(rank), seat.exact);
+                (self.gaits[rank], self.held[rank]) = (seat.gait, seat.held);
+                widen(&mut self.homes[block], middle);
+            }
+        }
+        self.mender = mender;
+    }
+
+    /// Remembers the overlaps of a block and drops its records.
+    fn carry_block(&mut self, block: usize, records: &mut Vec<u32>) {
+        records.clear();
+        for (other, record) in self.links.of(small(block)) {
+            records.push(record);
+            let [a, b] = self
+                .links
+                .blocks(record)
+                .map(|block| block as usize * WIDTH);
+            debug_assert!(a / WIDTH == block || b / WIDTH == block || other == NONE);
+            for (row, bits) in self.links.bits(record).hit.into_iter().enumerate() {
+                for lane in ones(bits) {
+                    let pair = (self.slot_of[a + row], self.slot_of[b + lane]);
+                    self.carried.push(pair);
+                    self.hits -= 1;
+                }
+            }
+        }
+        for record in records.drain(..) {
+            self.links.remove(record);
+        }
+    }
+
+    /// Empties a block that has no records. Its bound is taken anew in this tick.
+    fn vacate(&mut self, block: usize) {
+        for lane in ones(self.live[block]) {
+            let rank = block * WIDTH + lane;
+            self.rank_of[self.slot_of[rank] as usize] = NONE;
+            self.slot_of[rank] = NONE;
+            self.exact[rank] = Down::EMPTY;
+            self.held[rank] = Hold::EMPTY;
+            self.ages[rank] = self.ages[rank].wrapping_add(1);
+        }
+        self.len -= self.live[block].count_ones() as usize;
+        self.live[block] = 0;
+        self.renewing[block] = 0;
+        self.fat[block] = Boxes16::EMPTY;
+        self.sure[block] = Boxes16::EMPTY;
+        self.homes[block] = NO_BOUND;
+        self.worklist.push(small(block));
+    }
+}
