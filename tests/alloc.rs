@@ -3,13 +3,17 @@
 
 #![allow(unsafe_code, reason = "a counting allocator has no safe form")]
 #![allow(clippy::unwrap_used, reason = "a test")]
+#![allow(unreachable_pub, reason = "shared by tests")]
 
 mod harness;
+mod oracle;
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::fmt::Write as _;
 
 use harness::Drive;
+use oracle::meshes::{torus, trimesh};
 use sweepd::builtin::{Pattern, pile, pool};
 use sweepd::time::Budget;
 use sweepd::wire::Demand;
@@ -77,10 +81,48 @@ fn count(scene: &str, budget: Budget, ticks: u64) -> u64 {
     0
 }
 
+/// Tori and boxes in a heap: pairs of meshes, and of meshes with convex shapes, that come and go.
+fn tori() -> String {
+    let mut text = "[[source]]\nname = \"feed\"\n".to_owned();
+    let torus = trimesh(&torus(0.3, 0.1, 16, 10), None);
+    let cube = "{ type = \"box\", half_extents = [0.2, 0.25, 0.3] }";
+    for k in 0..30 {
+        let shape = if k % 3 == 2 { cube } else { &torus };
+        let at = [k % 3, k / 3 % 3, k / 9].map(|i| 0.45 * f64::from(i));
+        let _ = write!(
+            text,
+            "[[body]]\nname = \"b{k}\"\nmoves = true\nposition = {at:?}\nshape = {shape}\n",
+        );
+    }
+    text
+}
+
+/// Bodies of a torus and a box each, on a floor: pairs of several shapes, and of meshes with a half-space.
+fn compounds() -> String {
+    let mut text = "[[source]]\nname = \"feed\"\n".to_owned();
+    text += "[[body]]\nname = \"floor\"\nmoves = false\n";
+    text += "shape = { type = \"half_space\", normal = [0.0, 0.0, 1.0] }\n";
+    let torus = trimesh(&torus(0.3, 0.1, 16, 10), None);
+    let cube = "{ type = \"box\", half_extents = [0.1, 0.1, 0.3], position = [0.0, 0.0, 0.3] }";
+    for k in 0..20 {
+        let at = [k % 3, k / 3 % 3, k / 9].map(|i| 0.5 * f64::from(i));
+        let _ = write!(
+            text,
+            "[[body]]\nname = \"b{k}\"\nmoves = true\nposition = {at:?}\nshapes = [{torus}, {cube}]\n",
+        );
+    }
+    text
+}
+
 #[test]
 fn a_tick_allocates_nothing_after_warm_up() {
     TRACED.with(|traced| traced.set(std::env::var_os("SWEEPD_ALLOC_TRACE").is_some()));
-    for (name, scene) in [("pool", pool(300, 1)), ("pile", pile(300, 2))] {
+    for (name, scene) in [
+        ("pool", pool(300, 1)),
+        ("pile", pile(300, 2)),
+        ("tori", tori()),
+        ("compounds", compounds()),
+    ] {
         for budget in [
             Budget::UNLIMITED,
             Budget::units(50),

@@ -47,10 +47,11 @@ impl Narrow {
         let Some(front) = self.fronts.get_mut(memo.front) else {
             return false;
         };
+        let store = &mut self.front_store;
         let credit_m = a.motion.credit_m() + b.motion.credit_m();
         let (one_shape, other_shape) = (&one.shape, &other.shape);
         if fresh {
-            front.start(one_shape, other_shape, &pos12, self.search);
+            front.start(store, one_shape, other_shape, &pos12, self.search);
         } else if due {
             memo.retested = self.tick;
             self.counters.queries += 1;
@@ -63,10 +64,10 @@ impl Narrow {
                 return false;
             }
         }
-        front.move_to(one_shape, other_shape, &pos12);
+        front.move_to(store, one_shape, other_shape, &pos12);
         self.counters.slices += 1;
         let slice_units = SLICE_UNITS << waited.min(SLICE_DOUBLINGS_MAX);
-        let done = front.advance(one_shape, other_shape, goal, slice_units, meter);
+        let done = front.advance(store, one_shape, other_shape, goal, slice_units, meter);
         let found = sound(front.interval(), one, other, &rel);
         let now = memo.now;
         if !done && found.min <= now.min && found.max >= now.max {
@@ -93,7 +94,7 @@ impl Narrow {
             self.found.clear();
             if gap.min <= 0.0 {
                 let seen = |leaf| leaf_contact((one, other), (0, 0), &pos12, leaf, gap);
-                self.found.extend(front.contacts().iter().map(seen));
+                self.found.extend(front.contacts(store).iter().map(seen));
                 // Of a shape within another: the way out.
                 let within = self.found.is_empty() && gap.max <= 0.0;
                 self.found

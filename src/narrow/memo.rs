@@ -325,6 +325,9 @@ impl Narrow {
         memo.queued = false;
         memo.refreshing = false;
         self.cursors.give(&mut memo.cursor);
+        if let Some(front) = self.fronts.get_mut(memo.front) {
+            front.release(&mut self.front_store);
+        }
         self.fronts.give(&mut memo.front);
         self.contact_sets.give(&mut memo.contacts);
     }

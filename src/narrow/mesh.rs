@@ -33,7 +33,7 @@ mod side;
 mod triangle;
 mod walk;
 
-pub use carried::{CarriedFront, Search, has_front};
+pub use carried::{CarriedFront, FrontStore, Search, has_front};
 pub use contacts::{LEAF_CONTACTS_MAX, LeafContact};
 pub use retest::retest_witness;
 pub use walk::{Goal, Walk};

@@ -40,7 +40,7 @@ use crate::world::World;
 
 use cursor::Cursor;
 use memo::{Hot, Memo};
-use mesh::{CarriedFront, Search};
+use mesh::{CarriedFront, FrontStore, Search};
 use order::Urgency;
 
 /// What the narrow phase did in this tick.
@@ -81,6 +81,7 @@ pub struct Narrow {
     cursors: Pool<Cursor>,
     /// What is carried of pairs of single shapes of which one is a mesh.
     fronts: Pool<CarriedFront>,
+    front_store: FrontStore,
     search: Search,
     contact_sets: Pool<ContactSet>,
     /// What the order of work asks of each pair, by `PairSlot`.

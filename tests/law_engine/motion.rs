@@ -4,10 +4,9 @@ use sweepd::math::{Pose, Quat, Vec3};
 use sweepd::time::Budget;
 use sweepd::wire::{Demand, Verdict};
 
-use crate::oracle::meshes;
+use crate::oracle::meshes::{self, trimesh};
 use crate::oracle::rng::Rng;
 use crate::rig::{ALL, FRAME_NS, NONE, Rig, body, scene};
-use crate::shapes::trimesh;
 
 const BALL: &str = "{ type = \"sphere\", radius = 1.0 }";
 

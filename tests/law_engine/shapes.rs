@@ -1,30 +1,11 @@
 //! 3.2, 3.3, 4.6: what once was said of meshes, half-spaces and height fields, through the engine.
 
-use std::fmt::Write as _;
-
 use sweepd::math::{Pose, Quat, Vec3};
 use sweepd::time::Budget;
 use sweepd::wire::{State, Verdict};
 
-use crate::oracle::meshes::{self, Soup};
+use crate::oracle::meshes::{self, trimesh};
 use crate::rig::{ALL, NONE, Rig, ball, body, scene};
-
-/// A mesh as an inline table.
-pub(crate) fn trimesh(soup: &Soup, solid: Option<bool>) -> String {
-    let mut text = "{ type = \"trimesh\", vertices = [".to_owned();
-    for v in &soup.vertices {
-        let _ = write!(text, "[{:?}, {:?}, {:?}], ", v.x, v.y, v.z);
-    }
-    text += "], faces = [";
-    for f in &soup.faces {
-        let _ = write!(text, "{f:?}, ");
-    }
-    text += "]";
-    if let Some(solid) = solid {
-        let _ = write!(text, ", solid = {solid}");
-    }
-    text + " }"
-}
 
 #[test]
 fn law_4_6_a_half_space_turned_by_a_fifth_of_a_radian_sweeps_what_stands_far_from_its_centre() {

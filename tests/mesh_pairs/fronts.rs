@@ -5,7 +5,7 @@ use crate::oracle::meshes;
 use crate::oracle::rng::Rng;
 use crate::support::{CASES, KINDS, any_convex, any_mesh, place, shape, truth_of};
 use sweepd::math::{Pose, Quat, Vec3, relative};
-use sweepd::narrow::mesh::{CarriedFront, Goal, Search, has_front};
+use sweepd::narrow::mesh::{CarriedFront, FrontStore, Goal, Search, has_front};
 use sweepd::shape::Shape;
 use sweepd::time::{ManualClock, Meter};
 
@@ -60,18 +60,18 @@ fn drive(rng: &mut Rng, couple: &mut Couple<'_>, search: Search, whole: bool, wh
     let leaves = all_leaves(a, b);
     let home = couple.pose_b;
     let clock = ManualClock::new(0);
-    let mut front = CarriedFront::default();
+    let (mut store, mut front) = (FrontStore::default(), CarriedFront::default());
     for pose in 0..POSES {
         let at = format!("{what} pose {pose}");
         let pos12 = relative(&couple.pose_a, &couple.pose_b);
         let truth = truth_of(a, b, &couple.pose_a, &couple.pose_b);
         if pose == 0 {
-            front.start(a, b, &pos12, search);
+            front.start(&mut store, a, b, &pos12, search);
         } else {
             if front.still_touches(a, b, &pos12) {
                 assert!(matches!(truth, Truth::Overlap(_)), "{at}: {truth:?}");
             }
-            front.move_to(a, b, &pos12);
+            front.move_to(&mut store, a, b, &pos12);
         }
         let goal = [Goal::Verdict, Goal::Verdict, Goal::Gap, Goal::Contacts][rng.below(4)];
         let turns = if whole { usize::MAX } else { rng.below(5) };
@@ -85,7 +85,7 @@ fn drive(rng: &mut Rng, couple: &mut Couple<'_>, search: Search, whole: bool, wh
                 _ => rng.bits() % 60,
             };
             let mut meter = Meter::new(&clock, None, Some(units + u64::from(whole)));
-            done = front.advance(a, b, goal, u64::MAX, &mut meter);
+            done = front.advance(&mut store, a, b, goal, u64::MAX, &mut meter);
             let now = front.interval();
             match truth {
                 Truth::Apart(d) => assert!(
@@ -103,7 +103,7 @@ fn drive(rng: &mut Rng, couple: &mut Couple<'_>, search: Search, whole: bool, wh
                 "{at}: loosened from {last:?} to {now:?}"
             );
             last = now;
-            if let Some(covered) = front.covered(a, b) {
+            if let Some(covered) = front.covered(&store, a, b) {
                 assert!(
                     covered == leaves,
                     "{at}: leaf pairs uncovered or covered twice"
@@ -113,13 +113,20 @@ fn drive(rng: &mut Rng, couple: &mut Couple<'_>, search: Search, whole: bool, wh
             assert!(turn < 2_000_000, "{at}: no end");
         }
         if done {
-            check_end(&front, goal, truth, size, &at);
+            check_end(&front, &store, goal, truth, size, &at);
         }
         couple.pose_b = step(rng, &couple.pose_b, &home, a.radius.min(b.radius));
     }
 }
 
-fn check_end(front: &CarriedFront, goal: Goal, truth: Truth, size: f64, at: &str) {
+fn check_end(
+    front: &CarriedFront,
+    store: &FrontStore,
+    goal: Goal,
+    truth: Truth,
+    size: f64,
+    at: &str,
+) {
     let end = front.interval();
     match truth {
         Truth::Apart(d) if d > 1e-9 * size => {
@@ -142,7 +149,8 @@ fn check_end(front: &CarriedFront, goal: Goal, truth: Truth, size: f64, at: &str
         assert!(along < 1e-9 * size, "{at}: off by {along}");
     }
     if goal == Goal::Contacts && end.max > 0.0 {
-        assert_eq!(front.contacts().is_empty(), end.min > 0.0, "{at} {end:?}");
+        let none = front.contacts(store).is_empty();
+        assert_eq!(none, end.min > 0.0, "{at} {end:?}");
     }
 }
 
@@ -285,7 +293,7 @@ fn law_3_3_a_front_keeps_what_is_inside_apart_from_what_is_outside() {
 #[test]
 fn a_front_used_again_answers_as_a_new_one() {
     let clock = ManualClock::new(0);
-    let mut old = CarriedFront::default();
+    let (mut store, mut old) = (FrontStore::default(), CarriedFront::default());
     for case in 0..CASES {
         let mut rng = Rng::new(25_000_000 + case);
         let (kind_a, kind_b) = (rng.below(KINDS), rng.below(KINDS));
@@ -295,13 +303,13 @@ fn a_front_used_again_answers_as_a_new_one() {
         let mut new = CarriedFront::default();
         let spent = [&mut old, &mut new].map(|front| {
             let mut meter = Meter::unlimited(&clock);
-            front.start(&a, &b, &pos12, Search::Carried);
-            assert!(front.advance(&a, &b, Goal::Contacts, u64::MAX, &mut meter));
+            front.start(&mut store, &a, &b, &pos12, Search::Carried);
+            assert!(front.advance(&mut store, &a, &b, Goal::Contacts, u64::MAX, &mut meter));
             meter.spent()
         });
         assert_eq!(spent[0], spent[1]);
         assert_eq!(old.interval(), new.interval());
-        assert_eq!(old.contacts().len(), new.contacts().len());
+        assert_eq!(old.contacts(&store).len(), new.contacts(&store).len());
     }
 }
 
@@ -315,17 +323,17 @@ fn a_coherent_front_costs_a_fraction_of_starting_again() {
         .into_iter()
         .zip(&mut spent)
     {
-        let mut front = CarriedFront::default();
+        let (mut store, mut front) = (FrontStore::default(), CarriedFront::default());
         for tick in 0..200 {
             let at = 2.35 + 0.002 * f64::from(tick % 20);
             let pose = Pose::new(Vec3::new(at, 0.1, 0.2), Vec3::new(0.3, 0.2, 0.1));
             if tick == 0 {
-                front.start(&a, &b, &pose, search);
+                front.start(&mut store, &a, &b, &pose, search);
             } else {
-                front.move_to(&a, &b, &pose);
+                front.move_to(&mut store, &a, &b, &pose);
             }
             let mut meter = Meter::unlimited(&clock);
-            assert!(front.advance(&a, &b, Goal::Verdict, u64::MAX, &mut meter));
+            assert!(front.advance(&mut store, &a, &b, Goal::Verdict, u64::MAX, &mut meter));
             *spent += meter.spent();
         }
     }
@@ -335,4 +343,47 @@ fn a_coherent_front_costs_a_fraction_of_starting_again() {
         spent[0],
         spent[1]
     );
+}
+
+#[test]
+fn a_front_without_room_is_sound_and_says_that_it_is_not_certain() {
+    let clock = ManualClock::new(0);
+    let (mut decided, mut undecided) = (0, 0);
+    for case in 0..CASES {
+        let mut rng = Rng::new(26_000_000 + case);
+        let (kind_a, kind_b) = (rng.below(KINDS), rng.below(KINDS));
+        let ((a, _), (b, _)) = (any_mesh(&mut rng, kind_a), any_mesh(&mut rng, kind_b));
+        let (pose_a, mut pose_b) = place(&mut rng, &a, &b, usize::try_from(case % 3).unwrap());
+        let home = pose_b;
+        // Room for some groups and open pairs, and none for others.
+        let mut store = FrontStore::with_room(rng.below(40), rng.below(60));
+        let mut front = CarriedFront::default();
+        for pose in 0..POSES {
+            let pos12 = relative(&pose_a, &pose_b);
+            if pose == 0 {
+                front.start(&mut store, &a, &b, &pos12, Search::Carried);
+            } else {
+                front.move_to(&mut store, &a, &b, &pos12);
+            }
+            let goal = [Goal::Verdict, Goal::Gap, Goal::Contacts][rng.below(3)];
+            let mut meter = Meter::new(&clock, None, Some(2000));
+            let done = front.advance(&mut store, &a, &b, goal, u64::MAX, &mut meter);
+            let (gap, tolerance) = (front.interval(), 1e-11 * (a.radius + b.radius));
+            match truth_of(&a, &b, &pose_a, &pose_b) {
+                Truth::Apart(d) => {
+                    assert!(gap.min <= d + tolerance && d - tolerance <= gap.max);
+                    let collides = done && front.is_certain() && gap.contains(0.0);
+                    assert!(!collides || d <= tolerance, "case {case}: {gap:?} for {d}");
+                }
+                Truth::Overlap(depth) => assert!(gap.min <= depth + tolerance, "case {case}"),
+            }
+            if done && front.is_certain() {
+                decided += 1;
+            } else {
+                undecided += 1;
+            }
+            pose_b = step(&mut rng, &pose_b, &home, a.radius.min(b.radius));
+        }
+    }
+    assert!(decided > 0 && undecided > 0, "{decided} {undecided}");
 }

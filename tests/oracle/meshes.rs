@@ -1,5 +1,7 @@
 //! Small meshes for tests: solids, surfaces, shells in shells, slivers.
 
+use std::fmt::Write as _;
+
 use super::rng::Rng;
 use sweepd::math::{Point, Vec3};
 
@@ -209,4 +211,21 @@ pub fn slivers(rng: &mut Rng) -> Soup {
         faces.push([at, at + 1, at + 2]);
     }
     Soup::new(vertices, faces)
+}
+
+/// A mesh as an inline table of a scene file.
+pub fn trimesh(soup: &Soup, solid: Option<bool>) -> String {
+    let mut text = "{ type = \"trimesh\", vertices = [".to_owned();
+    for v in &soup.vertices {
+        let _ = write!(text, "[{:?}, {:?}, {:?}], ", v.x, v.y, v.z);
+    }
+    text += "], faces = [";
+    for f in &soup.faces {
+        let _ = write!(text, "{f:?}, ");
+    }
+    text += "]";
+    if let Some(solid) = solid {
+        let _ = write!(text, ", solid = {solid}");
+    }
+    text + " }"
 }

@@ -25,30 +25,32 @@
 //! pair of boxes (eight times the memory, and eight boxes are tested at the cost of one and a half).
 
 use super::bound::Frame;
-use super::contacts::{Contacts, LeafContact};
+use super::contacts::LeafContact;
 use super::containment::{Containment, ShellTests};
 use super::placed::Placed;
 use super::retest::{reach_of, tree_of};
 use super::side::{self, Side};
 use super::triangle::{Triangle, surely_crosses};
 use super::walk::Goal;
-use crate::math::{Interval, Pose, ROUND};
+use crate::math::{Pose, ROUND};
 use crate::shape::{BoxId, Obb, Shape};
 use crate::time::Meter;
 
 mod count;
 mod cover;
 mod drift;
+mod known;
+mod leaves;
 mod search;
+mod store;
 
 pub use cover::Search;
 use cover::{Group, Open, OpenList};
 use drift::Drift;
-use std::collections::BinaryHeap;
+use known::Known;
+pub use store::FrontStore;
+use store::{Proved, Run};
 
-/// Groups of one pair, 32 bytes each; beyond it what is proved apart is lumped together. A pair of 20,000-triangle meshes
-/// some 1 % apart has a few hundred.
-const GROUPS_MAX: usize = 1 << 18;
 /// A front that has split into so many times its fresh size, and [`STALE_MORE`], starts anew: entries only ever split.
 const STALE_TIMES: usize = 3;
 const STALE_MORE: usize = 128;
@@ -63,21 +65,23 @@ const PATH_MAX: f64 = 64.0;
 /// Beyond this share of the smaller body's radius between two poses, nothing much would be left of a front.
 const LEAP: f64 = 0.1;
 
-/// The front of one pair. Keeps its memory when it starts over.
+/// The front of one pair; its entries are in a [`FrontStore`], the same one from [`CarriedFront::start`] to
+/// [`CarriedFront::release`].
 #[derive(Debug, Default)]
 pub struct CarriedFront {
     search: Search,
     at: Placed,
     drift: Drift,
-    heap: BinaryHeap<Group>,
+    proved: Proved,
     open: OpenList,
     /// Apart at this pose by what stands for the expiry, and by no more than can be told at another.
-    passing: Vec<Group>,
+    passing: Run,
     /// The least gap of them, metres; infinite: there are none.
     passing_m: f64,
     /// Leaves found touching at this pose.
-    touching: Vec<(BoxId, BoxId)>,
-    /// When what was lumped together is no longer proved apart; infinite: nothing was.
+    touching: Run,
+    /// When what was lumped together is no longer proved apart; infinite: nothing was; minus infinity: something found no
+    /// room at all, and nothing is proved until the next start.
     lumped_expiry_m: f64,
     /// Boxes of a side that is convex.
     whole: [Option<Obb>; 2],
@@ -99,35 +103,8 @@ pub struct CarriedFront {
     witness: Option<LeafContact>,
     /// Corners of the triangles that touched last, each in its own frame: to ask them again costs no look into the meshes.
     crossing: Option<[Triangle; 2]>,
-    contacts: Contacts,
-}
-
-/// What is known at the pose worked at.
-#[derive(Clone, Copy, Debug)]
-struct Known {
-    /// Least lower end of the leaves queried, and least upper end, metres.
-    leaf_low: f64,
-    high: f64,
-    touches: bool,
-    /// A leaf query near zero could not be finished.
-    blurred: bool,
-    /// The last leaves have been asked at this pose.
-    asked_last: bool,
-    /// Bounds of the wholes at this pose, when they were asked for.
-    floor_m: f64,
-}
-
-impl Default for Known {
-    fn default() -> Self {
-        Self {
-            leaf_low: f64::INFINITY,
-            high: f64::INFINITY,
-            touches: false,
-            blurred: false,
-            asked_last: false,
-            floor_m: f64::NEG_INFINITY,
-        }
-    }
+    /// Leaves that touch, deepest first to stay.
+    contacts: Run,
 }
 
 /// Whether a pair of shapes can have a front.
@@ -143,15 +120,31 @@ impl CarriedFront {
     /// Forgets everything and starts at a pose.
     ///
     /// * `pos12` - pose of `b` seen from `a`, finite, unit quaternion; [`has_front`] holds for the two.
-    pub fn start(&mut self, a: &Shape, b: &Shape, pos12: &Pose, search: Search) {
+    pub fn start(
+        &mut self,
+        store: &mut FrontStore,
+        a: &Shape,
+        b: &Shape,
+        pos12: &Pose,
+        search: Search,
+    ) {
         self.search = search;
         self.at = Placed::new(pos12, reach_of(a), reach_of(b));
         (self.last, self.crossing) = (None, None);
-        self.start_over(a, b);
+        self.start_over(store, a, b);
+    }
+
+    /// Forgets everything and gives its memory back.
+    pub fn release(&mut self, store: &mut FrontStore) {
+        self.proved.release(&mut store.groups);
+        store.groups.release(&mut self.passing);
+        self.open.release(&mut store.open);
+        store.open.release(&mut self.touching);
+        store.contacts.release(&mut self.contacts);
     }
 
     /// Takes the pair to another pose; what was proved is carried over as far as it holds.
-    pub fn move_to(&mut self, a: &Shape, b: &Shape, pos12: &Pose) {
+    pub fn move_to(&mut self, store: &mut FrontStore, a: &Shape, b: &Shape, pos12: &Pose) {
         if self.at.pos12 == *pos12 {
             return;
         }
@@ -165,22 +158,25 @@ impl CarriedFront {
         let leap = self.drift.last_m > LEAP * a.radius.min(b.radius);
         // Where most is used up, the roots are the shorter way: large boxes tell more than many small ones.
         let gone = |g: &&Group| self.drift.left_m(g.expiry_m) <= 0.0;
+        let proved = store.groups.all(&self.proved.heap);
         let worn = self.fresh_len > 0
-            && WORN_TIMES * self.heap.iter().filter(gone).count() > self.fresh_steps;
+            && WORN_TIMES * proved.iter().filter(gone).count() > self.fresh_steps;
         // Where a long step has lost the touch, what is left open is far from the next one.
         let adrift =
             !self.touching.is_empty() && self.drift.last_m > ADRIFT * a.radius.min(b.radius);
         if worn || adrift || stale || far || lost || leap || self.search != Search::Carried {
-            self.start_over(a, b);
+            self.start_over(store, a, b);
             return;
         }
         self.known = Known::default();
         self.witness = None;
         self.contacts.clear();
-        while let Some((a, b)) = self.touching.pop() {
-            self.open.push(Open { low: 0.0, a, b });
+        while let Some(touching) = store.open.pop(&mut self.touching) {
+            self.look_into(store, touching);
         }
-        self.heap.extend(self.passing.drain(..).map(Group::expired));
+        while let Some(group) = store.groups.pop(&mut self.passing) {
+            self.prove(store, group.expired());
+        }
         self.passing_m = f64::INFINITY;
         if self.drift.left_m(self.shells_expiry_m) <= 0.0 {
             self.shells.start(self.solids);
@@ -188,12 +184,15 @@ impl CarriedFront {
     }
 
     /// Takes an anchor at this pose: from here on what is found holds at it to the last digit.
-    fn anchor_here(&mut self) {
-        if self.drift.anchor_here(&self.at.pos12) {
-            self.passing_m = f64::INFINITY;
-            for at in (0..self.passing.len()).rev() {
-                let group = self.passing.swap_remove(at);
-                self.keep(group, group.expiry_m);
+    fn anchor_here(&mut self, store: &mut FrontStore) {
+        if !self.drift.anchor_here(&self.at.pos12) {
+            return;
+        }
+        self.passing_m = f64::INFINITY;
+        for at in (0..self.passing.len()).rev() {
+            // What does not outlast this pose after all is put back: behind those that are still to come.
+            if let Some(group) = store.groups.swap_remove(&mut self.passing, at) {
+                self.keep(store, group, group.expiry_m);
             }
         }
     }
@@ -213,6 +212,7 @@ impl CarriedFront {
     /// `a` and `b` are those of [`CarriedFront::start`]. Units: a box against a pack, or two leaves; one each.
     pub fn advance(
         &mut self,
+        store: &mut FrontStore,
         a: &Shape,
         b: &Shape,
         goal: Goal,
@@ -224,7 +224,7 @@ impl CarriedFront {
         };
         if goal > Goal::Verdict && self.known.floor_m == f64::NEG_INFINITY {
             self.measure_wholes((a, side_a), (b, side_b));
-            self.anchor_here();
+            self.anchor_here(store);
         }
         let end = meter.spent().saturating_add(slice_units);
         loop {
@@ -234,52 +234,14 @@ impl CarriedFront {
             if meter.spent() >= end || !meter.open() {
                 return false;
             }
-            self.step(side_a, side_b, goal, meter);
+            self.step(store, (side_a, side_b), goal, meter);
         }
-    }
-
-    /// What is known of the gap at this pose, metres: sound at any interruption.
-    #[must_use]
-    pub fn interval(&self) -> Interval {
-        let high = self.known.high;
-        let floor = self.floor_m.max(self.known.floor_m);
-        let surfaces = self.surfaces_low();
-        let (low, high) = match self.containment() {
-            Containment::Open => (floor, high),
-            Containment::Outside => (surfaces.max(floor), high),
-            Containment::Inside => (floor, -surfaces.max(0.0)),
-        };
-        Interval::new(low.min(high), high)
-    }
-
-    /// Whether 0 in the interval of a reached goal means touching (law 3.4).
-    #[must_use]
-    pub fn is_certain(&self) -> bool {
-        self.known.touches || !self.known.blurred
-    }
-
-    /// The leaves with the least gap met at this pose; where one shape is within the other, with the normal that leads out.
-    #[must_use]
-    pub fn witness(&self) -> Option<LeafContact> {
-        let witness = self.witness?;
-        if self.containment() != Containment::Inside {
-            return Some(witness);
-        }
-        let gap = self.interval();
-        // Leaves farther apart than the depth can be are not the way out.
-        (-witness.closest.best_m >= gap.min).then(|| witness.way_out(gap))
-    }
-
-    /// Leaves that touch at this pose, at most [`super::LEAF_CONTACTS_MAX`]; all of them once `Goal::Contacts` is reached.
-    #[must_use]
-    pub fn contacts(&self) -> &[LeafContact] {
-        self.contacts.all()
     }
 
     /// Entries held, open or proved.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.heap.len() + self.open.len() + self.passing.len() + self.touching.len()
+        self.proved.len() + self.open.len() + self.passing.len() + self.touching.len()
     }
 
     /// Whether it was never started.
@@ -289,12 +251,12 @@ impl CarriedFront {
     }
 
     /// Everything from the roots, at the pose it is at.
-    fn start_over(&mut self, a: &Shape, b: &Shape) {
+    fn start_over(&mut self, store: &mut FrontStore, a: &Shape, b: &Shape) {
         let (Some(side_a), Some(side_b)) = (Side::of(a), Side::of(b)) else {
             return;
         };
         self.drift = Drift::at(&self.at.pos12);
-        self.heap.clear();
+        self.proved.clear();
         self.passing.clear();
         self.passing_m = f64::INFINITY;
         self.open.clear(self.search);
@@ -319,11 +281,12 @@ impl CarriedFront {
         self.floor_m = -(depth_m * (1.0 + 8.0 * ROUND)) - self.at.slop;
         self.shells.start(self.solids);
         self.shells_expiry_m = f64::NEG_INFINITY;
-        self.open.push(Open {
+        let roots = Open {
             low: 0.0,
             a: BoxId::ROOT,
             b: BoxId::ROOT,
-        });
+        };
+        self.look_into(store, roots);
     }
 
     /// Bounds on the gap of the two as wholes: what an overlapping pair's lower end is.
@@ -333,64 +296,5 @@ impl CarriedFront {
         let frame = Frame::new(&pos12, (origin_a, reach_of(a.0)), (origin_b, reach_of(b.0)));
         let wholes = side::low((a.1, &origin_a), (b.1, &origin_b), &frame);
         self.known.floor_m = frame.low(&root_a, &root_b).max(wholes);
-    }
-
-    /// A lower bound on the distance of the surfaces, metres; minus infinity while they may touch.
-    fn surfaces_low(&self) -> f64 {
-        if !self.open.is_empty() || self.known.touches {
-            return f64::NEG_INFINITY;
-        }
-        if self.known.blurred {
-            return self.known.leaf_low.min(0.0);
-        }
-        let soonest = self.heap.peek().map_or(f64::INFINITY, |g| g.expiry_m);
-        let carried = self.drift.left_m(soonest.min(self.lumped_expiry_m));
-        let proved = carried.min(self.passing_m);
-        if proved > 0.0 {
-            proved.min(self.known.high)
-        } else {
-            f64::NEG_INFINITY
-        }
-    }
-
-    /// What is known of it at this pose.
-    fn containment(&self) -> Containment {
-        if self.known.touches {
-            return Containment::Outside;
-        }
-        self.shells.state()
-    }
-
-    fn reached(&self, goal: Goal) -> bool {
-        if self.known.touches {
-            return goal < Goal::Contacts || (self.open.is_empty() && !self.has_expired());
-        }
-        if !self.open.is_empty() || self.has_expired() {
-            return false;
-        }
-        if self.known.blurred {
-            return true;
-        }
-        match self.shells.state() {
-            Containment::Open => false,
-            // The nearest points lead out: only a contact set wants them.
-            Containment::Inside if goal < Goal::Contacts => true,
-            _ => goal == Goal::Verdict || self.nearest_m() + self.fuzz_m() >= self.known.leaf_low,
-        }
-    }
-
-    /// Whether the soonest group is no longer proved apart.
-    fn has_expired(&self) -> bool {
-        (self.heap.peek()).is_some_and(|g| self.drift.left_m(g.expiry_m) <= 0.0)
-    }
-
-    /// The least bound of what can still be looked into, metres.
-    fn nearest_m(&self) -> f64 {
-        (self.heap.peek()).map_or(f64::INFINITY, |g| self.drift.left_m(g.expiry_m))
-    }
-
-    /// What cannot be told apart at this pose, metres.
-    fn fuzz_m(&self) -> f64 {
-        self.at.slop + 16.0 * ROUND * self.drift.path_m
     }
 }

@@ -40,12 +40,17 @@ impl Contacts {
             return;
         }
         self.left_out += 1;
-        let depth = |c: &LeafContact| c.closest.best_m;
-        let shallowest = (self.all.iter_mut()).max_by(|a, b| depth(a).total_cmp(&depth(b)));
-        if let Some(shallowest) = shallowest
-            && depth(&contact) < depth(shallowest)
-        {
-            *shallowest = contact;
-        }
+        keep_deepest(&mut self.all, contact);
+    }
+}
+
+/// Where there is no room for more: a contact takes the place of the shallowest, if it is deeper.
+pub(super) fn keep_deepest(all: &mut [LeafContact], contact: LeafContact) {
+    let depth = |c: &LeafContact| c.closest.best_m;
+    let shallowest = (all.iter_mut()).max_by(|a, b| depth(a).total_cmp(&depth(b)));
+    if let Some(shallowest) = shallowest
+        && depth(&contact) < depth(shallowest)
+    {
+        *shallowest = contact;
     }
 }

@@ -14,26 +14,39 @@ use super::predicates::{side, turn_yz};
 use super::tree::Below;
 use crate::math::Point;
 
-/// One inside test under way; keeps its memory from test to test.
-#[derive(Debug, Default)]
+/// Nodes that wait in a walk down a tree that is split at the median: one a level, and a mesh has under 2^31 triangles.
+const WAITING_MAX: usize = 33;
+
+/// One inside test under way.
+#[derive(Debug)]
 pub(crate) struct Inside {
     point: Point,
-    stack: Vec<u32>,
+    waiting: [u32; WAITING_MAX],
+    len: usize,
     winding: i64,
+}
+
+impl Default for Inside {
+    fn default() -> Self {
+        Self {
+            point: Point::origin(),
+            waiting: [0; WAITING_MAX],
+            len: 0,
+            winding: 0,
+        }
+    }
 }
 
 impl Inside {
     /// Starts the test of `point`, given in the mesh's frame.
     pub(crate) fn start(&mut self, point: Point) {
-        self.point = point;
-        self.stack.clear();
-        self.stack.push(0);
-        self.winding = 0;
+        (self.point, self.winding) = (point, 0);
+        (self.waiting[0], self.len) = (0, 1);
     }
 
     /// Whether the walk is over.
     pub(crate) fn finished(&self) -> bool {
-        self.stack.is_empty()
+        self.len == 0
     }
 
     /// How often the surface winds round the point; meaningful when finished.
@@ -43,9 +56,11 @@ impl Inside {
 
     /// Tests one node. `counts` says which triangles take part (all of them, or those of one shell).
     pub(crate) fn step(&mut self, mesh: &Mesh, counts: impl Fn(u32) -> bool) {
-        let Some(place) = self.stack.pop() else {
+        let Some(top) = self.len.checked_sub(1) else {
             return;
         };
+        self.len = top;
+        let place = self.waiting[top];
         let nodes = mesh.tree().nodes();
         let node = &nodes[place as usize];
         // Rounding of a difference is monotonic, so a vertex inside the box stays inside after it.
@@ -56,8 +71,8 @@ impl Inside {
         }
         match node.below(place) {
             Below::Nodes(left, right) => {
-                self.stack.push(right);
-                self.stack.push(left);
+                self.waiting[top..top + 2].copy_from_slice(&[right, left]);
+                self.len = top + 2;
             }
             Below::Triangle(face) if counts(face) => self.count(&mesh.triangle(face)),
             Below::Triangle(_) => {}

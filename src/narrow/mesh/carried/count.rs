@@ -1,14 +1,14 @@
 //! What a front covers, leaf by leaf: the check of its invariant.
 
 use super::cover::lanes;
-use super::{CarriedFront, Side};
+use super::{CarriedFront, FrontStore, Side};
 use crate::shape::{BoxId, Held, Shape};
 
 impl CarriedFront {
     /// Every pair of leaves (triangles; 0 for a convex shape) that an entry covers, sorted: each pair of the two once and
     /// only once, whatever was done before. `None` where some were lumped together for want of room.
     #[must_use]
-    pub fn covered(&self, a: &Shape, b: &Shape) -> Option<Vec<(u32, u32)>> {
+    pub fn covered(&self, store: &FrontStore, a: &Shape, b: &Shape) -> Option<Vec<(u32, u32)>> {
         let (side_a, side_b) = (Side::of(a)?, Side::of(b)?);
         if self.lumped_expiry_m < f64::INFINITY {
             return None;
@@ -20,11 +20,14 @@ impl CarriedFront {
                 all.extend(leaves_b.iter().map(|&j| (i, j)));
             }
         };
-        for group in self.heap.iter().chain(&self.passing) {
+        let groups = [&self.proved.heap, &self.passing].map(|run| store.groups.all(run));
+        for group in groups.into_iter().flatten() {
             lanes(group.mask).for_each(|lane| add(group.pair(lane)));
         }
-        self.open.iter().for_each(|open| add((open.a, open.b)));
-        self.touching.iter().for_each(|&pair| add(pair));
+        let pairs = [self.open.all(&store.open), store.open.all(&self.touching)];
+        for open in pairs.into_iter().flatten() {
+            add((open.a, open.b));
+        }
         all.sort_unstable();
         Some(all)
     }

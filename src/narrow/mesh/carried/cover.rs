@@ -1,8 +1,8 @@
 //! The entries of a front: pairs of boxes that may touch, and groups of pairs proved apart until the pair has moved so far.
 
 use std::cmp::Ordering;
-use std::collections::BinaryHeap;
 
+use super::store::{Arena, Run};
 use crate::shape::BoxId;
 
 /// A box of one side against boxes of one pack of the other side, all proved apart.
@@ -142,59 +142,64 @@ impl Search {
     }
 }
 
-/// The pairs that may touch, in the order of a search.
+/// The pairs of one front that may touch, in the order of a search.
 #[derive(Debug, Default)]
 pub(super) struct OpenList {
     search: Search,
-    items: Vec<Open>,
+    /// A stack, a queue, or a heap.
+    items: Run,
     /// Breadth first: the next to be taken.
     head: usize,
-    /// Of a priority queue: the items are here.
-    heap: BinaryHeap<Open>,
 }
 
 impl OpenList {
     pub(super) fn clear(&mut self, search: Search) {
         self.search = search;
         self.items.clear();
-        self.heap.clear();
         self.head = 0;
     }
 
-    pub(super) fn push(&mut self, open: Open) {
+    /// False where there is no room.
+    pub(super) fn push(&mut self, arena: &mut Arena<Open>, open: Open) -> bool {
         if self.search == Search::Priority {
-            self.heap.push(open);
+            arena.push_heap(&mut self.items, open)
         } else {
-            self.items.push(open);
+            arena.push(&mut self.items, open)
         }
     }
 
-    pub(super) fn pop(&mut self) -> Option<Open> {
+    pub(super) fn pop(&mut self, arena: &mut Arena<Open>) -> Option<Open> {
         match self.search {
-            Search::Priority => self.heap.pop(),
+            Search::Priority => arena.pop_heap(&mut self.items),
             Search::BreadthFirst => {
-                let next = self.items.get(self.head).copied();
+                let next = arena.all(&self.items).get(self.head).copied();
                 self.head += usize::from(next.is_some());
-                if self.head == self.items.len() {
+                if self.is_empty() {
                     self.items.clear();
                     self.head = 0;
                 }
                 next
             }
-            Search::Carried | Search::Restart => self.items.pop(),
+            Search::Carried | Search::Restart => arena.pop(&mut self.items),
         }
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        self.items.is_empty() && self.heap.is_empty()
+        self.len() == 0
     }
 
     pub(super) fn len(&self) -> usize {
-        self.items.len() - self.head + self.heap.len()
+        self.items.len() - self.head
     }
 
     /// The pairs, in no order.
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Open> {
-        self.items[self.head..].iter().chain(self.heap.iter())
+    pub(super) fn all<'a>(&self, arena: &'a Arena<Open>) -> &'a [Open] {
+        &arena.all(&self.items)[self.head..]
+    }
+
+    /// Gives its memory back.
+    pub(super) fn release(&mut self, arena: &mut Arena<Open>) {
+        arena.release(&mut self.items);
+        self.head = 0;
     }
 }

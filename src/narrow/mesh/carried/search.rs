@@ -1,9 +1,9 @@
 //! One step of work on a front: a box against a pack, two leaves, or a node of an inside test.
 
 use super::cover::{Group, Open, lanes};
-use super::{BoxId, CarriedFront, Containment, GROUPS_MAX, Goal, LeafContact, Side};
-use crate::math::Interval;
-use crate::narrow::exact::Closest;
+use super::leaves::contact;
+use super::store::FrontStore;
+use super::{BoxId, CarriedFront, Containment, Goal, Side};
 use crate::narrow::mesh::side;
 use crate::shape::{Held, Obb};
 use crate::simd::obb::LANES;
@@ -13,23 +13,29 @@ use crate::time::Meter;
 const LEAF_COST: u64 = 4;
 
 impl CarriedFront {
-    pub(super) fn step(&mut self, a: Side<'_>, b: Side<'_>, goal: Goal, meter: &mut Meter<'_>) {
+    pub(super) fn step(
+        &mut self,
+        store: &mut FrontStore,
+        (a, b): (Side<'_>, Side<'_>),
+        goal: Goal,
+        meter: &mut Meter<'_>,
+    ) {
         let gap_wanted = goal > Goal::Verdict;
         self.steps += 1;
         if gap_wanted && !std::mem::replace(&mut self.known.asked_last, true) {
             self.bound_by_last(a, b);
             meter.charge_weighted(1, LEAF_COST);
-        } else if let Some(open) = self.open.pop() {
-            self.expand(&open, (a, b), gap_wanted, meter);
+        } else if let Some(open) = self.open.pop(&mut store.open) {
+            self.expand(store, &open, (a, b), gap_wanted, meter);
         } else if self.has_expired() {
-            if let Some(group) = self.heap.pop() {
-                self.retest(&group, (a, b), gap_wanted, meter);
+            if let Some(group) = self.proved.pop(&mut store.groups) {
+                self.retest(store, &group, (a, b), gap_wanted, meter);
             }
         } else if self.shells.state() == Containment::Open {
             self.shells.step(a, b, &self.at);
             meter.charge(1);
         } else {
-            self.refine((a, b), meter);
+            self.refine(store, (a, b), meter);
         }
         self.note_apart();
     }
@@ -71,6 +77,7 @@ impl CarriedFront {
     /// Replaces an open pair of boxes by smaller ones, or queries two leaves.
     fn expand(
         &mut self,
+        store: &mut FrontStore,
         open: &Open,
         (a, b): (Side<'_>, Side<'_>),
         exact: bool,
@@ -78,13 +85,13 @@ impl CarriedFront {
     ) {
         let child = match (a.held(open.a), b.held(open.b)) {
             (Held::Triangle(_), Held::Triangle(_)) => {
-                self.leaves((open.a, open.b), (a, b), f64::NEG_INFINITY, exact);
+                self.leaves(store, (open.a, open.b), (a, b), f64::NEG_INFINITY, exact);
                 meter.charge_weighted(1, LEAF_COST);
                 return;
             }
             (held_a, held_b) => self.children((open.a, held_a), (open.b, held_b), (a, b)),
         };
-        self.test(&child, (a, b), f64::NEG_INFINITY);
+        self.test(store, &child, (a, b), f64::NEG_INFINITY);
         meter.charge(1);
     }
 
@@ -138,7 +145,13 @@ impl CarriedFront {
     /// Tests a group: what is apart is a group again, what may touch is open, the deepest on top.
     ///
     /// * `known_m` - a bound that holds for all of it at this pose.
-    fn test(&mut self, group: &Group, sides: (Side<'_>, Side<'_>), known_m: f64) {
+    fn test(
+        &mut self,
+        store: &mut FrontStore,
+        group: &Group,
+        sides: (Side<'_>, Side<'_>),
+        known_m: f64,
+    ) {
         let gaps = self.gaps(group, sides);
         let (mut apart, mut least) = (0_u8, f64::INFINITY);
         let mut deep = [(0.0, 0_u32); LANES];
@@ -162,41 +175,58 @@ impl CarriedFront {
         }
         if apart != 0 {
             let mask = apart;
-            self.keep(Group { mask, ..*group }, least);
+            self.keep(store, Group { mask, ..*group }, least);
         }
         for &(low, lane) in &deep[..count] {
             let (a, b) = group.pair(lane);
-            self.open.push(Open { low, a, b });
+            self.look_into(store, Open { low, a, b });
         }
     }
 
     /// Keeps a group that is apart by `gap` at this pose; where there is no room, only its expiry.
-    pub(super) fn keep(&mut self, group: Group, gap: f64) {
+    pub(super) fn keep(&mut self, store: &mut FrontStore, group: Group, gap: f64) {
         match self.drift.expiry(gap) {
-            Some(expiry_m) if self.heap.len() < GROUPS_MAX => {
-                self.heap.push(Group { expiry_m, ..group });
-            }
-            Some(expiry_m) => self.lumped_expiry_m = self.lumped_expiry_m.min(expiry_m),
+            Some(expiry_m) => self.prove(store, Group { expiry_m, ..group }),
             None if gap > 0.0 => {
                 self.passing_m = self.passing_m.min(gap);
-                self.passing.push(Group {
-                    expiry_m: gap,
-                    ..group
-                });
+                let expiry_m = gap;
+                let kept = (store.groups).push(&mut self.passing, Group { expiry_m, ..group });
+                self.note_room(kept);
             }
             // Not apart after all: every pair stays covered.
             None => {
                 for lane in lanes(group.mask) {
                     let (a, b) = group.pair(lane);
-                    self.open.push(Open { low: gap, a, b });
+                    self.look_into(store, Open { low: gap, a, b });
                 }
             }
+        }
+    }
+
+    /// Takes a group in until it expires.
+    pub(super) fn prove(&mut self, store: &mut FrontStore, group: Group) {
+        if !self.proved.push(&mut store.groups, group) {
+            self.lumped_expiry_m = self.lumped_expiry_m.min(group.expiry_m);
+        }
+    }
+
+    /// Takes a pair in that may touch.
+    pub(super) fn look_into(&mut self, store: &mut FrontStore, open: Open) {
+        let kept = self.open.push(&mut store.open, open);
+        self.note_room(kept);
+    }
+
+    /// What found no room is no longer covered: then nothing is proved until the next start.
+    pub(super) fn note_room(&mut self, kept: bool) {
+        if !kept {
+            self.lumped_expiry_m = f64::NEG_INFINITY;
         }
     }
 
     /// Tests a group whose proof has expired.
     fn retest(
         &mut self,
+        store: &mut FrontStore,
         group: &Group,
         sides: (Side<'_>, Side<'_>),
         exact: bool,
@@ -204,22 +234,29 @@ impl CarriedFront {
     ) {
         if group.leaf {
             let pair = group.pair(group.mask.trailing_zeros());
-            self.leaves(pair, sides, f64::NEG_INFINITY, exact);
+            self.leaves(store, pair, sides, f64::NEG_INFINITY, exact);
             meter.charge_weighted(1, LEAF_COST);
         } else {
-            self.test(group, sides, f64::NEG_INFINITY);
+            self.test(store, group, sides, f64::NEG_INFINITY);
             meter.charge(1);
         }
     }
 
     /// Looks into the nearest of all groups: best first.
-    fn refine(&mut self, sides: (Side<'_>, Side<'_>), meter: &mut Meter<'_>) {
-        let Some(group) = self.heap.pop() else { return };
+    fn refine(
+        &mut self,
+        store: &mut FrontStore,
+        sides: (Side<'_>, Side<'_>),
+        meter: &mut Meter<'_>,
+    ) {
+        let Some(group) = self.proved.pop(&mut store.groups) else {
+            return;
+        };
         // What is stored holds at this pose; a new test may be lower by rounding.
         let known_m = self.drift.left_m(group.expiry_m);
         if group.leaf {
             let pair = group.pair(group.mask.trailing_zeros());
-            self.leaves(pair, sides, known_m, true);
+            self.leaves(store, pair, sides, known_m, true);
             meter.charge_weighted(1, LEAF_COST);
             return;
         }
@@ -239,6 +276,7 @@ impl CarriedFront {
         }
         if rest != 0 {
             self.keep(
+                store,
                 Group {
                     mask: rest,
                     ..group
@@ -250,148 +288,14 @@ impl CarriedFront {
         let known_m = gaps[nearest as usize];
         match (sides.0.held(id_a), sides.1.held(id_b)) {
             (Held::Triangle(_), Held::Triangle(_)) => {
-                self.leaves((id_a, id_b), sides, known_m, true);
+                self.leaves(store, (id_a, id_b), sides, known_m, true);
                 meter.charge_weighted(2, LEAF_COST);
             }
             (held_a, held_b) => {
                 let child = self.children((id_a, held_a), (id_b, held_b), sides);
-                self.test(&child, sides, known_m);
+                self.test(store, &child, sides, known_m);
                 meter.charge(2);
             }
-        }
-    }
-
-    /// Queries two leaves.
-    ///
-    /// * `known_m` - a bound on their gap that holds at this pose.
-    /// * `exact` - their distance is wanted; else any proof that they are apart will do.
-    fn leaves(
-        &mut self,
-        (id_a, id_b): (BoxId, BoxId),
-        (a, b): (Side<'_>, Side<'_>),
-        known_m: f64,
-        exact: bool,
-    ) {
-        let (Held::Triangle(i), Held::Triangle(j)) = (a.held(id_a), b.held(id_b)) else {
-            return;
-        };
-        let (leaf_a, leaf_b) = ((a, i), (b, j));
-        // Once the pair touches, only what touches too is of interest.
-        let exact = exact && !self.known.touches;
-        if !exact && let Some(gap) = side::parted(leaf_a, leaf_b, &self.at) {
-            self.keep_leaf(id_a, id_b, gap);
-            return;
-        }
-        let beyond = if exact && self.known.high > 0.0 {
-            self.known.high
-        } else {
-            f64::INFINITY
-        };
-        let Some(closest) = side::leaf(leaf_a, leaf_b, &self.at, beyond) else {
-            // Farther than the nearest known: that is proof enough.
-            self.keep_leaf(id_a, id_b, beyond.max(known_m));
-            return;
-        };
-        let low = closest.gap.min.max(known_m);
-        self.known.leaf_low = self.known.leaf_low.min(low);
-        // A solid's depth is that of a point, and the translation that parts two leaves can be more: of an overlap
-        // their query proves no more than that it is one.
-        let high = if self.solids {
-            closest.gap.max.max(0.0)
-        } else {
-            closest.gap.max
-        };
-        let better = self.known.high > high || self.last.is_none();
-        self.known.high = self.known.high.min(high);
-        let contact = contact(leaf_a, leaf_b, closest);
-        if low > 0.0 {
-            if better {
-                (self.last, self.witness) = (Some((id_a, id_b)), Some(contact));
-            }
-            self.keep_leaf(id_a, id_b, low);
-            return;
-        }
-        // Certified, or zero within its rounding: touching collides.
-        if closest.gap.max <= 8.0 * self.at.slop || closest.finished {
-            let deeper = |w: &LeafContact| closest.best_m < w.closest.best_m;
-            if !self.known.touches || self.witness.as_ref().is_none_or(deeper) {
-                (self.last, self.witness) = (Some((id_a, id_b)), Some(contact));
-                self.crossing = side::triangles(leaf_a, leaf_b);
-            }
-            self.known.touches = true;
-            self.contacts.add(contact);
-        } else {
-            self.known.blurred = true;
-        }
-        self.touching.push((id_a, id_b));
-    }
-
-    fn keep_leaf(&mut self, id_a: BoxId, id_b: BoxId, gap: f64) {
-        let group = Group {
-            expiry_m: 0.0,
-            one: id_a,
-            pack: id_b.pack(),
-            mask: 1 << id_b.lane(),
-            pack_is_b: true,
-            leaf: true,
-        };
-        self.keep(group, gap);
-    }
-}
-
-fn contact(a: (Side<'_>, u32), b: (Side<'_>, u32), closest: Closest) -> LeafContact {
-    LeafContact {
-        closest,
-        triangle_a: a.0.triangle_name(a.1),
-        triangle_b: b.0.triangle_name(b.1),
-    }
-}
-
-impl LeafContact {
-    /// Of surfaces that are apart though one shape is within the other: moving B towards A's nearest point leads out.
-    pub(in crate::narrow::mesh) fn way_out(&self, gap: Interval) -> Self {
-        let found = self.closest;
-        let closest = Closest {
-            gap,
-            best_m: (-found.best_m).clamp(gap.min, gap.max),
-            normal: -found.normal,
-            ..found
-        };
-        Self { closest, ..*self }
-    }
-}
-
-impl<'a> Side<'a> {
-    /// What a box holds; a convex shape is one leaf.
-    pub(super) fn held(self, id: BoxId) -> Held {
-        match self {
-            Self::Mesh(mesh) => mesh.obb().held(id),
-            Self::Convex(_) => Held::Triangle(0),
-        }
-    }
-
-    /// The boxes that share a parent.
-    pub(super) fn pack(self, pack: u32) -> Option<&'a crate::shape::ObbPack> {
-        match self {
-            Self::Mesh(mesh) => mesh.obb().packs().get(pack as usize),
-            Self::Convex(_) => None,
-        }
-    }
-
-    /// A box by itself; that of a convex shape is handed in.
-    fn obb(self, id: BoxId, whole: &Option<Obb>) -> Obb {
-        match (self, whole) {
-            (Self::Mesh(mesh), _) => mesh.obb().get(id),
-            (Self::Convex(_), Some(whole)) => *whole,
-            (Self::Convex(_), None) => Obb::EVERYWHERE,
-        }
-    }
-
-    /// How contacts name a leaf: a convex shape has no triangles.
-    fn triangle_name(self, i: u32) -> u32 {
-        match self {
-            Self::Mesh(_) => i,
-            Self::Convex(_) => u32::MAX,
         }
     }
 }

@@ -1,0 +1,133 @@
+//! What a front knows of the pair at the pose it is at.
+
+use super::store::FrontStore;
+use super::{CarriedFront, Containment, Goal, LeafContact};
+use crate::math::{Interval, ROUND};
+
+/// What is known at the pose worked at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Known {
+    /// Least lower end of the leaves queried, and least upper end, metres.
+    pub(super) leaf_low: f64,
+    pub(super) high: f64,
+    pub(super) touches: bool,
+    /// A leaf query near zero could not be finished.
+    pub(super) blurred: bool,
+    /// The last leaves have been asked at this pose.
+    pub(super) asked_last: bool,
+    /// Bounds of the wholes at this pose, when they were asked for.
+    pub(super) floor_m: f64,
+}
+
+impl Default for Known {
+    fn default() -> Self {
+        Self {
+            leaf_low: f64::INFINITY,
+            high: f64::INFINITY,
+            touches: false,
+            blurred: false,
+            asked_last: false,
+            floor_m: f64::NEG_INFINITY,
+        }
+    }
+}
+
+impl CarriedFront {
+    /// What is known of the gap at this pose, metres: sound at any interruption.
+    #[must_use]
+    pub fn interval(&self) -> Interval {
+        let high = self.known.high;
+        let floor = self.floor_m.max(self.known.floor_m);
+        let surfaces = self.surfaces_low();
+        let (low, high) = match self.containment() {
+            Containment::Open => (floor, high),
+            Containment::Outside => (surfaces.max(floor), high),
+            Containment::Inside => (floor, -surfaces.max(0.0)),
+        };
+        Interval::new(low.min(high), high)
+    }
+
+    /// Whether 0 in the interval of a reached goal means touching (law 3.4).
+    #[must_use]
+    pub fn is_certain(&self) -> bool {
+        let covered = self.drift.left_m(self.lumped_expiry_m) > 0.0;
+        self.known.touches || (covered && !self.known.blurred)
+    }
+
+    /// The leaves with the least gap met at this pose; where one shape is within the other, with the normal that leads out.
+    #[must_use]
+    pub fn witness(&self) -> Option<LeafContact> {
+        let witness = self.witness?;
+        if self.containment() != Containment::Inside {
+            return Some(witness);
+        }
+        let gap = self.interval();
+        // Leaves farther apart than the depth can be are not the way out.
+        (-witness.closest.best_m >= gap.min).then(|| witness.way_out(gap))
+    }
+
+    /// Leaves that touch at this pose, at most [`super::LEAF_CONTACTS_MAX`]; all of them once `Goal::Contacts` is reached.
+    #[must_use]
+    pub fn contacts<'a>(&self, store: &'a FrontStore) -> &'a [LeafContact] {
+        store.contacts.all(&self.contacts)
+    }
+
+    /// A lower bound on the distance of the surfaces, metres; minus infinity while they may touch.
+    pub(super) fn surfaces_low(&self) -> f64 {
+        if !self.open.is_empty() || self.known.touches {
+            return f64::NEG_INFINITY;
+        }
+        if self.known.blurred {
+            return self.known.leaf_low.min(0.0);
+        }
+        let soonest_m = self.proved.soonest_m().min(self.lumped_expiry_m);
+        let carried = self.drift.left_m(soonest_m);
+        let proved = carried.min(self.passing_m);
+        if proved > 0.0 {
+            proved.min(self.known.high)
+        } else {
+            f64::NEG_INFINITY
+        }
+    }
+
+    /// What is known of it at this pose.
+    pub(super) fn containment(&self) -> Containment {
+        if self.known.touches {
+            return Containment::Outside;
+        }
+        self.shells.state()
+    }
+
+    pub(super) fn reached(&self, goal: Goal) -> bool {
+        if self.known.touches {
+            return goal < Goal::Contacts || (self.open.is_empty() && !self.has_expired());
+        }
+        if !self.open.is_empty() || self.has_expired() {
+            return false;
+        }
+        if self.known.blurred {
+            return true;
+        }
+        match self.shells.state() {
+            Containment::Open => false,
+            // The nearest points lead out: only a contact set wants them.
+            Containment::Inside if goal < Goal::Contacts => true,
+            _ => goal == Goal::Verdict || self.nearest_m() + self.fuzz_m() >= self.known.leaf_low,
+        }
+    }
+
+    /// Whether the soonest group is no longer proved apart.
+    pub(super) fn has_expired(&self) -> bool {
+        self.drift.left_m(self.proved.soonest_m()) <= 0.0
+    }
+
+    /// The least bound of what can still be looked into, metres.
+    fn nearest_m(&self) -> f64 {
+        self.drift.left_m(self.proved.soonest_m())
+    }
+
+    /// What cannot be told apart at this pose, metres.
+    fn fuzz_m(&self) -> f64 {
+        self.at.slop + 16.0 * ROUND * self.drift.path_m
+    }
+}

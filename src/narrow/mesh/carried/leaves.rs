@@ -1,0 +1,160 @@
+//! Two leaves of a front: triangles, or a convex shape.
+
+use super::cover::Group;
+use super::store::FrontStore;
+use super::{BoxId, CarriedFront, LeafContact, Open, Side};
+use crate::math::Interval;
+use crate::narrow::exact::Closest;
+use crate::narrow::mesh::contacts::{LEAF_CONTACTS_MAX, keep_deepest};
+use crate::narrow::mesh::side;
+use crate::shape::{Held, Obb};
+
+impl CarriedFront {
+    /// Queries two leaves.
+    ///
+    /// * `known_m` - a bound on their gap that holds at this pose.
+    /// * `exact` - their distance is wanted; else any proof that they are apart will do.
+    pub(super) fn leaves(
+        &mut self,
+        store: &mut FrontStore,
+        (id_a, id_b): (BoxId, BoxId),
+        (a, b): (Side<'_>, Side<'_>),
+        known_m: f64,
+        exact: bool,
+    ) {
+        let (Held::Triangle(i), Held::Triangle(j)) = (a.held(id_a), b.held(id_b)) else {
+            return;
+        };
+        let (leaf_a, leaf_b) = ((a, i), (b, j));
+        // Once the pair touches, only what touches too is of interest.
+        let exact = exact && !self.known.touches;
+        if !exact && let Some(gap) = side::parted(leaf_a, leaf_b, &self.at) {
+            self.keep_leaf(store, id_a, id_b, gap);
+            return;
+        }
+        let beyond = if exact && self.known.high > 0.0 {
+            self.known.high
+        } else {
+            f64::INFINITY
+        };
+        let Some(closest) = side::leaf(leaf_a, leaf_b, &self.at, beyond) else {
+            // Farther than the nearest known: that is proof enough.
+            self.keep_leaf(store, id_a, id_b, beyond.max(known_m));
+            return;
+        };
+        let low = closest.gap.min.max(known_m);
+        self.known.leaf_low = self.known.leaf_low.min(low);
+        // A solid's depth is that of a point, and the translation that parts two leaves can be more: of an overlap
+        // their query proves no more than that it is one.
+        let high = if self.solids {
+            closest.gap.max.max(0.0)
+        } else {
+            closest.gap.max
+        };
+        let better = self.known.high > high || self.last.is_none();
+        self.known.high = self.known.high.min(high);
+        let contact = contact(leaf_a, leaf_b, closest);
+        if low > 0.0 {
+            if better {
+                (self.last, self.witness) = (Some((id_a, id_b)), Some(contact));
+            }
+            self.keep_leaf(store, id_a, id_b, low);
+            return;
+        }
+        // Certified, or zero within its rounding: touching collides.
+        if closest.gap.max <= 8.0 * self.at.slop || closest.finished {
+            let deeper = |w: &LeafContact| closest.best_m < w.closest.best_m;
+            if !self.known.touches || self.witness.as_ref().is_none_or(deeper) {
+                (self.last, self.witness) = (Some((id_a, id_b)), Some(contact));
+                self.crossing = side::triangles(leaf_a, leaf_b);
+            }
+            self.known.touches = true;
+            self.add_contact(store, contact);
+        } else {
+            self.known.blurred = true;
+        }
+        let touching = Open {
+            low: 0.0,
+            a: id_a,
+            b: id_b,
+        };
+        let kept = store.open.push(&mut self.touching, touching);
+        self.note_room(kept);
+    }
+
+    fn add_contact(&mut self, store: &mut FrontStore, contact: LeafContact) {
+        let room = self.contacts.len() < LEAF_CONTACTS_MAX;
+        if !(room && store.contacts.push(&mut self.contacts, contact)) {
+            keep_deepest(store.contacts.all_mut(&self.contacts), contact);
+        }
+    }
+
+    fn keep_leaf(&mut self, store: &mut FrontStore, id_a: BoxId, id_b: BoxId, gap: f64) {
+        let group = Group {
+            expiry_m: 0.0,
+            one: id_a,
+            pack: id_b.pack(),
+            mask: 1 << id_b.lane(),
+            pack_is_b: true,
+            leaf: true,
+        };
+        self.keep(store, group, gap);
+    }
+}
+
+pub(super) fn contact(a: (Side<'_>, u32), b: (Side<'_>, u32), closest: Closest) -> LeafContact {
+    LeafContact {
+        closest,
+        triangle_a: a.0.triangle_name(a.1),
+        triangle_b: b.0.triangle_name(b.1),
+    }
+}
+
+impl LeafContact {
+    /// Of surfaces that are apart though one shape is within the other: moving B towards A's nearest point leads out.
+    pub(in crate::narrow::mesh) fn way_out(&self, gap: Interval) -> Self {
+        let found = self.closest;
+        let closest = Closest {
+            gap,
+            best_m: (-found.best_m).clamp(gap.min, gap.max),
+            normal: -found.normal,
+            ..found
+        };
+        Self { closest, ..*self }
+    }
+}
+
+impl<'a> Side<'a> {
+    /// What a box holds; a convex shape is one leaf.
+    pub(super) fn held(self, id: BoxId) -> Held {
+        match self {
+            Self::Mesh(mesh) => mesh.obb().held(id),
+            Self::Convex(_) => Held::Triangle(0),
+        }
+    }
+
+    /// The boxes that share a parent.
+    pub(super) fn pack(self, pack: u32) -> Option<&'a crate::shape::ObbPack> {
+        match self {
+            Self::Mesh(mesh) => mesh.obb().packs().get(pack as usize),
+            Self::Convex(_) => None,
+        }
+    }
+
+    /// A box by itself; that of a convex shape is handed in.
+    pub(super) fn obb(self, id: BoxId, whole: &Option<Obb>) -> Obb {
+        match (self, whole) {
+            (Self::Mesh(mesh), _) => mesh.obb().get(id),
+            (Self::Convex(_), Some(whole)) => *whole,
+            (Self::Convex(_), None) => Obb::EVERYWHERE,
+        }
+    }
+
+    /// How contacts name a leaf: a convex shape has no triangles.
+    fn triangle_name(self, i: u32) -> u32 {
+        match self {
+            Self::Mesh(_) => i,
+            Self::Convex(_) => u32::MAX,
+        }
+    }
+}
