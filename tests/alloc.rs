@@ -108,7 +108,7 @@ fn compounds() -> String {
         let at = [k % 3, k / 3 % 3, k / 9].map(|i| 0.5 * f64::from(i));
         let _ = write!(
             text,
-            "[[body]]\nname = \"b{k}\"\nmoves = true\nposition = {at:?}\nshapes = [{torus}, {cube}]\n",
+            "[[body]]\nname = \"b{k}\"\nmoves = true\nposition = {at:?}\nshape = [{torus}, {cube}]\n",
         );
     }
     text

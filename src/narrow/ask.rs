@@ -9,9 +9,10 @@ use crate::wire::Verdict;
 use crate::world::Body;
 
 use super::Counters;
-use super::cursor::{Cursor, Turn};
+use super::arena::Arena;
+use super::cursor::{Cursor, Room, Turn};
 use super::memo::Witness;
-use super::mesh::Goal;
+use super::mesh::{FrontStore, Goal};
 
 /// What is known of two bodies after a query of their own.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,10 +39,16 @@ pub struct Asked {
 pub fn gap_between(a: &Body, b: &Body, report_m: f64, meter: &mut Meter<'_>) -> Asked {
     let mut cursor = Cursor::default();
     cursor.start(relative(&a.pose, &b.pose), 0.0, 0, Goal::Gap);
-    let mut counters = Counters::default();
+    let (mut counters, mut fronts) = (Counters::default(), FrontStore::default());
+    let (mut contacts, mut found) = (Arena::default(), Vec::new());
+    let mut room = Room {
+        fronts: &mut fronts,
+        contacts: &mut contacts,
+        found: &mut found,
+    };
     let finished = !(a.unbounded && b.unbounded)
         && loop {
-            match cursor.turn((a, b), report_m, meter, &mut counters) {
+            match cursor.turn(&mut room, (a, b), report_m, meter, &mut counters) {
                 Turn::Finished => break true,
                 Turn::Open if !meter.open() => break false,
                 Turn::Open => {}

@@ -22,6 +22,19 @@ const RETEST_COST: u64 = 2;
 const SLICE_DOUBLINGS_MAX: u64 = 6;
 
 impl Narrow {
+    /// Gives back what work on a pair keeps from turn to turn.
+    pub(super) fn give_back(&mut self, slot: PairSlot) {
+        let memo = &mut self.memos[slot.index()];
+        if let Some(cursor) = self.cursors.get_mut(memo.cursor) {
+            cursor.release(&mut self.front_store, &mut self.found_store);
+        }
+        self.cursors.give(&mut memo.cursor);
+        if let Some(front) = self.fronts.get_mut(memo.front) {
+            front.release(&mut self.front_store);
+        }
+        self.fronts.give(&mut memo.front);
+    }
+
     /// One turn of a pair on its front; whether there is more to do for `goal`.
     pub(super) fn turn_front(
         &mut self,
@@ -95,10 +108,7 @@ impl Narrow {
             if gap.min <= 0.0 {
                 let seen = |leaf| leaf_contact((one, other), (0, 0), &pos12, leaf, gap);
                 self.found.extend(front.contacts(store).iter().map(seen));
-                // Of a shape within another: the way out.
-                let within = self.found.is_empty() && gap.max <= 0.0;
-                self.found
-                    .extend(front.witness().filter(|_| within).as_ref().map(seen));
+                self.found.extend(front.way_out(store).as_ref().map(seen));
             }
             self.keep_contacts(slot, a.radius.min(b.radius));
         }

@@ -7,6 +7,7 @@ use crate::math::{Interval, Point, Vec3};
 
 use choose::choose;
 
+use super::arena::Linked;
 use super::{NONE, Narrow};
 
 /// One point of contact.
@@ -34,6 +35,19 @@ pub struct Contact {
     pub gap_m: f64,
     /// Certified gap of the shape pair, metres.
     pub gap: Interval,
+}
+
+impl Linked for Contact {
+    fn linked(self, next: u32) -> Self {
+        Self {
+            triangle_a: next,
+            ..self
+        }
+    }
+
+    fn next(&self) -> u32 {
+        self.triangle_a
+    }
 }
 
 /// The contacts of one pair.

@@ -8,10 +8,11 @@ use crate::time::Meter;
 use crate::world::Body;
 
 use super::Counters;
+use super::arena::{Arena, Run};
 use super::contacts::Contact;
 use super::exact::Warm;
 use super::memo::Witness;
-use super::mesh::{Goal, Walk};
+use super::mesh::{FrontStore, Goal, MeshQuery};
 use super::query::{
     add_manifold, is_simple, leaf_contact, shape_gap, shape_pose, sound, sphere_bound, witness_of,
 };
@@ -37,10 +38,20 @@ pub(super) struct Cursor {
     /// Where it is.
     pub(super) witness: Option<Witness>,
     /// Contacts found so far.
-    pub(super) found: Vec<Contact>,
+    found: Run,
     next: usize,
-    walking: bool,
-    walk: Walk,
+    /// The mesh pair under way.
+    meshes: MeshQuery,
+    under_way: bool,
+}
+
+/// Where cursors keep what they find.
+#[derive(Debug)]
+pub(super) struct Room<'a> {
+    pub(super) fronts: &'a mut FrontStore,
+    pub(super) contacts: &'a mut Arena<Contact>,
+    /// Contacts of the query at hand.
+    pub(super) found: &'a mut Vec<Contact>,
 }
 
 impl Default for Cursor {
@@ -53,10 +64,10 @@ impl Default for Cursor {
             gap: Interval::UNKNOWN,
             certain: true,
             witness: None,
-            found: Vec::new(),
+            found: Run::default(),
             next: 0,
-            walking: false,
-            walk: Walk::default(),
+            meshes: MeshQuery::default(),
+            under_way: false,
         }
     }
 }
@@ -85,13 +96,24 @@ impl Cursor {
         self.witness = None;
         self.found.clear();
         self.next = 0;
-        self.walking = false;
+        self.under_way = false;
+    }
+
+    /// Gives its memory back.
+    pub(super) fn release(&mut self, fronts: &mut FrontStore, contacts: &mut Arena<Contact>) {
+        self.meshes.release(fronts);
+        contacts.release(&mut self.found);
+    }
+
+    /// The contacts found so far.
+    pub(super) fn found<'a>(&self, contacts: &'a Arena<Contact>) -> &'a [Contact] {
+        contacts.all(&self.found)
     }
 
     /// An upper bound on the gap at the start's pose, from whatever is done by now.
     pub(super) fn upper(&self) -> f64 {
-        if self.walking {
-            self.gap.max.min(self.walk.interval().max)
+        if self.under_way {
+            self.gap.max.min(self.meshes.interval().max)
         } else {
             self.gap.max
         }
@@ -100,6 +122,7 @@ impl Cursor {
     /// Works until the goal is reached, the slice is used up, or the meter closes.
     pub(super) fn turn(
         &mut self,
+        room: &mut Room<'_>,
         (a, b): (&Body, &Body),
         report_m: f64,
         meter: &mut Meter<'_>,
@@ -114,7 +137,7 @@ impl Cursor {
             if self.goal == Goal::Verdict && self.gap.max <= 0.0 {
                 return Turn::Finished;
             }
-            if self.shape_pair((a, b), report_m, stop_at, meter, counters) {
+            if self.shape_pair(room, (a, b), report_m, stop_at, meter, counters) {
                 self.next += 1;
             }
         }
@@ -124,6 +147,7 @@ impl Cursor {
     /// Works on the current shape pair; whether it is accounted for.
     fn shape_pair(
         &mut self,
+        room: &mut Room<'_>,
         (a, b): (&Body, &Body),
         report_m: f64,
         stop_at: u64,
@@ -137,7 +161,7 @@ impl Cursor {
             reason = "limits::SHAPES_PER_BODY_MAX fits"
         )]
         let places = (place_a as u32, place_b as u32);
-        if !self.walking {
+        if !self.under_way {
             let bound = sphere_bound(one, other, &self.rel);
             // A shape pair that cannot be the least (nor, where contacts are wanted, touch) needs no query.
             let enough = match self.goal {
@@ -153,45 +177,66 @@ impl Cursor {
         let pos12 = shape_pose(one, other, &self.rel);
         if is_simple(&one.shape, &other.shape) {
             counters.queries += 1;
-            if let Some(closest) = shape_gap(&one.shape, &other.shape, &pos12, &mut Warm::default())
-            {
-                let gap = sound(closest.gap, one, other, &self.rel);
-                self.certain &= closest.finished || !gap.contains(0.0);
-                if gap.max < self.gap.max {
-                    self.witness = Some(witness_of(one, other, &pos12, &closest, places));
-                }
-                if self.goal == Goal::Contacts && gap.min <= 0.0 {
-                    counters.manifolds += 1;
-                    add_manifold((a, b), places, &pos12, &closest, &mut self.found);
-                }
-                self.gap = self.gap.least(gap);
-            }
+            self.query_once(room, (a, b), places, &pos12, counters);
             meter.charge_dear(1);
             return true;
         }
-        if !self.walking {
-            self.walk.start(&one.shape, &other.shape, &pos12);
-            self.walking = true;
+        if !std::mem::replace(&mut self.under_way, true) {
+            (self.meshes).start(room.fronts, &one.shape, &other.shape, &pos12);
         }
         counters.slices += 1;
         let left = stop_at.saturating_sub(meter.spent()).max(1);
-        if !self
-            .walk
-            .advance(&one.shape, &other.shape, self.goal, left, meter)
-        {
+        let shapes = (&*one.shape, &*other.shape);
+        if !(self.meshes).advance(room.fronts, shapes, self.goal, left, meter) {
             return false;
         }
-        self.walking = false;
-        self.take_walk((a, b), places, &pos12);
+        self.under_way = false;
+        self.take_meshes(room, (a, b), places, &pos12);
         true
     }
 
-    /// Takes over what a finished walk found.
-    fn take_walk(&mut self, (a, b): (&Body, &Body), places: (u32, u32), pos12: &Pose) {
+    /// The one query that decides two shapes without meshes.
+    fn query_once(
+        &mut self,
+        room: &mut Room<'_>,
+        (a, b): (&Body, &Body),
+        places: (u32, u32),
+        pos12: &Pose,
+        counters: &mut Counters,
+    ) {
         let (one, other) = (&a.shapes[places.0 as usize], &b.shapes[places.1 as usize]);
-        let gap = sound(self.walk.interval(), one, other, &self.rel);
-        self.certain &= self.walk.is_certain();
-        if let Some(leaf) = self.walk.witness().filter(|_| gap.max < self.gap.max) {
+        let mut warm = Warm::default();
+        let Some(closest) = shape_gap(&one.shape, &other.shape, pos12, &mut warm) else {
+            return;
+        };
+        let gap = sound(closest.gap, one, other, &self.rel);
+        self.certain &= closest.finished || !gap.contains(0.0);
+        if gap.max < self.gap.max {
+            self.witness = Some(witness_of(one, other, pos12, &closest, places));
+        }
+        if self.goal == Goal::Contacts && gap.min <= 0.0 {
+            counters.manifolds += 1;
+            room.found.clear();
+            add_manifold((a, b), places, pos12, &closest, room.found);
+            for &contact in &*room.found {
+                room.contacts.push(&mut self.found, contact);
+            }
+        }
+        self.gap = self.gap.least(gap);
+    }
+
+    /// Takes over what a finished query of a mesh pair found.
+    fn take_meshes(
+        &mut self,
+        room: &mut Room<'_>,
+        (a, b): (&Body, &Body),
+        places: (u32, u32),
+        pos12: &Pose,
+    ) {
+        let (one, other) = (&a.shapes[places.0 as usize], &b.shapes[places.1 as usize]);
+        let gap = sound(self.meshes.interval(), one, other, &self.rel);
+        self.certain &= self.meshes.is_certain() || !gap.contains(0.0);
+        if let Some(leaf) = self.meshes.witness().filter(|_| gap.max < self.gap.max) {
             self.witness = Some(Witness {
                 triangle_a: leaf.triangle_a,
                 triangle_b: leaf.triangle_b,
@@ -199,9 +244,10 @@ impl Cursor {
             });
         }
         if self.goal == Goal::Contacts && gap.min <= 0.0 {
-            let contacts = self.walk.contacts().iter();
-            let seen = contacts.map(|leaf| leaf_contact((one, other), places, pos12, leaf, gap));
-            self.found.extend(seen);
+            for leaf in self.meshes.contacts(room.fronts) {
+                let contact = leaf_contact((one, other), places, pos12, &leaf, gap);
+                room.contacts.push(&mut self.found, contact);
+            }
         }
         self.gap = self.gap.least(gap);
     }

@@ -324,12 +324,8 @@ impl Narrow {
         memo.undecided_since = 0;
         memo.queued = false;
         memo.refreshing = false;
-        self.cursors.give(&mut memo.cursor);
-        if let Some(front) = self.fronts.get_mut(memo.front) {
-            front.release(&mut self.front_store);
-        }
-        self.fronts.give(&mut memo.front);
         self.contact_sets.give(&mut memo.contacts);
+        self.give_back(slot);
     }
 
     /// Takes a verdict and keeps lists and counts in step.

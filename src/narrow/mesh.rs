@@ -28,6 +28,7 @@ mod containment;
 mod front;
 mod half_space;
 mod placed;
+mod query;
 mod retest;
 mod side;
 mod triangle;
@@ -35,8 +36,9 @@ mod walk;
 
 pub use carried::{CarriedFront, FrontStore, Search, has_front};
 pub use contacts::{LEAF_CONTACTS_MAX, LeafContact};
+pub use query::{Goal, MeshQuery};
 pub use retest::retest_witness;
-pub use walk::{Goal, Walk};
+pub use walk::Walk;
 
 /// The nearest or deepest pair of leaves met so far.
 pub type Witness = LeafContact;

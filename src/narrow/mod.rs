@@ -17,6 +17,7 @@
 pub mod exact;
 pub mod mesh;
 
+mod arena;
 mod ask;
 mod carry;
 mod contacts;
@@ -38,6 +39,7 @@ use crate::time::Meter;
 use crate::wire::{BodyStatus, Verdict};
 use crate::world::World;
 
+use arena::Arena;
 use cursor::Cursor;
 use memo::{Hot, Memo};
 use mesh::{CarriedFront, FrontStore, Search};
@@ -82,6 +84,8 @@ pub struct Narrow {
     /// What is carried of pairs of single shapes of which one is a mesh.
     fronts: Pool<CarriedFront>,
     front_store: FrontStore,
+    /// Contacts that cursors have found.
+    found_store: Arena<Contact>,
     search: Search,
     contact_sets: Pool<ContactSet>,
     /// What the order of work asks of each pair, by `PairSlot`.

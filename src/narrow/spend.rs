@@ -7,7 +7,7 @@ use crate::wire::Verdict;
 use crate::world::{Body, World};
 
 use super::contacts::ContactSet;
-use super::cursor::{Cursor, Turn};
+use super::cursor::{Cursor, Room, Turn};
 use super::memo::{Witness, relative_motion};
 use super::mesh::{Goal, has_front};
 use super::order::Order;
@@ -242,7 +242,13 @@ impl Narrow {
             let credit_m = a.motion.credit_m() + b.motion.credit_m();
             cursor.start(relative(&a.pose, &b.pose), credit_m, self.tick, goal);
         }
-        let turn = cursor.turn((a, b), memo.report_m, meter, &mut self.counters);
+        let mut room = Room {
+            fronts: &mut self.front_store,
+            contacts: &mut self.found_store,
+            found: &mut self.found,
+        };
+        let (report_m, counters) = (memo.report_m, &mut self.counters);
+        let turn = cursor.turn(&mut room, (a, b), report_m, meter, counters);
         let certified = cursor.upper() <= 0.0 && memo.now.max > 0.0;
         if turn == Turn::Open && !certified {
             return Turn::Open;
@@ -267,9 +273,11 @@ impl Narrow {
         };
         let contacts = cursor.goal == Goal::Contacts && turn == Turn::Finished;
         if contacts {
-            std::mem::swap(&mut self.found, &mut cursor.found);
+            self.found.clear();
+            (self.found).extend_from_slice(cursor.found(&self.found_store));
         }
         if turn == Turn::Finished {
+            cursor.release(&mut self.front_store, &mut self.found_store);
             self.cursors.give(&mut memo.cursor);
         }
         self.store(slot, &answer);

@@ -16,7 +16,7 @@ use obb::ObbTree;
 pub(crate) use obb::{BoxId, Held, Obb, ObbPack};
 pub(crate) use predicates::side;
 use tree::Tree;
-pub(crate) use tree::{Below, Node};
+pub(crate) use tree::{Below, NODES_WAITING_MAX, Node};
 
 use outline::Outline;
 use topology::Topology;

@@ -4,7 +4,7 @@ use crate::oracle::meshes;
 use crate::oracle::rng::Rng;
 use crate::support::{CASES, KINDS, any_mesh, place, run, shape};
 use sweepd::math::{Interval, Pose, Quat, Vec3, relative};
-use sweepd::narrow::mesh::{Goal, Walk};
+use sweepd::narrow::mesh::{FrontStore, Goal, MeshQuery, Walk};
 use sweepd::time::{ManualClock, Meter};
 
 #[test]
@@ -120,4 +120,13 @@ fn a_pose_that_is_not_finite_leaves_everything_open() {
     walk.start(&a, &a, &Pose::translation(f64::NAN, 0.0, 0.0));
     assert!(!walk.advance(&a, &a, Goal::Verdict, 100, &mut meter));
     assert_eq!(walk.interval(), Interval::UNKNOWN);
+    let (mut store, mut query) = (FrontStore::default(), MeshQuery::default());
+    query.start(
+        &mut store,
+        &a,
+        &a,
+        &Pose::translation(0.0, 0.0, f64::INFINITY),
+    );
+    assert!(!query.advance(&mut store, (&a, &a), Goal::Verdict, 100, &mut meter));
+    assert_eq!(query.interval(), Interval::UNKNOWN);
 }

@@ -3,12 +3,13 @@
 use crate::oracle::rng::Rng;
 use crate::support::{CASES, KINDS, any_mesh, mesh_of};
 use sweepd::math::{Aabb, Interval, Point, Vec3, relative};
-use sweepd::narrow::mesh::{Goal, Walk};
+use sweepd::narrow::mesh::{FrontStore, Goal, MeshQuery};
 use sweepd::shape::{Geometry, Shape};
 use sweepd::time::{ManualClock, Meter};
 
 #[test]
 fn half_spaces_meet_the_lowest_vertex() {
+    let (mut store, mut query) = (FrontStore::default(), MeshQuery::default());
     for case in 0..CASES {
         let mut rng = Rng::new(9_000_000 + case);
         let kind = rng.below(KINDS);
@@ -40,11 +41,10 @@ fn half_spaces_meet_the_lowest_vertex() {
         ] {
             let clock = ManualClock::new(0);
             let mut meter = Meter::unlimited(&clock);
-            let mut walk = Walk::default();
-            walk.start(a, b, &pos12);
+            query.start(&mut store, a, b, &pos12);
             let mut last = Interval::UNKNOWN;
-            while !walk.advance(a, b, Goal::Gap, 1, &mut meter) {
-                let now = walk.interval();
+            while !query.advance(&mut store, (a, b), Goal::Gap, 1, &mut meter) {
+                let now = query.interval();
                 assert!(
                     now.widened(1e-12).contains(wanted),
                     "{name}: {now:?} {wanted}"
@@ -52,17 +52,21 @@ fn half_spaces_meet_the_lowest_vertex() {
                 assert!(now.min >= last.min && now.max <= last.max);
                 last = now;
             }
-            let end = walk.interval();
+            let end = query.interval();
             assert!(
                 end.width() < 1e-12 && end.widened(1e-12).contains(wanted),
                 "{name} {end:?}"
             );
-            let witness = walk.witness().unwrap().closest;
+            let witness = query.witness().unwrap().closest;
             let across = witness.point_b - witness.point_a;
             assert!((across - witness.normal * witness.best_m).norm() < 1e-12);
-            assert!(walk.advance(a, b, Goal::Contacts, u64::MAX, &mut meter));
-            assert_eq!(walk.contacts().is_empty(), end.min > 0.0, "{name}");
-            assert!(walk.interval().min >= end.min);
+            assert!(query.advance(&mut store, (a, b), Goal::Contacts, u64::MAX, &mut meter));
+            assert_eq!(
+                query.contacts(&store).next().is_none(),
+                end.min > 0.0,
+                "{name}"
+            );
+            assert!(query.interval().min >= end.min);
         }
     }
 }

@@ -4,7 +4,7 @@ use crate::oracle::meshes::{self, Soup};
 use crate::oracle::rng::Rng;
 use crate::oracle::{Placed, Truth, truth};
 use sweepd::math::{Interval, Point, Pose, Vec3, relative};
-use sweepd::narrow::mesh::{Goal, Walk, retest_witness};
+use sweepd::narrow::mesh::{FrontStore, Goal, MeshQuery, Walk, Witness, retest_witness};
 use sweepd::shape::{Convex, Geometry, Mesh, Shape};
 use sweepd::time::{ManualClock, Meter};
 
@@ -76,19 +76,97 @@ pub fn truth_of(a: &Shape, b: &Shape, pose_a: &Pose, pose_b: &Pose) -> Truth {
     truth(&placed(a, pose_a, &from), &placed(b, pose_b, &from))
 }
 
-/// Runs a walk in slices of one unit, checks every interruption, and yields where it ended.
+/// A resumable query of two meshes, or of a mesh and a convex shape.
+trait Resumable {
+    fn advance(&mut self, a: &Shape, b: &Shape, goal: Goal, meter: &mut Meter<'_>) -> bool;
+    fn interval(&self) -> Interval;
+    fn witness(&self) -> Option<Witness>;
+    fn touches(&self) -> bool;
+}
+
+impl Resumable for Walk {
+    fn advance(&mut self, a: &Shape, b: &Shape, goal: Goal, meter: &mut Meter<'_>) -> bool {
+        self.advance(a, b, goal, 1, meter)
+    }
+
+    fn interval(&self) -> Interval {
+        self.interval()
+    }
+
+    fn witness(&self) -> Option<Witness> {
+        self.witness()
+    }
+
+    fn touches(&self) -> bool {
+        !self.contacts().is_empty()
+    }
+}
+
+impl Resumable for (FrontStore, MeshQuery) {
+    fn advance(&mut self, a: &Shape, b: &Shape, goal: Goal, meter: &mut Meter<'_>) -> bool {
+        (self.1).advance(&mut self.0, (a, b), goal, 1, meter)
+    }
+
+    fn interval(&self) -> Interval {
+        self.1.interval()
+    }
+
+    fn witness(&self) -> Option<Witness> {
+        self.1.witness()
+    }
+
+    fn touches(&self) -> bool {
+        self.1.contacts(&self.0).next().is_some()
+    }
+}
+
+/// Runs both kinds of queries in slices of one unit, checks every interruption, and yields where they ended.
 pub fn run(a: &Shape, b: &Shape, pose_a: &Pose, pose_b: &Pose, goal: Goal, what: &str) -> Interval {
+    let pos12 = relative(pose_a, pose_b);
+    let mut walk = Walk::default();
+    walk.start(a, b, &pos12);
+    let end = follow(
+        &mut walk,
+        a,
+        b,
+        pose_a,
+        pose_b,
+        goal,
+        &format!("{what}, walk"),
+    );
+    let mut query = (FrontStore::default(), MeshQuery::default());
+    query.1.start(&mut query.0, a, b, &pos12);
+    follow(
+        &mut query,
+        a,
+        b,
+        pose_a,
+        pose_b,
+        goal,
+        &format!("{what}, query"),
+    );
+    query.1.release(&mut query.0);
+    end
+}
+
+fn follow(
+    query: &mut impl Resumable,
+    a: &Shape,
+    b: &Shape,
+    pose_a: &Pose,
+    pose_b: &Pose,
+    goal: Goal,
+    what: &str,
+) -> Interval {
     let truth = truth_of(a, b, pose_a, pose_b);
     let pos12 = relative(pose_a, pose_b);
     let size = a.radius.max(b.radius);
     let tolerance = 1e-11 * (a.radius + b.radius);
     let clock = ManualClock::new(0);
     let mut meter = Meter::unlimited(&clock);
-    let mut walk = Walk::default();
-    walk.start(a, b, &pos12);
     let mut last = Interval::UNKNOWN;
     loop {
-        let now = walk.interval();
+        let now = query.interval();
         assert!(
             now.min >= last.min && now.max <= last.max,
             "{what}: loosened from {last:?} to {now:?}"
@@ -104,12 +182,12 @@ pub fn run(a: &Shape, b: &Shape, pose_a: &Pose, pose_b: &Pose, goal: Goal, what:
             ),
         }
         last = now;
-        if walk.advance(a, b, goal, 1, &mut meter) {
+        if query.advance(a, b, goal, &mut meter) {
             break;
         }
         assert!(meter.spent() < 50_000_000, "{what}: no end");
     }
-    let end = walk.interval();
+    let end = query.interval();
     match truth {
         Truth::Apart(d) if d > 1e-9 * size => {
             assert!(end.min > 0.0, "{what}: {end:?} for {d}");
@@ -125,16 +203,16 @@ pub fn run(a: &Shape, b: &Shape, pose_a: &Pose, pose_b: &Pose, goal: Goal, what:
         }
         Truth::Apart(_) => {}
     }
-    if let Some(w) = walk.witness() {
+    if let Some(w) = query.witness() {
         let across = w.closest.point_b - w.closest.point_a;
         assert!((w.closest.normal.norm() - 1.0).abs() < 1e-12, "{what}");
         let along = (across - w.closest.normal * w.closest.best_m).norm();
         assert!(along < 1e-9 * size, "{what}: off by {along}");
     }
     if goal == Goal::Contacts {
-        assert_eq!(walk.contacts().is_empty(), end.min > 0.0, "{what} {end:?}");
+        assert_eq!(!query.touches(), end.min > 0.0, "{what} {end:?}");
     }
-    if let Some(w) = walk.witness().filter(|w| w.closest.best_m > 0.0) {
+    if let Some(w) = query.witness().filter(|w| w.closest.best_m > 0.0) {
         let again = retest_witness(a, b, &pos12, w.triangle_a, w.triangle_b).unwrap();
         assert_eq!(again.gap, w.closest.gap, "{what}");
     }

@@ -25,14 +25,15 @@
 //! pair of boxes (eight times the memory, and eight boxes are tested at the cost of one and a half).
 
 use super::bound::Frame;
-use super::contacts::LeafContact;
+use super::contacts::{Contacts, LeafContact};
 use super::containment::{Containment, ShellTests};
 use super::placed::Placed;
+use super::query::Goal;
 use super::retest::{reach_of, tree_of};
 use super::side::{self, Side};
 use super::triangle::{Triangle, surely_crosses};
-use super::walk::Goal;
 use crate::math::{Pose, ROUND};
+use crate::narrow::arena::Run;
 use crate::shape::{BoxId, Obb, Shape};
 use crate::time::Meter;
 
@@ -49,7 +50,7 @@ use cover::{Group, Open, OpenList};
 use drift::Drift;
 use known::Known;
 pub use store::FrontStore;
-use store::{Proved, Run};
+use store::Proved;
 
 /// A front that has split into so many times its fresh size, and [`STALE_MORE`], starts anew: entries only ever split.
 const STALE_TIMES: usize = 3;
@@ -103,8 +104,7 @@ pub struct CarriedFront {
     witness: Option<LeafContact>,
     /// Corners of the triangles that touched last, each in its own frame: to ask them again costs no look into the meshes.
     crossing: Option<[Triangle; 2]>,
-    /// Leaves that touch, deepest first to stay.
-    contacts: Run,
+    contacts: Contacts,
 }
 
 /// Whether a pair of shapes can have a front.
@@ -140,7 +140,7 @@ impl CarriedFront {
         store.groups.release(&mut self.passing);
         self.open.release(&mut store.open);
         store.open.release(&mut self.touching);
-        store.contacts.release(&mut self.contacts);
+        self.contacts.release(&mut store.contacts);
     }
 
     /// Takes the pair to another pose; what was proved is carried over as far as it holds.

@@ -1,6 +1,7 @@
 //! The contact set of a mesh pair: the deepest leaf pairs that touch or cross, a bounded number of them.
 
 use super::Closest;
+use crate::narrow::arena::{Arena, Linked, Run};
 
 /// Leaf contacts kept of one shape pair; the shallowest makes room for a deeper one.
 pub const LEAF_CONTACTS_MAX: usize = 64;
@@ -16,41 +17,55 @@ pub struct LeafContact {
     pub triangle_b: u32,
 }
 
-/// The deepest contacts met so far.
+/// The deepest contacts of one pair met so far.
 #[derive(Debug, Default)]
 pub(super) struct Contacts {
-    all: Vec<LeafContact>,
+    kept: Run,
     /// How many there were that had no room.
     pub(super) left_out: u64,
 }
 
 impl Contacts {
     pub(super) fn clear(&mut self) {
-        self.all.clear();
+        self.kept.clear();
         self.left_out = 0;
     }
 
-    pub(super) fn all(&self) -> &[LeafContact] {
-        &self.all
+    pub(super) fn all<'a>(&self, arena: &'a Arena<LeafContact>) -> &'a [LeafContact] {
+        arena.all(&self.kept)
     }
 
-    pub(super) fn add(&mut self, contact: LeafContact) {
-        if self.all.len() < LEAF_CONTACTS_MAX {
-            self.all.push(contact);
+    /// Takes a contact in, or in place of the shallowest where it is deeper.
+    pub(super) fn add(&mut self, arena: &mut Arena<LeafContact>, contact: LeafContact) {
+        if self.kept.len() < LEAF_CONTACTS_MAX && arena.push(&mut self.kept, contact) {
             return;
         }
         self.left_out += 1;
-        keep_deepest(&mut self.all, contact);
+        let depth = |c: &LeafContact| c.closest.best_m;
+        let kept = arena.all_mut(&self.kept).iter_mut();
+        if let Some(shallowest) = kept.max_by(|a, b| depth(a).total_cmp(&depth(b)))
+            && depth(&contact) < depth(shallowest)
+        {
+            *shallowest = contact;
+        }
+    }
+
+    /// Gives its memory back.
+    pub(super) fn release(&mut self, arena: &mut Arena<LeafContact>) {
+        arena.release(&mut self.kept);
+        self.left_out = 0;
     }
 }
 
-/// Where there is no room for more: a contact takes the place of the shallowest, if it is deeper.
-pub(super) fn keep_deepest(all: &mut [LeafContact], contact: LeafContact) {
-    let depth = |c: &LeafContact| c.closest.best_m;
-    let shallowest = (all.iter_mut()).max_by(|a, b| depth(a).total_cmp(&depth(b)));
-    if let Some(shallowest) = shallowest
-        && depth(&contact) < depth(shallowest)
-    {
-        *shallowest = contact;
+impl Linked for LeafContact {
+    fn linked(self, next: u32) -> Self {
+        Self {
+            triangle_a: next,
+            ..self
+        }
+    }
+
+    fn next(&self) -> u32 {
+        self.triangle_a
     }
 }

@@ -3,16 +3,17 @@
 //! For a surface each triangle is a convex pair with the half-space. For a solid the deepest vertex decides too: a
 //! ball in the solid about a point under the plane reaches down to a point of the solid at least its radius deeper.
 
-use super::Closest;
 use super::contacts::{Contacts, LeafContact};
+use super::{Closest, Goal};
 use crate::math::{Interval, Point, Pose, ROUND, Vec3};
-use crate::shape::{Below, Mesh};
+use crate::narrow::arena::Arena;
+use crate::shape::{Below, Mesh, NODES_WAITING_MAX};
+use crate::time::Meter;
 
-/// The walk; keeps its memory.
+/// The walk.
 #[derive(Debug, Default)]
 pub(super) struct HalfSpaceWalk {
-    /// Nodes that may hold a lower vertex, and the least height in each, metres.
-    stack: Vec<(f64, u32)>,
+    waiting: Waiting,
     /// Pose of the mesh seen from the half-space.
     pose: Pose,
     half_space_is_b: bool,
@@ -27,6 +28,44 @@ pub(super) struct HalfSpaceWalk {
     lowest: Option<(f64, Point, u32)>,
     /// Whether all vertices under the plane are wanted, not only the lowest.
     collects: bool,
+    contacts: Contacts,
+}
+
+/// Nodes that may hold a lower vertex, and the least height in each, metres: a stack.
+#[derive(Debug)]
+struct Waiting {
+    nodes: [(f64, u32); NODES_WAITING_MAX],
+    len: usize,
+}
+
+impl Default for Waiting {
+    fn default() -> Self {
+        Self {
+            nodes: [(0.0, 0); NODES_WAITING_MAX],
+            len: 0,
+        }
+    }
+}
+
+impl Waiting {
+    fn all(&self) -> &[(f64, u32)] {
+        &self.nodes[..self.len]
+    }
+
+    /// The root alone.
+    fn start(&mut self, low: f64) {
+        (self.nodes[0], self.len) = ((low, 0), 1);
+    }
+
+    fn push(&mut self, node: (f64, u32)) {
+        self.nodes[self.len] = node;
+        self.len += 1;
+    }
+
+    fn pop(&mut self) -> Option<(f64, u32)> {
+        self.len = self.len.checked_sub(1)?;
+        Some(self.nodes[self.len])
+    }
 }
 
 impl HalfSpaceWalk {
@@ -57,31 +96,60 @@ impl HalfSpaceWalk {
         self.slop = 32.0 * ROUND * size;
         self.lowest = None;
         self.collects = false;
-        self.stack.clear();
-        self.stack.push((self.bound(mesh, 0), 0));
+        self.contacts.clear();
+        self.waiting.start(self.bound(mesh, 0));
         // Any vertex bounds the least from above.
         self.offer(mesh, 0, None);
         size.is_finite()
     }
 
-    /// From now on all vertices under the plane are wanted: the walk begins again.
-    pub(super) fn collect(&mut self) {
-        if !self.collects {
+    /// Goes on until the goal is reached (true), `end_units` are spent in all, or the meter closes.
+    pub(super) fn advance(
+        &mut self,
+        arena: &mut Arena<LeafContact>,
+        mesh: &Mesh,
+        goal: Goal,
+        end_units: u64,
+        meter: &mut Meter<'_>,
+    ) -> bool {
+        if goal == Goal::Contacts && !self.collects {
+            // All vertices under the plane are wanted: the walk begins again, and what is known stays known.
             self.collects = true;
-            // What is known stays known.
-            let low = self.interval().min + self.slop;
-            self.stack.clear();
-            self.stack.push((low, 0));
+            self.waiting.start(self.interval().min + self.slop);
+        }
+        loop {
+            if self.reached(goal) {
+                return true;
+            }
+            if meter.spent() >= end_units || !meter.open() {
+                return false;
+            }
+            self.step(mesh, arena);
+            meter.charge(1);
         }
     }
 
-    pub(super) fn finished(&self) -> bool {
-        self.stack.is_empty()
+    fn reached(&self, goal: Goal) -> bool {
+        let decided = |gap: Interval| gap.min > 0.0 || gap.max <= 0.0;
+        self.waiting.len == 0 || (goal == Goal::Verdict && decided(self.interval()))
+    }
+
+    pub(super) fn contacts<'a>(&self, arena: &'a Arena<LeafContact>) -> &'a [LeafContact] {
+        self.contacts.all(arena)
+    }
+
+    /// Gives its memory back.
+    pub(super) fn release(&mut self, arena: &mut Arena<LeafContact>) {
+        self.contacts.release(arena);
     }
 
     pub(super) fn interval(&self) -> Interval {
         let high = self.lowest.map_or(f64::INFINITY, |l| l.0);
-        let low = self.stack.iter().fold(high, |low, entry| low.min(entry.0));
+        let low = self
+            .waiting
+            .all()
+            .iter()
+            .fold(high, |low, entry| low.min(entry.0));
         Interval::new(low - self.slop, high + self.slop)
     }
 
@@ -91,8 +159,8 @@ impl HalfSpaceWalk {
     }
 
     /// Tests one node.
-    pub(super) fn step(&mut self, mesh: &Mesh, contacts: &mut Contacts) {
-        let Some((bound, place)) = self.stack.pop() else {
+    fn step(&mut self, mesh: &Mesh, arena: &mut Arena<LeafContact>) {
+        let Some((bound, place)) = self.waiting.pop() else {
             return;
         };
         let lowest = self.lowest.map_or(f64::INFINITY, |l| l.0);
@@ -100,7 +168,7 @@ impl HalfSpaceWalk {
             return;
         }
         match mesh.tree().nodes()[place as usize].below(place) {
-            Below::Triangle(face) => self.offer(mesh, face, self.collects.then_some(contacts)),
+            Below::Triangle(face) => self.offer(mesh, face, self.collects.then_some(arena)),
             Below::Nodes(left, right) => {
                 let (left, right) = (
                     (self.bound(mesh, left).max(bound), left),
@@ -112,8 +180,8 @@ impl HalfSpaceWalk {
                 } else {
                     (left, right)
                 };
-                self.stack.push(far);
-                self.stack.push(near);
+                self.waiting.push(far);
+                self.waiting.push(near);
             }
         }
     }
@@ -122,7 +190,7 @@ impl HalfSpaceWalk {
         self.origin_height_m - mesh.tree().nodes()[place as usize].reach(&self.down)
     }
 
-    fn offer(&mut self, mesh: &Mesh, face: u32, mut contacts: Option<&mut Contacts>) {
+    fn offer(&mut self, mesh: &Mesh, face: u32, mut arena: Option<&mut Arena<LeafContact>>) {
         for corner in mesh.triangle(face) {
             let height = self.origin_height_m - self.down.dot(&(corner - mesh.tree().origin()));
             let here = (height, corner, face);
@@ -130,15 +198,16 @@ impl HalfSpaceWalk {
                 self.lowest = Some(here);
             }
             // A vertex belongs to some six triangles and is one contact.
-            if let Some(contacts) = contacts.as_deref_mut()
+            if let Some(arena) = arena.as_deref_mut()
                 && height <= self.slop
             {
                 let contact = self.contact(&here);
-                if !(contacts.all().iter()).any(|c| {
+                let same = |c: &LeafContact| {
                     c.closest.point_a == contact.closest.point_a
                         && c.closest.point_b == contact.closest.point_b
-                }) {
-                    contacts.add(contact);
+                };
+                if !self.contacts.all(arena).iter().any(same) {
+                    self.contacts.add(arena, contact);
                 }
             }
         }

@@ -1,34 +1,22 @@
 //! The walk itself: its stages and its interval.
 
-use super::Witness;
 use super::bound::Frame;
 use super::contacts::{Contacts, LeafContact};
 use super::containment::{Containment, ShellTests};
 use super::front::{Entry, Front};
-use super::half_space::HalfSpaceWalk;
 use super::retest::{reach_of, tree_of};
 use super::side::{self, Side};
+use super::{Goal, Witness};
 use crate::math::{Interval, Pose};
-use crate::shape::{Below, Geometry, Mesh, Node, Shape};
+use crate::narrow::arena::Arena;
+use crate::shape::{Below, Node, Shape};
 use crate::time::Meter;
-
-/// How far a walk is to go. A later goal can be asked for when an earlier one is reached; nothing is done twice.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Goal {
-    /// Until the pair is certified colliding or proved apart.
-    Verdict,
-    /// Until the least distance is exact; an overlapping pair needs no more than its verdict.
-    Gap,
-    /// Until all touching or crossing leaf pairs are met, or the least distance is exact.
-    Contacts,
-}
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Stage {
     /// Not started, or a pair that is none of ours.
     #[default]
     Idle,
-    HalfSpace,
     Surfaces,
     Inside,
     Refine,
@@ -41,7 +29,7 @@ pub struct Walk {
     frame: Frame,
     stage: Stage,
     front: Front,
-    /// Boxes of the sides that are convex; `None` when a half-space takes part.
+    /// Boxes of the sides that are convex.
     one: Option<[Node; 2]>,
     /// A solid mesh takes part.
     solids: bool,
@@ -57,7 +45,7 @@ pub struct Walk {
     blurred: bool,
     witness: Option<Witness>,
     contacts: Contacts,
-    half_space: HalfSpaceWalk,
+    arena: Arena<LeafContact>,
 }
 
 impl Walk {
@@ -65,7 +53,7 @@ impl Walk {
     ///
     /// * `pos12` - pose of `b` seen from `a`, finite, unit quaternion.
     ///
-    /// At least one of the two is a mesh; else, or with a pose that is not finite, the interval stays unknown and
+    /// At least one of the two is a mesh and none a half-space; else, or with a pose that is not finite, the interval stays unknown and
     /// the walk never finishes.
     pub fn start(&mut self, a: &Shape, b: &Shape, pos12: &Pose) {
         self.stage = Stage::Idle;
@@ -82,8 +70,6 @@ impl Walk {
         match (Side::of(a), Side::of(b)) {
             (Some(Side::Convex(_)), Some(Side::Convex(_))) => {}
             (Some(side_a), Some(side_b)) => self.start_surfaces((a, side_a), (b, side_b), pos12),
-            (None, Some(Side::Mesh(mesh))) => self.start_half_space(a, mesh, pos12, false),
-            (Some(Side::Mesh(mesh)), None) => self.start_half_space(b, mesh, pos12, true),
             _ => {}
         }
     }
@@ -100,10 +86,6 @@ impl Walk {
         meter: &mut Meter<'_>,
     ) -> bool {
         let end = meter.spent().saturating_add(slice_units);
-        if goal == Goal::Contacts && self.stage != Stage::Idle && self.one.is_none() {
-            self.stage = Stage::HalfSpace;
-            self.half_space.collect();
-        }
         loop {
             if self.reached(goal) {
                 return true;
@@ -123,9 +105,6 @@ impl Walk {
     pub fn interval(&self) -> Interval {
         if self.stage == Stage::Idle {
             return Interval::UNKNOWN;
-        }
-        if self.one.is_none() {
-            return self.half_space.interval();
         }
         // Surfaces: the least of what is open and what was queried.
         let surfaces = self.front.least().min(self.leaf_low).min(self.high);
@@ -158,7 +137,7 @@ impl Walk {
     /// reached, but for [`Walk::contacts_left_out`]. In no order. Of a shape within another: the nearest points.
     #[must_use]
     pub fn contacts(&self) -> &[LeafContact] {
-        self.contacts.all()
+        self.contacts.all(&self.arena)
     }
 
     /// How many leaf contacts had no room.
@@ -203,23 +182,10 @@ impl Walk {
         self.settle_stage();
     }
 
-    fn start_half_space(&mut self, plane: &Shape, mesh: &Mesh, pos12: &Pose, is_b: bool) {
-        let Geometry::HalfSpace { normal, offset } = &plane.geometry else {
-            return;
-        };
-        if self.half_space.start(mesh, (normal, *offset), pos12, is_b) {
-            self.stage = Stage::HalfSpace;
-        }
-    }
-
     fn reached(&self, goal: Goal) -> bool {
         match self.stage {
             Stage::Done => true,
             Stage::Idle | Stage::Inside => false,
-            Stage::HalfSpace => {
-                let interval = self.half_space.interval();
-                goal == Goal::Verdict && (interval.min > 0.0 || interval.max <= 0.0)
-            }
             Stage::Surfaces => goal < Goal::Contacts && self.touches,
             Stage::Refine => {
                 let inside = self.shells.state() == Containment::Inside;
@@ -230,15 +196,6 @@ impl Walk {
 
     fn step(&mut self, a: &Shape, b: &Shape, meter: &mut Meter<'_>) {
         match (self.stage, Side::of(a), Side::of(b)) {
-            (Stage::HalfSpace, Some(Side::Mesh(mesh)), _)
-            | (Stage::HalfSpace, _, Some(Side::Mesh(mesh))) => {
-                self.half_space.step(mesh, &mut self.contacts);
-                meter.charge(1);
-                self.witness = self.half_space.witness();
-                if self.half_space.finished() {
-                    self.stage = Stage::Done;
-                }
-            }
             (Stage::Inside, Some(a), Some(b)) => {
                 self.shells.step(a, b, &self.frame.placed);
                 meter.charge(1);
@@ -273,7 +230,7 @@ impl Walk {
         {
             self.stage = Stage::Done;
             if let (Containment::Inside, Some(way_out)) = (containment, self.witness()) {
-                self.contacts.add(way_out);
+                self.contacts.add(&mut self.arena, way_out);
             }
         }
     }
@@ -356,7 +313,7 @@ impl Walk {
             // Certified, or zero within its rounding: touching collides.
             if closest.gap.max <= 8.0 * self.frame.placed.slop || closest.finished {
                 self.touches = true;
-                self.contacts.add(contact);
+                self.contacts.add(&mut self.arena, contact);
             } else {
                 self.blurred = true;
             }

@@ -11,17 +11,14 @@ use std::cmp::Ordering;
 
 use super::Mesh;
 use super::predicates::{side, turn_yz};
-use super::tree::Below;
+use super::tree::{Below, NODES_WAITING_MAX};
 use crate::math::Point;
-
-/// Nodes that wait in a walk down a tree that is split at the median: one a level, and a mesh has under 2^31 triangles.
-const WAITING_MAX: usize = 33;
 
 /// One inside test under way.
 #[derive(Debug)]
 pub(crate) struct Inside {
     point: Point,
-    waiting: [u32; WAITING_MAX],
+    waiting: [u32; NODES_WAITING_MAX],
     len: usize,
     winding: i64,
 }
@@ -30,7 +27,7 @@ impl Default for Inside {
     fn default() -> Self {
         Self {
             point: Point::origin(),
-            waiting: [0; WAITING_MAX],
+            waiting: [0; NODES_WAITING_MAX],
             len: 0,
             winding: 0,
         }

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::store::{Arena, Run};
+use crate::narrow::arena::{Arena, Run};
 use crate::shape::BoxId;
 
 /// A box of one side against boxes of one pack of the other side, all proved apart.

@@ -69,7 +69,14 @@ impl CarriedFront {
     /// Leaves that touch at this pose, at most [`super::LEAF_CONTACTS_MAX`]; all of them once `Goal::Contacts` is reached.
     #[must_use]
     pub fn contacts<'a>(&self, store: &'a FrontStore) -> &'a [LeafContact] {
-        store.contacts.all(&self.contacts)
+        self.contacts.all(&store.contacts)
+    }
+
+    /// Where one shape is within the other and nothing touches: the leaves that lead out, which then stand for contacts.
+    #[must_use]
+    pub fn way_out(&self, store: &FrontStore) -> Option<LeafContact> {
+        let within = self.contacts(store).is_empty() && self.interval().max <= 0.0;
+        self.witness().filter(|_| within)
     }
 
     /// A lower bound on the distance of the surfaces, metres; minus infinity while they may touch.

@@ -5,7 +5,6 @@ use super::store::FrontStore;
 use super::{BoxId, CarriedFront, LeafContact, Open, Side};
 use crate::math::Interval;
 use crate::narrow::exact::Closest;
-use crate::narrow::mesh::contacts::{LEAF_CONTACTS_MAX, keep_deepest};
 use crate::narrow::mesh::side;
 use crate::shape::{Held, Obb};
 
@@ -69,7 +68,7 @@ impl CarriedFront {
                 self.crossing = side::triangles(leaf_a, leaf_b);
             }
             self.known.touches = true;
-            self.add_contact(store, contact);
+            self.contacts.add(&mut store.contacts, contact);
         } else {
             self.known.blurred = true;
         }
@@ -80,13 +79,6 @@ impl CarriedFront {
         };
         let kept = store.open.push(&mut self.touching, touching);
         self.note_room(kept);
-    }
-
-    fn add_contact(&mut self, store: &mut FrontStore, contact: LeafContact) {
-        let room = self.contacts.len() < LEAF_CONTACTS_MAX;
-        if !(room && store.contacts.push(&mut self.contacts, contact)) {
-            keep_deepest(store.contacts.all_mut(&self.contacts), contact);
-        }
     }
 
     fn keep_leaf(&mut self, store: &mut FrontStore, id_a: BoxId, id_b: BoxId, gap: f64) {

@@ -1,0 +1,168 @@
+//! One resumable query of a shape pair of which at least one is a mesh, at a fixed relative pose.
+
+use super::carried::{CarriedFront, FrontStore, Search};
+use super::contacts::LeafContact;
+use super::half_space::HalfSpaceWalk;
+use super::side::Side;
+use crate::math::{Interval, Pose};
+use crate::shape::{Geometry, Mesh, Shape};
+use crate::time::Meter;
+
+/// How far work is to go. A later goal can be asked for when an earlier one is reached; nothing is done twice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Goal {
+    /// Until the pair is certified colliding or proved apart.
+    Verdict,
+    /// Until the least distance is exact; an overlapping pair needs no more than its verdict.
+    Gap,
+    /// Until all touching or crossing leaf pairs are met, or the least distance is exact.
+    Contacts,
+}
+
+/// The query; what it keeps is in a [`FrontStore`], the same one from [`MeshQuery::start`] to [`MeshQuery::release`].
+#[derive(Debug)]
+pub struct MeshQuery {
+    kind: Kind,
+    /// What is known of the gap, metres.
+    gap: Interval,
+    front: CarriedFront,
+    half_space: HalfSpaceWalk,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Kind {
+    /// Not started, or a pair that is none of ours: nothing is ever known of it.
+    #[default]
+    Idle,
+    Surfaces,
+    HalfSpace,
+}
+
+impl Default for MeshQuery {
+    fn default() -> Self {
+        Self {
+            kind: Kind::Idle,
+            gap: Interval::UNKNOWN,
+            front: CarriedFront::default(),
+            half_space: HalfSpaceWalk::default(),
+        }
+    }
+}
+
+impl MeshQuery {
+    /// Starts a query; from here on [`MeshQuery::interval`] is sound.
+    ///
+    /// * `pos12` - pose of `b` seen from `a`, unit quaternion.
+    ///
+    /// At least one of the two is a mesh; else, or with a pose that is not finite, the interval stays unknown and
+    /// the query never finishes.
+    pub fn start(&mut self, store: &mut FrontStore, a: &Shape, b: &Shape, pos12: &Pose) {
+        (self.kind, self.gap) = (Kind::Idle, Interval::UNKNOWN);
+        if !(pos12
+            .translation
+            .vector
+            .iter()
+            .chain(pos12.rotation.coords.iter()))
+        .all(|x| x.is_finite())
+        {
+            return;
+        }
+        match (Side::of(a), Side::of(b)) {
+            (Some(Side::Convex(_)), Some(Side::Convex(_))) => {}
+            (Some(_), Some(_)) => {
+                self.front.start(store, a, b, pos12, Search::Restart);
+                self.kind = Kind::Surfaces;
+            }
+            (None, Some(Side::Mesh(mesh))) => self.start_half_space(a, mesh, pos12, false),
+            (Some(Side::Mesh(mesh)), None) => self.start_half_space(b, mesh, pos12, true),
+            _ => {}
+        }
+        self.narrow();
+    }
+
+    /// Goes on until the goal is reached (true), `slice_units` are spent, or the meter closes.
+    ///
+    /// `a` and `b` are those of [`MeshQuery::start`]. Units: a node test each, a leaf query each.
+    pub fn advance(
+        &mut self,
+        store: &mut FrontStore,
+        (a, b): (&Shape, &Shape),
+        goal: Goal,
+        slice_units: u64,
+        meter: &mut Meter<'_>,
+    ) -> bool {
+        let reached = match (self.kind, Side::of(a), Side::of(b)) {
+            (Kind::Surfaces, ..) => self.front.advance(store, a, b, goal, slice_units, meter),
+            (Kind::HalfSpace, Some(Side::Mesh(mesh)), _)
+            | (Kind::HalfSpace, _, Some(Side::Mesh(mesh))) => {
+                let end = meter.spent().saturating_add(slice_units);
+                (self.half_space).advance(&mut store.contacts, mesh, goal, end, meter)
+            }
+            _ => false,
+        };
+        self.narrow();
+        reached
+    }
+
+    /// What is known of the gap, metres: sound at any interruption, and never looser than before.
+    #[must_use]
+    pub fn interval(&self) -> Interval {
+        self.gap
+    }
+
+    /// Whether 0 in the interval of a reached goal means touching (law 3.4).
+    #[must_use]
+    pub fn is_certain(&self) -> bool {
+        self.kind == Kind::HalfSpace || self.front.is_certain()
+    }
+
+    /// The leaves with the least gap met so far; where one shape is within the other, with the normal that leads out.
+    #[must_use]
+    pub fn witness(&self) -> Option<LeafContact> {
+        match self.kind {
+            Kind::Idle => None,
+            Kind::Surfaces => self.front.witness(),
+            Kind::HalfSpace => self.half_space.witness(),
+        }
+    }
+
+    /// Leaf pairs that touch or cross, at most [`super::LEAF_CONTACTS_MAX`]; all of them once `Goal::Contacts` is
+    /// reached. In no order. Of a shape within another: the way out.
+    pub fn contacts<'a>(
+        &'a self,
+        store: &'a FrontStore,
+    ) -> impl Iterator<Item = LeafContact> + use<'a> {
+        let (found, within) = match self.kind {
+            Kind::Idle => (&[][..], None),
+            Kind::Surfaces => (self.front.contacts(store), self.front.way_out(store)),
+            Kind::HalfSpace => (self.half_space.contacts(&store.contacts), None),
+        };
+        found.iter().copied().chain(within)
+    }
+
+    /// Forgets everything and gives its memory back.
+    pub fn release(&mut self, store: &mut FrontStore) {
+        self.kind = Kind::Idle;
+        self.front.release(store);
+        self.half_space.release(&mut store.contacts);
+    }
+
+    /// A front's bound can be lower by rounding after it was stored: what was known at this pose stays known.
+    fn narrow(&mut self) {
+        let now = match self.kind {
+            Kind::Idle => return,
+            Kind::Surfaces => self.front.interval(),
+            Kind::HalfSpace => self.half_space.interval(),
+        };
+        self.gap = self.gap.meet(now);
+    }
+
+    fn start_half_space(&mut self, plane: &Shape, mesh: &Mesh, pos12: &Pose, is_b: bool) {
+        let Geometry::HalfSpace { normal, offset } = &plane.geometry else {
+            return;
+        };
+        if (self.half_space).start(mesh, (normal, *offset), pos12, is_b) {
+            self.kind = Kind::HalfSpace;
+        }
+    }
+}
