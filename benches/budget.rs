@@ -1,5 +1,6 @@
 //! Budgets above the floor: how far a tick overshoots, on the wall and on the thread's CPU clock, and how much of what is
-//! left above the floor is used while work remains. Scene: `pool(4000, 11)`, each body 1 % of its size a tick, pairs and
+//! left above the floor is used while work remains (before and after
+//! publishing; and before alone). Scene: `pool(4000, 11)`, each body 1 % of its size a tick, pairs and
 //! contacts asked for.
 //!
 //! `cargo bench --bench budget [-- --quick]`
@@ -19,7 +20,8 @@ fn main() {
     let ticks = if quick { 60 } else { 400 };
     let mut csv = String::from(
         "machine,commit,compiler,seed,bodies,above_floor_us,ticks,floor_us,overshoot_wall_p50_us,overshoot_wall_p99_us,\
-         overshoot_cpu_p50_us,overshoot_cpu_p99_us,used_percent,undecided_percent\n",
+         overshoot_cpu_p50_us,overshoot_cpu_p99_us,used_percent,used_before_publishing_percent,\
+         undecided_percent\n",
     );
     let from = provenance();
     for above_us in [100, 250, 500, 1_000, 2_000, 5_000_u64] {
@@ -28,7 +30,8 @@ fn main() {
         let mut rows = bench.rows.clone();
         let mut floors = Vec::new();
         let (mut wall, mut cpu) = (Vec::new(), Vec::new());
-        let (mut used, mut offered, mut open, mut all) = (0_u64, 0_u64, 0_u64, 0_u64);
+        let (mut used, mut told, mut offered) = (0_u64, 0_u64, 0_u64);
+        let (mut open, mut all) = (0_u64, 0_u64);
         for tick in 0..ticks + 40 {
             flight.advance();
             for (to, pose) in rows.iter_mut().zip(&flight.poses) {
@@ -41,7 +44,7 @@ fn main() {
                 quantile(&mut floors, 0.5)
             };
             let budget_ns = floor_ns + above_us * 1_000;
-            let (wall_ns, cpu_ns) = bench.tick(
+            let took = bench.tick(
                 &rows,
                 true,
                 Budget::time_ns(budget_ns),
@@ -61,10 +64,11 @@ fn main() {
             }
             // Below its own floor a tick takes the floor: then there is nothing to overshoot by.
             let limit_ns = budget_ns.max(out.floor_ns);
-            wall.push(wall_ns.saturating_sub(limit_ns));
-            cpu.push(cpu_ns.saturating_sub(limit_ns));
+            wall.push(took.wall_ns.saturating_sub(limit_ns));
+            cpu.push(took.cpu_ns.saturating_sub(limit_ns));
             if out.possible > 0 && budget_ns > out.floor_ns {
-                used += out.stage_ns[usize::from(Stage::Narrow.code())];
+                used += out.stage_ns[usize::from(Stage::Narrow.code())] + took.rest_ns;
+                told += out.stage_ns[usize::from(Stage::Narrow.code())];
                 offered += budget_ns - out.floor_ns;
             }
             open += out.possible;
@@ -79,13 +83,14 @@ fn main() {
             }
         };
         csv += &format!(
-            "{from},{seed},{bodies},{above_us},{ticks},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.2}\n",
+            "{from},{seed},{bodies},{above_us},{ticks},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.2}\n",
             us(quantile(&mut floors, 0.5)),
             us(quantile(&mut wall, 0.5)),
             us(quantile(&mut wall, 0.99)),
             us(quantile(&mut cpu, 0.5)),
             us(quantile(&mut cpu, 0.99)),
             share(used, offered),
+            share(told, offered),
             share(open, all)
         );
     }

@@ -156,7 +156,7 @@ fn main() {
                 for (to, pose) in rows.iter_mut().zip(&flight.poses) {
                     *to = row(to.body, pose);
                 }
-                let (own, _) = ours.tick(&rows, true, Budget::UNLIMITED, ASKED);
+                let own = ours.tick(&rows, true, Budget::UNLIMITED, ASKED).wall_ns;
                 let theirs = peer.tick(&flight.poses);
                 if tick >= 20 {
                     own_ns.push(own);

@@ -128,7 +128,7 @@ impl Budget {
 
     /// Limited by wall time alone.
     #[must_use]
-    pub fn time_ns(time_ns: u64) -> Self {
+    pub const fn time_ns(time_ns: u64) -> Self {
         Self {
             time_ns: Some(time_ns),
             units: None,

@@ -207,6 +207,8 @@ enum {
     SWEEPD_STAGE_PUBLISH = 4,
     /* Handing the outbox to the transports, in the tick before. */
     SWEEPD_STAGE_SEND = 5,
+    /* Narrowing that went on after that, until the budget of the tick before was used. */
+    SWEEPD_STAGE_REST = 6,
 };
 
 /* Bits of FrameHeader::flags; exactly one of the three. */

@@ -17,7 +17,7 @@ use crate::scene::Scene;
 use crate::tick::pace::{Due, Pacer};
 use crate::tick::{EditBatch, Engine, TickInput};
 use crate::time::{Budget, Clock};
-use crate::transport::{BodyChange, Door, RequestToken};
+use crate::transport::{BodyChange, Door, RequestToken, Wake};
 use crate::wire::{Answer, Inbox, TickRow};
 use crate::world::Edit;
 
@@ -30,6 +30,9 @@ pub use watchdog::Watchdog;
 const BUILD_LOOK_NS: u64 = 2_000_000;
 /// Longest wait, nanoseconds: a signal that comes between the look at the stop flag and the wait is seen then.
 const WAIT_MAX_NS: u64 = 100_000_000;
+
+/// Between two looks whether somebody has sent something while a tick's budget is used up, nanoseconds.
+const REST_SLICE_NS: u64 = 250_000;
 
 /// A running daemon.
 pub struct Daemon<'a> {
@@ -94,13 +97,24 @@ impl<'a> Daemon<'a> {
     /// `Error::Io` when a port breaks; the daemon must then be started again.
     pub fn run(&mut self, stop: &AtomicBool, ticks: Option<u64>) -> Result<()> {
         while !stop.load(Ordering::Relaxed) {
-            let wait_ns = self.wait_ns();
-            self.door.wait(wait_ns, self.clock.as_ref())?;
+            if !self.work_on()? {
+                let wait_ns = self.wait_ns();
+                self.door.wait(wait_ns, self.clock.as_ref())?;
+            }
             if self.round(ticks)? {
                 return Ok(());
             }
         }
         Ok(())
+    }
+
+    /// Uses what the last tick's budget left, until there is something else to do; whether there is.
+    fn work_on(&mut self) -> Result<bool> {
+        let mut news = false;
+        while !news && self.wait_ns() > 0 && self.engine.work_on(REST_SLICE_NS) {
+            news = self.door.wait(0, self.clock.as_ref())? != Wake::default();
+        }
+        Ok(news)
     }
 
     /// Takes what has come and runs the tick that is due, if one is; whether `ticks` have been run.

@@ -76,6 +76,8 @@ pub struct Narrow {
     active: Vec<PairSlot>,
     /// Pairs that stopped being active in this tick and still exist.
     left: Vec<PairSlot>,
+    /// They stopped after their findings were taken: the next tick is to hear of them.
+    left_is_news: bool,
     /// Pairs that lack a verdict at this tick's poses and can get one by work.
     undecided: Vec<PairSlot>,
     /// Active pairs whose bounds or contacts are older than their poses.
@@ -157,7 +159,9 @@ impl Narrow {
     pub fn begin(&mut self, tick: u64, world: &World, pairs: &PairSet, delta: &PairDelta) {
         self.tick = tick;
         self.counters = Counters::default();
-        self.left.clear();
+        if !std::mem::take(&mut self.left_is_news) {
+            self.left.clear();
+        }
         self.carry_over();
         self.note_bodies(world);
         self.note_missing(pairs);
@@ -174,13 +178,21 @@ impl Narrow {
         self.spend_on_verdicts(world, wanted, meter) && self.spend_on_reports(world, wanted, meter)
     }
 
+    /// As [`Narrow::spend`], after the tick's findings were taken: what is found now is told in the next tick.
+    pub fn go_on(&mut self, world: &World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
+        if !std::mem::replace(&mut self.left_is_news, true) {
+            self.left.clear();
+        }
+        self.spend(world, wanted, meter)
+    }
+
     /// Pairs whose verdict is not `apart`, in no order that means anything.
     #[must_use]
     pub fn active(&self) -> &[PairSlot] {
         &self.active
     }
 
-    /// Pairs that were active and are now proved apart.
+    /// Pairs that were active, in the tick before or after its findings were taken, and are now proved apart.
     #[must_use]
     pub fn left(&self) -> &[PairSlot] {
         &self.left

@@ -89,9 +89,9 @@ const WINDOW: usize = 128;
 const DECAY_SHIFT: u32 = 5;
 /// Of what is left above the floor, 1 / 12 may be kept back beyond the median of publishing. With 1 / 16 one tick in a
 /// hundred ended 60 to 100 us late, with 1 / 10 less than 90 % of the budget was used.
-const SAFETY_SHARE: u64 = 12;
+const SAFETY_SHARE: u64 = 3;
 /// Kept back beside it, nanoseconds: the query that is under way at the deadline, and closing the work lists.
-const CLOSING_NS: u64 = 20_000;
+pub(super) const CLOSING_NS: u64 = 20_000;
 
 impl Default for Floor {
     fn default() -> Self {

@@ -8,6 +8,7 @@ mod input;
 mod look;
 pub mod pace;
 mod repair;
+mod rest;
 
 use std::sync::Arc;
 
@@ -27,6 +28,7 @@ use crate::wire::{
 use crate::world::{ChangeSet, PlacedShape, World};
 
 use floor::{Floor, Laps};
+use rest::Rest;
 
 pub use input::{EditBatch, EditOutcome, TickInput};
 
@@ -52,6 +54,7 @@ pub struct Engine {
     clock: Arc<dyn Clock>,
     config: Config,
     floor: Floor,
+    rest: Rest,
     boot_id: u64,
     tick: u64,
     /// Time of this tick, nanoseconds of `CLOCK_BOOTTIME`.
@@ -104,6 +107,7 @@ impl Engine {
             outcomes: Vec::new(),
             config: scene.config.clone(),
             floor: Floor::default(),
+            rest: Rest::default(),
             tick: 0,
             now_ns: 0,
             missed: 0,
@@ -284,8 +288,11 @@ impl Engine {
             self.config.heartbeat_ns,
             &mut beat,
         );
-        self.narrow.spend(&self.world, wanted, &mut meter);
-        meter.spent()
+        let done = self.narrow.spend(&self.world, wanted, &mut meter);
+        let units = meter.spent();
+        let open = end_ns.filter(|_| !done && budget.units.is_none());
+        self.rest.open = open.map(|end_ns| (wanted, end_ns));
+        units
     }
 
     /// The tick that goes out alone while this one takes longer than a heartbeat.
@@ -334,12 +341,13 @@ impl Engine {
         let row = &mut self.out.tick;
         laps.fill(&mut row.stage_ns);
         row.stage_ns[usize::from(Stage::Send.code())] = self.floor.last_send_ns();
+        row.stage_ns[usize::from(Stage::Rest.code())] = std::mem::take(&mut self.rest.spent_ns);
         row.sent_ns = self.clock.boottime_ns();
         row.elapsed_ns = elapsed_ns;
         row.budget_ns = budget_ns;
         row.budget_units = input.budget.units.unwrap_or(u64::MAX);
         row.floor_ns = floor_ns;
-        row.units = units;
+        row.units = units + std::mem::take(&mut self.rest.units);
         row.cause = input.cause.code();
         row.cause_source = place(input.cause_source);
         row.overrun = u8::from(overrun);

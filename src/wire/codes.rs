@@ -234,6 +234,8 @@ code! {
         Publish = 4 => "publish",
         /// Handing the outbox to the transports, in the tick before.
         Send = 5 => "send",
+        /// Narrowing that went on after that, until the budget of the tick before was used.
+        Rest = 6 => "rest",
     }
 }
 

@@ -20,6 +20,7 @@ mod events;
 mod limits;
 mod motion;
 mod order;
+mod rest;
 mod rig;
 mod schedule;
 mod shapes;

@@ -1,4 +1,4 @@
-//! Three engines on the same scene, and the comparison of what they say with the truth.
+//! Four engines on the same scene, and the comparison of what they say with the truth.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -25,7 +25,9 @@ pub struct Run {
     pub pair_ticks: u64,
     pub overlapping: u64,
     pub close: u64,
-    undecided: [u64; 3],
+    undecided: [u64; 4],
+    /// Ticks after which the last engine went on and was not done.
+    went_on: u64,
     by_kind: BTreeMap<(usize, usize), u64>,
     within_rounding: u64,
 }
@@ -38,7 +40,7 @@ impl Run {
         let built = build_shapes(&scene).unwrap().bodies;
         take_meshes(&mut couples, &built);
         let clock = Arc::new(ManualClock::new(1_000_000_000));
-        let mut engines = [0; 3].map(|_| {
+        let mut engines = [0; 4].map(|_| {
             Engine::new(
                 &scene,
                 built.clone(),
@@ -63,20 +65,31 @@ impl Run {
             };
             run(&mut engines[1], &inbox, &clock, Budget::units(stop));
             run(&mut engines[2], &inbox, &clock, Budget::units(whole / 2));
+            // Each look at the clock takes 100 ns, and sending is said to take 100 us: the work stops anywhere, and time is
+            // left to go on.
+            clock.step_each_read(100);
+            let budget = Budget::time_ns(100_000 + rng.bits() % (100 * whole + 1));
+            run(&mut engines[3], &inbox, &clock, budget);
+            engines[3].note_sent(100_000);
+            clock.step_each_read(0);
             for engine in &engines {
                 engine.validate().unwrap();
             }
             for (k, couple) in couples.iter().enumerate() {
-                let outs = [0, 1, 2].map(|e: usize| engines[e].outbox());
+                let outs = [0, 1, 2, 3].map(|e: usize| engines[e].outbox());
                 self.compare(k as u64, couple, outs, &format!("seed {seed} tick {tick}"));
             }
+            clock.step_each_read(100);
+            self.went_on += u64::from(engines[3].work_on(rng.bits() % 20_000));
+            clock.step_each_read(0);
+            engines[3].validate().unwrap();
             for couple in &mut couples {
                 couple.step(&mut rng);
             }
         }
     }
 
-    fn compare(&mut self, k: u64, couple: &Couple, outs: [&Outbox; 3], what: &str) {
+    fn compare(&mut self, k: u64, couple: &Couple, outs: [&Outbox; 4], what: &str) {
         let [a, b] = &couple.bodies;
         let size = a.size.max(b.size);
         let noise = 1e-11 * size;
@@ -164,7 +177,7 @@ impl Run {
     pub fn report(&self) {
         let share = |n: u64| 100.0 * n as f64 / self.pair_ticks as f64;
         println!(
-            "{} pair-ticks, each against three engines; {} kinds of pairs, at least {} each; {:.1} % overlap, {:.1} % within 2 %",
+            "{} pair-ticks, each against four engines; {} kinds of pairs, at least {} each; {:.1} % overlap, {:.1} % within 2 %",
             self.pair_ticks,
             self.by_kind.len(),
             self.fewest(),
@@ -172,11 +185,13 @@ impl Run {
             share(self.close)
         );
         println!(
-            "unresolved: {:.3} % without limit ({} within rounding of touching), {:.2} % at a random stop, {:.2} % at half the work",
+            "unresolved: {:.3} % without limit ({} within rounding of touching), {:.2} % at a random stop, {:.2} % at half the work, {:.2} % at a deadline, which went on {} times and was not done then",
             share(self.undecided[0]),
             self.within_rounding,
             share(self.undecided[1]),
-            share(self.undecided[2])
+            share(self.undecided[2]),
+            share(self.undecided[3]),
+            self.went_on
         );
     }
 }

@@ -608,6 +608,8 @@ class Stage(IntEnum):
     PUBLISH = 4
     # Handing the outbox to the transports, in the tick before.
     SEND = 5
+    # Narrowing that went on after that, until the budget of the tick before was used.
+    REST = 6
 
 
 class FrameFlags(IntFlag):

@@ -1,0 +1,87 @@
+//! 4.5: what is left of a budget after the outbox was handed over is used, and the next tick tells what was found.
+
+use sweepd::math::Pose;
+use sweepd::time::Budget;
+use sweepd::wire::{Event, Stage, Verdict};
+
+use crate::rig::{ALL, NONE, Rig, ball, has, scene};
+
+/// Longer than the time that is kept back for sending, and no more: nothing is decided before the outbox goes out.
+const SHORT: Budget = Budget::time_ns(900_000);
+
+/// Two balls whose boxes overlap, after a tick in which all was decided and sending took long.
+fn two(at: [f64; 2]) -> Rig {
+    let mut rig = Rig::new(&scene("", &[ball(1, 0.0, ""), ball(2, 0.0, "")]));
+    rig.place(2, &Pose::translation(at[0], at[1], 0.0));
+    rig.send(ALL);
+    rig.engine.note_sent(1_000_000);
+    rig
+}
+
+const TOUCHING: [f64; 2] = [1.2, 1.2];
+const APART: [f64; 2] = [1.5, 1.5];
+
+#[test]
+fn law_4_5_a_collision_that_ends_after_publishing_is_told_in_the_next_tick() {
+    let mut rig = two(TOUCHING);
+    assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+    rig.place(2, &Pose::translation(APART[0], APART[1], 0.0));
+    rig.send(SHORT);
+    assert_eq!(rig.verdict(1, 2), Verdict::Possible);
+    assert_eq!(rig.out.tick.units, 0);
+    assert!(!rig.engine.work_on(u64::MAX), "all is decided");
+    rig.engine.validate().unwrap();
+    rig.send(NONE);
+    let row = rig.pair(1, 2).unwrap();
+    assert!(has(row, Event::End) && !has(row, Event::Begin));
+    assert_eq!((row.end_first_tick, row.end_last_tick), (2, 3));
+    assert_eq!(rig.verdict(1, 2), Verdict::Apart);
+    assert_eq!(rig.out.tick.units, 1, "of the rest of tick 2");
+    rig.send(NONE);
+    assert!(rig.out.pairs.is_empty());
+    assert_eq!(rig.out.tick.units, 0);
+}
+
+#[test]
+fn law_4_5_a_collision_found_after_publishing_is_told_in_the_next_tick() {
+    let mut rig = two(APART);
+    rig.place(2, &Pose::translation(TOUCHING[0], TOUCHING[1], 0.0));
+    rig.send(SHORT);
+    assert_eq!(rig.verdict(1, 2), Verdict::Possible);
+    while rig.engine.work_on(5_000) {}
+    rig.send(NONE);
+    let row = rig.pair(1, 2).unwrap();
+    assert!(has(row, Event::Begin) && !has(row, Event::End));
+    assert_eq!((row.begin_first_tick, row.begin_last_tick), (2, 3));
+    assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+}
+
+#[test]
+fn law_4_5_a_pair_that_ends_after_publishing_and_is_gone_in_the_next_tick_is_told_once() {
+    let mut rig = two(TOUCHING);
+    rig.place(2, &Pose::translation(APART[0], APART[1], 0.0));
+    rig.send(SHORT);
+    rig.engine.work_on(u64::MAX);
+    rig.place(2, &Pose::translation(100.0, 0.0, 0.0));
+    rig.send(NONE);
+    let ends = rig.out.pairs.iter().filter(|row| has(row, Event::End));
+    assert_eq!(ends.count(), 1);
+    rig.send(NONE);
+    assert!(rig.out.pairs.is_empty());
+}
+
+#[test]
+fn law_4_5_no_work_goes_on_past_the_deadline_nor_under_a_budget_of_units() {
+    let mut rig = two(TOUCHING);
+    rig.place(2, &Pose::translation(APART[0], APART[1], 0.0));
+    rig.send(SHORT);
+    rig.clock.advance(900_000);
+    assert!(!rig.engine.work_on(u64::MAX));
+    rig.send(NONE);
+    assert_eq!(rig.verdict(1, 2), Verdict::Possible);
+    assert_eq!(rig.out.tick.stage_ns[usize::from(Stage::Rest.code())], 0);
+    // Unit budgets replay bit for bit.
+    assert!(!rig.engine.work_on(u64::MAX));
+    rig.send(NONE);
+    assert_eq!(rig.verdict(1, 2), Verdict::Possible);
+}
