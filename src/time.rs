@@ -237,6 +237,13 @@ impl<'a> Meter<'a> {
         self.look();
     }
 
+    /// Whether work of about so many nanoseconds that cannot be stopped would end before the deadline.
+    #[must_use]
+    pub fn has_ns(&self, ns: u64) -> bool {
+        (self.deadline_ns)
+            .is_none_or(|end_ns| self.clock.monotonic_ns().saturating_add(ns) < end_ns)
+    }
+
     /// Units charged so far.
     #[must_use]
     pub fn spent(&self) -> u64 {

@@ -3,9 +3,11 @@
 //! In: two shapes of which at least one is a mesh, and the pose of B seen from A. Out: a sound interval of their gap
 //! from the first moment on, narrowed by every unit of work, a witness and contacts.
 //!
-//! Two ways:
+//! Three ways:
 //! - [`CarriedFront`] for a pair of single shapes: what was proved at one pose is carried to the next (see `carried`);
-//! - [`Walk`], a query at one pose that can stop: for bodies of several shapes, half-spaces, and queries without an engine.
+//! - [`MeshQuery`], a query at one pose that can stop: for bodies of several shapes, and half-spaces. Between two surfaces it
+//!   is a front that is not carried on;
+//! - [`Walk`], the same over the trees of axis-aligned boxes: the twin and the baseline of the two.
 //!
 //! Of a walk every pair of triangles is covered by exactly one entry at any time: on the stack (boxes that may touch), in
 //! the heap (boxes proved apart by so much), or settled (queried, or proved farther than the best distance known).

@@ -10,7 +10,7 @@ use super::contacts::ContactSet;
 use super::cursor::{Cursor, Room, Turn};
 use super::memo::{Witness, relative_motion};
 use super::mesh::{Goal, has_front};
-use super::order::Order;
+use super::order::{Order, RANK_NS};
 use super::query::{add_manifold, is_simple, retest, shape_gap, shape_pose, sound, witness_of};
 use super::{NONE, Narrow, Wanted};
 
@@ -89,15 +89,19 @@ impl Narrow {
         meter: &mut Meter<'m>,
         mut turn: impl FnMut(&mut Self, PairSlot, &mut Meter<'m>) -> bool,
     ) -> Vec<PairSlot> {
-        if work.is_empty() || !meter.open() {
+        // To rank them all takes a while too, and nothing can be done in what is left then.
+        if work.is_empty() || !meter.open() || !meter.has_ns(work.len() as u64 * RANK_NS) {
             return work;
         }
         let mut line = self.line_up(&work, order);
         while !work.is_empty() && meter.open() {
             let (mut at, mut left) = (0, 0);
-            while at < work.len() && meter.open() {
-                self.order_next(&mut line, &mut work, at, world, meter);
-                let slot = work[at];
+            while at < work.len() {
+                self.order_next(&mut line, at, world, meter);
+                if !meter.open() {
+                    break;
+                }
+                let slot = self.keyed.get(at).map_or(work[at], |&(_, slot)| slot);
                 if !turn(self, slot, meter) {
                     work[left] = slot;
                     left += 1;
@@ -105,10 +109,15 @@ impl Narrow {
                 at += 1;
             }
             // Who had no turn keeps its place behind those who had.
+            let behind = work.len() - at;
+            for (to, &(_, slot)) in work[at..].iter_mut().zip(self.keyed.iter().skip(at)) {
+                *to = slot;
+            }
             work.copy_within(at.., left);
-            work.truncate(left + work.len() - at);
+            work.truncate(left + behind);
             // Further rounds keep the order of the first.
-            line.ready = work.len();
+            self.keyed.clear();
+            line.finish(work.len());
         }
         work
     }

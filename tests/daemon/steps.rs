@@ -2,8 +2,9 @@
 
 use std::time::Instant;
 
+use sweepd::builtin::{Random, pool};
 use sweepd::transport::client::{Client, Heard};
-use sweepd::wire::{ContactKind, Event, State, TickCause, Verdict, name_str};
+use sweepd::wire::{ContactKind, Event, Stage, State, TickCause, Verdict, name_str};
 
 use crate::live::{Desk, SECOND_NS, TWO_SPHERES, at, send, state, step, tick_until, words};
 
@@ -165,4 +166,32 @@ fn a_reader_that_never_reads_holds_nobody_up() {
         step(&mut client, &[at(1, 0.0), at(2, f64::from(number))]);
     }
     drop(sleeper);
+}
+
+#[test]
+fn what_publishing_leaves_of_a_budget_is_used_and_told_in_the_next_tick() {
+    let desk = Desk::new();
+    let bodies = 1_000;
+    let scene = pool(bodies, 5);
+    // How long the floor takes depends on the machine: some budget ends amid the work.
+    let used = ["1ms", "3ms", "6ms", "12ms", "25ms", "50ms"]
+        .iter()
+        .any(|budget| {
+            let mut daemon = desk.run(&scene, &["--budget", budget]);
+            let mut client = desk.source("feed");
+            let mut random = Random::new(7);
+            let mut used_ns = 0;
+            for _ in 0..60 {
+                let mut rows: Vec<_> = (1..=bodies as u64).map(|id| at(id, 0.0)).collect();
+                for row in &mut rows {
+                    row.position = [0; 3].map(|_| random.range(0.0, 12.6));
+                }
+                step(&mut client, &rows);
+                used_ns += client.view().tick().stage_ns[usize::from(Stage::Rest.code())];
+            }
+            drop(client);
+            assert_eq!(daemon.stop().0.code(), Some(0), "{}", daemon.stderr());
+            used_ns > 0
+        });
+    assert!(used);
 }

@@ -1,4 +1,4 @@
-//! The walk itself: its stages and its interval.
+//! The walk over trees of axis-aligned boxes: its stages and its interval. The twin and the baseline of the fronts.
 
 use super::bound::Frame;
 use super::contacts::{Contacts, LeafContact};
