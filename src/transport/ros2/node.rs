@@ -294,7 +294,8 @@ impl Door for RosNode {
     }
 
     fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, &[u8])) {
-        for (token, json) in std::mem::take(&mut *open(&self.shared.desk.asked)) {
+        let asked = std::mem::take(&mut *open(&self.shared.desk.asked));
+        for (token, json) in asked {
             let header = RequestHeader {
                 json_len: json.len() as u64,
                 request: token,

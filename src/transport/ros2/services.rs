@@ -216,13 +216,16 @@ impl Services {
     }
 
     fn respond(&mut self, desk: &Desk, shared: &Shared) {
-        for (token, answer) in std::mem::take(&mut *open(&desk.answered)) {
+        // Taken in statements of their own: a loop would keep the lock while DDS sends, and the tick thread would wait for it.
+        let answered = std::mem::take(&mut *open(&desk.answered));
+        let ticked = std::mem::take(&mut *open(&desk.ticked));
+        for (token, answer) in answered {
             let Some((verb, id)) = self.pending.remove(&token) else {
                 continue;
             };
             self.send(verb, id, answer, shared);
         }
-        for (token, header) in std::mem::take(&mut *open(&desk.ticked)) {
+        for (token, header) in ticked {
             let Some(id) = self.ticks.remove(&token) else {
                 continue;
             };

@@ -156,7 +156,7 @@ def test_the_gap_is_that_of_the_pairs_and_filters_and_budgets_do_not_change_it(r
 
 
 def test_what_has_no_gap_is_told_with_the_reason(room):
-    room.daemon(SCENE.replace("60000", "400"), ros_args=["-p", "ros.allow_edits:=true"])
+    room.daemon(SCENE.replace("60000", "4000"), ros_args=["-p", "ros.allow_edits:=true"])
     node = room.node()
     states = room.hear(State, "/sweepd/state")
     room.until(lambda: states, "the node")
