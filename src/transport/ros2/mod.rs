@@ -17,6 +17,7 @@ mod lines;
 mod markers;
 mod mend;
 pub mod names;
+mod namesakes;
 mod node;
 mod outlet;
 mod params;

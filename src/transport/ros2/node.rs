@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 
 pub(super) use make::join;
-use make::{make, namesakes, said};
+use make::{make, said};
 use ros2_client::{Context, RosoutRaw as _, Spinner};
 use rustdds::mio1::Waker;
 
@@ -20,6 +20,7 @@ use super::inlet::Inlet;
 use super::lines::subscribe;
 use super::markers::Boxes;
 use super::names::Names;
+use super::namesakes::Namesakes;
 use super::outlet::{Outlet, Publishers, Read};
 use super::params::Table;
 use super::parcel::Parcels;
@@ -118,7 +119,7 @@ impl RosNode {
         let spinner = node
             .spinner()
             .map_err(|e| Error::io("ROS 2: the node cannot spin", e))?;
-        let namesakes = namesakes(&node, &context);
+        let namesakes = Namesakes::of(&context, node.fully_qualified_name())?;
         table.run();
 
         let parcels = Arc::new(Parcels::default());

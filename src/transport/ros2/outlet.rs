@@ -14,6 +14,7 @@ use super::diagnose::Diagnoser;
 use super::lines::{Arrival, Line, of_body};
 use super::markers::{Boxes, collisions, markers};
 use super::names::Names;
+use super::namesakes::Namesakes;
 use super::parcel::{Next, Parcel, Parcels};
 use super::services::open;
 use super::shared::{Say, Shared};
@@ -168,8 +169,7 @@ pub(super) struct Outlet {
     pub(super) shown_ns: u64,
     pub(super) boxes: Boxes,
     pub(super) read: Read,
-    /// Tells of another node of this one's name.
-    pub(super) namesakes: Box<dyn FnMut() -> Option<String> + Send>,
+    pub(super) namesakes: Namesakes,
     /// Makes full names of the topics of bodies that come.
     pub(super) names: Names,
     pub(super) sources: Vec<RosSourceSpec>,
@@ -199,7 +199,7 @@ impl Outlet {
             self.shared
                 .set_sim_time(matches!(sim_time, Some(ParameterValue::Boolean(true))));
             self.diagnose();
-            if let Some(text) = (self.namesakes)() {
+            if let Some(text) = self.namesakes.look() {
                 self.shared.say(Say::Warn, &text);
             }
             match self.parcels.next(SLEEP) {

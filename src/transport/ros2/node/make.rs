@@ -1,10 +1,10 @@
-//! What comes before topics: the DDS domain, the node with its parameters, other nodes of its name.
+//! What comes before topics: the DDS domain, and the node with its parameters.
 
 use std::net::Ipv4Addr;
 use std::sync::Arc;
 
-use ros2_client::{Context, Gid, Node, NodeEvent, NodeName, NodeOptions};
-use rustdds::{DomainParticipantBuilder, RTPSEntity as _};
+use ros2_client::{Context, Node, NodeName, NodeOptions};
+use rustdds::DomainParticipantBuilder;
 
 use super::super::args::{Params, RosArgs};
 use super::super::env::{Network, Range};
@@ -62,32 +62,6 @@ pub(super) fn make(
     context.new_node(name, declared).map_err(|e| {
         let text = format!("ROS 2: node {} cannot be made", names.full_node());
         Error::io(text, e)
-    })
-}
-
-/// Tells, when asked, of another node that has this one's name.
-pub(super) fn namesakes(
-    node: &Node,
-    context: &Context,
-) -> Box<dyn FnMut() -> Option<String> + Send> {
-    let (events, own) = (node.status_receiver(), node.fully_qualified_name());
-    let own_gid = Gid::from(context.domain_participant().guid());
-    Box::new(move || {
-        let mut found = None;
-        while let Some(Ok(event)) = events.as_ref().map(|events| events.try_recv()) {
-            if let NodeEvent::ParticipantEntities(info) = event
-                && info.gid() != own_gid
-                && info
-                    .nodes()
-                    .iter()
-                    .any(|node| node.fully_qualified_name() == own)
-            {
-                found = Some(format!(
-                    "another node is named {own}, too: give one of them another name with -r __node:=NAME"
-                ));
-            }
-        }
-        found
     })
 }
 
