@@ -513,7 +513,7 @@ fn grazing_pairs_are_finished_cold_and_warm_and_both_agree() {
 }
 
 #[test]
-#[ignore = "large; run by hand in release"]
+#[ignore = "large; SWEEPD_CI_SLOW=1 .ci/run runs it"]
 fn many_grazing_pairs_are_finished() {
     let seed = std::env::var("SEED").map_or(7, |s| s.parse().unwrap());
     let count = std::env::var("COUNT").map_or(100_000, |s| s.parse().unwrap());
@@ -521,7 +521,7 @@ fn many_grazing_pairs_are_finished() {
 }
 
 #[test]
-#[ignore = "large; run by hand in release"]
+#[ignore = "large; SWEEPD_CI_SLOW=1 .ci/run runs it"]
 fn a_large_sweep() {
     let seed = std::env::var("SEED").map_or(7, |s| s.parse().unwrap());
     let count = std::env::var("COUNT").map_or(2000, |s| s.parse().unwrap());

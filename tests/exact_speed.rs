@@ -189,7 +189,7 @@ fn parrys(a: &Both, b: &Both, poses: &[Pose]) -> [f64; 4] {
 }
 
 #[test]
-#[ignore = "timing; run by hand in release"]
+#[ignore = "timing; SWEEPD_CI_SLOW=1 .ci/run runs it"]
 fn nanoseconds_a_query() {
     let mut r = Random(5);
     let shapes = shapes();

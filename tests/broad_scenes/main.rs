@@ -181,7 +181,7 @@ fn motions_mixed_while_bodies_come_and_go_stay_exact() {
 }
 
 #[test]
-#[ignore = "takes 20 minutes; run by hand in release"]
+#[ignore = "takes 20 minutes; SWEEPD_CI_SLOW=1 .ci/run runs it"]
 fn soak_for_twenty_minutes() {
     let seconds = std::env::var("SWEEPD_SOAK_S").map_or(1200, |s| s.parse().unwrap());
     let clock = sweepd::time::SystemClock;

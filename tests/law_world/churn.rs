@@ -179,7 +179,7 @@ fn whatever_comes_the_structure_holds_and_the_change_sets_tell_all() {
 }
 
 #[test]
-#[ignore = "timing; run by hand in release"]
+#[ignore = "timing; SWEEPD_CI_SLOW=1 .ci/run runs it"]
 fn time_to_admit_ten_thousand_rows() {
     let bodies: Vec<_> = (1..=10_000)
         .map(|id| moving(&format!("b{id}"), id))

@@ -7,7 +7,7 @@ use sweepd::narrow::mesh::{Goal, Walk};
 use sweepd::time::Meter;
 
 #[test]
-#[ignore = "timing; run by hand in release"]
+#[ignore = "timing; SWEEPD_CI_SLOW=1 .ci/run runs it"]
 fn timing_of_bumpy_spheres_against_parry() {
     let clock = sweepd::time::SystemClock;
     let now = || sweepd::time::Clock::monotonic_ns(&clock);
