@@ -2,22 +2,25 @@
 # Shows sweepd at work: a daemon, a source that moves bodies, and a monitor, each a process of its own, joined by shared
 # memory. Ends by itself (or at Ctrl-C) and leaves nothing behind.
 #
-#   ./launch-free-scripts/demo.sh [--seconds N] [--count N] [--pile] [--mujoco [MODEL.xml]]
+#   ./launch-free-scripts/demo.sh [--seconds N] [--count N] [--pile] [--deadline] [--mujoco [MODEL.xml]]
 #
 #   --seconds N   how long to run (default 10)
 #   --count N     bodies of the built-in scene (default 60)
 #   --pile        bodies on a floor instead of bodies in free space
+#   --deadline    a source that works 7 to 15 ms of each frame, and leaves what is left of its 20 ms to the daemon (2,000
+#                 bodies unless --count says otherwise): a table of when the results were there
 #   --mujoco      a real simulator as the source: installs MuJoCo into a virtual environment of its own (.venv-demo)
 set -euo pipefail
 
 usage() { sed -n '2,/^set /p' "$0" | sed '$d; s/^# \{0,1\}//'; }
 
-seconds=10 count=60 kind=pool mujoco='' model=''
+seconds=10 count='' kind=pool deadline='' mujoco='' model=''
 while [ $# -gt 0 ]; do
   case "$1" in
     --seconds) seconds=${2:?--seconds needs a number}; shift 2 ;;
     --count) count=${2:?--count needs a number}; shift 2 ;;
     --pile) kind=pile; shift ;;
+    --deadline) deadline=yes; shift ;;
     --mujoco) mujoco=yes; shift; if [ $# -gt 0 ] && [ "${1#-}" = "$1" ]; then model=$1; shift; fi ;;
     -h|--help) usage; exit 0 ;;
     *) echo "demo.sh: unknown option $1" >&2; usage >&2; exit 2 ;;
@@ -55,7 +58,17 @@ if [ -n "$mujoco" ]; then
 fi
 
 scene=$work/scene.toml
-"$sweepd" feed --write-scene "$scene" --kind "$kind" --count "$count" --seed 7
+if [ -n "$deadline" ]; then
+  "$sweepd" feed --write-scene "$scene" --kind "$kind" --count "${count:-2000}" --seed 7
+  "$sweepd" --quiet run "$scene" --instance "$instance" --mode on_frame=feed --budget none & pids+=($!)
+  # Somebody who listens: else there is nothing to compute but verdicts.
+  "$sweepd" --quiet monitor --instance "$instance" --contacts --json >"$work/ticks.jsonl" & pids+=($!)
+  "$sweepd" --quiet feed "$scene" --instance "$instance" --rate 50 --work 7ms..15ms --frames "$((seconds * 50))"
+  finish
+  echo "done: daemon, source and monitor have ended, shared memory is clean"
+  exit 0
+fi
+"$sweepd" feed --write-scene "$scene" --kind "$kind" --count "${count:-60}" --seed 7
 "$sweepd" check "$scene"
 "$sweepd" --quiet run "$scene" --instance "$instance" --budget 2ms & pids+=($!)
 "$sweepd" --quiet feed "$scene" --instance "$instance" --rate 100 & pids+=($!)

@@ -132,6 +132,10 @@ pub(super) struct FeedArgs {
     /// End after so many frames; until a signal otherwise.
     #[arg(long, value_name = "N")]
     pub(super) frames: Option<u64>,
+    /// Work of the source's own before each frame, such as `7ms..15ms`: what is left of the frame is said to be the
+    /// daemon's, its result is waited for, and how well the frame time was kept is told at the end.
+    #[arg(long, value_name = "TIME..TIME", value_parser = span)]
+    pub(super) work: Option<(u64, u64)>,
     /// How long to wait for the daemon, such as `10s`.
     #[arg(long, default_value = "10s", value_name = "TIME", value_parser = nanoseconds)]
     pub(super) wait: u64,
@@ -237,6 +241,16 @@ fn nanoseconds(text: &str) -> Result<u64, String> {
     Ok(ns.round() as u64)
 }
 
+/// Nanoseconds of `7ms..15ms`, or of one time for both ends.
+fn span(text: &str) -> Result<(u64, u64), String> {
+    let (least, most) = text.split_once("..").unwrap_or((text, text));
+    let (least, most) = (nanoseconds(least)?, nanoseconds(most)?);
+    if least > most {
+        return Err(format!("`{text}`: the first time is the longer one"));
+    }
+    Ok((least, most))
+}
+
 fn mode(text: &str) -> Result<crate::config::Mode, String> {
     crate::config::Mode::parse(text)
 }
@@ -253,6 +267,15 @@ mod tests {
         assert_eq!(nanoseconds("0"), Ok(0));
         for bad in ["", "ms", "2", "-1ms", "2 hours", "1e30s", "nan ms"] {
             assert!(nanoseconds(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn spans_are_read_from_the_shorter_to_the_longer_time() {
+        assert_eq!(span("7ms..15ms"), Ok((7_000_000, 15_000_000)));
+        assert_eq!(span("2us"), Ok((2_000, 2_000)));
+        for bad in ["15ms..7ms", "7ms..", "7..15ms", "..", ""] {
+            assert!(span(bad).is_err(), "{bad}");
         }
     }
 

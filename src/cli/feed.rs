@@ -1,5 +1,7 @@
 //! `sweepd feed`: a built-in source of moving bodies, and the maker of scenes for it.
 
+mod cadence;
+
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::builtin::{Motion, Random, pile, pool};
@@ -59,7 +61,10 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
         bodies.moving,
         args.rate
     );
-    stream(args, &name, &mut bodies, &mut client, stop)?;
+    match args.work {
+        Some(work_ns) => cadence::keep(args, work_ns, &mut bodies, &mut client, (out, stop))?,
+        None => stream(args, &name, &mut bodies, &mut client, stop)?,
+    }
     Ok(true)
 }
 

@@ -51,6 +51,7 @@ fn without_a_daemon_it_ends_with_code_3_after_its_wait() {
         ["--rate", "nan"],
         ["--motion", "fly"],
         ["--wait", "3"],
+        ["--work", "3ms..2ms"],
     ] {
         let ended = output(&["feed", scene, bad[0], bad[1]]);
         assert_eq!(code(&ended), Some(2), "{bad:?} {}", err(&ended));
@@ -96,6 +97,42 @@ fn it_sends_so_many_frames_and_moves_so_many_bodies_the_same_for_a_seed() {
     }
     assert_eq!(ends[0], ends[1], "one seed, one motion");
     assert_ne!(ends[0], ends[2]);
+}
+
+#[test]
+fn with_work_of_its_own_it_leaves_the_rest_of_each_frame_to_the_daemon_and_tells_how_that_went() {
+    let desk = Desk::new();
+    let path = pool(&desk, "12");
+    let _daemon = desk.start("run", &[&path, "--mode", "on_frame=feed"]);
+    let ended = output(&[
+        "feed",
+        &path,
+        "--instance",
+        &desk.instance,
+        "--rate",
+        "100",
+        "--work",
+        "1ms..3ms",
+        "--frames",
+        "40",
+    ]);
+    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+    let text = String::from_utf8_lossy(&ended.stdout).into_owned();
+    let figures = |name: &str| -> Vec<f64> {
+        let line = text.lines().find(|line| line.contains(name)).unwrap();
+        let (_, after) = line.split_once(name).unwrap();
+        after
+            .split_whitespace()
+            .map(|f| f.parse().unwrap())
+            .collect()
+    };
+    let work = figures("the source's own work");
+    assert!(1.0 <= work[0] && work[3] <= 3.0, "{text}");
+    // What is left is said: never more than the frame without the work.
+    assert!(figures("left for the tick")[3] < 9.0, "{text}");
+    assert!(figures("until the result was there")[0] >= 1.0, "{text}");
+    assert!(text.contains("of 40 frames over 10.0 ms"), "{text}");
+    assert!(text.contains("; 0 without a result"), "{text}");
 }
 
 #[test]
