@@ -33,7 +33,7 @@ fn main() {
         let (mut used, mut told, mut offered) = (0_u64, 0_u64, 0_u64);
         let (mut open, mut all) = (0_u64, 0_u64);
         for tick in 0..ticks + 40 {
-            flight.advance();
+            flight.advance(0..flight.poses.len());
             for (to, pose) in rows.iter_mut().zip(&flight.poses) {
                 *to = row(to.body, pose);
             }

@@ -92,9 +92,11 @@ impl Peer {
         }
     }
 
-    fn tick(&mut self, poses: &[Pose]) -> u64 {
+    /// * `moved` - places of the bodies that have another pose.
+    fn tick(&mut self, poses: &[Pose], moved: impl Iterator<Item = usize>) -> u64 {
         let start_ns = SystemClock.monotonic_ns();
-        for ((handle, upright), pose) in self.handles.iter().zip(poses) {
+        for at in moved {
+            let ((handle, upright), pose) = (&self.handles[at], &poses[at]);
             let turn =
                 nalgebra::UnitQuaternion::from_euler_angles(std::f64::consts::FRAC_PI_2, 0.0, 0.0);
             let rotation = if *upright {
@@ -132,61 +134,91 @@ impl Peer {
     }
 }
 
+/// What is run: bodies, how many of them move in percent, by how much of their size in percent a tick, ticks.
+const CASES: [(usize, usize, f64, usize); 9] = [
+    (1_000, 100, 0.1, 200),
+    (1_000, 100, 1.0, 200),
+    (1_000, 100, 10.0, 200),
+    (1_000, 1, 1.0, 200),
+    (10_000, 100, 0.1, 200),
+    (10_000, 100, 1.0, 200),
+    (10_000, 100, 10.0, 200),
+    (10_000, 1, 1.0, 200),
+    (100_000, 1, 1.0, 40),
+];
+/// Ticks before the count begins.
+const SETTLE: usize = 20;
+const SEED: u64 = 11;
+
 fn main() {
     let quick = std::env::args().any(|arg| arg == "--quick");
-    let seed = 11;
     let mut csv = String::from(
-        "machine,commit,compiler,seed,bodies,density_per_m3,speed_percent,ticks,ours_median_us,ours_p99_us,\
-         rapier_median_us,rapier_p99_us,ratio_median,ours_colliding,rapier_colliding,ours_contacts,candidates,\
-         world_us,broad_us,widen_us,narrow_us,publish_us\n",
+        "machine,commit,compiler,seed,bodies,density_per_m3,moving_percent,speed_percent,ticks,ours_median_us,\
+         ours_p99_us,rapier_median_us,rapier_p99_us,ratio_median,ours_colliding,rapier_colliding,ours_contacts,\
+         candidates,world_us,broad_us,widen_us,narrow_us,publish_us\n",
     );
     let from = provenance();
-    for bodies in [1_000, 10_000] {
-        for percent in [0.1, 1.0, 10.0] {
-            // A body is about 0.75 m across.
-            let ticks = if quick { 40 } else { 200 };
-            let mut ours = Bench::new(&pool(bodies, seed));
-            let mut flight = Flight::new(&ours.scene, 0.75 * percent / 100.0, seed);
-            let mut peer = Peer::new(&ours.scene);
-            let (mut own_ns, mut peer_ns) = (Vec::new(), Vec::new());
-            let mut stages = [0_u64; 5];
-            let mut rows = ours.rows.clone();
-            for tick in 0..ticks + 20 {
-                flight.advance();
-                for (to, pose) in rows.iter_mut().zip(&flight.poses) {
-                    *to = row(to.body, pose);
-                }
-                let own = ours.tick(&rows, true, Budget::UNLIMITED, ASKED).wall_ns;
-                let theirs = peer.tick(&flight.poses);
-                if tick >= 20 {
-                    own_ns.push(own);
-                    peer_ns.push(theirs);
-                    for (sum, ns) in stages.iter_mut().zip(&ours.out().tick.stage_ns) {
-                        *sum += ns;
-                    }
-                }
-            }
-            let out = ours.out();
-            let us = |ns: u64| ns as f64 / 1e3;
-            let (own, theirs) = (quantile(&mut own_ns, 0.5), quantile(&mut peer_ns, 0.5));
-            let means: Vec<String> = stages
-                .iter()
-                .map(|sum| format!("{:.1}", us(sum / ticks as u64)))
-                .collect();
-            csv += &format!(
-                "{from},{seed},{bodies},0.5,{percent},{ticks},{:.1},{:.1},{:.1},{:.1},{:.2},{},{},{},{},{}\n",
-                us(own),
-                us(quantile(&mut own_ns, 0.99)),
-                us(theirs),
-                us(quantile(&mut peer_ns, 0.99)),
-                theirs as f64 / own as f64,
-                out.tick.colliding,
-                peer.colliding(),
-                out.contacts.len(),
-                out.tick.candidates,
-                means.join(",")
-            );
+    for (bodies, moving, percent, ticks) in CASES {
+        if quick && bodies > 10_000 {
+            continue;
         }
+        let ticks = if quick { 40 } else { ticks };
+        csv += &format!("{from},{}\n", run(bodies, moving, percent, ticks));
     }
     save("engine.csv", &csv);
+}
+
+/// One case; its columns of the CSV.
+fn run(bodies: usize, moving: usize, percent: f64, ticks: usize) -> String {
+    let mut ours = Bench::new(&pool(bodies, SEED));
+    // A body is about 0.75 m across.
+    let mut flight = Flight::new(&ours.scene, 0.75 * percent / 100.0, SEED);
+    let mut peer = Peer::new(&ours.scene);
+    let (mut own_ns, mut peer_ns) = (Vec::new(), Vec::new());
+    let mut stages = [0_u64; 5];
+    let who: Vec<usize> = (0..bodies).step_by(100 / moving).collect();
+    let all = ours.rows.clone();
+    let mut rows: Vec<_> = who.iter().map(|at| all[*at]).collect();
+    for tick in 0..ticks + SETTLE {
+        // At first everybody has a place.
+        let own = if tick == 0 {
+            peer.tick(&flight.poses, 0..bodies);
+            ours.tick(&all, true, Budget::UNLIMITED, ASKED).wall_ns
+        } else {
+            flight.advance(who.iter().copied());
+            for (to, at) in rows.iter_mut().zip(&who) {
+                *to = row(to.body, &flight.poses[*at]);
+            }
+            ours.tick(&rows, moving == 100, Budget::UNLIMITED, ASKED)
+                .wall_ns
+        };
+        let theirs = peer.tick(&flight.poses, who.iter().copied());
+        if tick >= SETTLE {
+            own_ns.push(own);
+            peer_ns.push(theirs);
+            for (sum, ns) in stages.iter_mut().zip(&ours.out().tick.stage_ns) {
+                *sum += ns;
+            }
+        }
+    }
+    let out = ours.out();
+    let us = |ns: u64| ns as f64 / 1e3;
+    let (own, theirs) = (quantile(&mut own_ns, 0.5), quantile(&mut peer_ns, 0.5));
+    let means: Vec<String> = stages
+        .iter()
+        .map(|sum| format!("{:.1}", us(sum / ticks as u64)))
+        .collect();
+    format!(
+        "{SEED},{bodies},0.5,{moving},{percent},{ticks},{:.1},{:.1},{:.1},{:.1},{:.2},{},{},{},{},{}",
+        us(own),
+        us(quantile(&mut own_ns, 0.99)),
+        us(theirs),
+        us(quantile(&mut peer_ns, 0.99)),
+        theirs as f64 / own as f64,
+        out.tick.colliding,
+        peer.colliding(),
+        out.contacts.len(),
+        out.tick.candidates,
+        means.join(",")
+    )
 }

@@ -159,8 +159,10 @@ impl Flight {
         }
     }
 
-    pub fn advance(&mut self) {
-        for (at, pose) in self.poses.iter_mut().enumerate() {
+    /// One tick of flight of those bodies.
+    pub fn advance(&mut self, who: impl Iterator<Item = usize>) {
+        for at in who {
+            let pose = &mut self.poses[at];
             let velocity = &mut self.velocities[at];
             for k in 0..3 {
                 let next = pose.translation.vector[k] + velocity[k];

@@ -4,7 +4,7 @@ use crate::ids::{BodySlot, PairSlot};
 use crate::math::{Interval, Point, Pose, Vec3, chord, displacement, relative};
 use crate::pairs::PairSet;
 use crate::shape::Geometry;
-use crate::wire::{Level, NO_INDEX, Verdict};
+use crate::wire::{NO_INDEX, Verdict};
 use crate::world::{Body, World};
 
 use super::exact::Warm;
@@ -89,33 +89,6 @@ pub struct Witness {
     pub triangle_a: u32,
     /// Triangle of B's shape, or `NO_INDEX`.
     pub triangle_b: u32,
-}
-
-/// What is known of a pair in this tick.
-#[derive(Clone, Copy, Debug)]
-pub struct Finding<'a> {
-    /// Body with the smaller id.
-    pub a: BodySlot,
-    /// Body with the larger id.
-    pub b: BodySlot,
-    /// Verdict at this tick's poses.
-    pub verdict: Verdict,
-    /// Sound interval of the gap at this tick's poses, metres.
-    pub gap: Interval,
-    /// Nearest or deepest place at the last test.
-    pub witness: Option<&'a Witness>,
-    /// How far work came.
-    pub level: Level,
-    /// Finished, with 0 inside the rounding interval.
-    pub touching: bool,
-    /// Tick of the poses that the bound was computed at; 0: boxes only.
-    pub tested: u64,
-    /// First tick without a verdict; 0: decided.
-    pub undecided_since: u64,
-    /// First tick of the pair.
-    pub born: u64,
-    /// Pairs nearer than this are `near`, metres.
-    pub report_m: f64,
 }
 
 impl Memo {
@@ -240,37 +213,6 @@ fn half_space_of(body: &Body) -> Option<Vec3> {
 }
 
 impl Narrow {
-    /// What is known of a pair; `None` for a slot that holds no pair.
-    #[must_use]
-    pub fn finding(&self, slot: PairSlot) -> Option<Finding<'_>> {
-        let hot = self.hot.get(slot.index()).filter(|hot| hot.live)?;
-        let memo = &self.memos[slot.index()];
-        let level = if memo.tested == 0 {
-            Level::Boxes
-        } else if memo.cursor != NONE {
-            Level::Partial
-        } else if memo.widened_m > 0.0 {
-            Level::Carried
-        } else if memo.tight {
-            Level::Exact
-        } else {
-            Level::Partial
-        };
-        Some(Finding {
-            a: hot.a,
-            b: hot.b,
-            verdict: hot.verdict,
-            gap: memo.now,
-            witness: memo.witness.as_ref(),
-            level,
-            touching: memo.touching(),
-            tested: memo.tested,
-            undecided_since: memo.undecided_since,
-            born: memo.born,
-            report_m: memo.report_m,
-        })
-    }
-
     /// Starts the memory of a pair that has begun.
     pub(super) fn meet(&mut self, slot: PairSlot, world: &World, pairs: &PairSet) {
         let Some(key) = pairs.get(slot) else { return };

@@ -22,6 +22,7 @@ mod ask;
 mod carry;
 mod contacts;
 mod cursor;
+mod finding;
 mod memo;
 mod order;
 mod query;
@@ -30,7 +31,8 @@ mod widen;
 
 pub use ask::{Asked, gap_between};
 pub use contacts::{Contact, ContactSet};
-pub use memo::{Finding, Witness};
+pub use finding::Finding;
+pub use memo::Witness;
 pub use order::Order;
 
 use crate::ids::{BodySlot, PairSlot};

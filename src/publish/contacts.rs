@@ -7,7 +7,7 @@ use crate::wire::{ContactKind, ContactRow, Level, MessageHeader, Outbox, Verdict
 use crate::world::Body;
 
 use super::pairs::Row;
-use super::{Publisher, View};
+use super::{AHEAD, Publisher, View};
 
 impl Publisher {
     /// Fills `contacts`; returns how many rows did not fit. Whole pairs are kept, deepest first.
@@ -31,6 +31,10 @@ impl Publisher {
             }
         } else {
             for at in 0..self.rows.len() {
+                let ahead = self.rows.get(at + AHEAD).filter(|row| row.contacts > 0);
+                if let Some(slot) = ahead.and_then(|row| row.slot) {
+                    view.narrow.ask_ahead_for_contacts(slot);
+                }
                 self.push_pair(view, self.rows[at], out);
             }
         }

@@ -125,7 +125,7 @@ impl Events {
                 .get(slot.index())
                 .is_some_and(|history| history.tick != 0)
                 && let Some(finding) = narrow.finding(slot)
-                && let (Some(a), Some(b)) = (world.body(finding.a), world.body(finding.b))
+                && let (Some(a), Some(b)) = (world.tag(finding.a), world.tag(finding.b))
             {
                 self.certify(tick, slot, &finding, (a.id, b.id), narrow);
             }

@@ -7,7 +7,7 @@ use crate::wire::{BodyStatus, Event, Level, MessageHeader, Outbox, PairRow, Verd
 use crate::world::Body;
 
 use super::contacts::contacts_of;
-use super::{Publisher, View};
+use super::{AHEAD, Publisher, View};
 
 /// A row to be: where it stands by rank, and what it is made of.
 ///
@@ -20,11 +20,11 @@ pub(super) struct Row {
     /// `None`: the pair is gone.
     pub(super) slot: Option<PairSlot>,
     /// Place of its event among those that wait; `NONE`: it has none.
-    event: u32,
+    pub(super) event: u32,
     /// How many contact rows it has.
     pub(super) contacts: u32,
     /// Events first, then colliding, possible, near.
-    class: u8,
+    pub(super) class: u8,
 }
 
 /// No event.
@@ -82,10 +82,13 @@ impl Publisher {
         if late > 0 || left_out > 0 {
             self.rows.sort_unstable_by_key(Row::order);
         }
-        for row in &self.rows {
+        let rows = &self.rows;
+        for (at, row) in rows.iter().enumerate() {
+            if let Some(ahead) = rows.get(at + AHEAD).and_then(|row| row.slot) {
+                view.narrow.ask_ahead(ahead);
+            }
             out.pairs.push(self.pair_row(view, row));
         }
-        let rows = &self.rows;
         if left_out == 0 {
             self.events.sent(|_| false);
         } else {
@@ -185,7 +188,8 @@ impl Publisher {
     }
 
     fn describe(&self, view: &View<'_>, slot: PairSlot, finding: &Finding<'_>, out: &mut PairRow) {
-        let (Some(a), Some(b)) = (view.world.body(finding.a), view.world.body(finding.b)) else {
+        let world = view.world;
+        let (Some(a), Some(b)) = (world.tag(finding.a), world.tag(finding.b)) else {
             return;
         };
         let history = self.events.history(slot);
@@ -199,7 +203,12 @@ impl Publisher {
         if let Some(witness) = finding.witness {
             // An estimate is never outside what is proved.
             out.gap_best_m = witness.best_m.max(finding.gap.min).min(finding.gap.max);
-            out.closing_mps = closing_speed(a, b, witness);
+            if a.has_velocity
+                && b.has_velocity
+                && let (Some(a), Some(b)) = (world.body(finding.a), world.body(finding.b))
+            {
+                out.closing_mps = closing_speed(a, b, witness);
+            }
         }
         if finding.touching {
             out.flags |= pair_flags::TOUCHING;
@@ -217,14 +226,11 @@ impl Publisher {
     }
 }
 
-/// How fast the gap shrinks at the witness, metres a second; NaN where a moving body's velocity is not known.
+/// How fast the gap shrinks at the witness of two bodies whose velocities are known, metres a second.
 fn closing_speed(a: &Body, b: &Body, witness: &Witness) -> f64 {
     let velocity_at = |body: &Body, point: Point| {
-        let [lx, ly, lz, ax, ay, az] = match body.velocity {
-            Some(velocity) => velocity,
-            None if body.moves => [f64::NAN; 6],
-            None => [0.0; 6],
-        };
+        // Who cannot move has none.
+        let [lx, ly, lz, ax, ay, az] = body.velocity.unwrap_or_default();
         let arm = body.pose.rotation * point.coords;
         Vec3::new(lx, ly, lz) + Vec3::new(ax, ay, az).cross(&arm)
     };

@@ -5,6 +5,7 @@
 
 use super::World;
 use super::admit::{NO_BODY, Times};
+use super::tag::Tag;
 use crate::ids::BodyId;
 use crate::ids::{BodySlot, SourceSlot};
 use crate::limits::{COORDINATE_MAX_M, QUATERNION_NORM_TOLERANCE};
@@ -77,7 +78,12 @@ impl World {
     /// A good row: its stamp, velocity and age.
     fn renew(&mut self, slot: BodySlot, stamp_ns: u64, velocity: Option<[f64; 6]>, times: Times) {
         if let Some(body) = self.bodies[slot.index()].as_mut() {
+            let begins_or_ends = body.velocity.is_some() != velocity.is_some();
             body.velocity = velocity;
+            // A body at rest is not settled again for it.
+            if begins_or_ends {
+                self.tags.set(slot, Some(Tag::of(body)));
+            }
             body.stamp_ns = stamp_ns;
             body.since_ns = Some(times.since_ns);
             body.received_ns = times.received_ns;

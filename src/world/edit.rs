@@ -244,6 +244,7 @@ impl World {
         self.filters.bodies.push(Hot::GONE);
         self.filters.margins_m.push(0.0);
         self.ages.grow(self.bodies.len());
+        self.tags.grow(self.bodies.len());
         self.lists.grow(self.bodies.len());
         slot
     }
@@ -265,6 +266,7 @@ impl World {
         self.entries[slot.index()] = Entry::gone(slot);
         self.filters.bodies[slot.index()] = Hot::GONE;
         self.ages.set(slot, None, None);
+        self.tags.set(slot, None);
         if let Some(name) = self.names.find(&body.name) {
             self.names.get_mut(name).slot = None;
         }

@@ -21,6 +21,7 @@ mod names;
 mod place;
 mod rules;
 mod source;
+mod tag;
 mod validate;
 
 use std::sync::Arc;
@@ -30,6 +31,7 @@ pub use body::{Body, ChangeSet, Motion, PlacedShape, Removed};
 pub use edit::{Applied, Edit};
 pub use filters::{Because, Filters};
 pub use source::SourceState;
+pub use tag::Tag;
 
 use crate::config::Config;
 use crate::error::{Error, Result};
@@ -43,6 +45,7 @@ use lists::Lists;
 use names::Names;
 use place::Entry;
 use source::SessionsOver;
+use tag::Tags;
 
 /// How many bodies are in which state; what the tick row says of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -63,6 +66,7 @@ pub struct World {
     bodies: Vec<Option<Body>>,
     entries: Vec<Entry>,
     ages: Ages,
+    tags: Tags,
     /// The bodies there are, by id.
     order: Vec<(BodyId, BodySlot)>,
     names: Names,
@@ -156,6 +160,7 @@ impl World {
             bodies: Vec::new(),
             entries: Vec::new(),
             ages: Ages::default(),
+            tags: Tags::default(),
             order: Vec::new(),
             names: Names::default(),
             filters: Filters::default(),
@@ -202,6 +207,13 @@ impl World {
     #[must_use]
     pub fn body(&self, slot: BodySlot) -> Option<&Body> {
         self.bodies.get(slot.index())?.as_ref()
+    }
+
+    /// What a pair's row says of a body, by slot, without a look at the body.
+    #[must_use]
+    #[inline]
+    pub fn tag(&self, slot: BodySlot) -> Option<&Tag> {
+        self.tags.get(slot)
     }
 
     /// All bodies with their slots, by id.

@@ -8,6 +8,7 @@ use super::World;
 use super::body::{Body, Motion, PlacedShape};
 use super::filters::{Hot, KEEPS};
 use super::names::NameId;
+use super::tag::Tag;
 use crate::config::OnStale;
 use crate::ids::BodySlot;
 use crate::math::{Aabb, Point, Pose, ROUND};
@@ -181,6 +182,7 @@ impl World {
         body.status = judged.status;
         body.reach_m = judged.reach_m;
         body.in_broad = judged.in_broad;
+        self.tags.set(slot, Some(Tag::of(body)));
         let status_changed = was_status != judged.status;
         if status_changed {
             self.by_status[usize::from(was_status.code())] -= 1;

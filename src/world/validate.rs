@@ -3,6 +3,7 @@
 use super::World;
 use super::body::Body;
 use super::filters::{ENABLED, KEEPS, LIVE, MOVES, UNBOUNDED};
+use super::tag::Tag;
 use crate::ids::BodySlot;
 use crate::wire::BodyStatus;
 
@@ -55,6 +56,7 @@ impl World {
             name.generation == body.generation,
             "its name has another generation",
         )?;
+        check(self.tag(slot) == Some(&Tag::of(body)), "its tag is another")?;
         check(hot.has(LIVE), "the filters do not know it")?;
         check(
             hot.has(ENABLED) == entry.enabled,

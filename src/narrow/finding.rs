@@ -1,0 +1,89 @@
+//! What the narrow phase says of a pair, for whoever publishes it. In: a pair's slot. Out: a [`Finding`].
+
+use crate::ids::{BodySlot, PairSlot};
+use crate::math::Interval;
+use crate::simd::boxes::prefetch;
+use crate::wire::{Level, Verdict};
+
+use super::memo::Witness;
+use super::{NONE, Narrow};
+
+/// What is known of a pair in this tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Finding<'a> {
+    /// Body with the smaller id.
+    pub a: BodySlot,
+    /// Body with the larger id.
+    pub b: BodySlot,
+    /// Verdict at this tick's poses.
+    pub verdict: Verdict,
+    /// Sound interval of the gap at this tick's poses, metres.
+    pub gap: Interval,
+    /// Nearest or deepest place at the last test.
+    pub witness: Option<&'a Witness>,
+    /// How far work came.
+    pub level: Level,
+    /// Finished, with 0 inside the rounding interval.
+    pub touching: bool,
+    /// Tick of the poses that the bound was computed at; 0: boxes only.
+    pub tested: u64,
+    /// First tick without a verdict; 0: decided.
+    pub undecided_since: u64,
+    /// First tick of the pair.
+    pub born: u64,
+    /// Pairs nearer than this are `near`, metres.
+    pub report_m: f64,
+}
+
+impl Narrow {
+    /// What is known of a pair; `None` for a slot that holds no pair.
+    #[must_use]
+    pub fn finding(&self, slot: PairSlot) -> Option<Finding<'_>> {
+        let hot = self.hot.get(slot.index()).filter(|hot| hot.live)?;
+        let memo = &self.memos[slot.index()];
+        let level = if memo.tested == 0 {
+            Level::Boxes
+        } else if memo.cursor != NONE {
+            Level::Partial
+        } else if memo.widened_m > 0.0 {
+            Level::Carried
+        } else if memo.tight {
+            Level::Exact
+        } else {
+            Level::Partial
+        };
+        Some(Finding {
+            a: hot.a,
+            b: hot.b,
+            verdict: hot.verdict,
+            gap: memo.now,
+            witness: memo.witness.as_ref(),
+            level,
+            touching: memo.touching(),
+            tested: memo.tested,
+            undecided_since: memo.undecided_since,
+            born: memo.born,
+            report_m: memo.report_m,
+        })
+    }
+
+    /// Says that [`Narrow::finding`] of a pair is wanted soon.
+    #[inline]
+    pub fn ask_ahead(&self, slot: PairSlot) {
+        if let (Some(hot), Some(memo)) = (self.hot.get(slot.index()), self.memos.get(slot.index()))
+        {
+            prefetch(hot);
+            prefetch(memo);
+        }
+    }
+
+    /// Says that [`Narrow::contacts`] of a pair are wanted soon.
+    #[inline]
+    pub fn ask_ahead_for_contacts(&self, slot: PairSlot) {
+        let memo = self.memos.get(slot.index());
+        let set = memo.and_then(|memo| self.contact_sets.get(memo.contacts));
+        if let Some(first) = set.and_then(|set| set.contacts().first()) {
+            prefetch(first);
+        }
+    }
+}
