@@ -178,21 +178,22 @@ impl Narrow {
         // A resumed query may have been overtaken by motion: then another one starts at this tick's poses.
         let current = !open && memo.tested == self.tick;
         self.settle(slot, verdict);
-        self.owe_report(slot, goal);
+        self.owe_report(slot, goal != Goal::Verdict && current);
         match goal {
             Goal::Verdict => verdict != Verdict::Possible || current,
             Goal::Gap | Goal::Contacts => current,
         }
     }
 
-    /// A verdict found by a query that was asked for no more owes bounds and contacts to whoever listens.
-    fn owe_report(&mut self, slot: PairSlot, goal: Goal) {
+    /// A verdict found by a query that was asked for no more, or that has not come to its end yet, owes bounds and contacts
+    /// to whoever listens.
+    fn owe_report(&mut self, slot: PairSlot, whole: bool) {
         let reported = matches!(
             self.hot[slot.index()].verdict,
             Verdict::Near | Verdict::Colliding
         );
         let memo = &mut self.memos[slot.index()];
-        if goal == Goal::Verdict && reported && !memo.refreshing {
+        if !whole && reported && !memo.refreshing {
             memo.refreshing = true;
             self.refresh.push(slot);
         }
