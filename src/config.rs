@@ -153,7 +153,8 @@ pub struct Limits {
     pub pair_rows: usize,
     /// Rows of `contacts`.
     pub contact_rows: usize,
-    /// Contacts of one pair, at most 16.
+    /// Contacts of one pair, at most 16. All surfaces on which the pair touches share it: at most four points each, the
+    /// deepest first, then what lies farthest from those kept, in place and in normal.
     pub contacts_per_pair: usize,
 }
 

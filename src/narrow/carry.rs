@@ -10,7 +10,7 @@ use crate::world::Body;
 
 use super::cursor::SLICE_UNITS;
 use super::memo::Witness;
-use super::mesh::{CarriedFront, Goal};
+use super::mesh::{CarriedFront, Goal, numbered};
 use super::query::{leaf_contact, shape_pose, sound, witness_of};
 use super::{NONE, Narrow};
 
@@ -107,8 +107,10 @@ impl Narrow {
             self.found.clear();
             if gap.min <= 0.0 {
                 let seen = |leaf| leaf_contact((one, other), (0, 0), &pos12, leaf, gap);
-                self.found.extend(front.contacts(store).iter().map(seen));
-                self.found.extend(front.way_out(store).as_ref().map(seen));
+                self.found.extend(numbered(front.contacts(store)).map(seen));
+                let way_out = front.way_out(store);
+                self.found
+                    .extend(way_out.as_ref().map(|leaf| seen((leaf, 0))));
             }
             self.keep_contacts(slot, a.radius.min(b.radius));
         }

@@ -1,11 +1,13 @@
 //! Contacts of a pair, and the ids that stay while the contact does.
 
 mod choose;
+mod patches;
 
 use crate::ids::PairSlot;
 use crate::math::{Interval, Point, Vec3};
 
 use choose::choose;
+use patches::reduce;
 
 use super::arena::Linked;
 use super::{NONE, Narrow};
@@ -23,8 +25,10 @@ pub struct Contact {
     pub triangle_a: u32,
     /// Triangle of B's shape, or `NO_INDEX`.
     pub triangle_b: u32,
-    /// What of the shapes touches; equal features are the same contact.
-    pub feature: u32,
+    /// What of the shapes touches; equal features of two shapes are the same contact.
+    pub feature: u64,
+    /// Which points of the shape pair came in together: those of one surface, with much the same normal.
+    pub patch: u32,
     /// On A's surface, A's body frame, metres.
     pub point_a: Point,
     /// On B's surface, B's body frame, metres.
@@ -62,6 +66,9 @@ pub struct ContactSet {
 /// change its id in every tick.
 const SAME_POINT: f64 = 0.05;
 
+/// Cosine of 45 degrees: a contact whose normal has turned by more is another one.
+const SAME_SIDE: f64 = 0.7;
+
 impl ContactSet {
     pub(super) fn with_room(contacts: usize) -> Self {
         Self {
@@ -80,7 +87,11 @@ impl ContactSet {
         self.contacts.clear();
     }
 
-    /// Takes the deepest of `found` and those that span the most, at most `most`; contacts that were there before keep their ids. `before` is scratch memory.
+    /// Takes at most four points of each patch, and of those at most `most`: the deepest and those that span the most.
+    /// Contacts that were there before keep their ids. `before` is scratch memory.
+    ///
+    /// `most` is shared by spread, not by quota: the deepest of all comes first, then what lies farthest from what is kept in
+    /// place and in normal, so that no patch has a second point while another far from it has none.
     pub(super) fn replace(
         &mut self,
         found: &mut [Contact],
@@ -88,26 +99,33 @@ impl ContactSet {
         radius: f64,
         before: &mut Vec<Contact>,
     ) {
-        found.sort_unstable_by(|x, y| x.gap_m.total_cmp(&y.gap_m).then(x.key().cmp(&y.key())));
         before.clear();
         before.extend_from_slice(&self.contacts);
         self.contacts.clear();
-        let kept = choose(found, most, radius, |contact| {
-            before.iter().any(|old| old.key() == contact.key())
-        });
+        let was_kept = |contact: &Contact| before.iter().any(|old| old.key() == contact.key());
+        let spanning = reduce(found, radius, was_kept);
+        let found = &mut found[..spanning];
+        found.sort_unstable_by(|x, y| x.gap_m.total_cmp(&y.gap_m).then(x.key().cmp(&y.key())));
+        let kept = choose(found, most, radius, was_kept);
         self.contacts.extend_from_slice(&found[..kept]);
+        // First those of equal name, so that no other takes an id that is spoken for.
         for contact in &mut self.contacts {
-            let heir = before
-                .iter()
-                .position(|old| old.id != 0 && old.key() == contact.key());
-            let heir = heir.or_else(|| {
-                before.iter().position(|old| {
-                    old.id != 0
-                        && (old.shape_a, old.shape_b) == (contact.shape_a, contact.shape_b)
-                        && (old.point_a - contact.point_a).norm() <= SAME_POINT * radius
-                })
-            });
-            if let Some(at) = heir {
+            let heir = |old: &Contact| old.id != 0 && old.key() == contact.key();
+            if let Some(at) = before.iter().position(heir) {
+                contact.id = std::mem::take(&mut before[at].id);
+            }
+        }
+        for contact in self.contacts.iter_mut().filter(|contact| contact.id == 0) {
+            // On one of the two it has stayed where it was: something slides on the other.
+            let heir = |old: &Contact| {
+                let moved = (old.point_a - contact.point_a).norm();
+                let moved = moved.min((old.point_b - contact.point_b).norm());
+                old.id != 0
+                    && (old.shape_a, old.shape_b) == (contact.shape_a, contact.shape_b)
+                    && old.normal.dot(&contact.normal) >= SAME_SIDE
+                    && moved <= SAME_POINT * radius
+            };
+            if let Some(at) = before.iter().position(heir) {
                 contact.id = std::mem::take(&mut before[at].id);
             }
         }
@@ -115,14 +133,10 @@ impl ContactSet {
 }
 
 impl Contact {
-    fn key(&self) -> [u32; 5] {
-        [
-            self.shape_a,
-            self.shape_b,
-            self.triangle_a,
-            self.triangle_b,
-            self.feature,
-        ]
+    /// Its name among the contacts of the pair: triangles are no part of it, for a corner that slides over a mesh is the same
+    /// contact on each of them.
+    fn key(&self) -> (u32, u32, u64) {
+        (self.shape_a, self.shape_b, self.feature)
     }
 }
 

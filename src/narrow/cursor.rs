@@ -244,8 +244,8 @@ impl Cursor {
             });
         }
         if self.goal == Goal::Contacts && gap.min <= 0.0 {
-            for leaf in self.meshes.contacts(room.fronts) {
-                let contact = leaf_contact((one, other), places, pos12, &leaf, gap);
+            for (leaf, patch) in self.meshes.contacts(room.fronts) {
+                let contact = leaf_contact((one, other), places, pos12, (&leaf, patch), gap);
                 room.contacts.push(&mut self.found, contact);
             }
         }

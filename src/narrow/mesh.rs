@@ -29,6 +29,8 @@ mod contacts;
 mod containment;
 mod front;
 mod half_space;
+mod manifold;
+mod patches;
 mod placed;
 mod query;
 mod retest;
@@ -38,6 +40,7 @@ mod walk;
 
 pub use carried::{CarriedFront, FrontStore, Search, has_front};
 pub use contacts::{LEAF_CONTACTS_MAX, LeafContact};
+pub use patches::{PATCH_POINTS, PATCHES_MAX, numbered};
 pub use query::{Goal, MeshQuery};
 pub use retest::retest_witness;
 pub use walk::Walk;

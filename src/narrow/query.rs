@@ -75,7 +75,8 @@ pub(super) fn add_manifold(
         shape_b: place_b,
         triangle_a: NO_INDEX,
         triangle_b: NO_INDEX,
-        feature,
+        feature: u64::from(feature),
+        patch: 0,
         point_a: one.pose * point_a,
         point_b: other.pose * pos12.inverse_transform_point(&point_b),
         normal: one.pose.rotation * closest.normal,
@@ -101,12 +102,12 @@ pub(super) fn add_manifold(
     }
 }
 
-/// Two leaves of meshes that touch, as a contact of the bodies.
+/// Where two leaves of meshes touch, as a contact of the bodies. `patch`: a number, equal for points that came in as one patch.
 pub(super) fn leaf_contact(
     (one, other): (&PlacedShape, &PlacedShape),
     places: (u32, u32),
     pos12: &Pose,
-    leaf: &LeafContact,
+    (leaf, patch): (&LeafContact, u32),
     gap: Interval,
 ) -> Contact {
     let seen = witness_of(one, other, pos12, &leaf.closest, places);
@@ -116,7 +117,8 @@ pub(super) fn leaf_contact(
         shape_b: places.1,
         triangle_a: leaf.triangle_a,
         triangle_b: leaf.triangle_b,
-        feature: 0,
+        feature: leaf.feature,
+        patch,
         point_a: seen.point_a,
         point_b: seen.point_b,
         normal: seen.normal,

@@ -3,6 +3,7 @@
 //! In: vertices and faces as read or generated. Out: an immutable mesh with its tree, its shells, its bounds and the
 //! warnings that `check` shows.
 
+mod adjacency;
 mod inside;
 mod obb;
 mod outline;
@@ -18,6 +19,7 @@ pub(crate) use predicates::side;
 use tree::Tree;
 pub(crate) use tree::{Below, NODES_WAITING_MAX, Node};
 
+use adjacency::Adjacency;
 use outline::Outline;
 use topology::Topology;
 
@@ -40,6 +42,7 @@ pub struct Mesh {
     /// Oriented boxes, for pairs of surfaces; the other tree serves rays, planes and extents, where its boxes are as good
     /// and a quarter of the size.
     obb: ObbTree,
+    adjacency: Adjacency,
     /// None for a small mesh, whose vertices are walked.
     outline: Option<Outline>,
     bounds: Aabb,
@@ -83,6 +86,7 @@ impl Mesh {
             outline,
             radius: radius(&vertices, &faces, &centre),
             obb: ObbTree::new(&vertices, &faces),
+            adjacency: Adjacency::default(),
             shells: topology.shells.iter().map(|s| s.vertex).collect(),
             vertices,
             faces,
@@ -95,6 +99,8 @@ impl Mesh {
         if solid {
             mesh.turn_shells(&topology);
         }
+        // Turned faces have their sides in another order.
+        mesh.adjacency = Adjacency::new(&topology, &mesh.vertices, &mesh.faces);
         Ok(mesh)
     }
 

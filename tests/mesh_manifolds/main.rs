@@ -18,5 +18,7 @@ mod harness;
 #[path = "../oracle/mod.rs"]
 mod oracle;
 
+mod flat;
 mod fresh;
 mod support;
+mod surfaces;

@@ -9,6 +9,9 @@ use crate::shape::Core;
 /// Corners of one feature; faces of hulls with more are thinned out (a manifold keeps four points anyway).
 pub(super) const CORNERS_MAX: usize = 8;
 
+/// See [`Feature::spread`].
+const RIM: f64 = 1e-9;
+
 /// A polygon (three corners and more), a segment or a point.
 pub(super) struct Feature {
     corners: [Vec3; CORNERS_MAX],
@@ -57,6 +60,13 @@ impl Feature {
     /// Cosine between its plane's normal and the contact normal's line; 0 for a segment or a point.
     pub(super) fn facing(&self, normal: &Vec3) -> f64 {
         self.normal.dot(normal).abs()
+    }
+
+    /// The same, larger by what rounding may take away at its rim: a corner over an edge of two neighbours is over both.
+    pub(super) fn spread(&self) -> Self {
+        let middle = self.used().iter().sum::<Vec3>() / self.count.max(1) as f64;
+        let corners = self.corners.map(|p| p + (p - middle) * RIM);
+        Self { corners, ..*self }
     }
 
     fn push(&mut self, corner: Vec3, id: u32) {

@@ -6,6 +6,10 @@
 //! capsule axis) or a point. The one is clipped by planes that stand along the normal on the edges of the other;
 //! gaps are measured along the normal. The deepest point is always among those that come out.
 
+mod shared;
+
+pub(in crate::narrow) use shared::shared_points;
+
 use super::feature::{CORNERS_MAX, Feature};
 use super::pair::Pair;
 use super::{Closest, Convex};

@@ -36,6 +36,7 @@ mod simplex;
 use crate::math::{Interval, Point, Pose, Vec3};
 use crate::shape::Convex;
 
+pub(in crate::narrow) use manifold::shared_points;
 pub use manifold::{Manifold, ManifoldPoint, manifold};
 
 use pair::{CoreGap, Held, Pair};

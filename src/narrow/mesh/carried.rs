@@ -25,8 +25,9 @@
 //! pair of boxes (eight times the memory, and eight boxes are tested at the cost of one and a half).
 
 use super::bound::Frame;
-use super::contacts::{Contacts, LeafContact};
+use super::contacts::LeafContact;
 use super::containment::{Containment, ShellTests};
+use super::patches::Patches;
 use super::placed::Placed;
 use super::query::Goal;
 use super::retest::{reach_of, tree_of};
@@ -104,7 +105,7 @@ pub struct CarriedFront {
     witness: Option<LeafContact>,
     /// Corners of the triangles that touched last, each in its own frame: to ask them again costs no look into the meshes.
     crossing: Option<[Triangle; 2]>,
-    contacts: Contacts,
+    contacts: Patches,
 }
 
 /// Whether a pair of shapes can have a front.

@@ -1,9 +1,9 @@
-//! The contact set of a mesh pair: the deepest leaf pairs that touch or cross, a bounded number of them.
+//! Leaves that touch or cross; and of a walk the deepest of them, a bounded number.
 
 use super::Closest;
 use crate::narrow::arena::{Arena, Linked, Run};
 
-/// Leaf contacts kept of one shape pair; the shallowest makes room for a deeper one.
+/// Leaf contacts that a walk keeps of one shape pair; the shallowest makes room for a deeper one.
 pub const LEAF_CONTACTS_MAX: usize = 64;
 
 /// Two leaves that touch or cross.
@@ -15,6 +15,15 @@ pub struct LeafContact {
     pub triangle_a: u32,
     /// Triangle of B; `u32::MAX` when B is no mesh.
     pub triangle_b: u32,
+    /// What meets here, by corners and edges of the shapes; 0: not named.
+    pub feature: u64,
+    /// The surface that the normal is of; see [`LeafContact::SPARE`].
+    pub patch: u32,
+}
+
+impl LeafContact {
+    /// Of no patch: stands for the pair where nothing else does.
+    pub const SPARE: u32 = u32::MAX;
 }
 
 /// The deepest contacts of one pair met so far.
@@ -48,12 +57,6 @@ impl Contacts {
         {
             *shallowest = contact;
         }
-    }
-
-    /// Gives its memory back.
-    pub(super) fn release(&mut self, arena: &mut Arena<LeafContact>) {
-        arena.release(&mut self.kept);
-        self.left_out = 0;
     }
 }
 

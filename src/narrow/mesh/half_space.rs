@@ -3,12 +3,17 @@
 //! For a surface each triangle is a convex pair with the half-space. For a solid the deepest vertex decides too: a
 //! ball in the solid about a point under the plane reaches down to a point of the solid at least its radius deeper.
 
-use super::contacts::{Contacts, LeafContact};
+use super::contacts::LeafContact;
+use super::manifold::PREDICTION;
+use super::patches::Patches;
 use super::{Closest, Goal};
 use crate::math::{Interval, Point, Pose, ROUND, Vec3};
 use crate::narrow::arena::Arena;
 use crate::shape::{Below, Mesh, NODES_WAITING_MAX};
 use crate::time::Meter;
+
+/// A vertex: its height over the plane, metres; where; of which triangle; its place in the mesh.
+type Lowest = (f64, Point, u32, u32);
 
 /// The walk.
 #[derive(Debug, Default)]
@@ -24,11 +29,13 @@ pub(super) struct HalfSpaceWalk {
     /// Height of the tree's origin over the plane, metres.
     origin_height_m: f64,
     slop: f64,
+    /// Vertices up to this height count as contacts, metres: of a body at rest all do, though rounding lifts some.
+    near_m: f64,
     /// Least height met, metres; where; which triangle.
-    lowest: Option<(f64, Point, u32)>,
+    lowest: Option<Lowest>,
     /// Whether all vertices under the plane are wanted, not only the lowest.
     collects: bool,
-    contacts: Contacts,
+    contacts: Patches,
 }
 
 /// Nodes that may hold a lower vertex, and the least height in each, metres: a stack.
@@ -94,6 +101,7 @@ impl HalfSpaceWalk {
             + origin.coords.norm()
             + mesh.radius();
         self.slop = 32.0 * ROUND * size;
+        self.near_m = self.slop.max(PREDICTION * mesh.radius());
         self.lowest = None;
         self.collects = false;
         self.contacts.clear();
@@ -164,7 +172,7 @@ impl HalfSpaceWalk {
             return;
         };
         let lowest = self.lowest.map_or(f64::INFINITY, |l| l.0);
-        if bound >= lowest && !(self.collects && bound <= self.slop) {
+        if bound >= lowest && !(self.collects && bound <= self.near_m) {
             return;
         }
         match mesh.tree().nodes()[place as usize].below(place) {
@@ -191,29 +199,22 @@ impl HalfSpaceWalk {
     }
 
     fn offer(&mut self, mesh: &Mesh, face: u32, mut arena: Option<&mut Arena<LeafContact>>) {
-        for corner in mesh.triangle(face) {
+        for vertex in mesh.faces()[face as usize] {
+            let corner = mesh.vertices()[vertex as usize];
             let height = self.origin_height_m - self.down.dot(&(corner - mesh.tree().origin()));
-            let here = (height, corner, face);
+            let here = (height, corner, face, vertex);
             if self.lowest.is_none_or(|l| height < l.0) {
                 self.lowest = Some(here);
             }
-            // A vertex belongs to some six triangles and is one contact.
             if let Some(arena) = arena.as_deref_mut()
-                && height <= self.slop
+                && height <= self.near_m
             {
-                let contact = self.contact(&here);
-                let same = |c: &LeafContact| {
-                    c.closest.point_a == contact.closest.point_a
-                        && c.closest.point_b == contact.closest.point_b
-                };
-                if !self.contacts.all(arena).iter().any(same) {
-                    self.contacts.add(arena, contact);
-                }
+                self.contacts.add(arena, &self.contact(&here));
             }
         }
     }
 
-    fn contact(&self, &(height, corner, face): &(f64, Point, u32)) -> LeafContact {
+    fn contact(&self, &(height, corner, face, vertex): &Lowest) -> LeafContact {
         let (on_mesh, down) = if self.half_space_is_b {
             (corner, self.down)
         } else {
@@ -251,6 +252,8 @@ impl HalfSpaceWalk {
             closest,
             triangle_a,
             triangle_b,
+            feature: u64::from(vertex) << 1 | 1,
+            patch: 0,
         }
     }
 }

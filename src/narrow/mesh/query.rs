@@ -3,6 +3,7 @@
 use super::carried::{CarriedFront, FrontStore, Search};
 use super::contacts::LeafContact;
 use super::half_space::HalfSpaceWalk;
+use super::patches::numbered;
 use super::side::Side;
 use crate::math::{Interval, Pose};
 use crate::shape::{Geometry, Mesh, Shape};
@@ -126,18 +127,19 @@ impl MeshQuery {
         }
     }
 
-    /// Leaf pairs that touch or cross, at most [`super::LEAF_CONTACTS_MAX`]; all of them once `Goal::Contacts` is
-    /// reached. In no order. Of a shape within another: the way out.
+    /// Points where leaves touch or cross, [`super::PATCH_POINTS`] of each patch, some twice; those of all leaves once
+    /// `Goal::Contacts` is reached. Of a shape within another: the way out. With each the number of its patch.
     pub fn contacts<'a>(
         &'a self,
         store: &'a FrontStore,
-    ) -> impl Iterator<Item = LeafContact> + use<'a> {
+    ) -> impl Iterator<Item = (LeafContact, u32)> + use<'a> {
         let (found, within) = match self.kind {
             Kind::Idle => (&[][..], None),
             Kind::Surfaces => (self.front.contacts(store), self.front.way_out(store)),
             Kind::HalfSpace => (self.half_space.contacts(&store.contacts), None),
         };
-        found.iter().copied().chain(within)
+        let found = numbered(found).map(|(point, patch)| (*point, patch));
+        found.chain(within.map(|point| (point, 0)))
     }
 
     /// Forgets everything and gives its memory back.

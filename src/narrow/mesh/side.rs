@@ -62,6 +62,14 @@ impl<'a> Side<'a> {
         }
     }
 
+    /// Greatest distance of its surface from its middle, metres.
+    pub(super) fn radius(self) -> f64 {
+        match self {
+            Self::Mesh(mesh) => mesh.radius(),
+            Self::Convex(convex) => convex.radius(),
+        }
+    }
+
     /// How many points stand for all its connected surfaces.
     pub(super) fn shell_count(self) -> usize {
         match self {

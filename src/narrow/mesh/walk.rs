@@ -304,6 +304,8 @@ impl Walk {
             closest,
             triangle_a: triangle(a),
             triangle_b: triangle(b),
+            feature: 0,
+            patch: 0,
         };
         let better = |w: &Witness| closest.best_m < w.closest.best_m;
         if self.witness.as_ref().is_none_or(better) {

@@ -42,13 +42,16 @@ impl Defects {
     }
 }
 
+/// One use of an edge: lesser and greater welded vertex, face, whether it runs from lesser to greater.
+pub(super) type EdgeUse = (u32, u32, u32, bool);
+
 /// Topology of the faces of a mesh.
 #[derive(Debug)]
 pub(super) struct Topology {
     /// For each vertex the first vertex in the same place.
     welded: Vec<u32>,
-    /// Every edge use: lesser and greater welded vertex, face, whether it runs from lesser to greater.
-    edges: Vec<(u32, u32, u32, bool)>,
+    /// Every edge use, in order.
+    edges: Vec<EdgeUse>,
     pub(super) defects: Defects,
     /// For each face its shell.
     pub(super) shell_of: Vec<u32>,
@@ -71,6 +74,20 @@ impl Topology {
         all.count_faces(vertices, faces);
         all.find_shells(vertices, faces);
         all
+    }
+
+    /// The uses of each edge: lesser and greater vertex, face, direction when they were read.
+    pub(super) fn edge_uses(&self) -> impl Iterator<Item = &[EdgeUse]> {
+        self.edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1))
+    }
+
+    /// Which side of its face a use is now, and whether it runs from the lesser to the greater vertex.
+    pub(super) fn side_of(&self, of: &EdgeUse, faces: &[[u32; 3]]) -> Option<(u32, bool)> {
+        let corners = faces[of.2 as usize].map(|v| self.welded[v as usize]);
+        (0u32..3).zip(0..3).find_map(|(k, i)| {
+            let (from, to) = (corners[i], corners[(i + 1) % 3]);
+            ((from.min(to), from.max(to)) == (of.0, of.1)).then_some((k, from < to))
+        })
     }
 
     fn count_edges(&mut self) {
@@ -207,7 +224,7 @@ fn weld(vertices: &[Point]) -> Vec<u32> {
     welded
 }
 
-fn edge_uses(welded: &[u32], faces: &[[u32; 3]]) -> Vec<(u32, u32, u32, bool)> {
+fn edge_uses(welded: &[u32], faces: &[[u32; 3]]) -> Vec<EdgeUse> {
     let mut edges = Vec::with_capacity(3 * faces.len());
     for (i, face) in (0u32..).zip(faces) {
         let corners = face.map(|v| welded[v as usize]);
@@ -223,19 +240,19 @@ fn edge_uses(welded: &[u32], faces: &[[u32; 3]]) -> Vec<(u32, u32, u32, bool)> {
 }
 
 /// Disjoint sets whose members may be opposite to their root.
-struct Sets {
+pub(super) struct Sets {
     parent: Vec<(u32, bool)>,
 }
 
 impl Sets {
-    fn new(len: usize) -> Self {
+    pub(super) fn new(len: usize) -> Self {
         Self {
             parent: (0u32..).take(len).map(|i| (i, false)).collect(),
         }
     }
 
     /// The root, and whether `i` is opposite to it.
-    fn root(&mut self, i: u32) -> (u32, bool) {
+    pub(super) fn root(&mut self, i: u32) -> (u32, bool) {
         let (mut at, mut odd) = (i, false);
         while self.parent[at as usize].0 != at {
             // Halving the path keeps later walks short.
@@ -249,7 +266,7 @@ impl Sets {
     }
 
     /// Joins two sets; false when they are one already and disagree.
-    fn join(&mut self, a: u32, b: u32, opposite: bool) -> bool {
+    pub(super) fn join(&mut self, a: u32, b: u32, opposite: bool) -> bool {
         let ((a, odd_a), (b, odd_b)) = (self.root(a), self.root(b));
         if a == b {
             return odd_a ^ odd_b == opposite;

@@ -66,7 +66,8 @@ impl CarriedFront {
         (-witness.closest.best_m >= gap.min).then(|| witness.way_out(gap))
     }
 
-    /// Leaves that touch at this pose, at most [`crate::narrow::mesh::LEAF_CONTACTS_MAX`]; all of them once `Goal::Contacts` is reached.
+    /// Points where leaves touch at this pose, [`crate::narrow::mesh::PATCH_POINTS`] of each patch, some twice; those of all
+    /// leaves once `Goal::Contacts` is reached.
     #[must_use]
     pub fn contacts<'a>(&self, store: &'a FrontStore) -> &'a [LeafContact] {
         self.contacts.all(&store.contacts)

@@ -5,7 +5,7 @@ use super::store::FrontStore;
 use super::{BoxId, CarriedFront, LeafContact, Open, Side};
 use crate::math::Interval;
 use crate::narrow::exact::Closest;
-use crate::narrow::mesh::side;
+use crate::narrow::mesh::{manifold, side};
 use crate::shape::{Held, Obb};
 
 impl CarriedFront {
@@ -68,7 +68,9 @@ impl CarriedFront {
                 self.crossing = side::triangles(leaf_a, leaf_b);
             }
             self.known.touches = true;
-            self.contacts.add(&mut store.contacts, contact);
+            manifold::points(leaf_a, leaf_b, &self.at, &contact, |point| {
+                self.contacts.add(&mut store.contacts, &point);
+            });
         } else {
             self.known.blurred = true;
         }
@@ -99,6 +101,8 @@ pub(super) fn contact(a: (Side<'_>, u32), b: (Side<'_>, u32), closest: Closest) 
         closest,
         triangle_a: a.0.triangle_name(a.1),
         triangle_b: b.0.triangle_name(b.1),
+        feature: 0,
+        patch: LeafContact::SPARE,
     }
 }
 

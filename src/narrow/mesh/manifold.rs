@@ -1,0 +1,277 @@
+//! The contact points of two leaves: with the normal of the surface they are of, not that of a triangle by itself.
+//!
+//! In: a triangle of a mesh and a convex shape, or two triangles, that touch or cross, and the answer of their own query.
+//! Out: points with a normal, each named by the corners and edges that meet there.
+//!
+//! A triangle by itself has edges; most of them are none of the surface's. Pushed in by a millimetre at such an edge, the
+//! least translation of the two leaves leads sideways, along the surface. So a normal counts by how far the two would have
+//! to move along it if each were followed over its neighbours to where it reaches farthest (`Mesh::climb`): along a flat
+//! floor that is far, at a convex ridge nothing is added. The least of these wins:
+//! - the normals of the faces, against how far the other one reaches behind the face's plane;
+//! - the leaves' own normal: edges, corners, and what is round.
+//!
+//! Refused: a table of Voronoi regions for each edge (a corner that pokes through a face is of no region of it); to take the
+//! face's normal everywhere (a box on a ridge would tilt to one of its sides).
+
+mod leaf;
+
+use leaf::{Leaf, mix};
+
+use super::Closest;
+use super::contacts::LeafContact;
+use super::placed::Placed;
+use super::side::Side;
+use crate::math::{Interval, Point, Vec3};
+use crate::narrow::exact::{ManifoldPoint, shared_points};
+use crate::shape::Mesh;
+
+/// Points so far apart still count as contacts, as a share of the smaller one's radius: of a body at rest all corners do, though
+/// rounding lifts some.
+pub(super) const PREDICTION: f64 = 1e-6;
+/// An own normal this close to a face's (cosine of 0.1 degrees) is the face's.
+const FACE: f64 = 0.999_998;
+/// A solid's surface does not push inwards (cosine; a little more than a right angle is rounding).
+const INWARD: f64 = -0.1;
+/// A later normal has to be better by this share of the smaller one's radius.
+const BETTER: f64 = 1e-9;
+
+/// Whose face the normal is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Base {
+    A,
+    B,
+    /// Of none: the leaves' own.
+    Own,
+}
+
+/// Hands over the points of two leaves that touch: at least one.
+///
+/// * `take` - is given points in A's frame; `patch` names the surface that the normal is of.
+pub(super) fn points(
+    a: (Side<'_>, u32),
+    b: (Side<'_>, u32),
+    at: &Placed,
+    found: &LeafContact,
+    mut take: impl FnMut(LeafContact),
+) {
+    let [a, b] = [(a, false), (b, true)].map(|((side, place), is_b)| Leaf {
+        side,
+        place,
+        is_b,
+        at,
+    });
+    let size = a.side.radius().min(b.side.radius());
+    // Rounding is a share of all, not of the smaller one.
+    let rounding_m = 4.0 * at.slop;
+    let better_m = rounding_m.max(BETTER * size);
+    let (normal, base) = choose(&a, &b, &found.closest, better_m);
+    let patch = match base {
+        Base::B => b.patch(),
+        _ if a.mesh().is_some() => a.patch(),
+        _ => b.patch(),
+    };
+    let mut any = false;
+    let mut put = |point_a: Point, point_b: Point, feature: u64| {
+        let gap_m = normal.dot(&(point_b - point_a));
+        any = true;
+        take(LeafContact {
+            closest: Closest {
+                gap: Interval::new(gap_m, gap_m),
+                best_m: gap_m,
+                normal,
+                point_a,
+                point_b,
+                finished: true,
+            },
+            feature: mix(feature, u64::from(patch)),
+            patch,
+            ..*found
+        });
+    };
+    let forced = match base {
+        Base::A => Some(false),
+        Base::B => Some(true),
+        Base::Own => None,
+    };
+    let prediction_m = rounding_m.max(PREDICTION * size);
+    shared(&a, &b, &normal, forced, prediction_m, |p, base_is_b| {
+        put(
+            p.point_a,
+            p.point_b,
+            feature_of(&a, &b, p.feature, base_is_b),
+        );
+    });
+    if let Some(base_is_b) = forced {
+        let (on, of) = if base_is_b { (&b, &a) } else { (&a, &b) };
+        corners(on, of, &normal, prediction_m, |on, of, feature| {
+            let (point_a, point_b) = if base_is_b { (of, on) } else { (on, of) };
+            put(point_a, point_b, feature);
+        });
+    }
+    if any {
+        return;
+    }
+    let patch = if base == Base::Own {
+        patch
+    } else {
+        LeafContact::SPARE
+    };
+    take(nearest(&a, &b, normal, patch, found));
+}
+
+/// Where the leaves themselves meet, straight across along a normal.
+fn nearest(
+    a: &Leaf<'_>,
+    b: &Leaf<'_>,
+    normal: Vec3,
+    patch: u32,
+    found: &LeafContact,
+) -> LeafContact {
+    // Two triangles that cross have their depth somewhere else; else these are the nearest points.
+    let middle = crossing(a, b)
+        .unwrap_or_else(|| nalgebra::center(&found.closest.point_a, &found.closest.point_b));
+    let gap_m = if patch == LeafContact::SPARE {
+        normal.dot(&(found.closest.point_b - found.closest.point_a))
+    } else {
+        found.closest.best_m
+    };
+    let triangles = u64::from(found.triangle_a) << 32 | u64::from(found.triangle_b);
+    LeafContact {
+        closest: Closest {
+            normal,
+            best_m: gap_m,
+            point_a: middle - normal * (0.5 * gap_m),
+            point_b: middle + normal * (0.5 * gap_m),
+            ..found.closest
+        },
+        feature: mix(triangles, 3),
+        patch,
+        ..*found
+    }
+}
+
+/// The normal, A to B, along which the two surfaces overlap least.
+fn choose(a: &Leaf<'_>, b: &Leaf<'_>, found: &Closest, better_m: f64) -> (Vec3, Base) {
+    let (normal_a, normal_b) = (a.normal(), b.normal());
+    let mut best = (f64::INFINITY, found.normal, Base::Own);
+    for (leaf, other, face, base) in [(a, b, normal_a, Base::A), (b, a, normal_b, Base::B)] {
+        let (Some(outward), Some(mesh)) = (face, leaf.mesh()) else {
+            continue;
+        };
+        let plane = leaf.corners()[0];
+        // A surface can be touched from both sides.
+        let ways = if mesh.is_solid() { 1 } else { 2 };
+        for outward in [outward, -outward].into_iter().take(ways) {
+            let height = outward.dot(&plane.coords);
+            let Some(reach) = other.reach(&-outward, best.0 - height) else {
+                continue;
+            };
+            if height + reach < best.0 - better_m {
+                let normal = if base == Base::A { outward } else { -outward };
+                best = (height + reach, normal, base);
+            }
+        }
+    }
+    let own = found.normal;
+    let known = |face: Option<Vec3>, outward: Vec3, leaf: &Leaf<'_>| {
+        let along = face.map_or(0.0, |n| n.dot(&outward));
+        let solid = leaf.mesh().is_some_and(Mesh::is_solid);
+        along.abs() >= FACE || (solid && along < INWARD)
+    };
+    if !known(normal_a, own, a) && !known(normal_b, -own, b) {
+        let reach = a.own_reach(&own, best.0 - b.least_reach(&-own));
+        let whole = reach.and_then(|r| Some(r + b.own_reach(&-own, best.0 - r)?));
+        if whole.is_some_and(|depth| depth < best.0 - better_m) {
+            return (own, Base::Own);
+        }
+    }
+    (best.1, best.2)
+}
+
+/// The points that two leaves share.
+fn shared(
+    a: &Leaf<'_>,
+    b: &Leaf<'_>,
+    normal: &Vec3,
+    forced: Option<bool>,
+    prediction_m: f64,
+    take: impl FnMut(&ManifoldPoint, bool),
+) {
+    let (one, other) = (a.convex(), b.convex());
+    shared_points(
+        (&one, &other),
+        &a.at.pos12,
+        normal,
+        forced,
+        prediction_m,
+        take,
+    );
+}
+
+/// What a clipped point is called: a corner of the one, or where two edges cross.
+fn feature_of(a: &Leaf<'_>, b: &Leaf<'_>, feature: u32, base_is_b: bool) -> u64 {
+    let (base, incident) = if base_is_b { (b, a) } else { (a, b) };
+    let (corner, cut) = (feature & 0x7fff, feature >> 15 & 0xffff);
+    match cut {
+        0 => incident.corner_name(corner),
+        cut => mix(incident.edge_name(corner), base.edge_name(cut - 1)),
+    }
+}
+
+/// Corners of `of` behind the surface about `on`, and the one that lies deepest: a triangle that pokes through the surface
+/// has its corners over other triangles than the one that it crosses.
+fn corners(
+    on: &Leaf<'_>,
+    of: &Leaf<'_>,
+    normal: &Vec3,
+    prediction_m: f64,
+    mut take: impl FnMut(Point, Point, u64),
+) {
+    let (Some(surface), Some(mesh)) = (on.mesh(), of.mesh()) else {
+        return;
+    };
+    let outward = if on.is_b { -normal } else { *normal };
+    let plane = on.corners()[0];
+    let own = on.turn(&outward);
+    let deepest = mesh.climb(of.place, &of.turn(&-outward), f64::INFINITY);
+    for vertex in mesh.faces()[of.place as usize].into_iter().chain(deepest) {
+        let point = of.in_a(&mesh.vertices()[vertex as usize]);
+        if outward.dot(&(point - plane)) > prediction_m {
+            continue;
+        }
+        let there = if on.is_b { on.at.to_b(&point) } else { point };
+        let Some(beneath) = surface.beneath(on.place, &there, &own) else {
+            continue;
+        };
+        let beneath = on.in_a(&beneath);
+        if outward.dot(&(point - beneath)) <= prediction_m {
+            take(beneath, point, u64::from(vertex) << 1 | u64::from(of.is_b));
+        }
+    }
+}
+
+/// The middle of what two triangles share where they cross.
+fn crossing(a: &Leaf<'_>, b: &Leaf<'_>) -> Option<Point> {
+    let (normal_a, normal_b) = (a.normal()?, b.normal()?);
+    let (of_a, of_b) = (a.corners(), b.corners());
+    let (mut sum, mut count) = (Vec3::zeros(), 0.0);
+    for (plane, normal, other) in [(&of_a, &normal_a, &of_b), (&of_b, &normal_b, &of_a)] {
+        for k in 0..3 {
+            let (from, to) = (other[k], other[(k + 1) % 3]);
+            let [x, y] = [from, to].map(|p| normal.dot(&(p - plane[0])));
+            if (x > 0.0) == (y > 0.0) {
+                continue;
+            }
+            let at = from + (to - from) * (x / (x - y));
+            let within = (0..3).all(|i| {
+                let along = plane[(i + 1) % 3] - plane[i];
+                along.cross(&(at - plane[i])).dot(normal) >= 0.0
+            });
+            if within {
+                sum += at.coords;
+                count += 1.0;
+            }
+        }
+    }
+    (count > 0.0).then(|| Point::from(sum / count))
+}

@@ -1,0 +1,145 @@
+//! A leaf of a pair: a triangle with the surface about it, or a convex shape; seen from A.
+
+use super::{Placed, Side};
+use crate::math::{Point, Vec3};
+use crate::shape::{Convex, Mesh};
+
+/// One of the two leaves.
+#[derive(Clone, Copy)]
+pub(super) struct Leaf<'a> {
+    pub(super) side: Side<'a>,
+    pub(super) place: u32,
+    pub(super) is_b: bool,
+    pub(super) at: &'a Placed,
+}
+
+impl<'a> Leaf<'a> {
+    pub(super) fn mesh(&self) -> Option<&'a Mesh> {
+        match self.side {
+            Side::Mesh(mesh) => Some(mesh),
+            Side::Convex(_) => None,
+        }
+    }
+
+    /// The surface that it is part of.
+    pub(super) fn patch(&self) -> u32 {
+        let region = self.mesh().map_or(0, |mesh| mesh.region(self.place));
+        region << 1 | u32::from(self.is_b)
+    }
+
+    /// A direction of A's frame in its own.
+    pub(super) fn turn(&self, direction: &Vec3) -> Vec3 {
+        if self.is_b {
+            self.at.turn_to_b(direction)
+        } else {
+            *direction
+        }
+    }
+
+    pub(super) fn in_a(&self, point: &Point) -> Point {
+        if self.is_b {
+            self.at.to_a(point)
+        } else {
+            *point
+        }
+    }
+
+    /// Of a triangle, A's frame.
+    pub(super) fn corners(&self) -> [Point; 3] {
+        match self.side {
+            Side::Mesh(mesh) => mesh.triangle(self.place).map(|p| self.in_a(&p)),
+            Side::Convex(_) => [Point::origin(); 3],
+        }
+    }
+
+    /// Of a triangle: unit, outward of a solid, A's frame.
+    pub(super) fn normal(&self) -> Option<Vec3> {
+        let normal = self.mesh()?.face_normal(self.place)?;
+        Some(if self.is_b {
+            self.at.rotation * normal
+        } else {
+            normal
+        })
+    }
+
+    /// Where A's origin lies along a direction of A's frame, seen from its own.
+    pub(super) fn offset(&self, direction: &Vec3) -> f64 {
+        direction.dot(&self.in_a(&Point::origin()).coords)
+    }
+
+    /// How far the surface about this leaf reaches along a direction, from A's origin; `None`: beyond `beyond_m`.
+    pub(super) fn reach(&self, direction: &Vec3, beyond_m: f64) -> Option<f64> {
+        let (own, offset) = (self.turn(direction), self.offset(direction));
+        let height = match self.side {
+            Side::Convex(convex) => own.dot(&convex.support(&own).coords),
+            Side::Mesh(mesh) => {
+                let top = mesh.climb(self.place, &own, beyond_m - offset)?;
+                own.dot(&mesh.vertices()[top as usize].coords)
+            }
+        };
+        Some(height + offset)
+    }
+
+    /// The same for a normal of the leaf's own: an edge that is one of the surface is not left for higher ground beyond it.
+    pub(super) fn own_reach(&self, direction: &Vec3, beyond_m: f64) -> Option<f64> {
+        let crest = (self.mesh()).and_then(|mesh| mesh.crest(self.place, &self.turn(direction)));
+        match crest {
+            Some(height) => Some(height + self.offset(direction)),
+            None => self.reach(direction, beyond_m),
+        }
+    }
+
+    /// How far the leaf alone reaches along a direction, from A's origin.
+    pub(super) fn least_reach(&self, direction: &Vec3) -> f64 {
+        match self.side {
+            Side::Convex(convex) => {
+                let own = self.turn(direction);
+                own.dot(&convex.support(&own).coords) + self.offset(direction)
+            }
+            Side::Mesh(_) => {
+                let on = self.corners().map(|p| direction.dot(&p.coords));
+                on[0].max(on[1]).max(on[2])
+            }
+        }
+    }
+
+    /// As a convex shape in its own frame.
+    pub(super) fn convex(&self) -> Convex {
+        match self.side {
+            Side::Mesh(mesh) => Convex::triangle(mesh.triangle(self.place)),
+            Side::Convex(convex) => convex.clone(),
+        }
+    }
+
+    /// A vertex of it by a corner's place, or that of a convex shape: what no other place of it is called.
+    pub(super) fn corner_name(&self, corner: u32) -> u64 {
+        let name = match self.side {
+            Side::Mesh(mesh) => mesh.faces()[self.place as usize]
+                .get(corner as usize)
+                .map_or(u64::MAX >> 2, |&v| u64::from(v)),
+            Side::Convex(_) => u64::from(corner),
+        };
+        name << 1 | u64::from(self.is_b)
+    }
+
+    /// An edge by its place: of a triangle by its two vertices.
+    pub(super) fn edge_name(&self, edge: u32) -> u64 {
+        if self.mesh().is_none() {
+            return mix(self.corner_name(edge), 1);
+        }
+        let (from, to) = (self.corner_name(edge % 3), self.corner_name((edge + 1) % 3));
+        mix(from.min(to), from.max(to))
+    }
+}
+
+/// Two names as one.
+pub(super) fn mix(one: u64, other: u64) -> u64 {
+    // Source: Steele, Lea, Flood 2014, Fast splittable pseudorandom number generators (the finalizer).
+    let mut x = one
+        .wrapping_mul(0x9e37_79b9_7f4a_7c15)
+        .wrapping_add(other)
+        .wrapping_add(0x632b_e59b_d9b4_e019);
+    x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ x >> 31
+}

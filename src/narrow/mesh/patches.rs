@@ -1,0 +1,136 @@
+//! The contact points of a mesh pair as they come in: of each patch the deepest and the outermost.
+//!
+//! In: points of leaves, in any order and of any number. Out: a bounded number of them that spans what all of them span. A
+//! patch is made of points on one smooth region with normals within 8 degrees of its first; which of its points make the
+//! manifold is decided when all are there (`narrow/contacts`).
+//!
+//! Refused: the deepest points alone (of a floor of many small triangles these lie side by side, and a body tips over them);
+//! clusters by distance (their middles are not where the rim is).
+
+use super::contacts::LeafContact;
+use crate::math::Vec3;
+use crate::narrow::arena::{Arena, Run};
+
+/// Patches of one shape pair; of more, those with normals nearest to one another are taken together.
+pub const PATCHES_MAX: usize = 16;
+/// Directions in a patch's plane in each of which the outermost point is kept: a polygon with angles of more than 135
+/// degrees can lose a corner, at most 8 % of its width.
+const DIRECTIONS: usize = 8;
+/// Points of a patch: its first, its deepest, its outermost. Some may be the same.
+pub const PATCH_POINTS: usize = DIRECTIONS + 2;
+/// Cosine of 8 degrees: what normals of one patch differ from its first by.
+const SAME_NORMAL: f64 = 0.99;
+
+/// The points of one pair met so far.
+#[derive(Debug, Default)]
+pub(super) struct Patches {
+    kept: Run,
+}
+
+impl Patches {
+    pub(super) fn clear(&mut self) {
+        self.kept.clear();
+    }
+
+    /// [`PATCH_POINTS`] of each patch, one patch behind the other.
+    pub(super) fn all<'a>(&self, arena: &'a Arena<LeafContact>) -> &'a [LeafContact] {
+        let all = arena.all(&self.kept);
+        &all[..all.len() / PATCH_POINTS * PATCH_POINTS]
+    }
+
+    /// Takes a point into its patch.
+    pub(super) fn add(&mut self, arena: &mut Arena<LeafContact>, point: &LeafContact) {
+        let all = arena.all_mut(&self.kept);
+        let spare = all.first().is_some_and(|p| p.patch == LeafContact::SPARE);
+        if spare && point.patch != LeafContact::SPARE {
+            all.fill(*point);
+            return;
+        }
+        if !all.is_empty() && !spare && point.patch == LeafContact::SPARE {
+            return;
+        }
+        let turn = |patch: &[LeafContact]| patch[0].closest.normal.dot(&point.closest.normal);
+        let (mut nearest, mut best) = (None, f64::NEG_INFINITY);
+        for (at, patch) in all.chunks_exact(PATCH_POINTS).enumerate() {
+            let turn = turn(patch);
+            let same = spare || (patch[0].patch == point.patch && turn >= SAME_NORMAL);
+            if same || turn > best {
+                (nearest, best) = (Some(at), turn);
+            }
+            if same {
+                best = f64::INFINITY;
+                break;
+            }
+        }
+        let full = all.len() / PATCH_POINTS >= PATCHES_MAX;
+        if !full && best < f64::INFINITY && self.begin(arena, point) {
+            return;
+        }
+        let all = arena.all_mut(&self.kept);
+        if let Some(patch) = nearest.and_then(|at| all.chunks_exact_mut(PATCH_POINTS).nth(at)) {
+            update(patch, point);
+        }
+    }
+
+    /// Begins a patch; false where there is no room.
+    fn begin(&mut self, arena: &mut Arena<LeafContact>, point: &LeafContact) -> bool {
+        let before = self.kept.len();
+        for _ in 0..PATCH_POINTS {
+            if !arena.push(&mut self.kept, *point) {
+                while self.kept.len() > before {
+                    arena.pop(&mut self.kept);
+                }
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Gives its memory back.
+    pub(super) fn release(&mut self, arena: &mut Arena<LeafContact>) {
+        arena.release(&mut self.kept);
+    }
+}
+
+/// Points with the number of their patch.
+pub fn numbered(all: &[LeafContact]) -> impl Iterator<Item = (&LeafContact, u32)> {
+    (0u32..)
+        .zip(all.chunks(PATCH_POINTS))
+        .flat_map(|(number, patch)| patch.iter().map(move |point| (point, number)))
+}
+
+/// Puts a point where it is deeper or lies farther out than what is there.
+fn update(patch: &mut [LeafContact], point: &LeafContact) {
+    let [first, deepest, outermost @ ..] = patch else {
+        return;
+    };
+    if point.closest.best_m < deepest.closest.best_m {
+        *deepest = *point;
+    }
+    let from = first.closest.point_a;
+    for (kept, direction) in outermost.iter_mut().zip(directions(&first.closest.normal)) {
+        let out = |p: &LeafContact| direction.dot(&(p.closest.point_a - from));
+        if out(point) > out(kept) {
+            *kept = *point;
+        }
+    }
+}
+
+/// Eight directions at right angles to a unit normal, evenly spread and along no axis of the frame: two corners of what is
+/// drawn along the axes are never equally far out.
+fn directions(normal: &Vec3) -> [Vec3; DIRECTIONS] {
+    let mut least = Vec3::zeros();
+    least[normal.iamin()] = 1.0;
+    let x = normal.cross(&least).normalize();
+    let y = normal.cross(&x);
+    let turns: [(f64, f64); 4] = [
+        (0.972, 0.233),
+        (0.522, 0.853),
+        (-0.233, 0.972),
+        (-0.853, 0.522),
+    ];
+    let half = turns.map(|(cos, sin)| x * cos + y * sin);
+    [
+        half[0], half[1], half[2], half[3], -half[0], -half[1], -half[2], -half[3],
+    ]
+}
