@@ -17,6 +17,10 @@
 //!    against the other solid, both ways (law 3.3).
 //! 3. `Refine`: the heap, best first, until nothing can be nearer than the best leaf pair.
 //!
+//! Contacts: `manifold` makes points of two leaves that touch, with the normal of the surface about them; `patches` keeps
+//! the deepest and the outermost of each patch as they come in. Which four of a patch are published is decided among those
+//! (`narrow/contacts`).
+//!
 //! Refused: breadth-first order (Hubbard): it confirms contacts last of all; one order for all three stages.
 //! Lower ends of overlapping pairs are bounds, not depths: the least overlap of the root boxes along 15 axes, and the
 //! largest ball that fits into a root box (see `bound`).

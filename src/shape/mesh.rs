@@ -8,6 +8,7 @@ mod inside;
 mod obb;
 mod outline;
 mod predicates;
+mod seams;
 mod topology;
 mod tree;
 mod turn;
@@ -42,7 +43,8 @@ pub struct Mesh {
     /// Oriented boxes, for pairs of surfaces; the other tree serves rays, planes and extents, where its boxes are as good
     /// and a quarter of the size.
     obb: ObbTree,
-    adjacency: Adjacency,
+    /// Apart, so that a shape that is no mesh is not large for it.
+    adjacency: Box<Adjacency>,
     /// None for a small mesh, whose vertices are walked.
     outline: Option<Outline>,
     bounds: Aabb,
@@ -86,7 +88,7 @@ impl Mesh {
             outline,
             radius: radius(&vertices, &faces, &centre),
             obb: ObbTree::new(&vertices, &faces),
-            adjacency: Adjacency::default(),
+            adjacency: Box::default(),
             shells: topology.shells.iter().map(|s| s.vertex).collect(),
             vertices,
             faces,
@@ -100,7 +102,8 @@ impl Mesh {
             mesh.turn_shells(&topology);
         }
         // Turned faces have their sides in another order.
-        mesh.adjacency = Adjacency::new(&topology, &mesh.vertices, &mesh.faces);
+        mesh.adjacency = Box::new(Adjacency::new(&topology, &mesh));
+        mesh.warnings.extend(mesh.adjacency.warning());
         Ok(mesh)
     }
 

@@ -5,17 +5,20 @@ use std::fmt::Write as _;
 
 use crate::oracle::meshes::trimesh;
 use crate::oracle::rng::Rng;
-use crate::support::{Kind, area, contacts, degrees, drive, kinds, normal, scene, sheet, slab};
+use crate::support::{
+    Kind, area, contacts, degrees, drive, kinds, normal, scene, sheet, slab, tiles,
+};
 use sweepd::math::{Pose, Quat, Vec3};
 
 const TICKS: u32 = if cfg!(debug_assertions) { 40 } else { 200 };
 const TILT_MAX_DEG: f64 = 0.05;
 
-/// Floors of each kind: a surface, a solid slab, a height field.
+/// Floors of each kind: a surface, a solid slab, tiles, a height field.
 fn floor(rng: &mut Rng, kind: usize, cells: usize) -> String {
     match kind {
         0 => trimesh(&sheet(rng, cells, 1.0), None),
         1 => trimesh(&slab(&sheet(rng, cells, 1.0), 0.5), None),
+        2 => trimesh(&tiles(rng, cells), None),
         _ => {
             let row = format!("[{}]", vec!["0.0"; cells + 1].join(", "));
             let rows = vec![row; cells + 1].join(", ");
@@ -86,7 +89,7 @@ fn on_a_flat_floor_no_normal_is_tilted_or_flipped_and_ids_stay() {
         let size = 2.0 * kind.height.max(0.5);
         let (mut worst, mut rows, mut flips, mut kept, mut followed) = (0.0_f64, 0, 0, 0, 0);
         let mut least = (usize::MAX, f64::INFINITY);
-        for floor_kind in 0..3 {
+        for floor_kind in 0..4 {
             for (round, push) in [0.0, 1e-4, 1e-3, 1e-2].into_iter().enumerate() {
                 let seed = 100 * at as u64 + 10 * floor_kind as u64 + round as u64;
                 let mut rng = Rng::new(seed);

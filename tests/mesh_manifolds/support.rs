@@ -44,6 +44,34 @@ pub fn sheet(rng: &mut Rng, cells: usize, irregular: f64) -> Soup {
     Soup::new(vertices, faces)
 }
 
+/// Tiles laid in bond: corners of the one lie on sides of the other, none is shared, and there are cracks of a nanometre.
+pub fn tiles(rng: &mut Rng, cells: usize) -> Soup {
+    let step = 2.0 * FLOOR / cells as f64;
+    let mut all = Soup::new(Vec::new(), Vec::new());
+    for i in 0..cells {
+        let bond = rng.range(0.1, 0.9) * step;
+        for j in 0..=cells {
+            let (y, x) = (step * i as f64 - FLOOR, step * j as f64 - FLOOR - bond);
+            let start = u32::try_from(all.vertices.len()).unwrap();
+            for [u, v] in [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]] {
+                let crack = rng.vector(1e-9);
+                let x = (x + u * step).clamp(-FLOOR, FLOOR);
+                all.vertices
+                    .push(Point::new(x + crack.x, y + v * step + crack.y, 0.0));
+            }
+            // Which way round a tile lies is anybody's guess: a sheet of tiles is no solid.
+            let faces = if rng.below(2) == 0 {
+                [[0, 1, 2], [0, 2, 3]]
+            } else {
+                [[0, 3, 1], [1, 3, 2]]
+            };
+            all.faces
+                .extend(faces.map(|f: [u32; 3]| f.map(|v| v + start)));
+        }
+    }
+    all
+}
+
 /// A sheet as the top of a solid slab.
 pub fn slab(top: &Soup, thick: f64) -> Soup {
     let count = u32::try_from(top.vertices.len()).unwrap();

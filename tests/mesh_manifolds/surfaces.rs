@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::oracle::meshes::{Soup, bumpy_sphere, cuboid, height_field, trimesh};
 use crate::oracle::rng::Rng;
 use crate::support::{
-    FLOOR, area, contacts, degrees, drive, fine_box, kinds, normal, scene, sheet, slab,
+    FLOOR, area, contacts, degrees, drive, fine_box, kinds, normal, scene, sheet, slab, tiles,
 };
 use sweepd::math::{Point, Pose, Quat, Vec3};
 use sweepd::wire::ContactRow;
@@ -154,10 +154,12 @@ fn a_floor_that_stands_askew_is_as_flat() {
         let kind = &all[rng.below(all.len())];
         let frame = Pose::from_parts(rng.vector(5.0).into(), rng.rotation());
         let cells = 3 + rng.below(25);
-        let mut top = sheet(&mut rng, cells, 1.0);
-        if rng.below(2) == 0 {
-            top = slab(&top, 0.3);
-        }
+        let sheet = sheet(&mut rng, cells, 1.0);
+        let mut top = match rng.below(3) {
+            0 => sheet,
+            1 => slab(&sheet, 0.3),
+            _ => tiles(&mut rng, cells),
+        };
         for v in &mut top.vertices {
             *v = frame * *v;
         }

@@ -4,14 +4,16 @@
 //! along it, and the smooth region that each face is part of. A side is named `3 * face + k`: from the face's corner `k` to
 //! the next one.
 //!
-//! Sides on a border, and those that three faces or more share, have no neighbour: what lies beyond them is not walked to.
+//! Sides on a border, and those that three faces or more share, have no neighbour; where the surface goes on beyond them
+//! nevertheless, they have a seam (`seams`).
 
 use super::Mesh;
+use super::seams::{self, SIDES_MAX, Seam};
 use super::topology::{Sets, Topology};
 use crate::math::{Point, Vec3};
 
 /// No neighbour.
-const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 /// Faces whose normals differ by less than 20 degrees (cosine) are of one smooth region. Larger, and the sides of a coarse
 /// cylinder are one surface with its caps; smaller, and a coarse ball is many.
 const SMOOTH: f64 = 0.94;
@@ -33,15 +35,20 @@ const SAME: f64 = 1e-10;
 pub(super) struct Adjacency {
     /// For each side that of the neighbour.
     twins: Vec<u32>,
+    /// What lies beyond sides without a neighbour, by side.
+    seams: Vec<Seam>,
     /// For each face the least face of its region.
     regions: Vec<u32>,
+    /// Sides without a neighbour.
+    open: usize,
 }
 
 impl Adjacency {
-    /// * `faces` - as they finally are; `topology` is of the same faces, whichever way they were turned then.
+    /// * `mesh` - its faces as they finally are; `topology` is of the same faces, whichever way they were turned then.
     ///
-    /// Cost: O(n).
-    pub(super) fn new(topology: &Topology, vertices: &[Point], faces: &[[u32; 3]]) -> Self {
+    /// Cost: O(n), and O(log n) for each side without a neighbour.
+    pub(super) fn new(topology: &Topology, mesh: &Mesh) -> Self {
+        let (vertices, faces) = (&mesh.vertices, &mesh.faces);
         let mut twins = vec![NONE; 3 * faces.len()];
         let mut sets = Sets::new(faces.len());
         for uses in topology.edge_uses() {
@@ -66,8 +73,49 @@ impl Adjacency {
                 sets.join(one.2, other.2, false);
             }
         }
+        let open = twins.iter().filter(|twin| **twin == NONE).count();
+        let mut seams = Vec::new();
+        if open <= SIDES_MAX {
+            seams = seams::find(mesh, &twins);
+        }
+        for seam in &seams {
+            let face = seam.side / 3;
+            let Some(here) = mesh.face_normal(face) else {
+                continue;
+            };
+            for &other in seam.faces.iter().filter(|other| **other != NONE) {
+                // Beyond a seam faces may be turned either way.
+                let along = mesh.face_normal(other).map_or(1.0, |n| n.dot(&here).abs());
+                if along >= SMOOTH {
+                    sets.join(face, other, false);
+                }
+            }
+        }
         let regions = (0u32..).zip(faces).map(|(i, _)| sets.root(i).0).collect();
-        Self { twins, regions }
+        Self {
+            twins,
+            seams,
+            regions,
+            open,
+        }
+    }
+
+    /// What `check` says where seams were not looked for.
+    pub(super) fn warning(&self) -> Option<String> {
+        (self.open > SIDES_MAX).then(|| {
+            format!(
+                "{} edges without a neighbour, more than {SIDES_MAX}: contacts may show edges within its surface; weld it",
+                self.open
+            )
+        })
+    }
+
+    /// The faces beyond a side without a neighbour.
+    fn beyond(&self, side: u32) -> impl Iterator<Item = u32> + use<'_> {
+        let at = self.seams.binary_search_by_key(&side, |seam| seam.side);
+        let seam = at.ok().and_then(|at| self.seams.get(at));
+        let faces = seam.into_iter().flat_map(|seam| seam.faces);
+        faces.filter(|face| *face != NONE)
     }
 }
 
@@ -139,7 +187,10 @@ impl Mesh {
         }
         let entry = self.adjacency.twins[(3 * face + k) as usize];
         if entry == NONE {
-            return Some(top);
+            let highest = (self.adjacency.beyond(3 * face + k))
+                .flat_map(|other| self.faces[other as usize])
+                .fold(top, |high, v| high.max(on(v)));
+            return (highest <= top + SAME * self.radius).then_some(top);
         }
         let opposite = self.faces[(entry / 3) as usize][((entry % 3 + 2) % 3) as usize];
         (on(opposite) <= top + SAME * self.radius).then_some(top)
@@ -157,6 +208,9 @@ impl Mesh {
             for _ in 0..RING_MAX {
                 let entry = self.adjacency.twins[leave as usize];
                 if entry == NONE {
+                    for other in self.adjacency.beyond(leave) {
+                        (3 * other..3 * other + 3).for_each(&mut visit);
+                    }
                     break;
                 }
                 let next = entry / 3;
@@ -195,29 +249,48 @@ impl Mesh {
             if rise.abs() < LEAN || (self.solid && rise < 0.0) {
                 return None;
             }
-            let over = |k: usize| {
-                let (from, to) = (corners[k], corners[(k + 1) % 3]);
-                let outward = (to - from).cross(direction) * rise.signum();
-                let length = outward.norm();
-                if length > 0.0 {
-                    outward.dot(&(point - from)) / length
-                } else {
-                    f64::NEG_INFINITY
-                }
-            };
-            let farthest = (0u32..3).zip([over(0), over(1), over(2)]);
-            let (k, out) =
-                farthest.fold((0, f64::NEG_INFINITY), |x, y| if y.1 > x.1 { y } else { x });
+            let (k, out) = self.farthest_side(face, point, direction, rise.signum());
             if out <= same {
                 let lift = normal.dot(&(point - corners[0])) / rise;
                 return Some(point - direction * lift);
             }
             let entry = self.adjacency.twins[(3 * face + k) as usize];
-            if entry == NONE {
-                return None;
-            }
-            face = entry / 3;
+            face = if entry == NONE {
+                // Of several faces beyond a seam the one that is nearest to being over the point.
+                let over = |other: &u32| self.off(*other, point, direction);
+                let beyond = self.adjacency.beyond(3 * face + k);
+                beyond.min_by(|x, y| over(x).total_cmp(&over(y)))?
+            } else {
+                entry / 3
+            };
         }
         None
+    }
+
+    /// The side of a face that a point lies farthest beyond, looking along `direction`, and how far, metres.
+    ///
+    /// * `sign` - of the face's normal along `direction`.
+    fn farthest_side(&self, face: u32, point: &Point, direction: &Vec3, sign: f64) -> (u32, f64) {
+        let corners = self.triangle(face);
+        let over = |k: usize| {
+            let (from, to) = (corners[k], corners[(k + 1) % 3]);
+            let outward = (to - from).cross(direction) * sign;
+            let length = outward.norm();
+            if length > 0.0 {
+                outward.dot(&(point - from)) / length
+            } else {
+                f64::NEG_INFINITY
+            }
+        };
+        let sides = (0u32..3).zip([over(0), over(1), over(2)]);
+        sides.fold((0, f64::NEG_INFINITY), |x, y| if y.1 > x.1 { y } else { x })
+    }
+
+    /// How far a point lies off a face, looking along `direction`, metres.
+    fn off(&self, face: u32, point: &Point, direction: &Vec3) -> f64 {
+        let sign = self
+            .face_normal(face)
+            .map_or(1.0, |n| n.dot(direction).signum());
+        self.farthest_side(face, point, direction, sign).1
     }
 }
