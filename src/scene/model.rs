@@ -61,6 +61,8 @@ pub struct BodySpec {
     pub moves: bool,
     /// Whether it is swept between its last two poses.
     pub continuous: bool,
+    /// A longer step of its centre between two frames is a teleport, which is not swept, metres; `None`: no step is.
+    pub teleport_m: Option<f64>,
     /// Place of its source in `Scene::sources`. `None` when it cannot move; an attached body may have none too, and
     /// then no frame moves it after it is detached.
     pub source: Option<usize>,

@@ -46,13 +46,7 @@ impl Scene {
         if self.bodies.is_empty() {
             notes.push("the scene has no body: its state is never clear, add [[body]]".to_owned());
         }
-        if let Some(body) = self.bodies.iter().find(|body| body.continuous) {
-            notes.push(format!(
-                "body \"{}\" says continuous = true, which is kept but not acted on in this version: what happens \
-                 between two of its poses is not seen",
-                shortened(&body.name)
-            ));
-        }
+        self.note_continuous(&mut notes);
         let unbounded: Vec<&str> = self
             .bodies
             .iter()
@@ -72,6 +66,28 @@ impl Scene {
         self.note_rules(&mut notes);
         self.note_groups(&mut notes);
         notes
+    }
+
+    fn note_continuous(&self, notes: &mut Vec<String>) {
+        for body in self.bodies.iter().filter(|body| body.continuous) {
+            let name = shortened(&body.name);
+            if body.is_unbounded() {
+                notes.push(format!(
+                    "body \"{name}\" says continuous = true, but a half-space is not swept: let what meets it be continuous"
+                ));
+            } else if !body.moves && body.attached_to.is_none() {
+                notes.push(format!(
+                    "body \"{name}\" says continuous = true, but it cannot move: there is nothing to sweep"
+                ));
+            }
+        }
+        let unread = |body: &&BodySpec| body.teleport_m.is_some() && !body.continuous;
+        if let Some(body) = self.bodies.iter().find(unread) {
+            notes.push(format!(
+                "body \"{}\" has teleport_m, which only a body with continuous = true reads",
+                shortened(&body.name)
+            ));
+        }
     }
 
     fn note_sources(&self, notes: &mut Vec<String>) {

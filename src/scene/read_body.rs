@@ -2,7 +2,7 @@
 
 use crate::config::OnStale;
 use crate::ids::BodyId;
-use crate::limits::{EXTENT_MAX_M, PRIORITY_MAX, PRIORITY_MIN, SHAPES_PER_BODY_MAX};
+use crate::limits::{EXTENT_MAX_M, EXTENT_MIN_M, PRIORITY_MAX, PRIORITY_MIN, SHAPES_PER_BODY_MAX};
 use crate::scene::node::{Fault, Node, Value};
 use crate::scene::read_shape::{read_pose, read_shape};
 use crate::scene::table::{Table, shortened};
@@ -46,6 +46,7 @@ const KEYS: &[&str] = &[
     "orientation",
     "moves",
     "continuous",
+    "teleport_m",
     "source",
     "ros_frame",
     "ros_topic",
@@ -109,6 +110,7 @@ pub(crate) fn read_body(node: Node, blobs: Option<&[u8]>) -> Result<BodyDraft, F
         pose,
         moves,
         continuous: table.flag("continuous")?.unwrap_or(false),
+        teleport_m: table.number_within("teleport_m", EXTENT_MIN_M, EXTENT_MAX_M)?,
         source: None,
         ros_frame: table.name("ros_frame", ROS_NAME_BYTES_MAX)?,
         ros_topic: table.name("ros_topic", ROS_NAME_BYTES_MAX)?,

@@ -9,7 +9,7 @@ use super::tag::Tag;
 use crate::ids::BodyId;
 use crate::ids::{BodySlot, SourceSlot};
 use crate::limits::{COORDINATE_MAX_M, QUATERNION_NORM_TOLERANCE};
-use crate::math::{Pose, pose_from};
+use crate::math::{Pose, Vec3, pose_from};
 use crate::wire::{BodyStatus, Frame, RejectReason, TransformRow};
 
 impl World {
@@ -50,8 +50,10 @@ impl World {
                 Ok(pose) => {
                     let stamp_ns = frame.stamps_ns.get(at).copied();
                     let stamp_ns = stamp_ns.unwrap_or(frame.header.stamp_ns);
+                    let declared = self.declared_turn(slot, stamp_ns, velocity);
                     self.renew(slot, stamp_ns, velocity.copied(), times);
-                    self.accept(slot, pose.map(|pose| (pose, raw)), deadline_ns, young);
+                    let pose = pose.map(|pose| (pose, raw));
+                    self.accept(slot, pose, declared, deadline_ns, young);
                 }
                 Err(reason) => {
                     self.note_reject(reason);
@@ -90,21 +92,43 @@ impl World {
         }
     }
 
+    /// What a continuous body turned by since its last pose, by its sender's word: angular velocity times the time between
+    /// the two stamps, radians. `None` where it says neither.
+    fn declared_turn(
+        &self,
+        slot: BodySlot,
+        stamp_ns: u64,
+        velocity: Option<&[f64; 6]>,
+    ) -> Option<Vec3> {
+        let body = self.body(slot).filter(|body| body.path.is_some())?;
+        let [_, _, _, x, y, z] = *velocity?;
+        if body.stamp_ns == 0 || stamp_ns <= body.stamp_ns {
+            return None;
+        }
+        #[allow(clippy::cast_precision_loss, reason = "stamps of one body are near")]
+        let time_s = (stamp_ns - body.stamp_ns) as f64 * 1e-9;
+        Some(Vec3::new(x, y, z) * time_s)
+    }
+
     /// A good row: its pose, where it is not the one the body has.
     fn accept(
         &mut self,
         slot: BodySlot,
         pose: Option<(Pose, [f64; 7])>,
+        declared: Option<Vec3>,
         deadline_ns: u64,
         young: bool,
     ) {
         let mut moved = false;
         if let Some((pose, raw)) = pose {
-            moved = self.place(slot, &pose);
+            moved = self.travel(slot, &pose, declared);
             let entry = &mut self.entries[slot.index()];
             entry.raw = raw;
             entry.has_pose = true;
             entry.refused = false;
+        } else if let Some(at) = self.body(slot).filter(|b| b.path.is_some()).map(|b| b.pose) {
+            // It stands still for a leg, or has turned about itself by whole turns.
+            moved = self.travel(slot, &at, declared);
         }
         let Some(body) = self.bodies[slot.index()].as_mut() else {
             return;

@@ -140,7 +140,7 @@ impl World {
             let (stamp_ns, since_ns, received_ns) =
                 (root.stamp_ns, root.since_ns, root.received_ns);
             let reject = root.reject;
-            let moved = self.place(slot, &pose);
+            let moved = self.place_attached(slot, &pose);
             if let Some(body) = self.bodies[slot.index()].as_mut() {
                 body.stamp_ns = stamp_ns;
                 body.since_ns = since_ns;

@@ -8,6 +8,8 @@ use crate::math::{Aabb, Point, Pose, displacement};
 use crate::shape::Shape;
 use crate::wire::{BodyStatus, EndCause, RejectReason};
 
+use super::path::Path;
+
 /// A shape at its place in a body.
 #[derive(Clone, Debug)]
 pub struct PlacedShape {
@@ -42,7 +44,9 @@ pub struct Body {
     pub radius: f64,
     /// How far it has moved, for certificates.
     pub motion: Motion,
-    /// Tight box at `pose`, widened by `report_within_m` and `reach_m`: its proxy.
+    /// Its way since the last tick, where it is continuous or a continuous body hangs on it.
+    pub path: Option<Box<Path>>,
+    /// Tight box at `pose` (of a continuous body: around its way), widened by `report_within_m` and `reach_m`: its proxy.
     pub proxy: Aabb,
     /// Whether its place is known.
     pub status: BodyStatus,

@@ -263,6 +263,7 @@ impl World {
             self.order.remove(at);
         }
         self.growing.retain(|&other| other != slot);
+        self.travelled.retain(|&other| other != slot);
         self.entries[slot.index()] = Entry::gone(slot);
         self.filters.bodies[slot.index()] = Hot::GONE;
         self.ages.set(slot, None, None);

@@ -62,6 +62,7 @@ impl World {
             if let Some(pose) = pose
                 && self.place(slot, pose)
             {
+                self.forget_way(slot);
                 self.settle(slot, true);
             }
         }
@@ -93,6 +94,7 @@ impl World {
                 self.requery(slot);
             }
         }
+        self.link_paths();
         // Their roots are settled now.
         for place in 0..self.attached.len() {
             let slot = self.attached[place];

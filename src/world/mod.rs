@@ -18,10 +18,12 @@ mod edit_rules;
 mod filters;
 mod lists;
 mod names;
+mod path;
 mod place;
 mod rules;
 mod source;
 mod tag;
+mod travel;
 mod validate;
 
 use std::sync::Arc;
@@ -30,6 +32,7 @@ pub use admit::Admission;
 pub use body::{Body, ChangeSet, Motion, PlacedShape, Removed};
 pub use edit::{Applied, Edit};
 pub use filters::{Because, Filters};
+pub use path::{Leg, Path};
 pub use source::SourceState;
 pub use tag::Tag;
 
@@ -82,6 +85,8 @@ pub struct World {
     attached: Vec<BodySlot>,
     /// Stale bodies whose reach still grows.
     growing: Vec<BodySlot>,
+    /// Bodies whose path has legs.
+    travelled: Vec<BodySlot>,
     lists: Lists,
     rejects: [u64; REJECTS_LEN],
     by_status: [u64; BodyStatus::ALL.len()],
@@ -171,6 +176,7 @@ impl World {
             resting: Vec::new(),
             attached: Vec::new(),
             growing: Vec::new(),
+            travelled: Vec::new(),
             lists: Lists::default(),
             rejects: [0; REJECTS_LEN],
             by_status: [0; BodyStatus::ALL.len()],
@@ -195,6 +201,7 @@ impl World {
             self.edited = false;
         }
         self.free.append(&mut self.resting);
+        self.end_travels();
     }
 
     /// What this tick changed so far; complete after [`World::age`].

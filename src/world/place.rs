@@ -9,6 +9,7 @@ use super::body::{Body, Motion, PlacedShape};
 use super::filters::{Hot, KEEPS};
 use super::names::NameId;
 use super::tag::Tag;
+use super::path::Path;
 use crate::config::OnStale;
 use crate::ids::BodySlot;
 use crate::math::{Aabb, Point, Pose, ROUND};
@@ -37,7 +38,7 @@ pub(super) struct Entry {
     pub(super) twice: u64,
     /// Tick in which its pose, age or what is known of it last changed.
     pub(super) touched: u64,
-    /// Tight box at the body's pose.
+    /// Tight box at the body's pose; of a continuous body: around its way since the last tick.
     pub(super) tight: Aabb,
     /// By how much `Body::proxy` is wider than `tight`, metres.
     pub(super) widened_m: f64,
@@ -292,6 +293,12 @@ pub(super) fn new_body(
         .any(|s| matches!(s.shape.geometry, Geometry::HalfSpace { .. }));
     let (centre, radius) = sphere_around(&shapes, unbounded);
     let tight = tight_box(&shapes, &spec.pose);
+    // A half-space has no box and no ball about it: there is nothing to sweep.
+    let path = (spec.continuous && !unbounded).then(|| {
+        let mut path = Path::new(centre, radius, spec.teleport_m, true);
+        path.restart(tight);
+        Box::new(path)
+    });
     let body = Body {
         id: spec.id,
         name: spec.name.clone(),
@@ -304,6 +311,7 @@ pub(super) fn new_body(
         centre,
         radius,
         motion: Motion::at(&spec.pose),
+        path,
         proxy: tight.widened(spec.report_within_m),
         // Settled right after; until then it counts as what it is before anything is known.
         status: BodyStatus::NotReceived,

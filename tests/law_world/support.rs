@@ -89,6 +89,7 @@ pub(crate) fn moving(name: &str, id: u64) -> BodySpec {
         pose: Pose::identity(),
         moves: true,
         continuous: false,
+        teleport_m: None,
         source: Some(0),
         ros_frame: None,
         ros_topic: None,

@@ -76,6 +76,7 @@ fn any_body(rng: &mut Rng, kind: usize, s: f64, id: u64, group: u32) -> (Body, B
         pose: Pose::identity(),
         moves: true,
         continuous: false,
+        teleport_m: None,
         source: Some(0),
         ros_frame: None,
         ros_topic: None,

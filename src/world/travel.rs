@@ -1,0 +1,172 @@
+//! Continuous bodies on their way: poses become legs of a path, and the path a box; in the next tick the box is tight again.
+//!
+//! In: admitted poses, and what the sender says of the spin. Out: paths of bodies and of what hangs on them. A body that was
+//! not in the broad phase in the last pose has no path: a first pose, one after a reset, an edit are no motion.
+
+use super::World;
+use super::census::slot_at;
+use super::path::Path;
+use super::place::tight_box;
+use crate::ids::BodySlot;
+use crate::math::{Aabb, Pose, Vec3};
+
+impl World {
+    /// Bodies with a path in this tick: those that are swept, and those that only carry one that is. Complete after
+    /// [`World::age`].
+    #[must_use]
+    pub fn travelled(&self) -> &[BodySlot] {
+        &self.travelled
+    }
+
+    /// Whether a continuous body's step in this tick was a teleport by what the scene says.
+    #[must_use]
+    pub fn has_teleported(&self) -> bool {
+        let path = |slot: &BodySlot| self.body(*slot)?.path.as_ref();
+        self.travelled
+            .iter()
+            .filter_map(path)
+            .any(|path| path.has_jumped())
+    }
+
+    /// A tick begins: what lay before it has been told, boxes are tight again.
+    pub(super) fn end_travels(&mut self) {
+        for at in 0..self.travelled.len() {
+            let slot = self.travelled[at];
+            let entry = &mut self.entries[slot.index()];
+            let Some(body) = self.bodies[slot.index()].as_mut() else {
+                continue;
+            };
+            let Some(path) = body.path.as_mut() else {
+                continue;
+            };
+            if path.rest() {
+                entry.tight = *path.hull();
+                body.proxy = entry.tight.widened(entry.widened_m);
+                if body.in_broad {
+                    self.lists.moved(slot);
+                }
+            }
+        }
+        self.travelled.clear();
+    }
+
+    /// As [`World::place`], for a pose that a frame has: a continuous body goes there.
+    ///
+    /// * `declared` - its angular velocity times the time since its last pose, where the sender says both.
+    /// * returns - whether pose or box changed.
+    pub(super) fn travel(&mut self, slot: BodySlot, pose: &Pose, declared: Option<Vec3>) -> bool {
+        let Some((from, path)) = self.take_path(slot) else {
+            return self.place(slot, pose);
+        };
+        let moved = self.place(slot, pose);
+        self.lay(slot, path, moved, |path, end| {
+            path.push(from, *pose, declared, end)
+        })
+    }
+
+    /// As [`World::place`], for a body that hangs on another: a continuous one goes the other's way.
+    pub(super) fn place_attached(&mut self, slot: BodySlot, pose: &Pose) -> bool {
+        let Some((_, path)) = self.take_path(slot) else {
+            return self.place(slot, pose);
+        };
+        let moved = self.place(slot, pose);
+        let entry = &self.entries[slot.index()];
+        let (root, local) = (entry.root, entry.root_pose);
+        let shapes = self.body(slot).map(|body| body.shapes.clone());
+        // Taken out for the loan, and put back.
+        let of_root = self.take_path(root);
+        let moved = self.lay(slot, path, moved, |path, end| {
+            let before = *path.hull();
+            match (&of_root, &shapes) {
+                (Some((_, root)), Some(shapes)) => path.follow(root, &local, shapes, end),
+                _ => path.restart(end),
+            }
+            *path.hull() != before
+        });
+        if let (Some(body), Some((_, path))) = (self.bodies[root.index()].as_mut(), of_root) {
+            body.path = Some(path);
+        }
+        moved
+    }
+
+    fn take_path(&mut self, slot: BodySlot) -> Option<(Pose, Box<Path>)> {
+        let body = self.bodies[slot.index()].as_mut()?;
+        Some((body.pose, body.path.take()?))
+    }
+
+    /// Gives a placed body its path back, with what `go` adds to it; whether pose or box changed.
+    fn lay(
+        &mut self,
+        slot: BodySlot,
+        mut path: Box<Path>,
+        moved: bool,
+        go: impl FnOnce(&mut Path, Aabb) -> bool,
+    ) -> bool {
+        let entry = &mut self.entries[slot.index()];
+        let Some(body) = self.bodies[slot.index()].as_mut() else {
+            return moved;
+        };
+        // Where it was placed, its box is new and tight.
+        let end = if moved { entry.tight } else { *path.end() };
+        let grown = if body.in_broad {
+            let was_empty = path.is_empty();
+            let grown = go(&mut path, end);
+            if was_empty && !path.is_empty() {
+                self.travelled.push(slot);
+            }
+            grown
+        } else {
+            path.restart(end);
+            false
+        };
+        entry.tight = *path.hull();
+        body.path = Some(path);
+        moved || grown
+    }
+
+    /// A body stands where an edit put it: that is no way.
+    pub(super) fn forget_way(&mut self, slot: BodySlot) {
+        let entry = &mut self.entries[slot.index()];
+        if let Some(body) = self.bodies[slot.index()].as_mut()
+            && let Some(path) = body.path.as_mut()
+        {
+            path.restart(tight_box(&body.shapes, &body.pose));
+            entry.tight = *path.hull();
+        }
+    }
+
+    /// Sees to it that continuous bodies that hang on another turn about its centre, and that it keeps its way for them.
+    pub(super) fn link_paths(&mut self) {
+        for index in 0..self.bodies.len() {
+            let slot = slot_at(index);
+            let Some(body) = self.body(slot).filter(|body| body.path.is_some()) else {
+                continue;
+            };
+            let entry = &self.entries[index];
+            let (root, local) = (entry.root, entry.root_pose);
+            let Some(root_body) = self.body(root).filter(|root| !root.unbounded) else {
+                continue;
+            };
+            let pivot = local.inverse_transform_point(&root_body.centre);
+            let arm = (pivot - body.centre).norm();
+            let reach = (body.radius + arm) * (1.0 + 8.0 * f64::EPSILON);
+            let (centre, radius, has) =
+                (root_body.centre, root_body.radius, root_body.path.is_some());
+            let tight = self.entries[root.index()].tight;
+            if root != slot
+                && !has
+                && let Some(body) = self.bodies[root.index()].as_mut()
+            {
+                let mut path = Path::new(centre, radius, None, false);
+                path.restart(tight);
+                body.path = Some(Box::new(path));
+            }
+            if let Some(path) = self.bodies[index]
+                .as_mut()
+                .and_then(|body| body.path.as_mut())
+            {
+                path.set_pivot(pivot, reach);
+            }
+        }
+    }
+}
