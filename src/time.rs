@@ -136,6 +136,14 @@ impl Budget {
     }
 }
 
+/// A part of what a [`Meter`] has left, so that one job leaves something to another.
+#[derive(Clone, Copy, Debug)]
+pub struct Share {
+    /// Units charged when it is used up.
+    units: u64,
+    end_ns: Option<u64>,
+}
+
 /// Spends a budget: counts units and, now and then, looks at the clock.
 pub struct Meter<'a> {
     clock: &'a dyn Clock,
@@ -242,6 +250,26 @@ impl<'a> Meter<'a> {
     pub fn has_ns(&self, ns: u64) -> bool {
         (self.deadline_ns)
             .is_none_or(|end_ns| self.clock.monotonic_ns().saturating_add(ns) < end_ns)
+    }
+
+    /// Half of what is left now.
+    #[must_use]
+    pub fn half(&self) -> Share {
+        let half_ns = |end_ns: u64| {
+            let now_ns = self.clock.monotonic_ns();
+            now_ns + end_ns.saturating_sub(now_ns) / 2
+        };
+        Share {
+            units: self.units_spent.saturating_add(self.units_left / 2),
+            end_ns: self.deadline_ns.map(half_ns),
+        }
+    }
+
+    /// Whether a share is not used up.
+    #[must_use]
+    pub fn within(&self, share: Share) -> bool {
+        let in_time = |end_ns: u64| self.clock.monotonic_ns() < end_ns;
+        self.units_spent < share.units && share.end_ns.is_none_or(in_time)
     }
 
     /// Units charged so far.

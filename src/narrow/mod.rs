@@ -27,6 +27,7 @@ mod memo;
 mod order;
 mod query;
 mod spend;
+mod sweep;
 mod widen;
 
 pub use ask::{Asked, gap_between};
@@ -34,6 +35,7 @@ pub use contacts::{Contact, ContactSet};
 pub use finding::Finding;
 pub use memo::Witness;
 pub use order::Order;
+pub use sweep::{Passage, Swept};
 
 use crate::ids::{BodySlot, PairSlot};
 use crate::pairs::{PairDelta, PairSet};
@@ -46,6 +48,7 @@ use cursor::Cursor;
 use memo::{Hot, Memo};
 use mesh::{CarriedFront, FrontStore, Search};
 use order::Urgency;
+use sweep::Sweeps;
 
 /// What the narrow phase did in this tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -91,6 +94,7 @@ pub struct Narrow {
     /// Contacts that cursors have found.
     found_store: Arena<Contact>,
     search: Search,
+    sweeps: Sweeps,
     contact_sets: Pool<ContactSet>,
     /// What the order of work asks of each pair, by `PairSlot`.
     urgencies: Vec<Urgency>,
@@ -164,6 +168,7 @@ impl Narrow {
         if !std::mem::take(&mut self.left_is_news) {
             self.left.clear();
         }
+        self.clear_sweeps();
         self.carry_over();
         self.note_bodies(world);
         self.note_missing(pairs);
@@ -175,9 +180,15 @@ impl Narrow {
         }
     }
 
-    /// Spends the meter: verdicts first, then what is listened to. Returns whether everything asked for is done.
+    /// Spends the meter: what lies between the poses, verdicts, then what is listened to. Returns whether everything asked
+    /// for is done.
     pub fn spend(&mut self, world: &World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
-        self.spend_on_verdicts(world, wanted, meter) && self.spend_on_reports(world, wanted, meter)
+        let half = self.has_sweeps().then(|| meter.half());
+        let swept = self.spend_on_sweeps(world, wanted, meter, half);
+        let decided = self.spend_on_verdicts(world, wanted, meter);
+        let swept = swept || self.spend_on_sweeps(world, wanted, meter, None);
+        self.close_sweeps(world);
+        decided && swept && self.spend_on_reports(world, wanted, meter)
     }
 
     /// As [`Narrow::spend`], after the tick's findings were taken: what is found now is told in the next tick.
@@ -185,7 +196,7 @@ impl Narrow {
         if !std::mem::replace(&mut self.left_is_news, true) {
             self.left.clear();
         }
-        self.spend(world, wanted, meter)
+        self.spend_on_verdicts(world, wanted, meter) && self.spend_on_reports(world, wanted, meter)
     }
 
     /// Pairs whose verdict is not `apart`, in no order that means anything.

@@ -147,6 +147,10 @@ impl Narrow {
     pub(super) fn line_up(&mut self, work: &[PairSlot], order: Order) -> Line {
         self.keyed.clear();
         if order != Order::AsFound {
+            // Room for every pair at once: how many are undecided creeps up for long where work is cut off.
+            if self.keyed.capacity() < work.len() {
+                self.keyed.reserve(self.hot.len());
+            }
             let (urgencies, tick) = (&self.urgencies, self.tick);
             let ranked = |&slot: &PairSlot| (urgencies[slot.index()].rank(tick), slot);
             self.keyed.extend(work.iter().map(ranked));

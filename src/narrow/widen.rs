@@ -14,6 +14,7 @@ impl Narrow {
     ///
     /// Undecided pairs of earlier ticks are in the work list already; this adds those that have become undecided.
     pub fn widen(&mut self, world: &World, pairs: &PairSet) {
+        self.enlist_sweeps(world, pairs);
         let changes = world.changes();
         for &body in &changes.requery {
             for slot in pairs.pairs_of(body) {

@@ -1,0 +1,374 @@
+//! Continuous bodies: whether two touch on the way from the last tick's poses to this one's, and when.
+//!
+//! In: the paths that the world keeps, a [`Meter`]. Out: for each pair with a body that was swept, what is known of the way
+//! ([`Passage`]): free of touch, a touch within an interval of the share `s`, or not decided. The verdicts at this tick's
+//! poses are not concerned.
+//!
+//! How: what the pair's certificate says of the last tick's poses, less the length of the way, is free. Else conservative
+//! advancement (see `advance`): from a share that is reached without touch, the pair surely goes on for a while; so the touch
+//! is approached from before it and never passed over. That there is one is certified by a pose at which the two are known
+//! to collide, sought just behind the share reached, by the slope of the gap.
+//!
+//! Sweeps come before the verdicts, because another tick has other poses: what is undecided at the end of this one is told as
+//! open. They take half of what the budget leaves, so that verdicts do not starve, and what verdicts leave.
+//!
+//! Refused: sampling (a wall is as thin as it likes); looking for the touch by bisection of the verdict (a bullet that ends
+//! behind the wall is apart at both ends); keeping an undecided sweep for later (nobody asks for it any more).
+
+mod advance;
+mod motion;
+
+use crate::ids::{BodySlot, PairSlot};
+use crate::math::Interval;
+use crate::pairs::PairSet;
+use crate::time::{Meter, Share};
+use crate::world::{Body, World};
+
+use super::exact::Warm;
+use super::memo::{Memo, relative_motion};
+use super::order::Order;
+use super::{NONE, Narrow, Wanted};
+
+use advance::{Ahead, Tools, Work};
+use motion::{Moment, reach_of, way};
+
+/// Looks at a pair before the next one has its turn.
+const SLICE_LOOKS: u32 = 8;
+/// Looks at a pair in all: what grazes, or turns about itself near a mesh, must end. A touch takes 5 to 40.
+const LOOKS_MAX: u32 = 160;
+/// A touch is bracketed by shares as near as this: a thousandth of what is promised.
+const CLOSE_ENOUGH: f64 = 1e-9;
+/// A sweep that has not come nearer than this in so many looks is asked for a touch ahead of it.
+const PATIENCE_LOOKS: u32 = 8;
+/// An advance by less has all but met the touch.
+const CREEP: f64 = 1e-10;
+/// Products of shares and times are off by some units of roundoff.
+const SHORT: f64 = 1.0 - 1e-12;
+
+/// What is known of a pair's way from the last tick's poses to this one's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Passage {
+    /// They did not touch before the end.
+    Free,
+    /// They touched: the first touch is within these shares of the motion.
+    Touched(Interval),
+    /// Not decided: if they touched, then within these shares.
+    Open(Interval),
+}
+
+/// A pair's sweep in this tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Swept {
+    /// The pair.
+    pub slot: PairSlot,
+    /// What is known of its way.
+    pub passage: Passage,
+    /// A body of it jumped: that part of the way was not asked.
+    pub jumped: bool,
+}
+
+/// A sweep under way.
+#[derive(Debug)]
+struct Sweep {
+    slot: PairSlot,
+    a: BodySlot,
+    b: BodySlot,
+    done: bool,
+    jumped: bool,
+    /// Free of touch up to here.
+    free: f64,
+    /// A share at which they are known to touch; infinite: none is known.
+    hit: f64,
+    looks: u32,
+    probes: u32,
+    /// Share and gap at the last look.
+    last: (f64, f64),
+    /// How fast the gap shrank between the last two looks, metres a share.
+    slope: f64,
+    warm: Warm,
+}
+
+/// The sweeps of a tick, and what is kept to do them with.
+#[derive(Debug, Default)]
+pub(super) struct Sweeps {
+    list: Vec<Sweep>,
+    /// Place in `list` by `PairSlot`; as long as the highest slot that was ever swept.
+    places: Vec<u32>,
+    tools: Tools,
+    /// This tick's have been told: nothing more is to be found out.
+    told: bool,
+}
+
+impl Narrow {
+    /// The pairs with a body that was swept in this tick, in no order that means anything.
+    pub fn swept(&self) -> impl Iterator<Item = Swept> + '_ {
+        self.sweeps.list.iter().map(Sweep::outcome)
+    }
+
+    /// What is known of a pair's way; `None`: nothing of it was swept.
+    #[must_use]
+    pub fn passage(&self, slot: PairSlot) -> Option<Swept> {
+        let at = *self.sweeps.places.get(slot.index())?;
+        self.sweeps.list.get(at as usize).map(Sweep::outcome)
+    }
+
+    /// Whether there is anything to sweep in this tick.
+    pub(super) fn has_sweeps(&self) -> bool {
+        !self.sweeps.list.is_empty()
+    }
+
+    /// Forgets the sweeps of the tick before.
+    pub(super) fn clear_sweeps(&mut self) {
+        let Sweeps {
+            list, places, told, ..
+        } = &mut self.sweeps;
+        for sweep in list.drain(..) {
+            places[sweep.slot.index()] = NONE;
+        }
+        *told = false;
+    }
+
+    /// Lists the pairs of the bodies that were swept, with what is known of them for nothing.
+    pub(super) fn enlist_sweeps(&mut self, world: &World, pairs: &PairSet) {
+        for &slot in world.travelled() {
+            let body = world.body(slot).filter(|body| body.in_broad);
+            if body.is_none_or(|body| way(body).is_none()) {
+                continue;
+            }
+            for pair in pairs.pairs_of(slot) {
+                let hot = self.hot[pair.index()];
+                let memo = &self.memos[pair.index()];
+                let (Some(a), Some(b)) = (world.body(hot.a), world.body(hot.b)) else {
+                    continue;
+                };
+                let Sweeps { list, places, .. } = &mut self.sweeps;
+                if places.len() <= pair.index() {
+                    places.resize(self.hot.len(), NONE);
+                }
+                if hot.live && places[pair.index()] == NONE {
+                    places[pair.index()] = u32::try_from(list.len()).unwrap_or(NONE);
+                    list.push(Sweep::begin((pair, hot.a, hot.b), (a, b), memo));
+                }
+            }
+        }
+    }
+
+    /// Works on sweeps while the meter is open, for at most this share of it; whether all are decided.
+    pub(super) fn spend_on_sweeps(
+        &mut self,
+        world: &World,
+        wanted: Wanted,
+        meter: &mut Meter<'_>,
+        share: Option<Share>,
+    ) -> bool {
+        if self.sweeps.told || self.sweeps.list.iter().all(|sweep| sweep.done) {
+            return true;
+        }
+        if wanted.order == Order::Counted {
+            self.order_sweeps(world);
+        }
+        let Self {
+            sweeps,
+            counters,
+            memos,
+            ..
+        } = self;
+        let Sweeps { list, tools, .. } = sweeps;
+        let mut work = Work {
+            tools,
+            counters,
+            meter,
+        };
+        let mut open = true;
+        while open {
+            open = false;
+            for sweep in list.iter_mut().filter(|sweep| !sweep.done) {
+                let within = share.is_none_or(|share| work.meter.within(share));
+                if !within || !work.meter.open() {
+                    open = false;
+                    break;
+                }
+                if let (Some(a), Some(b)) = (world.body(sweep.a), world.body(sweep.b)) {
+                    sweep.turn((a, b), &mut work);
+                    open |= !sweep.done;
+                    // Where they are next asked for their gap.
+                    memos[sweep.slot.index()].warm = sweep.warm;
+                }
+            }
+        }
+        work.release();
+        self.sweeps.list.iter().all(|sweep| sweep.done)
+    }
+
+    /// Sweeps are told: a row shows the gap of this tick's poses beside the touch on the way.
+    pub(super) fn close_sweeps(&mut self, world: &World) {
+        for at in 0..self.sweeps.list.len() {
+            let sweep = self.sweeps.list[at].outcome();
+            if sweep.passage != Passage::Free {
+                self.widen_pair(sweep.slot, world);
+            }
+        }
+        self.sweeps.told = true;
+    }
+
+    /// By body ids, so that a budget of units is spent alike whatever the slots are.
+    fn order_sweeps(&mut self, world: &World) {
+        let id = |slot| world.body(slot).map(|body| body.id);
+        let Sweeps { list, places, .. } = &mut self.sweeps;
+        list.sort_unstable_by_key(|sweep| (id(sweep.a), id(sweep.b)));
+        for (at, sweep) in list.iter().enumerate() {
+            places[sweep.slot.index()] = u32::try_from(at).unwrap_or(NONE);
+        }
+    }
+}
+
+impl Sweep {
+    /// A pair's sweep, and what is known of it before any look.
+    fn begin(
+        (slot, at_a, at_b): (PairSlot, BodySlot, BodySlot),
+        (a, b): (&Body, &Body),
+        memo: &Memo,
+    ) -> Self {
+        let paths = || [a, b].into_iter().filter_map(way);
+        let jumped = paths().any(crate::world::Path::has_jumped);
+        let mut sweep = Self {
+            slot,
+            a: at_a,
+            b: at_b,
+            done: false,
+            jumped,
+            free: 0.0,
+            hit: f64::INFINITY,
+            looks: 0,
+            probes: 0,
+            last: (f64::NAN, f64::NAN),
+            slope: 0.0,
+            warm: memo.warm,
+        };
+        let start = Moment::of((a, b), 0.0);
+        let change = relative_motion(a, b, &memo.rel, &start.rel);
+        let touching = change == 0.0 && memo.finished && memo.gap.contains(0.0);
+        if start.certain && (touching || memo.gap.max + change <= 0.0) {
+            (sweep.hit, sweep.done) = (0.0, true);
+        } else if paths().any(crate::world::Path::is_blurred) {
+            sweep.done = true;
+        } else if !jumped {
+            let low_m = (memo.gap.min - change - start.slop).next_down();
+            if low_m > 0.0 && low_m > length((a, b)) {
+                (sweep.free, sweep.done) = (1.0, true);
+            }
+        }
+        sweep
+    }
+
+    fn outcome(&self) -> Swept {
+        let until = |end: f64| Interval {
+            min: self.free.min(end),
+            max: end,
+        };
+        let passage = if self.hit.is_finite() {
+            Passage::Touched(until(self.hit))
+        } else if self.free >= 1.0 {
+            Passage::Free
+        } else {
+            Passage::Open(until(1.0))
+        };
+        Swept {
+            slot: self.slot,
+            passage,
+            jumped: self.jumped,
+        }
+    }
+
+    /// Some looks; ends early where the sweep is decided, given up, or the meter closes.
+    fn turn(&mut self, bodies: (&Body, &Body), work: &mut Work<'_, '_>) {
+        let stop = self.looks + SLICE_LOOKS;
+        while !self.done && self.looks < stop && work.meter.open() {
+            if self.free >= 1.0 || self.looks >= LOOKS_MAX {
+                self.done = true;
+                return;
+            }
+            let moment = Moment::of(bodies, self.free);
+            if moment.jumps() {
+                self.free = moment.until;
+                self.last = (f64::NAN, f64::NAN);
+                continue;
+            }
+            self.looks += 1;
+            let ahead = work.look(bodies, &moment, f64::INFINITY, &mut self.warm);
+            let step = match ahead {
+                Ahead::Cut => return,
+                Ahead::Touch => {
+                    (self.hit, self.done) = (self.free, true);
+                    return;
+                }
+                Ahead::Unsure => 0.0,
+                Ahead::Free { time, gap_m } => self.go_on(&moment, time, gap_m),
+            };
+            self.close_in(bodies, step, work);
+        }
+    }
+
+    /// Advances; returns by how much.
+    fn go_on(&mut self, moment: &Moment, time: f64, gap_m: f64) -> f64 {
+        let here = self.free;
+        let (last_s, last_m) = self.last;
+        if here > last_s && gap_m < last_m {
+            self.slope = (last_m - gap_m) / (here - last_s);
+        }
+        self.last = (here, gap_m);
+        self.free = (here + time * SHORT).min(moment.until).max(here);
+        self.free - here
+    }
+
+    /// Looks for a pose behind the share reached at which they surely touch, or one nearer than the one known.
+    fn close_in(&mut self, bodies: (&Body, &Body), step: f64, work: &mut Work<'_, '_>) {
+        let known = self.hit.is_finite();
+        if known && self.hit - self.free <= CLOSE_ENOUGH {
+            self.done = true;
+            return;
+        }
+        let creeps = step < CREEP || self.looks.is_multiple_of(PATIENCE_LOOKS);
+        let near = known && step < 0.1 * (self.hit - self.free);
+        if !(creeps && !known || near) || self.free >= 1.0 || !work.meter.open() {
+            return;
+        }
+        let behind = if known {
+            0.3 * (self.hit - self.free)
+        } else {
+            let gap_m = self.last.1.max(0.0);
+            let ahead = if self.slope > 0.0 {
+                gap_m / self.slope
+            } else {
+                step
+            };
+            // Each one that finds nothing goes farther.
+            let factor = 4.0_f64.powi(i32::try_from(self.probes.min(12)).unwrap_or(12));
+            let missing = if ahead.is_finite() { ahead } else { 0.0 };
+            1.05 * (missing - step).max(0.0) + factor * 0.4 * CREEP
+        };
+        let at = (self.free + behind).min(1.0);
+        let moment = Moment::of(bodies, at);
+        self.probes += 1;
+        self.looks += 1;
+        if moment.jumps() {
+            return;
+        }
+        let mut warm = self.warm;
+        if let Ahead::Touch = work.look(bodies, &moment, 0.0, &mut warm) {
+            (self.hit, self.probes) = (at, 0);
+        }
+    }
+}
+
+/// No point of the one goes farther than this seen from the other, metres.
+fn length(bodies: (&Body, &Body)) -> f64 {
+    let (mut s, mut sum) = (0.0, 0.0);
+    while s < 1.0 {
+        let moment = Moment::of(bodies, s);
+        sum += moment.speed(reach_of(bodies.0), reach_of(bodies.1)) * (moment.until - s);
+        sum += 2.0 * moment.slop;
+        s = moment.until;
+    }
+    sum * (1.0 + 1e-12)
+}

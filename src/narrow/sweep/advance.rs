@@ -1,0 +1,387 @@
+//! How far two bodies surely go on without touching: conservative advancement, from one share of the motion.
+//!
+//! In: a moment of the motion. Out: a time for which they stay apart, or that they touch. Every shape pair says its own time,
+//! and the least holds. Three bounds, the first that is good enough:
+//! - balls about the shapes, along the line between them;
+//! - convex pairs: the slab between them along the normal of the exact query. Its width goes down no faster than the
+//!   support points in a slightly turned direction say (see [`Slab::free_for`]), so the advance ends at the touch after a
+//!   few queries, also where bodies turn;
+//! - meshes: a lower bound of the gap from the trees, over the greatest speed of any point.
+//!
+//! Source: Mirtich 1996, "Impulse-based dynamic simulation of rigid body systems", section 2.3 (conservative advancement);
+//! the slab is the directional bound of Zhang, Lee and Kim 2006 (FAST), with one term more.
+
+use crate::math::{Interval, Pose, ROUND, Vec3};
+use crate::narrow::Counters;
+use crate::narrow::exact::Warm;
+use crate::narrow::mesh::{FrontStore, Goal, MeshQuery};
+use crate::narrow::query::{is_simple, shape_gap, shape_pose, sound, sphere_bound};
+use crate::shape::Geometry;
+use crate::time::Meter;
+use crate::world::{Body, PlacedShape};
+
+use super::motion::{Moment, Span};
+
+/// Balls are good enough while they are apart by this share of the smaller one's radius: then a query would gain little.
+const BALLS_ENOUGH: f64 = 0.5;
+/// A mesh pair's bound is good enough at this share of the distance: more work would advance little farther.
+const BOUND_ENOUGH: f64 = 0.75;
+/// Units between two looks at a mesh pair's bound.
+const MESH_UNITS: u64 = 16;
+
+/// What is known of two bodies from a moment on.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Ahead {
+    /// They do not touch for so long (in shares of the motion); where they are nearest they are apart by `gap_m`.
+    Free { time: f64, gap_m: f64 },
+    /// They touch here.
+    Touch,
+    /// Rounding leaves open whether they touch here.
+    Unsure,
+    /// The meter closed.
+    Cut,
+}
+
+/// What queries need beside the bodies; kept over pairs and ticks. Fronts of their own: in the store of those that are
+/// carried, what comes and goes in a look would find another room in each tick.
+#[derive(Debug, Default)]
+pub(super) struct Tools {
+    fronts: FrontStore,
+    meshes: MeshQuery,
+}
+
+/// Where work is done.
+pub(super) struct Work<'w, 'm> {
+    pub(super) tools: &'w mut Tools,
+    pub(super) counters: &'w mut Counters,
+    pub(super) meter: &'w mut Meter<'m>,
+}
+
+impl Work<'_, '_> {
+    /// Looks ahead from a moment.
+    ///
+    /// * `wanted` - a time that is enough: what is farther is not looked into.
+    pub(super) fn look(
+        &mut self,
+        (a, b): (&Body, &Body),
+        moment: &Moment,
+        wanted: f64,
+        warm: &mut Warm,
+    ) -> Ahead {
+        let (mut least, mut nearest_m, mut unsure) = (wanted, f64::INFINITY, false);
+        for one in a.shapes.iter() {
+            for other in b.shapes.iter() {
+                if !self.meter.open() {
+                    return Ahead::Cut;
+                }
+                match self.shapes((one, other), moment, least, warm) {
+                    Ahead::Free { time, gap_m } => {
+                        if time < least || gap_m < nearest_m {
+                            nearest_m = gap_m;
+                        }
+                        least = least.min(time);
+                    }
+                    Ahead::Unsure => unsure = true,
+                    end => return end,
+                }
+            }
+        }
+        if unsure {
+            return Ahead::Unsure;
+        }
+        Ahead::Free {
+            time: least,
+            gap_m: nearest_m,
+        }
+    }
+
+    /// As [`Work::look`], of two shapes.
+    fn shapes(
+        &mut self,
+        (one, other): (&PlacedShape, &PlacedShape),
+        moment: &Moment,
+        enough: f64,
+        warm: &mut Warm,
+    ) -> Ahead {
+        let bound_m = sphere_bound(one, other, &moment.rel) - moment.slop;
+        if bound_m > 0.0 {
+            let time = balls(one, other, moment, bound_m);
+            let near_m = BALLS_ENOUGH * one.shape.radius.min(other.shape.radius);
+            if time >= enough || bound_m > near_m {
+                self.meter.charge(1);
+                return Ahead::Free {
+                    time,
+                    gap_m: bound_m,
+                };
+            }
+        }
+        let pos12 = shape_pose(one, other, &moment.rel);
+        if !is_simple(&one.shape, &other.shape) {
+            return self.mesh_pair((one, other), moment, &pos12, enough);
+        }
+        let Some(closest) = shape_gap(&one.shape, &other.shape, &pos12, warm) else {
+            return Ahead::Unsure;
+        };
+        self.counters.queries += 1;
+        self.meter.charge_dear(1);
+        let gap = widened(sound(closest.gap, one, other, &moment.rel), moment.slop);
+        if gap.min > 0.0 {
+            let normal = moment.a.pose.rotation * (one.pose.rotation * closest.normal);
+            let slab = Slab::new((one, other), moment, normal, gap.min);
+            let time = slab.free_for(closest.best_m);
+            return Ahead::Free {
+                time,
+                gap_m: closest.best_m,
+            };
+        }
+        touch(gap, closest.finished && moment.certain)
+    }
+
+    /// As [`Work::shapes`], where one of the two is a mesh.
+    fn mesh_pair(
+        &mut self,
+        (one, other): (&PlacedShape, &PlacedShape),
+        moment: &Moment,
+        pos12: &Pose,
+        enough: f64,
+    ) -> Ahead {
+        let speed = moment.speed(arm(one, &moment.a).1, arm(other, &moment.b).1);
+        let shapes = (&*one.shape, &*other.shape);
+        let Tools { fronts, meshes } = &mut *self.tools;
+        meshes.start(fronts, shapes.0, shapes.1, pos12);
+        self.counters.slices += 1;
+        loop {
+            let done = meshes.advance(fronts, shapes, Goal::Gap, MESH_UNITS, self.meter);
+            let gap = widened(
+                sound(meshes.interval(), one, other, &moment.rel),
+                moment.slop,
+            );
+            let time = (gap.min / speed).max(0.0);
+            let good = gap.min > 0.0 && (time >= enough || gap.min >= BOUND_ENOUGH * gap.max);
+            if gap.max <= 0.0 {
+                return Ahead::Touch;
+            }
+            if done && gap.min <= 0.0 {
+                return touch(gap, meshes.is_certain() && moment.certain);
+            }
+            if done || good {
+                return Ahead::Free {
+                    time,
+                    gap_m: gap.min,
+                };
+            }
+            if !self.meter.open() {
+                return Ahead::Cut;
+            }
+        }
+    }
+
+    /// Gives memory back.
+    pub(super) fn release(&mut self) {
+        let Tools { fronts, meshes } = &mut *self.tools;
+        meshes.release(fronts);
+    }
+}
+
+/// What an interval that holds 0 says.
+fn touch(gap: Interval, finished: bool) -> Ahead {
+    if gap.max <= 0.0 || finished {
+        Ahead::Touch
+    } else {
+        Ahead::Unsure
+    }
+}
+
+fn widened(gap: Interval, slop: f64) -> Interval {
+    if slop == 0.0 { gap } else { gap.widened(slop) }
+}
+
+/// Distance of a shape's centre from the pivot, and of its farthest point.
+fn arm(placed: &PlacedShape, span: &Span) -> (f64, f64) {
+    let arm = (placed.pose * placed.shape.centre - span.pivot).norm();
+    let arm = arm * (1.0 + 8.0 * ROUND) + 8.0 * ROUND * span.pivot.coords.amax();
+    (arm, arm + placed.shape.radius)
+}
+
+/// For how long two balls stay apart: along the line between their centres now.
+fn balls(one: &PlacedShape, other: &PlacedShape, moment: &Moment, bound_m: f64) -> f64 {
+    let (from, to) = (
+        moment.a.pose * (one.pose * one.shape.centre),
+        moment.b.pose * (other.pose * other.shape.centre),
+    );
+    let direction = (to - from).try_normalize(0.0).unwrap_or_else(Vec3::z);
+    // The farther apart, the better is the line known; what rounding may turn it by costs as much of the speed.
+    let velocity = moment.closing_velocity();
+    let turned = moment.a.swing(arm(one, &moment.a).0) + moment.b.swing(arm(other, &moment.b).0);
+    let off = 16.0 * ROUND * (velocity.amax() + turned);
+    let closing = -velocity.dot(&direction) + turned + off;
+    // A slab between two balls along one direction: as wide as they are apart.
+    let slack = 32.0
+        * ROUND
+        * (from.coords.amax() + to.coords.amax() + one.shape.radius + other.shape.radius);
+    time_of(bound_m - slack, closing)
+}
+
+fn time_of(gap_m: f64, closing: f64) -> f64 {
+    if gap_m <= 0.0 {
+        0.0
+    } else if closing <= 0.0 {
+        f64::INFINITY
+    } else {
+        gap_m / closing
+    }
+}
+
+/// The slab between two convex shapes that are apart: along a fixed direction, everything of A lies below it, everything of
+/// B above.
+struct Slab<'a> {
+    shapes: (&'a PlacedShape, &'a PlacedShape),
+    moment: &'a Moment,
+    /// Unit, scene frame, from A to B.
+    normal: Vec3,
+    /// Its width is no less, metres.
+    width_m: f64,
+    /// Greatest distances of the two from their pivots, metres.
+    reach: (f64, f64),
+}
+
+impl<'a> Slab<'a> {
+    fn new(
+        shapes: (&'a PlacedShape, &'a PlacedShape),
+        moment: &'a Moment,
+        normal: Vec3,
+        gap_m: f64,
+    ) -> Self {
+        let reach = (arm(shapes.0, &moment.a).1, arm(shapes.1, &moment.b).1);
+        let mut slab = Self {
+            shapes,
+            moment,
+            normal,
+            width_m: gap_m,
+            reach,
+        };
+        // Asked of the shapes themselves where they have an extent: the normal has been turned into the scene's frame.
+        if reach.0.is_finite() && reach.1.is_finite() {
+            let between = (moment.b.at - moment.a.at).dot(&normal);
+            let width = between - slab.extent_b(&normal) - slab.extent_a(&normal);
+            slab.width_m = gap_m.min(width - slab.rounding(1.0) - moment.slop);
+        }
+        slab
+    }
+
+    /// Rounding of extents along a direction of this length, metres.
+    fn rounding(&self, length: f64) -> f64 {
+        let of = |reach: f64| if reach.is_finite() { reach } else { 0.0 };
+        let far = (self.moment.b.at - self.moment.a.at).amax();
+        64.0 * ROUND * length * (of(self.reach.0) + of(self.reach.1) + far)
+    }
+
+    /// How far A extends from its pivot along `m`.
+    fn extent_a(&self, m: &Vec3) -> f64 {
+        extent(self.shapes.0, &self.moment.a, m)
+    }
+
+    /// How far B extends from its pivot against `m`.
+    fn extent_b(&self, m: &Vec3) -> f64 {
+        extent(self.shapes.1, &self.moment.b, &-m)
+    }
+
+    /// For how long the slab surely stays open.
+    ///
+    /// Of a point `a` of A and `b` of B, the width `n . (b - a)` is `f + t f' ` but for `t^2 / 2` times the greatest
+    /// centripetal acceleration; and `f + t f'` is a dot product with `n + t n x w`: so the least of all pairs of points is
+    /// again a matter of support points, in a direction turned a little. It is concave in `t`, hence above the lesser of
+    /// its values at both ends.
+    ///
+    /// * `best_m` - the distance, for a first guess.
+    fn free_for(&self, best_m: f64) -> f64 {
+        let (a, b) = (&self.moment.a, &self.moment.b);
+        let (across_a, across_b) = (self.normal.cross(&a.spin), self.normal.cross(&b.spin));
+        let closing = -self.moment.closing_velocity().dot(&self.normal);
+        let off = 16.0 * ROUND * self.moment.closing_velocity().amax();
+        let side = |span: &Span, across: &Vec3, reach: f64| {
+            if span.mixed {
+                span.swing(reach)
+            } else {
+                (across.norm() * (1.0 + 8.0 * ROUND) + 8.0 * ROUND * span.rate)
+                    * if span.rate == 0.0 { 0.0 } else { reach }
+            }
+        };
+        let swing = side(a, &across_a, self.reach.0) + side(b, &across_b, self.reach.1);
+        let plain = time_of(self.width_m, closing + swing + off);
+        let left = self.moment.until - self.moment.share;
+        if swing == 0.0 || a.mixed || b.mixed || plain >= left {
+            return plain;
+        }
+        let bend = (a.rate * a.swing(self.reach.0) + b.rate * b.swing(self.reach.1)) / 2.0
+            * (1.0 + 16.0 * ROUND);
+        // The closing speed where they are nearest: the first guess of when the slab is used up.
+        let near = closing + self.closing_of_extremes(&across_a, &across_b);
+        let mut time = root(best_m.min(self.width_m).max(0.0), near, bend).min(left);
+        for _ in 0..4 {
+            if time <= plain {
+                return plain;
+            }
+            if self.holds(time, (closing + off, bend), (&across_a, &across_b)) {
+                return time;
+            }
+            time *= 0.7;
+        }
+        plain
+    }
+
+    /// Closing speed that the turns add where the slab is touched.
+    fn closing_of_extremes(&self, across_a: &Vec3, across_b: &Vec3) -> f64 {
+        let at = |placed: &PlacedShape, span: &Span, m: &Vec3| {
+            point(placed, span, m).unwrap_or_default()
+        };
+        at(self.shapes.0, &self.moment.a, &self.normal).dot(across_a)
+            - at(self.shapes.1, &self.moment.b, &-self.normal).dot(across_b)
+    }
+
+    fn holds(
+        &self,
+        time: f64,
+        (closing, bend): (f64, f64),
+        (across_a, across_b): (&Vec3, &Vec3),
+    ) -> bool {
+        let change = |now: f64, then: f64| then - now;
+        let turned = |across: &Vec3| self.normal + across * time;
+        let (m_a, m_b) = (turned(across_a), turned(across_b));
+        let mut lost = closing * time;
+        if self.moment.a.rate != 0.0 {
+            lost += change(self.extent_a(&self.normal), self.extent_a(&m_a));
+        }
+        if self.moment.b.rate != 0.0 {
+            lost += change(self.extent_b(&self.normal), self.extent_b(&m_b));
+        }
+        let length = 2.0 + m_a.norm() + m_b.norm();
+        let curve = bend * time * time + self.rounding(length);
+        self.width_m - lost.max(0.0) > curve
+    }
+}
+
+/// Least positive root of `gap - closing t - bend t^2`; `bend` is positive.
+fn root(gap: f64, closing: f64, bend: f64) -> f64 {
+    let disc = (closing * closing + 4.0 * bend * gap).max(0.0).sqrt();
+    // The form that does not cancel.
+    if closing > 0.0 {
+        2.0 * gap / (closing + disc)
+    } else {
+        (disc - closing) / (2.0 * bend)
+    }
+}
+
+/// The point of a shape farthest along `m`, from the pivot, scene frame; `None` for what has no such point.
+fn point(placed: &PlacedShape, span: &Span, m: &Vec3) -> Option<Vec3> {
+    let Geometry::Convex(convex) = &placed.shape.geometry else {
+        return None;
+    };
+    let local = placed.pose.rotation.inverse() * (span.pose.rotation.inverse() * m);
+    let point = placed.pose * convex.support(&local);
+    Some(span.pose.rotation * (point - span.pivot))
+}
+
+fn extent(placed: &PlacedShape, span: &Span, m: &Vec3) -> f64 {
+    point(placed, span, m).map_or(0.0, |point| point.dot(m))
+}

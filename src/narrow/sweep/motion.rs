@@ -1,0 +1,166 @@
+//! Two bodies on their way: where they are at a share of it, and how fast they go there.
+//!
+//! In: bodies with their paths. Out: poses, velocities and the rounding to allow for. A body that is not continuous is where
+//! this tick has it, all the way; of one that jumps nothing is asked meanwhile.
+
+use crate::math::{Point, Pose, ROUND, Vec3, relative};
+use crate::world::{Body, Leg, Path};
+
+/// A body's motion for a while, per unit of the share: the pivot goes straight, the body turns about a fixed axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Span {
+    /// Share at which it ends.
+    pub(super) until: f64,
+    pub(super) pose: Pose,
+    /// Body frame.
+    pub(super) pivot: Point,
+    /// The pivot now, scene frame.
+    pub(super) at: Point,
+    /// Velocity of the pivot, scene frame.
+    pub(super) velocity: Vec3,
+    /// Angular velocity, scene frame; of a turn in two parts only [`Span::rate`] is meant.
+    pub(super) spin: Vec3,
+    /// Greatest angular speed.
+    pub(super) rate: f64,
+    /// It turns in two parts at once, so `spin` is no axis.
+    pub(super) mixed: bool,
+    pub(super) jump: bool,
+    /// How far rounding may put a point of the body off the way, metres.
+    pub(super) slop: f64,
+}
+
+/// The path of a body, where it is to be followed.
+pub(super) fn way(body: &Body) -> Option<&Path> {
+    body.path.as_deref().filter(|path| path.is_swept())
+}
+
+impl Span {
+    /// The motion of a body at share `s`.
+    pub(super) fn at(body: &Body, s: f64) -> Self {
+        let Some((path, leg, share, until, parts)) = way(body)
+            .and_then(|path| Some((path, leg_at(path.legs(), s)?)))
+            .map(|(path, (leg, share, until))| (path, leg, share, until, path.legs().len()))
+        else {
+            return Self::rest(body);
+        };
+        #[allow(clippy::cast_precision_loss, reason = "at most limits::LEGS_MAX")]
+        let per_share = parts as f64;
+        let pose = leg.at(share, path.pivot());
+        let far = leg.from.translation.vector.amax();
+        let far = far.max(leg.to.translation.vector.amax());
+        let size = path.pivot().coords.amax() + (1.0 + leg.angle()) * path.reach();
+        Self {
+            until,
+            pose,
+            pivot: *path.pivot(),
+            at: pose * path.pivot(),
+            velocity: leg.travel * per_share,
+            spin: leg.spin * per_share,
+            rate: leg.angle() * per_share * (1.0 + 8.0 * ROUND),
+            mixed: leg.extra != Vec3::zeros(),
+            jump: leg.jump,
+            // Two sums of coordinates that far out; all else is of the size of the body and its way.
+            slop: 16.0 * ROUND * far + 64.0 * ROUND * (size + per_share * leg.travel.amax()),
+        }
+    }
+
+    fn rest(body: &Body) -> Self {
+        Self {
+            until: 1.0,
+            pose: body.pose,
+            pivot: body.centre,
+            at: body.pose * body.centre,
+            velocity: Vec3::zeros(),
+            spin: Vec3::zeros(),
+            rate: 0.0,
+            mixed: false,
+            jump: false,
+            slop: 0.0,
+        }
+    }
+
+    /// `rate` times a distance from the pivot, also where the distance has no bound and the body does not turn.
+    pub(super) fn swing(&self, reach: f64) -> f64 {
+        if self.rate == 0.0 {
+            0.0
+        } else {
+            self.rate * reach
+        }
+    }
+}
+
+/// The leg at share `s`, the share of it, and the share at which it ends.
+fn leg_at(legs: &[Leg], s: f64) -> Option<(&Leg, f64, f64)> {
+    #[allow(clippy::cast_precision_loss, reason = "at most limits::LEGS_MAX")]
+    let (count, end_of) = (legs.len() as f64, |at: usize| {
+        (at + 1) as f64 / legs.len() as f64
+    });
+    // The last leg also where rounding says it is over.
+    let at = (0..legs.len())
+        .find(|&at| end_of(at) > s)
+        .or(legs.len().checked_sub(1))?;
+    #[allow(clippy::cast_precision_loss, reason = "as above")]
+    let share = (s * count - at as f64).clamp(0.0, 1.0);
+    Some((&legs[at], if s >= 1.0 { 1.0 } else { share }, end_of(at)))
+}
+
+/// Both bodies of a pair at a share of the motion.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moment {
+    pub(super) a: Span,
+    pub(super) b: Span,
+    /// Pose of B seen from A.
+    pub(super) rel: Pose,
+    /// The share.
+    pub(super) share: f64,
+    /// Share at which either changes its motion.
+    pub(super) until: f64,
+    /// Rounding and reach of both: the gap may differ by as much, metres.
+    pub(super) slop: f64,
+    /// Their places are beyond doubt but for rounding.
+    pub(super) certain: bool,
+}
+
+impl Moment {
+    pub(super) fn of((a, b): (&Body, &Body), s: f64) -> Self {
+        let (of_a, of_b) = (Span::at(a, s), Span::at(b, s));
+        // Who goes a way between admitted poses is on it; who stands still may be elsewhere.
+        let reach = |body: &Body| {
+            if way(body).is_some() {
+                0.0
+            } else {
+                body.reach_m
+            }
+        };
+        let reach_m = reach(a) + reach(b);
+        Self {
+            a: of_a,
+            b: of_b,
+            rel: relative(&of_a.pose, &of_b.pose),
+            share: s,
+            until: of_a.until.min(of_b.until),
+            slop: of_a.slop + of_b.slop + reach_m,
+            certain: reach_m == 0.0,
+        }
+    }
+
+    pub(super) fn jumps(&self) -> bool {
+        self.a.jump || self.b.jump
+    }
+
+    /// Velocity of B's pivot seen from A's.
+    pub(super) fn closing_velocity(&self) -> Vec3 {
+        self.b.velocity - self.a.velocity
+    }
+
+    /// Greatest speed of any point of the one seen from any point of the other, per unit of the share.
+    pub(super) fn speed(&self, reach_a: f64, reach_b: f64) -> f64 {
+        let speed = self.closing_velocity().norm() + self.a.swing(reach_a) + self.b.swing(reach_b);
+        speed * (1.0 + 16.0 * ROUND)
+    }
+}
+
+/// How far a body's surface is from its pivot.
+pub(super) fn reach_of(body: &Body) -> f64 {
+    way(body).map_or(body.radius, Path::reach)
+}
