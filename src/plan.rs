@@ -8,8 +8,9 @@ use serde::Serialize;
 use crate::broad::Method;
 use crate::config::Config;
 use crate::ids::BodySlot;
+use crate::limits::LEGS_MAX;
 use crate::shape::Geometry;
-use crate::world::{Body, World};
+use crate::world::{Body, Leg, Path, World};
 
 /// Up to this many boxes every pair is compared: any structure costs more than it spares below it (24 bodies are 276
 /// comparisons of boxes).
@@ -67,6 +68,7 @@ struct Facts {
     triangles: u64,
     several_shapes: u64,
     stale_by_speed: u64,
+    continuous: u64,
 }
 
 impl Plan {
@@ -125,6 +127,11 @@ impl Facts {
             facts.moving += u64::from(body.moves);
             facts.boxes += usize::from(!body.unbounded);
             facts.several_shapes += u64::from(body.shapes.len() > 1);
+            facts.continuous += u64::from(
+                body.path
+                    .as_ref()
+                    .is_some_and(|path| path.is_of_continuous()),
+            );
             facts.stale_by_speed += u64::from(body.max_speed_mps.is_some());
             for placed in body.shapes.iter() {
                 match &placed.shape.geometry {
@@ -177,6 +184,15 @@ fn choices(facts: &Facts, method: Method, config: &Config) -> Vec<Choice> {
             facts.shapes[0], facts.shapes[1]
         ),
     });
+    if facts.continuous > 0 {
+        choices.push(Choice {
+            part: "swept tests",
+            chosen:
+                "boxes around the way between two poses, time of impact by conservative advancement"
+                    .to_owned(),
+            why: format!("{} continuous bodies", facts.continuous),
+        });
+    }
     let limited = config.budget.time_ns.is_some() || config.budget.units.is_some();
     choices.push(Choice {
         part: "order of work",
@@ -224,6 +240,14 @@ fn left_out(facts: &Facts, method: Method, world: &World) -> Vec<LeftOut> {
             "resumable queries",
             "each body is one convex shape or half-space".to_owned(),
             0,
+        );
+    }
+    if facts.continuous == 0 {
+        let path = size_of::<Path>() + LEGS_MAX * size_of::<Leg>();
+        out(
+            "swept tests",
+            "no continuous body".to_owned(),
+            facts.moving * path as u64,
         );
     }
     if world.ignored_pairs_count() == 0 {

@@ -64,10 +64,10 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Allocations of a motion's frames at their third time: what they need has been seen.
-fn count(scene: &str, budget: Budget, ticks: u64) -> u64 {
+/// Allocations of a motion's frames after they have been seen `times` times: what they need is there.
+fn count(scene: &str, budget: Budget, ticks: u64, times: u64) -> u64 {
     let mut drive = Drive::new(scene, Pattern::Wander, 3);
-    for tick in (0..ticks).chain(0..ticks) {
+    for tick in (0..times).flat_map(|_| 0..ticks) {
         drive.step(tick, budget, Demand::ALL);
     }
     for tick in 0..ticks {
@@ -82,11 +82,11 @@ fn count(scene: &str, budget: Budget, ticks: u64) -> u64 {
 }
 
 /// Tori and boxes in a heap: pairs of meshes, and of meshes with convex shapes, that come and go.
-fn tori() -> String {
+fn tori(count: u32) -> String {
     let mut text = "[[source]]\nname = \"feed\"\n".to_owned();
     let torus = trimesh(&torus(0.3, 0.1, 16, 10), None);
     let cube = "{ type = \"box\", half_extents = [0.2, 0.25, 0.3] }";
-    for k in 0..30 {
+    for k in 0..count {
         let shape = if k % 3 == 2 { cube } else { &torus };
         let at = [k % 3, k / 3 % 3, k / 9].map(|i| 0.45 * f64::from(i));
         let _ = write!(
@@ -98,13 +98,13 @@ fn tori() -> String {
 }
 
 /// Bodies of a torus and a box each, on a floor: pairs of several shapes, and of meshes with a half-space.
-fn compounds() -> String {
+fn compounds(count: u32) -> String {
     let mut text = "[[source]]\nname = \"feed\"\n".to_owned();
     text += "[[body]]\nname = \"floor\"\nmoves = false\n";
     text += "shape = { type = \"half_space\", normal = [0.0, 0.0, 1.0] }\n";
     let torus = trimesh(&torus(0.3, 0.1, 16, 10), None);
     let cube = "{ type = \"box\", half_extents = [0.1, 0.1, 0.3], position = [0.0, 0.0, 0.3] }";
-    for k in 0..20 {
+    for k in 0..count {
         let at = [k % 3, k / 3 % 3, k / 9].map(|i| 0.5 * f64::from(i));
         let _ = write!(
             text,
@@ -114,21 +114,34 @@ fn compounds() -> String {
     text
 }
 
+/// The same, with every body that moves swept.
+fn swept(scene: &str) -> String {
+    scene.replace("moves = true\n", "moves = true\ncontinuous = true\n")
+}
+
 #[test]
 fn a_tick_allocates_nothing_after_warm_up() {
     TRACED.with(|traced| traced.set(std::env::var_os("SWEEPD_ALLOC_TRACE").is_some()));
-    for (name, scene) in [
-        ("pool", pool(300, 1)),
-        ("pile", pile(300, 2)),
-        ("tori", tori()),
-        ("compounds", compounds()),
+    for (name, scene, times) in [
+        ("pool", pool(300, 1), 2),
+        ("pile", pile(300, 2), 2),
+        ("tori", tori(30), 2),
+        ("compounds", compounds(20), 2),
+        ("swept pool", swept(&pool(80, 1)), 4),
+        ("swept pile", swept(&pile(80, 2)), 4),
+        ("swept tori", swept(&tori(9)), 4),
+        ("swept compounds", swept(&compounds(6)), 4),
     ] {
         for budget in [
             Budget::UNLIMITED,
             Budget::units(50),
             Budget::time_ns(100_000),
         ] {
-            assert_eq!(count(&scene, budget, 150), 0, "{name} with {budget:?}");
+            assert_eq!(
+                count(&scene, budget, 150, times),
+                0,
+                "{name} with {budget:?}"
+            );
         }
     }
 }

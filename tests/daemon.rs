@@ -13,6 +13,8 @@ mod live;
 
 #[path = "daemon/bad_input.rs"]
 mod bad_input;
+#[path = "daemon/bullets.rs"]
+mod bullets;
 #[path = "daemon/edits.rs"]
 mod edits;
 #[path = "daemon/ends.rs"]

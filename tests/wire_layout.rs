@@ -53,7 +53,7 @@ fn layouts() -> Vec<Layout> {
         TransformVelRow { transform linear angular }
         FrameHeader { session epoch seq sent_ns stamp_ns scene_rev deadline_ns time_left_ns source flags clock_id schema reserved }
         MessageHeader { boot_id tick scene_rev oldest_stamp_ns newest_stamp_ns truncated state reserved schema }
-        PairRow { body_a body_b gap_min_m gap_max_m gap_best_m closing_mps begin_first_tick begin_last_tick end_first_tick end_last_tick certified_tick bound_age_ticks verdict certified_verdict events end_cause level flags reserved }
+        PairRow { body_a body_b gap_min_m gap_max_m gap_best_m closing_mps toi_min toi_max begin_first_tick begin_last_tick end_first_tick end_last_tick certified_tick bound_age_ticks verdict certified_verdict events end_cause level flags reserved }
         ContactRow { id body_a body_b point_a point_b point_a_body point_b_body normal gap_m gap_min_m gap_max_m shape_a shape_b triangle_a triangle_b flags kind reserved }
         BodyRow { body position orientation stamp_ns received_ns age_ns generation source status verdict reject reserved }
         NameRow { body source generation len reserved name }
@@ -94,6 +94,9 @@ fn codes() -> Vec<(&'static str, Vec<(&'static str, u32)>)> {
             ("UNKNOWN_BODY", pair_flags::UNKNOWN_BODY.into()),
             ("HELD_BODY", pair_flags::HELD_BODY.into()),
             ("GONE", pair_flags::GONE.into()),
+            ("SWEPT_HIT", pair_flags::SWEPT_HIT.into()),
+            ("SWEPT_OPEN", pair_flags::SWEPT_OPEN.into()),
+            ("TELEPORTED", pair_flags::TELEPORTED.into()),
         ],
     ));
     all.push(("ContactFlags", vec![("ESTIMATE", contact_flags::ESTIMATE)]));

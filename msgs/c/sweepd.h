@@ -75,6 +75,12 @@ enum {
     SWEEPD_REASON_UNDECIDED = 6,
     /* There is no body, or no source has sent anything. */
     SWEEPD_REASON_NO_INPUT = 7,
+    /* A continuous body touched another on its way to this tick's poses, or it is not decided
+     * whether it did. */
+    SWEEPD_REASON_SWEPT = 8,
+    /* A continuous body's step was beyond its teleport_m: what lies between was not asked. clear
+     * may stand beside it. */
+    SWEEPD_REASON_TELEPORTED = 9,
 };
 
 /* Why a tick was run. */
@@ -89,7 +95,8 @@ enum {
     SWEEPD_TICK_CAUSE_EDIT = 3,
 };
 
-/* Bits of PairRow::events; a row may carry an end and a begin, in that order. */
+/* Bits of PairRow::events; a row may carry an end and a begin, in that order but where passed says
+ * otherwise. */
 enum {
     /* First tick in which the pair is certified colliding. */
     SWEEPD_EVENT_BEGIN = 0,
@@ -97,6 +104,8 @@ enum {
     SWEEPD_EVENT_PERSIST = 1,
     /* Certified not colliding, or ended by a cause. */
     SWEEPD_EVENT_END = 2,
+    /* Beside a begin and an end: it began and ended within this tick's motion, the begin first. */
+    SWEEPD_EVENT_PASSED = 3,
 };
 
 /* Why a collision ended. */
@@ -234,6 +243,13 @@ enum {
     /* The pair is gone (removed, filtered, ended by a cause); this row only carries its last
      * event. */
     SWEEPD_PAIR_FLAGS_GONE = 16,
+    /* Certified to have touched on the way to this tick's poses, within toi_min to toi_max. */
+    SWEEPD_PAIR_FLAGS_SWEPT_HIT = 32,
+    /* Not decided whether it touched on the way; if so, from toi_min on. */
+    SWEEPD_PAIR_FLAGS_SWEPT_OPEN = 64,
+    /* A continuous body of the pair jumped by more than its teleport_m: what lies between was not
+     * asked. */
+    SWEEPD_PAIR_FLAGS_TELEPORTED = 128,
 };
 
 /* Bits of ContactRow::flags. */
@@ -357,7 +373,7 @@ SWEEPD_ASSERT(offsetof(sweepd_message_header, reserved) == 49);
 SWEEPD_ASSERT(offsetof(sweepd_message_header, schema) == 52);
 SWEEPD_ASSERT(sizeof(sweepd_message_header) == 56);
 
-/* Type name "sweepd.v1.Pair", 104 bytes. One pair that is not plainly apart, or one last event
+/* Type name "sweepd.v1.Pair", 120 bytes. One pair that is not plainly apart, or one last event
  * of a pair. */
 typedef struct sweepd_pair_row {
     /* Smaller body id. */
@@ -373,6 +389,11 @@ typedef struct sweepd_pair_row {
     /* How fast the gap shrinks along the normal, metres a second; negative: it grows; NaN:
      * velocities unknown. */
     double closing_mps;
+    /* Of a swept pair that touched, or may have, on the way from the last tick's poses (0) to this
+     * one's (1): the share before which it did not; NaN: not swept, or free of touch. */
+    double toi_min;
+    /* The share by which it had touched first (SWEPT_HIT), or 1 (SWEPT_OPEN); NaN as toi_min. */
+    double toi_max;
     /* Begin: the earliest tick in which it may have happened. */
     uint64_t begin_first_tick;
     /* Begin: the tick in which it was certified. */
@@ -406,20 +427,22 @@ SWEEPD_ASSERT(offsetof(sweepd_pair_row, gap_min_m) == 16);
 SWEEPD_ASSERT(offsetof(sweepd_pair_row, gap_max_m) == 24);
 SWEEPD_ASSERT(offsetof(sweepd_pair_row, gap_best_m) == 32);
 SWEEPD_ASSERT(offsetof(sweepd_pair_row, closing_mps) == 40);
-SWEEPD_ASSERT(offsetof(sweepd_pair_row, begin_first_tick) == 48);
-SWEEPD_ASSERT(offsetof(sweepd_pair_row, begin_last_tick) == 56);
-SWEEPD_ASSERT(offsetof(sweepd_pair_row, end_first_tick) == 64);
-SWEEPD_ASSERT(offsetof(sweepd_pair_row, end_last_tick) == 72);
-SWEEPD_ASSERT(offsetof(sweepd_pair_row, certified_tick) == 80);
-SWEEPD_ASSERT(offsetof(sweepd_pair_row, bound_age_ticks) == 88);
-SWEEPD_ASSERT(offsetof(sweepd_pair_row, verdict) == 92);
-SWEEPD_ASSERT(offsetof(sweepd_pair_row, certified_verdict) == 93);
-SWEEPD_ASSERT(offsetof(sweepd_pair_row, events) == 94);
-SWEEPD_ASSERT(offsetof(sweepd_pair_row, end_cause) == 95);
-SWEEPD_ASSERT(offsetof(sweepd_pair_row, level) == 96);
-SWEEPD_ASSERT(offsetof(sweepd_pair_row, flags) == 97);
-SWEEPD_ASSERT(offsetof(sweepd_pair_row, reserved) == 98);
-SWEEPD_ASSERT(sizeof(sweepd_pair_row) == 104);
+SWEEPD_ASSERT(offsetof(sweepd_pair_row, toi_min) == 48);
+SWEEPD_ASSERT(offsetof(sweepd_pair_row, toi_max) == 56);
+SWEEPD_ASSERT(offsetof(sweepd_pair_row, begin_first_tick) == 64);
+SWEEPD_ASSERT(offsetof(sweepd_pair_row, begin_last_tick) == 72);
+SWEEPD_ASSERT(offsetof(sweepd_pair_row, end_first_tick) == 80);
+SWEEPD_ASSERT(offsetof(sweepd_pair_row, end_last_tick) == 88);
+SWEEPD_ASSERT(offsetof(sweepd_pair_row, certified_tick) == 96);
+SWEEPD_ASSERT(offsetof(sweepd_pair_row, bound_age_ticks) == 104);
+SWEEPD_ASSERT(offsetof(sweepd_pair_row, verdict) == 108);
+SWEEPD_ASSERT(offsetof(sweepd_pair_row, certified_verdict) == 109);
+SWEEPD_ASSERT(offsetof(sweepd_pair_row, events) == 110);
+SWEEPD_ASSERT(offsetof(sweepd_pair_row, end_cause) == 111);
+SWEEPD_ASSERT(offsetof(sweepd_pair_row, level) == 112);
+SWEEPD_ASSERT(offsetof(sweepd_pair_row, flags) == 113);
+SWEEPD_ASSERT(offsetof(sweepd_pair_row, reserved) == 114);
+SWEEPD_ASSERT(sizeof(sweepd_pair_row) == 120);
 
 /* Type name "sweepd.v1.Contact", 192 bytes. One point of contact, or the closest points of a
  * near pair. */

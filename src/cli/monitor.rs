@@ -10,7 +10,7 @@ use crate::time::{Clock, SystemClock};
 use crate::transport::client::{Heard, Message, Restarted, Topics, View};
 use crate::wire::{
     BodyRow, BodyStatus, ContactRow, EndCause, Event, Level, NameRow, PairRow, Reason,
-    RejectReason, Stage, State, TickCause, TickRow, Verdict, name_str,
+    RejectReason, Stage, State, TickCause, TickRow, Verdict, name_str, pair_flags,
 };
 
 use super::args::MonitorArgs;
@@ -250,7 +250,7 @@ fn tick_json(view: &View, names: &Names, args: &MonitorArgs) -> Value {
     line
 }
 
-/// JSON has no infinity: an open end is null.
+/// A number; JSON has no infinity: an open end is null.
 fn metres(value: f64) -> Value {
     if value.is_finite() {
         json!(value)
@@ -278,6 +278,14 @@ fn pair_json(row: &PairRow, names: &Names) -> Value {
     if row.end_cause != 0 {
         pair["end_cause"] = json!(EndCause::from_code(row.end_cause).map_or("?", EndCause::word));
         pair["end_ticks"] = json!([row.end_first_tick, row.end_last_tick]);
+    }
+    let has = |flag: u8| row.flags & flag != 0;
+    if has(pair_flags::SWEPT_HIT) || has(pair_flags::SWEPT_OPEN) {
+        pair["toi"] = json!([metres(row.toi_min), metres(row.toi_max)]);
+        pair["touched_on_the_way"] = json!(has(pair_flags::SWEPT_HIT));
+    }
+    if has(pair_flags::TELEPORTED) {
+        pair["teleported"] = json!(true);
     }
     if row.events & Event::Begin.bit() != 0 {
         pair["begin_ticks"] = json!([row.begin_first_tick, row.begin_last_tick]);

@@ -5,7 +5,9 @@ use std::fmt::Write as _;
 use crate::error::Result;
 use crate::time::{Clock, SystemClock};
 use crate::transport::client::View;
-use crate::wire::{EndCause, Event, PairRow, Stage, TickCause, TickRow, Verdict, name_str};
+use crate::wire::{
+    EndCause, Event, PairRow, Stage, TickCause, TickRow, Verdict, name_str, pair_flags,
+};
 
 use super::figures::{cut, number, seconds, time};
 use super::monitor::{Names, reasons, rejects, state_word, unknown_word};
@@ -290,10 +292,20 @@ impl Screen {
             "a", "b", "verdict", "gap from [m]", "to [m]", "closing"
         );
         let mut rows: Vec<&PairRow> = pairs.rows.iter().collect();
-        // The worst on top: by verdict, then the deepest.
+        // The worst on top: by verdict or what happened on the way, then the deepest.
+        let rank = |row: &PairRow| {
+            let way = if row.flags & pair_flags::SWEPT_HIT != 0 {
+                Verdict::Colliding.code()
+            } else if row.flags & pair_flags::SWEPT_OPEN != 0 {
+                Verdict::Possible.code()
+            } else {
+                0
+            };
+            row.verdict.max(way)
+        };
         rows.sort_by(|x, y| {
-            y.verdict
-                .cmp(&x.verdict)
+            rank(y)
+                .cmp(&rank(x))
                 .then(x.gap_min_m.total_cmp(&y.gap_min_m))
         });
         let shown = rows.len().min(self.pairs).min(self.room(text));
@@ -317,7 +329,9 @@ impl Screen {
         let verdict = Verdict::from_code(row.verdict);
         let colour = match verdict {
             Some(Verdict::Colliding) => RED,
+            _ if row.flags & pair_flags::SWEPT_HIT != 0 => RED,
             Some(Verdict::Possible) => YELLOW,
+            _ if row.flags & pair_flags::SWEPT_OPEN != 0 => YELLOW,
             _ => "",
         };
         let mut events: Vec<String> = Vec::new();
@@ -328,8 +342,17 @@ impl Screen {
                     events.push(format!("end ({cause})"));
                 }
                 Event::Begin => events.push("begin".to_owned()),
+                Event::Passed => events.push("passed on the way".to_owned()),
                 Event::Persist => {}
             }
+        }
+        if row.flags & pair_flags::SWEPT_HIT != 0 {
+            events.push(format!("touched at {} of the way", number(row.toi_max, 6)));
+        } else if row.flags & pair_flags::SWEPT_OPEN != 0 {
+            events.push(format!("open from {} of the way", number(row.toi_min, 6)));
+        }
+        if row.flags & pair_flags::TELEPORTED != 0 {
+            events.push("teleported".to_owned());
         }
         let word = verdict.map_or("?", Verdict::word);
         let line = format!(

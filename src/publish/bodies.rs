@@ -3,6 +3,7 @@
 use crate::wire::{BODY_NAME_LEN, BodyRow, BodyStatus, MessageHeader, NameRow, Outbox, Verdict};
 use crate::world::Body;
 
+use super::pairs::worst_of;
 use super::{Publisher, View};
 
 impl Publisher {
@@ -54,6 +55,16 @@ impl Publisher {
         for &slot in view.pairs.truncated() {
             if let Some(worst) = self.verdicts.get_mut(slot.index()) {
                 *worst = Verdict::Possible.code();
+            }
+        }
+        for swept in view.narrow.swept() {
+            if let Some(finding) = view.narrow.finding(swept.slot)
+                && self.events.is_news(swept.slot, swept.passage)
+            {
+                for body in [finding.a, finding.b] {
+                    let worst = &mut self.verdicts[body.index()];
+                    *worst = (*worst).max(worst_of(Verdict::Apart, Some(swept.passage)).code());
+                }
             }
         }
         for &slot in view.narrow.active() {

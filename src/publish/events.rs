@@ -1,10 +1,11 @@
 //! Begin, persist, end: what is certified about each pair's collisions, and events that still wait to be sent.
 //!
 //! Events are about certified collisions only. With less budget a begin comes later; it is never wrong. An event that
-//! does not fit into a message waits here with its range, also after its pair is gone.
+//! does not fit into a message waits here with its range, also after its pair is gone. A touch on the way of a continuous
+//! body that is over at this tick's poses is a begin and an end of one tick: a pass.
 
 use crate::ids::{BodyId, PairKey, PairSlot};
-use crate::narrow::{Finding, Narrow};
+use crate::narrow::{Finding, Narrow, Passage};
 use crate::pairs::{PairDelta, PairSet};
 use crate::wire::{EndCause, Verdict};
 use crate::world::World;
@@ -19,7 +20,7 @@ pub(super) struct Ticks {
     pub(super) last: u64,
 }
 
-/// The events of one pair that wait to be sent: an end, then a begin.
+/// The events of one pair that wait to be sent: an end, then a begin or a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct PairEvent {
     pub(super) ids: Ids,
@@ -27,6 +28,8 @@ pub(super) struct PairEvent {
     seq: u64,
     pub(super) end: Option<(Ticks, EndCause)>,
     pub(super) begin: Option<Ticks>,
+    /// A begin and an end between the poses of two ticks.
+    pub(super) pass: Option<Ticks>,
 }
 
 /// What is certified about a pair.
@@ -39,6 +42,8 @@ pub(super) struct History {
     pub(super) tick: u64,
     /// Certified colliding, and not certified ended since.
     pub(super) colliding: bool,
+    /// `colliding` before this tick.
+    was_colliding: bool,
     /// Last tick in which the pair was more than plainly apart.
     active: u64,
     /// First tick in which it may have collided; 0: not seen yet.
@@ -51,6 +56,7 @@ impl History {
         verdict: Verdict::None,
         tick: 0,
         colliding: false,
+        was_colliding: false,
         active: 0,
         born: 0,
     };
@@ -99,6 +105,15 @@ impl Events {
                 };
                 self.push(history.ids, Some((ticks, cause)), None);
             }
+        }
+    }
+
+    /// Whether a touch on the way is news: a collision that was told before goes on from the last tick's poses.
+    pub(super) fn is_news(&self, slot: PairSlot, passage: Passage) -> bool {
+        match passage {
+            Passage::Touched(toi) => toi.max > 0.0 || !self.history(slot).was_colliding,
+            Passage::Open(_) => true,
+            Passage::Free => false,
         }
     }
 
@@ -163,7 +178,11 @@ impl Events {
             self.histories.resize(slot.index() + 1, History::NONE);
         }
         let mut history = self.histories[slot.index()];
+        if history.active == tick {
+            return;
+        }
         history.ids = ids;
+        history.was_colliding = history.colliding;
         // Not active in the tick before: proved apart there by its certificate or by its boxes, unless it is new and a
         // body of it was not in, not known, or not looked for there.
         let unseen = (finding.born == tick)
@@ -188,6 +207,8 @@ impl Events {
             history.tick + 1
         };
         let ticks = Ticks { first, last: tick };
+        let passage = narrow.passage(slot).map(|swept| swept.passage);
+        let touched = matches!(passage, Some(Passage::Touched(_)));
         match finding.verdict {
             Verdict::Colliding => {
                 if !history.colliding {
@@ -198,10 +219,17 @@ impl Events {
             Verdict::Near | Verdict::Apart => {
                 if history.colliding {
                     self.push(history.ids, Some((ticks, EndCause::Separated)), None);
+                } else if touched {
+                    self.push_pass(history.ids, ticks);
                 }
                 history.colliding = false;
             }
             Verdict::Possible | Verdict::None => {
+                if touched && !history.colliding {
+                    self.push(history.ids, None, Some(ticks));
+                    history.colliding = true;
+                    (history.verdict, history.tick) = (Verdict::Colliding, tick);
+                }
                 self.histories[slot.index()] = history;
                 return;
             }
@@ -218,7 +246,15 @@ impl Events {
             seq: self.seq,
             end,
             begin,
+            pass: None,
         });
+    }
+
+    fn push_pass(&mut self, ids: Ids, ticks: Ticks) {
+        self.push(ids, None, None);
+        if let Some(event) = self.waiting.last_mut() {
+            event.pass = Some(ticks);
+        }
     }
 
     /// One entry a pair, by ids: a begin that was never sent and the end that follows it cancel.
@@ -230,6 +266,11 @@ impl Events {
             if next.ids != kept.ids {
                 return false;
             }
+            // Whatever follows a pass that was never sent: its begin and its end cancel.
+            if kept.pass.take().is_some() {
+                *cancelled += 1;
+            }
+            kept.pass = next.pass;
             if next.end.is_some() {
                 if kept.begin.take().is_some() {
                     *cancelled += 1;
@@ -243,7 +284,7 @@ impl Events {
             true
         });
         self.waiting
-            .retain(|event| event.end.is_some() || event.begin.is_some());
+            .retain(|event| event.end.is_some() || event.begin.is_some() || event.pass.is_some());
     }
 }
 
@@ -286,6 +327,25 @@ mod tests {
         assert_eq!(event.end, Some((ticks(5, 5), EndCause::Removed)));
         assert_eq!(event.begin, Some(ticks(6, 7)));
         assert_eq!(events.cancelled, 0);
+    }
+
+    #[test]
+    fn law_3_9_a_pass_that_was_never_sent_cancels_when_more_happens_and_waits_while_nothing_does() {
+        let ids = (BodyId(1), BodyId(2));
+        let mut events = Events::default();
+        events.push(ids, Some((ticks(2, 2), EndCause::Separated)), None);
+        events.push_pass(ids, ticks(3, 3));
+        events.merge();
+        events.merge();
+        assert_eq!(events.waiting()[0].pass, Some(ticks(3, 3)));
+        events.push(ids, None, Some(ticks(5, 5)));
+        events.merge();
+        let [event] = events.waiting() else {
+            panic!("one row")
+        };
+        assert_eq!((event.pass, event.begin), (None, Some(ticks(5, 5))));
+        assert_eq!(event.end, Some((ticks(2, 2), EndCause::Separated)));
+        assert_eq!(events.cancelled, 1);
     }
 
     #[test]

@@ -11,7 +11,7 @@ mod pairs;
 mod state;
 
 use crate::config::Limits;
-use crate::narrow::Narrow;
+use crate::narrow::{Narrow, Passage};
 use crate::pairs::{PairDelta, PairSet};
 use crate::wire::{Demand, MessageHeader, Outbox, Verdict, WIRE_VERSION};
 use crate::world::World;
@@ -133,13 +133,41 @@ impl Publisher {
             };
             let ids = (a.id, b.id);
             events.certify(view.tick, slot, &finding, ids, view.narrow);
-            survey.take(view.tick, ids, &finding);
+            let swept = view.narrow.passage(slot).map(|swept| swept.passage);
+            let passage = swept.filter(|passage| events.is_news(slot, *passage));
+            survey.take(view.tick, ids, &finding, passage);
             if listed {
-                listing.push(rows, Row::of_active(view, slot, ids, &finding));
+                listing.push(rows, Row::of_active(view, slot, ids, &finding, passage));
             }
         }
-        events.merge();
-        listing.finish(rows);
+        self.review_ways(view, listed);
+        self.events.merge();
+        self.listing.finish(&mut self.rows);
+    }
+
+    /// As [`Publisher::review`], of pairs that are apart and not active, but may have touched on the way.
+    fn review_ways(&mut self, view: &View<'_>, listed: bool) {
+        for swept in view.narrow.swept() {
+            let finding = view.narrow.finding(swept.slot);
+            let apart = finding.filter(|finding| finding.verdict == Verdict::Apart);
+            let Some(finding) = apart.filter(|_| swept.passage != Passage::Free) else {
+                continue;
+            };
+            let (Some(a), Some(b)) = (view.world.tag(finding.a), view.world.tag(finding.b)) else {
+                continue;
+            };
+            let (slot, ids) = (swept.slot, (a.id, b.id));
+            self.events
+                .certify(view.tick, slot, &finding, ids, view.narrow);
+            if self.events.is_news(slot, swept.passage) {
+                let passage = Some(swept.passage);
+                self.survey.take(view.tick, ids, &finding, passage);
+                if listed {
+                    let row = Row::of_active(view, slot, ids, &finding, passage);
+                    self.listing.push(&mut self.rows, row);
+                }
+            }
+        }
     }
 
     fn header(view: &View<'_>) -> MessageHeader {

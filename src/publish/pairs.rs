@@ -1,9 +1,11 @@
 //! Rows of `pairs`: every pair that is not plainly apart, and every event.
 
 use crate::ids::{BodyId, PairKey, PairSlot};
-use crate::math::{Point, Vec3};
-use crate::narrow::{Finding, Witness};
-use crate::wire::{BodyStatus, Event, Level, MessageHeader, Outbox, PairRow, Verdict, pair_flags};
+use crate::math::{Interval, Point, Vec3};
+use crate::narrow::{Finding, Passage, Witness};
+use crate::wire::{
+    BodyStatus, EndCause, Event, Level, MessageHeader, Outbox, PairRow, Verdict, pair_flags,
+};
 use crate::world::Body;
 
 use super::contacts::contacts_of;
@@ -27,6 +29,15 @@ pub(super) struct Row {
     pub(super) class: u8,
 }
 
+/// A verdict, or what a way that is news says, whichever is worse.
+pub(super) fn worst_of(verdict: Verdict, passage: Option<Passage>) -> Verdict {
+    match passage {
+        Some(Passage::Touched(_)) => Verdict::Colliding,
+        Some(Passage::Open(_)) => verdict.max(Verdict::Possible),
+        Some(Passage::Free) | None => verdict,
+    }
+}
+
 /// No event.
 const NONE: u32 = u32::MAX;
 
@@ -37,6 +48,7 @@ impl Row {
         slot: PairSlot,
         ids: (BodyId, BodyId),
         finding: &Finding<'_>,
+        passage: Option<Passage>,
     ) -> Self {
         let contacts = if view.demand.contacts {
             contacts_of(view, slot, finding)
@@ -49,7 +61,7 @@ impl Row {
             slot: Some(slot),
             event: NONE,
             contacts: u32::try_from(contacts).unwrap_or(u32::MAX),
-            class: match finding.verdict {
+            class: match worst_of(finding.verdict, passage) {
                 Verdict::Colliding => 1,
                 Verdict::Possible => 2,
                 Verdict::Near | Verdict::Apart | Verdict::None => 3,
@@ -161,6 +173,8 @@ impl Publisher {
             gap_max_m: f64::INFINITY,
             gap_best_m: f64::NAN,
             closing_mps: f64::NAN,
+            toi_min: f64::NAN,
+            toi_max: f64::NAN,
             ..PairRow::default()
         };
         match row
@@ -176,9 +190,16 @@ impl Publisher {
                 out.end_cause = cause.code();
                 (out.end_first_tick, out.end_last_tick) = (ticks.first, ticks.last);
             }
-            if let Some(ticks) = event.begin {
+            if let Some(ticks) = event.begin.or(event.pass) {
                 out.events |= Event::Begin.bit();
                 (out.begin_first_tick, out.begin_last_tick) = (ticks.first, ticks.last);
+            }
+            if let Some(ticks) = event.pass {
+                out.events |= Event::End.bit() | Event::Passed.bit();
+                // An end before it that found no room is told with its own: from its first tick on.
+                let first = event.end.map_or(ticks.last, |(end, _)| end.first);
+                out.end_cause = EndCause::Separated.code();
+                (out.end_first_tick, out.end_last_tick) = (first, ticks.last);
             }
         }
         if out.verdict == Verdict::Colliding.code() && out.events & Event::Begin.bit() == 0 {
@@ -210,6 +231,7 @@ impl Publisher {
                 out.closing_mps = closing_speed(a, b, witness);
             }
         }
+        self.describe_way(view, slot, out);
         if finding.touching {
             out.flags |= pair_flags::TOUCHING;
         }
@@ -223,6 +245,38 @@ impl Publisher {
                 _ => out.flags |= pair_flags::UNKNOWN_BODY,
             }
         }
+    }
+
+    /// What is known of the way to this tick's poses.
+    fn describe_way(&self, view: &View<'_>, slot: PairSlot, out: &mut PairRow) {
+        let Some(swept) = view.narrow.passage(slot) else {
+            return;
+        };
+        if swept.jumped {
+            out.flags |= pair_flags::TELEPORTED;
+        }
+        // Who collides now has touched by now.
+        let colliding = out.verdict == Verdict::Colliding.code();
+        let toi = match swept.passage {
+            Passage::Free if colliding => Passage::Touched(Interval { min: 1.0, max: 1.0 }),
+            Passage::Open(toi) if colliding => Passage::Touched(toi),
+            passage => passage,
+        };
+        if !self.events.is_news(slot, toi) {
+            return;
+        }
+        let toi = match toi {
+            Passage::Free => return,
+            Passage::Touched(toi) => {
+                out.flags |= pair_flags::SWEPT_HIT;
+                toi
+            }
+            Passage::Open(toi) => {
+                out.flags |= pair_flags::SWEPT_OPEN;
+                toi
+            }
+        };
+        (out.toi_min, out.toi_max) = (toi.min, toi.max);
     }
 }
 

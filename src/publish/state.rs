@@ -1,11 +1,12 @@
 //! The tick in one word, its reasons, its counts, and the worst pair.
 
 use crate::ids::{BodyId, BodySlot};
-use crate::narrow::Finding;
+use crate::narrow::{Finding, Passage};
 use crate::wire::{
     BodyStatus, MessageHeader, Outbox, Reason, SOURCES_MAX, SourceRow, State, TickRow, Verdict,
 };
 
+use super::pairs::worst_of;
 use super::{Publisher, View};
 
 /// The pair that a person should look at first.
@@ -34,8 +35,15 @@ impl Publisher {
         if truncated > 0 {
             reasons |= Reason::Truncated.bit();
         }
-        if possible > 0 {
+        let survey = self.survey;
+        if possible > 0 || survey.open > 0 {
             reasons |= Reason::Undecided.bit();
+        }
+        if survey.touched > 0 || survey.open > 0 {
+            reasons |= Reason::Swept.bit();
+        }
+        if view.world.has_teleported() {
+            reasons |= Reason::Teleported.bit();
         }
         if counts.bodies == 0 {
             reasons |= Reason::NoInput.bit();
@@ -50,19 +58,19 @@ impl Publisher {
             .iter()
             .filter(|slot| cut(slot))
             .count() as u64;
-        let unsafe_reasons = reasons & !Reason::Undecided.bit();
-        let state = if narrow.count(Verdict::Colliding) > 0 {
+        let of_pairs = Reason::Undecided.bit() | Reason::Swept.bit() | Reason::Teleported.bit();
+        let unsafe_reasons = reasons & !of_pairs;
+        let state = if narrow.count(Verdict::Colliding) > 0 || survey.touched > 0 {
             State::Colliding
         } else if unsafe_reasons != 0 || counts.unknown > 0 {
             State::Unknown
-        } else if possible > 0 {
+        } else if possible > 0 || survey.open > 0 {
             State::Possible
         } else if narrow.count(Verdict::Near) > 0 {
             State::Near
         } else {
             State::Clear
         };
-        let survey = self.survey;
         out.tick = TickRow {
             header: MessageHeader {
                 truncated,
@@ -109,11 +117,27 @@ pub(super) struct Survey {
     widest_m: f64,
     /// For how many ticks the oldest undecided pair has been so.
     oldest_ticks: u64,
+    /// Pairs that touched on their way, and those that may have.
+    touched: u64,
+    open: u64,
 }
 
 impl Survey {
     /// Takes an active pair.
-    pub(super) fn take(&mut self, tick: u64, ids: (BodyId, BodyId), finding: &Finding<'_>) {
+    ///
+    /// * `passage` - what its way says, where that is news.
+    pub(super) fn take(
+        &mut self,
+        tick: u64,
+        ids: (BodyId, BodyId),
+        finding: &Finding<'_>,
+        passage: Option<Passage>,
+    ) {
+        match passage {
+            Some(Passage::Touched(_)) => self.touched += 1,
+            Some(Passage::Open(_)) => self.open += 1,
+            Some(Passage::Free) | None => {}
+        }
         self.widest_m = self.widest_m.max(finding.gap.width());
         if finding.undecided_since != 0 {
             self.oldest_ticks = self.oldest_ticks.max(tick - finding.undecided_since + 1);
@@ -121,7 +145,8 @@ impl Survey {
         let depth = -finding
             .witness
             .map_or(finding.gap.min, |witness| witness.best_m);
-        let (rank, worst) = ((finding.verdict.code(), depth), self.worst);
+        let verdict = worst_of(finding.verdict, passage);
+        let (rank, worst) = ((verdict.code(), depth), self.worst);
         let order = rank
             .0
             .cmp(&worst.rank.0)

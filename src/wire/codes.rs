@@ -86,6 +86,10 @@ code! {
         Undecided = 6 => "undecided",
         /// There is no body, or no source has sent anything.
         NoInput = 7 => "no_input",
+        /// A continuous body touched another on its way to this tick's poses, or it is not decided whether it did.
+        Swept = 8 => "swept",
+        /// A continuous body's step was beyond its `teleport_m`: what lies between was not asked. `clear` may stand beside it.
+        Teleported = 9 => "teleported",
     }
 }
 
@@ -104,7 +108,7 @@ code! {
 }
 
 code! {
-    /// Bits of `PairRow::events`; a row may carry an end and a begin, in that order.
+    /// Bits of `PairRow::events`; a row may carry an end and a begin, in that order but where `Passed` says otherwise.
     Event {
         /// First tick in which the pair is certified colliding.
         Begin = 0 => "begin",
@@ -112,6 +116,8 @@ code! {
         Persist = 1 => "persist",
         /// Certified not colliding, or ended by a cause.
         End = 2 => "end",
+        /// Beside a begin and an end: it began and ended within this tick's motion, the begin first.
+        Passed = 3 => "passed",
     }
 }
 
@@ -261,6 +267,12 @@ pub mod pair_flags {
     pub const HELD_BODY: u8 = 8;
     /// The pair is gone (removed, filtered, ended by a cause, or its boxes parted); this row only carries its last event.
     pub const GONE: u8 = 16;
+    /// Certified to have touched on the way to this tick's poses, within `toi_min` to `toi_max`.
+    pub const SWEPT_HIT: u8 = 32;
+    /// Not decided whether it touched on the way; if so, from `toi_min` on.
+    pub const SWEPT_OPEN: u8 = 64;
+    /// A continuous body of the pair jumped by more than its `teleport_m`: what lies between was not asked.
+    pub const TELEPORTED: u8 = 128;
 }
 
 /// Bits of `ContactRow::flags`.

@@ -121,6 +121,11 @@ pub struct PairRow {
     pub gap_best_m: f64,
     /// How fast the gap shrinks along the normal, metres a second; negative: it grows; NaN: velocities unknown.
     pub closing_mps: f64,
+    /// Of a swept pair that touched, or may have, on the way from the last tick's poses (0) to this one's (1): the share
+    /// before which it did not; NaN: not swept, or free of touch.
+    pub toi_min: f64,
+    /// The share by which it had touched first (`SWEPT_HIT`), or 1 (`SWEPT_OPEN`); NaN as `toi_min`.
+    pub toi_max: f64,
     /// Begin: the earliest tick in which it may have happened.
     pub begin_first_tick: u64,
     /// Begin: the tick in which it was certified.
@@ -382,7 +387,7 @@ const _: () = {
     assert!(size_of::<TransformRow>() == 72);
     assert!(size_of::<TransformVelRow>() == 120);
     assert!(size_of::<MessageHeader>() == 56);
-    assert!(size_of::<PairRow>() == 104);
+    assert!(size_of::<PairRow>() == 120);
     assert!(size_of::<ContactRow>() == 192);
     assert!(size_of::<BodyRow>() == 104);
     assert!(size_of::<NameRow>() == 128);

@@ -65,6 +65,8 @@ pub(crate) struct Rig {
     pub(crate) demand: Demand,
     pub(crate) epoch: u64,
     pub(crate) flags: u32,
+    /// Linear and angular velocity of each row, or empty.
+    pub(crate) velocities: Vec<[f64; 6]>,
     pub(crate) out: Outbox,
     /// Whether the whole structure is checked after each tick.
     pub(crate) checked: bool,
@@ -93,6 +95,7 @@ impl Rig {
             demand: Demand::ALL,
             epoch: 1,
             flags: frame_flags::FULL,
+            velocities: Vec::new(),
             out: Outbox::default(),
             checked: true,
             seq: 0,
@@ -116,6 +119,24 @@ impl Rig {
     /// A frame with the rows as they are, and a tick.
     pub(crate) fn send(&mut self, budget: Budget) -> &Outbox {
         self.frame();
+        self.tick(budget, &[], TickCause::Frame)
+    }
+
+    /// Frames one after the other, the rows of each as `set` makes them, and one tick.
+    #[allow(dead_code, reason = "of the tests that share this rig one sends so")]
+    pub(crate) fn send_several(
+        &mut self,
+        frames: usize,
+        mut set: impl FnMut(usize, &mut Self),
+        budget: Budget,
+    ) -> &Outbox {
+        let mut all = Inbox::default();
+        for at in 0..frames {
+            set(at, self);
+            self.frame();
+            all.push().clone_from(&self.inbox.frames()[0]);
+        }
+        self.inbox = all;
         self.tick(budget, &[], TickCause::Frame)
     }
 
@@ -160,6 +181,7 @@ impl Rig {
         };
         frame.received_ns = self.clock.boottime_ns();
         frame.set_transforms(&self.rows);
+        frame.velocities.clone_from(&self.velocities);
     }
 
     fn tick(&mut self, budget: Budget, edits: &[EditBatch], cause: TickCause) -> &Outbox {

@@ -84,6 +84,9 @@ fn the_constants_of_the_messages_are_the_codes_of_the_wire() {
                         ("unknown_body", u64::from(pair_flags::UNKNOWN_BODY)),
                         ("held_body", u64::from(pair_flags::HELD_BODY)),
                         ("gone", u64::from(pair_flags::GONE)),
+                        ("swept_hit", u64::from(pair_flags::SWEPT_HIT)),
+                        ("swept_open", u64::from(pair_flags::SWEPT_OPEN)),
+                        ("teleported", u64::from(pair_flags::TELEPORTED)),
                     ]
                     .into_iter(),
                 ))

@@ -138,6 +138,11 @@ class PairRow(_Row):
         ("gap_best_m", ctypes.c_double),
         # How fast the gap shrinks along the normal, metres a second; negative: it grows; NaN: velocities unknown.
         ("closing_mps", ctypes.c_double),
+        # Of a swept pair that touched, or may have, on the way from the last tick's poses (0) to this one's (1): the share
+        # before which it did not; NaN: not swept, or free of touch.
+        ("toi_min", ctypes.c_double),
+        # The share by which it had touched first (SWEPT_HIT), or 1 (SWEPT_OPEN); NaN as toi_min.
+        ("toi_max", ctypes.c_double),
         # Begin: the earliest tick in which it may have happened.
         ("begin_first_tick", ctypes.c_uint64),
         # Begin: the tick in which it was certified.
@@ -468,6 +473,10 @@ class Reason(IntEnum):
     UNDECIDED = 6
     # There is no body, or no source has sent anything.
     NO_INPUT = 7
+    # A continuous body touched another on its way to this tick's poses, or it is not decided whether it did.
+    SWEPT = 8
+    # A continuous body's step was beyond its teleport_m: what lies between was not asked. clear may stand beside it.
+    TELEPORTED = 9
 
 
 class TickCause(IntEnum):
@@ -484,7 +493,7 @@ class TickCause(IntEnum):
 
 
 class Event(IntEnum):
-    """Bits of PairRow::events; a row may carry an end and a begin, in that order."""
+    """Bits of PairRow::events; a row may carry an end and a begin, in that order but where PASSED says otherwise."""
 
     # First tick in which the pair is certified colliding.
     BEGIN = 0
@@ -492,6 +501,8 @@ class Event(IntEnum):
     PERSIST = 1
     # Certified not colliding, or ended by a cause.
     END = 2
+    # Beside a begin and an end: it began and ended within this tick's motion, the begin first.
+    PASSED = 3
 
 
 class EndCause(IntEnum):
@@ -636,6 +647,12 @@ class PairFlags(IntFlag):
     HELD_BODY = 8
     # The pair is gone (removed, filtered, ended by a cause); this row only carries its last event.
     GONE = 16
+    # Certified to have touched on the way to this tick's poses, within toi_min to toi_max.
+    SWEPT_HIT = 32
+    # Not decided whether it touched on the way; if so, from toi_min on.
+    SWEPT_OPEN = 64
+    # A continuous body of the pair jumped by more than its teleport_m: what lies between was not asked.
+    TELEPORTED = 128
 
 
 class ContactFlags(IntFlag):

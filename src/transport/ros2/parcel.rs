@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use crate::wire::{
     BodyRow, ContactRow, Demand, Event, MessageHeader, NameRow, Outbox, PairRow, TickRow, Verdict,
+    pair_flags,
 };
 
 /// Parcels that wait: one being sent and one behind it; more would only be older.
@@ -81,10 +82,13 @@ impl Picker {
 /// Rows with events first, then colliding, possible, near; deepest first.
 fn pair_rank(row: &PairRow) -> (u8, f64) {
     let told = row.events & !Event::Persist.bit() != 0;
+    let has = |flag: u8| row.flags & flag != 0;
     let class = match Verdict::from_code(row.verdict) {
         _ if told => 0,
         Some(Verdict::Colliding) => 1,
+        _ if has(pair_flags::SWEPT_HIT) => 1,
         Some(Verdict::Possible) => 2,
+        _ if has(pair_flags::SWEPT_OPEN) => 2,
         _ => 3,
     };
     (class, row.gap_min_m)

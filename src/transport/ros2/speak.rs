@@ -14,7 +14,7 @@ use crate::wire::{
 /// 128 KB with their headers is the most.
 const MESSAGE_BYTES_MAX: usize = 120_000;
 /// Bytes of a row beside its names, with the padding of CDR, rounded up.
-const PAIR_BYTES: usize = 136;
+const PAIR_BYTES: usize = 152;
 /// As [`PAIR_BYTES`].
 const CONTACT_BYTES: usize = 248;
 /// As [`PAIR_BYTES`].
@@ -224,6 +224,8 @@ impl Speaker {
             gap_max_m: row.gap_max_m,
             gap_best_m: row.gap_best_m,
             closing_mps: row.closing_mps,
+            toi_min: row.toi_min,
+            toi_max: row.toi_max,
             begin_first_tick: row.begin_first_tick,
             begin_last_tick: row.begin_last_tick,
             end_first_tick: row.end_first_tick,

@@ -85,6 +85,10 @@ pub struct Pair {
     pub gap_best_m: f64,
     /// How fast the gap shrinks, metres a second.
     pub closing_mps: f64,
+    /// Share of the way to this tick's poses before which they did not touch.
+    pub toi_min: f64,
+    /// Share by which they had, or 1.
+    pub toi_max: f64,
     /// Begin: the earliest tick in which it may have happened.
     pub begin_first_tick: u64,
     /// Begin: the tick in which it was certified.

@@ -1,0 +1,409 @@
+//! Cases whose answer is known by hand.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use sweepd::math::{Pose, Quat, Vec3};
+use sweepd::wire::{Event, PairRow, Reason, State, Verdict, pair_flags};
+
+use crate::oracle::meshes::{cuboid, trimesh};
+use crate::rig::{ALL, FRAME_NS, NONE, Rig, body, has, scene};
+
+const PLATE: &str = "{ type = \"box\", half_extents = [5.0, 5.0, 0.0005] }";
+const SHOT: &str = "{ type = \"sphere\", radius = 0.01 }";
+const SWEPT: &str = "continuous = true";
+
+fn at(x: f64, y: f64, z: f64) -> Pose {
+    Pose::translation(x, y, z)
+}
+
+fn hit(row: &PairRow) -> bool {
+    row.flags & pair_flags::SWEPT_HIT != 0
+}
+
+fn open(row: &PairRow) -> bool {
+    row.flags & pair_flags::SWEPT_OPEN != 0
+}
+
+fn is_near(row: &PairRow, toi: f64, close: f64) {
+    assert!(hit(row), "{row:?}");
+    assert!(
+        row.toi_min <= toi + 1e-12
+            && toi - 1e-12 <= row.toi_max
+            && row.toi_max - row.toi_min <= close,
+        "{toi}: {row:?}"
+    );
+}
+
+/// A plate in the plane z = 0, and a ball of 10 mm above it.
+fn plate(more: &str) -> Rig {
+    let mut rig = Rig::new(&scene(
+        "",
+        &[
+            body(1, [0.0; 3], PLATE, ""),
+            body(2, [0.0, 0.0, 5.0], SHOT, more),
+        ],
+    ));
+    rig.send(ALL);
+    rig
+}
+
+#[test]
+fn a_ball_through_a_plate_is_a_begin_and_an_end_of_one_tick() {
+    let mut rig = plate(SWEPT);
+    rig.place(2, &at(0.0, 0.0, -5.0));
+    rig.send(ALL);
+    let row = rig.pair(1, 2).unwrap();
+    is_near(row, (5.0 - 0.0105) / 10.0, 1e-9);
+    for event in [Event::Begin, Event::End, Event::Passed] {
+        assert!(has(row, event), "{row:?}");
+    }
+    assert_eq!((row.begin_first_tick, row.begin_last_tick), (2, 2));
+    assert_eq!((row.end_first_tick, row.end_last_tick), (2, 2));
+    assert_eq!(rig.verdict(1, 2), Verdict::Apart);
+    assert_eq!(rig.state(), State::Colliding);
+    assert!(rig.because(Reason::Swept));
+    assert_eq!((rig.out.tick.worst_a, rig.out.tick.worst_b), (1, 2));
+    assert_eq!(rig.out.tick.colliding, 0, "none at these poses");
+    let worst = |id| {
+        rig.out
+            .bodies
+            .iter()
+            .find(|row| row.body == id)
+            .unwrap()
+            .verdict
+    };
+    assert_eq!(
+        (worst(1), worst(2)),
+        (Verdict::Colliding.code(), Verdict::Colliding.code())
+    );
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+    assert!(!rig.because(Reason::Swept));
+}
+
+#[test]
+fn a_ball_that_is_not_continuous_goes_through() {
+    let mut rig = plate("");
+    rig.place(2, &at(0.0, 0.0, -5.0));
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+    assert!(rig.pair(1, 2).is_none());
+}
+
+#[test]
+fn without_a_budget_a_way_is_open_and_not_clear() {
+    let mut rig = plate(SWEPT);
+    rig.place(2, &at(0.0, 0.0, -5.0));
+    rig.send(NONE);
+    let row = rig.pair(1, 2).unwrap();
+    assert!(open(row) && !hit(row), "{row:?}");
+    assert!((row.toi_min, row.toi_max) == (0.0, 1.0), "{row:?}");
+    assert_eq!(rig.state(), State::Possible);
+    assert!(rig.because(Reason::Swept) && rig.because(Reason::Undecided));
+    assert_eq!(row.events, 0);
+    rig.send(ALL);
+    assert_eq!(
+        rig.state(),
+        State::Clear,
+        "the next tick has another motion"
+    );
+}
+
+#[test]
+fn a_ball_that_ends_in_the_plate_collides_and_has_its_time() {
+    let mut rig = plate(SWEPT);
+    rig.place(2, &at(0.0, 0.0, 0.0));
+    rig.send(ALL);
+    let row = rig.pair(1, 2).unwrap();
+    is_near(row, (5.0 - 0.0105) / 5.0, 1e-9);
+    assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+    assert!(has(row, Event::Begin) && !has(row, Event::End) && !has(row, Event::Passed));
+}
+
+#[test]
+fn what_starts_in_contact_is_no_news_when_it_leaves_or_stays() {
+    let mut rig = plate(SWEPT);
+    rig.place(2, &at(0.0, 0.0, 0.005));
+    rig.send(ALL);
+    assert!(has(rig.pair(1, 2).unwrap(), Event::Begin));
+    rig.place(2, &at(1.0, 0.0, 0.005));
+    rig.send(ALL);
+    let row = rig.pair(1, 2).unwrap();
+    assert!(
+        has(row, Event::Persist) && !hit(row) && !open(row),
+        "{row:?}"
+    );
+    rig.place(2, &at(1.0, 0.0, 5.0));
+    rig.send(ALL);
+    let row = rig.pair(1, 2).unwrap();
+    assert!(has(row, Event::End) && !has(row, Event::Begin), "{row:?}");
+    assert!(!hit(row) && !open(row) && row.toi_min.is_nan(), "{row:?}");
+    assert_eq!(rig.state(), State::Clear);
+}
+
+#[test]
+fn what_starts_beyond_the_wall_and_goes_on_is_clear() {
+    let mut rig = plate(SWEPT);
+    rig.place(2, &at(0.0, 0.0, 50.0));
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+    assert!(rig.pair(1, 2).is_none());
+}
+
+#[test]
+fn what_grazes_above_the_plate_is_clear_and_below_its_face_a_hit() {
+    for (height, touches) in [(1e-7, false), (-1e-7, true)] {
+        let mut rig = plate(SWEPT);
+        rig.place(2, &at(-20.0, 0.0, 0.0105 + height));
+        rig.epoch += 1;
+        rig.send(ALL);
+        rig.place(2, &at(20.0, 0.0, 0.0105 + height));
+        rig.send(ALL);
+        assert_eq!(
+            rig.pair(1, 2).is_some_and(hit),
+            touches,
+            "{:?}",
+            rig.pair(1, 2)
+        );
+        let state = if touches {
+            State::Colliding
+        } else {
+            State::Clear
+        };
+        assert_eq!(rig.state(), state);
+    }
+}
+
+#[test]
+fn two_bullets_that_pass_through_each_other_touch_half_way() {
+    let mut rig = Rig::new(&scene(
+        "",
+        &[
+            body(1, [0.0; 3], SHOT, SWEPT),
+            body(2, [0.0; 3], SHOT, SWEPT),
+        ],
+    ));
+    rig.place(1, &at(-50.0, 0.0, 0.0));
+    rig.place(2, &at(0.0, 50.0, 0.0));
+    rig.send(ALL);
+    rig.place(1, &at(50.0, 0.0, 0.0));
+    rig.place(2, &at(0.0, -50.0, 0.0));
+    rig.send(ALL);
+    // They close along the diagonal: 100 sqrt(2) m in all.
+    let toi = 0.5 - 0.02 / (100.0 * 2.0_f64.sqrt());
+    is_near(rig.pair(1, 2).unwrap(), toi, 1e-9);
+    // Side by side they keep their distance, however fast.
+    rig.place(1, &at(50.0, 99.97, 0.0));
+    rig.place(2, &at(0.0, 0.0, 0.0));
+    rig.epoch += 1;
+    rig.send(ALL);
+    rig.place(1, &at(-50.0, 99.97, 0.0));
+    rig.place(2, &at(-100.0, 0.0, 0.0));
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+}
+
+#[test]
+fn frames_skipped_between_two_ticks_are_swept_too() {
+    let plane = "{ type = \"half_space\", normal = [0.0, 0.0, 1.0] }";
+    for wall in [PLATE, plane] {
+        let mut rig = Rig::new(&scene(
+            "",
+            &[
+                format!("name = \"b1\"\nid = 1\nmoves = false\nshape = {wall}\n"),
+                body(2, [0.0, 0.0, 5.0], SHOT, SWEPT),
+            ],
+        ));
+        rig.send(ALL);
+        // Down through it and back within one tick.
+        let height = [-5.0, 5.0];
+        rig.send_several(2, |k, rig| rig.place(2, &at(0.0, 0.0, height[k])), ALL);
+        let top = if wall == PLATE { 0.0105 } else { 0.01 };
+        is_near(rig.pair(1, 2).unwrap(), (5.0 - top) / 10.0 / 2.0, 1e-9);
+        assert!(has(rig.pair(1, 2).unwrap(), Event::Passed));
+    }
+}
+
+#[test]
+fn more_poses_than_are_kept_leave_a_way_open() {
+    let mut rig = plate(SWEPT);
+    rig.send_several(
+        12,
+        |k, rig| rig.place(2, &at(k as f64, 0.0, if k == 10 { -1.0 } else { 1.0 })),
+        ALL,
+    );
+    let row = rig.pair(1, 2).unwrap();
+    assert!(open(row) && !hit(row), "{row:?}");
+    assert_eq!(rig.state(), State::Possible);
+}
+
+#[test]
+fn a_body_that_hangs_on_one_with_more_poses_than_are_kept_is_open_too() {
+    let arm = "name = \"b3\"\nid = 3\nattached_to = \"b2\"\nposition = [2.0, 0.0, 0.0]\ncontinuous = true\n\
+               shape = { type = \"sphere\", radius = 0.01 }";
+    let mut rig = Rig::new(&scene(
+        "",
+        &[
+            body(1, [0.0, 0.0, 7.0], SHOT, ""),
+            body(2, [0.0; 3], "{ type = \"sphere\", radius = 0.1 }", ""),
+            arm.to_owned(),
+        ],
+    ));
+    rig.send(ALL);
+    // In its eleventh pose alone it is near the ball.
+    let height = |k| if k == 10 { 7.0 } else { 0.0 };
+    rig.send_several(12, |k, rig| rig.place(2, &at(-2.0, 0.0, height(k))), ALL);
+    assert!(open(rig.pair(1, 3).unwrap()), "{:?}", rig.pair(1, 3));
+}
+
+/// A rod of 2 m through the origin, which turns about x, and a small ball on the y axis.
+fn rod(more: &str) -> Rig {
+    let rod = "{ type = \"capsule\", radius = 0.001, half_height = 1.0 }";
+    Rig::new(&scene(
+        "",
+        &[
+            body(1, [0.0, -0.9, 0.0], SHOT, ""),
+            body(2, [0.0; 3], rod, more),
+        ],
+    ))
+}
+
+#[test]
+fn a_declared_spin_adds_the_turns_that_the_poses_do_not_show() {
+    let ball_at = FRAC_PI_2 - (0.011_f64 / 0.9).asin();
+    for turns in [1.0, -2.0, 0.75, 1.75, 100.0] {
+        let mut rig = rod(SWEPT);
+        let still = [0.0; 6];
+        rig.velocities = vec![still, still];
+        rig.send(ALL);
+        let spin = turns * TAU / (FRAME_NS as f64 * 1e-9);
+        // Off by a tenth of a turn: the poses say which.
+        let said = spin * (1.0 + 0.1 / turns);
+        rig.velocities = vec![still, [0.0, 0.0, 0.0, said, 0.0, 0.0]];
+        rig.place(2, &Pose::rotation(Vec3::x() * (turns * TAU)));
+        rig.send(ALL);
+        is_near(rig.pair(1, 2).unwrap(), ball_at / (turns.abs() * TAU), 1e-6);
+    }
+    // What is not declared is the shortest turn: none.
+    let mut rig = rod(SWEPT);
+    rig.send(ALL);
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+}
+
+#[test]
+fn the_shortest_turn_is_taken_where_nothing_is_declared() {
+    let mut rig = rod(SWEPT);
+    rig.send(ALL);
+    rig.place(2, &Pose::rotation(Vec3::x() * (0.9 * PI)));
+    rig.send(ALL);
+    let ball_at = FRAC_PI_2 - (0.011_f64 / 0.9).asin();
+    is_near(rig.pair(1, 2).unwrap(), ball_at / (0.9 * PI), 1e-9);
+}
+
+#[test]
+fn a_step_beyond_the_limit_is_a_teleport_and_told() {
+    let mut rig = plate("continuous = true\nteleport_m = 20.0");
+    rig.place(2, &at(0.0, 0.0, -20.0));
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+    assert!(rig.because(Reason::Teleported) && !rig.because(Reason::Swept));
+    rig.place(2, &at(0.0, 0.0, -0.1));
+    rig.send(ALL);
+    assert!(
+        !rig.because(Reason::Teleported),
+        "19.9 m are fast, no teleport"
+    );
+    rig.place(2, &at(0.0, 0.0, 15.0));
+    rig.send(ALL);
+    assert!(hit(rig.pair(1, 2).unwrap()));
+    // Jumped and went on within one tick: what it went is swept.
+    let z = [-20.0, 5.0, -5.0];
+    rig.send_several(3, |k, rig| rig.place(2, &at(0.0, 0.0, z[k])), ALL);
+    let row = rig.pair(1, 2).unwrap();
+    is_near(row, (2.0 + (5.0 - 0.0105) / 10.0) / 3.0, 1e-9);
+    assert_ne!(row.flags & pair_flags::TELEPORTED, 0);
+}
+
+#[test]
+fn a_reset_and_a_first_pose_are_no_motion() {
+    let mut rig = plate(SWEPT);
+    rig.epoch += 1;
+    rig.place(2, &at(0.0, 0.0, -5.0));
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+    assert!(rig.pair(1, 2).is_none_or(|row| !hit(row) && !open(row)));
+}
+
+#[test]
+fn an_attached_body_goes_the_way_of_the_body_it_hangs_on() {
+    // A ball at the end of an arm of 2 m, which turns by 120 degrees about z; a ball on its circle at 60 degrees.
+    let third = TAU / 3.0;
+    let on_circle = Quat::from_scaled_axis(Vec3::z() * (third / 2.0)) * Vec3::x() * 2.0;
+    let mut rig = Rig::new(&scene(
+        "",
+        &[
+            body(1, on_circle.into(), SHOT, ""),
+            body(2, [0.0; 3], "{ type = \"sphere\", radius = 0.1 }", ""),
+            "name = \"b3\"\nid = 3\nattached_to = \"b2\"\nposition = [2.0, 0.0, 0.0]\ncontinuous = true\n\
+             shape = { type = \"sphere\", radius = 0.01 }"
+                .to_owned(),
+        ],
+    ));
+    rig.send(ALL);
+    rig.place(2, &Pose::rotation(Vec3::z() * third));
+    rig.send(ALL);
+    // The chord of two radii between the centres: 0.02 m at 2 m.
+    let half = (0.01_f64 / 2.0).asin();
+    let toi = (third / 2.0 - 2.0 * half) / third;
+    is_near(rig.pair(1, 3).unwrap(), toi, 1e-9);
+    assert!(rig.pair(1, 2).is_none());
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+}
+
+#[test]
+fn walls_that_are_meshes_or_of_several_shapes_are_met_too() {
+    let mesh = trimesh(&cuboid(Vec3::new(5.0, 5.0, 0.0005)), None);
+    let surface = trimesh(&cuboid(Vec3::new(5.0, 5.0, 0.0005)), Some(false));
+    let two = "[{ type = \"box\", half_extents = [5.0, 5.0, 0.0005] }, \
+               { type = \"sphere\", radius = 0.1, position = [3.0, 0.0, 0.2] }]";
+    for wall in [mesh.as_str(), surface.as_str(), two] {
+        let mut rig = Rig::new(&scene(
+            "",
+            &[
+                body(1, [0.0; 3], wall, ""),
+                body(2, [0.3, 0.2, 5.0], SHOT, SWEPT),
+            ],
+        ));
+        rig.send(ALL);
+        rig.place(2, &at(0.3, 0.2, -5.0));
+        rig.send(ALL);
+        is_near(rig.pair(1, 2).unwrap(), (5.0 - 0.0105) / 10.0, 1e-8);
+        assert!(has(rig.pair(1, 2).unwrap(), Event::Passed));
+    }
+}
+
+#[test]
+fn a_body_that_is_not_continuous_is_where_the_tick_has_it() {
+    let mut rig = plate(SWEPT);
+    // The plate moves away sideways in the same tick.
+    rig.place(1, &at(50.0, 0.0, 0.0));
+    rig.place(2, &at(0.0, 0.0, -5.0));
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+    rig.place(1, &at(0.0, 0.0, 0.0));
+    rig.place(2, &at(0.0, 0.0, 5.0));
+    rig.send(ALL);
+    assert!(hit(rig.pair(1, 2).unwrap()));
+}
+
+#[test]
+fn a_touch_on_the_way_of_an_undecided_pair_is_a_begin() {
+    // It ends so that the verdict has no budget left, but the way has.
+    let mut rig = plate(SWEPT);
+    rig.place(2, &at(0.0, 0.0, -0.0104));
+    rig.send(ALL);
+    let row = rig.pair(1, 2).unwrap();
+    assert!(hit(row) && has(row, Event::Begin), "{row:?}");
+}
