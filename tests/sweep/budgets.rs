@@ -21,8 +21,16 @@ fn with_any_budget_a_bullet_is_a_hit_or_open_and_with_enough_a_hit() {
         let mut rng = Rng::new(500 + kind as u64);
         let mut rig = world(bullet);
         let mut hits = [0; BUDGETS.len()];
+        let mut count = 0;
         for case in 0..COUNT {
-            let (plate, motion, _) = shot(&mut rng, 10.0);
+            let (plate, motion, share) = shot(&mut rng, 10.0);
+            let up = plate.pose.rotation * sweepd::math::Vec3::z();
+            let ahead = 1.01 * (bullet.radius + 2.0 * HALF.z) / up.dot(&motion.travel).abs();
+            // What is in the wall from the first is no news.
+            if ahead > share || ahead > 1.0 - share {
+                continue;
+            }
+            count += 1;
             for (at, units) in BUDGETS.into_iter().enumerate() {
                 fly(&mut rig, &plate, &motion, Budget::units(units));
                 let told = flags(&rig);
@@ -43,10 +51,10 @@ fn with_any_budget_a_bullet_is_a_hit_or_open_and_with_enough_a_hit() {
                 );
             }
         }
-        println!("kind {kind}: hits of {COUNT} by budget {BUDGETS:?}: {hits:?}");
+        println!("kind {kind}: hits of {count} by budget {BUDGETS:?}: {hits:?}");
         assert!(hits.is_sorted(), "{hits:?}");
         assert_eq!(hits[0], 0);
-        assert_eq!(hits[BUDGETS.len() - 1], COUNT);
+        assert_eq!(hits[BUDGETS.len() - 1], count);
     }
 }
 

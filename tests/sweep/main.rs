@@ -22,5 +22,6 @@ mod rig;
 mod boxes;
 mod budgets;
 mod cases;
+mod pairs;
 mod truth;
 mod walls;

@@ -119,7 +119,8 @@ fn shots(count: usize, far: f64) {
     for (kind, bullet) in bullets().iter().enumerate() {
         let mut rng = Rng::new(40 + kind as u64);
         let mut rig = world(bullet);
-        for case in 0..count {
+        let mut case = 0;
+        while case < count {
             let (plate, motion, share) = shot(&mut rng, far);
             let speed = (plate.pose.rotation * Vec3::z()).dot(&motion.travel).abs();
             let ahead = 1.01 * (bullet.radius + 2.0 * HALF.z) / speed;
@@ -127,6 +128,7 @@ fn shots(count: usize, far: f64) {
             if ahead > share || ahead > 1.0 - share {
                 continue;
             }
+            case += 1;
             let truth = plate.first_touch(&bullet.points, bullet.margin, &motion, (share, ahead));
             fly(&mut rig, &plate, &motion, ALL);
             let what = format!("kind {kind} case {case} at {far} m");
