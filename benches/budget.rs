@@ -1,5 +1,5 @@
-//! Budgets above the floor: how far a tick overshoots, on the wall and on the thread's CPU clock, and how much of what is
-//! left above the floor is used while work remains (before and after
+//! Budgets above the floor: how far a tick overshoots, on the wall and on the thread's CPU clock, and how much of what
+//! is left above the floor is used while work remains (before and after
 //! publishing; and before alone). Scene: `pool(4000, 11)`, each body 1 % of its size a tick, pairs and
 //! contacts asked for.
 //!

@@ -1,6 +1,6 @@
 //! A whole engine tick against rapier3d-f64's `CollisionPipeline`, same convex bodies, same poses, contacts asked of
-//! both, in one run, tick by tick in turn. Timed on both sides: taking the poses in, broad phase, narrow phase, contacts;
-//! on ours also the filled outbox with all rows.
+//! both, in one run, tick by tick in turn. Timed on both sides: taking the poses in, broad phase, narrow phase,
+//! contacts; on ours also the filled outbox with all rows.
 //!
 //! `cargo bench --bench engine [-- --quick]`
 

@@ -1,5 +1,5 @@
-//! The narrow phase's motion pass costs in proportion to what moved: some 300,000 candidate pairs (10,000 spheres, 60 pairs
-//! a body), of which 1 %, 10 % or 100 % of the bodies move.
+//! The narrow phase's motion pass costs in proportion to what moved: some 300,000 candidate pairs (10,000 spheres, 60
+//! pairs a body), of which 1 %, 10 % or 100 % of the bodies move.
 //!
 //! `cargo bench --bench motion_pass [-- --quick]`
 

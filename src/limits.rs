@@ -39,8 +39,8 @@ pub const QUATERNION_NORM_TOLERANCE: f64 = 1e-2;
 pub const PRIORITY_MIN: f64 = 0.01;
 /// See [`PRIORITY_MIN`].
 pub const PRIORITY_MAX: f64 = 100.0;
-/// Poses between two ticks that the path of a continuous body follows; beyond it only its box knows of them, and its pairs
-/// are told as open. More than one comes only where frames are partial, or a tick takes longer than a frame.
+/// Poses between two ticks that the path of a continuous body follows; beyond it only its box knows of them, and its
+/// pairs are told as open. More than one comes only where frames are partial, or a tick takes longer than a frame.
 pub const LEGS_MAX: usize = 8;
 /// Whole turns between two poses that a declared angular velocity may add; beyond it a pair is told as open. A drill at
 /// 100,000 turns a minute makes 1667 in a second.

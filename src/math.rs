@@ -129,7 +129,8 @@ impl Interval {
         }
     }
 
-    /// What both intervals allow. Two sound intervals of one number always meet; should rounding part them, `self` wins.
+    /// What both intervals allow. Two sound intervals of one number always meet; should rounding part them, `self`
+    /// wins.
     #[must_use]
     pub fn meet(self, other: Self) -> Self {
         let both = Self {

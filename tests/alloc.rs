@@ -1,5 +1,5 @@
-//! Goal: no allocation in a tick after warm-up at constant scene size. Method: a counting allocator around the system's,
-//! armed for the ticks that count. `SWEEPD_ALLOC_TRACE=1` prints where each counted one was made.
+//! Goal: no allocation in a tick after warm-up at constant scene size. Method: a counting allocator around the
+//! system's, armed for the ticks that count. `SWEEPD_ALLOC_TRACE=1` prints where each counted one was made.
 
 #![allow(unsafe_code, reason = "a counting allocator has no safe form")]
 #![allow(clippy::unwrap_used, reason = "a test")]
@@ -132,8 +132,8 @@ fn a_tick_allocates_nothing_after_warm_up() {
         ("swept tori", swept(&tori(9)), 4),
         ("swept compounds", swept(&compounds(6)), 4),
     ] {
-        // Where work on meshes is cut off, how much of it is under way creeps up for long when pairs come and go as fast as
-        // those of swept boxes do.
+        // Where work on meshes is cut off, how much of it is under way creeps up for long when pairs come and go as
+        // fast as those of swept boxes do.
         let limited = !matches!(name, "swept tori" | "swept compounds");
         let budgets = [
             Budget::UNLIMITED,

@@ -165,6 +165,17 @@ fn every_file_says_its_duty_and_stays_short() {
         if !text.starts_with("//!") {
             wrong.push(format!("src/{file} does not open with its duty (//!)"));
         }
+        for (at, line) in text.lines().enumerate() {
+            let words = line.trim_start();
+            // A table is as wide as it is.
+            let prose = words.starts_with("//") && !words.contains(" | ");
+            if prose && line.chars().count() > 120 {
+                wrong.push(format!(
+                    "src/{file}:{}: a comment beyond 120 columns",
+                    at + 1
+                ));
+            }
+        }
         let lines = text.lines().count();
         if lines > 400 {
             wrong.push(format!(

@@ -1,20 +1,21 @@
 //! Goal: every door keeps the same promises. Method: one suite, two backends (shared memory, memory of this process),
 //! a stand-in daemon that names in each tick the frames it used.
 //!
-//! The ROS 2 node is a door, too, and is not among the backends: half of the suite's rules are about what DDS does not have.
-//! - *The end of a client ends its session*: DDS tells of a writer's end by its lease, 20 s later; a session ends by the
-//!   source's time-out (law 4.2). *A second daemon is refused*: ROS 2 allows two nodes of one name; both are told.
-//! - *A slow reader keeps the newest 8*: a reader's history is its own, by its depth; what the node keeps for one that stopped
-//!   is bounded (`transport/ros2/wheel.rs`). *Sixteen sources are all heard*, *a flooder starves nobody*: frames are best
-//!   effort, and a receive buffer that is full loses the one as the other; what the node itself passes over is counted
-//!   (`transport/ros2/shelf.rs`).
-//! - *Frames of another layout*, *a broken request is refused*: a type that differs does not match, or is not decoded, which is
-//!   counted; requests are services with types of their own, and no JSON with blobs.
+//! The ROS 2 node is a door, too, and is not among the backends: half of the suite's rules are about what DDS does not
+//! have.
+//! - *The end of a client ends its session*: DDS tells of a writer's end by its lease, 20 s later; a session ends by
+//!   the source's time-out (law 4.2). *A second daemon is refused*: ROS 2 allows two nodes of one name; both are told.
+//! - *A slow reader keeps the newest 8*: a reader's history is its own, by its depth; what the node keeps for one that
+//!   stopped is bounded (`transport/ros2/wheel.rs`). *Sixteen sources are all heard*, *a flooder starves nobody*:
+//!   frames are best effort, and a receive buffer that is full loses the one as the other; what the node itself passes
+//!   over is counted (`transport/ros2/shelf.rs`).
+//! - *Frames of another layout*, *a broken request is refused*: a type that differs does not match, or is not decoded,
+//!   which is counted; requests are services with types of their own, and no JSON with blobs.
 //! - *Body rows, body verdicts and the plan* are not offered; late joiners get names, and all else with the next tick.
 //!
-//! The rules that do hold (each step has its result, passed-over frames are said to be, sessions, epochs, pauses, restarts
-//! with a new boot id, waiting frames, nothing computed for nobody) are held by real peers in `tests/python/ros2`, and its
-//! messages field by field against shared memory.
+//! The rules that do hold (each step has its result, passed-over frames are said to be, sessions, epochs, pauses,
+//! restarts with a new boot id, waiting frames, nothing computed for nobody) are held by real peers in
+//! `tests/python/ros2`, and its messages field by field against shared memory.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,

@@ -1,5 +1,5 @@
-//! Ours behind the trait that the peers share: one timed step a frame, and the pairs it left behind. What is timed is the
-//! whole `update` with its pair set and the events in order.
+//! Ours behind the trait that the peers share: one timed step a frame, and the pairs it left behind. What is timed is
+//! the whole `update` with its pair set and the events in order.
 
 use sweepd::broad::{BroadPhase, Method, Proxies, Work};
 use sweepd::ids::{BodyId, BodySlot};

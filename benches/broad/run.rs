@@ -1,8 +1,8 @@
 //! One process a run, and what it prints: CSV on stdout, a table of means on stderr.
 //!
 //! A run: build, 40 frames to settle (the first one told apart as `first_us`), then the frames that count. In a middle
-//! frame and the last one the pairs are compared with the exact set; a run that differs is printed as `wrong` and counts
-//! for nothing. Times are those of the thread's CPU, so that what else runs is mostly left out.
+//! frame and the last one the pairs are compared with the exact set; a run that differs is printed as `wrong` and
+//! counts for nothing. Times are those of the thread's CPU, so that what else runs is mostly left out.
 
 use std::fmt::Write as _;
 use std::process::Command;

@@ -2,8 +2,9 @@
 //!
 //! For each method: a cold start (all verdicts, and the share of verdicts against the budget, in microseconds and in
 //! work units), and coherent motion of 0.1, 0.5 and 2 % of the diameter a tick, without a limit and within 200 and
-//! 500 us: unresolved pairs, pairs whose last verdict is not the truth, the oldest pair without a verdict, contacts that
-//! were reported late, overshoot. The time starts after the motion pass, which is told beside it. Truth: walks to the end over the other trees.
+//! 500 us: unresolved pairs, pairs whose last verdict is not the truth, the oldest pair without a verdict, contacts
+//! that were reported late, overshoot. The time starts after the motion pass, which is told beside it. Truth: walks to
+//! the end over the other trees.
 //!
 //! `cargo bench --bench time_critical [-- --quick] [--cold] [METHOD..]`
 

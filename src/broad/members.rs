@@ -1,7 +1,7 @@
 //! What the broad phase knows of its bodies: a copy of each box, the id, and what this tick did to it.
 //!
-//! In: slots and the caller's [`Proxies`]. Out: boxes in an array by slot, for the methods that go through boxes by slot
-//! (a body is some hundred bytes, a box 48); the others read them where they are.
+//! In: slots and the caller's [`Proxies`]. Out: boxes in an array by slot, for the methods that go through boxes by
+//! slot (a body is some hundred bytes, a box 48); the others read them where they are.
 
 use super::Proxies;
 use crate::ids::{BodyId, BodySlot, PairKey};

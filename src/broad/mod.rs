@@ -4,10 +4,10 @@
 //! ([`PairPolicy`]). Out: the [`PairSet`], of which this room is the only writer, and a [`PairDelta`].
 //!
 //! Six methods behind one door. [`Method::BruteForce`] looks at every pair: the twin, for ever. [`Method::Order`] keeps
-//! blocks of fat boxes and their candidates (see `order`). [`Method::SweepAndPrune`] keeps sorted lists of box ends (see
-//! `sap`). [`Method::UniformGrid`], [`Method::SpatialHash`] and [`Method::HierarchicalGrid`] keep bodies in cells (see
-//! `grid`). A method only suggests pairs; what is stored is decided in one place (`commit`), so all give the same pairs
-//! in the same slots, and the same delta.
+//! blocks of fat boxes and their candidates (see `order`). [`Method::SweepAndPrune`] keeps sorted lists of box ends
+//! (see `sap`). [`Method::UniformGrid`], [`Method::SpatialHash`] and [`Method::HierarchicalGrid`] keep bodies in cells
+//! (see `grid`). A method only suggests pairs; what is stored is decided in one place (`commit`), so all give the same
+//! pairs in the same slots, and the same delta.
 //!
 //! The pairs are those of the f64 boxes, at any offset: what rounds boxes to f32 asks the f64 boxes where rounding
 //! could tell otherwise.

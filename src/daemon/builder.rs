@@ -1,5 +1,5 @@
-//! The worker that turns requests into edits with built shapes, and answers questions, off the tick's thread: a mesh of a
-//! million triangles takes a second to build, and no tick waits for it.
+//! The worker that turns requests into edits with built shapes, and answers questions, off the tick's thread: a mesh of
+//! a million triangles takes a second to build, and no tick waits for it.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;

@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use crate::error::{Error, Result};
 
-/// Looks without progress after which the thread is given up. Its own looks are counted, not the time: a machine that was
-/// suspended, or a process that was stopped, wakes up to one look, not to ten.
+/// Looks without progress after which the thread is given up. Its own looks are counted, not the time: a machine that
+/// was suspended, or a process that was stopped, wakes up to one look, not to ten.
 const LOOKS: u32 = 10;
 
 /// Watches a thread until it is dropped.

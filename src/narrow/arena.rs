@@ -48,8 +48,8 @@ impl Run {
 
 /// Blocks of 4, 8, 16, ... items in one vector that only ever grows, up to a limit.
 ///
-/// A block that is given back serves the next owner, whole or split; blocks are not merged, so the vector is at most the sum
-/// of what was ever in use at once of each size.
+/// A block that is given back serves the next owner, whole or split; blocks are not merged, so the vector is at most
+/// the sum of what was ever in use at once of each size.
 #[derive(Debug)]
 pub(super) struct Arena<T> {
     items: Vec<T>,

@@ -1,7 +1,7 @@
 //! Pairs of single shapes of which one is a mesh: work on their fronts, and what it says of the bodies.
 //!
-//! A front works at this tick's poses; what it had proved before is carried there. The pair's memory is an interval with
-//! its own certificate, so a pair that has not moved enough is not looked at, and its front is not touched.
+//! A front works at this tick's poses; what it had proved before is carried there. The pair's memory is an interval
+//! with its own certificate, so a pair that has not moved enough is not looked at, and its front is not touched.
 
 use crate::ids::PairSlot;
 use crate::math::{Interval, relative};
@@ -17,8 +17,8 @@ use super::{NONE, Narrow};
 /// What asking the last contact again costs, in tests of a box against a pack: when the clock is to be read.
 const RETEST_COST: u64 = 2;
 
-/// A pair's turn doubles with each tick it waits for its verdict, up to so many times: what motion undoes in a tick may be
-/// more than a plain turn, and then equal turns for all would decide it never.
+/// A pair's turn doubles with each tick it waits for its verdict, up to so many times: what motion undoes in a tick may
+/// be more than a plain turn, and then equal turns for all would decide it never.
 const SLICE_DOUBLINGS_MAX: u64 = 6;
 
 impl Narrow {

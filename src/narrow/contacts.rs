@@ -90,8 +90,8 @@ impl ContactSet {
     /// Takes at most four points of each patch, and of those at most `most`: the deepest and those that span the most.
     /// Contacts that were there before keep their ids. `before` is scratch memory.
     ///
-    /// `most` is shared by spread, not by quota: the deepest of all comes first, then what lies farthest from what is kept in
-    /// place and in normal, so that no patch has a second point while another far from it has none.
+    /// `most` is shared by spread, not by quota: the deepest of all comes first, then what lies farthest from what is
+    /// kept in place and in normal, so that no patch has a second point while another far from it has none.
     pub(super) fn replace(
         &mut self,
         found: &mut [Contact],
@@ -133,8 +133,8 @@ impl ContactSet {
 }
 
 impl Contact {
-    /// Its name among the contacts of the pair: triangles are no part of it, for a corner that slides over a mesh is the same
-    /// contact on each of them.
+    /// Its name among the contacts of the pair: triangles are no part of it, for a corner that slides over a mesh is
+    /// the same contact on each of them.
     fn key(&self) -> (u32, u32, u64) {
         (self.shape_a, self.shape_b, self.feature)
     }

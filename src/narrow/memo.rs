@@ -182,8 +182,8 @@ pub(super) fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f6
     }
 }
 
-/// How far two bodies came nearer between the test's relative pose and this one, metres: along the witness, or along the
-/// line of their centres where there is none. For the order of work, no bound.
+/// How far two bodies came nearer between the test's relative pose and this one, metres: along the witness, or along
+/// the line of their centres where there is none. For the order of work, no bound.
 pub(super) fn closing(a: &Body, b: &Body, memo: &Memo, rel: &Pose) -> f64 {
     let (point, direction) = match memo.witness {
         Some(witness) => (witness.point_b, witness.normal),

@@ -5,21 +5,21 @@
 //!
 //! Three ways:
 //! - [`CarriedFront`] for a pair of single shapes: what was proved at one pose is carried to the next (see `carried`);
-//! - [`MeshQuery`], a query at one pose that can stop: for bodies of several shapes, and half-spaces. Between two surfaces it
-//!   is a front that is not carried on;
+//! - [`MeshQuery`], a query at one pose that can stop: for bodies of several shapes, and half-spaces. Between two
+//!   surfaces it is a front that is not carried on;
 //! - [`Walk`], the same over the trees of axis-aligned boxes: the twin and the baseline of the two.
 //!
-//! Of a walk every pair of triangles is covered by exactly one entry at any time: on the stack (boxes that may touch), in
-//! the heap (boxes proved apart by so much), or settled (queried, or proved farther than the best distance known).
+//! Of a walk every pair of triangles is covered by exactly one entry at any time: on the stack (boxes that may touch),
+//! in the heap (boxes proved apart by so much), or settled (queried, or proved farther than the best distance known).
 //! So the least of all entries is a sound lower bound at any interruption. Three stages:
 //! 1. `Surfaces`: the stack, depth first and nearest child first, until two leaves touch or none is left.
 //! 2. `Inside`: where surfaces are apart and a solid takes part, one point of every connected surface is tested
 //!    against the other solid, both ways (law 3.3).
 //! 3. `Refine`: the heap, best first, until nothing can be nearer than the best leaf pair.
 //!
-//! Contacts: `manifold` makes points of two leaves that touch, with the normal of the surface about them; `patches` keeps
-//! the deepest and the outermost of each patch as they come in. Which four of a patch are published is decided among those
-//! (`narrow/contacts`).
+//! Contacts: `manifold` makes points of two leaves that touch, with the normal of the surface about them; `patches`
+//! keeps the deepest and the outermost of each patch as they come in. Which four of a patch are published is decided
+//! among those (`narrow/contacts`).
 //!
 //! Refused: breadth-first order (Hubbard): it confirms contacts last of all; one order for all three stages.
 //! Lower ends of overlapping pairs are bounds, not depths: the least overlap of the root boxes along 15 axes, and the

@@ -133,8 +133,8 @@ impl Narrow {
         }
     }
 
-    /// An empty memory in place of one that did not hold: pairs that begin in tick `tick` may have collided unseen since
-    /// `since`.
+    /// An empty memory in place of one that did not hold: pairs that begin in tick `tick` may have collided unseen
+    /// since `since`.
     #[must_use]
     pub fn renewed(contacts_per_pair: usize, world: &World, since: u64, tick: u64) -> Self {
         let mut narrow = Self::new(contacts_per_pair);
@@ -180,8 +180,8 @@ impl Narrow {
         }
     }
 
-    /// Spends the meter: what lies between the poses, verdicts, then what is listened to. Returns whether everything asked
-    /// for is done.
+    /// Spends the meter: what lies between the poses, verdicts, then what is listened to. Returns whether everything
+    /// asked for is done.
     pub fn spend(&mut self, world: &World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
         let half = self.has_sweeps().then(|| meter.half());
         let swept = self.spend_on_sweeps(world, wanted, meter, half);
@@ -365,8 +365,8 @@ const NONE: u32 = u32::MAX;
 impl<T> Pool<T> {
     /// An object, used before or made now.
     ///
-    /// When there is none left, half as many more are made at once: how many are out at the same time creeps up for long
-    /// where work is cut off, and each new peak would allocate.
+    /// When there is none left, half as many more are made at once: how many are out at the same time creeps up for
+    /// long where work is cut off, and each new peak would allocate.
     fn take(&mut self, make: impl Fn() -> T) -> u32 {
         if self.free.is_empty() {
             let more = self.items.len() / 2 + 1;

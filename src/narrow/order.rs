@@ -13,16 +13,16 @@ use super::memo::Memo;
 pub enum Order {
     /// As found: for a budget without limit, where order means nothing.
     AsFound,
-    /// Last tick's contacts, then by age, weighted by the bodies' priority and by how fast they come nearer: for a budget
-    /// in time.
+    /// Last tick's contacts, then by age, weighted by the bodies' priority and by how fast they come nearer: for a
+    /// budget in time.
     Aged,
     /// As `Aged`, with ties broken by body ids: for a budget in units, so that a run replays bit for bit whatever the
     /// slots are.
     Counted,
 }
 
-/// Pairs put in order at once. Work is put in order as it is reached: where time ends after a few queries, most of the list
-/// never needs an order, and no sort takes longer than a query or two.
+/// Pairs put in order at once. Work is put in order as it is reached: where time ends after a few queries, most of the
+/// list never needs an order, and no sort takes longer than a query or two.
 const BATCH: usize = 128;
 
 /// Parts that a list can be in while the front of it is put in order: each is at least a quarter of the one around it.
@@ -81,8 +81,8 @@ impl Urgency {
         self.touched = memo.witness.is_some_and(|w| w.best_m <= 0.0);
     }
 
-    /// Place in the order of work, the least first: one bit whether it is no contact of last tick, then age times weight,
-    /// the greatest first (positive floats order like their bits).
+    /// Place in the order of work, the least first: one bit whether it is no contact of last tick, then age times
+    /// weight, the greatest first (positive floats order like their bits).
     fn rank(self, tick: u64) -> u64 {
         let age = match self.since {
             0 => 0,

@@ -102,7 +102,8 @@ pub(super) fn add_manifold(
     }
 }
 
-/// Where two leaves of meshes touch, as a contact of the bodies. `patch`: a number, equal for points that came in as one patch.
+/// Where two leaves of meshes touch, as a contact of the bodies. `patch`: a number, equal for points that came in as
+/// one patch.
 pub(super) fn leaf_contact(
     (one, other): (&PlacedShape, &PlacedShape),
     places: (u32, u32),
@@ -150,8 +151,9 @@ pub(super) fn sphere_bound(a: &PlacedShape, b: &PlacedShape, bodies12: &Pose) ->
     (cb - ca).norm() - ra - rb - 16.0 * f64::EPSILON * magnitude
 }
 
-/// The certificate of a shape pair's answer for the bodies: its ends in order, and wider by what composing the poses may
-/// have lost. A shape a kilometre from its body's origin has its place rounded there, which the exact query cannot know.
+/// The certificate of a shape pair's answer for the bodies: its ends in order, and wider by what composing the poses
+/// may have lost. A shape a kilometre from its body's origin has its place rounded there, which the exact query cannot
+/// know.
 pub(super) fn sound(gap: Interval, a: &PlacedShape, b: &PlacedShape, bodies12: &Pose) -> Interval {
     let ordered = Interval {
         min: gap.min.min(gap.max),

@@ -185,8 +185,8 @@ impl Narrow {
         }
     }
 
-    /// A verdict found by a query that was asked for no more, or that has not come to its end yet, owes bounds and contacts
-    /// to whoever listens.
+    /// A verdict found by a query that was asked for no more, or that has not come to its end yet, owes bounds and
+    /// contacts to whoever listens.
     fn owe_report(&mut self, slot: PairSlot, whole: bool) {
         let reported = matches!(
             self.hot[slot.index()].verdict,

@@ -1,19 +1,19 @@
 //! Continuous bodies: whether two touch on the way from the last tick's poses to this one's, and when.
 //!
-//! In: the paths that the world keeps, a [`Meter`]. Out: for each pair with a body that was swept, what is known of the way
-//! ([`Passage`]): free of touch, a touch within an interval of the share `s`, or not decided. The verdicts at this tick's
-//! poses are not concerned.
+//! In: the paths that the world keeps, a [`Meter`]. Out: for each pair with a body that was swept, what is known of the
+//! way ([`Passage`]): free of touch, a touch within an interval of the share `s`, or not decided. The verdicts at this
+//! tick's poses are not concerned.
 //!
-//! How: what the pair's certificate says of the last tick's poses, less the length of the way, is free. Else conservative
-//! advancement (see `advance`): from a share that is reached without touch, the pair surely goes on for a while; so the touch
-//! is approached from before it and never passed over. That there is one is certified by a pose at which the two are known
-//! to collide, sought just behind the share reached, by the slope of the gap.
+//! How: what the pair's certificate says of the last tick's poses, less the length of the way, is free. Else
+//! conservative advancement (see `advance`): from a share that is reached without touch, the pair surely goes on for a
+//! while; so the touch is approached from before it and never passed over. That there is one is certified by a pose at
+//! which the two are known to collide, sought just behind the share reached, by the slope of the gap.
 //!
-//! Sweeps come before the verdicts, because another tick has other poses: what is undecided at the end of this one is told as
-//! open. They take half of what the budget leaves, so that verdicts do not starve, and what verdicts leave.
+//! Sweeps come before the verdicts, because another tick has other poses: what is undecided at the end of this one is
+//! told as open. They take half of what the budget leaves, so that verdicts do not starve, and what verdicts leave.
 //!
-//! Refused: sampling (a wall is as thin as it likes); looking for the touch by bisection of the verdict (a bullet that ends
-//! behind the wall is apart at both ends); keeping an undecided sweep for later (nobody asks for it any more).
+//! Refused: sampling (a wall is as thin as it likes); looking for the touch by bisection of the verdict (a bullet that
+//! ends behind the wall is apart at both ends); keeping an undecided sweep for later (nobody asks for it any more).
 
 mod advance;
 mod motion;

@@ -1,8 +1,8 @@
 //! Begin, persist, end: what is certified about each pair's collisions, and events that still wait to be sent.
 //!
 //! Events are about certified collisions only. With less budget a begin comes later; it is never wrong. An event that
-//! does not fit into a message waits here with its range, also after its pair is gone. A touch on the way of a continuous
-//! body that is over at this tick's poses is a begin and an end of one tick: a pass.
+//! does not fit into a message waits here with its range, also after its pair is gone. A touch on the way of a
+//! continuous body that is over at this tick's poses is a begin and an end of one tick: a pass.
 
 use crate::ids::{BodyId, PairKey, PairSlot};
 use crate::narrow::{Finding, Narrow, Passage};
@@ -83,8 +83,8 @@ impl Events {
         self.adrift.extend(seen);
     }
 
-    /// Gives the histories whose slots were lost to the same pairs' new slots; where there is no such pair any more, its
-    /// collision has ended.
+    /// Gives the histories whose slots were lost to the same pairs' new slots; where there is no such pair any more,
+    /// its collision has ended.
     pub(super) fn find_slots(&mut self, tick: u64, world: &World, pairs: &PairSet) {
         for history in std::mem::take(&mut self.adrift) {
             let (a, b) = (world.slot_of(history.ids.0), world.slot_of(history.ids.1));

@@ -1,5 +1,5 @@
-//! The gap of two bodies of a running daemon. In: names, and the world between two ticks. Out: a question that holds all
-//! it needs, so that a worker answers it while ticks go on; or why there is no answer.
+//! The gap of two bodies of a running daemon. In: names, and the world between two ticks. Out: a question that holds
+//! all it needs, so that a worker answers it while ticks go on; or why there is no answer.
 
 use crate::math::{Point, Vec3};
 use crate::narrow::gap_between;
@@ -27,8 +27,8 @@ impl GapQuestion {
     /// * `tick_header` - of the tick that left the world so.
     ///
     /// # Errors
-    /// Why there is no gap to tell, which body, and what to change: no such body, one whose place is not known, the same
-    /// one twice, two that have half-spaces.
+    /// Why there is no gap to tell, which body, and what to change: no such body, one whose place is not known, the
+    /// same one twice, two that have half-spaces.
     pub fn new(
         world: &World,
         tick_header: MessageHeader,

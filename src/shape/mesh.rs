@@ -40,8 +40,8 @@ pub struct Mesh {
     shells: Vec<u32>,
     warnings: Vec<String>,
     tree: Tree,
-    /// Oriented boxes, for pairs of surfaces; the other tree serves rays, planes and extents, where its boxes are as good
-    /// and a quarter of the size.
+    /// Oriented boxes, for pairs of surfaces; the other tree serves rays, planes and extents, where its boxes are as
+    /// good and a quarter of the size.
     obb: ObbTree,
     /// Apart, so that a shape that is no mesh is not large for it.
     adjacency: Box<Adjacency>,

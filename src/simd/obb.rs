@@ -3,9 +3,9 @@
 //! In: eight boxes in columns (a [`Pack`]) and one box seen from their frame. Out: for each of the eight the greatest
 //! separation along the 15 axes of Gottschalk, Lin, Manocha 1996 (OBBTree), before rounding is taken off.
 //!
-//! Positive: nothing in the one is nearer to anything in the other, but for rounding. Along the face axes of one box the
-//! separations are at right angles and add up as squares. The edge axes are not normalised: their length is at most 1,
-//! so a positive separation along one is too small at worst. Zero or less: the boxes may touch, and the number only
+//! Positive: nothing in the one is nearer to anything in the other, but for rounding. Along the face axes of one box
+//! the separations are at right angles and add up as squares. The edge axes are not normalised: their length is at most
+//! 1, so a positive separation along one is too small at worst. Zero or less: the boxes may touch, and the number only
 //! says by how much, for an order.
 
 /// Boxes in a pack.

@@ -66,8 +66,8 @@ impl Laps {
 ///
 /// Publishing is taken by the thread's CPU clock: a slice that the scheduler gave to others says nothing about the next
 /// tick. How long it takes varies by a fifth from tick to tick with what is in the caches, so a mean would be too short
-/// every other tick. What is kept back is a decaying maximum, and where the budget leaves more, up to the longest of the
-/// window for half of what it leaves: a safety that a small budget could not pay.
+/// every other tick. What is kept back is a decaying maximum, and where the budget leaves more, up to the longest of
+/// the window for half of what it leaves: a safety that a small budget could not pay.
 #[derive(Clone, Debug)]
 pub(super) struct Floor {
     /// CPU time of the last publishings, nanoseconds, the oldest overwritten first.
@@ -84,8 +84,8 @@ pub(super) struct Floor {
 
 /// Publishings remembered: the longest of so many is exceeded by about one tick in a hundred.
 const WINDOW: usize = 128;
-/// Each tick the decaying maximum loses 1 / 32 of itself: a spike is forgotten in about 80 ticks. Faster (1 / 8), and one
-/// tick in a hundred ended 0.1 to 0.5 ms late; slower, and more of the budget is kept back than publishing takes.
+/// Each tick the decaying maximum loses 1 / 32 of itself: a spike is forgotten in about 80 ticks. Faster (1 / 8), and
+/// one tick in a hundred ended 0.1 to 0.5 ms late; slower, and more of the budget is kept back than publishing takes.
 const DECAY_SHIFT: u32 = 5;
 /// Of what is left above the floor, a half may be kept back beyond the median of publishing. With a sixth one tick in a
 /// hundred ended 34 to 76 us late, with a half 24 to 45; with all of it no sooner, and with a small budget most answers

@@ -17,8 +17,8 @@ impl Engine {
     }
 
     /// Checks what the last tick left; if it does not hold, this tick builds all that is made from the world anew: the
-    /// broad phase, the pair set, and the narrow phase's memory. Events go on by body ids; pairs that the broken structure
-    /// may have missed carry the ticks since the last check in their ranges.
+    /// broad phase, the pair set, and the narrow phase's memory. Events go on by body ids; pairs that the broken
+    /// structure may have missed carry the ticks since the last check in their ranges.
     ///
     /// Not one room alone: the others were made from what does not hold.
     ///

@@ -1,6 +1,8 @@
-//! What is left of a tick's budget after its outbox was handed over: narrowing goes on, and the next tick tells what it found.
+//! What is left of a tick's budget after its outbox was handed over: narrowing goes on, and the next tick tells what it
+//! found.
 //!
-//! More is kept back for publishing than it mostly takes, because how long it takes varies; what it did not take is used here.
+//! More is kept back for publishing than it mostly takes, because how long it takes varies; what it did not take is
+//! used here.
 
 use super::Engine;
 use super::floor::CLOSING_NS;
@@ -10,8 +12,8 @@ use crate::time::Meter;
 /// The last tick's budget after its outbox was handed over.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Rest {
-    /// What was asked of the narrow phase, and when the tick's time is up, `CLOCK_MONOTONIC` nanoseconds; `None`: nothing is
-    /// left to do, or to do it in.
+    /// What was asked of the narrow phase, and when the tick's time is up, `CLOCK_MONOTONIC` nanoseconds; `None`:
+    /// nothing is left to do, or to do it in.
     pub(super) open: Option<(Wanted, u64)>,
     /// Used so far, nanoseconds and work units.
     pub(super) spent_ns: u64,
@@ -19,8 +21,8 @@ pub(super) struct Rest {
 }
 
 impl Engine {
-    /// Works on what the last tick left undone, within its budget of time and for at most `slice_ns`; what is found goes out
-    /// with the next tick. Returns whether there is more to do and time to do it.
+    /// Works on what the last tick left undone, within its budget of time and for at most `slice_ns`; what is found
+    /// goes out with the next tick. Returns whether there is more to do and time to do it.
     ///
     /// Ticks under a budget of work units do not go on: they replay bit for bit.
     pub fn work_on(&mut self, slice_ns: u64) -> bool {

@@ -22,8 +22,8 @@ use crate::error::Result;
 use crate::time::Clock;
 use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow};
 
-/// How long a wait looks before it sleeps where nothing else is said, nanoseconds: on a single core it would only keep the
-/// other side from its work.
+/// How long a wait looks before it sleeps where nothing else is said, nanoseconds: on a single core it would only keep
+/// the other side from its work.
 pub(crate) fn spin_default_ns() -> u64 {
     match std::thread::available_parallelism() {
         Ok(cores) if cores.get() > 1 => crate::limits::SPIN_US_DEFAULT * 1000,
@@ -141,7 +141,8 @@ pub trait Door {
     /// Hands over what was set since the last call; a door without an operator has nothing.
     fn settings(&mut self, _take: &mut dyn FnMut(Setting)) {}
 
-    /// Says what edits did to bodies, after the tick that applied them; a door whose frames name bodies has no use for it.
+    /// Says what edits did to bodies, after the tick that applied them; a door whose frames name bodies has no use for
+    /// it.
     fn bodies(&mut self, _changes: &[BodyChange]) {}
 
     /// Lets late joiners have the newest state, forgets requests of clients that left. Cheap; each idle round.

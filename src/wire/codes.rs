@@ -88,7 +88,8 @@ code! {
         NoInput = 7 => "no_input",
         /// A continuous body touched another on its way to this tick's poses, or it is not decided whether it did.
         Swept = 8 => "swept",
-        /// A continuous body's step was beyond its `teleport_m`: what lies between was not asked. `clear` may stand beside it.
+        /// A continuous body's step was beyond its `teleport_m`: what lies between was not asked. `clear` may stand
+        /// beside it.
         Teleported = 9 => "teleported",
     }
 }
@@ -265,7 +266,8 @@ pub mod pair_flags {
     pub const UNKNOWN_BODY: u8 = 4;
     /// A body of the pair is held at an old pose.
     pub const HELD_BODY: u8 = 8;
-    /// The pair is gone (removed, filtered, ended by a cause, or its boxes parted); this row only carries its last event.
+    /// The pair is gone (removed, filtered, ended by a cause, or its boxes parted); this row only carries its last
+    /// event.
     pub const GONE: u8 = 16;
     /// Certified to have touched on the way to this tick's poses, within `toi_min` to `toi_max`.
     pub const SWEPT_HIT: u8 = 32;

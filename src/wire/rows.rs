@@ -121,8 +121,8 @@ pub struct PairRow {
     pub gap_best_m: f64,
     /// How fast the gap shrinks along the normal, metres a second; negative: it grows; NaN: velocities unknown.
     pub closing_mps: f64,
-    /// Of a swept pair that touched, or may have, on the way from the last tick's poses (0) to this one's (1): the share
-    /// before which it did not; NaN: not swept, or free of touch.
+    /// Of a swept pair that touched, or may have, on the way from the last tick's poses (0) to this one's (1): the
+    /// share before which it did not; NaN: not swept, or free of touch.
     pub toi_min: f64,
     /// The share by which it had touched first (`SWEPT_HIT`), or 1 (`SWEPT_OPEN`); NaN as `toi_min`.
     pub toi_max: f64,

@@ -92,8 +92,8 @@ impl World {
         }
     }
 
-    /// What a continuous body turned by since its last pose, by its sender's word: angular velocity times the time between
-    /// the two stamps, radians. `None` where it says neither.
+    /// What a continuous body turned by since its last pose, by its sender's word: angular velocity times the time
+    /// between the two stamps, radians. `None` where it says neither.
     fn declared_turn(
         &self,
         slot: BodySlot,

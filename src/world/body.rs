@@ -46,7 +46,8 @@ pub struct Body {
     pub motion: Motion,
     /// Its way since the last tick, where it is continuous or a continuous body hangs on it.
     pub path: Option<Box<Path>>,
-    /// Tight box at `pose` (of a continuous body: around its way), widened by `report_within_m` and `reach_m`: its proxy.
+    /// Tight box at `pose` (of a continuous body: around its way), widened by `report_within_m` and `reach_m`: its
+    /// proxy.
     pub proxy: Aabb,
     /// Whether its place is known.
     pub status: BodyStatus,

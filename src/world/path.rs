@@ -1,11 +1,11 @@
 //! The path of a continuous body since the last tick: what lies between its poses, and the box around it.
 //!
-//! In: the pose of the last tick and each one admitted since. Out: legs from pose to pose, along which the pivot (the centre
-//! of the body's geometry; of an attached body that of the body it hangs on) goes straight and the body turns about a fixed
-//! axis at a constant rate; and a box that holds the body all the way.
+//! In: the pose of the last tick and each one admitted since. Out: legs from pose to pose, along which the pivot (the
+//! centre of the body's geometry; of an attached body that of the body it hangs on) goes straight and the body turns
+//! about a fixed axis at a constant rate; and a box that holds the body all the way.
 //!
-//! The share `s` of the motion runs from 0 (the last tick's pose) to 1 (this one's); legs take equal parts of it, one leg a
-//! pose, also where the body stood still: so two bodies of one source are in step.
+//! The share `s` of the motion runs from 0 (the last tick's pose) to 1 (this one's); legs take equal parts of it, one
+//! leg a pose, also where the body stood still: so two bodies of one source are in step.
 
 use crate::limits::{LEG_TURNS_MAX, LEGS_MAX};
 use crate::math::{Aabb, Point, Pose, Quat, ROUND, Vec3};
@@ -257,8 +257,8 @@ impl Path {
 
 /// A box that holds a body all along a leg, from those at its ends.
 ///
-/// A point at distance `r` from the pivot leaves the straight line between its two ends by at most `angle^2 r / 8`; and it
-/// never leaves the ball about the pivot. Both hold, so their intersection does.
+/// A point at distance `r` from the pivot leaves the straight line between its two ends by at most `angle^2 r / 8`; and
+/// it never leaves the ball about the pivot. Both hold, so their intersection does.
 fn swept_box(leg: &Leg, pivot: &Point, reach: f64, (begin, end): (&Aabb, &Aabb)) -> Aabb {
     let angle = leg.angle() * (1.0 + 8.0 * ROUND);
     let far = leg.from.translation.vector.amax() + leg.to.translation.vector.amax();

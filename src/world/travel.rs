@@ -1,7 +1,9 @@
-//! Continuous bodies on their way: poses become legs of a path, and the path a box; in the next tick the box is tight again.
+//! Continuous bodies on their way: poses become legs of a path, and the path a box; in the next tick the box is tight
+//! again.
 //!
-//! In: admitted poses, and what the sender says of the spin. Out: paths of bodies and of what hangs on them. A body that was
-//! not in the broad phase in the last pose has no path: a first pose, one after a reset, an edit are no motion.
+//! In: admitted poses, and what the sender says of the spin. Out: paths of bodies and of what hangs on them. A body
+//! that was not in the broad phase in the last pose has no path: a first pose, one after a reset, an edit are no
+//! motion.
 
 use super::World;
 use super::census::slot_at;
@@ -135,7 +137,8 @@ impl World {
         }
     }
 
-    /// Sees to it that continuous bodies that hang on another turn about its centre, and that it keeps its way for them.
+    /// Sees to it that continuous bodies that hang on another turn about its centre, and that it keeps its way for
+    /// them.
     pub(super) fn link_paths(&mut self) {
         for index in 0..self.bodies.len() {
             let slot = slot_at(index);

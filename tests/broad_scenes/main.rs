@@ -104,7 +104,8 @@ fn a_heap_is_exact() {
     run(Kind::Heap, 400, frames() / 10 + 10);
 }
 
-/// What the main method does in all frames of a scene: sorts of everything, boxes compared; and the pairs of all frames.
+/// What the main method does in all frames of a scene: sorts of everything, boxes compared; and the pairs of all
+/// frames.
 fn work(kind: Kind, bodies: usize, frames: usize) -> (u64, u64, u64) {
     let mut scene = Scene::new(kind, bodies, 11);
     let mut rig = Rig::new(Level::best(), bodies, false);

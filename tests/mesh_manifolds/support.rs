@@ -13,7 +13,8 @@ use sweepd::wire::{ContactKind, ContactRow, Demand};
 /// Half the extent of a floor, metres.
 pub const FLOOR: f64 = 3.0;
 
-/// The upper faces of a floor at height 0: `cells` by `cells`, cut by random diagonals, with corners moved in the plane.
+/// The upper faces of a floor at height 0: `cells` by `cells`, cut by random diagonals, with corners moved in the
+/// plane.
 pub fn sheet(rng: &mut Rng, cells: usize, irregular: f64) -> Soup {
     let n = cells + 1;
     let step = 2.0 * FLOOR / cells as f64;
@@ -44,7 +45,8 @@ pub fn sheet(rng: &mut Rng, cells: usize, irregular: f64) -> Soup {
     Soup::new(vertices, faces)
 }
 
-/// Tiles laid in bond: corners of the one lie on sides of the other, none is shared, and there are cracks of a nanometre.
+/// Tiles laid in bond: corners of the one lie on sides of the other, none is shared, and there are cracks of a
+/// nanometre.
 pub fn tiles(rng: &mut Rng, cells: usize) -> Soup {
     let step = 2.0 * FLOOR / cells as f64;
     let mut all = Soup::new(Vec::new(), Vec::new());

@@ -190,7 +190,8 @@ fn a_floor_that_stands_askew_is_as_flat() {
     println!("worst tilt {worst:.2e} degrees");
 }
 
-/// A ball of triangles pushed into a flat floor of small ones: the deepest point is found though its triangles cross none.
+/// A ball of triangles pushed into a flat floor of small ones: the deepest point is found though its triangles cross
+/// none.
 #[test]
 fn a_ball_of_triangles_pushed_into_a_floor_has_its_deepest_point() {
     let ball = bumpy_sphere(24, 30, 0.0);

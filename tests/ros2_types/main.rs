@@ -1,7 +1,7 @@
 //! Goal: the Rust structs and codes are those of the ROS 2 interfaces: field names, types, order, constants.
-//! Method: `data/ros2_types.txt` has every type as rosidl's JSON type descriptions say (a ROS 2 test holds it against the
-//! generator); each struct is traced through serde, as CDR reads it, and compared with it. Constants are read from the
-//! `.msg` files and compared with the codes of the wire.
+//! Method: `data/ros2_types.txt` has every type as rosidl's JSON type descriptions say (a ROS 2 test holds it against
+//! the generator); each struct is traced through serde, as CDR reads it, and compared with it. Constants are read from
+//! the `.msg` files and compared with the codes of the wire.
 #![cfg(feature = "ros2")]
 #![allow(
     clippy::unwrap_used,

@@ -1,6 +1,7 @@
 //! What a struct is to CDR: the calls that its `Deserialize` makes, field by field.
 //!
-//! In: a type. Out: a tree of words as `.msg` files write them (`uint8`, `string`, `T[8]`, `T[]`), structs by their fields.
+//! In: a type. Out: a tree of words as `.msg` files write them (`uint8`, `string`, `T[8]`, `T[]`), structs by their
+//! fields.
 
 use std::fmt;
 

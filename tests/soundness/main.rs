@@ -1,7 +1,7 @@
-//! Goal: whatever is published holds the truth, at any budget, for every kind of shape (laws 1, 3.4). Method: couples of
-//! bodies of all kinds in random motion, driven through four engines at once (work without limit, with a random stop in
-//! each tick, with half of what the first one spent, to a deadline and on after its outbox was taken); each published verdict and interval against an oracle that
-//! shares no code with the narrow phase (`truth.rs`).
+//! Goal: whatever is published holds the truth, at any budget, for every kind of shape (laws 1, 3.4). Method: couples
+//! of bodies of all kinds in random motion, driven through four engines at once (work without limit, with a random stop
+//! in each tick, with half of what the first one spent, to a deadline and on after its outbox was taken); each
+//! published verdict and interval against an oracle that shares no code with the narrow phase (`truth.rs`).
 //!
 //! `SWEEPD_PAIR_TICKS` says how many couples times ticks; default 1,500; `SWEEPD_SEED` where to
 //! start.

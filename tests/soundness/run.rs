@@ -65,8 +65,8 @@ impl Run {
             };
             run(&mut engines[1], &inbox, &clock, Budget::units(stop));
             run(&mut engines[2], &inbox, &clock, Budget::units(whole / 2));
-            // Each look at the clock takes 100 ns, and sending is said to take 100 us: the work stops anywhere, and time is
-            // left to go on.
+            // Each look at the clock takes 100 ns, and sending is said to take 100 us: the work stops anywhere, and
+            // time is left to go on.
             clock.step_each_read(100);
             let budget = Budget::time_ns(100_000 + rng.bits() % (100 * whole + 1));
             run(&mut engines[3], &inbox, &clock, budget);

@@ -222,8 +222,8 @@ impl Core {
     }
 }
 
-/// The gap of two polytopes with radii: the greatest `f` is at a face normal, across two edges, or along the line between
-/// two corners or from a corner to an edge; all are tried.
+/// The gap of two polytopes with radii: the greatest `f` is at a face normal, across two edges, or along the line
+/// between two corners or from a corner to an edge; all are tried.
 fn exact(a: At<'_>, b: At<'_>, one: &Core, other: &Core) -> f64 {
     let mut top = f64::NEG_INFINITY;
     let mut offer = |n: Vec3| {

@@ -1,5 +1,5 @@
-//! Two bodies that both go and turn, of boxes, meshes and both together, against samples of the motion with exact predicates
-//! on triangles.
+//! Two bodies that both go and turn, of boxes, meshes and both together, against samples of the motion with exact
+//! predicates on triangles.
 
 use sweepd::math::{Point, Pose, Vec3};
 use sweepd::wire::pair_flags;

@@ -1,4 +1,5 @@
-//! The motion by Rodrigues' formula, and the first touch with a wall by sampling and bisection: none of it is the library's.
+//! The motion by Rodrigues' formula, and the first touch with a wall by sampling and bisection: none of it is the
+//! library's.
 
 use sweepd::math::{Point, Pose, Vec3};
 
@@ -51,7 +52,8 @@ impl Plate {
             - self.half.z
     }
 
-    /// The share at which a body first touches the plate's face, for a body that is before it at first and goes through.
+    /// The share at which a body first touches the plate's face, for a body that is before it at first and goes
+    /// through.
     ///
     /// * `around` - a share at which it is in the plate, and how much before it it cannot have been there yet.
     pub fn first_touch(

@@ -11,7 +11,8 @@ use crate::oracle::rng::Rng;
 use crate::rig::{ALL, Rig, body, has, scene};
 use crate::truth::{Motion, Plate, point_box};
 
-/// What flies: its shape as text, the points it is the hull of (a mesh: its corners), the ball rolled round them, its radius.
+/// What flies: its shape as text, the points it is the hull of (a mesh: its corners), the ball rolled round them, its
+/// radius.
 pub struct Bullet {
     pub shape: String,
     pub points: Vec<Vec3>,

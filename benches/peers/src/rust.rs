@@ -1,7 +1,7 @@
 //! The peers in Rust, in f32 as they are mostly used.
 //!
-//! What is timed: parry, leaves, refit, optimiser, self-traversal and all pairs written; rapier, `set_aabb` of the moved
-//! boxes and `update` with its events. Filling the peers' own objects is not timed.
+//! What is timed: parry, leaves, refit, optimiser, self-traversal and all pairs written; rapier, `set_aabb` of the
+//! moved boxes and `update` with its events. Filling the peers' own objects is not timed.
 
 use parry3d::bounding_volume::Aabb as PeerBox;
 use parry3d::math::Vector as PeerVector;

@@ -1,5 +1,5 @@
-//! From boxes to cells: a place's cell grows with the place, so boxes that share a point share a cell, whatever rounding
-//! does.
+//! From boxes to cells: a place's cell grows with the place, so boxes that share a point share a cell, whatever
+//! rounding does.
 
 use crate::broad::members::Bounds;
 

@@ -13,7 +13,8 @@
 //! not ask a million cells for a few pebbles. A pair is told in the cell of the lower corner of what two boxes share.
 //! Boxes without end cover no cells: they are compared with all.
 //!
-//! Sources: RTR3 section 17.5.2 (uniform grids, spatial hashing); Mirtich 1996, Ericson 2005 section 7.2 (levels by size).
+//! Sources: RTR3 section 17.5.2 (uniform grids, spatial hashing); Mirtich 1996, Ericson 2005 section 7.2 (levels by
+//! size).
 
 use super::Work;
 use super::members::{ASKED, CAME, MOVED, Members, small};

@@ -21,7 +21,8 @@ const SWEEP_MAX: f32 = 0.75;
 const MARGIN_MAX: f32 = 0.2;
 /// Least margin, in mean sides: what stands still but for its sender's rounding stays in.
 const MARGIN_MIN: f32 = 1e-3;
-/// A margin that was enough for as long as was hoped shrinks by this factor, so that a body that has calmed is tight again.
+/// A margin that was enough for as long as was hoped shrinks by this factor, so that a body that has calmed is tight
+/// again.
 const SHRINK: f32 = 0.9;
 /// Bodies that go farther than any margin within so many ticks are wild, ...
 const WILD_TICKS: u32 = 1;

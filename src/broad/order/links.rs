@@ -299,8 +299,9 @@ pub(super) fn room<T>(list: &mut Vec<T>, len: usize) {
     list.reserve(len.saturating_sub(list.len()));
 }
 
-/// Room for what a list of so many entries may grow to until the next sort: half as many again, and as many as `some`. What
-/// is missing is made in twice that measure, so that a sort which finds a few more entries than the last one makes none.
+/// Room for what a list of so many entries may grow to until the next sort: half as many again, and as many as `some`.
+/// What is missing is made in twice that measure, so that a sort which finds a few more entries than the last one makes
+/// none.
 pub(super) fn spare<T>(list: &mut Vec<T>, len: usize, some: usize) {
     if list.capacity() < len + len / 2 + some {
         room(list, 2 * len + 2 * some);

@@ -4,8 +4,8 @@ use super::fatten::HORIZON;
 use super::{BodySlot, NONE, Order, Proxies, Tick, ones, parts, small};
 use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch};
 
-/// Lanes that moved and have lived for half a round are renewed at their block's turn, or with a lane of their block that
-/// must be: the walk down the tree is then shared, and they would be next.
+/// Lanes that moved and have lived for half a round are renewed at their block's turn, or with a lane of their block
+/// that must be: the walk down the tree is then shared, and they would be next.
 const ALONG_AGE: u32 = HORIZON / 2;
 
 /// Stretches of blocks at least, that the turns go round; a stretch is a quarter at most.
@@ -48,9 +48,9 @@ impl Order {
         self.renewing[block] |= lanes;
     }
 
-    /// Ticks until it is a block's turn. While many move, each tick renews a few stretches of the order, so that all ticks
-    /// cost the same, wherever large or crowded bodies stand, and most neighbours are renewed together: then one of two
-    /// asks for both.
+    /// Ticks until it is a block's turn. While many move, each tick renews a few stretches of the order, so that all
+    /// ticks cost the same, wherever large or crowded bodies stand, and most neighbours are renewed together: then one
+    /// of two asks for both.
     #[inline(always)]
     fn until_turn(&self, block: usize) -> u32 {
         let stretch = (self.live.len() / STRETCHES).clamp(1, WIDTH);

@@ -1,8 +1,8 @@
 //! Keeps the order good while bodies move, a little in each tick, so that everything is seldom sorted anew.
 //!
-//! Sixteen blocks that stand side by side share a quarter: the part of space that their bodies filled after the last sort
-//! of all. It follows what its bodies do together. A body that has left its quarter moves to a lane in another; within a
-//! quarter the bodies are dealt to the blocks anew when these have spread.
+//! Sixteen blocks that stand side by side share a quarter: the part of space that their bodies filled after the last
+//! sort of all. It follows what its bodies do together. A body that has left its quarter moves to a lane in another;
+//! within a quarter the bodies are dealt to the blocks anew when these have spread.
 
 use super::fatten::Gait;
 use super::links::room;
@@ -16,8 +16,8 @@ use crate::simd::boxes::{Boxes16, Down, Hold, WIDTH};
 const DRIFT_SIDES: f32 = 0.5;
 /// ... which must be so many times nearer, squared: a lane changed costs about a microsecond.
 const NEARER: f32 = 4.0;
-/// Blocks whose bodies have spread so much over what they were dealt are dealt anew: that costs about as much as renewing
-/// all of them once more, and blocks that are so much longer meet twice as many others.
+/// Blocks whose bodies have spread so much over what they were dealt are dealt anew: that costs about as much as
+/// renewing all of them once more, and blocks that are so much longer meet twice as many others.
 const MIXED: f32 = 1.2;
 /// Least bodies of a block that is dealt anew: with fewer the blocks would be many and empty.
 const FILL_LEAST: usize = 8;
@@ -66,7 +66,8 @@ impl Order {
         }
     }
 
-    /// Looks after the quarters whose turn it is: who has left one moves, and those that have got mixed up are dealt anew.
+    /// Looks after the quarters whose turn it is: who has left one moves, and those that have got mixed up are dealt
+    /// anew.
     pub(super) fn mend(&mut self) {
         for quarter in 0..self.quarters.len() {
             let first = quarter * WIDTH;

@@ -9,8 +9,8 @@
 //! * **Candidates** (`links`): for each two blocks that come near one another a matrix of 16 by 16 bits. They change
 //!   only where a body left its fat box (`renew`), a few blocks in each tick rather than all at once.
 //! * **The look** (`look`): candidates are compared one after the other, and begin and end are differences of bits.
-//!   Pairs whose cores overlap are sure and not compared. Cost in proportion to what moved: few moved bodies are looked at
-//!   one by one.
+//!   Pairs whose cores overlap are sure and not compared. Cost in proportion to what moved: few moved bodies are looked
+//!   at one by one.
 //! * **Mending** (`mend`): while bodies move, a few blocks in each tick are put in order again, so that everything is
 //!   seldom sorted anew.
 //! * **Exact.** Boxes are f32, rounded outward, relative to an f64 origin amid the scene; where rounding could tell
@@ -18,10 +18,10 @@
 //! * **Modes** (few or many moved; renewal or sorting anew) are chosen by counted work with weights that were measured
 //!   once, so that a replay chooses alike. They decide about cost alone: pairs, slots and events are the same.
 //!
-//! Refused: three lists of sorted ends (see `sap`: exponent 1.5 to 2 as soon as motion is incoherent); a list of pairs as
-//! the one home of candidates (each renewal would insert, remove and look up single pairs; matrices are overwritten, and
-//! the list of the look is only a copy in the order of memory); a renewal of all boxes at once (cheaper by a fifth, but
-//! each eighth tick takes five times the others).
+//! Refused: three lists of sorted ends (see `sap`: exponent 1.5 to 2 as soon as motion is incoherent); a list of pairs
+//! as the one home of candidates (each renewal would insert, remove and look up single pairs; matrices are overwritten,
+//! and the list of the look is only a copy in the order of memory); a renewal of all boxes at once (cheaper by a fifth,
+//! but each eighth tick takes five times the others).
 //!
 //! Sources: Terdiman, "Box pruning revisited" (2017), for sorted copies in structure-of-arrays form; Verlet lists
 //! (Verlet 1967) for candidates that outlive a step; Morton 1966 for the order.
@@ -83,8 +83,8 @@ pub(super) struct Order {
     live: Vec<u16>,
     /// By rank: the box, rounded outward.
     exact: Vec<Down>,
-    /// By rank: the fat box and the core; and by block, to be asked sixteen at a time, the fat boxes and what is sure of
-    /// the cores.
+    /// By rank: the fat box and the core; and by block, to be asked sixteen at a time, the fat boxes and what is sure
+    /// of the cores.
     held: Vec<Hold>,
     fat: Vec<Boxes16>,
     sure: Vec<Boxes16>,

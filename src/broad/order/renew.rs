@@ -290,8 +290,8 @@ impl Renew<'_> {
         self.write(lanes, block, other, record, &cand, renewing);
     }
 
-    /// Writes a matrix of candidates, and lists those of renewed lanes; what overlapped and is no candidate any more has
-    /// parted.
+    /// Writes a matrix of candidates, and lists those of renewed lanes; what overlapped and is no candidate any more
+    /// has parted.
     #[inline(always)]
     fn write<L: Lanes>(
         &mut self,

@@ -10,8 +10,8 @@ const CURVE_BITS: u32 = 3 * AXIS_BITS;
 const INDEX_BITS: u32 = 28;
 /// Octaves of size: the longest sides from 2^-32 to 2^31 metres, all others at the ends.
 const OCTAVES: usize = 64;
-/// Octaves that share a class. Boxes of a block then differ by a factor of 4 at most, and scenes whose sizes lie about a
-/// power of two are not torn in two.
+/// Octaves that share a class. Boxes of a block then differ by a factor of 4 at most, and scenes whose sizes lie about
+/// a power of two are not torn in two.
 const OCTAVES_A_CLASS: usize = 2;
 /// Most classes: the bits left in a sorted word.
 pub(super) const CLASSES_MAX: usize = 1 << (64 - CURVE_BITS - INDEX_BITS);

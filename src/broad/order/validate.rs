@@ -7,8 +7,8 @@ use crate::ids::BodySlot;
 use crate::simd::boxes::{Lanes, Portable, WIDTH};
 
 impl Order {
-    /// Lanes and bodies name each other, boxes are stored and held by their fat boxes, the tree holds the fat boxes, and
-    /// the candidates and overlaps of each block are all there.
+    /// Lanes and bodies name each other, boxes are stored and held by their fat boxes, the tree holds the fat boxes,
+    /// and the candidates and overlaps of each block are all there.
     pub(in crate::broad) fn check<P: Proxies>(
         &self,
         members: &Members,

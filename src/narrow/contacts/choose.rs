@@ -1,5 +1,5 @@
-//! Which contacts of a pair are kept when there are more than fit. In: all that were found. Out: the deepest, then those
-//! that lie farthest from what is kept already, so that few points span the patches that many made.
+//! Which contacts of a pair are kept when there are more than fit. In: all that were found. Out: the deepest, then
+//! those that lie farthest from what is kept already, so that few points span the patches that many made.
 
 use super::Contact;
 
@@ -8,8 +8,8 @@ use super::Contact;
 const SAME_PLACE: f64 = 1e-3;
 /// Cosine of 8 degrees: what neighbouring triangles of one patch differ by at most.
 const SAME_NORMAL: f64 = 0.99;
-/// What was kept in the tick before counts as this much farther away: without it two equally good points would take turns,
-/// and ids with them.
+/// What was kept in the tick before counts as this much farther away: without it two equally good points would take
+/// turns, and ids with them.
 const KEPT_BEFORE: f64 = 1.25;
 
 /// Brings the contacts to keep to the front, deepest first; returns how many these are.
@@ -19,8 +19,8 @@ const KEPT_BEFORE: f64 = 1.25;
 /// * `radius` - of the smaller body, metres: two contacts with opposite normals are as far apart as two ends of it.
 /// * `was_kept` - whether a contact was kept in the tick before.
 ///
-/// Greedy: the one that is farthest from its nearest kept neighbour comes next (Gonzalez 1985, Clustering to minimize the
-/// maximum intercluster distance), never worse than half of the best spread.
+/// Greedy: the one that is farthest from its nearest kept neighbour comes next (Gonzalez 1985, Clustering to minimize
+/// the maximum intercluster distance), never worse than half of the best spread.
 ///
 /// Cost: O(`found` x `most`), no allocation.
 pub(super) fn choose(

@@ -1,9 +1,10 @@
-//! The manifold of each patch: at most four of its points. In: all points that were found of a pair. Out: of each patch the
-//! deepest, and those that with it span the largest area.
+//! The manifold of each patch: at most four of its points. In: all points that were found of a pair. Out: of each patch
+//! the deepest, and those that with it span the largest area.
 //!
-//! A patch is what touches with one normal: points of one shape pair that came in as one, and such patches taken together
-//! whose normals are within 8 degrees and whose boxes lie side by side (two regions of a mesh meet at a ridge, and what lies
-//! on the ridge is one patch). Two shelves of one height are two patches: they are two surfaces, far apart.
+//! A patch is what touches with one normal: points of one shape pair that came in as one, and such patches taken
+//! together whose normals are within 8 degrees and whose boxes lie side by side (two regions of a mesh meet at a ridge,
+//! and what lies on the ridge is one patch). Two shelves of one height are two patches: they are two surfaces, far
+//! apart.
 
 use super::{Contact, SAME_POINT};
 use crate::limits::MANIFOLD_POINTS_MAX;
@@ -11,11 +12,11 @@ use crate::math::{Aabb, Vec3};
 
 /// Cosine of 8 degrees: what normals of one patch differ by.
 const SAME_NORMAL: f64 = 0.99;
-/// Points of a patch whose distance from the segment or triangle of the others is a smaller share of the smaller body's radius
-/// span nothing more.
+/// Points of a patch whose distance from the segment or triangle of the others is a smaller share of the smaller body's
+/// radius span nothing more.
 const SPANS: f64 = 1e-3;
-/// Points as deep as the deepest but for this share of the radius are as good: of a body that lies flat the outermost comes
-/// first, whatever rounding says.
+/// Points as deep as the deepest but for this share of the radius are as good: of a body that lies flat the outermost
+/// comes first, whatever rounding says.
 const AS_DEEP: f64 = 1e-9;
 /// A point that was kept in the tick before counts as so much farther out: two that are equally good do not take turns.
 const KEPT_BEFORE: f64 = 1.25;

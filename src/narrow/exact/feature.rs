@@ -62,7 +62,8 @@ impl Feature {
         self.normal.dot(normal).abs()
     }
 
-    /// The same, larger by what rounding may take away at its rim: a corner over an edge of two neighbours is over both.
+    /// The same, larger by what rounding may take away at its rim: a corner over an edge of two neighbours is over
+    /// both.
     pub(super) fn spread(&self) -> Self {
         let middle = self.used().iter().sum::<Vec3>() / self.count.max(1) as f64;
         let corners = self.corners.map(|p| p + (p - middle) * RIM);

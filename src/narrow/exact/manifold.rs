@@ -117,8 +117,8 @@ pub fn manifold(
     found.write(out);
 }
 
-/// The middle of what two cores share along `normal` once B has moved out by `-gap`: clipped features, least points only.
-/// `None` where they show no faces to clip.
+/// The middle of what two cores share along `normal` once B has moved out by `-gap`: clipped features, least points
+/// only. `None` where they show no faces to clip.
 pub(super) fn deepest_shared(pair: &Pair<'_>, normal: &Vec3, gap: f64) -> Option<(Vec3, Vec3)> {
     let of_a = Feature::of_a(pair, normal);
     let of_b = Feature::of_b(pair, normal);

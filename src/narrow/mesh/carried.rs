@@ -1,28 +1,29 @@
-//! The certificate front of a mesh pair: what was proved of it stays proved while the two have moved less than it takes.
+//! The certificate front of a mesh pair: what was proved of it stays proved while the two have moved less than it
+//! takes.
 //!
 //! In: two shapes of which at least one is a mesh and none is a half-space, and one pose after the other of B seen from
-//! A. Out: a sound interval of their gap at the pose it works at, a witness, contacts. Stops after any unit, and goes on
-//! at the same pose or at another.
+//! A. Out: a sound interval of their gap at the pose it works at, a witness, contacts. Stops after any unit, and goes
+//! on at the same pose or at another.
 //!
 //! Every pair of leaves is covered by exactly one entry at any time ([`CarriedFront::covered`] counts them):
-//! - a [`Group`] of pairs of boxes proved apart by `g` when the pair's path was `M`: it holds while the path is less than
-//!   `g + M`, at no cost; the group that expires soonest is on top of a heap, so the heap is at once the front, the
-//!   best-first queue and the bound;
+//! - a [`Group`] of pairs of boxes proved apart by `g` when the pair's path was `M`: it holds while the path is less
+//!   than `g + M`, at no cost; the group that expires soonest is on top of a heap, so the heap is at once the front,
+//!   the best-first queue and the bound;
 //! - an open pair of boxes that may touch;
 //! - a group apart at this pose by less than can be carried to another, or a pair of leaves found touching: at the next
 //!   pose it is open again;
 //! - what was lumped together when there was no room: one expiry for all of it, and a new start when that is up.
 //!
-//! The path `S` runs over anchors (poses), and `d` is the displacement from the newest: what is apart by `g` now holds while
-//! `S + d < g + S - d` (DESIGN 4.6; here of the relative pose, so two that move together do not move). An anchor is taken
-//! where the pair goes on away from the last two, and where the bounds are to be exact; so a drift adds up its length, and
-//! a pair that trembles about its place adds nothing.
+//! The path `S` runs over anchors (poses), and `d` is the displacement from the newest: what is apart by `g` now holds
+//! while `S + d < g + S - d` (DESIGN 4.6; here of the relative pose, so two that move together do not move). An anchor
+//! is taken where the pair goes on away from the last two, and where the bounds are to be exact; so a drift adds up its
+//! length, and a pair that trembles about its place adds nothing.
 //!
 //! Three orders for the three jobs: depth first, deepest overlap first, for a verdict; the heap, best first, for the
 //! bounds; depth first to the end for the contact set. [`Search`] names the others: they are the baselines they are.
 //!
-//! Refused: radii of nodes in place of the body's (the order of a heap would change with the motion); one entry for each
-//! pair of boxes (eight times the memory, and eight boxes are tested at the cost of one and a half).
+//! Refused: radii of nodes in place of the body's (the order of a heap would change with the motion); one entry for
+//! each pair of boxes (eight times the memory, and eight boxes are tested at the cost of one and a half).
 
 use super::bound::Frame;
 use super::contacts::LeafContact;
@@ -57,10 +58,11 @@ use store::Proved;
 const STALE_TIMES: usize = 3;
 const STALE_MORE: usize = 128;
 /// A front starts anew when so many times its used-up groups exceed the steps that a fresh start took: at 2 % of the
-/// diameter a tick 6,400 units in place of 14,800, at 0.1 % no difference (`benches/time_critical`; 1 and 4 were tried).
+/// diameter a tick 6,400 units in place of 14,800, at 0.1 % no difference (`benches/time_critical`; 1 and 4 were
+/// tried).
 const WORN_TIMES: usize = 2;
-/// Steps beyond this share of the smaller body's radius start anew where the touch is lost: 5,300 units in place of 7,300 at
-/// 2 % of the diameter a tick, 3,400 in place of 3,700 at 0.5 %; at 0.02 more pairs stay open within a limit.
+/// Steps beyond this share of the smaller body's radius start anew where the touch is lost: 5,300 units in place of
+/// 7,300 at 2 % of the diameter a tick, 3,400 in place of 3,700 at 0.5 %; at 0.02 more pairs stay open within a limit.
 const ADRIFT: f64 = 0.04;
 /// Length of a path, in sizes of the two, after which expiries are measured anew.
 const PATH_MAX: f64 = 64.0;
@@ -82,8 +84,8 @@ pub struct CarriedFront {
     passing_m: f64,
     /// Leaves found touching at this pose.
     touching: Run,
-    /// When what was lumped together is no longer proved apart; infinite: nothing was; minus infinity: something found no
-    /// room at all, and nothing is proved until the next start.
+    /// When what was lumped together is no longer proved apart; infinite: nothing was; minus infinity: something found
+    /// no room at all, and nothing is proved until the next start.
     lumped_expiry_m: f64,
     /// Boxes of a side that is convex.
     whole: [Option<Obb>; 2],
@@ -103,7 +105,8 @@ pub struct CarriedFront {
     /// The leaves that were nearest or touched last.
     last: Option<(BoxId, BoxId)>,
     witness: Option<LeafContact>,
-    /// Corners of the triangles that touched last, each in its own frame: to ask them again costs no look into the meshes.
+    /// Corners of the triangles that touched last, each in its own frame: to ask them again costs no look into the
+    /// meshes.
     crossing: Option<[Triangle; 2]>,
     contacts: Patches,
 }

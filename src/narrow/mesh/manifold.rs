@@ -1,17 +1,17 @@
 //! The contact points of two leaves: with the normal of the surface they are of, not that of a triangle by itself.
 //!
-//! In: a triangle of a mesh and a convex shape, or two triangles, that touch or cross, and the answer of their own query.
-//! Out: points with a normal, each named by the corners and edges that meet there.
+//! In: a triangle of a mesh and a convex shape, or two triangles, that touch or cross, and the answer of their own
+//! query. Out: points with a normal, each named by the corners and edges that meet there.
 //!
-//! A triangle by itself has edges; most of them are none of the surface's. Pushed in by a millimetre at such an edge, the
-//! least translation of the two leaves leads sideways, along the surface. So a normal counts by how far the two would have
-//! to move along it if each were followed over its neighbours to where it reaches farthest (`Mesh::climb`): along a flat
-//! floor that is far, at a convex ridge nothing is added. The least of these wins:
+//! A triangle by itself has edges; most of them are none of the surface's. Pushed in by a millimetre at such an edge,
+//! the least translation of the two leaves leads sideways, along the surface. So a normal counts by how far the two
+//! would have to move along it if each were followed over its neighbours to where it reaches farthest (`Mesh::climb`):
+//! along a flat floor that is far, at a convex ridge nothing is added. The least of these wins:
 //! - the normals of the faces, against how far the other one reaches behind the face's plane;
 //! - the leaves' own normal: edges, corners, and what is round.
 //!
-//! Refused: a table of Voronoi regions for each edge (a corner that pokes through a face is of no region of it); to take the
-//! face's normal everywhere (a box on a ridge would tilt to one of its sides).
+//! Refused: a table of Voronoi regions for each edge (a corner that pokes through a face is of no region of it); to
+//! take the face's normal everywhere (a box on a ridge would tilt to one of its sides).
 
 mod leaf;
 
@@ -25,8 +25,8 @@ use crate::math::{Interval, Point, Vec3};
 use crate::narrow::exact::{ManifoldPoint, shared_points};
 use crate::shape::Mesh;
 
-/// Points so far apart still count as contacts, as a share of the smaller one's radius: of a body at rest all corners do, though
-/// rounding lifts some.
+/// Points so far apart still count as contacts, as a share of the smaller one's radius: of a body at rest all corners
+/// do, though rounding lifts some.
 pub(super) const PREDICTION: f64 = 1e-6;
 /// An own normal this close to a face's (cosine of 0.1 degrees) is the face's.
 const FACE: f64 = 0.999_998;
@@ -218,8 +218,8 @@ fn feature_of(a: &Leaf<'_>, b: &Leaf<'_>, feature: u32, base_is_b: bool) -> u64 
     }
 }
 
-/// Corners of `of` behind the surface about `on`, and the one that lies deepest: a triangle that pokes through the surface
-/// has its corners over other triangles than the one that it crosses.
+/// Corners of `of` behind the surface about `on`, and the one that lies deepest: a triangle that pokes through the
+/// surface has its corners over other triangles than the one that it crosses.
 fn corners(
     on: &Leaf<'_>,
     of: &Leaf<'_>,

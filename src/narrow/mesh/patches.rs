@@ -1,11 +1,11 @@
 //! The contact points of a mesh pair as they come in: of each patch the deepest and the outermost.
 //!
-//! In: points of leaves, in any order and of any number. Out: a bounded number of them that spans what all of them span. A
-//! patch is made of points on one smooth region with normals within 8 degrees of its first; which of its points make the
-//! manifold is decided when all are there (`narrow/contacts`).
+//! In: points of leaves, in any order and of any number. Out: a bounded number of them that spans what all of them
+//! span. A patch is made of points on one smooth region with normals within 8 degrees of its first; which of its points
+//! make the manifold is decided when all are there (`narrow/contacts`).
 //!
-//! Refused: the deepest points alone (of a floor of many small triangles these lie side by side, and a body tips over them);
-//! clusters by distance (their middles are not where the rim is).
+//! Refused: the deepest points alone (of a floor of many small triangles these lie side by side, and a body tips over
+//! them); clusters by distance (their middles are not where the rim is).
 
 use super::contacts::LeafContact;
 use crate::math::Vec3;
@@ -116,8 +116,8 @@ fn update(patch: &mut [LeafContact], point: &LeafContact) {
     }
 }
 
-/// Eight directions at right angles to a unit normal, evenly spread and along no axis of the frame: two corners of what is
-/// drawn along the axes are never equally far out.
+/// Eight directions at right angles to a unit normal, evenly spread and along no axis of the frame: two corners of what
+/// is drawn along the axes are never equally far out.
 fn directions(normal: &Vec3) -> [Vec3; DIRECTIONS] {
     let mut least = Vec3::zeros();
     least[normal.iamin()] = 1.0;

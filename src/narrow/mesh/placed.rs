@@ -55,8 +55,8 @@ impl Placed {
         self.rotation.tr_mul(direction)
     }
 
-    /// Sound lower bounds on the gaps of what `one` holds and what each box of `pack` holds, metres; zero or less where they
-    /// may touch, and then of no meaning but for an order. Lanes without a box yield anything.
+    /// Sound lower bounds on the gaps of what `one` holds and what each box of `pack` holds, metres; zero or less where
+    /// they may touch, and then of no meaning but for an order. Lanes without a box yield anything.
     ///
     /// * `pack_is_b` - the pack is of B and `one` of A, else the other way round.
     pub(super) fn gaps(&self, one: &Obb, pack: &ObbPack, pack_is_b: bool) -> [f64; LANES] {

@@ -25,7 +25,8 @@ pub(super) fn reach_of(shape: &Shape) -> f64 {
 
 /// Queries the leaf pair of last tick's contact again: one unit. `None` when the two have no such leaves.
 ///
-/// * `triangle_a`, `triangle_b` - of a [`super::Witness`] or [`super::LeafContact`]; `u32::MAX` for a side that is no mesh.
+/// * `triangle_a`, `triangle_b` - of a [`super::Witness`] or [`super::LeafContact`]; `u32::MAX` for a side that is no
+///   mesh.
 #[must_use]
 pub fn retest_witness(
     a: &Shape,

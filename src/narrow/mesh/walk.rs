@@ -53,8 +53,8 @@ impl Walk {
     ///
     /// * `pos12` - pose of `b` seen from `a`, finite, unit quaternion.
     ///
-    /// At least one of the two is a mesh and none a half-space; else, or with a pose that is not finite, the interval stays unknown and
-    /// the walk never finishes.
+    /// At least one of the two is a mesh and none a half-space; else, or with a pose that is not finite, the interval
+    /// stays unknown and the walk never finishes.
     pub fn start(&mut self, a: &Shape, b: &Shape, pos12: &Pose) {
         self.stage = Stage::Idle;
         self.front.clear();

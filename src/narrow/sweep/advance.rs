@@ -1,15 +1,15 @@
 //! How far two bodies surely go on without touching: conservative advancement, from one share of the motion.
 //!
-//! In: a moment of the motion. Out: a time for which they stay apart, or that they touch. Every shape pair says its own time,
-//! and the least holds. Three bounds, the first that is good enough:
+//! In: a moment of the motion. Out: a time for which they stay apart, or that they touch. Every shape pair says its own
+//! time, and the least holds. Three bounds, the first that is good enough:
 //! - balls about the shapes, along the line between them;
 //! - convex pairs: the slab between them along the normal of the exact query. Its width goes down no faster than the
-//!   support points in a slightly turned direction say (see [`Slab::free_for`]), so the advance ends at the touch after a
-//!   few queries, also where bodies turn;
+//!   support points in a slightly turned direction say (see [`Slab::free_for`]), so the advance ends at the touch after
+//!   a few queries, also where bodies turn;
 //! - meshes: a lower bound of the gap from the trees, over the greatest speed of any point.
 //!
-//! Source: Mirtich 1996, "Impulse-based dynamic simulation of rigid body systems", section 2.3 (conservative advancement);
-//! the slab is the directional bound of Zhang, Lee and Kim 2006 (FAST), with one term more.
+//! Source: Mirtich 1996, "Impulse-based dynamic simulation of rigid body systems", section 2.3 (conservative
+//! advancement); the slab is the directional bound of Zhang, Lee and Kim 2006 (FAST), with one term more.
 
 use crate::math::{Interval, Pose, ROUND, Vec3};
 use crate::narrow::Counters;
@@ -22,7 +22,8 @@ use crate::world::{Body, PlacedShape};
 
 use super::motion::{Moment, Span};
 
-/// Balls are good enough while they are apart by this share of the smaller one's radius: then a query would gain little.
+/// Balls are good enough while they are apart by this share of the smaller one's radius: then a query would gain
+/// little.
 const BALLS_ENOUGH: f64 = 0.5;
 /// A mesh pair's bound is good enough at this share of the distance: more work would advance little farther.
 const BOUND_ENOUGH: f64 = 0.75;
@@ -232,8 +233,8 @@ fn time_of(gap_m: f64, closing: f64) -> f64 {
     }
 }
 
-/// The slab between two convex shapes that are apart: along a fixed direction, everything of A lies below it, everything of
-/// B above.
+/// The slab between two convex shapes that are apart: along a fixed direction, everything of A lies below it,
+/// everything of B above.
 struct Slab<'a> {
     shapes: (&'a PlacedShape, &'a PlacedShape),
     moment: &'a Moment,
@@ -289,9 +290,9 @@ impl<'a> Slab<'a> {
     /// For how long the slab surely stays open.
     ///
     /// Of a point `a` of A and `b` of B, the width `n . (b - a)` is `f + t f' ` but for `t^2 / 2` times the greatest
-    /// centripetal acceleration; and `f + t f'` is a dot product with `n + t n x w`: so the least of all pairs of points is
-    /// again a matter of support points, in a direction turned a little. It is concave in `t`, hence above the lesser of
-    /// its values at both ends.
+    /// centripetal acceleration; and `f + t f'` is a dot product with `n + t n x w`: so the least of all pairs of
+    /// points is again a matter of support points, in a direction turned a little. It is concave in `t`, hence above
+    /// the lesser of its values at both ends.
     ///
     /// * `best_m` - the distance, for a first guess.
     fn free_for(&self, best_m: f64) -> f64 {

@@ -1,7 +1,7 @@
 //! Two bodies on their way: where they are at a share of it, and how fast they go there.
 //!
-//! In: bodies with their paths. Out: poses, velocities and the rounding to allow for. A body that is not continuous is where
-//! this tick has it, all the way; of one that jumps nothing is asked meanwhile.
+//! In: bodies with their paths. Out: poses, velocities and the rounding to allow for. A body that is not continuous is
+//! where this tick has it, all the way; of one that jumps nothing is asked meanwhile.
 
 use crate::math::{Point, Pose, ROUND, Vec3, relative};
 use crate::world::{Body, Leg, Path};

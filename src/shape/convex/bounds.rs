@@ -21,7 +21,8 @@ impl Convex {
             let row = Vec3::new(rotation[(k, 0)], rotation[(k, 1)], rotation[(k, 2)]);
             (low[k], high[k]) = self.core.span(&row);
         }
-        // Entries of the matrix are off by some ulps of 1, dot products by some of the reach, the sum by one of the place.
+        // Entries of the matrix are off by some ulps of 1, dot products by some of the reach, the sum by one of the
+        // place.
         let pad = 16.0 * f64::EPSILON * self.reach_m + self.margin_m;
         // Two ulps further out for the sums; as a product, since stepping to the next float costs ten times as much.
         let ulps = |v: f64| 2.0 * f64::EPSILON * v.abs();

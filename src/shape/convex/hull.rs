@@ -95,7 +95,8 @@ impl Hull {
         Ok(())
     }
 
-    /// Greatest distance of a point from the plane of a large triangle of points, and the greatest extent: both 0 for a point.
+    /// Greatest distance of a point from the plane of a large triangle of points, and the greatest extent: both 0 for a
+    /// point.
     fn thickness(&self) -> (f64, f64) {
         let Some(first) = self.points.first() else {
             return (0.0, 0.0);

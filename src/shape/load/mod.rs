@@ -1,5 +1,5 @@
-//! Mesh files: STL (binary and text), OBJ, DAE. Own readers, because the ones at hand keep f32 coordinates, skip a DAE's
-//! up-axis, believe any size that a file claims, and cannot say in which line a mistake stands.
+//! Mesh files: STL (binary and text), OBJ, DAE. Own readers, because the ones at hand keep f32 coordinates, skip a
+//! DAE's up-axis, believe any size that a file claims, and cannot say in which line a mistake stands.
 //!
 //! In: a path. Out: vertices in metres, z up, equal ones merged; faces in the file's order, objects one after another.
 

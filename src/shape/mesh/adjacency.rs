@@ -1,11 +1,11 @@
 //! Which faces of a mesh are neighbours, and walks from one to the next.
 //!
 //! In: the topology of the faces as they finally are. Out: for every side of a face the side of the neighbour that runs
-//! along it, and the smooth region that each face is part of. A side is named `3 * face + k`: from the face's corner `k` to
-//! the next one.
+//! along it, and the smooth region that each face is part of. A side is named `3 * face + k`: from the face's corner
+//! `k` to the next one.
 //!
-//! Sides on a border, and those that three faces or more share, have no neighbour; where the surface goes on beyond them
-//! nevertheless, they have a seam (`seams`).
+//! Sides on a border, and those that three faces or more share, have no neighbour; where the surface goes on beyond
+//! them nevertheless, they have a seam (`seams`).
 
 use super::Mesh;
 use super::seams::{self, SIDES_MAX, Seam};
@@ -14,8 +14,8 @@ use crate::math::{Point, Vec3};
 
 /// No neighbour.
 pub(super) const NONE: u32 = u32::MAX;
-/// Faces whose normals differ by less than 20 degrees (cosine) are of one smooth region. Larger, and the sides of a coarse
-/// cylinder are one surface with its caps; smaller, and a coarse ball is many.
+/// Faces whose normals differ by less than 20 degrees (cosine) are of one smooth region. Larger, and the sides of a
+/// coarse cylinder are one surface with its caps; smaller, and a coarse ball is many.
 const SMOOTH: f64 = 0.94;
 /// Corners a climb goes over. A climb that needs more leads along a surface and not to a point of it.
 const HOPS_MAX: u32 = 48;
@@ -140,8 +140,8 @@ impl Mesh {
         self.faces[(side / 3) as usize][(side % 3) as usize]
     }
 
-    /// From the corner of a face that lies farthest along `direction` over the mesh's edges to one that no neighbour lies
-    /// beyond: a place where the surface, as far as it hangs together, reaches farthest.
+    /// From the corner of a face that lies farthest along `direction` over the mesh's edges to one that no neighbour
+    /// lies beyond: a place where the surface, as far as it hangs together, reaches farthest.
     ///
     /// * `beyond_m` - a place that reaches farther, along `direction` from the origin, is of no interest.
     /// * returns - the vertex; `None` where the climb leads beyond, or does not end within 48 corners.
@@ -167,8 +167,8 @@ impl Mesh {
         None
     }
 
-    /// The height of the edge of a face that lies across `direction` on top of it, if neither of the two faces at it reaches
-    /// higher: then it is the surface's edge too, whatever lies further on.
+    /// The height of the edge of a face that lies across `direction` on top of it, if neither of the two faces at it
+    /// reaches higher: then it is the surface's edge too, whatever lies further on.
     pub(crate) fn crest(&self, face: u32, direction: &Vec3) -> Option<f64> {
         let on = |v: u32| direction.dot(&self.vertices[v as usize].coords);
         let [a, b, c] = self.faces[face as usize].map(on);

@@ -1,11 +1,11 @@
 //! A static tree of oriented boxes over triangles, eight children a node: one triangle a leaf.
 //!
-//! In: triangles. Out: packs of eight boxes for `simd::obb`, each pack in f32 relative to an f64 origin of its own, so that
-//! rounding is a share of what is near and not of the whole mesh. Boxes hold their triangles exactly: half sides are
-//! measured in f64 against the rounded axes and centre, and rounded up.
+//! In: triangles. Out: packs of eight boxes for `simd::obb`, each pack in f32 relative to an f64 origin of its own, so
+//! that rounding is a share of what is near and not of the whole mesh. Boxes hold their triangles exactly: half sides
+//! are measured in f64 against the rounded axes and centre, and rounded up.
 //!
-//! Source: Gottschalk, Lin, Manocha 1996, OBBTree; axes are those of the area's covariance, or of the mesh's frame where
-//! these fit tighter.
+//! Source: Gottschalk, Lin, Manocha 1996, OBBTree; axes are those of the area's covariance, or of the mesh's frame
+//! where these fit tighter.
 
 use nalgebra::Matrix3;
 

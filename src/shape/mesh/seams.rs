@@ -1,13 +1,14 @@
 //! Neighbours that share no whole edge: tiles laid in bond, corners that were not welded, sheets that are doubled.
 //!
-//! In: a mesh and its sides that have no neighbour. Out: for each the faces that lie just beyond it. They are no part of
-//! the topology (such a mesh is open); they tell where the surface goes on.
+//! In: a mesh and its sides that have no neighbour. Out: for each the faces that lie just beyond it. They are no part
+//! of the topology (such a mesh is open); they tell where the surface goes on.
 
 use super::tree::{Below, NODES_WAITING_MAX};
 use super::{Mesh, adjacency::NONE};
 use crate::math::Point;
 
-/// Where along a side is looked beyond it: near its ends too, for what lies beyond a corner of a tile may begin just there.
+/// Where along a side is looked beyond it: near its ends too, for what lies beyond a corner of a tile may begin just
+/// there.
 const LOOKS: [f64; 5] = [0.01, 0.2, 0.5, 0.8, 0.99];
 /// How far beyond a side is looked, as a share of the mesh's radius: narrower cracks are none.
 const BEYOND: f64 = 1e-6;

@@ -10,8 +10,8 @@ const LEAF: u32 = 1 << 31;
 /// takes some 100 for the exact answer.
 const REACH_NODES_MAX: usize = 512;
 
-/// Nodes that wait in a walk that goes depth first: one a level of a tree split at the median, and a mesh has under 2^31
-/// triangles.
+/// Nodes that wait in a walk that goes depth first: one a level of a tree split at the median, and a mesh has under
+/// 2^31 triangles.
 pub(crate) const NODES_WAITING_MAX: usize = 33;
 
 const _: () = assert!(crate::limits::TRIANGLES_MAX < LEAF as usize);

@@ -120,7 +120,8 @@ pub(crate) trait Lanes: Copy {
     /// Whether two boxes are surely apart, and whether they surely overlap: on every axis by the slack of `a` at least.
     fn parts(self, a: &Down, b: &Down) -> (bool, bool);
 
-    /// Whether `inner` lies inside `outer`. The spare lanes are compared too: those of `outer` are to be minus infinity.
+    /// Whether `inner` lies inside `outer`. The spare lanes are compared too: those of `outer` are to be minus
+    /// infinity.
     fn holds(self, outer: &Down, inner: &Down) -> bool;
 }
 

@@ -1,8 +1,8 @@
 //! Kernels over sixteen boxes at a time.
 //!
-//! In: blocks of sixteen boxes as a structure of arrays (`Boxes16`), single boxes (`Down`). Out: masks of sixteen bits, one a
-//! lane, and plain answers. `Portable` is the safe twin in plain Rust; every other set of `Lanes` gives the same bits, which tests
-//! compare. Which one runs is decided once, by what the processor says (`Level::best`).
+//! In: blocks of sixteen boxes as a structure of arrays (`Boxes16`), single boxes (`Down`). Out: masks of sixteen bits,
+//! one a lane, and plain answers. `Portable` is the safe twin in plain Rust; every other set of `Lanes` gives the same
+//! bits, which tests compare. Which one runs is decided once, by what the processor says (`Level::best`).
 //!
 //! How: a caller writes its loop once as a `Work`, generic over `Lanes`, all of it `#[inline(always)]`;
 //! `Level::run` compiles it once a level inside a function that has the level's instructions switched on, so that

@@ -131,7 +131,8 @@ impl Client {
     }
 
     /// How long a wait looks for the next tick before it sleeps, nanoseconds; `u64::MAX`: it never sleeps. Over
-    /// shared memory 50 us where there is more than one core, else 0. Finding takes 0.5 us, waking from a sleep 10 to 25 us.
+    /// shared memory 50 us where there is more than one core, else 0. Finding takes 0.5 us, waking from a sleep 10 to
+    /// 25 us.
     pub fn set_spin_ns(&mut self, spin_ns: u64) {
         self.patience = Patience::new(spin_ns);
     }

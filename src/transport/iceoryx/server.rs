@@ -45,8 +45,8 @@ pub struct ServerOptions {
     pub heartbeat_ns: u64,
     /// Largest frame, rows.
     pub frame_rows_max: usize,
-    /// How long a wait looks for what has come before it sleeps, nanoseconds; `u64::MAX`: it never sleeps. Finding takes
-    /// 0.5 us, waking from a sleep 10 to 25 us.
+    /// How long a wait looks for what has come before it sleeps, nanoseconds; `u64::MAX`: it never sleeps. Finding
+    /// takes 0.5 us, waking from a sleep 10 to 25 us.
     pub spin_ns: u64,
 }
 

@@ -137,7 +137,8 @@ impl Inlet {
         for at in 0..self.lines.len() {
             let (some, rest) = self.take(at, receipt);
             more |= rest;
-            // A whole frame waits for nothing else: each look at a quiet subscription or server is a call into the system.
+            // A whole frame waits for nothing else: each look at a quiet subscription or server is a call into the
+            // system.
             if some && self.lines.get(at).is_some_and(Line::is_whole) {
                 (self.wake)();
             } else {

@@ -1,7 +1,7 @@
 //! Other nodes of this one's name. In: what participants say of their nodes. Out: a word on each namesake, once.
 //!
-//! A reader of its own, because the crate's hands its finds on over a channel of eight that drops what comes in a burst,
-//! and a burst is what discovery is: of two nodes of one name, neither told in every second start.
+//! A reader of its own, because the crate's hands its finds on over a channel of eight that drops what comes in a
+//! burst, and a burst is what discovery is: of two nodes of one name, neither told in every second start.
 
 use ros2_client::entities_info::ParticipantEntitiesInfo;
 use ros2_client::{Context, Gid, builtin_topics};

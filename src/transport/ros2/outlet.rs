@@ -35,7 +35,8 @@ const NAMES_DEPTH: usize = 64;
 /// Between two messages of diagnostics, nanoseconds: what `/diagnostics` is read at.
 const DIAGNOSTICS_NS: u64 = 1_000_000_000;
 /// Bytes of a state, and of a tick of a few sources: a reader that has stopped may hold 16 and 8 thousand of them, at
-/// 400 Hz for the 20 s until its lease ends. These topics keep one writer, because a new one would look like a new node.
+/// 400 Hz for the 20 s until its lease ends. These topics keep one writer, because a new one would look like a new
+/// node.
 const STATE_BYTES: usize = 512;
 /// As [`STATE_BYTES`].
 const TICK_BYTES: usize = 1024;

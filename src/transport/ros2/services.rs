@@ -216,7 +216,8 @@ impl Services {
     }
 
     fn respond(&mut self, desk: &Desk, shared: &Shared) {
-        // Taken in statements of their own: a loop would keep the lock while DDS sends, and the tick thread would wait for it.
+        // Taken in statements of their own: a loop would keep the lock while DDS sends, and the tick thread would wait
+        // for it.
         let answered = std::mem::take(&mut *open(&desk.answered));
         let ticked = std::mem::take(&mut *open(&desk.ticked));
         for (token, answer) in answered {

@@ -6,8 +6,8 @@
 //! subscribers ask for reliable topics. Larger bounds would not do: 5 MB/s for 20 s is 100 MB a stopped reader.
 //!
 //! In: messages. Out: the same, on a writer that has room. The one that is full stays until the next turn, so that what
-//! is on its way to the healthy readers is not lost. A new writer takes some 170 ms until its readers know it (measured:
-//! 5 ticks at 30 Hz were lost a turn); so while a reader is stuck, the next one is made in advance.
+//! is on its way to the healthy readers is not lost. A new writer takes some 170 ms until its readers know it
+//! (measured: 5 ticks at 30 Hz were lost a turn); so while a reader is stuck, the next one is made in advance.
 
 use ros2_client::{Context, Node, Publisher, WriteError};
 use serde::Serialize;

@@ -1,13 +1,13 @@
 //! What two leaves share along a normal that was found otherwise than by their own query.
 //!
-//! In: a triangle of a mesh and a convex shape, or two triangles, and a normal. Out: the clipped points, all of them: which
-//! are kept is decided among those of all leaves.
+//! In: a triangle of a mesh and a convex shape, or two triangles, and a normal. Out: the clipped points, all of them:
+//! which are kept is decided among those of all leaves.
 
 use super::{Closest, Convex, FACING, Feature, Found, ManifoldPoint, Pair, clip_onto};
 use crate::math::{Pose, Vec3};
 
-/// As [`manifold`] for shapes that are leaves of meshes: all points that the two share along `normal`, whatever the answer
-/// of their own query was.
+/// As [`manifold`] for shapes that are leaves of meshes: all points that the two share along `normal`, whatever the
+/// answer of their own query was.
 ///
 /// * `normal` - unit, A's frame, from A to B.
 /// * `base_is_b` - whose face the points are cast onto; `None`: whose faces the normal more.

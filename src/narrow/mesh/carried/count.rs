@@ -5,8 +5,8 @@ use super::{CarriedFront, FrontStore, Side};
 use crate::shape::{BoxId, Held, Shape};
 
 impl CarriedFront {
-    /// Every pair of leaves (triangles; 0 for a convex shape) that an entry covers, sorted: each pair of the two once and
-    /// only once, whatever was done before. `None` where some were lumped together for want of room.
+    /// Every pair of leaves (triangles; 0 for a convex shape) that an entry covers, sorted: each pair of the two once
+    /// and only once, whatever was done before. `None` where some were lumped together for want of room.
     #[must_use]
     pub fn covered(&self, store: &FrontStore, a: &Shape, b: &Shape) -> Option<Vec<(u32, u32)>> {
         let (side_a, side_b) = (Side::of(a)?, Side::of(b)?);

@@ -1,4 +1,5 @@
-//! The entries of a front: pairs of boxes that may touch, and groups of pairs proved apart until the pair has moved so far.
+//! The entries of a front: pairs of boxes that may touch, and groups of pairs proved apart until the pair has moved so
+//! far.
 
 use std::cmp::Ordering;
 

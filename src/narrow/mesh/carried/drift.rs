@@ -1,4 +1,5 @@
-//! How far a pair has moved since its certificates were made: a path over anchors, and what has been gone since the last.
+//! How far a pair has moved since its certificates were made: a path over anchors, and what has been gone since the
+//! last.
 
 use crate::math::{Pose, ROUND, displacement};
 use crate::shape::Shape;

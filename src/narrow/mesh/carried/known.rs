@@ -54,7 +54,8 @@ impl CarriedFront {
         self.known.touches || (covered && !self.known.blurred)
     }
 
-    /// The leaves with the least gap met at this pose; where one shape is within the other, with the normal that leads out.
+    /// The leaves with the least gap met at this pose; where one shape is within the other, with the normal that leads
+    /// out.
     #[must_use]
     pub fn witness(&self) -> Option<LeafContact> {
         let witness = self.witness?;
@@ -66,14 +67,15 @@ impl CarriedFront {
         (-witness.closest.best_m >= gap.min).then(|| witness.way_out(gap))
     }
 
-    /// Points where leaves touch at this pose, [`crate::narrow::mesh::PATCH_POINTS`] of each patch, some twice; those of all
-    /// leaves once `Goal::Contacts` is reached.
+    /// Points where leaves touch at this pose, [`crate::narrow::mesh::PATCH_POINTS`] of each patch, some twice; those
+    /// of all leaves once `Goal::Contacts` is reached.
     #[must_use]
     pub fn contacts<'a>(&self, store: &'a FrontStore) -> &'a [LeafContact] {
         self.contacts.all(&store.contacts)
     }
 
-    /// Where one shape is within the other and nothing touches: the leaves that lead out, which then stand for contacts.
+    /// Where one shape is within the other and nothing touches: the leaves that lead out, which then stand for
+    /// contacts.
     #[must_use]
     pub fn way_out(&self, store: &FrontStore) -> Option<LeafContact> {
         let within = self.contacts(store).is_empty() && self.interval().max <= 0.0;

@@ -40,8 +40,8 @@ impl CarriedFront {
         self.note_apart();
     }
 
-    /// Where the surfaces are apart, what is known of the insides, and what is asked of them at this pose, holds as long as
-    /// they stay so.
+    /// Where the surfaces are apart, what is known of the insides, and what is asked of them at this pose, holds as
+    /// long as they stay so.
     fn note_apart(&mut self) {
         if self.known.touches {
             // Whatever the next pose is, insides must be asked again.

@@ -80,7 +80,8 @@ impl<'a> Leaf<'a> {
         Some(height + offset)
     }
 
-    /// The same for a normal of the leaf's own: an edge that is one of the surface is not left for higher ground beyond it.
+    /// The same for a normal of the leaf's own: an edge that is one of the surface is not left for higher ground beyond
+    /// it.
     pub(super) fn own_reach(&self, direction: &Vec3, beyond_m: f64) -> Option<f64> {
         let crest = (self.mesh()).and_then(|mesh| mesh.crest(self.place, &self.turn(direction)));
         match crest {

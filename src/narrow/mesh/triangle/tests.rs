@@ -1,5 +1,5 @@
-//! Goal: leaves that are apart never touch, and what surely crosses does. Method: seeded triangles, parted by a plane or
-//! anywhere; each cheap answer against the whole one.
+//! Goal: leaves that are apart never touch, and what surely crosses does. Method: seeded triangles, parted by a plane
+//! or anywhere; each cheap answer against the whole one.
 
 use super::*;
 

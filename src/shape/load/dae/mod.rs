@@ -1,5 +1,5 @@
-//! COLLADA (.dae) 1.4 and 1.5: triangles and polygons of the geometries that the scene instances, each at its node's place,
-//! in the unit and with the up-axis that the file names.
+//! COLLADA (.dae) 1.4 and 1.5: triangles and polygons of the geometries that the scene instances, each at its node's
+//! place, in the unit and with the up-axis that the file names.
 //!
 //! What is not read (skins, splines, holes, look-at and skew transforms, other files) is refused by name: geometry left
 //! out in silence would be a collision never seen. Materials, lights, cameras, lines and animations carry no surface.

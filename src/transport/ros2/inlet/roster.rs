@@ -1,6 +1,7 @@
 //! Bodies that come and go while the node runs: their places, their subscriptions.
 //!
-//! In: what edits did, with the subscriptions that the sending thread made. Out: lines and places in step with the scene.
+//! In: what edits did, with the subscriptions that the sending thread made. Out: lines and places in step with the
+//! scene.
 
 use rustdds::mio1::Token;
 
