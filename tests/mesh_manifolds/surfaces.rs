@@ -147,47 +147,58 @@ fn of_many_small_triangles_the_extremes_are_kept() {
 /// Floors that stand at any angle, bodies that lie on them a little askew: the normals are the floor's.
 #[test]
 fn a_floor_that_stands_askew_is_as_flat() {
+    let seeds = if cfg!(debug_assertions) { 40 } else { 400 };
+    let worst = (0..seeds).map(tilt_on_askew_floor).fold(0.0, f64::max);
+    println!("worst tilt {worst:.2e} degrees");
+}
+
+/// Over the seams of tiles a climb found no corner higher than one it stood on, where the side it came to lay level.
+#[test]
+fn bug_a_climb_over_tiles_ended_at_a_level_side() {
+    assert!(tilt_on_askew_floor(337) < 1e-9);
+}
+
+/// Ten poses of some body on some floor; the greatest tilt of a normal, degrees.
+fn tilt_on_askew_floor(seed: u64) -> f64 {
     let mut worst = 0.0_f64;
-    for seed in 0..if cfg!(debug_assertions) { 40 } else { 400 } {
-        let mut rng = Rng::new(seed);
-        let all = kinds();
-        let kind = &all[rng.below(all.len())];
-        let frame = Pose::from_parts(rng.vector(5.0).into(), rng.rotation());
-        let cells = 3 + rng.below(25);
-        let sheet = sheet(&mut rng, cells, 1.0);
-        let mut top = match rng.below(3) {
-            0 => sheet,
-            1 => slab(&sheet, 0.3),
-            _ => tiles(&mut rng, cells),
-        };
-        for v in &mut top.vertices {
-            *v = frame * *v;
-        }
-        let first = rng.below(2) == 0;
-        let mut drive = drive(&scene(&trimesh(&top, None), &kind.shape, first));
-        let up = frame.rotation * Vec3::z();
-        for _ in 0..10 {
-            let askew = Quat::from_scaled_axis(rng.vector(0.004));
-            let turn = Quat::from_scaled_axis(Vec3::z() * rng.range(0.0, 6.0));
-            let push = 10.0_f64.powf(rng.range(-4.0, -2.0)) + 0.003;
-            let place = rng.vector(1.5);
-            let on = Vec3::new(place.x, place.y, kind.height - push);
-            let turn = askew * turn * Quat::from_scaled_axis(kind.lying);
-            let rows = contacts(&mut drive, &(frame * Pose::from_parts(on.into(), turn)));
-            assert!(
-                !rows.is_empty() && rows.len() <= 4,
-                "{} {}",
-                kind.name,
-                rows.len()
-            );
-            for row in &rows {
-                let tilt = degrees(&normal(row, first), &up);
-                worst = worst.max(tilt);
-                assert!(tilt <= 0.05, "{seed} {}: {tilt} {row:?}", kind.name);
-            }
+    let mut rng = Rng::new(seed);
+    let all = kinds();
+    let kind = &all[rng.below(all.len())];
+    let frame = Pose::from_parts(rng.vector(5.0).into(), rng.rotation());
+    let cells = 3 + rng.below(25);
+    let sheet = sheet(&mut rng, cells, 1.0);
+    let mut top = match rng.below(3) {
+        0 => sheet,
+        1 => slab(&sheet, 0.3),
+        _ => tiles(&mut rng, cells),
+    };
+    for v in &mut top.vertices {
+        *v = frame * *v;
+    }
+    let first = rng.below(2) == 0;
+    let mut drive = drive(&scene(&trimesh(&top, None), &kind.shape, first));
+    let up = frame.rotation * Vec3::z();
+    for _ in 0..10 {
+        let askew = Quat::from_scaled_axis(rng.vector(0.004));
+        let turn = Quat::from_scaled_axis(Vec3::z() * rng.range(0.0, 6.0));
+        let push = 10.0_f64.powf(rng.range(-4.0, -2.0)) + 0.003;
+        let place = rng.vector(1.5);
+        let on = Vec3::new(place.x, place.y, kind.height - push);
+        let turn = askew * turn * Quat::from_scaled_axis(kind.lying);
+        let rows = contacts(&mut drive, &(frame * Pose::from_parts(on.into(), turn)));
+        assert!(
+            !rows.is_empty() && rows.len() <= 4,
+            "{} {}",
+            kind.name,
+            rows.len()
+        );
+        for row in &rows {
+            let tilt = degrees(&normal(row, first), &up);
+            worst = worst.max(tilt);
+            assert!(tilt <= 0.05, "{seed} {}: {tilt} {row:?}", kind.name);
         }
     }
-    println!("worst tilt {worst:.2e} degrees");
+    worst
 }
 
 /// A ball of triangles pushed into a flat floor of small ones: the deepest point is found though its triangles cross

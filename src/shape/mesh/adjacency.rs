@@ -208,8 +208,17 @@ impl Mesh {
             for _ in 0..RING_MAX {
                 let entry = self.adjacency.twins[leave as usize];
                 if entry == NONE {
+                    // Over a seam the corner may be none of the faces beyond: those beside them are looked at, too,
+                    // else a walk along a side that lies level ends there.
                     for other in self.adjacency.beyond(leave) {
-                        (3 * other..3 * other + 3).for_each(&mut visit);
+                        for side in 3 * other..3 * other + 3 {
+                            visit(side);
+                            let beside = self.adjacency.twins[side as usize];
+                            if beside != NONE {
+                                let face = beside / 3;
+                                (3 * face..3 * face + 3).for_each(&mut visit);
+                            }
+                        }
                     }
                     break;
                 }
