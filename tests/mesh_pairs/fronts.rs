@@ -314,6 +314,43 @@ fn a_front_used_again_answers_as_a_new_one() {
 }
 
 #[test]
+fn contact_points_are_made_when_they_are_asked_for_and_are_those_of_a_query_for_them_at_once() {
+    let clock = ManualClock::new(0);
+    let mut touched = 0;
+    for case in 0..CASES {
+        let mut rng = Rng::new(26_000_000 + case);
+        let (kind_a, kind_b) = (rng.below(KINDS), rng.below(KINDS));
+        let ((a, _), (b, _)) = (any_mesh(&mut rng, kind_a), any_mesh(&mut rng, kind_b));
+        let (pose_a, pose_b) = place(&mut rng, &a, &b, usize::try_from(case % 3).unwrap());
+        let pos12 = relative(&pose_a, &pose_b);
+        let mut store = FrontStore::default();
+        let mut run = |goals: &[Goal]| {
+            let mut front = CarriedFront::default();
+            front.start(&mut store, &a, &b, &pos12, Search::Carried);
+            for goal in goals {
+                let mut meter = Meter::unlimited(&clock);
+                assert!(front.advance(&mut store, &a, &b, *goal, u64::MAX, &mut meter));
+                let none = front.contacts(&store).is_empty();
+                assert!(none || *goal == Goal::Contacts, "case {case}");
+            }
+            let mut points: Vec<[u64; 3]> = (front.contacts(&store).iter())
+                .map(|c| c.closest.point_a.coords.map(f64::to_bits).into())
+                .collect();
+            points.sort_unstable();
+            points.dedup();
+            (front.covered(&store, &a, &b), points)
+        };
+        let at_once = run(&[Goal::Contacts]);
+        let later = run(&[Goal::Verdict, Goal::Gap, Goal::Contacts]);
+        assert_eq!(at_once.0, later.0, "case {case}");
+        // Which points of a patch span the most hangs on the order in which they come.
+        assert_eq!(at_once.1.is_empty(), later.1.is_empty(), "case {case}");
+        touched += usize::from(!later.1.is_empty());
+    }
+    assert!(touched * 5 > usize::try_from(CASES).unwrap(), "{touched}");
+}
+
+#[test]
 fn a_coherent_front_costs_a_fraction_of_starting_again() {
     let a = shape(&meshes::bumpy_sphere(24, 30, 0.1), None);
     let b = shape(&meshes::torus(1.0, 0.3, 24, 16), None);

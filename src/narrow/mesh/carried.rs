@@ -175,15 +175,20 @@ impl CarriedFront {
         self.known = Known::default();
         self.witness = None;
         self.contacts.clear();
-        while let Some(touching) = store.open.pop(&mut self.touching) {
-            self.look_into(store, touching);
-        }
+        self.ask_touching_again(store);
         while let Some(group) = store.groups.pop(&mut self.passing) {
             self.prove(store, group.expired());
         }
         self.passing_m = f64::INFINITY;
         if self.drift.left_m(self.shells_expiry_m) <= 0.0 {
             self.shells.start(self.solids);
+        }
+    }
+
+    /// Leaves that were found touching are open again.
+    fn ask_touching_again(&mut self, store: &mut FrontStore) {
+        while let Some(touching) = store.open.pop(&mut self.touching) {
+            self.look_into(store, touching);
         }
     }
 
@@ -229,6 +234,13 @@ impl CarriedFront {
         if goal > Goal::Verdict && self.known.floor_m == f64::NEG_INFINITY {
             self.measure_wholes((a, side_a), (b, side_b));
             self.anchor_here(store);
+        }
+        if goal == Goal::Contacts
+            && !std::mem::replace(&mut self.known.points_wanted, true)
+            && self.known.touches
+        {
+            // A verdict ends at the first that touches: there are few.
+            self.ask_touching_again(store);
         }
         let end = meter.spent().saturating_add(slice_units);
         loop {

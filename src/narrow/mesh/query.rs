@@ -9,7 +9,8 @@ use crate::math::{Interval, Pose};
 use crate::shape::{Geometry, Mesh, Shape};
 use crate::time::Meter;
 
-/// How far work is to go. A later goal can be asked for when an earlier one is reached; nothing is done twice.
+/// How far work is to go. A later goal can be asked for when an earlier one is reached: of what was done, only leaves
+/// that touch are asked once more, for their contact points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Goal {
     /// Until the pair is certified colliding or proved apart.

@@ -13,6 +13,8 @@ pub(super) struct Known {
     pub(super) touches: bool,
     /// A leaf query near zero could not be finished.
     pub(super) blurred: bool,
+    /// Contact points are made of leaves that touch: a verdict needs none.
+    pub(super) points_wanted: bool,
     /// The last leaves have been asked at this pose.
     pub(super) asked_last: bool,
     /// Bounds of the wholes at this pose, when they were asked for.
@@ -26,6 +28,7 @@ impl Default for Known {
             high: f64::INFINITY,
             touches: false,
             blurred: false,
+            points_wanted: false,
             asked_last: false,
             floor_m: f64::NEG_INFINITY,
         }
@@ -67,8 +70,8 @@ impl CarriedFront {
         (-witness.closest.best_m >= gap.min).then(|| witness.way_out(gap))
     }
 
-    /// Points where leaves touch at this pose, [`crate::narrow::mesh::PATCH_POINTS`] of each patch, some twice; those
-    /// of all leaves once `Goal::Contacts` is reached.
+    /// Points where leaves touch at this pose, [`crate::narrow::mesh::PATCH_POINTS`] of each patch, some twice: none
+    /// until `Goal::Contacts` is asked for, those of all leaves once it is reached.
     #[must_use]
     pub fn contacts<'a>(&self, store: &'a FrontStore) -> &'a [LeafContact] {
         self.contacts.all(&store.contacts)

@@ -68,9 +68,11 @@ impl CarriedFront {
                 self.crossing = side::triangles(leaf_a, leaf_b);
             }
             self.known.touches = true;
-            manifold::points(leaf_a, leaf_b, &self.at, &contact, |point| {
-                self.contacts.add(&mut store.contacts, &point);
-            });
+            if self.known.points_wanted {
+                manifold::points(leaf_a, leaf_b, &self.at, &contact, |point| {
+                    self.contacts.add(&mut store.contacts, &point);
+                });
+            }
         } else {
             self.known.blurred = true;
         }
