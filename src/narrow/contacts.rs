@@ -66,6 +66,11 @@ pub struct ContactSet {
 /// change its id in every tick.
 const SAME_POINT: f64 = 0.05;
 
+/// Cosine of 8 degrees: what normals of one patch differ by at most.
+pub(super) const SAME_NORMAL: f64 = 0.99;
+/// What was kept in the tick before counts as this much farther away: without it two equally good points would take
+/// turns, and ids with them.
+const KEPT_BEFORE: f64 = 1.25;
 /// Cosine of 45 degrees: a contact whose normal has turned by more is another one.
 const SAME_SIDE: f64 = 0.7;
 
@@ -168,5 +173,24 @@ impl Narrow {
             contact.id = *next_id;
             *next_id += 1;
         }
+    }
+}
+
+/// A contact of two shapes of one pair, for tests: its place on A's upper side, named by a number.
+#[cfg(test)]
+fn at_place(x: f64, y: f64, gap_m: f64, name: u32) -> Contact {
+    Contact {
+        id: 0,
+        shape_a: 0,
+        shape_b: 0,
+        triangle_a: name,
+        triangle_b: 0,
+        feature: u64::from(name),
+        patch: 0,
+        point_a: Point::new(x, y, 0.0),
+        point_b: Point::new(x, y, gap_m),
+        normal: Vec3::z(),
+        gap_m,
+        gap: Interval::UNKNOWN,
     }
 }

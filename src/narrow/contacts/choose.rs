@@ -1,16 +1,11 @@
 //! Which contacts of a pair are kept when there are more than fit. In: all that were found. Out: the deepest, then
 //! those that lie farthest from what is kept already, so that few points span the patches that many made.
 
-use super::Contact;
+use super::{Contact, KEPT_BEFORE, SAME_NORMAL};
 
 /// Two points nearer than this share of the smaller body's radius, with normals within [`SAME_NORMAL`], are one contact
 /// that two triangles with a common edge have both found.
 const SAME_PLACE: f64 = 1e-3;
-/// Cosine of 8 degrees: what neighbouring triangles of one patch differ by at most.
-const SAME_NORMAL: f64 = 0.99;
-/// What was kept in the tick before counts as this much farther away: without it two equally good points would take
-/// turns, and ids with them.
-const KEPT_BEFORE: f64 = 1.25;
 
 /// Brings the contacts to keep to the front, deepest first; returns how many these are.
 ///
@@ -89,25 +84,9 @@ fn apart(one: &Contact, other: &Contact, radius: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::at_place as contact;
     use super::*;
-    use crate::math::{Interval, Point, Vec3};
-
-    fn contact(x: f64, y: f64, gap_m: f64, triangle_a: u32) -> Contact {
-        Contact {
-            id: 0,
-            shape_a: 0,
-            shape_b: 0,
-            triangle_a,
-            triangle_b: 0,
-            feature: u64::from(triangle_a),
-            patch: 0,
-            point_a: Point::new(x, y, 0.0),
-            point_b: Point::new(x, y, gap_m),
-            normal: Vec3::z(),
-            gap_m,
-            gap: Interval::UNKNOWN,
-        }
-    }
+    use crate::math::Vec3;
 
     /// A grid of contacts over the unit square, a little deeper towards the middle.
     fn patch() -> Vec<Contact> {

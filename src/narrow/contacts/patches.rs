@@ -6,20 +6,16 @@
 //! and what lies on the ridge is one patch). Two shelves of one height are two patches: they are two surfaces, far
 //! apart.
 
-use super::{Contact, SAME_POINT};
+use super::{Contact, KEPT_BEFORE, SAME_NORMAL, SAME_POINT};
 use crate::limits::MANIFOLD_POINTS_MAX;
 use crate::math::{Aabb, Vec3};
 
-/// Cosine of 8 degrees: what normals of one patch differ by.
-const SAME_NORMAL: f64 = 0.99;
 /// Points of a patch whose distance from the segment or triangle of the others is a smaller share of the smaller body's
 /// radius span nothing more.
 const SPANS: f64 = 1e-3;
 /// Points as deep as the deepest but for this share of the radius are as good: of a body that lies flat the outermost
 /// comes first, whatever rounding says.
 const AS_DEEP: f64 = 1e-9;
-/// A point that was kept in the tick before counts as so much farther out: two that are equally good do not take turns.
-const KEPT_BEFORE: f64 = 1.25;
 
 /// Reduces the points of each patch; returns how many are left, at the front.
 ///

@@ -10,6 +10,7 @@
 use super::contacts::LeafContact;
 use crate::math::Vec3;
 use crate::narrow::arena::{Arena, Run};
+use crate::narrow::contacts::SAME_NORMAL;
 
 /// Patches of one shape pair; of more, those with normals nearest to one another are taken together.
 pub const PATCHES_MAX: usize = 16;
@@ -18,8 +19,6 @@ pub const PATCHES_MAX: usize = 16;
 const DIRECTIONS: usize = 8;
 /// Points of a patch: its first, its deepest, its outermost. Some may be the same.
 pub const PATCH_POINTS: usize = DIRECTIONS + 2;
-/// Cosine of 8 degrees: what normals of one patch differ from its first by.
-const SAME_NORMAL: f64 = 0.99;
 
 /// The points of one pair met so far.
 #[derive(Debug, Default)]

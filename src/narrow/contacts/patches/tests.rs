@@ -1,24 +1,7 @@
 //! The manifold of a patch: what is kept of squares and lines, and which patches are one.
 
+use super::super::at_place as contact;
 use super::*;
-use crate::math::{Interval, Point};
-
-fn contact(x: f64, y: f64, gap_m: f64, feature: u64) -> Contact {
-    Contact {
-        id: 0,
-        shape_a: 0,
-        shape_b: 0,
-        triangle_a: 0,
-        triangle_b: 0,
-        feature,
-        patch: 0,
-        point_a: Point::new(x, y, 0.0),
-        point_b: Point::new(x, y, gap_m),
-        normal: Vec3::z(),
-        gap_m,
-        gap: Interval::UNKNOWN,
-    }
-}
 
 fn names(found: &mut [Contact]) -> Vec<u64> {
     let left = reduce(found, 1.0, |_| false);
@@ -33,7 +16,7 @@ fn of_a_flat_square_the_corners_are_kept_whatever_rounding_says() {
     for k in 0..81_u32 {
         let (x, y) = (f64::from(k % 9) / 8.0, f64::from(k / 9) / 8.0);
         let rounding = 1e-15 * f64::from(k * 37 % 11);
-        found.push(contact(x, y, -0.01 - rounding, u64::from(k)));
+        found.push(contact(x, y, -0.01 - rounding, k));
     }
     assert_eq!(names(&mut found), [0, 8, 72, 80]);
 }
@@ -43,12 +26,12 @@ fn the_deepest_is_kept_and_a_line_has_two_ends() {
     let mut found: Vec<_> = (0..9_u32)
         .map(|k| {
             let depth = if k == 3 { 0.02 } else { 0.01 };
-            contact(f64::from(k), 0.0, -depth, u64::from(k))
+            contact(f64::from(k), 0.0, -depth, k)
         })
         .collect();
     assert_eq!(names(&mut found), [0, 3, 8]);
     let mut found: Vec<_> = (0..9_u32)
-        .map(|k| contact(f64::from(k), 0.0, -0.01, u64::from(k)))
+        .map(|k| contact(f64::from(k), 0.0, -0.01, k))
         .collect();
     assert_eq!(names(&mut found), [0, 8]);
 }
