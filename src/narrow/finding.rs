@@ -67,6 +67,28 @@ impl Narrow {
         })
     }
 
+    /// Whether what there is to say of a pair may have changed since [`Narrow::told`]: it was looked at or worked on, a
+    /// body of it moved, or its slot holds another pair.
+    #[must_use]
+    pub fn is_stirred(&self, slot: PairSlot) -> bool {
+        self.hot.get(slot.index()).is_none_or(|hot| hot.stirred)
+    }
+
+    /// What is known of a pair has been taken down.
+    pub fn told(&mut self, slot: PairSlot) {
+        if let Some(hot) = self.hot.get_mut(slot.index()) {
+            hot.stirred = false;
+        }
+    }
+
+    /// Says that [`Narrow::is_stirred`] of a pair is wanted soon.
+    #[inline]
+    pub fn ask_ahead_if_stirred(&self, slot: PairSlot) {
+        if let Some(hot) = self.hot.get(slot.index()) {
+            prefetch(hot);
+        }
+    }
+
     /// Says that [`Narrow::finding`] of a pair is wanted soon.
     #[inline]
     pub fn ask_ahead(&self, slot: PairSlot) {

@@ -24,7 +24,14 @@ pub(super) struct Hot {
     pub(super) visited: u32,
     pub(super) verdict: Verdict,
     pub(super) live: bool,
+    /// What [`Narrow::finding`] or the contacts say may differ from what was last told.
+    pub(super) stirred: bool,
 }
+
+const _: () = assert!(
+    size_of::<Hot>() == 24,
+    "what the motion pass reads of a pair"
+);
 
 /// Everything else.
 #[derive(Clone, Debug)]
@@ -239,6 +246,7 @@ impl Narrow {
             visited: 0,
             verdict: Verdict::Apart,
             live: true,
+            stirred: true,
         };
         self.counts[usize::from(Verdict::Apart.code())] += 1;
         let memo = &mut self.memos[slot.index()];
@@ -260,6 +268,7 @@ impl Narrow {
         };
         self.counts[usize::from(hot.verdict.code())] -= 1;
         hot.live = false;
+        hot.stirred = true;
         hot.verdict = Verdict::Apart;
         self.deactivate(slot);
         let memo = &mut self.memos[slot.index()];
@@ -320,6 +329,7 @@ impl Hot {
             visited: 0,
             verdict: Verdict::Apart,
             live: false,
+            stirred: true,
         }
     }
 }

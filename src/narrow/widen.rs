@@ -110,6 +110,7 @@ impl Narrow {
     pub(super) fn widen_pair(&mut self, slot: PairSlot, world: &World) {
         let hot = &mut self.hot[slot.index()];
         let memo = &mut self.memos[slot.index()];
+        hot.stirred = true;
         let (Some(a), Some(b)) = (world.body(hot.a), world.body(hot.b)) else {
             return;
         };

@@ -6,7 +6,8 @@ use crate::narrow::{Contact, Finding, Witness};
 use crate::wire::{ContactKind, ContactRow, Level, MessageHeader, Outbox, Verdict, contact_flags};
 use crate::world::Body;
 
-use super::pairs::Row;
+use super::kept::{Kept, Span};
+use super::listing::Row;
 use super::{AHEAD, Publisher, View};
 
 impl Publisher {
@@ -17,28 +18,37 @@ impl Publisher {
         header: MessageHeader,
         out: &mut Outbox,
     ) -> u64 {
-        out.contacts.clear();
         if !view.demand.contacts {
+            out.contacts.clear();
             return 0;
         }
-        let rows: usize = self.rows.iter().map(|row| row.contacts as usize).sum();
-        let most = self.limits.contact_rows;
-        if rows > most {
-            self.choose_pairs(view, most);
-            for at in 0..self.contact_pairs.len() {
-                let row = self.rows[self.contact_pairs[at].1];
-                self.push_pair(view, row, out);
-            }
-        } else {
-            for at in 0..self.rows.len() {
-                let ahead = self.rows.get(at + AHEAD).filter(|row| row.contacts > 0);
-                if let Some(slot) = ahead.and_then(|row| row.slot) {
-                    view.narrow.ask_ahead_for_contacts(slot);
-                }
-                self.push_pair(view, self.rows[at], out);
-            }
+        let rows = &self.listing.rows;
+        let all: usize = rows.iter().map(|row| row.contacts as usize).sum();
+        let cut = all > self.limits.contact_rows;
+        if cut {
+            self.choose_pairs();
         }
-        let left_out = rows.saturating_sub(out.contacts.len()) as u64;
+        let mut kept = std::mem::take(&mut self.kept_contacts);
+        kept.begin();
+        for at in 0..self.listing.rows.len() {
+            let ahead = self.listing.rows.get(at + AHEAD);
+            if let Some(ahead) = ahead.filter(|row| row.fresh && row.contacts > 0)
+                && let Some(slot) = ahead.slot
+            {
+                view.narrow.ask_ahead_for_contacts(slot);
+            }
+            let row = self.listing.rows[at];
+            let sent = !cut || self.chosen.get(at) == Some(&true);
+            self.listing.rows[at].in_contacts = match row.slot {
+                Some(slot) if sent && row.contacts > 0 => {
+                    self.keep_or_make(view, &mut kept, (slot, &row), out)
+                }
+                _ => Span::default(),
+            };
+        }
+        kept.finish(&mut out.contacts);
+        self.kept_contacts = kept;
+        let left_out = all.saturating_sub(out.contacts.len()) as u64;
         out.contacts_header = MessageHeader {
             truncated: left_out,
             ..header
@@ -46,73 +56,94 @@ impl Publisher {
         left_out
     }
 
-    /// Chooses the pairs whose contacts fit: deepest first, then by ids again.
-    fn choose_pairs(&mut self, view: &View<'_>, most: usize) {
-        let (chosen, rows) = (&mut self.contact_pairs, &self.rows);
-        chosen.clear();
-        let depth_of = |row: &Row| {
-            let witness = view.narrow.finding(row.slot?)?.witness?;
-            Some(witness.best_m)
-        };
+    /// The contacts of a pair that has some, as they were or as they are now; returns where they stand.
+    fn keep_or_make(
+        &mut self,
+        view: &mut View<'_>,
+        kept: &mut Kept<ContactRow>,
+        (slot, row): (PairSlot, &Row),
+        out: &mut Outbox,
+    ) -> Span {
+        if !row.fresh && row.in_contacts.len == row.contacts {
+            return kept.keep(&mut out.contacts, row.in_contacts);
+        }
+        view.narrow.name_contacts(slot, &mut self.next_contact);
+        kept.make(&mut out.contacts, row.in_contacts, |out| {
+            push_rows(view, slot, out);
+        })
+    }
+
+    /// Chooses the pairs whose contacts fit: the deepest, of equally deep ones those with the smaller ids.
+    fn choose_pairs(&mut self) {
+        let (by_depth, rows) = (&mut self.contact_pairs, &self.listing.rows);
+        by_depth.clear();
         let pairs = rows.iter().enumerate().filter(|(_, row)| row.contacts > 0);
-        chosen.extend(pairs.map(|(at, row)| (depth_of(row).unwrap_or(0.0), at)));
-        // Rows are ordered by ids, and so are their places.
-        chosen.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-        let mut room = most;
-        chosen.retain(|&(_, at)| {
-            let count = rows[at].contacts as usize;
-            let fits = count <= room;
-            room -= if fits { count } else { 0 };
-            fits
-        });
-        chosen.sort_unstable_by_key(|&(_, at)| at);
-    }
-
-    fn push_pair(&mut self, view: &mut View<'_>, row: Row, out: &mut Outbox) {
-        if let (1.., Some(slot)) = (row.contacts, row.slot) {
-            view.narrow.name_contacts(slot, &mut self.next_contact);
-            Self::push_rows(view, slot, out);
-        }
-    }
-
-    fn push_rows(view: &View<'_>, slot: PairSlot, out: &mut Outbox) {
-        let Some(finding) = view.narrow.finding(slot) else {
-            return;
-        };
-        let (Some(a), Some(b)) = (view.world.body(finding.a), view.world.body(finding.b)) else {
-            return;
-        };
-        if finding.verdict == Verdict::Near {
-            if let Some(witness) = finding.witness {
-                let mut row = closest_row(a, b, witness);
-                (row.gap_min_m, row.gap_max_m) = (finding.gap.min, finding.gap.max);
-                row.flags = if finding.level == Level::Exact {
-                    0
-                } else {
-                    contact_flags::ESTIMATE
-                };
-                out.contacts.push(row);
+        by_depth.extend(pairs.map(|(at, row)| (row.best_m, at)));
+        // Halves what the limit lies in, until it is one pair; a sort of all would take several times as long.
+        let (mut from, mut to, mut room) = (0, by_depth.len(), self.limits.contact_rows);
+        while from < to {
+            let middle = (to - from) / 2;
+            // Rows are ordered by ids, and so are their places.
+            by_depth[from..to]
+                .select_nth_unstable_by(middle, |x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+            let deeper = &by_depth[from..=from + middle];
+            let count: usize = deeper
+                .iter()
+                .map(|&(_, at)| rows[at].contacts as usize)
+                .sum();
+            if count <= room {
+                room -= count;
+                from += middle + 1;
+            } else {
+                to = from + middle;
             }
-            return;
         }
-        let (contacts, tick) = view.narrow.contacts(slot);
-        let current = finding.level == Level::Exact && tick >= finding.tested;
-        let start = out.contacts.len();
-        for contact in contacts {
-            let mut row = contact_row(a, b, contact);
-            row.flags = if current { 0 } else { contact_flags::ESTIMATE };
-            out.contacts.push(row);
-        }
-        out.contacts[start..].sort_unstable_by_key(|row| {
-            (
-                row.shape_a,
-                row.shape_b,
-                row.triangle_a,
-                row.triangle_b,
-                row.id,
-            )
-        });
+        self.chosen.clear();
+        self.chosen.resize(rows.len(), false);
+        by_depth[..from]
+            .iter()
+            .for_each(|&(_, at)| self.chosen[at] = true);
     }
+}
+
+/// Appends the contacts of a pair.
+fn push_rows(view: &View<'_>, slot: PairSlot, out: &mut Vec<ContactRow>) {
+    let Some(finding) = view.narrow.finding(slot) else {
+        return;
+    };
+    let (Some(a), Some(b)) = (view.world.body(finding.a), view.world.body(finding.b)) else {
+        return;
+    };
+    if finding.verdict == Verdict::Near {
+        if let Some(witness) = finding.witness {
+            let mut row = closest_row(a, b, witness);
+            (row.gap_min_m, row.gap_max_m) = (finding.gap.min, finding.gap.max);
+            row.flags = if finding.level == Level::Exact {
+                0
+            } else {
+                contact_flags::ESTIMATE
+            };
+            out.push(row);
+        }
+        return;
+    }
+    let (contacts, tick) = view.narrow.contacts(slot);
+    let current = finding.level == Level::Exact && tick >= finding.tested;
+    let start = out.len();
+    for contact in contacts {
+        let mut row = contact_row(a, b, contact);
+        row.flags = if current { 0 } else { contact_flags::ESTIMATE };
+        out.push(row);
+    }
+    out[start..].sort_unstable_by_key(|row| {
+        (
+            row.shape_a,
+            row.shape_b,
+            row.triangle_a,
+            row.triangle_b,
+            row.id,
+        )
+    });
 }
 
 /// How many contact rows an active pair has.

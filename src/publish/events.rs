@@ -44,7 +44,7 @@ pub(super) struct History {
     pub(super) colliding: bool,
     /// `colliding` before this tick.
     was_colliding: bool,
-    /// Last tick in which the pair was more than plainly apart.
+    /// Last tick in which the pair was seen to be more than plainly apart.
     active: u64,
     /// First tick in which it may have collided; 0: not seen yet.
     born: u64,
@@ -60,6 +60,15 @@ impl History {
         active: 0,
         born: 0,
     };
+
+    /// A pair that was certified colliding or near stayed so in every tick up to `last`, unless something else was
+    /// certified of it since: nothing is said of a pair that nothing happens to.
+    fn go_on_to(&mut self, last: u64) {
+        let stays = matches!(self.verdict, Verdict::Colliding | Verdict::Near);
+        if stays && self.active < last {
+            (self.active, self.tick) = (last, last);
+        }
+    }
 }
 
 /// The history of every pair and the events that wait.
@@ -85,8 +94,15 @@ impl Events {
 
     /// Gives the histories whose slots were lost to the same pairs' new slots; where there is no such pair any more,
     /// its collision has ended.
-    pub(super) fn find_slots(&mut self, tick: u64, world: &World, pairs: &PairSet) {
-        for history in std::mem::take(&mut self.adrift) {
+    pub(super) fn find_slots(
+        &mut self,
+        tick: u64,
+        world: &World,
+        pairs: &PairSet,
+        narrow: &Narrow,
+    ) {
+        for mut history in std::mem::take(&mut self.adrift) {
+            history.go_on_to(tick - 1);
             let (a, b) = (world.slot_of(history.ids.0), world.slot_of(history.ids.1));
             let bodies = a.zip(b);
             if let Some(slot) = bodies.and_then(|(a, b)| pairs.find(PairKey::new(a, b))) {
@@ -94,6 +110,9 @@ impl Events {
                     self.histories.resize(slot.index() + 1, History::NONE);
                 }
                 self.histories[slot.index()] = history;
+                if let Some(finding) = narrow.finding(slot) {
+                    self.certify(tick, slot, &finding, history.ids, narrow);
+                }
             } else if history.colliding {
                 let cause = match bodies {
                     Some(_) => EndCause::Separated,
@@ -119,11 +138,13 @@ impl Events {
 
     /// Takes the pairs that ended, and those that were active and are now proved apart.
     ///
-    /// Then comes [`Events::certify`] for each active pair, and [`Events::merge`].
+    /// Then comes [`Events::certify`] for each active pair of which there may be something new to say, and
+    /// [`Events::merge`].
     pub(super) fn begin(&mut self, tick: u64, world: &World, narrow: &Narrow, delta: &PairDelta) {
         for ended in &delta.ended {
             if let Some(history) = self.histories.get_mut(ended.slot.index()) {
-                let gone = std::mem::replace(history, History::NONE);
+                let mut gone = std::mem::replace(history, History::NONE);
+                gone.go_on_to(tick - 1);
                 if gone.colliding {
                     let ticks = Ticks {
                         first: gone.tick + 1,
@@ -181,6 +202,7 @@ impl Events {
         if history.active == tick {
             return;
         }
+        history.go_on_to(tick - 1);
         history.ids = ids;
         history.was_colliding = history.colliding;
         // Not active in the tick before: proved apart there by its certificate or by its boxes, unless it is new and a

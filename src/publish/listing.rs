@@ -1,30 +1,81 @@
-//! Rows in the order of their bodies' ids, kept from tick to tick: what was in order stays so, and only what is new has
-//! to find its place.
+//! The pairs that are not plainly apart, in the order of their bodies' ids, kept from tick to tick with what the tick
+//! and the messages need of each.
 //!
-//! In: the active pairs, in no order. Out: rows by ids. A sort of all rows would be a sixth of what publishing takes.
+//! In: the active pairs, in no order, and of which of them there may be something new to say. Out: rows by ids; of a
+//! pair that nothing happened to, the row of the tick before. A sort of all rows would be a sixth of what publishing
+//! them takes, and to ask what is known of every pair most of it.
 
-use super::pairs::Row;
-use crate::ids::PairSlot;
+use super::kept::Span;
+use crate::ids::{BodyId, PairSlot};
+use crate::math::Interval;
+use crate::wire::Verdict;
 
-/// The order of the last tick, and memory kept over calls.
+/// A pair: where it stands by ids and by rank, and where its rows stand in the messages.
+///
+/// Kept small: a sort moves these, and above 96 bytes it branches at each comparison.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    pub(super) ids: (BodyId, BodyId),
+    /// At this tick's poses, metres.
+    pub(super) gap: Interval,
+    /// Best estimate of the gap; its lower end where there is none, metres.
+    pub(super) best_m: f64,
+    /// `None`: the pair is gone.
+    pub(super) slot: Option<PairSlot>,
+    /// Place of its event among those that wait; [`NO_EVENT`]: it has none.
+    pub(super) event: u32,
+    /// How many contact rows it has.
+    pub(super) contacts: u32,
+    /// Where it stood in `pairs` when they were last filled.
+    pub(super) in_pairs: Span,
+    /// Where its contacts stood in `contacts` when they were last filled.
+    pub(super) in_contacts: Span,
+    /// What the pair or its way says, whichever is worse.
+    pub(super) verdict: Verdict,
+    /// There is something new to say of it.
+    pub(super) fresh: bool,
+}
+
+const _: () = assert!(size_of::<Row>() <= 96, "larger rows make a sort branch");
+
+/// No event.
+pub(super) const NO_EVENT: u32 = u32::MAX;
+
+impl Row {
+    /// The order of rows: by ids, the smaller first. One number, so that a comparison does not branch.
+    pub(super) fn order(&self) -> u128 {
+        u128::from(self.ids.0.0) << 64 | u128::from(self.ids.1.0)
+    }
+
+    /// Events first, then colliding, possible, near.
+    pub(super) fn class(&self) -> u8 {
+        match self.verdict {
+            _ if self.event != NO_EVENT => 0,
+            Verdict::Colliding => 1,
+            Verdict::Possible => 2,
+            Verdict::Near | Verdict::Apart | Verdict::None => 3,
+        }
+    }
+
+    /// Whether it may be taken over from the tick before as it is, unless its pair was stirred. What is undecided ages
+    /// by ticks, and an event is over.
+    pub(super) fn may_last(&self) -> bool {
+        self.event == NO_EVENT && matches!(self.verdict, Verdict::Colliding | Verdict::Near)
+    }
+}
+
+/// The rows, and memory kept over calls.
 #[derive(Debug, Default)]
 pub(super) struct Listing {
-    /// Pairs by ids, as of the last tick in which rows were made.
-    order: Vec<PairSlot>,
+    /// By ids.
+    pub(super) rows: Vec<Row>,
     /// By pair: the last tick in which it was listed.
     seen: Vec<u64>,
-    /// Rows that stand before their neighbours.
+    /// Rows that are yet to find their places.
     late: Vec<Row>,
 }
 
 impl Listing {
-    /// The slots to look at, in order: first those of the last tick, of which some may be active no more (or be other
-    /// pairs now), then all that are active, of which most were among them.
-    pub(super) fn at(&self, active: &[PairSlot], place: usize) -> Option<PairSlot> {
-        let later = || active.get(place - self.order.len()).copied();
-        self.order.get(place).copied().or_else(later)
-    }
-
     /// Whether a pair has come in this tick already.
     pub(super) fn was_seen(&self, slot: PairSlot, tick: u64) -> bool {
         self.seen.get(slot.index()) == Some(&tick)
@@ -38,39 +89,39 @@ impl Listing {
         self.seen[slot.index()] = tick;
     }
 
-    /// Takes the next row.
-    pub(super) fn push(&mut self, rows: &mut Vec<Row>, row: Row) {
-        if rows.last().is_some_and(|last| row.order() < last.order()) {
-            self.late.push(row);
-        } else {
-            rows.push(row);
-        }
+    /// Takes a row that was not there before; [`Listing::finish`] puts it in its place.
+    pub(super) fn add(&mut self, row: Row) {
+        self.late.push(row);
     }
 
-    /// Puts the late rows in their places.
-    pub(super) fn finish(&mut self, rows: &mut Vec<Row>) {
-        self.late.sort_unstable_by_key(Row::order);
-        let (mut to, mut from) = (rows.len() + self.late.len(), rows.len());
-        rows.extend_from_slice(&self.late);
+    /// Puts what was added in its place.
+    pub(super) fn finish(&mut self) {
+        let Self { rows, late, .. } = self;
+        late.sort_unstable_by_key(Row::order);
+        let (mut to, mut from) = (rows.len() + late.len(), rows.len());
+        rows.extend_from_slice(late);
         // From the end: a place is written after what stood there has been moved on.
-        while let Some(late) = self.late.pop() {
+        while let Some(row) = late.pop() {
             to -= 1;
-            while from > 0 && rows[from - 1].order() > late.order() {
+            while from > 0 && rows[from - 1].order() > row.order() {
                 from -= 1;
                 rows[to] = rows[from];
                 to -= 1;
             }
-            rows[to] = late;
+            rows[to] = row;
         }
-        // How many come late differs from tick to tick: room for all of them is made when rows are more than ever.
-        self.late.reserve(rows.len());
-        self.order.clear();
-        self.order.extend(rows.iter().filter_map(|row| row.slot));
+        // How many are added differs from tick to tick: room for all of them is made when rows are more than ever.
+        late.reserve(rows.len());
+    }
+
+    /// Nothing of the last tick holds: every row is made anew.
+    pub(super) fn forget(&mut self) {
+        self.rows.clear();
     }
 
     /// The slots of all pairs are void.
     pub(super) fn forget_slots(&mut self) {
-        self.order.clear();
+        self.rows.clear();
         self.seen.clear();
     }
 }
@@ -79,50 +130,39 @@ impl Listing {
 mod tests {
     use super::*;
     use crate::builtin::Random;
-    use crate::ids::BodyId;
 
     fn row(id: u64) -> Row {
         Row {
             ids: (BodyId(id), BodyId(id + 1)),
+            gap: Interval::UNKNOWN,
+            best_m: 0.0,
             slot: Some(PairSlot(u32::try_from(id).unwrap())),
-            depth_m: 0.0,
-            event: u32::MAX,
+            event: NO_EVENT,
             contacts: 0,
-            class: 1,
+            in_pairs: Span::default(),
+            in_contacts: Span::default(),
+            verdict: Verdict::Near,
+            fresh: true,
         }
     }
 
     #[test]
-    fn rows_are_by_ids_whatever_left_came_or_took_a_slot() {
+    fn rows_are_by_ids_whatever_left_or_came() {
         let (mut listing, mut random) = (Listing::default(), Random::new(3));
-        for tick in 1..200 {
+        for tick in 0..200 {
             let mut wanted: Vec<u64> = (0..60).filter(|_| random.unit() < 0.6).collect();
-            let active: Vec<PairSlot> = {
-                let mut any = wanted.clone();
-                any.sort_by_key(|id| id * 37 % 61);
-                any.iter().map(|id| row(*id).slot.unwrap()).collect()
-            };
-            // What a slot stands for changes now and then.
-            let shift = tick / 50;
-            let id_of = |slot: PairSlot| (u64::from(slot.0) * (1 + shift)) % 61;
-            let mut rows = Vec::new();
-            let mut place = 0;
-            while let Some(slot) = listing.at(&active, place) {
-                place += 1;
-                if active.contains(&slot) && !listing.was_seen(slot, tick) {
-                    listing.see(slot, tick);
-                    let made = Row {
-                        slot: Some(slot),
-                        ..row(id_of(slot))
-                    };
-                    listing.push(&mut rows, made);
-                }
+            listing.rows.retain(|row| wanted.contains(&row.ids.0.0));
+            for row in &listing.rows {
+                wanted.retain(|id| *id != row.ids.0.0);
             }
-            listing.finish(&mut rows);
-            wanted = wanted.iter().map(|id| id * (1 + shift) % 61).collect();
-            wanted.sort_unstable();
-            let got: Vec<u64> = rows.iter().map(|row| row.ids.0.0).collect();
-            assert_eq!(got, wanted, "tick {tick}");
+            wanted.sort_unstable_by_key(|id| id * 37 % 61);
+            let mut all: Vec<u64> = listing.rows.iter().map(|row| row.ids.0.0).collect();
+            all.extend(&wanted);
+            wanted.iter().for_each(|id| listing.add(row(*id)));
+            listing.finish();
+            all.sort_unstable();
+            let got: Vec<u64> = listing.rows.iter().map(|row| row.ids.0.0).collect();
+            assert_eq!(got, all, "tick {tick}");
         }
     }
 }

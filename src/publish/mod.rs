@@ -6,19 +6,21 @@
 mod bodies;
 mod contacts;
 mod events;
+mod kept;
 mod listing;
 mod pairs;
+mod review;
 mod state;
 
 use crate::config::Limits;
-use crate::narrow::{Narrow, Passage};
+use crate::narrow::Narrow;
 use crate::pairs::{PairDelta, PairSet};
-use crate::wire::{Demand, MessageHeader, Outbox, Verdict, WIRE_VERSION};
+use crate::wire::{ContactRow, Demand, MessageHeader, Outbox, PairRow, WIRE_VERSION};
 use crate::world::World;
 
 use events::Events;
+use kept::Kept;
 use listing::Listing;
-use pairs::Row;
 use state::Survey;
 
 pub use state::Worst;
@@ -53,12 +55,16 @@ pub struct View<'a> {
 pub struct Publisher {
     limits: Limits,
     events: Events,
-    /// Pairs that rows are made of, by ids.
-    rows: Vec<Row>,
     listing: Listing,
     survey: Survey,
-    /// Depth in metres and place in `rows` of the pairs whose contacts are sent, used only when not all fit.
+    /// Whether the last tick's `pairs` and `contacts` were listened to.
+    heard: (bool, bool),
+    kept_pairs: Kept<PairRow>,
+    kept_contacts: Kept<ContactRow>,
+    /// Used only when not all contacts fit: depth in metres and place among the rows of the pairs that have some, and
+    /// by row whether they are sent.
     contact_pairs: Vec<(f64, usize)>,
+    chosen: Vec<bool>,
     verdicts: Vec<u8>,
     next_contact: u64,
 }
@@ -70,10 +76,13 @@ impl Publisher {
         Self {
             limits,
             events: Events::default(),
-            rows: Vec::new(),
             listing: Listing::default(),
             survey: Survey::default(),
+            heard: (false, false),
+            kept_pairs: Kept::default(),
+            kept_contacts: Kept::default(),
             contact_pairs: Vec::new(),
+            chosen: Vec::new(),
             verdicts: Vec::new(),
             next_contact: 1,
         }
@@ -85,7 +94,15 @@ impl Publisher {
         self.listing.forget_slots();
     }
 
+    /// As if nothing of the last tick held: the twin that rows which are kept are compared with.
+    #[cfg(test)]
+    pub(crate) fn forget_rows(&mut self) {
+        self.listing.forget();
+    }
+
     /// Fills every message that is listened to, then the tick's own counts, state and reasons.
+    ///
+    /// * `out` - as the last call left it: rows that still hold are not made again.
     pub fn fill(&mut self, view: &mut View<'_>, out: &mut Outbox) {
         let header = Self::header(view);
         self.review(view);
@@ -96,78 +113,6 @@ impl Publisher {
         Self::fill_names(view, out);
         let left = pairs_left + contacts_left + bodies_left;
         self.fill_tick(view, header, left, out);
-    }
-
-    /// One walk over the active pairs, for the events, the tick's counts and the rows.
-    fn review(&mut self, view: &View<'_>) {
-        self.rows.clear();
-        self.survey = Survey::default();
-        let Self {
-            events,
-            rows,
-            survey,
-            listing,
-            ..
-        } = self;
-        events.find_slots(view.tick, view.world, view.pairs);
-        events.begin(view.tick, view.world, view.narrow, view.delta);
-        let listed = view.demand.pairs || view.demand.contacts;
-        let active = view.narrow.active();
-        let mut place = 0;
-        while let Some(slot) = listing.at(active, place) {
-            let ahead = listing.at(active, place + AHEAD);
-            if let Some(ahead) = ahead.filter(|slot| !listing.was_seen(*slot, view.tick)) {
-                view.narrow.ask_ahead(ahead);
-            }
-            place += 1;
-            if listing.was_seen(slot, view.tick) {
-                continue;
-            }
-            listing.see(slot, view.tick);
-            let finding = view.narrow.finding(slot);
-            let Some(finding) = finding.filter(|finding| finding.verdict != Verdict::Apart) else {
-                continue;
-            };
-            let (Some(a), Some(b)) = (view.world.tag(finding.a), view.world.tag(finding.b)) else {
-                continue;
-            };
-            let ids = (a.id, b.id);
-            events.certify(view.tick, slot, &finding, ids, view.narrow);
-            let swept = view.narrow.passage(slot).map(|swept| swept.passage);
-            let passage = swept.filter(|passage| events.is_news(slot, *passage));
-            survey.take(view.tick, ids, &finding, passage);
-            if listed {
-                listing.push(rows, Row::of_active(view, slot, ids, &finding, passage));
-            }
-        }
-        self.review_ways(view, listed);
-        self.events.merge();
-        self.listing.finish(&mut self.rows);
-    }
-
-    /// As [`Publisher::review`], of pairs that are apart and not active, but may have touched on the way.
-    fn review_ways(&mut self, view: &View<'_>, listed: bool) {
-        for swept in view.narrow.swept() {
-            let finding = view.narrow.finding(swept.slot);
-            let apart = finding.filter(|finding| finding.verdict == Verdict::Apart);
-            let Some(finding) = apart.filter(|_| swept.passage != Passage::Free) else {
-                continue;
-            };
-            let (Some(a), Some(b)) = (view.world.tag(finding.a), view.world.tag(finding.b)) else {
-                continue;
-            };
-            let (slot, ids) = (swept.slot, (a.id, b.id));
-            self.events
-                .certify(view.tick, slot, &finding, ids, view.narrow);
-            if self.events.is_news(slot, swept.passage) {
-                let passage = Some(swept.passage);
-                self.survey.take(view.tick, ids, &finding, passage);
-                if listed {
-                    let row = Row::of_active(view, slot, ids, &finding, passage);
-                    self.listing.push(&mut self.rows, row);
-                }
-            }
-        }
     }
 
     fn header(view: &View<'_>) -> MessageHeader {

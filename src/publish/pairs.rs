@@ -8,26 +8,9 @@ use crate::wire::{
 };
 use crate::world::Body;
 
-use super::contacts::contacts_of;
+use super::kept::Span;
+use super::listing::{NO_EVENT, Row};
 use super::{AHEAD, Publisher, View};
-
-/// A row to be: where it stands by rank, and what it is made of.
-///
-/// Kept small: a sort moves these, and above 96 bytes it branches at each comparison.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Row {
-    pub(super) ids: (BodyId, BodyId),
-    /// Deepest first within a class, metres.
-    pub(super) depth_m: f64,
-    /// `None`: the pair is gone.
-    pub(super) slot: Option<PairSlot>,
-    /// Place of its event among those that wait; `NONE`: it has none.
-    pub(super) event: u32,
-    /// How many contact rows it has.
-    pub(super) contacts: u32,
-    /// Events first, then colliding, possible, near.
-    pub(super) class: u8,
-}
 
 /// A verdict, or what a way that is news says, whichever is worse.
 pub(super) fn worst_of(verdict: Verdict, passage: Option<Passage>) -> Verdict {
@@ -35,43 +18,6 @@ pub(super) fn worst_of(verdict: Verdict, passage: Option<Passage>) -> Verdict {
         Some(Passage::Touched(_)) => Verdict::Colliding,
         Some(Passage::Open(_)) => verdict.max(Verdict::Possible),
         Some(Passage::Free) | None => verdict,
-    }
-}
-
-/// No event.
-const NONE: u32 = u32::MAX;
-
-impl Row {
-    /// The row of an active pair.
-    pub(super) fn of_active(
-        view: &View<'_>,
-        slot: PairSlot,
-        ids: (BodyId, BodyId),
-        finding: &Finding<'_>,
-        passage: Option<Passage>,
-    ) -> Self {
-        let contacts = if view.demand.contacts {
-            contacts_of(view, slot, finding)
-        } else {
-            0
-        };
-        Self {
-            ids,
-            depth_m: finding.gap.min,
-            slot: Some(slot),
-            event: NONE,
-            contacts: u32::try_from(contacts).unwrap_or(u32::MAX),
-            class: match worst_of(finding.verdict, passage) {
-                Verdict::Colliding => 1,
-                Verdict::Possible => 2,
-                Verdict::Near | Verdict::Apart | Verdict::None => 3,
-            },
-        }
-    }
-
-    /// The order of rows: by ids, the smaller first. One number, so that a comparison does not branch.
-    pub(super) fn order(&self) -> u128 {
-        u128::from(self.ids.0.0) << 64 | u128::from(self.ids.1.0)
     }
 }
 
@@ -83,23 +29,39 @@ impl Publisher {
         header: MessageHeader,
         out: &mut Outbox,
     ) -> u64 {
-        out.pairs.clear();
         if !view.demand.pairs {
+            out.pairs.clear();
             // Who begins to listen later sees the full state; there is nobody to tell what happened before.
             self.events.sent(|_| false);
             return 0;
         }
-        let late = self.add_events(view);
+        self.add_events(view);
         let left_out = self.rank();
-        if late > 0 || left_out > 0 {
-            self.rows.sort_unstable_by_key(Row::order);
-        }
-        let rows = &self.rows;
-        for (at, row) in rows.iter().enumerate() {
-            if let Some(ahead) = rows.get(at + AHEAD).and_then(|row| row.slot) {
-                view.narrow.ask_ahead(ahead);
+        let mut kept = std::mem::take(&mut self.kept_pairs);
+        kept.begin();
+        for at in 0..self.listing.rows.len() {
+            let rows = &self.listing.rows;
+            if let Some(ahead) = rows.get(at + AHEAD).filter(|row| row.fresh)
+                && let Some(slot) = ahead.slot
+            {
+                view.narrow.ask_ahead(slot);
             }
-            out.pairs.push(self.pair_row(view, row));
+            let row = rows[at];
+            let span = if row.fresh {
+                let make = |out: &mut Vec<PairRow>| out.push(self.pair_row(view, &row));
+                kept.make(&mut out.pairs, row.in_pairs, make)
+            } else {
+                kept.keep(&mut out.pairs, row.in_pairs)
+            };
+            self.listing.rows[at].in_pairs = span;
+        }
+        kept.finish(&mut out.pairs);
+        self.kept_pairs = kept;
+        let rows = &self.listing.rows;
+        for (row, sent) in rows.iter().zip(&mut out.pairs) {
+            if !row.fresh {
+                grow_older(sent, view.tick);
+            }
         }
         if left_out == 0 {
             self.events.sent(|_| false);
@@ -114,15 +76,15 @@ impl Publisher {
         left_out
     }
 
-    /// Gives the listed pairs their events, and lists those that are not active any more; returns how many these are.
-    fn add_events(&mut self, view: &mut View<'_>) -> usize {
-        let active = self.rows.len();
-        for (at, event) in self.events.waiting().iter().enumerate() {
-            let place = u32::try_from(at).unwrap_or(NONE);
-            match self.rows[..active].binary_search_by_key(&event.ids, |row| row.ids) {
+    /// Gives the listed pairs their events, and lists those that are not active any more.
+    fn add_events(&mut self, view: &mut View<'_>) {
+        let (events, listing) = (&self.events, &mut self.listing);
+        for (at, event) in events.waiting().iter().enumerate() {
+            let place = u32::try_from(at).unwrap_or(NO_EVENT);
+            match (listing.rows).binary_search_by_key(&event.ids, |row| row.ids) {
                 Ok(at) => {
-                    self.rows[at].event = place;
-                    self.rows[at].class = 0;
+                    listing.rows[at].event = place;
+                    listing.rows[at].fresh = true;
                 }
                 Err(_) => {
                     let slot = Self::slot_of(view, event.ids);
@@ -130,18 +92,22 @@ impl Publisher {
                     if let Some(slot) = slot {
                         view.narrow.bring_up(slot, view.world);
                     }
-                    self.rows.push(Row {
+                    listing.add(Row {
                         ids: event.ids,
-                        depth_m: 0.0,
+                        gap: Interval { min: 0.0, max: 0.0 },
+                        best_m: 0.0,
                         slot,
                         event: place,
                         contacts: 0,
-                        class: 0,
+                        in_pairs: Span::default(),
+                        in_contacts: Span::default(),
+                        verdict: Verdict::Apart,
+                        fresh: true,
                     });
                 }
             }
         }
-        self.rows.len() - active
+        listing.finish();
     }
 
     /// The slot of a pair that is apart but still a candidate.
@@ -152,15 +118,16 @@ impl Publisher {
 
     /// Leaves out what does not fit, worst rank first; returns how many were left out.
     fn rank(&mut self) -> u64 {
-        let most = self.limits.pair_rows;
-        let left_out = self.rows.len().saturating_sub(most);
+        let (most, rows) = (self.limits.pair_rows, &mut self.listing.rows);
+        let left_out = rows.len().saturating_sub(most);
         if left_out > 0 {
-            self.rows.sort_unstable_by(|x, y| {
-                (x.class.cmp(&y.class))
-                    .then(x.depth_m.total_cmp(&y.depth_m))
+            rows.sort_unstable_by(|x, y| {
+                (x.class().cmp(&y.class()))
+                    .then(x.gap.min.total_cmp(&y.gap.min))
                     .then(x.ids.cmp(&y.ids))
             });
-            self.rows.truncate(most);
+            rows.truncate(most);
+            rows.sort_unstable_by_key(Row::order);
         }
         left_out as u64
     }
@@ -213,11 +180,16 @@ impl Publisher {
         let (Some(a), Some(b)) = (world.tag(finding.a), world.tag(finding.b)) else {
             return;
         };
-        let history = self.events.history(slot);
         out.verdict = finding.verdict.code();
         out.level = finding.level.code();
-        out.certified_verdict = history.verdict.code();
-        out.certified_tick = history.tick;
+        let (verdict, tick) = match finding.verdict {
+            Verdict::Colliding | Verdict::Near => (finding.verdict, view.tick),
+            _ => {
+                let history = self.events.history(slot);
+                (history.verdict, history.tick)
+            }
+        };
+        (out.certified_verdict, out.certified_tick) = (verdict.code(), tick);
         (out.gap_min_m, out.gap_max_m) = (finding.gap.min, finding.gap.max);
         out.bound_age_ticks =
             u32::try_from(view.tick - finding.tested.max(finding.born)).unwrap_or(u32::MAX);
@@ -278,6 +250,12 @@ impl Publisher {
         };
         (out.toi_min, out.toi_max) = (toi.min, toi.max);
     }
+}
+
+/// A row of a pair that nothing happened to since the tick before: what was certified is so again, by an older bound.
+fn grow_older(row: &mut PairRow, tick: u64) {
+    row.bound_age_ticks = row.bound_age_ticks.saturating_add(1);
+    row.certified_tick = tick;
 }
 
 /// How fast the gap shrinks at the witness of two bodies whose velocities are known, metres a second.

@@ -1,12 +1,12 @@
 //! The tick in one word, its reasons, its counts, and the worst pair.
 
 use crate::ids::{BodyId, BodySlot};
-use crate::narrow::{Finding, Passage};
+use crate::narrow::Passage;
 use crate::wire::{
     BodyStatus, MessageHeader, Outbox, Reason, SOURCES_MAX, SourceRow, State, TickRow, Verdict,
 };
 
-use super::pairs::worst_of;
+use super::listing::Row;
 use super::{Publisher, View};
 
 /// The pair that a person should look at first.
@@ -126,33 +126,28 @@ impl Survey {
     /// Takes an active pair.
     ///
     /// * `passage` - what its way says, where that is news.
-    pub(super) fn take(
-        &mut self,
-        tick: u64,
-        ids: (BodyId, BodyId),
-        finding: &Finding<'_>,
-        passage: Option<Passage>,
-    ) {
+    pub(super) fn take(&mut self, row: &Row, passage: Option<Passage>) {
         match passage {
             Some(Passage::Touched(_)) => self.touched += 1,
             Some(Passage::Open(_)) => self.open += 1,
             Some(Passage::Free) | None => {}
         }
-        self.widest_m = self.widest_m.max(finding.gap.width());
-        if finding.undecided_since != 0 {
-            self.oldest_ticks = self.oldest_ticks.max(tick - finding.undecided_since + 1);
-        }
-        let depth = -finding
-            .witness
-            .map_or(finding.gap.min, |witness| witness.best_m);
-        let verdict = worst_of(finding.verdict, passage);
-        let (rank, worst) = ((verdict.code(), depth), self.worst);
+        self.widest_m = self.widest_m.max(row.gap.width());
+        let (ids, worst) = (row.ids, self.worst);
+        let rank = (row.verdict.code(), -row.best_m);
         let order = rank
             .0
             .cmp(&worst.rank.0)
             .then(rank.1.total_cmp(&worst.rank.1));
         if order.is_gt() || (order.is_eq() && (ids < worst.ids || worst.ids.0 == BodyId(0))) {
             self.worst = Worst { ids, rank };
+        }
+    }
+
+    /// Takes since when a pair has had no verdict; 0: it has one.
+    pub(super) fn wait(&mut self, tick: u64, undecided_since: u64) {
+        if undecided_since != 0 {
+            self.oldest_ticks = self.oldest_ticks.max(tick - undecided_since + 1);
         }
     }
 }

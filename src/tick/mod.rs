@@ -9,6 +9,8 @@ mod look;
 pub mod pace;
 mod repair;
 mod rest;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 

@@ -51,9 +51,12 @@ impl World {
                     let stamp_ns = frame.stamps_ns.get(at).copied();
                     let stamp_ns = stamp_ns.unwrap_or(frame.header.stamp_ns);
                     let declared = self.declared_turn(slot, stamp_ns, velocity);
-                    self.renew(slot, stamp_ns, velocity.copied(), times);
+                    let other_speed = self.renew(slot, stamp_ns, velocity.copied(), times);
                     let pose = pose.map(|pose| (pose, raw));
-                    self.accept(slot, pose, declared, deadline_ns, young);
+                    let moved = self.accept(slot, pose, declared, deadline_ns, young);
+                    if other_speed && !moved {
+                        self.lists.restated(slot);
+                    }
                 }
                 Err(reason) => {
                     self.note_reject(reason);
@@ -78,18 +81,29 @@ impl World {
     }
 
     /// A good row: its stamp, velocity and age.
-    fn renew(&mut self, slot: BodySlot, stamp_ns: u64, velocity: Option<[f64; 6]>, times: Times) {
+    ///
+    /// * returns - whether the velocity of a body that pairs may have is another one now.
+    fn renew(
+        &mut self,
+        slot: BodySlot,
+        stamp_ns: u64,
+        velocity: Option<[f64; 6]>,
+        times: Times,
+    ) -> bool {
         if let Some(body) = self.bodies[slot.index()].as_mut() {
-            let begins_or_ends = body.velocity.is_some() != velocity.is_some();
+            let bits = |v: Option<[f64; 6]>| v.map(|v| v.map(f64::to_bits));
+            let other_speed = bits(body.velocity) != bits(velocity);
             body.velocity = velocity;
-            // A body at rest is not settled again for it.
-            if begins_or_ends {
-                self.tags.set(slot, Some(Tag::of(body)));
-            }
             body.stamp_ns = stamp_ns;
             body.since_ns = Some(times.since_ns);
             body.received_ns = times.received_ns;
+            // A body at rest is not settled again for it.
+            if other_speed {
+                self.tags.set(slot, Some(Tag::of(body)));
+            }
+            return other_speed && body.in_broad;
         }
+        false
     }
 
     /// What a continuous body turned by since its last pose, by its sender's word: angular velocity times the time
@@ -111,6 +125,8 @@ impl World {
     }
 
     /// A good row: its pose, where it is not the one the body has.
+    ///
+    /// * returns - whether that moved it.
     fn accept(
         &mut self,
         slot: BodySlot,
@@ -118,7 +134,7 @@ impl World {
         declared: Option<Vec3>,
         deadline_ns: u64,
         young: bool,
-    ) {
+    ) -> bool {
         let mut moved = false;
         if let Some((pose, raw)) = pose {
             moved = self.travel(slot, &pose, declared);
@@ -131,7 +147,7 @@ impl World {
             moved = self.travel(slot, &at, declared);
         }
         let Some(body) = self.bodies[slot.index()].as_mut() else {
-            return;
+            return moved;
         };
         body.reject = None;
         let known = body.status == BodyStatus::Known && body.in_broad;
@@ -143,6 +159,7 @@ impl World {
         } else {
             self.settle(slot, moved);
         }
+        moved
     }
 
     /// The newest pose of a body was refused: it is unknown until a good one comes; its last good one is kept.

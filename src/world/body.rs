@@ -155,7 +155,7 @@ pub struct ChangeSet {
     pub moved: Vec<BodySlot>,
     /// Bodies whose filters changed, or whose pairs must be found again by a query.
     pub requery: Vec<BodySlot>,
-    /// Bodies whose status or reach changed without their pose.
+    /// Bodies whose status, reach or velocity changed without their pose.
     pub restated: Vec<BodySlot>,
 }
 
