@@ -24,12 +24,18 @@ pub trait Runner {
     }
 }
 
-/// The runners of a full run; `brute` can be asked for too.
+/// The runners of a full run; `brute`, and the two ways of the order by name (`lasting`, `afresh`), can be asked for too.
 pub const NAMES: &[&str] = &["limit", "order", "sap", "grid", "hash", "hgrid"];
 
 pub fn runner(name: &str, scene: &Scene) -> Option<Box<dyn Runner>> {
     Some(match name {
         "limit" => Box::new(Limit::default()),
+        // The two ways of the order, whatever the scene.
+        "lasting" | "afresh" => {
+            let mut ours = Ours::new(Method::Order, scene);
+            ours.broad.use_afresh(name == "afresh");
+            Box::new(ours)
+        }
         _ => Box::new(Ours::new(Method::named(name)?, scene)),
     })
 }

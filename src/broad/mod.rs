@@ -124,6 +124,14 @@ impl BroadPhase {
         }
     }
 
+    /// Sets whether the order works every tick from scratch, or none; without it: as counted work says. All give the
+    /// same pairs and events.
+    pub fn use_afresh(&mut self, afresh: bool) {
+        if let Engine::Order(order) = &mut self.engine {
+            order.use_afresh(Some(afresh));
+        }
+    }
+
     /// Bodies in the broad phase.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -237,6 +237,8 @@ impl Oracle {
 /// One method with its own set.
 struct Rig {
     method: Method,
+    /// Which ticks the order works from scratch, around the clock; nothing: as it chooses.
+    gears: &'static [bool],
     broad: BroadPhase,
     pairs: PairSet,
     delta: PairDelta,
@@ -273,17 +275,22 @@ pub struct Bench {
 
 impl Bench {
     pub fn new(limit: usize) -> Self {
-        let rig = |method| Rig {
+        let rig = |method, gears| Rig {
             method,
+            gears,
             broad: BroadPhase::new(method),
             pairs: PairSet::new(limit),
             delta: PairDelta::default(),
         };
+        let mut rigs: Vec<Rig> = Method::NAMED
+            .iter()
+            .map(|(method, _)| rig(*method, &[][..]))
+            .collect();
+        // The ways of the order, whatever it would choose.
+        rigs.push(rig(Method::Order, &[true]));
+        rigs.push(rig(Method::Order, &[true, true, false, true, false]));
         Self {
-            rigs: Method::NAMED
-                .iter()
-                .map(|(method, _)| rig(*method))
-                .collect(),
+            rigs,
             oracle: Oracle::default(),
             limit,
             seen: Summary::default(),
@@ -300,9 +307,13 @@ impl Bench {
             if world.forced_changed {
                 rig.broad.force(&world.forced);
             }
+            let at = self.seen.ticks as usize % rig.gears.len().max(1);
+            if let Some(afresh) = rig.gears.get(at) {
+                rig.broad.use_afresh(*afresh);
+            }
             rig.broad
                 .update(&world.changes, world, world, &mut rig.pairs, &mut rig.delta);
-            let name = format!("{what}: {:?}", rig.method);
+            let name = format!("{what}: {:?} {:?}", rig.method, rig.gears);
             let valid = rig.broad.validate(world, world, &rig.pairs);
             assert_eq!(valid, Ok(()), "{name}");
             let outcome = outcome(world, &rig.pairs, &rig.delta);

@@ -48,7 +48,12 @@ fn run(kind: Kind, bodies: usize, frames: usize) {
         .collect();
     let others = Method::NAMED.iter().map(|(method, _)| *method);
     let others = others.filter(|method| !matches!(method, Method::Order | Method::BruteForce));
-    rigs.extend(others.map(|method| Rig::of(method, bodies, kind == Kind::Far)));
+    let far = kind == Kind::Far;
+    rigs.extend(others.map(|method| Rig::of(method, bodies, far)));
+    rigs.push(Rig::geared("lasting", &[false], bodies, far));
+    rigs.push(Rig::geared("from scratch", &[true], bodies, far));
+    let gears = &[true, false, false, true, true, true, false];
+    rigs.push(Rig::geared("shifting", gears, bodies, far));
     for rig in &mut rigs {
         rig.start(&scene.boxes);
     }

@@ -47,6 +47,9 @@ pub fn at(place: [f32; 3], half: f32) -> Box3 {
 
 pub struct Rig {
     pub name: String,
+    /// Which ticks are from scratch; nothing: as the method chooses.
+    gears: &'static [bool],
+    ticks: usize,
     broad: BroadPhase,
     bodies: Bodies,
     changes: ChangeSet,
@@ -65,6 +68,15 @@ impl Rig {
         rig
     }
 
+    /// The main method, from scratch in each tick as some numbers say, around the clock.
+    pub fn geared(name: &str, gears: &'static [bool], bodies: usize, far: bool) -> Self {
+        Self {
+            name: name.into(),
+            gears,
+            ..Self::of(Method::Order, bodies, far)
+        }
+    }
+
     /// Any method.
     pub fn of(method: Method, bodies: usize, far: bool) -> Self {
         let mut rng = Rng::new(bodies as u64);
@@ -74,6 +86,8 @@ impl Rig {
         }
         Self {
             name: format!("{method:?}"),
+            gears: &[],
+            ticks: 0,
             broad: BroadPhase::new(method),
             bodies: Bodies {
                 boxes: vec![Aabb::empty(); bodies],
@@ -130,6 +144,10 @@ impl Rig {
 
     /// One update; pairs and events must be those of the exact set.
     pub fn tick(&mut self, wanted: &[Pair], what: &str) {
+        if let Some(afresh) = self.gears.get(self.ticks % self.gears.len().max(1)) {
+            self.broad.use_afresh(*afresh);
+        }
+        self.ticks += 1;
         self.broad.update(
             &self.changes,
             &self.bodies,

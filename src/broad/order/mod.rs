@@ -15,8 +15,10 @@
 //!   seldom sorted anew.
 //! * **Exact.** Boxes are f32, rounded outward, relative to an f64 origin amid the scene; where rounding could tell
 //!   otherwise than the f64 boxes, those are asked. So the pairs are those of the f64 boxes at any offset.
-//! * **Modes** (few or many moved; renewal or sorting anew) are chosen by counted work with weights that were measured
-//!   once, so that a replay chooses alike. They decide about cost alone: pairs, slots and events are the same.
+//! * **From scratch** (`afresh`): where no fat box lasts, nothing is kept but the list of overlaps.
+//! * **Modes** (few or many moved; renewal, sorting anew, from scratch) are chosen by counted work with weights that
+//!   were measured once, so that a replay chooses alike. They decide about cost alone: pairs, slots and events are the
+//!   same.
 //!
 //! Refused: three lists of sorted ends (see `sap`: exponent 1.5 to 2 as soon as motion is incoherent); a list of pairs
 //! as the one home of candidates (each renewal would insert, remove and look up single pairs; matrices are overwritten,
@@ -32,7 +34,9 @@ use super::members::{ASKED, CAME, Members};
 use crate::ids::{BodySlot, PairKey};
 use crate::simd::boxes::{Boxes16, Down, Hold, Level, WIDTH};
 
+mod afresh;
 mod fatten;
+mod gear;
 mod links;
 mod load;
 mod look;
@@ -43,6 +47,7 @@ mod sort;
 mod tree;
 mod validate;
 
+use afresh::Afresh;
 use fatten::Gait;
 use links::{Links, small, spare};
 use tree::Tree;
@@ -134,6 +139,9 @@ pub(super) struct Order {
     excess: u64,
     /// Blocks met by a query right after the last sort, in sixteenths.
     usual: u64,
+    /// Lanes given up or taken in this tick, but for a sort.
+    lanes_changed: u64,
+    afresh: Afresh,
 }
 
 impl Default for Order {
@@ -185,11 +193,17 @@ impl Order {
             rows: Vec::new(),
             excess: 0,
             usual: 0,
+            lanes_changed: 0,
+            afresh: Afresh::default(),
         }
     }
 
     /// Bodies with a box left (and may be about to come again). Their pairs are ended by the caller.
     pub(super) fn leave(&mut self, left: &[BodySlot]) {
+        if self.afresh.on {
+            self.forget_held(left);
+            return;
+        }
         for slot in left {
             self.evict(*slot, false);
         }
@@ -198,11 +212,24 @@ impl Order {
     /// Brings boxes and candidates up to date and reports what began and parted.
     pub(super) fn update<P: Proxies>(&mut self, mut tick: Tick<'_, P>, work: &mut Work) {
         self.tick = self.tick.wrapping_add(1);
+        let (moved, bodies) = (tick.moved.len(), tick.members.bounded().len());
+        let was = self.afresh.on;
+        if (self.afresh.gear).choose(was, moved, bodies, self.hits) {
+            if !was {
+                self.begin_afresh();
+            }
+            self.update_afresh(&mut tick, work);
+            self.afresh.gear.note_scratch(bodies, work);
+            return;
+        }
+        if was {
+            self.end_afresh();
+        }
         self.homeless.clear();
         let came = tick.members.touched().iter().copied();
         let came = came.filter(|s| tick.members.has(*s, CAME) && tick.members.is_bounded(*s));
         self.homeless.extend(came);
-        let anew = self.homeless.len() * MANY_CAME > tick.members.bounded().len();
+        let anew = was || self.homeless.len() * MANY_CAME > tick.members.bounded().len();
         // With hysteresis: to list all candidates again costs as much as some ticks.
         let share = if self.listed { STILL_MANY } else { MANY_MOVED };
         let many = tick.moved.len() * share > self.len;
@@ -229,6 +256,13 @@ impl Order {
         }
         self.tell_asked(&mut tick);
         self.close();
+        let lanes = std::mem::take(&mut self.lanes_changed);
+        self.afresh.gear.note(moved, lanes, work);
+    }
+
+    /// Sets whether every tick is worked from scratch, or none; `None`: as counted work says.
+    pub(super) fn use_afresh(&mut self, afresh: Option<bool>) {
+        self.afresh.gear.forced = afresh;
     }
 
     /// Reports every overlap of bodies whose pairs must be looked for, whatever moved.

@@ -68,6 +68,7 @@ impl Order {
         self.held[rank] = Hold::EMPTY;
         self.ages[rank] = self.ages[rank].wrapping_add(1);
         self.len -= 1;
+        self.lanes_changed += 1;
     }
 
     /// Whether the order has cost more than sorting anew would.
@@ -99,6 +100,7 @@ impl Order {
         self.slot_of[rank as usize] = slot.0;
         self.live[block] |= 1 << lane;
         self.len += 1;
+        self.lanes_changed += 1;
         self.exact[rank as usize] = one;
         self.mark(block, 1 << lane);
     }
@@ -185,7 +187,7 @@ impl Order {
     }
 
     /// Remembers every overlap.
-    fn carry_all(&mut self) {
+    pub(super) fn carry_all(&mut self) {
         for block in 0..small(self.live.len()) {
             let (links, slot_of, carried) = (&self.links, &self.slot_of, &mut self.carried);
             for (other, record) in links.of(block) {
@@ -325,7 +327,7 @@ fn grow<T: Clone>(list: &mut Vec<T>, index: usize, value: T) {
 }
 
 /// The middle of the boxes' finite corners.
-fn middle<'a>(boxes: impl Iterator<Item = &'a Aabb>) -> [f64; 3] {
+pub(super) fn middle<'a>(boxes: impl Iterator<Item = &'a Aabb>) -> [f64; 3] {
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for aabb in boxes {
         for k in 0..3 {

@@ -112,8 +112,11 @@ impl Sorter {
         key >> CURVE_BITS
     }
 
-    /// Sorts; yields for each box, block by block, a key and its index. Keys ascend; all blocks of a stretch share one.
-    pub(super) fn sort(&mut self, boxes: &[[f32; 6]]) -> &[(u64, u32)] {
+    /// Sorts; yields for each box, along the curve, its key and its index.
+    pub(super) fn along_curve(
+        &mut self,
+        boxes: &[[f32; 6]],
+    ) -> impl Iterator<Item = (u64, u32)> + '_ {
         let mut words = std::mem::take(&mut self.words);
         words.clear();
         let all = boxes.iter().enumerate();
@@ -127,12 +130,16 @@ impl Sorter {
             shift += DIGIT_BITS;
         }
         let index = |word: u64| u32::try_from(word & ((1 << INDEX_BITS) - 1)).unwrap_or(0);
-        self.order.clear();
-        self.order.extend(
-            self.words
-                .iter()
-                .map(|word| (word >> INDEX_BITS, index(*word))),
-        );
+        let words = self.words.iter();
+        words.map(move |word| (word >> INDEX_BITS, index(*word)))
+    }
+
+    /// Sorts; yields for each box, block by block, a key and its index. Keys ascend; all blocks of a stretch share one.
+    pub(super) fn sort(&mut self, boxes: &[[f32; 6]]) -> &[(u64, u32)] {
+        let mut order = std::mem::take(&mut self.order);
+        order.clear();
+        order.extend(self.along_curve(boxes));
+        self.order = order;
         let mut from = 0;
         while from < self.order.len() {
             let class = Self::class_of(self.order[from].0);

@@ -3,6 +3,8 @@
 
 use crate::simd::boxes::{Boxes16, LANES, Lanes, Portable, WIDTH};
 
+const _: () = assert!(WIDTH == 1 << 4, "a level is four bits of a block's number");
+
 /// Levels a tree can have: sixteen blocks, 256, ... far more than `limits::BODIES_MAX` bodies fill.
 const LEVELS_MAX: usize = 8;
 
@@ -122,11 +124,26 @@ impl Tree {
     /// Appends the blocks whose bound meets a box.
     #[inline(always)]
     pub(super) fn query<L: Lanes>(&mut self, lanes: L, one: &[f32; 6], found: &mut Vec<u32>) {
+        self.query_from(lanes, one, 0, found);
+    }
+
+    /// As [`Tree::query`], of the blocks from one on.
+    #[inline(always)]
+    pub(super) fn query_from<L: Lanes>(
+        &mut self,
+        lanes: L,
+        one: &[f32; 6],
+        first: u32,
+        found: &mut Vec<u32>,
+    ) {
         self.stack.clear();
         #[allow(clippy::cast_possible_truncation, reason = "at most LEVELS_MAX levels")]
         self.stack.push(((self.height - 1) as u8, 0));
         while let Some((level, node)) = self.stack.pop() {
             let mut hits = lanes.meets(&self.levels[usize::from(level)][node as usize], one);
+            // Children that hold none but earlier blocks.
+            let early = (first >> (4 * u32::from(level))).saturating_sub(node * LANES);
+            hits &= u16::MAX.checked_shl(early).unwrap_or(0);
             while hits != 0 {
                 let child = node * LANES + hits.trailing_zeros();
                 hits &= hits - 1;

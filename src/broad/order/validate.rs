@@ -14,6 +14,9 @@ impl Order {
         members: &Members,
         proxies: &P,
     ) -> Result<(), String> {
+        if self.afresh.on {
+            return self.check_afresh(members, proxies);
+        }
         let bodies = members.bounded();
         if bodies.len() != self.len {
             return Err(format!(

@@ -1,0 +1,196 @@
+//! Which way of working a tick takes: candidates that last, or everything from scratch (`afresh`).
+//!
+//! In: counted work, never time, so that a replay chooses alike. Out: a choice, with hysteresis. The weights were
+//! measured once; they decide about cost alone.
+
+use super::{MANY_MOVED, Work};
+
+/// Weights, in nanoseconds of the machine that they were measured on: a box taken, a candidate compared, a fat box
+/// renewed, a lane given up or taken ...
+const TAKE: u64 = 10;
+const TEST: u64 = 15;
+const RENEW: u64 = 200;
+const LANE: u64 = 1500;
+/// ... and from scratch a body, a box compared with a block, an overlap.
+const BODY: u64 = 80;
+const MEET: u64 = 7;
+const OVERLAP: u64 = 35;
+/// Boxes compared with a block from scratch, a body, where that is not known yet.
+const MEETS_USUAL: u64 = 5;
+/// Ticks that a mean of the work is taken over ...
+const MEAN_TICKS: u64 = 16;
+/// ... and ticks after a sort of all that do not count: bodies have yet to learn their margins.
+const SETTLE_TICKS: u64 = 16;
+/// Below so many bodies either way takes next to nothing.
+const BODIES_MIN: u64 = 64;
+/// Ticks from scratch before candidates are tried again; twice as many each time that they prove no better.
+const SPELL_MIN: u32 = 128;
+const SPELL_MAX: u32 = 2048;
+/// A trial of candidates that lasted so many ticks was no failure.
+const TRIAL_TICKS: u32 = 64;
+/// So many ticks in a row with few moved, and candidates are better without a trial.
+const CALM_TICKS: u32 = 4;
+
+/// What the choice is made by.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gear {
+    /// The choice, where it is not left to counted work.
+    pub(super) forced: Option<bool>,
+    /// Mean work of a tick with candidates, and how many ticks it is a mean of.
+    mean: u64,
+    ticks: u64,
+    /// Ticks left from scratch, and how many there will be the next time.
+    left: u32,
+    spell: u32,
+    /// Ticks since the last spell began or ended.
+    since: u32,
+    calm: u32,
+    /// Boxes compared with a block from scratch, a body, by the last such tick.
+    meets: u64,
+}
+
+impl Default for Gear {
+    fn default() -> Self {
+        Self {
+            forced: None,
+            mean: 0,
+            ticks: 0,
+            left: 0,
+            spell: SPELL_MIN,
+            since: TRIAL_TICKS,
+            calm: 0,
+            meets: MEETS_USUAL,
+        }
+    }
+}
+
+impl Gear {
+    /// Whether this tick is to be worked from scratch.
+    ///
+    /// * `on` - whether the last one was.
+    /// * `overlaps` - how many pairs of boxes overlapped.
+    pub(super) fn choose(
+        &mut self,
+        on: bool,
+        moved: usize,
+        bodies: usize,
+        overlaps: usize,
+    ) -> bool {
+        if let Some(forced) = self.forced {
+            return forced;
+        }
+        self.since = self.since.saturating_add(1);
+        self.calm = if moved * MANY_MOVED > bodies {
+            0
+        } else {
+            self.calm.saturating_add(1)
+        };
+        let chosen = if on {
+            self.left = self.left.saturating_sub(1);
+            let calm = self.calm >= CALM_TICKS;
+            if calm {
+                self.spell = SPELL_MIN;
+            }
+            !calm && self.left > 0
+        } else {
+            let (bodies, overlaps) = (bodies as u64, overlaps as u64);
+            let scratch = bodies * (BODY + self.meets * MEET) + overlaps * OVERLAP;
+            // A fifth more: a change costs as much as some ticks.
+            self.ticks >= SETTLE_TICKS + MEAN_TICKS
+                && bodies >= BODIES_MIN
+                && self.mean * 5 > scratch * 6
+        };
+        if chosen != on {
+            if chosen {
+                let failed = self.since < TRIAL_TICKS;
+                self.spell = if failed {
+                    (self.spell * 2).min(SPELL_MAX)
+                } else {
+                    SPELL_MIN
+                };
+                self.left = self.spell;
+            }
+            (self.since, self.ticks, self.mean) = (0, 0, 0);
+        }
+        chosen
+    }
+
+    /// Takes the work of a tick from scratch.
+    pub(super) fn note_scratch(&mut self, bodies: usize, work: &Work) {
+        self.meets = work.tests / (bodies as u64).max(1) + 1;
+    }
+
+    /// Takes the work of a tick with candidates.
+    ///
+    /// * `lanes` - how many were given up or taken.
+    pub(super) fn note(&mut self, moved: usize, lanes: u64, work: &Work) {
+        if work.rebuilds > 0 {
+            // A sort of all says nothing of the ticks after it.
+            (self.ticks, self.mean) = (0, 0);
+            return;
+        }
+        let cost = moved as u64 * TAKE + work.tests * TEST + work.renewed * RENEW + lanes * LANE;
+        self.ticks += 1;
+        if self.ticks <= SETTLE_TICKS {
+            return;
+        }
+        let share = (self.ticks - SETTLE_TICKS).min(MEAN_TICKS);
+        self.mean = (self.mean * (share - 1) + cost) / share;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn work(tests: u64, renewed: u64) -> Work {
+        Work {
+            tests,
+            renewed,
+            ..Work::default()
+        }
+    }
+
+    /// Runs ticks in which all of 1,000 bodies move; returns how many were worked from scratch.
+    fn run(gear: &mut Gear, on: &mut bool, ticks: u32, work: &Work) -> u32 {
+        let mut scratch = 0;
+        for _ in 0..ticks {
+            *on = gear.choose(*on, 1000, 1000, 800);
+            if *on {
+                scratch += 1;
+            } else {
+                gear.note(1000, 0, work);
+            }
+        }
+        scratch
+    }
+
+    #[test]
+    fn motion_that_no_box_holds_is_worked_from_scratch_but_for_ever_rarer_trials() {
+        let (mut gear, mut on) = (Gear::default(), false);
+        let wild = work(10_000, 900);
+        assert!(run(&mut gear, &mut on, 40, &wild) >= 1);
+        assert!(run(&mut gear, &mut on, 10_000, &wild) > 9_700);
+        // It has calmed: a trial finds that out and stays.
+        let calm = work(2_000, 60);
+        run(&mut gear, &mut on, SPELL_MAX + 1, &calm);
+        assert_eq!(run(&mut gear, &mut on, 1000, &calm), 0);
+    }
+
+    #[test]
+    fn a_world_that_comes_to_rest_is_left_to_candidates_at_once() {
+        let (mut gear, mut on) = (Gear::default(), false);
+        run(&mut gear, &mut on, 40, &work(10_000, 900));
+        assert!(on);
+        for _ in 0..CALM_TICKS {
+            on = gear.choose(on, 10, 1000, 800);
+        }
+        assert!(!on);
+    }
+
+    #[test]
+    fn motion_that_boxes_hold_is_never_worked_from_scratch() {
+        let (mut gear, mut on) = (Gear::default(), false);
+        assert_eq!(run(&mut gear, &mut on, 5_000, &work(2_500, 80)), 0);
+    }
+}
