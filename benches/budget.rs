@@ -49,6 +49,7 @@ fn main() {
                 true,
                 Budget::time_ns(budget_ns),
                 Demand {
+                    regions: false,
                     bodies: false,
                     body_verdicts: false,
                     ..Demand::ALL

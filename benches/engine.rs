@@ -31,6 +31,7 @@ use sweepd::wire::Demand;
 const ASKED: Demand = Demand {
     pairs: true,
     contacts: true,
+    regions: false,
     bodies: false,
     body_verdicts: false,
 };

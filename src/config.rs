@@ -153,6 +153,8 @@ pub struct Limits {
     pub pair_rows: usize,
     /// Rows of `contacts`.
     pub contact_rows: usize,
+    /// Rows of `regions`, at least 8: a pair's regions go out together.
+    pub region_rows: usize,
     /// Contacts of one pair, at most 16. All surfaces on which the pair touches share it: at most four points each, the
     /// deepest first, then what lies farthest from those kept, in place and in normal.
     pub contacts_per_pair: usize,
@@ -165,6 +167,7 @@ impl Default for Limits {
             pairs: limits::PAIRS_DEFAULT,
             pair_rows: limits::PAIR_ROWS_DEFAULT,
             contact_rows: limits::CONTACT_ROWS_DEFAULT,
+            region_rows: limits::REGION_ROWS_DEFAULT,
             contacts_per_pair: limits::MANIFOLD_POINTS_MAX,
         }
     }

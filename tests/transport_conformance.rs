@@ -158,6 +158,7 @@ fn a_step_returns_the_result_of_exactly_its_frame<B: Backend>() {
         assert_eq!(view.tick().sources[0].seq, u64::try_from(x).unwrap());
         assert_eq!(view.pairs().unwrap().rows[1].gap_best_m, f64::from(x));
         assert_eq!(view.contacts().unwrap().rows.len(), 2);
+        assert_eq!(view.regions().unwrap().rows[1].radius_m, f64::from(x));
     }
 }
 
@@ -326,6 +327,7 @@ fn nothing_is_sent_for_nobody<B: Backend>() {
     step(&mut client, 3, 2.0).unwrap();
     assert_eq!(client.view().pairs().unwrap().rows.len(), 3);
     assert!(client.view().contacts().is_none());
+    assert!(client.view().regions().is_none());
 }
 
 fn a_request_is_answered_and_a_broken_one_refused<B: Backend>() {

@@ -52,6 +52,7 @@ fn a_step_over_shared_memory_returns_the_result_of_its_frame_and_nothing_is_left
         assert_eq!(pairs.rows.len(), 3);
         assert_eq!(pairs.rows[0].gap_best_m, f64::from(x));
         assert_eq!(client.view().contacts().unwrap().rows.len(), 3);
+        assert_eq!(client.view().regions().unwrap().rows.len(), 3);
     }
     assert_eq!(client.view().names().unwrap().rows.len(), 1);
     drop(client);

@@ -16,9 +16,9 @@ use std::process::Command;
 
 use sweepd::wire::{
     AnswerHeader, BodyRow, BodyStatus, ContactKind, ContactRow, EndCause, Event, FrameHeader,
-    Hello, Level, MessageHeader, NameRow, PairRow, Reason, RejectReason, RequestHeader, SourceRow,
-    Stage, State, TickCause, TickRow, TransformRow, TransformVelRow, Verdict, WIRE_VERSION,
-    contact_flags, frame_flags, pair_flags,
+    Hello, Level, MessageHeader, NameRow, PairRow, Reason, RegionRow, RejectReason, RequestHeader,
+    SourceRow, Stage, State, TickCause, TickRow, TransformRow, TransformVelRow, Verdict,
+    WIRE_VERSION, contact_flags, frame_flags, pair_flags, region_flags,
 };
 
 struct Layout {
@@ -55,6 +55,7 @@ fn layouts() -> Vec<Layout> {
         MessageHeader { boot_id tick scene_rev oldest_stamp_ns newest_stamp_ns truncated state reserved schema }
         PairRow { body_a body_b gap_min_m gap_max_m gap_best_m closing_mps toi_min toi_max begin_first_tick begin_last_tick end_first_tick end_last_tick certified_tick bound_age_ticks verdict certified_verdict events end_cause level flags reserved }
         ContactRow { id body_a body_b point_a point_b point_a_body point_b_body normal gap_m gap_min_m gap_max_m shape_a shape_b triangle_a triangle_b flags kind reserved }
+        RegionRow { body_a body_b centre radius_m cone_axis cone_half_angle_rad point normal depth_m flags index count level reserved }
         BodyRow { body position orientation stamp_ns received_ns age_ns generation source status verdict reject reserved }
         NameRow { body source generation len reserved name }
         SourceRow { name session epoch seq stamp_ns age_ns frames skipped refused clock_id alive paused reserved }
@@ -100,6 +101,14 @@ fn codes() -> Vec<(&'static str, Vec<(&'static str, u32)>)> {
         ],
     ));
     all.push(("ContactFlags", vec![("ESTIMATE", contact_flags::ESTIMATE)]));
+    all.push((
+        "RegionFlags",
+        vec![
+            ("COMPLETE", region_flags::COMPLETE),
+            ("ESTIMATE", region_flags::ESTIMATE),
+            ("CLIPPED", region_flags::CLIPPED),
+        ],
+    ));
     all
 }
 

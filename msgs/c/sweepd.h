@@ -258,6 +258,17 @@ enum {
     SWEEPD_CONTACT_FLAGS_ESTIMATE = 1,
 };
 
+/* Bits of RegionRow::flags. */
+enum {
+    /* The pair's contacts are exact at this tick's poses, and all of them lie in its regions. */
+    SWEEPD_REGION_FLAGS_COMPLETE = 1,
+    /* Not all of the pair was looked at: the regions hold what there may be, and get smaller
+     * with work. */
+    SWEEPD_REGION_FLAGS_ESTIMATE = 2,
+    /* There was more than is looked at for one pair: one of the regions stands for the rest. */
+    SWEEPD_REGION_FLAGS_CLIPPED = 4,
+};
+
 /* Type name "sweepd.v1.Transform", 72 bytes. One body's pose. */
 typedef struct sweepd_transform_row {
     /* Body id. */
@@ -503,6 +514,54 @@ SWEEPD_ASSERT(offsetof(sweepd_contact_row, flags) == 184);
 SWEEPD_ASSERT(offsetof(sweepd_contact_row, kind) == 188);
 SWEEPD_ASSERT(offsetof(sweepd_contact_row, reserved) == 189);
 SWEEPD_ASSERT(sizeof(sweepd_contact_row) == 192);
+
+/* Type name "sweepd.v1.Region", 144 bytes. One place where a pair may touch. The union of a
+ * pair's regions holds every point that the two share. */
+typedef struct sweepd_region_row {
+    /* Smaller body id. */
+    uint64_t body_a;
+    /* Larger body id. */
+    uint64_t body_b;
+    /* Centre of the sphere, scene frame, metres. */
+    double centre[3];
+    /* Its radius, metres; infinity: the place of a body is not known. */
+    double radius_m;
+    /* Axis of the cone of normals, from A to B, unit, scene frame. */
+    double cone_axis[3];
+    /* Half angle of that cone, radians; pi: any direction. */
+    double cone_half_angle_rad;
+    /* Best guess of a point of contact, scene frame, metres. */
+    double point[3];
+    /* Best guess of the normal there, from A to B, unit, scene frame. */
+    double normal[3];
+    /* Best guess of the depth there, metres, not below 0. */
+    double depth_m;
+    /* region_flags. */
+    uint32_t flags;
+    /* Place among the pair's regions, from 0. */
+    uint8_t index;
+    /* How many regions the pair has. */
+    uint8_t count;
+    /* Level reached; boxes: no more than the bodies' boxes is behind it. */
+    uint8_t level;
+    /* Zero. */
+    uint8_t reserved;
+} sweepd_region_row;
+SWEEPD_ASSERT(offsetof(sweepd_region_row, body_a) == 0);
+SWEEPD_ASSERT(offsetof(sweepd_region_row, body_b) == 8);
+SWEEPD_ASSERT(offsetof(sweepd_region_row, centre) == 16);
+SWEEPD_ASSERT(offsetof(sweepd_region_row, radius_m) == 40);
+SWEEPD_ASSERT(offsetof(sweepd_region_row, cone_axis) == 48);
+SWEEPD_ASSERT(offsetof(sweepd_region_row, cone_half_angle_rad) == 72);
+SWEEPD_ASSERT(offsetof(sweepd_region_row, point) == 80);
+SWEEPD_ASSERT(offsetof(sweepd_region_row, normal) == 104);
+SWEEPD_ASSERT(offsetof(sweepd_region_row, depth_m) == 128);
+SWEEPD_ASSERT(offsetof(sweepd_region_row, flags) == 136);
+SWEEPD_ASSERT(offsetof(sweepd_region_row, index) == 140);
+SWEEPD_ASSERT(offsetof(sweepd_region_row, count) == 141);
+SWEEPD_ASSERT(offsetof(sweepd_region_row, level) == 142);
+SWEEPD_ASSERT(offsetof(sweepd_region_row, reserved) == 143);
+SWEEPD_ASSERT(sizeof(sweepd_region_row) == 144);
 
 /* Type name "sweepd.v1.Body", 104 bytes. One body. */
 typedef struct sweepd_body_row {

@@ -12,7 +12,7 @@ use super::arena::{Arena, Run};
 use super::contacts::Contact;
 use super::exact::Warm;
 use super::memo::Witness;
-use super::mesh::{FrontStore, Goal, MeshQuery};
+use super::mesh::{CarriedFront, FrontStore, Goal, MeshQuery};
 use super::query::{
     add_manifold, is_simple, leaf_contact, shape_gap, shape_pose, sound, sphere_bound, witness_of,
 };
@@ -108,6 +108,12 @@ impl Cursor {
     /// The contacts found so far.
     pub(super) fn found<'a>(&self, contacts: &'a Arena<Contact>) -> &'a [Contact] {
         contacts.all(&self.found)
+    }
+
+    /// The front under way, if it is that of the `place`th pair of shapes.
+    pub(super) fn front_of(&self, place: usize) -> Option<&CarriedFront> {
+        let here = self.under_way && self.next == place;
+        here.then(|| self.meshes.front())?
     }
 
     /// An upper bound on the gap at the start's pose, from whatever is done by now.

@@ -75,6 +75,8 @@ pub(super) struct Memo {
     pub(super) cursor: u32,
     pub(super) front: u32,
     pub(super) contacts: u32,
+    /// Regions of the pair when it was last complete.
+    pub(super) regions: u32,
 }
 
 /// Where a pair is nearest or deepest: the shapes, triangles and points.
@@ -123,6 +125,7 @@ impl Memo {
             cursor: NONE,
             front: NONE,
             contacts: NONE,
+            regions: NONE,
         }
     }
 
@@ -276,6 +279,7 @@ impl Narrow {
         memo.queued = false;
         memo.refreshing = false;
         self.contact_sets.give(&mut memo.contacts);
+        self.kept.give(&mut memo.regions);
         self.give_back(slot);
     }
 
@@ -299,6 +303,7 @@ impl Narrow {
         self.counts[usize::from(verdict.code())] += 1;
         if verdict == Verdict::Apart {
             self.contact_sets.give(&mut memo.contacts);
+            self.kept.give(&mut memo.regions);
             memo.contacts_tick = 0;
             self.deactivate(slot);
             self.left.push(slot);

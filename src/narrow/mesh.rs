@@ -38,6 +38,8 @@ mod patches;
 mod placed;
 mod query;
 mod retest;
+mod scan;
+mod shared;
 mod side;
 mod triangle;
 mod walk;
@@ -47,6 +49,7 @@ pub use contacts::{LEAF_CONTACTS_MAX, LeafContact};
 pub use patches::{PATCH_POINTS, PATCHES_MAX, numbered};
 pub use query::{Goal, MeshQuery};
 pub use retest::retest_witness;
+pub(in crate::narrow) use scan::{PlaneScan, Scan, behind};
 pub use walk::Walk;
 
 /// The nearest or deepest pair of leaves met so far.

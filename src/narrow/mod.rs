@@ -17,6 +17,7 @@
 pub mod exact;
 pub mod mesh;
 
+mod approx;
 mod arena;
 mod ask;
 mod carry;
@@ -25,11 +26,13 @@ mod cursor;
 mod finding;
 mod memo;
 mod order;
+mod pool;
 mod query;
 mod spend;
 mod sweep;
 mod widen;
 
+pub use approx::{Region, Regions};
 pub use ask::{Asked, gap_between};
 pub use contacts::{Contact, ContactSet};
 pub use finding::Finding;
@@ -43,11 +46,13 @@ use crate::time::Meter;
 use crate::wire::{BodyStatus, Verdict};
 use crate::world::World;
 
+use approx::{Approx, Kept};
 use arena::Arena;
 use cursor::Cursor;
 use memo::{Hot, Memo};
 use mesh::{CarriedFront, FrontStore, Search};
 use order::Urgency;
+use pool::{NONE, Pool};
 use sweep::Sweeps;
 
 /// What the narrow phase did in this tick.
@@ -104,6 +109,9 @@ pub struct Narrow {
     found: Vec<Contact>,
     /// The contacts that a set had before, while ids are handed on.
     before: Vec<Contact>,
+    approx: Approx,
+    /// Regions of pairs that were complete.
+    kept: Pool<Kept>,
     counts: [u64; Verdict::ALL.len()],
     counters: Counters,
     contacts_per_pair: usize,
@@ -349,51 +357,5 @@ impl Unseen {
             self.first = first;
         }
         self.last = self.last.max(last);
-    }
-}
-
-/// Reusable objects by index: what was given back is handed out again with its memory.
-#[derive(Debug, Default)]
-struct Pool<T> {
-    items: Vec<T>,
-    free: Vec<u32>,
-}
-
-/// No object of a pool.
-const NONE: u32 = u32::MAX;
-
-impl<T> Pool<T> {
-    /// An object, used before or made now.
-    ///
-    /// When there is none left, half as many more are made at once: how many are out at the same time creeps up for
-    /// long where work is cut off, and each new peak would allocate.
-    fn take(&mut self, make: impl Fn() -> T) -> u32 {
-        if self.free.is_empty() {
-            let more = self.items.len() / 2 + 1;
-            for _ in 0..more {
-                let at = u32::try_from(self.items.len()).unwrap_or(NONE);
-                self.items.push(make());
-                self.free.push(at);
-            }
-            // Room to give every object back without growing later.
-            self.free.reserve(self.items.len() - self.free.len());
-        }
-        self.free.pop().unwrap_or(NONE)
-    }
-
-    /// Gives an object back.
-    fn give(&mut self, at: &mut u32) {
-        if *at != NONE {
-            self.free.push(*at);
-            *at = NONE;
-        }
-    }
-
-    fn get(&self, at: u32) -> Option<&T> {
-        self.items.get(at as usize)
-    }
-
-    fn get_mut(&mut self, at: u32) -> Option<&mut T> {
-        self.items.get_mut(at as usize)
     }
 }

@@ -9,6 +9,7 @@ mod events;
 mod kept;
 mod listing;
 mod pairs;
+mod regions;
 mod review;
 mod state;
 
@@ -65,6 +66,8 @@ pub struct Publisher {
     /// by row whether they are sent.
     contact_pairs: Vec<(f64, usize)>,
     chosen: Vec<bool>,
+    /// Places among the rows of the pairs whose regions are sent.
+    region_pairs: Vec<usize>,
     verdicts: Vec<u8>,
     next_contact: u64,
 }
@@ -83,6 +86,7 @@ impl Publisher {
             kept_contacts: Kept::default(),
             contact_pairs: Vec::new(),
             chosen: Vec::new(),
+            region_pairs: Vec::new(),
             verdicts: Vec::new(),
             next_contact: 1,
         }
@@ -108,10 +112,11 @@ impl Publisher {
         self.review(view);
         // Before the pairs, which leave out of the list what does not fit.
         let contacts_left = self.fill_contacts(view, header, out);
+        let regions_left = self.fill_regions(view, header, out);
         let pairs_left = self.fill_pairs(view, header, out);
         let bodies_left = self.fill_bodies(view, header, out);
         Self::fill_names(view, out);
-        let left = pairs_left + contacts_left + bodies_left;
+        let left = pairs_left + contacts_left + regions_left + bodies_left;
         self.fill_tick(view, header, left, out);
     }
 

@@ -42,6 +42,7 @@ const LIMIT_KEYS: &[&str] = &[
     "pairs",
     "pair_rows",
     "contact_rows",
+    "region_rows",
     "contacts_per_pair",
 ];
 
@@ -240,6 +241,7 @@ fn read_limits(node: Option<Node>) -> std::result::Result<Limits, Fault> {
         ("pairs", &mut all.pairs, u32::MAX as usize - 1),
         ("pair_rows", &mut all.pair_rows, 1 << 24),
         ("contact_rows", &mut all.contact_rows, 1 << 24),
+        ("region_rows", &mut all.region_rows, 1 << 24),
         (
             "contacts_per_pair",
             &mut all.contacts_per_pair,

@@ -5,6 +5,7 @@
 
 mod adjacency;
 mod inside;
+mod normals;
 mod obb;
 mod outline;
 mod predicates;
@@ -14,6 +15,7 @@ mod tree;
 mod turn;
 
 pub(crate) use inside::Inside;
+pub(crate) use normals::Cone;
 use obb::ObbTree;
 pub(crate) use obb::{BoxId, Held, Obb, ObbPack};
 pub(crate) use predicates::side;
@@ -21,6 +23,7 @@ use tree::Tree;
 pub(crate) use tree::{Below, NODES_WAITING_MAX, Node};
 
 use adjacency::Adjacency;
+use normals::Normals;
 use outline::Outline;
 use topology::Topology;
 
@@ -45,6 +48,8 @@ pub struct Mesh {
     obb: ObbTree,
     /// Apart, so that a shape that is no mesh is not large for it.
     adjacency: Box<Adjacency>,
+    /// Which way the faces under each oriented box look; apart as well.
+    normals: Box<Normals>,
     /// None for a small mesh, whose vertices are walked.
     outline: Option<Outline>,
     bounds: Aabb,
@@ -89,6 +94,7 @@ impl Mesh {
             radius: radius(&vertices, &faces, &centre),
             obb: ObbTree::new(&vertices, &faces),
             adjacency: Box::default(),
+            normals: Box::default(),
             shells: topology.shells.iter().map(|s| s.vertex).collect(),
             vertices,
             faces,
@@ -103,6 +109,7 @@ impl Mesh {
         }
         // Turned faces have their sides in another order.
         mesh.adjacency = Box::new(Adjacency::new(&topology, &mesh));
+        mesh.normals = Box::new(Normals::new(&mesh));
         mesh.warnings.extend(mesh.adjacency.warning());
         Ok(mesh)
     }

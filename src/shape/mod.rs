@@ -19,7 +19,9 @@ pub use error::ShapeError;
 pub use library::Library;
 pub(crate) use load::find_mesh;
 pub use mesh::Mesh;
-pub(crate) use mesh::{Below, BoxId, Held, Inside, NODES_WAITING_MAX, Node, Obb, ObbPack, side};
+pub(crate) use mesh::{
+    Below, BoxId, Cone, Held, Inside, NODES_WAITING_MAX, Node, Obb, ObbPack, side,
+};
 pub use spec::ShapeSpec;
 
 use crate::math::{Aabb, Point, Pose, Vec3};

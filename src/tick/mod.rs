@@ -266,8 +266,8 @@ impl Engine {
         };
         let demand = input.demand;
         let wanted = Wanted {
-            contacts: demand.contacts,
-            bounds: demand.pairs || demand.contacts,
+            contacts: demand.contacts || demand.regions,
+            bounds: demand.pairs || demand.contacts || demand.regions,
             order,
         };
         let woke_ns = laps.woke_ns();

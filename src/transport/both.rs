@@ -42,6 +42,7 @@ impl Door for Both<'_> {
         Demand {
             pairs: first.pairs || beside.pairs,
             contacts: first.contacts || beside.contacts,
+            regions: first.regions || beside.regions,
             bodies: first.bodies || beside.bodies,
             body_verdicts: first.body_verdicts || beside.body_verdicts,
         }

@@ -283,6 +283,16 @@ pub mod contact_flags {
     pub const ESTIMATE: u32 = 1;
 }
 
+/// Bits of `RegionRow::flags`.
+pub mod region_flags {
+    /// The pair's contacts are exact at this tick's poses, and all of them lie in its regions.
+    pub const COMPLETE: u32 = 1;
+    /// Not all of the pair was looked at: the regions hold what there may be, and get smaller with work.
+    pub const ESTIMATE: u32 = 2;
+    /// There was more than is looked at for one pair: one of the regions stands for the rest.
+    pub const CLIPPED: u32 = 4;
+}
+
 impl Event {
     /// The bit of this event in `PairRow::events`.
     #[must_use]

@@ -5,6 +5,7 @@
 mod codes;
 mod frame;
 mod outbox;
+mod region;
 mod request;
 #[cfg(feature = "ros2")]
 pub mod ros;
@@ -12,10 +13,11 @@ mod rows;
 
 pub use codes::{
     BodyStatus, ContactKind, EndCause, Event, Level, Reason, RejectReason, Stage, State, TickCause,
-    Verdict, contact_flags, frame_flags, pair_flags,
+    Verdict, contact_flags, frame_flags, pair_flags, region_flags,
 };
 pub use frame::{Frame, Inbox, name_bytes, name_str};
 pub use outbox::{Demand, Outbox};
+pub use region::RegionRow;
 pub use request::{Answer, AnswerHeader, GapFound, RequestHeader};
 pub use rows::{
     BODY_NAME_LEN, BodyRow, ContactRow, FrameHeader, Hello, MessageHeader, NameRow, PairRow,

@@ -1,5 +1,6 @@
 //! The outbox of a tick, and the demand that says which parts of it anybody reads.
 
+use super::region::RegionRow;
 use super::rows::{BodyRow, ContactRow, MessageHeader, NameRow, PairRow, TickRow};
 
 /// What is listened to; what nobody listens to is not computed.
@@ -13,6 +14,8 @@ pub struct Demand {
     pub pairs: bool,
     /// Somebody reads `contacts`: manifolds are computed.
     pub contacts: bool,
+    /// Somebody reads `regions`: work goes on for the contacts of pairs that touch, as if these were read.
+    pub regions: bool,
     /// Somebody reads `bodies`.
     pub bodies: bool,
     /// Somebody reads `body_verdicts`.
@@ -24,6 +27,7 @@ impl Demand {
     pub const ALL: Self = Self {
         pairs: true,
         contacts: true,
+        regions: true,
         bodies: true,
         body_verdicts: true,
     };
@@ -42,6 +46,10 @@ pub struct Outbox {
     pub contacts_header: MessageHeader,
     /// Contacts, by `(body_a, body_b)`, then by shapes, triangles and id.
     pub contacts: Vec<ContactRow>,
+    /// Header of `regions`.
+    pub regions_header: MessageHeader,
+    /// Regions, by `(body_a, body_b)`, then by index.
+    pub regions: Vec<RegionRow>,
     /// Header of `bodies`.
     pub bodies_header: MessageHeader,
     /// Bodies, by id.

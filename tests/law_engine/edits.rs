@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use sweepd::math::Pose;
 use sweepd::scene::{PairAction, Scene};
-use sweepd::wire::{BodyStatus, EndCause, Event, State, Verdict};
+use sweepd::wire::{BodyStatus, EndCause, Event, State, Verdict, region_flags};
 use sweepd::world::Edit;
 
 use crate::rig::{ALL, FRAME_NS, Rig, ball, has, rule, scene};
@@ -151,12 +151,20 @@ fn law_4_7_contacts_are_computed_only_for_listeners_and_owed_to_those_who_come_l
         crate::rig::body(2, [0.9, 0.0, 0.0], shape, ""),
     ];
     let mut rig = Rig::new(&scene("", &bodies));
-    rig.demand.contacts = false;
+    (rig.demand.contacts, rig.demand.regions) = (false, false);
     rig.send(ALL);
     assert_eq!(rig.engine.counters().manifolds, 0);
     rig.send(ALL);
     assert_eq!(rig.engine.counters().manifolds, 0);
-    assert_eq!(rig.out.contacts.len(), 0);
+    assert_eq!((rig.out.contacts.len(), rig.out.regions.len()), (0, 0));
+    // Regions are made of them, whoever reads these.
+    rig.demand.regions = true;
+    rig.idle(FRAME_NS, ALL);
+    assert_eq!(
+        (rig.out.contacts.len(), rig.out.regions.is_empty()),
+        (0, false)
+    );
+    assert_eq!(rig.out.regions[0].flags, region_flags::COMPLETE);
     rig.demand.contacts = true;
     rig.idle(FRAME_NS, ALL);
     assert_eq!(rig.verdict(1, 2), Verdict::Colliding);

@@ -127,6 +127,17 @@ fn law_3_9_contact_rows_that_do_not_fit_are_the_shallowest() {
 }
 
 #[test]
+fn law_3_9_regions_that_do_not_fit_are_those_of_whole_pairs_the_shallowest() {
+    let mut rig = couples("[limits]\nregion_rows = 8", 4, |k| -0.1 * k as f64, "");
+    rig.send(ALL);
+    let kept: Vec<u64> = rig.out.regions.iter().map(|row| row.body_a / 2).collect();
+    assert_eq!(kept, [4], "one contact, one region");
+    assert_eq!(rig.out.regions_header.truncated, 3);
+    assert_eq!(rig.out.pairs.len(), 4);
+    assert!(rig.because(Reason::Truncated));
+}
+
+#[test]
 fn law_3_9_beyond_the_pair_set_the_state_is_unknown_and_so_is_each_body_concerned() {
     let mut rig = couples("[limits]\npairs = 2", 4, |_| 0.1, "report_within_m = 0.05");
     for k in 1..=4 {

@@ -7,6 +7,7 @@
 
 pub mod meshes;
 pub mod rng;
+pub mod shared;
 
 use robust::Coord3D;
 use sweepd::math::{Point, Pose, Vec3};

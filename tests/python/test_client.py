@@ -81,6 +81,21 @@ def test_each_step_returns_the_result_of_exactly_its_frame(daemon):
                 np.testing.assert_allclose(contact["gap_m"], x - 1.0, atol=1e-9)
 
 
+def test_regions_hold_the_contacts_and_say_that_they_are_all(daemon):
+    with sweepd.Client(daemon[0], "sim", quat_order="wxyz", listen=("pairs", "contacts", "regions")) as client:
+        result = client.step(poses(0.9), timeout_s=5)
+        regions, contacts = result.regions, result.contacts
+        assert 1 <= len(regions) <= 8 and (regions["count"] == len(regions)).all()
+        assert (regions["flags"] == sweepd.layout.RegionFlags.COMPLETE).all()
+        for contact in contacts:
+            for point in (contact["point_a"], contact["point_b"]):
+                away = np.linalg.norm(regions["centre"] - point, axis=1)
+                assert (away <= regions["radius_m"] + 1e-12).any()
+        np.testing.assert_allclose(regions[0]["normal"], [1, 0, 0], atol=1e-9)
+        np.testing.assert_allclose(regions["depth_m"].max(), 0.1, atol=1e-9)
+        assert len(client.step(poses(1.2), timeout_s=5).regions) == 0
+
+
 def test_a_quaternion_is_read_in_the_order_that_was_said(daemon):
     half = math.sqrt(0.5)
     with sweepd.Client(daemon[0], "sim", quat_order="wxyz") as client:

@@ -22,8 +22,8 @@ use sweepd::time::{Clock, SystemClock};
 use sweepd::transport::iceoryx::{Place, Server, ServerOptions};
 use sweepd::transport::{Door, RequestToken};
 use sweepd::wire::{
-    ContactRow, Frame, FrameHeader, Inbox, MessageHeader, NameRow, Outbox, PairRow, RejectReason,
-    TickCause, TickRow, TransformRow, Verdict, WIRE_VERSION,
+    ContactRow, Frame, FrameHeader, Inbox, MessageHeader, NameRow, Outbox, PairRow, RegionRow,
+    RejectReason, TickCause, TickRow, TransformRow, Verdict, WIRE_VERSION,
 };
 
 pub const SECOND_NS: u64 = 1_000_000_000;
@@ -283,7 +283,9 @@ fn tick(door: &mut dyn Door, outbox: &mut Outbox, demand: sweepd::wire::Demand, 
     (outbox.pairs_header, outbox.contacts_header) = (header, header);
     outbox.bodies_header = header;
     outbox.pairs.clear();
+    outbox.regions_header = header;
     outbox.contacts.clear();
+    outbox.regions.clear();
     // one colliding pair for each body: enough to tell frames apart
     for row in &frame.transforms {
         if demand.pairs {
@@ -300,6 +302,13 @@ fn tick(door: &mut dyn Door, outbox: &mut Outbox, demand: sweepd::wire::Demand, 
             outbox.contacts.push(ContactRow {
                 body_a: row.body,
                 ..ContactRow::default()
+            });
+        }
+        if demand.regions {
+            outbox.regions.push(RegionRow {
+                body_a: row.body,
+                radius_m: row.position[0],
+                ..RegionRow::default()
             });
         }
     }

@@ -16,6 +16,7 @@ _BOOTS_OVER_MAX = 16
 _TOPICS = {
     "pairs": layout.PairRow,
     "contacts": layout.ContactRow,
+    "regions": layout.RegionRow,
     "bodies": layout.BodyRow,
     "body_verdicts": ctypes.c_uint8,
     "names": layout.NameRow,
@@ -31,8 +32,8 @@ def _text(chars):
 class Result:
     """A tick and what belongs to it.
 
-    ``tick`` is a structure (see ``msgs/README.md``); ``pairs``, ``contacts`` and ``bodies`` are numpy structured
-    arrays over shared memory, None where the client did not listen or a newer one overtook it. Keep at most three
+    ``tick`` is a structure (see ``msgs/README.md``); ``pairs``, ``contacts``, ``regions`` and ``bodies`` are numpy
+    structured arrays over shared memory, None where the client did not listen or a newer one overtook it. Keep at most three
     results, or copy what you keep.
     """
 
@@ -40,6 +41,7 @@ class Result:
         self.tick = tick
         self.pairs = messages.get("pairs")
         self.contacts = messages.get("contacts")
+        self.regions = messages.get("regions")
         self.bodies = messages.get("bodies")
         self.body_verdicts = messages.get("body_verdicts")
 

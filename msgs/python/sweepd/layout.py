@@ -216,6 +216,42 @@ class ContactRow(_Row):
     ]
 
 
+class RegionRow(_Row):
+    """One place where a pair may touch. The union of a pair's regions holds every point that the two share."""
+
+    TYPE_NAME = "sweepd.v1.Region"
+    _fields_ = [
+        # Smaller body id.
+        ("body_a", ctypes.c_uint64),
+        # Larger body id.
+        ("body_b", ctypes.c_uint64),
+        # Centre of the sphere, scene frame, metres.
+        ("centre", ctypes.c_double * 3),
+        # Its radius, metres; infinity: the place of a body is not known.
+        ("radius_m", ctypes.c_double),
+        # Axis of the cone of normals, from A to B, unit, scene frame.
+        ("cone_axis", ctypes.c_double * 3),
+        # Half angle of that cone, radians; pi: any direction.
+        ("cone_half_angle_rad", ctypes.c_double),
+        # Best guess of a point of contact, scene frame, metres.
+        ("point", ctypes.c_double * 3),
+        # Best guess of the normal there, from A to B, unit, scene frame.
+        ("normal", ctypes.c_double * 3),
+        # Best guess of the depth there, metres, not below 0.
+        ("depth_m", ctypes.c_double),
+        # region_flags.
+        ("flags", ctypes.c_uint32),
+        # Place among the pair's regions, from 0.
+        ("index", ctypes.c_uint8),
+        # How many regions the pair has.
+        ("count", ctypes.c_uint8),
+        # Level reached; boxes: no more than the bodies' boxes is behind it.
+        ("level", ctypes.c_uint8),
+        # Zero.
+        ("reserved", ctypes.c_uint8),
+    ]
+
+
 class BodyRow(_Row):
     """One body."""
 
@@ -662,6 +698,17 @@ class ContactFlags(IntFlag):
     ESTIMATE = 1
 
 
+class RegionFlags(IntFlag):
+    """Bits of RegionRow::flags."""
+
+    # The pair's contacts are exact at this tick's poses, and all of them lie in its regions.
+    COMPLETE = 1
+    # Not all of the pair was looked at: the regions hold what there may be, and get smaller with work.
+    ESTIMATE = 2
+    # There was more than is looked at for one pair: one of the regions stands for the rest.
+    CLIPPED = 4
+
+
 #: Every structure that crosses a process boundary, by name.
 LAYOUTS = {
     row.__name__: row
@@ -672,6 +719,7 @@ LAYOUTS = {
         MessageHeader,
         PairRow,
         ContactRow,
+        RegionRow,
         BodyRow,
         NameRow,
         SourceRow,

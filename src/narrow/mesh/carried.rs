@@ -46,8 +46,10 @@ mod known;
 mod leaves;
 mod search;
 mod store;
+mod unproved;
 
 pub use cover::Search;
+pub(super) use cover::lanes;
 use cover::{Group, Open, OpenList};
 use drift::Drift;
 use known::Known;

@@ -53,7 +53,7 @@ impl<'a> Side<'a> {
     }
 
     /// Upper bounds on how far it reaches from the origin of its tree along a direction of its frame, and against it.
-    fn extent(self, direction: &Vec3, origin: &Point) -> [f64; 2] {
+    pub(super) fn extent(self, direction: &Vec3, origin: &Point) -> [f64; 2] {
         match self {
             Self::Mesh(mesh) => mesh.extent(direction),
             Self::Convex(convex) => {

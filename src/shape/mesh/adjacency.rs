@@ -196,6 +196,13 @@ impl Mesh {
         (on(opposite) <= top + SAME * self.radius).then_some(top)
     }
 
+    /// Visits the faces about the corners of a face, some more than once.
+    pub(super) fn about(&self, face: u32, mut visit: impl FnMut(u32)) {
+        for side in 3 * face..3 * face + 3 {
+            self.ring(side, |other| visit(other / 3));
+        }
+    }
+
     /// Visits the corners of all faces about the start of a side, as sides that start there.
     fn ring(&self, side: u32, mut visit: impl FnMut(u32)) {
         let (face, k) = (side / 3, side % 3);

@@ -3,7 +3,7 @@
 use super::link::Link;
 use super::{BOOTS_OVER_MAX, Heard, Restarted, ends_of};
 use crate::error::Result;
-use crate::wire::{BodyRow, ContactRow, MessageHeader, NameRow, PairRow, TickRow};
+use crate::wire::{BodyRow, ContactRow, MessageHeader, NameRow, PairRow, RegionRow, TickRow};
 
 /// A message as it was received.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,6 +26,7 @@ pub struct View {
     tick: TickRow,
     pairs: Stream<PairRow>,
     contacts: Stream<ContactRow>,
+    regions: Stream<RegionRow>,
     bodies: Stream<BodyRow>,
     body_verdicts: Stream<u8>,
     names: Stream<NameRow>,
@@ -49,6 +50,12 @@ impl View {
     #[must_use]
     pub fn contacts(&self) -> Option<&Message<ContactRow>> {
         self.contacts.of(&self.tick.header)
+    }
+
+    /// The regions of this very tick; `None` as for [`View::pairs`].
+    #[must_use]
+    pub fn regions(&self) -> Option<&Message<RegionRow>> {
+        self.regions.of(&self.tick.header)
     }
 
     /// The bodies of this very tick; `None` as for [`View::pairs`].
@@ -186,6 +193,7 @@ impl Follow {
     fn gather(&mut self, link: &mut dyn Link, tick: &MessageHeader) -> Result<()> {
         let (view, over) = (&mut self.view, &self.boots_over);
         view.contacts.advance(tick, over, |m| link.contacts(m))?;
+        view.regions.advance(tick, over, |m| link.regions(m))?;
         view.pairs.advance(tick, over, |m| link.pairs(m))?;
         view.bodies.advance(tick, over, |m| link.bodies(m))?;
         view.body_verdicts

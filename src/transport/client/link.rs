@@ -5,8 +5,8 @@ use std::fmt::Debug;
 use super::follow::Message;
 use crate::error::Result;
 use crate::wire::{
-    AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, NameRow, PairRow, RequestHeader,
-    TickRow, TransformRow, TransformVelRow,
+    AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, NameRow, PairRow, RegionRow,
+    RequestHeader, TickRow, TransformRow, TransformVelRow,
 };
 
 /// What to listen to beside ticks.
@@ -20,6 +20,8 @@ pub struct Topics {
     pub pairs: bool,
     /// `contacts`.
     pub contacts: bool,
+    /// `regions`.
+    pub regions: bool,
     /// `bodies`.
     pub bodies: bool,
     /// `body_verdicts`.
@@ -35,6 +37,7 @@ impl Topics {
     pub const ALL: Self = Self {
         pairs: true,
         contacts: true,
+        regions: true,
         bodies: true,
         body_verdicts: true,
         names: true,
@@ -85,6 +88,11 @@ pub trait Link: Debug {
     /// # Errors
     /// `Error::Io`.
     fn contacts(&mut self, into: &mut Message<ContactRow>) -> Result<bool>;
+    /// The next `regions`.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn regions(&mut self, into: &mut Message<RegionRow>) -> Result<bool>;
     /// The next `bodies`.
     ///
     /// # Errors

@@ -19,7 +19,7 @@ use crate::time::Clock;
 use crate::transport::client::{Link, Message, Rows, Topics};
 use crate::wire::{
     AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, MessageHeader, NameRow, PairRow,
-    RequestHeader, TickRow, TransformRow, TransformVelRow,
+    RegionRow, RequestHeader, TickRow, TransformRow, TransformVelRow,
 };
 
 /// Between two looks for a daemon.
@@ -46,6 +46,7 @@ pub struct IoxLink {
     hello: Subscriber<Ipc, Hello, ()>,
     pairs: Reader<PairRow>,
     contacts: Reader<ContactRow>,
+    regions: Reader<RegionRow>,
     bodies: Reader<BodyRow>,
     body_verdicts: Reader<u8>,
     names: Reader<NameRow>,
@@ -120,6 +121,7 @@ impl IoxLink {
             hello,
             pairs: None,
             contacts: None,
+            regions: None,
             bodies: None,
             body_verdicts: None,
             names: None,
@@ -221,6 +223,9 @@ impl Link for IoxLink {
         if topics.contacts && self.contacts.is_none() {
             self.contacts = Some(self.reader("contacts")?);
         }
+        if topics.regions && self.regions.is_none() {
+            self.regions = Some(self.reader("regions")?);
+        }
         if topics.bodies && self.bodies.is_none() {
             self.bodies = Some(self.reader("bodies")?);
         }
@@ -282,6 +287,10 @@ impl Link for IoxLink {
 
     fn contacts(&mut self, into: &mut Message<ContactRow>) -> Result<bool> {
         read(&self.contacts, limits::PAIRS_DEFAULT, into)
+    }
+
+    fn regions(&mut self, into: &mut Message<RegionRow>) -> Result<bool> {
+        read(&self.regions, limits::PAIRS_DEFAULT, into)
     }
 
     fn bodies(&mut self, into: &mut Message<BodyRow>) -> Result<bool> {

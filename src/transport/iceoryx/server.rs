@@ -31,7 +31,7 @@ use crate::transport::patience::Patience;
 use crate::transport::{Door, ICEORYX2_VERSION, RequestToken, Wake};
 use crate::wire::{
     AnswerHeader, BodyRow, ContactRow, Demand, Hello, Inbox, MessageHeader, NameRow, Outbox,
-    PairRow, RequestHeader, TickRow, TransformRow, TransformVelRow, WIRE_VERSION,
+    PairRow, RegionRow, RequestHeader, TickRow, TransformRow, TransformVelRow, WIRE_VERSION,
 };
 
 /// How a server opens.
@@ -99,6 +99,7 @@ pub struct Server {
     wake: Listener<Ipc>,
     ready: Notifier<Ipc>,
     contacts: Out<ContactRow>,
+    regions: Out<RegionRow>,
     pairs: Out<PairRow>,
     bodies: Out<BodyRow>,
     body_verdicts: Out<u8>,
@@ -184,6 +185,7 @@ impl Server {
                 .create()
                 .map_err(|e| failed("ready", e))?,
             contacts: Out::open(&node, place, "contacts").map_err(held)?,
+            regions: Out::open(&node, place, "regions").map_err(held)?,
             pairs: Out::open(&node, place, "pairs").map_err(held)?,
             bodies: Out::open(&node, place, "bodies").map_err(held)?,
             body_verdicts: Out::open(&node, place, "body_verdicts").map_err(held)?,
@@ -242,6 +244,7 @@ impl Door for Server {
         self.demand = Demand {
             pairs: self.pairs.read(),
             contacts: self.contacts.read(),
+            regions: self.regions.read(),
             bodies: self.bodies.read(),
             body_verdicts: self.body_verdicts.read(),
         };

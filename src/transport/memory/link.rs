@@ -8,7 +8,8 @@ use super::{Peer, Rows as Queued, SOURCE_BUFFER, Shared};
 use crate::error::Result;
 use crate::transport::client::{Link, Message, Rows, Topics};
 use crate::wire::{
-    AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, NameRow, PairRow, RequestHeader, TickRow,
+    AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, NameRow, PairRow, RegionRow,
+    RequestHeader, TickRow,
 };
 
 /// A client's ports in memory; a clean leave when dropped.
@@ -73,7 +74,7 @@ impl Link for MemoryLink {
                 }
             )+};
         }
-        join!(pairs contacts bodies body_verdicts names plan);
+        join!(pairs contacts regions bodies body_verdicts names plan);
         state.wake.peers_changed = true;
         self.shared.to_server.notify_all();
         Ok(())
@@ -128,6 +129,10 @@ impl Link for MemoryLink {
 
     fn contacts(&mut self, into: &mut Message<ContactRow>) -> Result<bool> {
         Ok(self.with(false, |peer| pop(&mut peer.contacts, into)))
+    }
+
+    fn regions(&mut self, into: &mut Message<RegionRow>) -> Result<bool> {
+        Ok(self.with(false, |peer| pop(&mut peer.regions, into)))
     }
 
     fn bodies(&mut self, into: &mut Message<BodyRow>) -> Result<bool> {

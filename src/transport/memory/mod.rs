@@ -15,8 +15,8 @@ pub use server::MemoryServer;
 use crate::transport::client::{Message, Topics};
 use crate::transport::{RequestToken, Wake};
 use crate::wire::{
-    AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, NameRow, PairRow, RequestHeader,
-    TickRow, TransformRow, TransformVelRow,
+    AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, NameRow, PairRow, RegionRow,
+    RequestHeader, TickRow, TransformRow, TransformVelRow,
 };
 
 /// Frames of one source that wait for the daemon; then the oldest goes. As over shared memory.
@@ -62,6 +62,7 @@ struct Peer {
     tick: VecDeque<TickRow>,
     pairs: VecDeque<Message<PairRow>>,
     contacts: VecDeque<Message<ContactRow>>,
+    regions: VecDeque<Message<RegionRow>>,
     bodies: VecDeque<Message<BodyRow>>,
     body_verdicts: VecDeque<Message<u8>>,
     names: VecDeque<Message<NameRow>>,
@@ -76,6 +77,7 @@ struct Newest {
     tick: Option<TickRow>,
     pairs: Option<Message<PairRow>>,
     contacts: Option<Message<ContactRow>>,
+    regions: Option<Message<RegionRow>>,
     bodies: Option<Message<BodyRow>>,
     body_verdicts: Option<Message<u8>>,
     names: Option<Message<NameRow>>,

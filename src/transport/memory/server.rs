@@ -91,6 +91,9 @@ impl MemoryServer {
         if self.demand.contacts {
             send!(contacts, outbox.contacts_header, outbox.contacts);
         }
+        if self.demand.regions {
+            send!(regions, outbox.regions_header, outbox.regions);
+        }
         if self.demand.pairs {
             send!(pairs, outbox.pairs_header, outbox.pairs);
         }
@@ -170,6 +173,7 @@ impl Door for MemoryServer {
         for peer in state.peers.values().filter(|peer| !peer.left) {
             demand.pairs |= peer.topics.pairs;
             demand.contacts |= peer.topics.contacts;
+            demand.regions |= peer.topics.regions;
             demand.bodies |= peer.topics.bodies;
             demand.body_verdicts |= peer.topics.body_verdicts;
         }

@@ -46,7 +46,7 @@ impl Group {
 }
 
 /// The lanes of a mask, ascending.
-pub(super) fn lanes(mask: u8) -> impl Iterator<Item = u32> {
+pub(in crate::narrow::mesh) fn lanes(mask: u8) -> impl Iterator<Item = u32> {
     let mut rest = mask;
     std::iter::from_fn(move || {
         let lane = rest.trailing_zeros();

@@ -74,7 +74,7 @@ impl Drift {
 }
 
 /// How far any point of the smaller one's surface moves, seen from the other, metres, rounded up.
-fn moved(a: &Shape, b: &Shape, from: &Pose, to: &Pose) -> f64 {
+pub(super) fn moved(a: &Shape, b: &Shape, from: &Pose, to: &Pose) -> f64 {
     if a.radius < b.radius {
         displacement(&from.inverse(), &to.inverse(), &a.centre, a.radius)
     } else {

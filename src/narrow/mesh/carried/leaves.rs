@@ -124,7 +124,7 @@ impl LeafContact {
 
 impl<'a> Side<'a> {
     /// What a box holds; a convex shape is one leaf.
-    pub(super) fn held(self, id: BoxId) -> Held {
+    pub(in crate::narrow::mesh) fn held(self, id: BoxId) -> Held {
         match self {
             Self::Mesh(mesh) => mesh.obb().held(id),
             Self::Convex(_) => Held::Triangle(0),
@@ -132,7 +132,7 @@ impl<'a> Side<'a> {
     }
 
     /// The boxes that share a parent.
-    pub(super) fn pack(self, pack: u32) -> Option<&'a crate::shape::ObbPack> {
+    pub(in crate::narrow::mesh) fn pack(self, pack: u32) -> Option<&'a crate::shape::ObbPack> {
         match self {
             Self::Mesh(mesh) => mesh.obb().packs().get(pack as usize),
             Self::Convex(_) => None,
@@ -140,7 +140,7 @@ impl<'a> Side<'a> {
     }
 
     /// A box by itself; that of a convex shape is handed in.
-    pub(super) fn obb(self, id: BoxId, whole: &Option<Obb>) -> Obb {
+    pub(in crate::narrow::mesh) fn obb(self, id: BoxId, whole: &Option<Obb>) -> Obb {
         match (self, whole) {
             (Self::Mesh(mesh), _) => mesh.obb().get(id),
             (Self::Convex(_), Some(whole)) => *whole,

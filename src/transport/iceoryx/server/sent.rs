@@ -27,6 +27,13 @@ impl Server {
                 &outbox.contacts,
             );
         }
+        if demand.regions {
+            failures += send(
+                &self.regions.publisher,
+                &outbox.regions_header,
+                &outbox.regions,
+            );
+        }
         if demand.pairs {
             failures += send(&self.pairs.publisher, &outbox.pairs_header, &outbox.pairs);
         }

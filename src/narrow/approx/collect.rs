@@ -1,0 +1,290 @@
+//! The spots of a body pair: shape pair by shape pair, from fronts, trees, boxes and contacts that were found.
+
+use crate::ids::PairSlot;
+use crate::limits::{REGION_LOOKS_MAX, REGION_SHAPE_PAIRS_MAX};
+use crate::math::{Pose, ROUND, Vec3, relative};
+use crate::narrow::Narrow;
+use crate::narrow::contacts::Contact;
+use crate::narrow::mesh::{CarriedFront, PlaneScan, Scan, behind};
+use crate::narrow::query::{shape_pose, sphere_bound};
+use crate::shape::{Cone, Geometry, Mesh, Obb, Shape};
+use crate::world::{Body, PlacedShape};
+
+use super::gather::{SPOTS_MAX, push};
+use super::spot::Spot;
+use super::{Approx, FOUND_MAX, boxes};
+
+/// Spots smaller than this share of the smaller body's radius are not split: they are no larger than what a sphere
+/// round a few of them is too large by.
+const ENOUGH: f64 = 0.02;
+
+/// A pair of shapes at this tick's poses.
+struct Pair<'a> {
+    one: &'a PlacedShape,
+    other: &'a PlacedShape,
+    /// Of the second seen from the first.
+    pos12: Pose,
+    /// What rounding of the bodies' poses can be, metres.
+    slop_m: f64,
+    /// Its contacts are known, and are all.
+    complete: bool,
+}
+
+impl Narrow {
+    /// Collects the spots of two bodies that are where their poses say.
+    pub(super) fn collect(
+        &self,
+        slot: PairSlot,
+        (a, b): (&Body, &Body),
+        complete: bool,
+        tests: u32,
+        approx: &mut Approx,
+    ) {
+        let rel = relative(&a.pose, &b.pose);
+        if a.shapes.len() * b.shapes.len() > REGION_SHAPE_PAIRS_MAX {
+            approx.clipped = true;
+            push(&mut approx.all, boxes(a, b));
+        } else {
+            let (mut tests, mut place) = (tests, 0);
+            for one in a.shapes.iter() {
+                for other in b.shapes.iter() {
+                    let front = self.front_at(slot, place);
+                    place += 1;
+                    if sphere_bound(one, other, &rel) > 0.0 {
+                        continue;
+                    }
+                    let size = rel.translation.vector.norm() + reach(one) + reach(other);
+                    let pair = Pair {
+                        one,
+                        other,
+                        pos12: shape_pose(one, other, &rel),
+                        slop_m: 32.0 * ROUND * size,
+                        complete,
+                    };
+                    self.collect_shapes(&pair, front, a.radius.min(b.radius), &mut tests, approx);
+                }
+            }
+        }
+        if complete {
+            for contact in self.contacts(slot).0 {
+                push(&mut approx.all, found(contact, &rel));
+            }
+        }
+    }
+
+    /// The front of the `place`th pair of shapes: that of a pair of single shapes, or the one under way.
+    fn front_at(&self, slot: PairSlot, place: usize) -> Option<&CarriedFront> {
+        let memo = self.memos.get(slot.index())?;
+        let resumed = self.cursors.get(memo.cursor);
+        let under_way = resumed.and_then(|cursor| cursor.front_of(place));
+        under_way.or_else(|| self.front_of(slot))
+    }
+
+    fn collect_shapes(
+        &self,
+        pair: &Pair<'_>,
+        front: Option<&CarriedFront>,
+        size_m: f64,
+        tests: &mut u32,
+        approx: &mut Approx,
+    ) {
+        let (one, other) = (&*pair.one.shape, &*pair.other.shape);
+        match (&one.geometry, &other.geometry) {
+            (Geometry::HalfSpace { normal, offset }, Geometry::Mesh(mesh)) => {
+                pair.take_plane(mesh, (*normal, *offset), false, tests, approx);
+            }
+            (Geometry::Mesh(mesh), Geometry::HalfSpace { normal, offset }) => {
+                pair.take_plane(mesh, (*normal, *offset), true, tests, approx);
+            }
+            (Geometry::Mesh(_), _) | (_, Geometry::Mesh(_)) => {
+                if let Some(scan) = Scan::new(one, other, &pair.pos12) {
+                    self.take_surfaces(pair, &scan, front, size_m, tests, approx);
+                }
+            }
+            // Their contacts are all there is.
+            _ if pair.complete => {}
+            _ => {
+                if let Some(spot) = pair.convex() {
+                    pair.put(spot, approx);
+                }
+            }
+        }
+    }
+
+    /// What two surfaces share, or a surface and a convex shape.
+    fn take_surfaces(
+        &self,
+        pair: &Pair<'_>,
+        scan: &Scan<'_>,
+        front: Option<&CarriedFront>,
+        size_m: f64,
+        tests: &mut u32,
+        approx: &mut Approx,
+    ) {
+        approx.raw.clear();
+        let (mut looks, mut full) = (0, false);
+        let known = front.is_some_and(|front| {
+            scan.of_front(front, &self.front_store, |spot| {
+                looks += 1;
+                if looks > REGION_LOOKS_MAX {
+                    return;
+                }
+                if approx.raw.len() == SPOTS_MAX {
+                    full = true;
+                    pair.flush(scan, approx);
+                }
+                approx.raw.push(spot);
+            })
+        });
+        if !known || looks > REGION_LOOKS_MAX {
+            approx.clipped |= looks > REGION_LOOKS_MAX;
+            approx.raw.truncate(SPOTS_MAX - 1);
+            approx.raw.extend(scan.whole());
+        }
+        for front in front.into_iter().filter(|_| !pair.complete) {
+            for leaf in front.found_at(&self.front_store, &pair.pos12) {
+                let c = &leaf.closest;
+                if approx.found.len() < FOUND_MAX {
+                    let spot = Spot::found(&c.point_a, &c.point_b, c.normal, -c.best_m);
+                    approx.found.push(pair.place(spot));
+                }
+            }
+        }
+        if !pair.complete
+            && let Some(spot) = scan.held(front)
+        {
+            pair.put(spot.of_any_normal(), approx);
+        }
+        if full || (pair.complete && known) {
+            pair.flush(scan, approx);
+            return;
+        }
+        // The largest first, while tests last.
+        let enough_m = ENOUGH * size_m;
+        let Approx { raw, heap, .. } = approx;
+        heap.clear();
+        heap.extend(raw.drain(..));
+        while *tests > 0 && heap.len() + raw.len() < SPOTS_MAX {
+            if heap.peek().is_none_or(|spot| spot.radius_m <= enough_m) {
+                break;
+            }
+            let Some(spot) = heap.pop() else { break };
+            if scan.is_leaf(spot.boxes) {
+                raw.push(spot);
+                continue;
+            }
+            *tests -= 1;
+            scan.split(spot.boxes, |part| heap.push(part));
+        }
+        raw.extend(heap.drain());
+        pair.flush(scan, approx);
+    }
+}
+
+impl Pair<'_> {
+    /// Takes the spots at hand in, with their normals.
+    fn flush(&self, scan: &Scan<'_>, approx: &mut Approx) {
+        for at in 0..approx.raw.len() {
+            let spot = approx.raw[at];
+            let cone = scan.normals(spot.boxes);
+            self.put(Spot { cone, ..spot }, approx);
+        }
+        approx.raw.clear();
+    }
+
+    /// Takes a spot of the first shape's frame in.
+    fn put(&self, spot: Spot, approx: &mut Approx) {
+        push(&mut approx.all, self.place(spot));
+    }
+
+    /// A spot of the first shape's frame in A's body frame.
+    fn place(&self, spot: Spot) -> Spot {
+        let pose = &self.one.pose;
+        let turn = pose.rotation.to_rotation_matrix();
+        Spot {
+            centre: pose * spot.centre,
+            radius_m: spot.radius_m + self.slop_m,
+            along: pose.rotation * spot.along,
+            across_m: spot.across_m + self.slop_m,
+            cone: spot.cone.turned(turn.matrix()),
+            ..spot
+        }
+    }
+
+    /// What the boxes of two shapes without meshes share.
+    fn convex(&self) -> Option<Spot> {
+        let (one, other) = (&*self.one.shape, &*self.other.shape);
+        match (&one.geometry, &other.geometry) {
+            (Geometry::HalfSpace { normal, offset }, _) => {
+                let obb = Spot::placed(&Obb::around(&other.aabb), &self.pos12);
+                let spot = behind(&obb, *normal, *offset, self.slop_m)?;
+                Some(spot.of_normals(Cone::of(*normal)))
+            }
+            (_, Geometry::HalfSpace { normal, offset }) => {
+                let (normal, offset) = plane_at(&self.pos12, normal, *offset);
+                let spot = behind(&Obb::around(&one.aabb), normal, offset, self.slop_m)?;
+                Some(spot.of_normals(Cone::of(-normal)))
+            }
+            _ => {
+                let obb = Spot::placed(&Obb::around(&other.aabb), &self.pos12);
+                let spot = Spot::shared(&Obb::around(&one.aabb), &obb, self.slop_m)?;
+                Some(spot.of_any_normal())
+            }
+        }
+    }
+
+    /// What of a mesh lies behind a plane.
+    fn take_plane(
+        &self,
+        mesh: &Mesh,
+        (normal, offset): (Vec3, f64),
+        is_b: bool,
+        tests: &mut u32,
+        approx: &mut Approx,
+    ) {
+        let (mesh_from_plane, mesh_from_one) = if is_b {
+            (self.pos12, Pose::identity())
+        } else {
+            (self.pos12.inverse(), self.pos12.inverse())
+        };
+        let (down, offset) = plane_at(&mesh_from_plane, &normal, offset);
+        let to_one = mesh_from_one.inverse();
+        let turn = to_one.rotation.to_rotation_matrix();
+        // From A to B: into the mesh where the half-space is A.
+        let out = if is_b { -down } else { down };
+        let mut heap = std::mem::take(&mut approx.heap);
+        PlaneScan::new(mesh, down, offset, self.slop_m).spots(&mut heap, tests, |spot| {
+            let seen = Spot {
+                centre: to_one * spot.centre,
+                along: to_one.rotation * spot.along,
+                cone: Cone::of(out).turned(turn.matrix()),
+                ..spot
+            };
+            self.put(seen, approx);
+        });
+        approx.heap = heap;
+    }
+}
+
+/// A contact of the pair's contact set, A's body frame.
+fn found(contact: &Contact, rel: &Pose) -> Spot {
+    let b = rel * contact.point_b;
+    Spot::found(&contact.point_a, &b, contact.normal, -contact.gap_m)
+}
+
+/// The plane `normal . x = offset` of a frame that stands at `pose`, seen from where `pose` is told.
+fn plane_at(pose: &Pose, normal: &Vec3, offset: f64) -> (Vec3, f64) {
+    let turned = pose.rotation * normal;
+    (turned, offset + turned.dot(&pose.translation.vector))
+}
+
+/// Greatest distance of a shape's point from its body's origin, metres; of a half-space that of its frame.
+fn reach(placed: &PlacedShape) -> f64 {
+    let shape: &Shape = &placed.shape;
+    let own = if shape.radius.is_finite() {
+        shape.centre.coords.norm() + shape.radius
+    } else {
+        0.0
+    };
+    placed.pose.translation.vector.norm() + own
+}

@@ -1,0 +1,77 @@
+//! What a front has not proved apart, at whatever pose: where a pair may still touch.
+
+use super::cover::lanes;
+use super::drift::moved;
+use super::{CarriedFront, Containment, FrontStore, LeafContact};
+use crate::math::Pose;
+use crate::narrow::mesh::PATCH_POINTS;
+use crate::shape::{BoxId, Shape};
+
+impl CarriedFront {
+    /// How far the pair is from the pose that the front works at, metres, rounded up; 0: it is there.
+    pub(in crate::narrow) fn moved_m(&self, a: &Shape, b: &Shape, pos12: &Pose) -> f64 {
+        if self.at.pos12 == *pos12 {
+            0.0
+        } else {
+            moved(a, b, &self.at.pos12, pos12)
+        }
+    }
+
+    /// Visits every pair of boxes that is not proved apart at a pose `moved_m` away from the front's. All that the two
+    /// surfaces share at that pose is under these.
+    ///
+    /// * returns - false where some pairs were lumped together and are not known any more: then nothing is visited.
+    pub(in crate::narrow::mesh) fn unproved(
+        &self,
+        store: &FrontStore,
+        moved_m: f64,
+        mut visit: impl FnMut(BoxId, BoxId),
+    ) -> bool {
+        if self.drift.left_m(self.lumped_expiry_m) <= moved_m {
+            return false;
+        }
+        for open in [self.open.all(&store.open), store.open.all(&self.touching)]
+            .into_iter()
+            .flatten()
+        {
+            visit(open.a, open.b);
+        }
+        // Of groups that pass, the expiry is their gap at the front's pose.
+        let passing = store.groups.all(&self.passing).iter();
+        let passed = passing.filter(|group| group.expiry_m <= moved_m);
+        let any = self.drift.left_m(self.proved.soonest_m()) <= moved_m;
+        let proved = if any {
+            store.groups.all(&self.proved.heap)
+        } else {
+            &[]
+        };
+        let expired = (proved.iter()).filter(|group| self.drift.left_m(group.expiry_m) <= moved_m);
+        for group in passed.chain(expired) {
+            for lane in lanes(group.mask) {
+                let (a, b) = group.pair(lane);
+                visit(a, b);
+            }
+        }
+        true
+    }
+
+    /// Contacts found at the front's own pose if it is there, two of each patch; none elsewhere.
+    pub(in crate::narrow) fn found_at<'a>(
+        &'a self,
+        store: &'a FrontStore,
+        pos12: &Pose,
+    ) -> impl Iterator<Item = &'a LeafContact> {
+        let here = self.at.pos12 == *pos12;
+        let all = if here { self.contacts(store) } else { &[] };
+        all.chunks(PATCH_POINTS)
+            .flat_map(|patch| patch.iter().take(2))
+    }
+
+    /// Whether no surface of the one is known to lie, or can lie, within the other as a whole, at a pose `moved_m` away
+    /// from the front's; a pair that touches at the front's own pose counts as not.
+    pub(in crate::narrow::mesh) fn holds_none(&self, moved_m: f64) -> bool {
+        let outside = self.shells.state() == Containment::Outside
+            && self.drift.left_m(self.shells_expiry_m) > moved_m;
+        !self.solids || outside || (moved_m == 0.0 && self.known.touches)
+    }
+}

@@ -1,0 +1,47 @@
+//! Objects that are handed out and given back: their memory serves the next owner.
+
+/// Reusable objects by index: what was given back is handed out again with its memory.
+#[derive(Debug, Default)]
+pub(super) struct Pool<T> {
+    items: Vec<T>,
+    free: Vec<u32>,
+}
+
+/// No object of a pool.
+pub(super) const NONE: u32 = u32::MAX;
+
+impl<T> Pool<T> {
+    /// An object, used before or made now.
+    ///
+    /// When there is none left, half as many more are made at once: how many are out at the same time creeps up for
+    /// long where work is cut off, and each new peak would allocate.
+    pub(super) fn take(&mut self, make: impl Fn() -> T) -> u32 {
+        if self.free.is_empty() {
+            let more = self.items.len() / 2 + 1;
+            for _ in 0..more {
+                let at = u32::try_from(self.items.len()).unwrap_or(NONE);
+                self.items.push(make());
+                self.free.push(at);
+            }
+            // Room to give every object back without growing later.
+            self.free.reserve(self.items.len() - self.free.len());
+        }
+        self.free.pop().unwrap_or(NONE)
+    }
+
+    /// Gives an object back.
+    pub(super) fn give(&mut self, at: &mut u32) {
+        if *at != NONE {
+            self.free.push(*at);
+            *at = NONE;
+        }
+    }
+
+    pub(super) fn get(&self, at: u32) -> Option<&T> {
+        self.items.get(at as usize)
+    }
+
+    pub(super) fn get_mut(&mut self, at: u32) -> Option<&mut T> {
+        self.items.get_mut(at as usize)
+    }
+}
