@@ -29,7 +29,7 @@ pub const REGION_LOOKS_MAX: usize = 4096;
 /// Shape pairs that are looked at for the regions of one body pair; of more only the bodies' boxes are.
 pub const REGION_SHAPE_PAIRS_MAX: usize = 256;
 /// Tests spent on the regions of one pair, some 1 us each: publishing is part of the floor. At a quarter of the work
-/// the median radius is 27 % of the diameter with none, 14 % with 16, 8 % with 64, 5 % with 256
+/// the median radius is 25 % of the diameter with none, 14 % with 16, 9 % with 64, 6 % with 256
 /// (`benches/time_critical`).
 pub const REGION_TESTS_PER_PAIR: u32 = 64;
 /// Tests spent on regions in one tick, shared by its pairs: some 4 ms at most.

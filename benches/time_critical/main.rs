@@ -6,7 +6,8 @@
 //! that were reported late, overshoot. The time starts after the motion pass, which is told beside it. Truth: walks to
 //! the end over the other trees.
 //!
-//! `cargo bench --bench time_critical [-- --quick] [--cold] [METHOD..]`
+//! `cargo bench --bench time_critical [-- --quick] [--cold] [METHOD..]`, and `-- regions` for approximate contacts
+//! alone (see `regions`).
 
 #![allow(
     clippy::cast_precision_loss,
@@ -19,6 +20,9 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../../tests/oracle/mod.rs"]
+mod oracle;
+mod regions;
 mod restart;
 mod stage;
 
@@ -188,6 +192,10 @@ fn main() {
         .collect();
     let ticks = if quick { 20 } else { 99 };
     let shapes = shapes();
+    if only.iter().any(|name| name == "regions") {
+        regions::run(&shapes, quick);
+        return;
+    }
     let from = provenance();
     let mut csv = String::from(
         "machine,commit,compiler,seed,method,case,motion_percent,budget,ticks,pairs,spent_p50_us,spent_p99_us,spent_cpu_p50_us,motion_pass_p50_us,\

@@ -278,7 +278,7 @@ fn course(k: usize, percent: f64, random: &mut Random) -> Course {
     }
 }
 
-fn body(id: u64) -> BodySpec {
+pub fn body(id: u64) -> BodySpec {
     BodySpec {
         name: format!("b{id}"),
         id: BodyId(id),

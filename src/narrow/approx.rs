@@ -7,11 +7,12 @@
 //! - of a pair whose contacts are complete the union also holds both points of each contact; of two convex shapes that
 //!   is then all it holds;
 //! - the cone holds the outward normals of every face of A and the inward ones of every face of B that may meet in the
-//!   sphere, with the arcs between neighbours; of a complete pair also its contacts' normals. That the normals of a
-//!   manifold computed later lie in it follows for those that are of a face, and is tested, not proved, for those of
-//!   two edges;
-//! - of a pair with a body of unknown place: the boxes, no more. Of one that is apart, but may have touched on the way
-//!   to these poses, too.
+//!   sphere, with the arcs between neighbours; of a complete pair also its contacts' normals. What a manifold finds
+//!   later is mostly in it, not surely: it may be the normal of two edges, or of faces beside the sphere, for its
+//!   points lie deeper than what is shared. Measured (`benches/time_critical`, meshes of 19,880 triangles): 99.4 to
+//!   100 % of them, 98.6 % at the worst share of the work of pairs that overlap by a fifth;
+//! - of a pair with a body of unknown place: the boxes, no more. Of one that is not known to collide, but may have
+//!   touched on the way to these poses, too.
 //!
 //! How: every pair of boxes of a front that is not proved apart at these poses, or the roots where there is no front,
 //! is cut down to what the two boxes share; the largest are split by a few tests of their own, down to triangles cut by
