@@ -11,6 +11,10 @@ pub const BODIES_MAX: usize = 1 << 20;
 pub const SHAPES_PER_BODY_MAX: usize = 1 << 16;
 /// Triangles of one mesh. 10 million take about two gigabytes with their trees; refused, never loaded in part.
 pub const TRIANGLES_MAX: usize = 8_000_000;
+/// Triangles of a mesh that deforms: a million are refitted in some 5 ms.
+pub const DEFORMING_TRIANGLES_MAX: usize = 1 << 20;
+/// Vertices of a mesh that deforms, and rows of one vertex message: 12 MiB. More in a message are refused.
+pub const DEFORMING_VERTICES_MAX: usize = 1 << 20;
 /// Vertices of a convex hull after building; support functions walk all of them.
 pub const HULL_VERTICES_MAX: usize = 4096;
 /// Default for pairs kept; beyond it the state is `unknown` and so is each body concerned.
@@ -40,6 +44,9 @@ pub const MANIFOLD_POINTS_MAX: usize = 4;
 pub const CONTACTS_PER_PAIR_MAX: usize = 16;
 /// Transforms in one frame; more are refused as `over_limit`.
 pub const FRAME_ROWS_MAX: usize = BODIES_MAX;
+/// Vertex messages that wait for their tick; beyond it the oldest go, and the bodies concerned are unknown until all of
+/// their vertices come again.
+pub const VERTEX_FRAMES_WAITING_MAX: usize = 1024;
 /// Frames taken from one source in one drain; the rest waits in its queue, newest kept.
 pub const FRAMES_PER_DRAIN_MAX: usize = 64;
 /// Largest coordinate of a pose, metres: beyond it f64 has a spacing of 0.1 mm and no contact means anything.

@@ -114,6 +114,19 @@ fn compounds(count: u32) -> String {
     text
 }
 
+/// Tori that deform in each tick, boxes, and a floor.
+fn bending(count: u32) -> String {
+    let mut text = tori(count);
+    let shape = trimesh(&torus(0.3, 0.1, 16, 10), None);
+    text = text.replace(
+        &format!("shape = {shape}"),
+        &format!("deforms = true\nshape = {shape}"),
+    );
+    text += "[[body]]\nname = \"floor\"\nmoves = false\n";
+    text += "shape = { type = \"half_space\", normal = [0.0, 0.0, 1.0] }\n";
+    text
+}
+
 /// The same, with every body that moves swept.
 fn swept(scene: &str) -> String {
     scene.replace("moves = true\n", "moves = true\ncontinuous = true\n")
@@ -127,6 +140,7 @@ fn a_tick_allocates_nothing_after_warm_up() {
         ("pile", pile(300, 2), 2),
         ("tori", tori(30), 2),
         ("compounds", compounds(20), 2),
+        ("bending", bending(18), 2),
         ("swept pool", swept(&pool(80, 1)), 4),
         ("swept pile", swept(&pile(80, 2)), 4),
         ("swept tori", swept(&tori(9)), 4),

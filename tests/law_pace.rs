@@ -14,7 +14,7 @@ use sweepd::ids::SourceSlot;
 use sweepd::scene::Scene;
 use sweepd::tick::pace::{Due, Pacer};
 use sweepd::time::{Clock, ManualClock};
-use sweepd::wire::{BodyStatus, Frame, Inbox, TickCause, frame_flags};
+use sweepd::wire::{BodyStatus, Frame, Inbox, TickCause, WIRE_VERSION, frame_flags};
 use sweepd::world::{Edit, World};
 
 use support::{MS, START_NS, TIMEOUT_NS, cube, fixed, frame, moving, row, scene};
@@ -476,6 +476,51 @@ fn law_4_2_an_ended_session_ends_after_the_last_of_its_frames() {
     daemon.run(20.0, vec![(15.0, lead)]);
     assert_eq!(daemon.world.sources()[1].frames(), 1);
     assert_eq!(daemon.world.sources()[1].session, 0);
+}
+
+#[test]
+fn law_4_4_vertices_wait_for_the_frame_that_they_belong_with() {
+    let vertices = |daemon: &mut Daemon, source: &str, seq: u64, version: u64| {
+        let header = &mut daemon.drained.push_vertices().header;
+        (header.session, header.seq, header.version) = (1, seq, version);
+        (header.source, header.schema) = (sweepd::wire::name_bytes(source), WIRE_VERSION);
+    };
+    // What the next tick takes: frames of the lead, and versions of vertices.
+    let next = |daemon: &mut Daemon| {
+        let now_ns = daemon.clock.boottime_ns();
+        daemon.pacer.take(&mut daemon.drained, now_ns);
+        let due = (daemon.pacer).due(now_ns, false, None, &mut daemon.inbox);
+        due.map(|_| {
+            let frames = daemon.inbox.frames().iter().map(|f| f.header.seq);
+            let versions = daemon.inbox.vertices().iter().map(|v| v.header.version);
+            (frames.collect::<Vec<_>>(), versions.collect::<Vec<_>>())
+        })
+    };
+    let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
+    vertices(&mut daemon, "sim", 1, 1);
+    vertices(&mut daemon, "robot", 5, 50);
+    vertices(&mut daemon, "sim", 0, 2);
+    // The first tick is a heartbeat: what is not of the lead, or of no frame, goes with it.
+    assert_eq!(next(&mut daemon), Some((vec![], vec![50, 2])));
+    assert_eq!(next(&mut daemon), None);
+    *daemon.drained.push() = sim(1);
+    vertices(&mut daemon, "sim", 2, 3);
+    vertices(&mut daemon, "sim", 2, 4);
+    *daemon.drained.push() = sim(2);
+    vertices(&mut daemon, "sim", 4, 5);
+    *daemon.drained.push() = sim(3);
+    assert_eq!(next(&mut daemon), Some((vec![1], vec![1])));
+    assert_eq!(next(&mut daemon), Some((vec![2], vec![3, 4])));
+    assert_eq!(next(&mut daemon), Some((vec![3], vec![])));
+    // Its session ends: what waited for a frame that never comes is gone with it.
+    daemon.drained.end_session(1);
+    daemon.clock.advance(200 * MS);
+    assert_eq!(next(&mut daemon), Some((vec![], vec![])));
+    *daemon.drained.push() = sim(9);
+    assert_eq!(next(&mut daemon), Some((vec![9], vec![])));
+    let mut daemon = Daemon::of(Mode::Rate(100.0));
+    vertices(&mut daemon, "sim", 7, 1);
+    assert_eq!(next(&mut daemon), Some((vec![], vec![1])));
 }
 
 #[test]

@@ -30,7 +30,7 @@ fn the_example_scene_is_read_with_every_key() {
     assert_eq!(scene.config.limits.bodies, 1000);
     assert_eq!(scene.sources[0].timeout_ns, 200_000_000);
     assert_eq!(scene.sources[1].timeout_ns, 500_000_000);
-    assert_eq!(scene.bodies.len(), 12);
+    assert_eq!(scene.bodies.len(), 13);
     let link = scene
         .bodies
         .iter()
@@ -46,6 +46,7 @@ fn the_example_scene_is_read_with_every_key() {
     assert_eq!(scene.bodies[0].id, BodyId(1));
     assert_eq!(scene.bodies[6].id, BodyId(6));
     assert_eq!(scene.bodies[11].id, BodyId(12));
+    assert!(scene.bodies[12].deforms && !scene.bodies[11].deforms);
     assert_eq!(scene.rules.len(), 2);
     assert_eq!(scene.rules[1].report_within_m, Some(0.1));
 }
@@ -61,8 +62,9 @@ fn an_empty_scene_is_legal() {
 fn the_example_scene_is_built_and_equal_shapes_are_one() {
     let mut library = Library::new();
     let built = example().build_shapes(&mut library, |_, _| {}).unwrap();
-    assert_eq!(built.shapes.len(), 12);
-    assert_eq!(library.len(), 13, "each shape once");
+    assert_eq!(built.shapes.len(), 13);
+    assert_eq!(library.len(), 14, "each shape once");
+    assert!(built.shapes[12][0].is_deforming());
     let again = example().build_shapes(&mut library, |_, _| {}).unwrap();
     assert!(std::sync::Arc::ptr_eq(
         &built.shapes[0][0],
@@ -173,7 +175,7 @@ fn each_wrong_body_and_setting_is_one_error_with_file_line_and_mend() {
         }
         seen.push(cases.len());
     }
-    assert_eq!(seen, [33, 25]);
+    assert_eq!(seen, [39, 25]);
 }
 
 #[test]

@@ -18,7 +18,8 @@ use sweepd::wire::{
     AnswerHeader, BodyRow, BodyStatus, ContactKind, ContactRow, EndCause, Event, FrameHeader,
     Hello, Level, MessageHeader, NameRow, PairRow, Reason, RegionRow, RejectReason, RequestHeader,
     SourceRow, Stage, State, TickCause, TickRow, TransformRow, TransformVelRow, Verdict,
-    WIRE_VERSION, contact_flags, frame_flags, pair_flags, region_flags,
+    VertexHeader, VertexRow, WIRE_VERSION, contact_flags, frame_flags, pair_flags, region_flags,
+    vertex_flags,
 };
 
 struct Layout {
@@ -52,6 +53,8 @@ fn layouts() -> Vec<Layout> {
         TransformRow { body flags reserved position orientation }
         TransformVelRow { transform linear angular }
         FrameHeader { session epoch seq sent_ns stamp_ns scene_rev deadline_ns time_left_ns source flags clock_id schema reserved }
+        VertexRow { position }
+        VertexHeader { session epoch seq sent_ns body version base_version source first count total flags schema reserved }
         MessageHeader { boot_id tick scene_rev oldest_stamp_ns newest_stamp_ns truncated state reserved schema }
         PairRow { body_a body_b gap_min_m gap_max_m gap_best_m closing_mps toi_min toi_max begin_first_tick begin_last_tick end_first_tick end_last_tick certified_tick bound_age_ticks verdict certified_verdict events end_cause level flags reserved }
         ContactRow { id body_a body_b point_a point_b point_a_body point_b_body normal gap_m gap_min_m gap_max_m shape_a shape_b triangle_a triangle_b flags kind reserved }
@@ -86,6 +89,10 @@ fn codes() -> Vec<(&'static str, Vec<(&'static str, u32)>)> {
             ("PARTIAL", frame_flags::PARTIAL),
             ("PAUSED", frame_flags::PAUSED),
         ],
+    ));
+    all.push((
+        "VertexFlags",
+        vec![("FULL", vertex_flags::FULL), ("RANGE", vertex_flags::RANGE)],
     ));
     all.push((
         "PairFlags",
@@ -288,7 +295,7 @@ fn rust_bytes(kind: &str) -> usize {
     };
     let base = match base {
         "u8" => 1,
-        "u32" => 4,
+        "u32" | "f32" => 4,
         "u64" | "f64" => 8,
         row => layouts().iter().find(|l| l.name == row).unwrap().size,
     };

@@ -94,7 +94,7 @@ impl Subject {
         match self {
             Self::Engine(search) => {
                 stage.narrow.set_search(*search);
-                stage.narrow.spend(&stage.world, WANTED, meter);
+                stage.narrow.spend(&mut stage.world, WANTED, meter);
             }
             Self::Restart(restart) => restart.spend(stage, meter),
         }

@@ -289,6 +289,7 @@ pub fn body(id: u64) -> BodySpec {
         }],
         pose: Pose::identity(),
         moves: true,
+        deforms: false,
         continuous: false,
         teleport_m: None,
         source: Some(0),

@@ -152,7 +152,8 @@ enum {
     SWEEPD_REJECT_REASON_BAD_LAYOUT = 9,
     /* The same body twice in one frame. */
     SWEEPD_REJECT_REASON_DUPLICATE = 10,
-    /* The body takes its pose from another (attach), or cannot move. */
+    /* The body takes its pose from another (attach), or cannot move; or vertices of one that
+     * does not deform. */
     SWEEPD_REJECT_REASON_NOT_STEERABLE = 11,
     /* Frames that waited while the daemon was silent too long, without sent_ns. */
     SWEEPD_REJECT_REASON_TOO_OLD = 12,
@@ -160,15 +161,19 @@ enum {
     SWEEPD_REJECT_REASON_OVER_LIMIT = 13,
     /* A chain of ROS 2 frames from the body to the scene's frame that has a loop, or stamps too far apart. */
     SWEEPD_REJECT_REASON_BAD_CHAIN = 14,
+    /* A range of vertices that does not follow on the version the body has, or comes after
+     * refused ones. */
+    SWEEPD_REJECT_REASON_VERTEX_VERSION = 15,
 };
 
 /* Whether a body's place is known. */
 enum {
     /* Its newest pose is admitted and young enough, or it cannot move. */
     SWEEPD_BODY_STATUS_KNOWN = 0,
-    /* It moves, and no pose was admitted in this boot (or since a reset). */
+    /* It moves, and no pose was admitted in this boot (or since a reset); or it deforms, and no
+     * vertices were. */
     SWEEPD_BODY_STATUS_NOT_RECEIVED = 1,
-    /* Its newest pose was refused. */
+    /* Its newest pose or vertices were refused. */
     SWEEPD_BODY_STATUS_REJECTED = 2,
     /* Too old; its pairs are possible within reach. */
     SWEEPD_BODY_STATUS_STALE = 3,
@@ -228,6 +233,14 @@ enum {
     SWEEPD_FRAME_FLAGS_PARTIAL = 2,
     /* Holds none: the world stands still, ages are renewed for one time-out. */
     SWEEPD_FRAME_FLAGS_PAUSED = 4,
+};
+
+/* VertexHeader::flags; exactly one of the two. */
+enum {
+    /* Holds every vertex of the mesh. */
+    SWEEPD_VERTEX_FLAGS_FULL = 1,
+    /* Holds a range of them, applied to base_version. */
+    SWEEPD_VERTEX_FLAGS_RANGE = 2,
 };
 
 /* Bits of PairRow::flags. */
@@ -350,6 +363,63 @@ SWEEPD_ASSERT(offsetof(sweepd_frame_header, clock_id) == 100);
 SWEEPD_ASSERT(offsetof(sweepd_frame_header, schema) == 104);
 SWEEPD_ASSERT(offsetof(sweepd_frame_header, reserved) == 108);
 SWEEPD_ASSERT(sizeof(sweepd_frame_header) == 112);
+
+/* Type name "sweepd.v1.Vertex", 12 bytes. One vertex. */
+typedef struct sweepd_vertex_row {
+    /* In the body's frame, metres. */
+    float position[3];
+} sweepd_vertex_row;
+SWEEPD_ASSERT(offsetof(sweepd_vertex_row, position) == 0);
+SWEEPD_ASSERT(sizeof(sweepd_vertex_row) == 12);
+
+/* Type name "sweepd.v1.VertexHeader", 112 bytes. User header of vertices: whose they are, which
+ * of them, and which version they make. */
+typedef struct sweepd_vertex_header {
+    /* Session of the client, the same as in its frames; never 0. */
+    uint64_t session;
+    /* Epoch of the frame that they belong with. */
+    uint64_t epoch;
+    /* Number of the frame that they belong with: in a mode that takes each frame by itself they
+     * are taken with the first that is not older. 0: at once. */
+    uint64_t seq;
+    /* When the client sent them, nanoseconds of CLOCK_BOOTTIME; 0: not said. */
+    uint64_t sent_ns;
+    /* Body id. */
+    uint64_t body;
+    /* Version of the vertices after this message, from 1; raised with each message of a body. */
+    uint64_t version;
+    /* Of a range: the version that it is applied to. Any other, and it is refused. */
+    uint64_t base_version;
+    /* Name of the source, NUL-padded UTF-8. */
+    uint8_t source[SWEEPD_SOURCE_NAME_LEN];
+    /* Place of the first row in the mesh's list of vertices; 0 where all are sent. */
+    uint32_t first;
+    /* How many rows follow. */
+    uint32_t count;
+    /* How many vertices the mesh has. */
+    uint32_t total;
+    /* vertex_flags: full or range. */
+    uint32_t flags;
+    /* WIRE_VERSION of the sender. */
+    uint32_t schema;
+    /* Zero. */
+    uint32_t reserved;
+} sweepd_vertex_header;
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, session) == 0);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, epoch) == 8);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, seq) == 16);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, sent_ns) == 24);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, body) == 32);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, version) == 40);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, base_version) == 48);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, source) == 56);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, first) == 88);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, count) == 92);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, total) == 96);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, flags) == 100);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, schema) == 104);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, reserved) == 108);
+SWEEPD_ASSERT(sizeof(sweepd_vertex_header) == 112);
 
 /* Type name "sweepd.v1.MessageHeader", 56 bytes. User header of every message the daemon
  * publishes. */

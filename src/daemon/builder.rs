@@ -194,15 +194,19 @@ impl Against {
                 let mut shapes = Vec::with_capacity(body.shapes.len());
                 for (place, spec) in body.shapes.iter().enumerate() {
                     let built = self.library.get(&spec.shape, &self.base);
-                    let built = built
-                        .map_err(|e| format!("body \"{}\": shape {}: {e}", body.name, place + 1))?;
+                    let named = |e| format!("body \"{}\": shape {}: {e}", body.name, place + 1);
+                    let built = built.map_err(named)?;
                     warnings.extend(
                         built
                             .warnings
                             .iter()
                             .map(|w| format!("body \"{}\": {w}", body.name)),
                     );
-                    shapes.push(built.shape);
+                    shapes.push(if body.deforms {
+                        Arc::new(built.shape.to_deforming().map_err(named)?)
+                    } else {
+                        built.shape
+                    });
                 }
                 let shapes = place(&body, shapes);
                 Edit::Put {

@@ -11,7 +11,7 @@ use crate::world::Body;
 use super::Counters;
 use super::arena::Arena;
 use super::cursor::{Cursor, Room, Turn};
-use super::memo::Witness;
+use super::memo::{Witness, bent};
 use super::mesh::{FrontStore, Goal};
 
 /// What is known of two bodies after a query of their own.
@@ -38,7 +38,8 @@ pub struct Asked {
 #[must_use]
 pub fn gap_between(a: &Body, b: &Body, report_m: f64, meter: &mut Meter<'_>) -> Asked {
     let mut cursor = Cursor::default();
-    cursor.start(relative(&a.pose, &b.pose), 0.0, 0, Goal::Gap);
+    let rel = relative(&a.pose, &b.pose);
+    cursor.start((rel, bent(a, b)), 0.0, 0, Goal::Gap);
     let (mut counters, mut fronts) = (Counters::default(), FrontStore::default());
     let (mut contacts, mut found) = (Arena::default(), Vec::new());
     let mut room = Room {

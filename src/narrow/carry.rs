@@ -9,7 +9,7 @@ use crate::time::Meter;
 use crate::world::Body;
 
 use super::cursor::SLICE_UNITS;
-use super::memo::Witness;
+use super::memo::{Witness, bent};
 use super::mesh::{CarriedFront, Goal, numbered};
 use super::query::{leaf_contact, shape_pose, sound, witness_of};
 use super::{NONE, Narrow};
@@ -62,6 +62,7 @@ impl Narrow {
         };
         let store = &mut self.front_store;
         let credit_m = a.motion.credit_m() + b.motion.credit_m();
+        let bent_m = bent(a, b);
         let (one_shape, other_shape) = (&one.shape, &other.shape);
         if fresh {
             front.start(store, one_shape, other_shape, &pos12, self.search);
@@ -73,7 +74,7 @@ impl Narrow {
                 // A certified touch at these very poses; the lower end is what motion left of the old one.
                 memo.gap = Interval::new(memo.now.min.min(0.0), 0.0);
                 (memo.rel, memo.credit_m, memo.tested) = (rel, credit_m, self.tick);
-                (memo.finished, memo.tight) = (false, false);
+                (memo.bent_m, memo.finished, memo.tight) = (bent_m, false, false);
                 return false;
             }
         }
@@ -89,6 +90,7 @@ impl Narrow {
         // What was known before holds at these poses too.
         memo.gap = found.meet(now);
         (memo.rel, memo.credit_m, memo.tested) = (rel, credit_m, self.tick);
+        memo.bent_m = bent_m;
         let whole = done && !(goal == Goal::Verdict && memo.gap.max <= 0.0);
         memo.finished = whole && front.is_certain();
         memo.tight = whole && goal != Goal::Verdict;

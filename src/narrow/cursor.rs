@@ -25,6 +25,9 @@ pub(super) const SLICE_UNITS: u64 = 32;
 pub(super) struct Cursor {
     /// Pose of B's body seen from A's, at the start.
     pub(super) rel: Pose,
+    /// What both bodies had deformed by at the start, metres. What is found later is of the vertices of then: it holds
+    /// for those of any other moment since the start when it is widened by what was deformed since the start.
+    pub(super) bent_m: f64,
     /// Sum of both bodies' `S - d` at the start.
     pub(super) credit_m: f64,
     /// Tick of the start.
@@ -58,6 +61,7 @@ impl Default for Cursor {
     fn default() -> Self {
         Self {
             rel: Pose::identity(),
+            bent_m: 0.0,
             credit_m: 0.0,
             tick: 0,
             goal: Goal::Verdict,
@@ -82,9 +86,15 @@ pub(super) enum Turn {
 }
 
 impl Cursor {
-    /// Starts over at a relative pose.
-    pub(super) fn start(&mut self, rel: Pose, credit_m: f64, tick: u64, goal: Goal) {
-        self.rel = rel;
+    /// Starts over at a relative pose, with bodies that have deformed so much.
+    pub(super) fn start(
+        &mut self,
+        (rel, bent_m): (Pose, f64),
+        credit_m: f64,
+        tick: u64,
+        goal: Goal,
+    ) {
+        (self.rel, self.bent_m) = (rel, bent_m);
         self.credit_m = credit_m;
         self.tick = tick;
         self.goal = goal;

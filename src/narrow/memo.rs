@@ -1,7 +1,7 @@
 //! What is remembered of a pair: its certificate, its verdict, its witness.
 
 use crate::ids::{BodySlot, PairSlot};
-use crate::math::{Interval, Point, Pose, Vec3, chord, displacement, relative};
+use crate::math::{Interval, Point, Pose, ROUND, Vec3, chord, displacement, relative};
 use crate::pairs::PairSet;
 use crate::shape::Geometry;
 use crate::wire::{NO_INDEX, Verdict};
@@ -40,6 +40,8 @@ pub(super) struct Memo {
     pub(super) gap: Interval,
     /// Sum of both bodies' `S - d` at the test, metres.
     pub(super) credit_m: f64,
+    /// Sum of what both bodies had deformed at the test, metres.
+    pub(super) bent_m: f64,
     /// Pose of B's body seen from A's at the test.
     pub(super) rel: Pose,
     /// Tick of the test's poses; 0: never tested, `gap` comes from the boxes.
@@ -105,6 +107,7 @@ impl Memo {
         Self {
             gap: Interval::UNKNOWN,
             credit_m: 0.0,
+            bent_m: 0.0,
             rel: Pose::identity(),
             tested: 0,
             finished: false,
@@ -167,11 +170,29 @@ pub(super) fn box_bounds(a: &Body, b: &Body) -> Interval {
     }
 }
 
-/// An upper bound on how much the gap of two bodies changed between two relative poses, metres.
+/// Sum of what two bodies have deformed since they were put, metres.
+pub(super) fn bent(a: &Body, b: &Body) -> f64 {
+    a.motion.bent_m + b.motion.bent_m
+}
+
+/// An upper bound on how much the gap of two bodies changed since a test, by their relative pose then and by how much
+/// they had deformed then, metres.
+pub(super) fn changed_since(a: &Body, b: &Body, (then, bent_m): (&Pose, f64), now: &Pose) -> f64 {
+    let sum_m = bent(a, b);
+    let moved_m = relative_motion(a, b, then, now);
+    if sum_m > bent_m {
+        moved_m + (sum_m - bent_m) + 4.0 * ROUND * (sum_m + moved_m)
+    } else {
+        moved_m
+    }
+}
+
+/// An upper bound on how much the gap of two bodies changed between two relative poses, metres; what they deformed by
+/// meanwhile comes on top.
 ///
 /// The displacement of the smaller body's surface seen from the other; for a half-space the change of the centre's
 /// height above its plane, plus what the relative turn adds.
-pub(super) fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f64 {
+fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f64 {
     if then == now {
         return 0.0;
     }
@@ -256,6 +277,7 @@ impl Narrow {
         *memo = Memo {
             gap: box_bounds(body_a, body_b),
             credit_m: body_a.motion.credit_m() + body_b.motion.credit_m(),
+            bent_m: bent(body_a, body_b),
             rel: relative(&body_a.pose, &body_b.pose),
             report_m: world.report_within(one, other),
             born: self.tick,

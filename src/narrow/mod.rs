@@ -28,6 +28,7 @@ mod memo;
 mod order;
 mod pool;
 mod query;
+mod refit;
 mod spend;
 mod sweep;
 mod widen;
@@ -53,6 +54,7 @@ use memo::{Hot, Memo};
 use mesh::{CarriedFront, FrontStore, Search};
 use order::Urgency;
 use pool::{NONE, Pool};
+use refit::Refits;
 use sweep::Sweeps;
 
 /// What the narrow phase did in this tick.
@@ -100,6 +102,7 @@ pub struct Narrow {
     found_store: Arena<Contact>,
     search: Search,
     sweeps: Sweeps,
+    refits: Refits,
     contact_sets: Pool<ContactSet>,
     /// What the order of work asks of each pair, by `PairSlot`.
     urgencies: Vec<Urgency>,
@@ -188,9 +191,18 @@ impl Narrow {
         }
     }
 
-    /// Spends the meter: what lies between the poses, verdicts, then what is listened to. Returns whether everything
-    /// asked for is done.
-    pub fn spend(&mut self, world: &World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
+    /// Spends the meter: boxes of meshes that deform, what lies between the poses, verdicts, then what is listened to.
+    /// Returns whether everything asked for is done.
+    ///
+    /// * `world` - nothing of it is changed but boxes in trees.
+    pub fn spend(&mut self, world: &mut World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
+        self.spend_on_refits(world, wanted, meter);
+        let done = self.spend_on_pairs(world, wanted, meter);
+        self.go_on_with_refits(world, meter);
+        done
+    }
+
+    fn spend_on_pairs(&mut self, world: &World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
         let half = self.has_sweeps().then(|| meter.half());
         let swept = self.spend_on_sweeps(world, wanted, meter, half);
         let decided = self.spend_on_verdicts(world, wanted, meter);
@@ -200,10 +212,11 @@ impl Narrow {
     }
 
     /// As [`Narrow::spend`], after the tick's findings were taken: what is found now is told in the next tick.
-    pub fn go_on(&mut self, world: &World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
+    pub fn go_on(&mut self, world: &mut World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
         if !std::mem::replace(&mut self.left_is_news, true) {
             self.left.clear();
         }
+        self.go_on_with_refits(world, meter);
         self.spend_on_verdicts(world, wanted, meter) && self.spend_on_reports(world, wanted, meter)
     }
 

@@ -8,7 +8,7 @@ use crate::world::{Body, World};
 
 use super::contacts::ContactSet;
 use super::cursor::{Cursor, Room, Turn};
-use super::memo::{Witness, relative_motion};
+use super::memo::{Witness, bent, changed_since};
 use super::mesh::{Goal, has_front};
 use super::order::{Order, RANK_NS};
 use super::query::{add_manifold, is_simple, retest, shape_gap, shape_pose, sound, witness_of};
@@ -216,6 +216,7 @@ impl Narrow {
         let witness = witness_of(&a.shapes[0], &b.shapes[0], &pos12, &closest, (0, 0));
         memo.rel = rel;
         memo.credit_m = a.motion.credit_m() + b.motion.credit_m();
+        memo.bent_m = bent(a, b);
         memo.tested = self.tick;
         memo.tight = closest.finished;
         let answer = Answer {
@@ -250,7 +251,8 @@ impl Narrow {
         };
         if fresh || (cursor.goal == Goal::Verdict && goal != Goal::Verdict) {
             let credit_m = a.motion.credit_m() + b.motion.credit_m();
-            cursor.start(relative(&a.pose, &b.pose), credit_m, self.tick, goal);
+            let rel = relative(&a.pose, &b.pose);
+            cursor.start((rel, bent(a, b)), credit_m, self.tick, goal);
         }
         let mut room = Room {
             fronts: &mut self.front_store,
@@ -264,13 +266,15 @@ impl Narrow {
             return Turn::Open;
         }
         // What was known before holds at this tick's poses; carried back to the cursor's, it loses the motion between.
-        let since = relative_motion(a, b, &cursor.rel, &relative(&a.pose, &b.pose));
+        let then = (&cursor.rel, cursor.bent_m);
+        let since = changed_since(a, b, then, &relative(&a.pose, &b.pose));
         let known_low = (memo.now.min - since).next_down();
         let whole =
             turn == Turn::Finished && !(cursor.goal == Goal::Verdict && cursor.gap.max <= 0.0);
         let low = if whole { cursor.gap.min } else { known_low };
         memo.rel = cursor.rel;
         memo.credit_m = cursor.credit_m;
+        memo.bent_m = cursor.bent_m;
         memo.tested = cursor.tick;
         memo.tight = whole && cursor.goal != Goal::Verdict;
         let answer = Answer {
@@ -333,6 +337,7 @@ impl Narrow {
         };
         memo.rel = rel;
         memo.credit_m = a.motion.credit_m() + b.motion.credit_m();
+        memo.bent_m = bent(a, b);
         memo.tested = self.tick;
         memo.finished = false;
         memo.tight = false;

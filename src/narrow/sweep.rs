@@ -25,7 +25,7 @@ use crate::time::{Meter, Share};
 use crate::world::{Body, World};
 
 use super::exact::Warm;
-use super::memo::{Memo, relative_motion};
+use super::memo::{Memo, changed_since};
 use super::order::Order;
 use super::{NONE, Narrow, Wanted};
 
@@ -248,7 +248,7 @@ impl Sweep {
             warm: memo.warm,
         };
         let start = Moment::of((a, b), 0.0);
-        let change = relative_motion(a, b, &memo.rel, &start.rel);
+        let change = changed_since(a, b, (&memo.rel, memo.bent_m), &start.rel);
         let touching = change == 0.0 && memo.finished && memo.gap.contains(0.0);
         if start.certain && (touching || memo.gap.max + change <= 0.0) {
             (sweep.hit, sweep.done) = (0.0, true);

@@ -6,7 +6,7 @@ use crate::pairs::PairSet;
 use crate::wire::{BodyStatus, Verdict};
 use crate::world::World;
 
-use super::memo::{closing, relative_motion};
+use super::memo::{changed_since, closing};
 use super::{NONE, Narrow};
 
 impl Narrow {
@@ -123,7 +123,7 @@ impl Narrow {
             // Rounded up by what the sums of long paths may have lost, not by an ulp of their small difference.
             (spent - memo.credit_m) + 4.0 * ROUND * (spent.abs() + memo.credit_m.abs())
         };
-        let by_pose = relative_motion(a, b, &memo.rel, &rel);
+        let by_pose = changed_since(a, b, (&memo.rel, memo.bent_m), &rel);
         let motion_m = by_path.min(by_pose).max(0.0);
         memo.rest = motion_m == 0.0;
         memo.widened_m = motion_m + reach_m;

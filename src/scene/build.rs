@@ -53,7 +53,12 @@ impl Scene {
                         spoken.insert(address, (prefix, built.warnings, 0));
                     }
                 }
-                shapes.push(built.shape);
+                shapes.push(if body.deforms {
+                    let own = built.shape.to_deforming();
+                    Arc::new(own.map_err(|error| self.shape_error(place, nth, &error))?)
+                } else {
+                    built.shape
+                });
             }
             all.shapes.push(shapes);
             progress(place + 1, self.bodies.len());

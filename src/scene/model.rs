@@ -59,6 +59,8 @@ pub struct BodySpec {
     pub pose: Pose,
     /// Whether frames may move it. A body that moves is not known before its first pose.
     pub moves: bool,
+    /// Whether its source sends vertices of its one triangle mesh.
+    pub deforms: bool,
     /// Whether it is swept between its last two poses.
     pub continuous: bool,
     /// A longer step of its centre between two frames is a teleport, which is not swept, metres; `None`: no step is.

@@ -3,10 +3,12 @@
 use crate::config::OnStale;
 use crate::ids::BodyId;
 use crate::limits::{EXTENT_MAX_M, EXTENT_MIN_M, PRIORITY_MAX, PRIORITY_MIN, SHAPES_PER_BODY_MAX};
+use crate::math::Pose;
 use crate::scene::node::{Fault, Node, Value};
 use crate::scene::read_shape::{read_pose, read_shape};
 use crate::scene::table::{Table, shortened};
 use crate::scene::{BodySpec, PlacedSpec};
+use crate::shape::ShapeSpec;
 
 /// Longest name of a body, bytes: what a row of `names` holds.
 pub const BODY_NAME_BYTES_MAX: usize = 104;
@@ -45,6 +47,7 @@ const KEYS: &[&str] = &[
     "position",
     "orientation",
     "moves",
+    "deforms",
     "continuous",
     "teleport_m",
     "source",
@@ -77,6 +80,7 @@ pub(crate) fn title(node: &Node, nth: usize) -> String {
 pub(crate) fn read_body(node: Node, blobs: Option<&[u8]>) -> Result<BodyDraft, Fault> {
     let at = node.at;
     let mut table = Table::open(node, "a body", KEYS)?;
+    let deforms_at = table.at("deforms");
     let mut places = Places {
         name: table.at("name"),
         id: table.at("id"),
@@ -109,6 +113,7 @@ pub(crate) fn read_body(node: Node, blobs: Option<&[u8]>) -> Result<BodyDraft, F
         id: BodyId(id),
         pose,
         moves,
+        deforms: table.flag("deforms")?.unwrap_or(false),
         continuous: table.flag("continuous")?.unwrap_or(false),
         teleport_m: table.number_within("teleport_m", EXTENT_MIN_M, EXTENT_MAX_M)?,
         source: None,
@@ -130,11 +135,43 @@ pub(crate) fn read_body(node: Node, blobs: Option<&[u8]>) -> Result<BodyDraft, F
         enabled: table.flag("enabled")?.unwrap_or(true),
         shapes: read_shapes(&mut table, at, blobs, &mut places)?,
     };
+    check_deforms(&spec).map_err(|text| Fault::new(deforms_at, text))?;
     Ok(BodyDraft {
         spec,
         source,
         places,
     })
+}
+
+/// What a body that deforms cannot be beside.
+fn check_deforms(spec: &BodySpec) -> Result<(), &'static str> {
+    if !spec.deforms {
+        return Ok(());
+    }
+    match spec.shapes.as_slice() {
+        [one] if !matches!(one.shape, ShapeSpec::Trimesh { .. }) => Err(
+            "deforms = true is for a body whose shape is a trimesh: give one, or remove `deforms`",
+        ),
+        [one] if one.pose != Pose::identity() => Err(
+            "deforms = true, and its shape has a position or orientation: vertices are in the body's frame, remove it",
+        ),
+        [_] => Ok(()),
+        _ => Err("deforms = true is for a body of one shape: split it into several bodies"),
+    }?;
+    if !spec.moves {
+        return Err("deforms = true, but nobody may move it: remove moves = false");
+    }
+    if spec.continuous {
+        return Err(
+            "deforms = true and continuous = true: a body that deforms is not swept, let what meets it be continuous",
+        );
+    }
+    if spec.attached_to.is_some() {
+        return Err(
+            "deforms = true and attached_to: its source sends its vertices, so it hangs on no other; remove one",
+        );
+    }
+    Ok(())
 }
 
 fn read_on_stale(table: &mut Table) -> Result<Option<OnStale>, Fault> {

@@ -4,16 +4,20 @@
 //! warnings that `check` shows.
 
 mod adjacency;
+mod deform;
 mod inside;
 mod normals;
 mod obb;
 mod outline;
+mod places;
 mod predicates;
 mod seams;
 mod topology;
 mod tree;
 mod turn;
 
+use deform::Deform;
+pub(crate) use deform::{NoVertex, can_be_vertices};
 pub(crate) use inside::Inside;
 pub(crate) use normals::Cone;
 use obb::ObbTree;
@@ -35,7 +39,7 @@ use crate::shape::ShapeError;
 const OUTLINE_VERTICES_MIN: usize = 24;
 
 /// Triangles in their own frame: a solid when they are closed and face consistently, else a surface.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Mesh {
     vertices: Vec<Point>,
     faces: Vec<[u32; 3]>,
@@ -52,9 +56,12 @@ pub struct Mesh {
     normals: Box<Normals>,
     /// None for a small mesh, whose vertices are walked.
     outline: Option<Outline>,
+    /// Its box; of one that deforms it holds the vertices that no face names, too.
     bounds: Aabb,
     centre: Point,
     radius: f64,
+    /// None for a rigid mesh. Then there is neither a tree beside `obb` nor an outline.
+    deform: Option<Box<Deform>>,
 }
 
 impl Mesh {
@@ -103,6 +110,7 @@ impl Mesh {
             tree,
             bounds,
             centre,
+            deform: None,
         };
         if solid {
             mesh.turn_shells(&topology);
@@ -192,6 +200,9 @@ impl Mesh {
 
     /// Upper bounds, but for rounding, on how far it reaches from its centre along a unit direction and against it.
     pub(crate) fn extent(&self, direction: &Vec3) -> [f64; 2] {
+        if self.is_deforming() {
+            return self.extent_of_bounds(direction);
+        }
         let Some(outline) = &self.outline else {
             let named = self.faces.iter().flatten();
             return named.fold([f64::NEG_INFINITY; 2], |[up, down], &v| {
@@ -207,17 +218,18 @@ impl Mesh {
     ///
     /// Cost: one path down the tree.
     pub(crate) fn outlying(&self, direction: &Vec3) -> Point {
-        let nodes = self.tree.nodes();
         let mut place = 0;
         loop {
-            match nodes[place as usize].below(place) {
-                Below::Nodes(left, right) => {
-                    let reach = |i: u32| nodes[i as usize].reach(direction);
-                    place = if reach(left) >= reach(right) {
-                        left
-                    } else {
-                        right
-                    };
+            match self.below(place) {
+                Below::Nodes(..) | Below::Row(..) => {
+                    let mut best = (f64::NEG_INFINITY, place);
+                    self.each_below(place, |child| {
+                        let reach = self.node(child).reach(direction);
+                        if reach > best.0 {
+                            best = (reach, child);
+                        }
+                    });
+                    place = best.1;
                 }
                 Below::Triangle(face) => {
                     let [a, b, c] = self.triangle(face);
@@ -229,7 +241,7 @@ impl Mesh {
         }
     }
 
-    /// The tree over its triangles.
+    /// The tree over the triangles of a rigid mesh, for the twin of the fronts; see [`Mesh::node`].
     pub(crate) fn tree(&self) -> &Tree {
         &self.tree
     }

@@ -5,6 +5,7 @@
 mod build;
 mod check;
 mod convex;
+mod deform;
 mod error;
 mod height_field;
 mod library;
@@ -20,14 +21,15 @@ pub use library::Library;
 pub(crate) use load::find_mesh;
 pub use mesh::Mesh;
 pub(crate) use mesh::{
-    Below, BoxId, Cone, Held, Inside, NODES_WAITING_MAX, Node, Obb, ObbPack, side,
+    Below, BoxId, Cone, Held, Inside, NODES_WAITING_MAX, NoVertex, Node, Obb, ObbPack,
+    can_be_vertices, side,
 };
 pub use spec::ShapeSpec;
 
 use crate::math::{Aabb, Point, Pose, Vec3};
 
-/// A built shape, immutable and shared between bodies.
-#[derive(Debug)]
+/// A built shape, immutable and shared between bodies; one that deforms belongs to one body alone.
+#[derive(Clone, Debug)]
 pub struct Shape {
     /// What it is.
     pub geometry: Geometry,
@@ -40,7 +42,7 @@ pub struct Shape {
 }
 
 /// The kinds of geometry that the narrow phase tells apart.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub enum Geometry {
     /// A convex solid, or a triangle.
     Convex(Convex),

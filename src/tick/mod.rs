@@ -185,6 +185,9 @@ impl Engine {
         for frame in input.inbox.frames() {
             self.world.admit(frame, now_ns);
         }
+        for vertices in input.inbox.vertices() {
+            self.world.admit_vertices(vertices, now_ns);
+        }
         // After its last frames: a client that leaves has still said where its bodies are.
         for &session in input.inbox.ended() {
             self.world.end_session(session);
@@ -290,7 +293,7 @@ impl Engine {
             self.config.heartbeat_ns,
             &mut beat,
         );
-        let done = self.narrow.spend(&self.world, wanted, &mut meter);
+        let done = self.narrow.spend(&mut self.world, wanted, &mut meter);
         let units = meter.spent();
         let open = end_ns.filter(|_| !done && budget.units.is_none());
         self.rest.open = open.map(|end_ns| (wanted, end_ns));

@@ -11,7 +11,7 @@
 
 mod held;
 
-use held::{Held, Queue};
+use held::{Held, Queue, Vertices};
 
 use crate::config::{Config, Mode};
 use crate::error::{Error, Result};
@@ -66,6 +66,7 @@ pub struct Pacer {
     heartbeat_ns: u64,
     sources: Vec<Source>,
     queue: Queue,
+    vertices: Vertices,
     /// Sessions that ended, until the last of their frames is handed out.
     ended: Vec<u64>,
     passed_of_none: u64,
@@ -94,6 +95,7 @@ impl Pacer {
             heartbeat_ns: config.heartbeat_ns.max(1),
             sources: sources.iter().map(source).collect(),
             queue: Queue::default(),
+            vertices: Vertices::default(),
             ended: Vec::new(),
             passed_of_none: 0,
             last_tick_ns: None,
@@ -143,6 +145,11 @@ impl Pacer {
                 None => self.passed_of_none += passed,
             }
         }
+        for frame in inbox.vertices_mut() {
+            let name = name_str(&frame.header.source).map(name_bytes);
+            let place = self.sources.iter().position(|s| Some(s.name) == name);
+            self.vertices.put(frame, place);
+        }
         for &session in inbox.ended() {
             self.ended.push(session);
             for source in self.sources.iter_mut().filter(|s| s.session == session) {
@@ -179,6 +186,11 @@ impl Pacer {
                 ages_only: on_frame,
             })
         })?;
+        let lead = match self.beat {
+            Beat::OnFrame(lead) => Some(lead),
+            _ => None,
+        };
+        self.vertices.take(into, lead);
         self.hand_over_ended(into);
         self.last_tick_ns = Some(now_ns);
         Some(due)
@@ -312,6 +324,7 @@ impl Pacer {
         self.ended.retain(|&session| {
             let waits = waiting.iter().any(|h| h.frame.header.session == session);
             if !waits {
+                self.vertices.forget(session);
                 into.end_session(session);
             }
             waits

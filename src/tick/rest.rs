@@ -36,7 +36,7 @@ impl Engine {
         }
         let stop_ns = start_ns + left_ns.min(slice_ns);
         let mut meter = Meter::new(self.clock.as_ref(), Some(stop_ns), None);
-        let done = self.narrow.go_on(&self.world, wanted, &mut meter);
+        let done = self.narrow.go_on(&mut self.world, wanted, &mut meter);
         self.rest.units += meter.spent();
         self.rest.spent_ns += self.clock.monotonic_ns().saturating_sub(start_ns);
         let more = !done && left_ns > slice_ns;

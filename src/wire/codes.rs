@@ -78,7 +78,7 @@ code! {
         Held = 2 => "held",
         /// A too old body was taken out of the scene by request.
         RemovedByAge = 3 => "removed_by_age",
-        /// A body's newest pose was refused.
+        /// A body's newest pose or vertices were refused.
         Rejected = 4 => "rejected",
         /// Rows or pairs did not fit.
         Truncated = 5 => "truncated",
@@ -169,7 +169,7 @@ code! {
         BadLayout = 9 => "bad_layout",
         /// The same body twice in one frame.
         Duplicate = 10 => "duplicate",
-        /// The body takes its pose from another (`attach`), or cannot move.
+        /// The body takes its pose from another (`attach`), or cannot move; or vertices of one that does not deform.
         NotSteerable = 11 => "not_steerable",
         /// Frames that waited while the daemon was silent too long, without `sent_ns`.
         TooOld = 12 => "too_old",
@@ -177,6 +177,8 @@ code! {
         OverLimit = 13 => "over_limit",
         /// A chain of ROS 2 frames from the body to the scene's frame that has a loop, or stamps too far apart.
         BadChain = 14 => "bad_chain",
+        /// A range of vertices that does not follow on the version the body has, or comes after refused ones.
+        VertexVersion = 15 => "vertex_version",
     }
 }
 
@@ -185,9 +187,9 @@ code! {
     BodyStatus {
         /// Its newest pose is admitted and young enough, or it cannot move.
         Known = 0 => "known",
-        /// It moves, and no pose was admitted in this boot (or since a reset).
+        /// It moves, and no pose was admitted in this boot (or since a reset); or it deforms, and no vertices were.
         NotReceived = 1 => "not_received",
-        /// Its newest pose was refused.
+        /// Its newest pose or vertices were refused.
         Rejected = 2 => "rejected",
         /// Too old; its pairs are `possible` within reach.
         Stale = 3 => "stale",
@@ -256,6 +258,14 @@ pub mod frame_flags {
     pub const PAUSED: u32 = 4;
 }
 
+/// `VertexHeader::flags`; exactly one of the two.
+pub mod vertex_flags {
+    /// Holds every vertex of the mesh.
+    pub const FULL: u32 = 1;
+    /// Holds a range of them, applied to `base_version`.
+    pub const RANGE: u32 = 2;
+}
+
 /// Bits of `PairRow::flags`.
 pub mod pair_flags {
     /// Finished, and 0 lies inside the rounding interval: touching counts as colliding.
@@ -317,6 +327,6 @@ mod tests {
     fn a_number_without_meaning_is_no_code() {
         assert_eq!(Verdict::from_code(4), Some(Verdict::Colliding));
         assert_eq!(Verdict::from_code(5), None);
-        assert_eq!(RejectReason::ALL.len(), 15);
+        assert_eq!(RejectReason::ALL.len(), 16);
     }
 }

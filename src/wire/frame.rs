@@ -2,6 +2,7 @@
 
 use super::codes::RejectReason;
 use super::rows::{FrameHeader, SOURCE_NAME_LEN, TransformRow, TransformVelRow};
+use super::vertices::{VertexFrame, VertexFrames};
 
 /// One batch of transforms from one source, copied out of the transport, not yet checked.
 #[derive(Clone, Debug, Default)]
@@ -49,6 +50,7 @@ impl Frame {
 pub struct Inbox {
     frames: Vec<Frame>,
     len: usize,
+    vertices: VertexFrames,
     ended: Vec<u64>,
 }
 
@@ -82,6 +84,22 @@ impl Inbox {
         &mut self.frames[..self.len]
     }
 
+    /// An emptied vertex frame at the end, to be filled.
+    pub fn push_vertices(&mut self) -> &mut VertexFrame {
+        self.vertices.push()
+    }
+
+    /// The vertex frames, oldest first; admitted after the frames.
+    #[must_use]
+    pub fn vertices(&self) -> &[VertexFrame] {
+        self.vertices.all()
+    }
+
+    /// As [`Inbox::frames_mut`].
+    pub fn vertices_mut(&mut self) -> &mut [VertexFrame] {
+        self.vertices.all_mut()
+    }
+
     /// Notes that the node behind a session is gone: the session is over.
     pub fn end_session(&mut self, session: u64) {
         self.ended.push(session);
@@ -96,13 +114,14 @@ impl Inbox {
     /// Forgets the frames and ended sessions, keeps their memory.
     pub fn clear(&mut self) {
         self.len = 0;
+        self.vertices.clear();
         self.ended.clear();
     }
 
-    /// Whether there is neither a frame nor an ended session.
+    /// Whether there is neither a frame, nor vertices, nor an ended session.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.len == 0 && self.ended.is_empty()
+        self.len == 0 && self.vertices.all().is_empty() && self.ended.is_empty()
     }
 }
 

@@ -10,10 +10,11 @@ mod request;
 #[cfg(feature = "ros2")]
 pub mod ros;
 mod rows;
+mod vertices;
 
 pub use codes::{
     BodyStatus, ContactKind, EndCause, Event, Level, Reason, RejectReason, Stage, State, TickCause,
-    Verdict, contact_flags, frame_flags, pair_flags, region_flags,
+    Verdict, contact_flags, frame_flags, pair_flags, region_flags, vertex_flags,
 };
 pub use frame::{Frame, Inbox, name_bytes, name_str};
 pub use outbox::{Demand, Outbox};
@@ -24,6 +25,7 @@ pub use rows::{
     REJECTS_LEN, SOURCE_NAME_LEN, SOURCES_MAX, STAGES_LEN, SourceRow, TickRow, TransformRow,
     TransformVelRow,
 };
+pub use vertices::{VertexFrame, VertexHeader, VertexRow};
 
 /// Version of every layout here; it stands in service names and type names, and in each header.
 pub const WIRE_VERSION: u32 = 1;

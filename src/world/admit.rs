@@ -241,6 +241,9 @@ impl World {
         if let Some(body) = self.bodies[slot.index()].as_mut() {
             body.since_ns = None;
             body.reject = None;
+            if let Some(vertices) = body.vertices.as_mut() {
+                vertices.forget();
+            }
             body.velocity = None;
         }
         if let Some(hot) = self.hot(slot) {

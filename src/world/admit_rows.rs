@@ -149,7 +149,7 @@ impl World {
         let Some(body) = self.bodies[slot.index()].as_mut() else {
             return moved;
         };
-        body.reject = None;
+        body.reject = body.vertices.as_ref().and_then(|v| v.refused);
         let known = body.status == BodyStatus::Known && body.in_broad;
         if known && young && !moved {
             // The common case of a world at rest: nothing but the age is new.

@@ -8,6 +8,7 @@ use crate::math::{Aabb, Point, Pose, displacement};
 use crate::shape::Shape;
 use crate::wire::{BodyStatus, EndCause, RejectReason};
 
+use super::bend::Vertices;
 use super::path::Path;
 
 /// A shape at its place in a body.
@@ -46,6 +47,8 @@ pub struct Body {
     pub motion: Motion,
     /// Its way since the last tick, where it is continuous or a continuous body hangs on it.
     pub path: Option<Box<Path>>,
+    /// What is known of its vertices, where it deforms: then its one shape is its own.
+    pub vertices: Option<Box<Vertices>>,
     /// Tight box at `pose` (of a continuous body: around its way), widened by `report_within_m` and `reach_m`: its
     /// proxy.
     pub proxy: Aabb,
@@ -54,7 +57,7 @@ pub struct Body {
     /// How far any of its surface points may be from where `pose` puts it, metres: 0 for a known body, infinite for
     /// an unknown one whose speed is not bounded.
     pub reach_m: f64,
-    /// Why its newest pose was refused, when it was.
+    /// Why its newest pose or vertices were refused, when they were.
     pub reject: Option<RejectReason>,
     /// The source that may move it.
     pub source: Option<SourceSlot>,
@@ -84,8 +87,10 @@ pub struct Body {
 pub struct Motion {
     /// Pose from which `offset_m` is measured.
     pub anchor: Pose,
-    /// `S`: length of the path over all anchors, metres, rounded up.
+    /// `S`: length of the path over all anchors, and all that it was deformed by, metres, rounded up.
     pub path_m: f64,
+    /// The largest displacement of a vertex, summed over all updates, metres, rounded up.
+    pub bent_m: f64,
     /// `d`: bound on the displacement of any surface point from the anchor, metres, rounded up.
     pub offset_m: f64,
 }
@@ -97,6 +102,7 @@ impl Motion {
         Self {
             anchor: *pose,
             path_m: 0.0,
+            bent_m: 0.0,
             offset_m: 0.0,
         }
     }
@@ -109,6 +115,20 @@ impl Motion {
             self.anchor = *pose;
             self.offset_m = 0.0;
         }
+    }
+
+    /// Takes vertices none of which went farther than `step_m`.
+    ///
+    /// The sum, not the displacement since some moment: what went 1 cm there and back has been there. It is in `S` and
+    /// not in `d`, where every test would pay for it twice.
+    ///
+    /// * `radius` - with the new vertices.
+    pub fn bend(&mut self, step_m: f64, pose: &Pose, centre: &Point, radius: f64) {
+        if step_m > 0.0 {
+            self.path_m = (self.path_m + step_m).next_up();
+            self.bent_m = (self.bent_m + step_m).next_up();
+        }
+        self.offset_m = displacement(&self.anchor, pose, centre, radius);
     }
 
     /// Takes a new anchor at the pose last moved to: for a body that enters the broad phase, whose certificates are yet

@@ -209,6 +209,9 @@ impl World {
             self.order.insert(at, (id, slot));
         }
         self.bodies[slot.index()] = Some(body);
+        if spec.deforms {
+            self.deforming.push(slot);
+        }
         self.names_changed = true;
         self.settle(slot, true);
         true
@@ -230,9 +233,15 @@ impl World {
             **old == *spec
         };
         // A file may have changed under the same name.
+        let measures = |placed: &PlacedShape| match &body.vertices {
+            // As it was put: what its sender made of it since is no other shape.
+            Some(vertices) => vertices.rest,
+            None => (placed.shape.aabb, placed.shape.radius),
+        };
         let same_shapes = body.shapes.len() == shapes.len()
             && body.shapes.iter().zip(shapes).all(|(a, b)| {
-                a.shape.aabb == b.shape.aabb && a.shape.radius.to_bits() == b.shape.radius.to_bits()
+                let (aabb, radius) = measures(a);
+                aabb == b.shape.aabb && radius.to_bits() == b.shape.radius.to_bits()
             });
         !entry.edited && same_words && same_shapes
     }
@@ -264,6 +273,7 @@ impl World {
         }
         self.growing.retain(|&other| other != slot);
         self.travelled.retain(|&other| other != slot);
+        self.deforming.retain(|&other| other != slot);
         self.entries[slot.index()] = Entry::gone(slot);
         self.filters.bodies[slot.index()] = Hot::GONE;
         self.ages.set(slot, None, None);

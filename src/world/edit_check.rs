@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 
 use super::World;
+use super::body::PlacedShape;
 use super::edit::Edit;
 use super::edit_rules::is_rule_of;
 use super::rules::sides_of;
@@ -70,7 +71,10 @@ impl World {
 impl<'a> Draft<'a> {
     fn look_at(&mut self, edit: &'a Edit) -> Result<(), String> {
         match edit {
-            Edit::Put { body, shapes } => self.look_at_put(body, shapes.len()),
+            Edit::Put { body, shapes } => {
+                bends_as_said(body, shapes)?;
+                self.look_at_put(body, shapes.len())
+            }
             Edit::Remove { name } => {
                 self.must_have(name)?;
                 self.bodies.insert(name, None);
@@ -257,6 +261,11 @@ impl<'a> Draft<'a> {
         // What this request puts has no place of its own yet but its start pose.
         let placed = |name: &str| self.bodies.contains_key(name) || self.world.is_placed(name);
         match to {
+            Some(_) if self.deforms(name) => {
+                return Err(format!(
+                    "body `{name}` deforms: its source says where its vertices are, so it cannot hang on another"
+                ));
+            }
             Some(to) => {
                 self.must_have(to)?;
                 if pose.is_none() && !(placed(name) && placed(to)) {
@@ -292,6 +301,12 @@ impl<'a> Draft<'a> {
             return Err(format!("it is not known where `{name}` is: give `pose`"));
         }
         Ok(())
+    }
+
+    fn deforms(&self, name: &str) -> bool {
+        let slot = self.world.slot_named(name);
+        let body = slot.and_then(|slot| self.world.body(slot));
+        body.is_some_and(|body| body.vertices.is_some())
     }
 
     /// After the last edit: parents and attachments are there, and none hangs on itself.
@@ -339,4 +354,23 @@ impl<'a> Draft<'a> {
         let (to, _) = self.world.entries[slot.index()].attach?;
         Some(&self.world.names.get(to).text)
     }
+}
+
+/// Whether shapes that deform belong to a body that says so, and it can.
+fn bends_as_said(spec: &BodySpec, shapes: &[PlacedShape]) -> Result<(), String> {
+    let wrong = |what: &str| Err(format!("body `{}`: {what}", spec.name));
+    let bending = shapes.iter().filter(|p| p.shape.is_deforming()).count();
+    if !spec.deforms {
+        return match bending {
+            0 => Ok(()),
+            _ => wrong("it has a shape that deforms: write deforms = true"),
+        };
+    }
+    if (bending, shapes.len()) != (1, 1) || shapes[0].pose != Pose::identity() {
+        return wrong("it deforms: give one triangle mesh without a pose of its own");
+    }
+    if !spec.moves || spec.attached_to.is_some() || spec.continuous {
+        return wrong("it deforms: it moves, is not continuous and hangs on no other");
+    }
+    Ok(())
 }

@@ -9,6 +9,7 @@
 mod admit;
 mod admit_rows;
 mod age;
+mod bend;
 mod body;
 mod census;
 mod edit;
@@ -29,6 +30,7 @@ mod validate;
 use std::sync::Arc;
 
 pub use admit::Admission;
+pub use bend::Vertices;
 pub use body::{Body, ChangeSet, Motion, PlacedShape, Removed};
 pub use edit::{Applied, Edit};
 pub use filters::{Because, Filters};
@@ -87,6 +89,8 @@ pub struct World {
     growing: Vec<BodySlot>,
     /// Bodies whose path has legs.
     travelled: Vec<BodySlot>,
+    /// Bodies that deform.
+    deforming: Vec<BodySlot>,
     lists: Lists,
     rejects: [u64; REJECTS_LEN],
     by_status: [u64; BodyStatus::ALL.len()],
@@ -177,6 +181,7 @@ impl World {
             attached: Vec::new(),
             growing: Vec::new(),
             travelled: Vec::new(),
+            deforming: Vec::new(),
             lists: Lists::default(),
             rejects: [0; REJECTS_LEN],
             by_status: [0; BodyStatus::ALL.len()],

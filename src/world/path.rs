@@ -169,6 +169,16 @@ impl Path {
         wider
     }
 
+    /// Takes the box of other vertices at the newest pose.
+    pub(super) fn take_end(&mut self, end: Aabb) {
+        self.end = end;
+        self.hull = if self.is_empty() {
+            end
+        } else {
+            self.hull.merged(&end)
+        };
+    }
+
     /// The box at the newest pose.
     pub(super) fn end(&self) -> &Aabb {
         &self.end

@@ -5,6 +5,7 @@
 use std::sync::Arc;
 
 use super::World;
+use super::bend::Vertices;
 use super::body::{Body, Motion, PlacedShape};
 use super::filters::{Hot, KEEPS};
 use super::names::NameId;
@@ -85,13 +86,14 @@ impl World {
     pub(super) fn judge(&self, slot: BodySlot, body: &Body) -> Judgement {
         let entry = &self.entries[slot.index()];
         let root = &self.entries[entry.root.index()];
+        let has_vertices = body.vertices.as_ref().is_none_or(|v| v.version.is_some());
         let (status, reach_m) = if !entry.enabled {
             (BodyStatus::Disabled, 0.0)
         } else if !body.moves {
             (BodyStatus::Known, 0.0)
-        } else if root.refused {
+        } else if root.refused || body.vertices.as_ref().is_some_and(|v| v.refused.is_some()) {
             (BodyStatus::Rejected, f64::INFINITY)
-        } else if !root.has_pose {
+        } else if !(root.has_pose && has_vertices) {
             (BodyStatus::NotReceived, f64::INFINITY)
         } else {
             self.judge_age(body, entry.root)
@@ -99,7 +101,7 @@ impl World {
         let in_broad = match status {
             BodyStatus::Known | BodyStatus::Stale | BodyStatus::Held => true,
             // Its last good pose is kept; without one there is nothing to keep.
-            BodyStatus::Rejected => root.has_pose,
+            BodyStatus::Rejected => root.has_pose && has_vertices,
             _ => false,
         };
         Judgement {
@@ -299,6 +301,8 @@ pub(super) fn new_body(
         path.restart(tight);
         Box::new(path)
     });
+    let bends = shapes.first().filter(|_| spec.deforms);
+    let vertices = bends.map(|placed| Box::new(Vertices::of(&placed.shape)));
     let body = Body {
         id: spec.id,
         name: spec.name.clone(),
@@ -312,6 +316,7 @@ pub(super) fn new_body(
         radius,
         motion: Motion::at(&spec.pose),
         path,
+        vertices,
         proxy: tight.widened(spec.report_within_m),
         // Settled right after; until then it counts as what it is before anything is known.
         status: BodyStatus::NotReceived,

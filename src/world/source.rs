@@ -7,7 +7,9 @@ use super::body::Body;
 use crate::ids::{BodySlot, SourceSlot};
 use crate::limits::SESSIONS_OVER_MAX;
 use crate::scene::SourceSpec;
-use crate::wire::{Frame, FrameHeader, RejectReason, SourceRow, frame_flags, name_bytes};
+use crate::wire::{
+    Frame, FrameHeader, RejectReason, SourceRow, VertexHeader, frame_flags, name_bytes,
+};
 
 /// A source as the world knows it.
 #[derive(Clone, Debug)]
@@ -197,6 +199,33 @@ pub(super) fn stand(
             Standing::Afresh
         }
     }
+}
+
+/// As [`stand`], for what comes beside frames: of the session in force it is taken in any order.
+///
+/// A new session or epoch may show itself here first; the frame that follows then finds it in force.
+pub(super) fn stand_beside(
+    source: &mut SourceState,
+    slot: SourceSlot,
+    over: &mut SessionsOver,
+    header: &VertexHeader,
+    received_ns: u64,
+) -> Standing {
+    let epoch = source.order.map(|(epoch, _)| epoch);
+    let in_force = header.session == source.session;
+    if in_force && epoch == Some(header.epoch) {
+        source.heard_ns = source.heard_ns.max(received_ns);
+        return Standing::Next;
+    }
+    if in_force && epoch.is_some_and(|epoch| header.epoch < epoch) {
+        return Standing::Refused(RejectReason::OldFrame);
+    }
+    let first = FrameHeader {
+        session: header.session,
+        epoch: header.epoch,
+        ..FrameHeader::default()
+    };
+    stand(source, slot, over, &first, received_ns)
 }
 
 /// Whether a source may move a body.

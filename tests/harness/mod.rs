@@ -20,10 +20,10 @@ use sweepd::shape::Geometry;
 use sweepd::tick::{Engine, TickInput};
 use sweepd::time::{Budget, Clock, ManualClock};
 use sweepd::wire::{
-    Demand, FrameHeader, Inbox, Outbox, TickCause, TransformRow, WIRE_VERSION, frame_flags,
-    name_bytes,
+    Demand, FrameHeader, Inbox, Outbox, TickCause, TransformRow, VertexHeader, WIRE_VERSION,
+    frame_flags, name_bytes, vertex_flags,
 };
-use sweepd::world::Body;
+use sweepd::world::{Body, PlacedShape};
 
 /// Nanoseconds between two frames.
 pub const FRAME_NS: u64 = 10_000_000;
@@ -38,6 +38,8 @@ pub struct Drive {
     source: String,
     seq: u64,
     out: Outbox,
+    /// Bodies that deform, with their vertices at rest.
+    bending: Vec<(u64, Vec<[f32; 3]>)>,
 }
 
 impl Drive {
@@ -51,6 +53,7 @@ impl Drive {
     pub fn of(scene: &Scene, pattern: Pattern, seed: u64) -> Self {
         let clock = Arc::new(ManualClock::new(1_000_000_000));
         let shapes = build_shapes(scene).unwrap();
+        let bending = bending(scene, &shapes.bodies);
         let engine = Engine::new(
             scene,
             shapes.bodies,
@@ -87,6 +90,7 @@ impl Drive {
             source,
             seq: 0,
             out,
+            bending,
         }
     }
 
@@ -161,6 +165,32 @@ impl Drive {
         };
         frame.received_ns = self.clock.boottime_ns();
         frame.set_transforms(&self.rows);
+        self.bend();
+    }
+
+    /// A wave goes through the meshes that deform.
+    fn bend(&mut self) {
+        #[allow(clippy::cast_precision_loss, reason = "small counts")]
+        let phase = (self.seq % 150) as f32 * (std::f32::consts::TAU / 150.0);
+        for (body, rest) in &self.bending {
+            let frame = self.inbox.push_vertices();
+            let count = u32::try_from(rest.len()).unwrap();
+            frame.header = VertexHeader {
+                session: 11,
+                epoch: 1,
+                seq: self.seq,
+                body: *body,
+                version: self.seq,
+                source: name_bytes(&self.source),
+                count,
+                total: count,
+                flags: vertex_flags::FULL,
+                schema: WIRE_VERSION,
+                ..VertexHeader::default()
+            };
+            let wave = |&[x, y, z]: &[f32; 3]| [x, y, z + 0.05 * (5.0 * x + phase).sin()];
+            frame.rows.extend(rest.iter().map(wave));
+        }
     }
 
     /// Runs a tick without a frame.
@@ -204,6 +234,24 @@ impl Drive {
     pub fn rows_mut(&mut self) -> &mut Vec<TransformRow> {
         &mut self.rows
     }
+}
+
+/// Bodies that deform, with their vertices as the scene has them.
+fn bending(scene: &Scene, shapes: &[Arc<[PlacedShape]>]) -> Vec<(u64, Vec<[f32; 3]>)> {
+    let bodies = scene.bodies.iter().zip(shapes);
+    let bent = bodies.filter(|(body, _)| body.deforms);
+    bent.map(|(body, placed)| {
+        let Geometry::Mesh(mesh) = &placed[0].shape.geometry else {
+            panic!("a mesh")
+        };
+        #[allow(clippy::cast_possible_truncation, reason = "they are f32")]
+        let rows = mesh
+            .vertices()
+            .iter()
+            .map(|v| [v.x as f32, v.y as f32, v.z as f32]);
+        (body.id.0, rows.collect())
+    })
+    .collect()
 }
 
 /// The gap of two bodies of one convex shape or half-space each, by a cold exact query.

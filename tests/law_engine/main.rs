@@ -26,3 +26,4 @@ mod schedule;
 mod shapes;
 mod state;
 mod verdicts;
+mod vertices;

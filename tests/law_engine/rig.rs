@@ -10,8 +10,8 @@ use sweepd::scene::{PairAction, PairRule, Scene};
 use sweepd::tick::{EditBatch, Engine, TickInput};
 use sweepd::time::{Budget, Clock, ManualClock};
 use sweepd::wire::{
-    Demand, Event, FrameHeader, Inbox, Outbox, PairRow, Reason, State, TickCause, TransformRow,
-    Verdict, WIRE_VERSION, frame_flags, name_bytes, pair_flags,
+    Demand, Event, FrameHeader, Inbox, Outbox, PairRow, Reason, RejectReason, State, TickCause,
+    TransformRow, Verdict, VertexFrame, WIRE_VERSION, frame_flags, name_bytes, pair_flags,
 };
 use sweepd::world::Edit;
 
@@ -67,6 +67,8 @@ pub(crate) struct Rig {
     pub(crate) flags: u32,
     /// Linear and angular velocity of each row, or empty.
     pub(crate) velocities: Vec<[f64; 6]>,
+    /// What goes with the next frame.
+    pub(crate) vertices: Vec<VertexFrame>,
     pub(crate) out: Outbox,
     /// Whether the whole structure is checked after each tick.
     pub(crate) checked: bool,
@@ -96,6 +98,7 @@ impl Rig {
             epoch: 1,
             flags: frame_flags::FULL,
             velocities: Vec::new(),
+            vertices: Vec::new(),
             out: Outbox::default(),
             checked: true,
             seq: 0,
@@ -147,6 +150,21 @@ impl Rig {
         self.tick(budget, &[], TickCause::Heartbeat)
     }
 
+    /// A tick with vertices and no frame, `after_ns` later.
+    #[allow(dead_code, reason = "of the tests that share this rig one sends so")]
+    pub(crate) fn idle_with_vertices(&mut self, after_ns: u64, budget: Budget) -> &Outbox {
+        self.clock.advance(after_ns);
+        self.inbox.clear();
+        self.take_vertices();
+        self.tick(budget, &[], TickCause::Heartbeat)
+    }
+
+    /// How many were refused for a reason in this boot.
+    #[allow(dead_code, reason = "as above")]
+    pub(crate) fn rejects(&self, reason: RejectReason) -> u64 {
+        self.out.tick.rejects[usize::from(reason.code())]
+    }
+
     /// A tick with edits and no frame.
     pub(crate) fn edit(&mut self, edits: Vec<Edit>, budget: Budget) -> &Outbox {
         self.clock.advance(FRAME_NS);
@@ -182,6 +200,13 @@ impl Rig {
         frame.received_ns = self.clock.boottime_ns();
         frame.set_transforms(&self.rows);
         frame.velocities.clone_from(&self.velocities);
+        self.take_vertices();
+    }
+
+    fn take_vertices(&mut self) {
+        for vertices in self.vertices.drain(..) {
+            self.inbox.push_vertices().clone_from(&vertices);
+        }
     }
 
     fn tick(&mut self, budget: Budget, edits: &[EditBatch], cause: TickCause) -> &Outbox {

@@ -88,6 +88,7 @@ pub(crate) fn moving(name: &str, id: u64) -> BodySpec {
         }],
         pose: Pose::identity(),
         moves: true,
+        deforms: false,
         continuous: false,
         teleport_m: None,
         source: Some(0),

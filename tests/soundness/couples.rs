@@ -9,7 +9,8 @@ use sweepd::world::PlacedShape;
 
 use std::sync::Arc;
 
-use crate::kinds::{HALF_SPACE, Solid, any};
+use crate::bends::Bend;
+use crate::kinds::{BENDING, HALF_SPACE, Solid, any};
 use crate::oracle::meshes::Soup;
 use crate::oracle::rng::Rng;
 use crate::truth::{Bounds, bounds};
@@ -24,6 +25,8 @@ pub struct Body {
     /// About where it is, metres.
     pub size: f64,
     pub pose: Pose,
+    /// How its one mesh deforms.
+    pub bend: Option<Bend>,
 }
 
 pub struct Couple {
@@ -56,11 +59,11 @@ pub fn gap_of(a: &Body, b: &Body, samples: u32) -> Bounds {
 fn any_body(rng: &mut Rng, kind: usize, s: f64, id: u64, group: u32) -> (Body, BodySpec) {
     let mut parts = Vec::new();
     let mut shapes = Vec::new();
-    let several = kind != HALF_SPACE && rng.below(4) == 0;
+    let several = kind != HALF_SPACE && kind < BENDING && rng.below(4) == 0;
     for place in 0..=usize::from(several) {
         let other = if place == 0 { kind } else { rng.below(8) };
         let (solid, shape) = any(rng, other, s);
-        let local = if several || rng.below(3) == 0 {
+        let local = if kind < BENDING && (several || rng.below(3) == 0) {
             let at = rng.vector(0.5 * s);
             rng.pose(at)
         } else {
@@ -75,6 +78,7 @@ fn any_body(rng: &mut Rng, kind: usize, s: f64, id: u64, group: u32) -> (Body, B
         shapes,
         pose: Pose::identity(),
         moves: true,
+        deforms: kind >= BENDING,
         continuous: false,
         teleport_m: None,
         source: Some(0),
@@ -96,6 +100,7 @@ fn any_body(rng: &mut Rng, kind: usize, s: f64, id: u64, group: u32) -> (Body, B
             parts,
             size: 2.0 * s,
             pose: Pose::identity(),
+            bend: (kind >= BENDING).then(Bend::default),
         },
         spec,
     )
@@ -184,6 +189,11 @@ impl Couple {
             }
         }
         for body in &mut self.bodies {
+            if let (Some(bend), [part]) = (&mut body.bend, &mut body.parts[..])
+                && let Solid::Mesh(soup, _) = &mut part.solid
+            {
+                bend.step(rng, soup, 0.5 * body.size);
+            }
             body.pose.rotation = Quat::new_normalize(body.pose.rotation.into_inner());
         }
     }

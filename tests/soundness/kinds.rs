@@ -6,8 +6,10 @@ use sweepd::shape::ShapeSpec;
 use crate::oracle::meshes::{self, Soup};
 use crate::oracle::rng::Rng;
 
-pub const KINDS: usize = 11;
+pub const KINDS: usize = 13;
 pub const HALF_SPACE: usize = 9;
+/// From here on bodies deform.
+pub const BENDING: usize = 11;
 pub const NAMES: [&str; KINDS] = [
     "sphere",
     "box",
@@ -20,6 +22,8 @@ pub const NAMES: [&str; KINDS] = [
     "surface",
     "half-space",
     "height field",
+    "deforming solid",
+    "deforming surface",
 ];
 
 /// A shape by its definition.
@@ -96,8 +100,9 @@ pub fn any(rng: &mut Rng, kind: usize, s: f64) -> (Solid, ShapeSpec) {
                 },
             )
         }
-        7 => mesh(some_solid(rng).scaled(Vec3::new(s, s, s)), true),
+        7 | 11 => mesh(some_solid(rng).scaled(Vec3::new(s, s, s)), true),
         8 => mesh(some_surface(rng).scaled(Vec3::new(s, s, s)), false),
+        12 => mesh(meshes::patch(rng, 5).scaled(Vec3::new(s, s, s)), false),
         HALF_SPACE => {
             let normal = rng.direction();
             let spec = ShapeSpec::HalfSpace {

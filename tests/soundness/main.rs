@@ -22,6 +22,7 @@
 #[path = "../oracle/mod.rs"]
 mod oracle;
 
+mod bends;
 mod couples;
 mod kinds;
 mod run;
@@ -34,10 +35,26 @@ use run::{Run, TICKS};
 fn law_1_every_verdict_and_interval_holds_the_truth_at_any_budget_for_all_kinds_of_shapes() {
     let wanted: u64 = std::env::var("SWEEPD_PAIR_TICKS").map_or(1_500, |s| s.parse().unwrap());
     let first: u64 = std::env::var("SWEEPD_SEED").map_or(0, |s| s.parse().unwrap());
+    let run = run_all(wanted, first, |b| b < kinds::BENDING);
+    assert!(run.overlapping * 5 > run.pair_ticks, "too few overlap");
+    assert!(run.close * 10 > run.pair_ticks, "too few are close");
+}
+
+#[test]
+fn law_4_6_bodies_that_deform_hold_it_too_with_all_kinds_of_shapes_and_at_any_budget() {
+    let wanted: u64 = std::env::var("SWEEPD_PAIR_TICKS").map_or(600, |s| s.parse().unwrap());
+    let first: u64 = std::env::var("SWEEPD_SEED").map_or(0, |s| s.parse().unwrap());
+    let run = run_all(wanted, first, |b| b >= kinds::BENDING);
+    assert!(run.overlapping * 5 > run.pair_ticks, "too few overlap");
+    assert!(run.close * 20 > run.pair_ticks, "too few are close");
+}
+
+/// Runs scenes of all pairs of kinds of which the second is `wanted_kind`.
+fn run_all(wanted: u64, first: u64, wanted_kind: impl Fn(usize) -> bool) -> Run {
     let mut kinds = Vec::new();
     for a in 0..KINDS {
         for b in a..KINDS {
-            if (a, b) != (kinds::HALF_SPACE, kinds::HALF_SPACE) {
+            if (a, b) != (kinds::HALF_SPACE, kinds::HALF_SPACE) && wanted_kind(b) {
                 kinds.push((a, b));
             }
         }
@@ -51,6 +68,5 @@ fn law_1_every_verdict_and_interval_holds_the_truth_at_any_budget_for_all_kinds_
     }
     run.report();
     assert!(run.fewest() >= TICKS * each);
-    assert!(run.overlapping * 5 > run.pair_ticks, "too few overlap");
-    assert!(run.close * 10 > run.pair_ticks, "too few are close");
+    run
 }

@@ -11,6 +11,7 @@ use sweepd::wire::{
     frame_flags, name_bytes,
 };
 
+use crate::bends;
 use crate::couples::{Body, Couple, any_scene, gap_of, take_meshes};
 use crate::kinds::{NAMES, Solid};
 use crate::oracle::rng::Rng;
@@ -211,7 +212,7 @@ fn fill(inbox: &mut Inbox, couples: &[Couple], clock: &ManualClock, seq: u64) {
     };
     frame.received_ns = clock.boottime_ns();
     let bodies = couples.iter().flat_map(|couple| &couple.bodies);
-    for (id, body) in (1..).zip(bodies) {
+    for (id, body) in (1..).zip(bodies.clone()) {
         let q = body.pose.rotation.as_vector();
         frame.transforms.push(TransformRow {
             body: id,
@@ -219,6 +220,11 @@ fn fill(inbox: &mut Inbox, couples: &[Couple], clock: &ManualClock, seq: u64) {
             orientation: [q.x, q.y, q.z, q.w],
             ..TransformRow::default()
         });
+    }
+    for (id, body) in (1..).zip(bodies) {
+        if let (Some(bend), Solid::Mesh(soup, _)) = (&body.bend, &body.parts[0].solid) {
+            bends::send(inbox, id, seq, bend, soup);
+        }
     }
 }
 

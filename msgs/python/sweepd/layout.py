@@ -95,6 +95,53 @@ class FrameHeader(_Row):
     ]
 
 
+class VertexRow(_Row):
+    """One vertex."""
+
+    TYPE_NAME = "sweepd.v1.Vertex"
+    _fields_ = [
+        # In the body's frame, metres.
+        ("position", ctypes.c_float * 3),
+    ]
+
+
+class VertexHeader(_Row):
+    """User header of vertices: whose they are, which of them, and which version they make."""
+
+    TYPE_NAME = "sweepd.v1.VertexHeader"
+    _fields_ = [
+        # Session of the client, the same as in its frames; never 0.
+        ("session", ctypes.c_uint64),
+        # Epoch of the frame that they belong with.
+        ("epoch", ctypes.c_uint64),
+        # Number of the frame that they belong with: in a mode that takes each frame by itself they are taken with
+        # the first that is not older. 0: at once.
+        ("seq", ctypes.c_uint64),
+        # When the client sent them, nanoseconds of CLOCK_BOOTTIME; 0: not said.
+        ("sent_ns", ctypes.c_uint64),
+        # Body id.
+        ("body", ctypes.c_uint64),
+        # Version of the vertices after this message, from 1; raised with each message of a body.
+        ("version", ctypes.c_uint64),
+        # Of a range: the version that it is applied to. Any other, and it is refused.
+        ("base_version", ctypes.c_uint64),
+        # Name of the source, NUL-padded UTF-8.
+        ("source", ctypes.c_uint8 * SOURCE_NAME_LEN),
+        # Place of the first row in the mesh's list of vertices; 0 where all are sent.
+        ("first", ctypes.c_uint32),
+        # How many rows follow.
+        ("count", ctypes.c_uint32),
+        # How many vertices the mesh has.
+        ("total", ctypes.c_uint32),
+        # vertex_flags: full or range.
+        ("flags", ctypes.c_uint32),
+        # WIRE_VERSION of the sender.
+        ("schema", ctypes.c_uint32),
+        # Zero.
+        ("reserved", ctypes.c_uint32),
+    ]
+
+
 class MessageHeader(_Row):
     """User header of every message the daemon publishes."""
 
@@ -587,7 +634,7 @@ class RejectReason(IntEnum):
     BAD_LAYOUT = 9
     # The same body twice in one frame.
     DUPLICATE = 10
-    # The body takes its pose from another (attach), or cannot move.
+    # The body takes its pose from another (attach), or cannot move; or vertices of one that does not deform.
     NOT_STEERABLE = 11
     # Frames that waited while the daemon was silent too long, without sent_ns.
     TOO_OLD = 12
@@ -595,6 +642,8 @@ class RejectReason(IntEnum):
     OVER_LIMIT = 13
     # A chain of ROS 2 frames from the body to the scene's frame that has a loop, or stamps too far apart.
     BAD_CHAIN = 14
+    # A range of vertices that does not follow on the version the body has, or comes after refused ones.
+    VERTEX_VERSION = 15
 
 
 class BodyStatus(IntEnum):
@@ -602,9 +651,9 @@ class BodyStatus(IntEnum):
 
     # Its newest pose is admitted and young enough, or it cannot move.
     KNOWN = 0
-    # It moves, and no pose was admitted in this boot (or since a reset).
+    # It moves, and no pose was admitted in this boot (or since a reset); or it deforms, and no vertices were.
     NOT_RECEIVED = 1
-    # Its newest pose was refused.
+    # Its newest pose or vertices were refused.
     REJECTED = 2
     # Too old; its pairs are possible within reach.
     STALE = 3
@@ -670,6 +719,15 @@ class FrameFlags(IntFlag):
     PAUSED = 4
 
 
+class VertexFlags(IntFlag):
+    """VertexHeader::flags; exactly one of the two."""
+
+    # Holds every vertex of the mesh.
+    FULL = 1
+    # Holds a range of them, applied to base_version.
+    RANGE = 2
+
+
 class PairFlags(IntFlag):
     """Bits of PairRow::flags."""
 
@@ -716,6 +774,8 @@ LAYOUTS = {
         TransformRow,
         TransformVelRow,
         FrameHeader,
+        VertexRow,
+        VertexHeader,
         MessageHeader,
         PairRow,
         ContactRow,

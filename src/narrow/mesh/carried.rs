@@ -22,6 +22,9 @@
 //! Three orders for the three jobs: depth first, deepest overlap first, for a verdict; the heap, best first, for the
 //! bounds; depth first to the end for the contact set. [`Search`] names the others: they are the baselines they are.
 //!
+//! A mesh that deforms moves too: the sum of its updates' largest displacements is added to the path. Its boxes may be
+//! of older vertices; then as much is taken off the gap of boxes (`placed`). Leaves are always those of now.
+//!
 //! Refused: radii of nodes in place of the body's (the order of a heap would change with the motion); one entry for
 //! each pair of boxes (eight times the memory, and eight boxes are tested at the cost of one and a half).
 
@@ -29,7 +32,7 @@ use super::bound::Frame;
 use super::contacts::LeafContact;
 use super::containment::{Containment, ShellTests};
 use super::patches::Patches;
-use super::placed::Placed;
+use super::placed::{Placed, lag_of};
 use super::query::Goal;
 use super::retest::{reach_of, tree_of};
 use super::side::{self, Side};
@@ -107,10 +110,20 @@ pub struct CarriedFront {
     /// The leaves that were nearest or touched last.
     last: Option<(BoxId, BoxId)>,
     witness: Option<LeafContact>,
-    /// Corners of the triangles that touched last, each in its own frame: to ask them again costs no look into the
-    /// meshes.
-    crossing: Option<[Triangle; 2]>,
+    crossing: Option<Crossing>,
     contacts: Patches,
+    /// Sum of what the two have deformed, when they were last looked at, metres.
+    bent_m: f64,
+    /// Which trees the boxes are of.
+    trees: [u32; 2],
+}
+
+/// The triangles that touched last.
+#[derive(Clone, Copy, Debug)]
+struct Crossing {
+    places: [u32; 2],
+    /// Each in its own frame: to ask them again costs no look into a mesh that does not deform.
+    corners: [Triangle; 2],
 }
 
 /// Whether a pair of shapes can have a front.
@@ -135,7 +148,7 @@ impl CarriedFront {
         search: Search,
     ) {
         self.search = search;
-        self.at = Placed::new(pos12, reach_of(a), reach_of(b));
+        self.at = Placed::of(a, b, pos12);
         (self.last, self.crossing) = (None, None);
         self.start_over(store, a, b);
     }
@@ -149,13 +162,28 @@ impl CarriedFront {
         self.contacts.release(&mut store.contacts);
     }
 
-    /// Takes the pair to another pose; what was proved is carried over as far as it holds.
+    /// Takes the pair to another pose, and to the vertices of now; what was proved is carried over as far as it holds.
     pub fn move_to(&mut self, store: &mut FrontStore, a: &Shape, b: &Shape, pos12: &Pose) {
-        if self.at.pos12 == *pos12 {
+        let bent_m = bent_of(a, b);
+        let other_trees = self.trees != trees_of(a, b);
+        if self.at.pos12 == *pos12 && bent_m.to_bits() == self.bent_m.to_bits() && !other_trees {
+            // A refit since can only have brought boxes nearer to what they hold.
+            self.at.lag_m = lag_of(a, b);
             return;
         }
-        self.at = Placed::new(pos12, reach_of(a), reach_of(b));
+        self.at = Placed::of(a, b, pos12);
+        if other_trees {
+            (self.last, self.crossing) = (None, None);
+            self.start_over(store, a, b);
+            return;
+        }
         self.drift.follow(a, b, pos12);
+        if bent_m > self.bent_m {
+            self.drift.add(bent_m - self.bent_m, bent_m);
+            self.bent_m = bent_m;
+            self.shells.drop_test();
+            self.measure_depth(a, b);
+        }
         let stale = self.fresh_len > 0 && self.len() > STALE_TIMES * self.fresh_len + STALE_MORE;
         // Few digits would be left of expiries after a long way.
         let far = self.drift.path_m > PATH_MAX * (a.radius + b.radius);
@@ -211,11 +239,25 @@ impl CarriedFront {
     /// Whether the leaves that touched last are certain to touch at a pose; nothing else is looked at or changed.
     #[must_use]
     pub fn still_touches(&self, a: &Shape, b: &Shape, pos12: &Pose) -> bool {
-        let Some([of_a, of_b]) = &self.crossing else {
+        let Some(crossing) = &self.crossing else {
             return false;
         };
+        let now = |shape: &Shape, k: usize| match shape.mesh() {
+            Some(mesh) if mesh.is_deforming() => mesh.triangle(crossing.places[k]),
+            _ => crossing.corners[k],
+        };
         let at = Placed::new(pos12, reach_of(a), reach_of(b));
-        surely_crosses(of_a, &of_b.map(|p| at.to_a(&p)), at.slop)
+        surely_crosses(&now(a, 0), &now(b, 1).map(|p| at.to_a(&p)), at.slop)
+    }
+
+    /// A mesh has other vertices than when this was last asked, and the front is to stay at its pose: what is found
+    /// from now on is of the new ones, and its user allows for what moved meanwhile.
+    pub(super) fn note_bend(&mut self, a: &Shape, b: &Shape) {
+        let bent_m = bent_of(a, b);
+        if bent_m > self.bent_m {
+            self.bent_m = bent_m;
+            self.shells.drop_test();
+        }
     }
 
     /// Goes on at the pose until the goal is reached (true), `slice_units` are spent, or the meter closes.
@@ -286,6 +328,23 @@ impl CarriedFront {
         self.witness = None;
         self.whole = [(a, side_a), (b, side_b)].map(|(shape, side)| side.whole(shape));
         self.solids = side_a.solid().or(side_b.solid()).is_some();
+        (self.bent_m, self.trees) = (bent_of(a, b), trees_of(a, b));
+        self.measure_depth(a, b);
+        self.shells.start(self.solids);
+        self.shells_expiry_m = f64::NEG_INFINITY;
+        let roots = Open {
+            low: 0.0,
+            a: BoxId::ROOT,
+            b: BoxId::ROOT,
+        };
+        self.look_into(store, roots);
+    }
+
+    /// The least depth that the two can have, as they are now.
+    fn measure_depth(&mut self, a: &Shape, b: &Shape) {
+        let (Some(side_a), Some(side_b)) = (Side::of(a), Side::of(b)) else {
+            return;
+        };
         // A ball about the deepest point fits into the solid that it is in; pieces part when moved by both radii.
         let ball = |side: Side<'_>, shape: &Shape| match side {
             Side::Mesh(mesh) if !mesh.is_solid() => 0.0,
@@ -297,14 +356,6 @@ impl CarriedFront {
             a.radius + b.radius
         };
         self.floor_m = -(depth_m * (1.0 + 8.0 * ROUND)) - self.at.slop;
-        self.shells.start(self.solids);
-        self.shells_expiry_m = f64::NEG_INFINITY;
-        let roots = Open {
-            low: 0.0,
-            a: BoxId::ROOT,
-            b: BoxId::ROOT,
-        };
-        self.look_into(store, roots);
     }
 
     /// Bounds on the gap of the two as wholes: what an overlapping pair's lower end is.
@@ -315,4 +366,13 @@ impl CarriedFront {
         let wholes = side::low((a.1, &origin_a), (b.1, &origin_b), &frame);
         self.known.floor_m = frame.low(&root_a, &root_b).max(wholes);
     }
+}
+
+/// Sum of what two shapes have deformed, metres.
+fn bent_of(a: &Shape, b: &Shape) -> f64 {
+    a.bent_m() + b.bent_m()
+}
+
+fn trees_of(a: &Shape, b: &Shape) -> [u32; 2] {
+    [a.tree_revision(), b.tree_revision()]
 }

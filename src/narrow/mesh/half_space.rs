@@ -94,7 +94,7 @@ impl HalfSpaceWalk {
         self.half_space_is_b = half_space_is_b;
         self.down_there = -normal;
         self.down = self.pose.rotation.inverse() * self.down_there;
-        let origin = mesh.tree().origin();
+        let origin = mesh.places_origin();
         self.origin_height_m = normal.dot(&(self.pose * origin).coords) - offset;
         let size = self.pose.translation.vector.norm()
             + offset.abs()
@@ -175,7 +175,17 @@ impl HalfSpaceWalk {
         if bound >= lowest && !(self.collects && bound <= self.near_m) {
             return;
         }
-        match mesh.tree().nodes()[place as usize].below(place) {
+        match mesh.below(place) {
+            Below::Row(..) => {
+                // Sorted in: the lowest on top, it is the next to be looked into.
+                let from = self.waiting.len;
+                mesh.each_below(place, |child| {
+                    let low = self.bound(mesh, child).max(bound);
+                    self.waiting.push((low, child));
+                });
+                let row = &mut self.waiting.nodes[from..self.waiting.len];
+                row.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
+            }
             Below::Triangle(face) => self.offer(mesh, face, self.collects.then_some(arena)),
             Below::Nodes(left, right) => {
                 let (left, right) = (
@@ -195,13 +205,13 @@ impl HalfSpaceWalk {
     }
 
     fn bound(&self, mesh: &Mesh, place: u32) -> f64 {
-        self.origin_height_m - mesh.tree().nodes()[place as usize].reach(&self.down)
+        self.origin_height_m - mesh.node(place).reach(&self.down)
     }
 
     fn offer(&mut self, mesh: &Mesh, face: u32, mut arena: Option<&mut Arena<LeafContact>>) {
         for vertex in mesh.faces()[face as usize] {
             let corner = mesh.vertices()[vertex as usize];
-            let height = self.origin_height_m - self.down.dot(&(corner - mesh.tree().origin()));
+            let height = self.origin_height_m - self.down.dot(&(corner - mesh.places_origin()));
             let here = (height, corner, face, vertex);
             if self.lowest.is_none_or(|l| height < l.0) {
                 self.lowest = Some(here);

@@ -2,8 +2,9 @@
 
 use nalgebra::Matrix3;
 
+use super::retest::reach_of;
 use crate::math::{Point, Pose, ROUND, Vec3, f32_down};
-use crate::shape::{Obb, ObbPack};
+use crate::shape::{Obb, ObbPack, Shape};
 use crate::simd::obb::{GAP_ROUND, LANES, One, gaps};
 
 /// A relative pose as matrix and vector.
@@ -15,6 +16,8 @@ pub(super) struct Placed {
     translation: Vec3,
     /// Bound on the rounding of any distance computed between the two, metres.
     pub(super) slop: f64,
+    /// How far what is in boxes may be outside of them, both sides together, metres: of meshes that deform.
+    pub(super) lag_m: f64,
 }
 
 impl Default for Placed {
@@ -24,6 +27,7 @@ impl Default for Placed {
             rotation: Matrix3::identity(),
             translation: Vec3::zeros(),
             slop: 0.0,
+            lag_m: 0.0,
         }
     }
 }
@@ -37,6 +41,15 @@ impl Placed {
             rotation: *pos12.rotation.to_rotation_matrix().matrix(),
             translation,
             slop: 32.0 * ROUND * (translation.norm() + reach_a + reach_b),
+            lag_m: 0.0,
+        }
+    }
+
+    /// Of two shapes as they are now.
+    pub(super) fn of(a: &Shape, b: &Shape, pos12: &Pose) -> Self {
+        Self {
+            lag_m: lag_of(a, b),
+            ..Self::new(pos12, reach_of(a), reach_of(b))
         }
     }
 
@@ -77,11 +90,16 @@ impl Placed {
         };
         let half = one.half[0] + one.half[1] + one.half[2];
         let size = from.lp_norm(1) + f64::from(half) + f64::from(pack.reach);
-        let slop = GAP_ROUND * size + self.slop;
+        let slop = GAP_ROUND * size + self.slop + self.lag_m;
         let mut low = [0.0; LANES];
         for (low, gap) in low.iter_mut().zip(gaps(&seen, &pack.boxes)) {
             *low = f64::from(gap) - slop;
         }
         low
     }
+}
+
+/// How far what is in boxes may be outside of them, both together, metres, rounded up.
+pub(super) fn lag_of(a: &Shape, b: &Shape) -> f64 {
+    (a.lag_m() + b.lag_m()) * (1.0 + 2.0 * ROUND)
 }

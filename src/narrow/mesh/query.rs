@@ -29,6 +29,9 @@ pub struct MeshQuery {
     gap: Interval,
     front: CarriedFront,
     half_space: HalfSpaceWalk,
+    pos12: Pose,
+    /// Which trees the places in `half_space` are of.
+    trees: [u32; 2],
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -47,6 +50,8 @@ impl Default for MeshQuery {
             gap: Interval::UNKNOWN,
             front: CarriedFront::default(),
             half_space: HalfSpaceWalk::default(),
+            pos12: Pose::identity(),
+            trees: [0; 2],
         }
     }
 }
@@ -60,6 +65,7 @@ impl MeshQuery {
     /// the query never finishes.
     pub fn start(&mut self, store: &mut FrontStore, a: &Shape, b: &Shape, pos12: &Pose) {
         (self.kind, self.gap) = (Kind::Idle, Interval::UNKNOWN);
+        (self.pos12, self.trees) = (*pos12, [a.tree_revision(), b.tree_revision()]);
         if !(pos12
             .translation
             .vector
@@ -85,6 +91,9 @@ impl MeshQuery {
     /// Goes on until the goal is reached (true), `slice_units` are spent, or the meter closes.
     ///
     /// `a` and `b` are those of [`MeshQuery::start`]. Units: a node test each, a leaf query each.
+    ///
+    /// Where a mesh deforms from turn to turn, each thing found is of the vertices of its turn: the interval then holds
+    /// for those of any one moment when it is widened by what the two have deformed since the start.
     pub fn advance(
         &mut self,
         store: &mut FrontStore,
@@ -93,6 +102,13 @@ impl MeshQuery {
         slice_units: u64,
         meter: &mut Meter<'_>,
     ) -> bool {
+        if self.trees != [a.tree_revision(), b.tree_revision()] {
+            // Places in another tree say nothing; what is known of the gap stays known.
+            let (gap, pos12) = (self.gap, self.pos12);
+            self.start(store, a, b, &pos12);
+            self.gap = gap;
+        }
+        self.front.note_bend(a, b);
         let reached = match (self.kind, Side::of(a), Side::of(b)) {
             (Kind::Surfaces, ..) => self.front.advance(store, a, b, goal, slice_units, meter),
             (Kind::HalfSpace, Some(Side::Mesh(mesh)), _)

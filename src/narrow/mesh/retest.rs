@@ -9,7 +9,7 @@ use crate::shape::{Node, Shape};
 /// The root box of a side and what it is relative to, own frame.
 pub(super) fn tree_of(shape: &Shape, side: Side<'_>) -> (Node, Point) {
     match side {
-        Side::Mesh(mesh) => (mesh.tree().nodes()[0], mesh.tree().origin()),
+        Side::Mesh(mesh) => (mesh.whole(), mesh.centre()),
         Side::Convex(_) => {
             let origin = shape.aabb.centre();
             let (low, high) = (shape.aabb.min - origin, shape.aabb.max - origin);
@@ -43,7 +43,7 @@ pub fn retest_witness(
     if !there(side_a, triangle_a) || !there(side_b, triangle_b) {
         return None;
     }
-    let at = Placed::new(pos12, reach_of(a), reach_of(b));
+    let at = Placed::of(a, b, pos12);
     if !at.slop.is_finite() {
         return None;
     }

@@ -7,11 +7,11 @@ use std::collections::BinaryHeap;
 
 use super::carried::lanes;
 use super::placed::Placed;
-use super::retest::{reach_of, tree_of};
+use super::retest::tree_of;
 use super::shared::shared;
 use super::side::Side;
 use super::{CarriedFront, FrontStore};
-use crate::math::{Point, Pose, ROUND, Vec3};
+use crate::math::{Point, Pose, ROUND, Vec3, f32_up};
 use crate::narrow::approx::{Slab, Spot};
 use crate::shape::{BoxId, Cone, Held, Mesh, Obb, Shape};
 use crate::simd::obb::LANES;
@@ -35,7 +35,7 @@ impl<'a> Scan<'a> {
             shapes: (a, b),
             sides,
             wholes: [sides.0.whole(a), sides.1.whole(b)],
-            at: Placed::new(pos12, reach_of(a), reach_of(b)),
+            at: Placed::of(a, b, pos12),
         })
     }
 
@@ -56,8 +56,8 @@ impl<'a> Scan<'a> {
                 return exact.map(|spot| Spot { boxes, ..spot });
             }
         }
-        let p = self.sides.0.obb(a, &self.wholes[0]);
-        let q = self.sides.1.obb(b, &self.wholes[1]);
+        let p = held(&self.sides.0.obb(a, &self.wholes[0]), self.shapes.0.lag_m());
+        let q = held(&self.sides.1.obb(b, &self.wholes[1]), self.shapes.1.lag_m());
         let q = Obb {
             centre: self.at.to_a(&q.centre),
             axes: self.at.rotation * q.axes,
@@ -79,6 +79,9 @@ impl<'a> Scan<'a> {
         store: &FrontStore,
         mut take: impl FnMut(Spot),
     ) -> bool {
+        if !front.names_boxes_of(self.shapes.0, self.shapes.1) {
+            return false;
+        }
         let moved_m = front.moved_m(self.shapes.0, self.shapes.1, &self.at.pos12);
         front.unproved(store, moved_m, |a, b| {
             if let Some(spot) = self.spot(a, b) {
@@ -209,7 +212,7 @@ impl<'a> PlaneScan<'a> {
     }
 
     fn spot(&self, id: BoxId) -> Option<Spot> {
-        let obb = self.mesh.obb().get(id);
+        let obb = held(&self.mesh.obb().get(id), self.mesh.lag_m());
         let spot = behind(&obb, self.normal, self.offset, self.slop_m)?;
         Some(Spot {
             boxes: (id, BoxId::ROOT),
@@ -236,6 +239,17 @@ impl<'a> PlaneScan<'a> {
                 _ => take(spot),
             }
         }
+    }
+}
+
+/// A box that holds what is in one whose mesh has deformed since it was fitted.
+fn held(obb: &Obb, lag_m: f64) -> Obb {
+    if lag_m == 0.0 {
+        return *obb;
+    }
+    Obb {
+        half: obb.half.map(|half| f32_up(f64::from(half) + lag_m)),
+        ..*obb
     }
 }
 

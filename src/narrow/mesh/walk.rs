@@ -53,8 +53,8 @@ impl Walk {
     ///
     /// * `pos12` - pose of `b` seen from `a`, finite, unit quaternion.
     ///
-    /// At least one of the two is a mesh and none a half-space; else, or with a pose that is not finite, the interval
-    /// stays unknown and the walk never finishes.
+    /// At least one of the two is a mesh, none a half-space or a mesh that deforms; else, or with a pose that is not
+    /// finite, the interval stays unknown and the walk never finishes.
     pub fn start(&mut self, a: &Shape, b: &Shape, pos12: &Pose) {
         self.stage = Stage::Idle;
         self.front.clear();
@@ -69,6 +69,7 @@ impl Walk {
         self.shells.start(true);
         match (Side::of(a), Side::of(b)) {
             (Some(Side::Convex(_)), Some(Side::Convex(_))) => {}
+            _ if a.is_deforming() || b.is_deforming() => {}
             (Some(side_a), Some(side_b)) => self.start_surfaces((a, side_a), (b, side_b), pos12),
             _ => {}
         }
@@ -252,6 +253,8 @@ impl Walk {
             }
             (Below::Nodes(left, right), Below::Triangle(_)) => [(left, entry.b), (right, entry.b)],
             (Below::Triangle(_), Below::Nodes(left, right)) => [(entry.a, left), (entry.a, right)],
+            // Not reached: no walk of a mesh that deforms is started.
+            (Below::Row(..), _) | (_, Below::Row(..)) => return,
             (Below::Nodes(al, ar), Below::Nodes(bl, br)) => {
                 // The larger is parted, so that both boxes shrink alike.
                 if node_a.half().norm_squared() >= node_b.half().norm_squared() {

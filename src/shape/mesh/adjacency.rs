@@ -31,7 +31,7 @@ const LEVEL: f64 = 1e-5;
 const SAME: f64 = 1e-10;
 
 /// Neighbours and regions of the faces of a mesh.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Adjacency {
     /// For each side that of the neighbour.
     twins: Vec<u32>,
@@ -98,6 +98,16 @@ impl Adjacency {
             regions,
             open,
         }
+    }
+
+    /// For each side that of the neighbour.
+    pub(super) fn twins(&self) -> &[u32] {
+        &self.twins
+    }
+
+    /// Takes other regions, and no seams.
+    pub(super) fn replace_measured(&mut self, regions: Vec<u32>) {
+        (self.regions, self.seams) = (regions, Vec::new());
     }
 
     /// What `check` says where seams were not looked for.

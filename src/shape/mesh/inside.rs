@@ -58,19 +58,22 @@ impl Inside {
         };
         self.len = top;
         let place = self.waiting[top];
-        let nodes = mesh.tree().nodes();
-        let node = &nodes[place as usize];
+        let node = mesh.node(place);
         // Rounding of a difference is monotonic, so a vertex inside the box stays inside after it.
-        let p = self.point - mesh.tree().origin();
+        let p = self.point - mesh.places_origin();
         let beside = |k: usize, x: f64| x < f64::from(node.min[k]) || x > f64::from(node.max[k]);
         if p.x > f64::from(node.max[0]) || beside(1, p.y) || beside(2, p.z) {
             return;
         }
-        match node.below(place) {
+        match mesh.below(place) {
             Below::Nodes(left, right) => {
                 self.waiting[top..top + 2].copy_from_slice(&[right, left]);
                 self.len = top + 2;
             }
+            Below::Row(..) => mesh.each_below(place, |child| {
+                self.waiting[self.len] = child;
+                self.len += 1;
+            }),
             Below::Triangle(face) if counts(face) => self.count(&mesh.triangle(face)),
             Below::Triangle(_) => {}
         }

@@ -92,7 +92,7 @@ fn angle(u: &Vec3, v: &Vec3) -> f64 {
 }
 
 /// Cones of a mesh's boxes, own frame.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Normals {
     /// By face: how far the normals about it lean from its own, radians, rounded up; pi: it has none.
     spread: Vec<f32>,
@@ -160,8 +160,16 @@ impl Normals {
 
 impl Mesh {
     /// The outward normals of the faces under a box, of their edges and of their corners, own frame; of a surface,
-    /// which can be touched from both sides, every direction.
+    /// which can be touched from both sides, and of a mesh that deforms, every direction.
     pub(crate) fn normals(&self, id: BoxId) -> Cone {
+        if self.is_deforming() {
+            // Cones are those of the faces as they were when it was made.
+            let own = match self.obb.held(id) {
+                Held::Triangle(face) => self.face_normal(face),
+                Held::Pack(_) => None,
+            };
+            return Cone::every(own.unwrap_or_default());
+        }
         let cone = match self.obb.held(id) {
             Held::Triangle(face) => self.normals.face(self, face),
             Held::Pack(pack) => {

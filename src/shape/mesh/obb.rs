@@ -100,8 +100,8 @@ impl Obb {
     }
 }
 
-/// The tree. Pack 0 holds the root alone.
-#[derive(Debug)]
+/// The tree. Pack 0 holds the root alone; a pack stands before those below it.
+#[derive(Clone, Debug)]
 pub(crate) struct ObbTree {
     packs: Vec<ObbPack>,
 }
@@ -112,13 +112,7 @@ impl ObbTree {
     /// Cost: O(n log n), some 3 us a triangle.
     pub(crate) fn new(vertices: &[Point], faces: &[[u32; 3]]) -> Self {
         let corners = |face: u32| faces[face as usize].map(|v| vertices[v as usize]);
-        let mut order: Vec<(u32, Vec3)> = (0u32..)
-            .zip(faces)
-            .map(|(i, _)| {
-                let [a, b, c] = corners(i);
-                (i, (a.coords + b.coords + c.coords) / 3.0)
-            })
-            .collect();
+        let mut order = middles(vertices, faces);
         let mut tree = Self {
             packs: Vec::with_capacity(faces.len() / 6 + 2),
         };
@@ -133,6 +127,42 @@ impl ObbTree {
         tree
     }
 
+    /// A tree over at least one triangle, with boxes along the axes of the mesh's frame that are yet to be measured;
+    /// centres are relative to the origin of that frame.
+    pub(super) fn aligned(vertices: &[Point], faces: &[[u32; 3]]) -> Self {
+        let mut tree = Self {
+            packs: Vec::with_capacity(faces.len() / 6 + 2),
+        };
+        let mut order = middles(vertices, faces);
+        tree.packs.push(ObbPack::aligned(1));
+        tree.packs[0].link[0] = if order.len() == 1 {
+            order[0].0 | LEAF
+        } else {
+            tree.lay_out(&mut order)
+        };
+        tree
+    }
+
+    /// Appends aligned packs over `order`, at least two triangles; returns the place of the first.
+    fn lay_out(&mut self, order: &mut [(u32, Vec3)]) -> u32 {
+        let place = self.packs.len();
+        let parts = split(order, parts_of(order.len()));
+        self.packs.push(ObbPack::aligned(parts.len()));
+        for (lane, part) in parts.into_iter().enumerate() {
+            self.packs[place].link[lane] = if let [(face, _)] = part {
+                *face | LEAF
+            } else {
+                self.lay_out(part)
+            };
+        }
+        u32::try_from(place).unwrap_or(0)
+    }
+
+    /// The packs, to be measured anew.
+    pub(super) fn packs_mut(&mut self) -> &mut [ObbPack] {
+        &mut self.packs
+    }
+
     /// The packs.
     pub(crate) fn packs(&self) -> &[ObbPack] {
         &self.packs
@@ -140,12 +170,7 @@ impl ObbTree {
 
     /// What a box holds.
     pub(crate) fn held(&self, id: BoxId) -> Held {
-        let link = self.packs[id.pack() as usize].link[id.lane()];
-        if link & LEAF == 0 {
-            Held::Pack(link)
-        } else {
-            Held::Triangle(link & !LEAF)
-        }
+        self.packs[id.pack() as usize].below(id.lane())
     }
 
     /// A box by itself.
@@ -164,12 +189,7 @@ impl ObbTree {
     fn build(&mut self, order: &mut [(u32, Vec3)], corners: &impl Fn(u32) -> [Point; 3]) -> u32 {
         let place = self.packs.len();
         self.packs.push(ObbPack::empty());
-        // Full packs below: as few children as reach, each a power of eight or a little less.
-        let mut below = 1;
-        while below * LANES < order.len() {
-            below *= LANES;
-        }
-        let parts = order.len().div_ceil(below);
+        let parts = parts_of(order.len());
         let mut boxes = Vec::with_capacity(LANES);
         for part in split(order, parts) {
             let link = if let [(face, _)] = part {
@@ -182,6 +202,28 @@ impl ObbTree {
         self.packs[place] = ObbPack::of(&boxes);
         u32::try_from(place).unwrap_or(0)
     }
+}
+
+/// Each triangle and its middle.
+fn middles(vertices: &[Point], faces: &[[u32; 3]]) -> Vec<(u32, Vec3)> {
+    let middle = |face: &[u32; 3]| {
+        let [a, b, c] = face.map(|v| vertices[v as usize].coords);
+        (a + b + c) / 3.0
+    };
+    (0u32..)
+        .zip(faces)
+        .map(|(i, face)| (i, middle(face)))
+        .collect()
+}
+
+/// How many children a pack over so many triangles gets. Full packs below: as few children as reach, each a power of
+/// eight or a little less.
+fn parts_of(triangles: usize) -> usize {
+    let mut below = 1;
+    while below * LANES < triangles {
+        below *= LANES;
+    }
+    triangles.div_ceil(below)
 }
 
 /// Parts triangles into `parts` groups of nearly equal size, by halves along the longest axis of their middles.
@@ -207,6 +249,27 @@ fn split(order: &mut [(u32, Vec3)], parts: usize) -> Vec<&mut [(u32, Vec3)]> {
 }
 
 impl ObbPack {
+    /// So many boxes along the axes of the frame, of no size yet.
+    fn aligned(boxes: usize) -> Self {
+        let mut pack = Self::empty();
+        for k in 0..3 {
+            pack.boxes.axes[k][k] = [1.0; LANES];
+        }
+        pack.mask = u8::MAX >> (LANES - boxes.clamp(1, LANES));
+        pack
+    }
+
+    /// What the box of a lane holds.
+    #[inline]
+    pub(super) fn below(&self, lane: usize) -> Held {
+        let link = self.link[lane];
+        if link & LEAF == 0 {
+            Held::Pack(link)
+        } else {
+            Held::Triangle(link & !LEAF)
+        }
+    }
+
     fn empty() -> Self {
         Self {
             boxes: Pack::EMPTY,

@@ -15,7 +15,7 @@ const CELLS: usize = 16;
 const NODES: usize = CELLS + 1;
 
 /// The table.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Outline {
     /// `[6][NODES][NODES]`: cube face (axis, then sign), second axis, third axis; metres, rounded up.
     reach: Vec<f32>,

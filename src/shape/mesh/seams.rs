@@ -71,6 +71,7 @@ impl Mesh {
                     waiting[len + 1] = left;
                     len += 2;
                 }
+                Below::Row(..) => {}
                 Below::Triangle(other) if other == face => {}
                 Below::Triangle(other) if self.is_near(other, &point, 2.0 * beyond) => {
                     return Some(other);

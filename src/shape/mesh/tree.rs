@@ -11,10 +11,14 @@ const LEAF: u32 = 1 << 31;
 const REACH_NODES_MAX: usize = 512;
 
 /// Nodes that wait in a walk that goes depth first: one a level of a tree split at the median, and a mesh has under
-/// 2^31 triangles.
-pub(crate) const NODES_WAITING_MAX: usize = 33;
+/// 2^31 triangles; or, of a mesh that deforms, seven a level of its tree of eight children a node, and the last eight.
+pub(crate) const NODES_WAITING_MAX: usize = 64;
 
-const _: () = assert!(crate::limits::TRIANGLES_MAX < LEAF as usize);
+const _: () = {
+    assert!(crate::limits::TRIANGLES_MAX < LEAF as usize);
+    // Seven levels of eights.
+    assert!(crate::limits::DEFORMING_TRIANGLES_MAX <= 1 << 21);
+};
 
 /// A box and what is in it. The left child of an inner node is the next node.
 #[derive(Clone, Copy, Debug)]
@@ -33,6 +37,8 @@ pub(crate) enum Below {
     Triangle(u32),
     /// Two nodes, by their places.
     Nodes(u32, u32),
+    /// Up to eight boxes of a mesh that deforms: the place of the first, and a bit for each that is there.
+    Row(u32, u8),
 }
 
 impl Node {
@@ -80,7 +86,7 @@ impl Node {
 }
 
 /// The tree.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Tree {
     nodes: Vec<Node>,
     origin: Point,
@@ -104,6 +110,14 @@ impl Tree {
             Node::leaf(&a.inf(&b).inf(&c), &a.sup(&b).sup(&c), face)
         });
         Self { nodes, origin }
+    }
+
+    /// No tree, of a mesh that has another.
+    pub(crate) fn none(origin: Point) -> Self {
+        Self {
+            nodes: Vec::new(),
+            origin,
+        }
     }
 
     /// The nodes, root first.
@@ -141,6 +155,8 @@ impl Tree {
                         best = best.max(direction.dot(&(vertices[v as usize] - self.origin)));
                     }
                 }
+                // Of no such tree.
+                Below::Row(..) => {}
                 Below::Nodes(left, right) => {
                     let with = |i: u32| (i, self.nodes[i as usize].reach(direction));
                     let (mut far, mut near) = (with(left), with(right));

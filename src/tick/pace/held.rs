@@ -3,8 +3,8 @@
 //! In: the frames of a drain. Out: the frames of a tick. A full frame stands for the older ones of its session, which
 //! are passed over and counted; a partial one does not, because those may hold bodies that it lacks.
 
-use crate::limits::FRAMES_PER_DRAIN_MAX;
-use crate::wire::{Frame, Inbox, WIRE_VERSION, frame_flags};
+use crate::limits::{FRAMES_PER_DRAIN_MAX, VERTEX_FRAMES_WAITING_MAX};
+use crate::wire::{Frame, Inbox, VertexFrame, WIRE_VERSION, frame_flags};
 
 /// A frame and whose it is.
 #[derive(Clone, Debug, Default)]
@@ -79,6 +79,68 @@ impl Queue {
     fn drop_at(&mut self, at: usize) {
         let held = self.frames.remove(at);
         self.spare.push(held);
+    }
+}
+
+/// Vertices that wait, and spare memory.
+///
+/// None is passed over for a newer one: a range stands on the version before. Those of the source whose frames make
+/// ticks wait for the frame that they belong with, so that a tick has vertices and poses of one moment.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Vertices {
+    waiting: Vec<(VertexFrame, Option<usize>)>,
+    spare: Vec<VertexFrame>,
+}
+
+impl Vertices {
+    /// Takes vertices out of an inbox. Beyond the limit the oldest of all go: the versions then say that some are
+    /// missing, and their bodies are unknown.
+    pub(super) fn put(&mut self, frame: &mut VertexFrame, source: Option<usize>) {
+        if self.waiting.len() >= VERTEX_FRAMES_WAITING_MAX {
+            let (oldest, _) = self.waiting.remove(0);
+            self.spare.push(oldest);
+        }
+        let mut held = self.spare.pop().unwrap_or_default();
+        std::mem::swap(&mut held, frame);
+        self.waiting.push((held, source));
+    }
+
+    /// Hands out what a tick with these frames takes.
+    ///
+    /// * `lead` - the source each of whose frames makes a tick of its own.
+    pub(super) fn take(&mut self, into: &mut Inbox, lead: Option<usize>) {
+        let mut kept = 0;
+        for at in 0..self.waiting.len() {
+            let (frame, source) = &self.waiting[at];
+            let header = &frame.header;
+            let of_lead = lead.is_some() && *source == lead && header.seq != 0;
+            let belongs = |f: &Frame| {
+                let frame = &f.header;
+                frame.source == header.source
+                    && (frame.session != header.session
+                        || (frame.epoch, frame.seq) >= (header.epoch, header.seq))
+            };
+            if !of_lead || into.frames().iter().any(belongs) {
+                std::mem::swap(into.push_vertices(), &mut self.waiting[at].0);
+            } else {
+                self.waiting.swap(kept, at);
+                kept += 1;
+            }
+        }
+        self.spare
+            .extend(self.waiting.drain(kept..).map(|(frame, _)| frame));
+    }
+
+    /// Drops what a session that is over has left without a frame.
+    pub(super) fn forget(&mut self, session: u64) {
+        let Self { waiting, spare } = self;
+        waiting.retain_mut(|(frame, _)| {
+            let stays = frame.header.session != session;
+            if !stays {
+                spare.push(std::mem::take(frame));
+            }
+            stays
+        });
     }
 }
 

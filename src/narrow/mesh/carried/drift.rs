@@ -47,6 +47,15 @@ impl Drift {
         }
     }
 
+    /// Adds what the two deformed by, metres.
+    ///
+    /// * `sum_m` - of which size the numbers were whose difference it is.
+    pub(super) fn add(&mut self, bent_m: f64, sum_m: f64) {
+        let path_m = self.path_m + bent_m + 2.0 * ROUND * sum_m;
+        self.path_m = path_m + 2.0 * ROUND * path_m;
+        self.last_m += bent_m;
+    }
+
     /// Takes an anchor at the pose last moved to; whether it was none before.
     pub(super) fn anchor_here(&mut self, pos12: &Pose) -> bool {
         if self.offset_m == 0.0 {

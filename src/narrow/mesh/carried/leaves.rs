@@ -2,7 +2,7 @@
 
 use super::cover::Group;
 use super::store::FrontStore;
-use super::{BoxId, CarriedFront, LeafContact, Open, Side};
+use super::{BoxId, CarriedFront, Crossing, LeafContact, Open, Side};
 use crate::math::Interval;
 use crate::narrow::exact::Closest;
 use crate::narrow::mesh::{manifold, side};
@@ -65,7 +65,11 @@ impl CarriedFront {
             let deeper = |w: &LeafContact| closest.best_m < w.closest.best_m;
             if !self.known.touches || self.witness.as_ref().is_none_or(deeper) {
                 (self.last, self.witness) = (Some((id_a, id_b)), Some(contact));
-                self.crossing = side::triangles(leaf_a, leaf_b);
+                let corners = side::triangles(leaf_a, leaf_b);
+                self.crossing = corners.map(|corners| Crossing {
+                    places: [i, j],
+                    corners,
+                });
             }
             self.known.touches = true;
             if self.known.points_wanted {

@@ -2,19 +2,31 @@
 
 use super::cover::lanes;
 use super::drift::moved;
-use super::{CarriedFront, Containment, FrontStore, LeafContact};
-use crate::math::Pose;
+use super::{CarriedFront, Containment, FrontStore, LeafContact, bent_of, trees_of};
+use crate::math::{Pose, ROUND};
 use crate::narrow::mesh::PATCH_POINTS;
 use crate::shape::{BoxId, Shape};
 
 impl CarriedFront {
-    /// How far the pair is from the pose that the front works at, metres, rounded up; 0: it is there.
+    /// How far the pair is from the pose and the vertices that the front works at, metres, rounded up; 0: it is there.
     pub(in crate::narrow) fn moved_m(&self, a: &Shape, b: &Shape, pos12: &Pose) -> f64 {
-        if self.at.pos12 == *pos12 {
+        let by_pose = if self.at.pos12 == *pos12 {
             0.0
         } else {
             moved(a, b, &self.at.pos12, pos12)
+        };
+        let bent_m = bent_of(a, b);
+        if bent_m > self.bent_m {
+            // A sum of two, less one of them: each is rounded.
+            (by_pose + (bent_m - self.bent_m)).next_up() + 4.0 * ROUND * bent_m
+        } else {
+            by_pose
         }
+    }
+
+    /// Whether the boxes that it names are those of the trees that the shapes have now.
+    pub(in crate::narrow::mesh) fn names_boxes_of(&self, a: &Shape, b: &Shape) -> bool {
+        self.trees == trees_of(a, b)
     }
 
     /// Visits every pair of boxes that is not proved apart at a pose `moved_m` away from the front's. All that the two

@@ -1,0 +1,81 @@
+//! Shapes that deform: one of a mesh, for one body alone.
+
+use super::{Geometry, Mesh, Shape, ShapeError};
+
+impl Shape {
+    /// The same shape as one whose vertices can be moved, of its own.
+    ///
+    /// # Errors
+    /// It is no mesh, or one that cannot deform, and what to change.
+    pub fn to_deforming(&self) -> Result<Self, ShapeError> {
+        let Geometry::Mesh(mesh) = &self.geometry else {
+            return Err(ShapeError::Setting(
+                "deforms = true, but it is no triangle mesh: give a trimesh, or remove `deforms`"
+                    .to_owned(),
+            ));
+        };
+        let mut shape = Self {
+            geometry: Geometry::Mesh(mesh.clone().into_deforming()?),
+            ..self.clone()
+        };
+        shape.follow_mesh();
+        Ok(shape)
+    }
+
+    /// Whether its vertices may be moved.
+    #[must_use]
+    pub fn is_deforming(&self) -> bool {
+        self.mesh().is_some_and(Mesh::is_deforming)
+    }
+
+    /// See [`Mesh::lag_m`]; 0 where nothing deforms.
+    #[inline]
+    pub(crate) fn lag_m(&self) -> f64 {
+        self.mesh().map_or(0.0, Mesh::lag_m)
+    }
+
+    /// See [`Mesh::bent_m`]; 0 where nothing deforms.
+    #[inline]
+    pub(crate) fn bent_m(&self) -> f64 {
+        self.mesh().map_or(0.0, Mesh::bent_m)
+    }
+
+    /// Another number means another tree.
+    #[inline]
+    pub(crate) fn tree_revision(&self) -> u32 {
+        self.mesh().map_or(0, Mesh::tree_revision)
+    }
+
+    /// See [`Mesh::bend`].
+    pub(crate) fn bend(&mut self, first: usize, moved: &[[f32; 3]]) -> f64 {
+        let Geometry::Mesh(mesh) = &mut self.geometry else {
+            return 0.0;
+        };
+        let step_m = mesh.bend(first, moved);
+        self.follow_mesh();
+        step_m
+    }
+
+    /// See [`Mesh::refit`].
+    pub(crate) fn refit(&mut self, packs_max: usize) -> usize {
+        match &mut self.geometry {
+            Geometry::Mesh(mesh) => mesh.refit(packs_max),
+            _ => 0,
+        }
+    }
+
+    /// The mesh that it is.
+    #[inline]
+    pub(crate) fn mesh(&self) -> Option<&Mesh> {
+        match &self.geometry {
+            Geometry::Mesh(mesh) => Some(mesh),
+            _ => None,
+        }
+    }
+
+    fn follow_mesh(&mut self) {
+        if let Geometry::Mesh(mesh) = &self.geometry {
+            (self.aabb, self.radius) = (mesh.aabb(), mesh.radius());
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! Boxes against brute force over the vertices, whatever was moved and wherever a refit stopped.
+
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::float_cmp,
+    reason = "tests: numbers that f32 has"
+)]
+
+use super::*;
+use crate::shape::{Inside, Node};
+
+/// A bumpy ball of 3 n n triangles and more, closed.
+fn ball(n: u32) -> Mesh {
+    let (mut vertices, mut faces) = (vec![Point::new(0.0, 0.0, 1.0)], Vec::new());
+    for row in 1..n {
+        for column in 0..2 * n {
+            let (theta, phi) = (
+                std::f64::consts::PI * f64::from(row) / f64::from(n),
+                std::f64::consts::PI * f64::from(column) / f64::from(n),
+            );
+            let r = 1.0 + 0.1 * (5.0 * theta).sin() * (3.0 * phi).cos();
+            vertices.push(Point::new(
+                r * theta.sin() * phi.cos(),
+                r * theta.sin() * phi.sin(),
+                r * theta.cos(),
+            ));
+        }
+    }
+    let last = u32::try_from(vertices.len()).unwrap();
+    vertices.push(Point::new(0.0, 0.0, -1.0));
+    let at = |row: u32, column: u32| 1 + (row - 1) * 2 * n + column % (2 * n);
+    for column in 0..2 * n {
+        faces.push([0, at(1, column), at(1, column + 1)]);
+        faces.push([last, at(n - 1, column + 1), at(n - 1, column)]);
+        for row in 1..n - 1 {
+            let (a, b) = (at(row, column), at(row, column + 1));
+            let (c, d) = (at(row + 1, column + 1), at(row + 1, column));
+            faces.extend([[a, d, c], [a, c, b]]);
+        }
+    }
+    Mesh::new(vertices, faces, None).unwrap()
+}
+
+fn rows(mesh: &Mesh, of: impl Fn(usize, &Point) -> Point) -> Vec<[f32; 3]> {
+    let moved = mesh.vertices().iter().enumerate();
+    moved
+        .map(|(i, v)| of(i, v).coords.map(|x| x as f32).into())
+        .collect()
+}
+
+/// Every triangle lies in every box above it, widened by the lag.
+fn boxes_hold(mesh: &Mesh) {
+    let mut seen = vec![0; mesh.faces().len()];
+    let mut stack = vec![(0_u32, Vec::new())];
+    while let Some((place, mut above)) = stack.pop() {
+        above.push(mesh.node(place));
+        if let super::super::Below::Triangle(face) = mesh.below(place) {
+            seen[face as usize] += 1;
+            for v in mesh.triangle(face) {
+                for node in &above {
+                    let p = v - mesh.places_origin();
+                    for k in 0..3 {
+                        assert!(f64::from(node.min[k]) <= p[k] && p[k] <= f64::from(node.max[k]));
+                    }
+                }
+            }
+        }
+        mesh.each_below(place, |child| stack.push((child, above.clone())));
+    }
+    assert!(seen.iter().all(|&n| n == 1));
+    let whole = Aabb::of(mesh.vertices());
+    assert!(mesh.aabb().holds(&whole));
+    for v in mesh.vertices() {
+        assert!((v - mesh.centre()).norm() <= mesh.radius());
+    }
+}
+
+fn wave(i: usize, v: &Point, by: f64) -> Point {
+    let shift = Vec3::new((i as f64).sin(), (2.0 * i as f64).cos(), (v.x * 7.0).sin());
+    v + shift * by
+}
+
+#[test]
+fn boxes_hold_their_triangles_wherever_a_refit_stops_and_whatever_comes_meanwhile() {
+    let mut mesh = ball(12).into_deforming().unwrap();
+    assert_eq!(mesh.lag_m(), 0.0);
+    boxes_hold(&mesh);
+    let mut sum = 0.0;
+    for step in 0..60_usize {
+        if step % 3 != 2 {
+            let by = 0.01 * (1.0 + (step % 5) as f64);
+            let moved = rows(&mesh, |i, v| wave(i + step, v, by));
+            let before = mesh.vertices().to_vec();
+            let (first, part) = if step % 4 == 1 {
+                (17, &moved[17..60])
+            } else {
+                (0, &moved[..])
+            };
+            let largest = mesh.bend(first, part);
+            let truth = before.iter().zip(mesh.vertices());
+            let truth = truth.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            assert!(largest >= truth && largest <= truth * (1.0 + 1e-12));
+            sum += truth;
+        }
+        assert!(mesh.bent_m() >= sum && mesh.bent_m() <= sum * (1.0 + 1e-12));
+        boxes_hold(&mesh);
+        mesh.refit(step * 3 % 17);
+        boxes_hold(&mesh);
+    }
+    // Rounds end, whatever came meanwhile, and then the boxes fit.
+    while mesh.refit(5) > 0 {}
+    assert_eq!((mesh.lag_m(), mesh.refit(1)), (0.0, 0));
+    boxes_hold(&mesh);
+    let [tight, whole] = [
+        mesh.node(0),
+        Node::leaf(&mesh.aabb().min.coords, &mesh.aabb().max.coords, 0),
+    ];
+    for k in 0..3 {
+        assert!((tight.min[k] - whole.min[k]).abs() < 1e-5);
+        assert!((tight.max[k] - whole.max[k]).abs() < 1e-5);
+    }
+}
+
+#[test]
+fn inside_tests_are_of_the_newest_vertices_with_boxes_of_any_age() {
+    let mut mesh = ball(8).into_deforming().unwrap();
+    let far = Vec3::new(5.0, 0.0, 0.0);
+    let moved = rows(&mesh, |_, v| v + far);
+    mesh.bend(0, &moved);
+    for packs in [0, 3, usize::MAX] {
+        mesh.refit(packs);
+        let mut test = Inside::default();
+        assert_eq!(test.run(&mesh, Point::origin(), |_| true), 0);
+        assert_eq!(test.run(&mesh, Point::from(far), |_| true), 1);
+        // Lags of the move, and in the end none.
+        let outer = mesh.outlying(&Vec3::x());
+        assert!(mesh.vertices().contains(&outer));
+    }
+}
+
+#[test]
+fn there_and_back_counts_twice_and_the_radius_is_that_of_now() {
+    let mut mesh = ball(6).into_deforming().unwrap();
+    let radius = mesh.radius();
+    let rest = rows(&mesh, |_, v| *v);
+    let there = rows(&mesh, |_, v| v + Vec3::z() * 0.01);
+    for _ in 0..100 {
+        mesh.bend(0, &there);
+        assert!(mesh.radius() > radius);
+        mesh.bend(0, &rest);
+        assert!(mesh.radius() <= radius * (1.0 + 1e-12));
+    }
+    assert!((mesh.bent_m() - 2.0).abs() < 1e-6, "{}", mesh.bent_m());
+    assert!(mesh.lag_m() >= 2.0 - 1e-6);
+}
+
+#[test]
+fn a_mesh_with_two_vertices_in_one_place_cannot_deform() {
+    let p = |x: f64, y: f64| Point::new(x, y, 0.0);
+    let vertices = vec![
+        p(0.0, 0.0),
+        p(1.0, 0.0),
+        p(0.0, 1.0),
+        p(1.0, 0.0),
+        p(1.0, 1.0),
+    ];
+    let mesh = Mesh::new(vertices, vec![[0, 1, 2], [3, 4, 2]], None).unwrap();
+    let error = mesh.into_deforming().unwrap_err().to_string();
+    assert!(
+        error.contains("vertices 1 and 3 are in one place"),
+        "{error}"
+    );
+}
+
+#[test]
+fn rows_that_are_no_vertices_are_told_apart() {
+    let good = [[0.0_f32, 1.0, -1e8]];
+    assert_eq!(can_be_vertices(&good), Ok(()));
+    assert_eq!(can_be_vertices(&[]), Ok(()));
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        for k in 0..3 {
+            let mut rows = [[0.5_f32; 3]; 9];
+            rows[7][k] = bad;
+            assert_eq!(can_be_vertices(&rows), Err(NoVertex::NotFinite));
+        }
+    }
+    assert_eq!(can_be_vertices(&[[0.0, 2e9, 0.0]]), Err(NoVertex::TooFar));
+}

@@ -1,0 +1,235 @@
+//! Vertices: the newest shapes of bodies that deform.
+//!
+//! In: vertex frames from a client that may be wrong in every field. Out: vertices taken, motion sums and boxes with
+//! them at once, refusals counted, bodies marked unknown. A frame is looked at as a whole before any of it is taken, so
+//! a refused one leaves the last good shape. No allocation, unless somebody else holds the shape at that moment.
+
+use std::sync::Arc;
+
+use super::World;
+use super::admit::Admission;
+use super::body::Body;
+use super::place::tight_box;
+use super::source::{Standing, stand_beside};
+use crate::ids::{BodyId, BodySlot, SourceSlot};
+use crate::limits::DEFORMING_VERTICES_MAX;
+use crate::math::Aabb;
+use crate::shape::{NoVertex, Shape, can_be_vertices};
+use crate::wire::{RejectReason, VertexFrame, WIRE_VERSION, name_str, vertex_flags};
+
+/// What is known of the vertices of a body that deforms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vertices {
+    /// Version of the vertices it has; `None`: those of the scene, which nobody has sent in this session.
+    pub version: Option<u64>,
+    /// Why its newest vertices were refused, when they were.
+    pub refused: Option<RejectReason>,
+    /// Box and radius in the scene, by which a put tells whether it is another shape.
+    pub(super) rest: (Aabb, f64),
+}
+
+impl Vertices {
+    /// Of a body that deforms, as the scene has it.
+    pub(super) fn of(shape: &Shape) -> Self {
+        Self {
+            version: None,
+            refused: None,
+            rest: (shape.aabb, shape.radius),
+        }
+    }
+
+    /// What was known is void.
+    pub(super) fn forget(&mut self) {
+        (self.version, self.refused) = (None, None);
+    }
+}
+
+impl Body {
+    /// The one shape of a body that deforms.
+    fn bending_shape(&mut self) -> Option<&mut Shape> {
+        self.vertices.as_ref()?;
+        // Somebody who measures the body at this moment holds it as it was.
+        let placed = Arc::make_mut(&mut self.shapes).first_mut()?;
+        Some(Arc::make_mut(&mut placed.shape))
+    }
+
+    /// Whether boxes in its tree are older than its vertices.
+    #[must_use]
+    pub fn lags(&self) -> bool {
+        let lags = |body: &Self| body.shapes.first().is_some_and(|p| p.shape.lag_m() > 0.0);
+        self.vertices.is_some() && lags(self)
+    }
+}
+
+impl World {
+    /// The bodies that deform, in no order that means anything.
+    #[must_use]
+    pub fn deforming(&self) -> &[BodySlot] {
+        &self.deforming
+    }
+
+    /// Fits boxes of a body that deforms to its vertices, at most so many packs of them; returns how many were done.
+    pub fn refit(&mut self, slot: BodySlot, packs_max: usize) -> usize {
+        let body = self.bodies.get_mut(slot.index()).and_then(Option::as_mut);
+        // Looked at first: to change what somebody else holds is to copy it.
+        match body
+            .filter(|body| body.lags())
+            .and_then(Body::bending_shape)
+        {
+            Some(shape) => shape.refit(packs_max),
+            None => 0,
+        }
+    }
+
+    /// Admits vertices of one body, or says why not. Bad input is counted, never an error.
+    ///
+    /// Only who may move the body may bend it, in a session under the same rules as for poses. What is wrong with the
+    /// vertices of the right sender leaves the body unknown until good ones of all vertices come; an older version, or
+    /// the same again, changes nothing.
+    ///
+    /// Cost: O(rows).
+    pub fn admit_vertices(&mut self, frame: &VertexFrame, now_boot_ns: u64) -> Admission {
+        self.now_ns = self.now_ns.max(now_boot_ns);
+        let found = self.find_bent(frame);
+        let taken = found.and_then(|(source, slot)| {
+            self.bend(slot, frame).map_err(|reason| {
+                if reason != RejectReason::OldFrame {
+                    self.refuse_vertices(slot, reason);
+                }
+                (Some(source), reason)
+            })?;
+            Ok(Admission::Admitted {
+                source,
+                poses: 0,
+                refused_rows: 0,
+            })
+        });
+        taken.unwrap_or_else(|(source, reason)| {
+            self.note_reject(reason);
+            if let Some(source) = source {
+                self.sources[source.index()].refused += 1;
+            }
+            Admission::Refused { source, reason }
+        })
+    }
+
+    /// Layout, source, session, body: what is said before the vertices themselves are looked at.
+    fn find_bent(
+        &mut self,
+        frame: &VertexFrame,
+    ) -> Result<(SourceSlot, BodySlot), (Option<SourceSlot>, RejectReason)> {
+        let header = &frame.header;
+        let name = name_str(&header.source);
+        let (Some(name), true) = (name, header.schema == WIRE_VERSION && header.session != 0)
+        else {
+            return Err((None, RejectReason::BadLayout));
+        };
+        let Some(source) = self.source_named(name) else {
+            return Err((None, RejectReason::UnknownSource));
+        };
+        let refused = |reason| Err((Some(source), reason));
+        let received_ns = match frame.received_ns {
+            0 => self.now_ns,
+            received_ns => received_ns.min(self.now_ns),
+        };
+        let state = &mut self.sources[source.index()];
+        match stand_beside(state, source, &mut self.over, header, received_ns) {
+            Standing::Refused(reason) => return refused(reason),
+            Standing::Afresh => self.forget_poses(source),
+            Standing::Next => {}
+        }
+        let Some(slot) = self.slot_of(BodyId(header.body)) else {
+            return refused(RejectReason::UnknownBody);
+        };
+        if let Err(reason) = self.may_move(source, slot) {
+            return refused(reason);
+        }
+        if self.body(slot).is_none_or(|body| body.vertices.is_none()) {
+            return refused(RejectReason::NotSteerable);
+        }
+        Ok((source, slot))
+    }
+
+    /// Takes the vertices of a frame whose sender may bend the body, all or none.
+    fn bend(&mut self, slot: BodySlot, frame: &VertexFrame) -> Result<(), RejectReason> {
+        let first = self.check_vertices(slot, frame)?;
+        let Some(body) = self.bodies[slot.index()].as_mut() else {
+            return Err(RejectReason::UnknownBody);
+        };
+        let Some(shape) = body.bending_shape() else {
+            return Err(RejectReason::NotSteerable);
+        };
+        let step_m = shape.bend(first, &frame.rows);
+        let radius = shape.radius;
+        body.radius = radius;
+        body.motion.bend(step_m, &body.pose, &body.centre, radius);
+        if let Some(vertices) = body.vertices.as_mut() {
+            (vertices.version, vertices.refused) = (Some(frame.header.version), None);
+        }
+        if !self.entries[slot.index()].refused {
+            body.reject = None;
+        }
+        let tight = tight_box(&body.shapes, &body.pose);
+        self.entries[slot.index()].tight = match body.path.as_mut() {
+            Some(path) => {
+                path.take_end(tight);
+                *path.hull()
+            }
+            None => tight,
+        };
+        self.settle(slot, true);
+        Ok(())
+    }
+
+    /// Counts, versions, numbers; yields the place of the first vertex.
+    fn check_vertices(&self, slot: BodySlot, frame: &VertexFrame) -> Result<usize, RejectReason> {
+        let header = &frame.header;
+        let body = self.body(slot).ok_or(RejectReason::UnknownBody)?;
+        let known = body.vertices.as_deref().ok_or(RejectReason::NotSteerable)?;
+        if known.version.is_some_and(|newest| header.version <= newest) {
+            return Err(RejectReason::OldFrame);
+        }
+        if let Some(reason) = frame.refused {
+            return Err(reason);
+        }
+        if frame.waited && header.sent_ns == 0 {
+            return Err(RejectReason::TooOld);
+        }
+        let shape = body.shapes.first().map(|placed| &placed.shape);
+        let there = shape.and_then(|shape| shape.mesh());
+        let there = there.map_or(0, |mesh| mesh.vertices().len());
+        let size = |n: u32| usize::try_from(n).unwrap_or(usize::MAX);
+        let (first, count, total) = (size(header.first), size(header.count), size(header.total));
+        let fits = total == there
+            && count == frame.rows.len()
+            && count <= DEFORMING_VERTICES_MAX
+            && first.checked_add(count).is_some_and(|end| end <= there);
+        let whole = first == 0 && count == there;
+        match header.flags {
+            vertex_flags::FULL if fits && whole => {}
+            vertex_flags::RANGE if fits && count > 0 => {
+                let follows = known.version == Some(header.base_version);
+                if known.refused.is_some() || !follows {
+                    return Err(RejectReason::VertexVersion);
+                }
+            }
+            _ => return Err(RejectReason::BadLayout),
+        }
+        match can_be_vertices(&frame.rows) {
+            Ok(()) => Ok(first),
+            Err(NoVertex::NotFinite) => Err(RejectReason::NotFinite),
+            Err(NoVertex::TooFar) => Err(RejectReason::OverLimit),
+        }
+    }
+
+    /// The newest vertices of a body were refused: it is unknown until good ones come; its last good ones are kept.
+    fn refuse_vertices(&mut self, slot: BodySlot, reason: RejectReason) {
+        if let Some(body) = self.bodies[slot.index()].as_mut()
+            && let Some(vertices) = body.vertices.as_mut()
+        {
+            vertices.refused = Some(reason);
+            body.reject = Some(reason);
+        }
+        self.settle(slot, false);
+    }
+}

@@ -1,0 +1,266 @@
+//! Law 3.7 and 4.2 for vertices: what a sender may say, and what becomes of what it may not.
+
+use sweepd::wire::{
+    BodyStatus, RejectReason, State, Verdict, VertexFrame, VertexHeader, WIRE_VERSION, name_bytes,
+    vertex_flags,
+};
+
+use crate::rig::{ALL, FRAME_NS, NONE, Rig, body, scene};
+use sweepd::wire::Reason;
+
+/// A square of two triangles in the plane of x and y, of side 2.
+const SHEET: &str = "{ type = \"trimesh\", solid = false, \
+    vertices = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]], \
+    faces = [[0, 1, 2], [0, 2, 3]] }";
+const CUBE: &str = "{ type = \"box\", half_extents = [0.5, 0.5, 0.5] }";
+
+fn rig() -> Rig {
+    Rig::new(&scene(
+        "",
+        &[
+            body(1, [0.0, 0.0, 3.0], SHEET, "deforms = true\n"),
+            body(2, [0.0, 0.0, 0.0], CUBE, ""),
+        ],
+    ))
+}
+
+/// The sheet at a height in its own frame.
+fn at(z: f32) -> Vec<[f32; 3]> {
+    vec![
+        [-1.0, -1.0, z],
+        [1.0, -1.0, z],
+        [1.0, 1.0, z],
+        [-1.0, 1.0, z],
+    ]
+}
+
+fn full(version: u64, rows: Vec<[f32; 3]>) -> VertexFrame {
+    let count = u32::try_from(rows.len()).unwrap();
+    VertexFrame {
+        header: VertexHeader {
+            session: 11,
+            epoch: 1,
+            body: 1,
+            version,
+            source: name_bytes("feed"),
+            count,
+            total: count,
+            flags: vertex_flags::FULL,
+            schema: WIRE_VERSION,
+            ..VertexHeader::default()
+        },
+        rows,
+        ..VertexFrame::default()
+    }
+}
+
+fn range(version: u64, base_version: u64, first: u32, rows: Vec<[f32; 3]>) -> VertexFrame {
+    let mut frame = full(version, rows);
+    frame.header.base_version = base_version;
+    frame.header.first = first;
+    frame.header.total = 4;
+    frame.header.flags = vertex_flags::RANGE;
+    frame
+}
+
+fn status(rig: &Rig, id: u64) -> BodyStatus {
+    let row = rig.out.bodies.iter().find(|row| row.body == id).unwrap();
+    BodyStatus::from_code(row.status).unwrap()
+}
+
+/// A tick with poses and these vertices.
+fn send(rig: &mut Rig, vertices: Vec<VertexFrame>) {
+    rig.vertices = vertices;
+    rig.send(ALL);
+}
+
+fn known(rig: &mut Rig) {
+    send(rig, vec![full(1, at(0.0))]);
+    assert_eq!(status(rig, 1), BodyStatus::Known);
+    assert_eq!(rig.state(), State::Clear);
+}
+
+#[test]
+fn law_3_7_a_body_that_deforms_is_not_received_until_its_pose_and_all_vertices_have_come() {
+    let mut rig = rig();
+    send(&mut rig, vec![]);
+    assert_eq!(status(&rig, 1), BodyStatus::NotReceived);
+    assert_eq!(rig.state(), State::Unknown);
+    assert!(rig.because(Reason::NotReceived));
+    // A range of what nobody has sent says nothing, and is told.
+    send(&mut rig, vec![range(2, 1, 0, at(0.0))]);
+    assert_eq!(status(&rig, 1), BodyStatus::Rejected);
+    assert_eq!(rig.rejects(RejectReason::VertexVersion), 1);
+    known(&mut rig);
+}
+
+#[test]
+fn vertices_move_the_surface_in_the_tick_they_come_with_at_any_budget() {
+    let mut rig = rig();
+    known(&mut rig);
+    // One corner goes down so far that the sheet between it and the opposite one cuts an edge of the cube.
+    send(&mut rig, vec![range(2, 1, 2, vec![[1.0, 1.0, -3.5]])]);
+    assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+    rig.vertices = vec![full(3, at(-2.4)), full(4, at(0.0))];
+    rig.send(NONE);
+    assert_ne!(rig.verdict(1, 2), Verdict::Colliding);
+    rig.vertices = vec![full(5, at(-2.55))];
+    rig.send(NONE);
+    assert_eq!(rig.verdict(1, 2), Verdict::Possible, "nothing was spent");
+    rig.send(ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+    rig.vertices = vec![full(6, at(0.0))];
+    rig.send(ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Apart);
+    assert_eq!(rig.state(), State::Clear);
+}
+
+#[test]
+fn law_3_7_wrong_vertices_leave_the_last_good_ones_and_the_body_unknown_until_all_come_again() {
+    let mut nan = at(0.0);
+    nan[2][1] = f32::NAN;
+    let mut far = at(0.0);
+    far[0][0] = 3e9;
+    let mut short = full(2, at(0.0)[..3].to_vec());
+    short.header.total = 4;
+    let other_total = full(2, at(0.0)[..3].to_vec());
+    let mut cut = full(2, at(0.0));
+    cut.rows.pop();
+    let mut flags = full(2, at(0.0));
+    flags.header.flags = 7;
+    let mut late = full(2, at(0.0));
+    late.waited = true;
+    let mut large = full(2, Vec::new());
+    large.refused = Some(RejectReason::OverLimit);
+    let bent = vec![[0.0_f32, 0.0, 0.1]];
+    for (wrong, reason) in [
+        (full(2, nan.clone()), RejectReason::NotFinite),
+        (range(2, 1, 0, nan), RejectReason::NotFinite),
+        (full(2, far), RejectReason::OverLimit),
+        (large, RejectReason::OverLimit),
+        (short, RejectReason::BadLayout),
+        (other_total, RejectReason::BadLayout),
+        (cut, RejectReason::BadLayout),
+        (flags, RejectReason::BadLayout),
+        (full(2, Vec::new()), RejectReason::BadLayout),
+        (range(2, 1, 1, Vec::new()), RejectReason::BadLayout),
+        (range(2, 1, 4, bent.clone()), RejectReason::BadLayout),
+        (range(2, 1, u32::MAX, bent.clone()), RejectReason::BadLayout),
+        (range(3, 2, 0, bent.clone()), RejectReason::VertexVersion),
+        (range(3, 0, 0, bent.clone()), RejectReason::VertexVersion),
+        (late, RejectReason::TooOld),
+    ] {
+        let mut rig = rig();
+        known(&mut rig);
+        send(&mut rig, vec![wrong.clone()]);
+        assert_eq!(status(&rig, 1), BodyStatus::Rejected, "{reason} {wrong:?}");
+        assert_eq!(rig.rejects(reason), 1, "{reason}");
+        assert_eq!(rig.state(), State::Unknown);
+        assert!(rig.because(Reason::Rejected));
+        let row = rig.out.bodies.iter().find(|row| row.body == 1).unwrap();
+        assert_eq!(RejectReason::from_code(row.reject), Some(reason));
+        let slot = rig.engine.world().slot_of(sweepd::ids::BodyId(1)).unwrap();
+        let body = rig.engine.world().body(slot).unwrap();
+        let tight = body.shapes[0].shape.aabb_at(&body.pose);
+        assert!((tight.min.z - 3.0).abs() < 1e-9 && (tight.max.z - 3.0).abs() < 1e-9);
+        // A good pose is no vertex, and a range of what it had is none either.
+        send(&mut rig, vec![]);
+        assert_eq!(status(&rig, 1), BodyStatus::Rejected);
+        send(&mut rig, vec![range(9, 1, 0, bent.clone())]);
+        assert_eq!(status(&rig, 1), BodyStatus::Rejected);
+        assert!(rig.rejects(RejectReason::VertexVersion) >= 1);
+        send(&mut rig, vec![full(10, at(0.0))]);
+        assert_eq!(status(&rig, 1), BodyStatus::Known);
+        assert_eq!(rig.state(), State::Clear);
+    }
+}
+
+#[test]
+fn vertices_that_come_again_or_late_change_nothing() {
+    let mut rig = rig();
+    known(&mut rig);
+    send(&mut rig, vec![full(7, at(0.5))]);
+    for old in [
+        full(7, at(-2.5)),
+        full(3, at(-2.5)),
+        range(7, 1, 0, at(-2.5)),
+    ] {
+        send(&mut rig, vec![old]);
+        assert_eq!(status(&rig, 1), BodyStatus::Known);
+        assert_eq!(rig.state(), State::Clear);
+    }
+    assert_eq!(rig.rejects(RejectReason::OldFrame), 3);
+    // The chain goes on from the newest.
+    send(&mut rig, vec![range(8, 7, 0, at(-2.6))]);
+    assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+}
+
+#[test]
+fn law_4_2_only_the_session_that_moves_a_body_may_bend_it() {
+    let mut rig = rig();
+    known(&mut rig);
+    let mut stranger = full(2, at(-2.6));
+    stranger.header.session = 12;
+    let mut nobody = full(2, at(-2.6));
+    nobody.header.source = name_bytes("nobody");
+    let mut rigid = full(2, at(-2.6));
+    rigid.header.body = 2;
+    let mut unknown = full(2, at(-2.6));
+    unknown.header.body = 77;
+    let mut anonymous = full(2, at(-2.6));
+    anonymous.header.session = 0;
+    for (wrong, reason) in [
+        (stranger, RejectReason::SourceTaken),
+        (nobody, RejectReason::UnknownSource),
+        (rigid, RejectReason::NotSteerable),
+        (unknown, RejectReason::UnknownBody),
+        (anonymous, RejectReason::BadLayout),
+    ] {
+        send(&mut rig, vec![wrong]);
+        assert_eq!(rig.rejects(reason), 1);
+        assert_eq!(status(&rig, 1), BodyStatus::Known);
+        assert_eq!(rig.state(), State::Clear, "{reason}");
+    }
+}
+
+#[test]
+fn law_4_2_a_new_session_or_epoch_has_to_send_all_vertices() {
+    let mut rig = rig();
+    known(&mut rig);
+    // The world resets: its vertices may come ahead of its first frame.
+    let mut first = full(1, at(0.2));
+    first.header.epoch = 2;
+    rig.vertices = vec![first];
+    rig.idle_with_vertices(FRAME_NS, ALL);
+    assert_eq!(status(&rig, 1), BodyStatus::NotReceived, "no pose yet");
+    rig.epoch = 2;
+    send(&mut rig, vec![]);
+    assert_eq!(status(&rig, 1), BodyStatus::Known);
+    // What is left of the epoch before is passed over.
+    send(&mut rig, vec![full(9, at(-2.6))]);
+    assert_eq!(rig.rejects(RejectReason::OldFrame), 1);
+    assert_eq!(rig.state(), State::Clear);
+    // Another reset, of which only poses come: the shape of before is void.
+    rig.epoch = 3;
+    send(&mut rig, vec![]);
+    assert_eq!(status(&rig, 1), BodyStatus::NotReceived);
+    let mut part = range(2, 1, 0, at(0.0));
+    part.header.epoch = 3;
+    send(&mut rig, vec![part]);
+    assert_eq!(status(&rig, 1), BodyStatus::Rejected);
+}
+
+#[test]
+fn law_4_6_a_sheet_that_goes_there_and_back_has_gone_both_ways() {
+    let mut rig = rig();
+    rig.demand.bodies = true;
+    known(&mut rig);
+    let slot = rig.engine.world().slot_of(sweepd::ids::BodyId(1)).unwrap();
+    let path = |rig: &Rig| rig.engine.world().body(slot).unwrap().motion.path_m;
+    let before = path(&rig);
+    // A number that f32 has.
+    let step = 1.0 / 64.0;
+    send(&mut rig, vec![full(2, at(step)), full(3, at(0.0))]);
+    let gone = path(&rig) - before;
+    assert!((0.03125..0.031_251).contains(&gone), "{gone}");
+}
