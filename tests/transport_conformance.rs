@@ -33,13 +33,13 @@ use std::time::Duration;
 use sweepd::error::Error;
 use sweepd::time::SystemClock;
 use sweepd::transport::client::{
-    Client, ClientOptions, FrameInfo, Heard, Link, Rows, StepError, Topics,
+    Client, ClientOptions, FrameInfo, Heard, Link, Part, Rows, StepError, Topics,
 };
 use sweepd::transport::iceoryx::{IoxLink, Server, ServerOptions};
 use sweepd::transport::memory::{Hub, MemoryServer};
 use sweepd::wire::{
-    EndCause, FrameHeader, RejectReason, RequestHeader, TransformVelRow, WIRE_VERSION, frame_flags,
-    name_bytes,
+    EndCause, FrameHeader, RejectReason, RequestHeader, TransformVelRow, VertexHeader, VertexRow,
+    WIRE_VERSION, frame_flags, name_bytes,
 };
 use transport_support::{Files, Manners, SECOND_NS, StandIn, poses, until};
 
@@ -422,6 +422,76 @@ fn the_end_of_a_client_ends_its_session_after_its_frames<B: Backend>() {
     assert_eq!(daemon.log().ended, [session], "and it is told once");
 }
 
+fn vertices_come_with_the_frame_that_they_belong_with<B: Backend>() {
+    let backend = B::new();
+    let daemon = backend.daemon(Manners::default());
+    let mut client = backend.client(Some("sim"));
+    let vertex = |k: u32, at: f32| VertexRow {
+        position: [k as f32, at, -1.0],
+    };
+    let all: Vec<_> = (0..10_000).map(|k| vertex(k, 0.0)).collect();
+    let nothing = client.send_vertices(
+        3,
+        Part::Range {
+            first: 5,
+            total: 10_000,
+        },
+        &all[..2],
+    );
+    assert!(nothing.is_err(), "nothing was sent before");
+    assert_eq!(client.send_vertices(3, Part::Full, &all).unwrap(), 1);
+    assert_eq!(client.send_vertices(4, Part::Full, &all[..50]).unwrap(), 1);
+    step(&mut client, 1, 0.0).unwrap();
+    let part = Part::Range {
+        first: 5,
+        total: 10_000,
+    };
+    let some = [vertex(5, 2.0), vertex(6, 3.0)];
+    assert_eq!(client.send_vertices(3, part, &some).unwrap(), 2);
+    step(&mut client, 1, 0.0).unwrap();
+    client.reset_epoch();
+    assert!(
+        client.send_vertices(3, part, &some).is_err(),
+        "void with the epoch"
+    );
+    assert_eq!(client.send_vertices(3, Part::Full, &all).unwrap(), 1);
+    step(&mut client, 1, 0.0).unwrap();
+    let log = daemon.log();
+    let seen = |v: &(VertexHeader, Vec<[f32; 3]>, Option<RejectReason>)| {
+        let h = &v.0;
+        assert_eq!((h.session, h.schema), (client.session(), WIRE_VERSION));
+        assert_eq!(h.source, name_bytes("sim"));
+        assert!(v.2.is_none() && h.sent_ns > 0 && h.count as usize == v.1.len());
+        let order = (h.epoch, h.seq, h.body);
+        (
+            order,
+            h.version,
+            h.base_version,
+            (h.first, h.count, h.total),
+        )
+    };
+    let told: Vec<_> = log.vertices.iter().map(seen).collect();
+    let wanted = [
+        ((0, 1, 3), 1, 0, (0, 10_000, 10_000)),
+        ((0, 1, 4), 1, 0, (0, 50, 50)),
+        ((0, 2, 3), 2, 1, (5, 2, 10_000)),
+        ((1, 3, 3), 1, 0, (0, 10_000, 10_000)),
+    ];
+    assert_eq!(told, wanted);
+    let rows = |at: usize| &log.vertices[at].1;
+    assert!((rows(0).iter().zip(&all)).all(|(row, sent)| *row == sent.position));
+    assert_eq!(rows(2)[..], some.map(|v| v.position));
+    // Each was there in the round of its frame, or before.
+    drop(client);
+    // Who only ever sends vertices has a session too, and it ends.
+    let mut bender = backend.client(Some("bender"));
+    bender.send_vertices(9, Part::Full, &all[..10]).unwrap();
+    let session = bender.session();
+    until("its vertices come", || daemon.log().vertices.len() == 5);
+    drop(bender);
+    until("its session ends", || daemon.log().ended.contains(&session));
+}
+
 fn pauses_and_epochs_are_carried<B: Backend>() {
     let backend = B::new();
     let daemon = backend.daemon(Manners::default());
@@ -518,6 +588,7 @@ macro_rules! both {
 }
 
 both! {
+    vertices_come_with_the_frame_that_they_belong_with
     a_step_returns_the_result_of_exactly_its_frame
     velocities_come_on_a_type_of_their_own
     a_frame_that_was_passed_over_is_said_to_be_skipped

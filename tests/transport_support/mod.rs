@@ -23,7 +23,7 @@ use sweepd::transport::iceoryx::{Place, Server, ServerOptions};
 use sweepd::transport::{Door, RequestToken};
 use sweepd::wire::{
     ContactRow, Frame, FrameHeader, Inbox, MessageHeader, NameRow, Outbox, PairRow, RegionRow,
-    RejectReason, TickCause, TickRow, TransformRow, Verdict, WIRE_VERSION,
+    RejectReason, TickCause, TickRow, TransformRow, Verdict, VertexHeader, WIRE_VERSION,
 };
 
 pub const SECOND_NS: u64 = 1_000_000_000;
@@ -97,6 +97,7 @@ impl Drop for Files {
 #[derive(Clone, Debug, Default)]
 pub struct Log {
     pub frames: Vec<(FrameHeader, usize, Option<RejectReason>, bool)>,
+    pub vertices: Vec<(VertexHeader, Vec<[f32; 3]>, Option<RejectReason>)>,
     pub ended: Vec<u64>,
     pub requests: Vec<Vec<u8>>,
 }
@@ -230,6 +231,9 @@ fn note(log: &Mutex<Log>, inbox: &Inbox) {
             frame.waited,
         ));
     }
+    let vertices = inbox.vertices().iter();
+    log.vertices
+        .extend(vertices.map(|v| (v.header, v.rows.clone(), v.refused)));
     log.ended.extend_from_slice(inbox.ended());
 }
 

@@ -23,6 +23,7 @@ _TOPICS = {
     "plan": ctypes.c_uint8,
 }
 _POSE = np.dtype(layout.TransformRow)
+_VERTEX = np.dtype(layout.VertexRow)
 
 
 def _text(chars):
@@ -100,6 +101,7 @@ class Client:
         self.session = secrets.randbits(64) or 1
         self._epoch = 0
         self._seq = 0
+        self._versions = {}
         self._requests = 0
         self._tick = None
         self._held = None
@@ -163,6 +165,50 @@ class Client:
     def reset_epoch(self):
         """Says that the world was reset: with the next frame every pair of the source's bodies ends."""
         self._epoch += 1
+        # what the daemon had of vertices is void with it
+        self._versions = {}
+
+    def send_vertices(self, body, vertices, *, first=None, total=None):
+        """Sends vertices of a body that deforms; they belong with the frame that is sent next. Returns their version.
+
+        * ``body``: name or id.
+        * ``vertices``: ``(n, 3)`` positions in the body's frame, metres; they go out as float32.
+        * ``first``, ``total``: these are ``n`` of ``total`` vertices, from place ``first`` on, and take the place of
+          those sent before; without them these are all.
+
+        Where the daemon has missed or refused vertices of the body, it needs all of them again: the body's pairs are
+        possible and ``bodies`` say why.
+        """
+        if (first is None) != (total is None):
+            raise SweepdError("a range of vertices needs first and total")
+        vertices = np.ascontiguousarray(vertices, dtype=np.float32)
+        if vertices.ndim != 2 or vertices.shape[1] != 3:
+            raise SweepdError(f"vertices of shape {vertices.shape}: give (n, 3)")
+        body = self._ids([body])[0] if isinstance(body, str) else int(body)
+        base = self._versions.get(body)
+        if first is not None and base is None:
+            raise SweepdError("a range of vertices changes those sent before: send all of them first")
+        base = base or 0
+        flags = layout.VertexFlags.FULL if first is None else layout.VertexFlags.RANGE
+        header = layout.VertexHeader(
+            session=self.session,
+            epoch=self._epoch,
+            seq=self._seq + 1,
+            sent_ns=time.clock_gettime_ns(time.CLOCK_BOOTTIME),
+            body=body,
+            version=base + 1,
+            base_version=base,
+            first=first or 0,
+            count=len(vertices),
+            total=len(vertices) if total is None else total,
+            flags=flags,
+            schema=layout.WIRE_VERSION,
+        )
+        self._name(header)
+        rows = vertices.view(_VERTEX).reshape(len(vertices))
+        self._ports.send("vertices", layout.VertexRow, header, rows, wake=False)
+        self._versions[body] = base + 1
+        return base + 1
 
     def step(self, poses, timeout_s=1.0, **fields):
         """Sends a frame and returns the :class:`Result` of exactly that frame.
@@ -245,8 +291,6 @@ class Client:
             raise SweepdError(f"the scene has no body {e}; it has {', '.join(sorted(names)) or 'none'}") from None
 
     def _send(self, rows, flags, fields):
-        if self._source is None:
-            raise SweepdError("this client was opened as a reader; name a source to send frames")
         header = layout.FrameHeader(
             session=self.session,
             epoch=self._epoch,
@@ -256,11 +300,16 @@ class Client:
             schema=layout.WIRE_VERSION,
             **fields,
         )
-        name = self._source.encode()
-        header.source[: len(name)] = name
+        self._name(header)
         self._ports.send("transforms", layout.TransformRow, header, rows)
         self._seq += 1
         return self._seq
+
+    def _name(self, header):
+        if self._source is None:
+            raise SweepdError("this client was opened as a reader; name a source to send frames")
+        name = self._source.encode()
+        header.source[: len(name)] = name
 
     def _row(self, tick):
         for row in tick.sources[: tick.sources_len]:

@@ -192,10 +192,10 @@ class Ports:
         header = layout.MessageHeader.from_buffer_copy(sample.user_header().contents)
         return header, _view(sample, kind)
 
-    def send(self, topic, row, header, rows):
-        """Hands a frame over and wakes the daemon."""
+    def send(self, topic, row, header, rows, wake=True):
+        """Hands rows over and, where said, wakes the daemon."""
         if topic not in self._senders:
-            service = self._topic(topic).publish_subscribe(iox2.Slice[row]).user_header(layout.FrameHeader).open()
+            service = self._topic(topic).publish_subscribe(iox2.Slice[row]).user_header(type(header)).open()
             self._senders[topic] = (
                 service.publisher_builder()
                 # a sample sent right after a growth is lost if its sender ends before it is mapped
@@ -208,7 +208,8 @@ class Ports:
         ctypes.memmove(sample.user_header_ptr, ctypes.byref(header), ctypes.sizeof(header))
         _fill(sample.payload_ptr, np.dtype(row), rows)
         sample.assume_init().send()
-        self.wake(SENT)
+        if wake:
+            self.wake(SENT)
 
     def request(self, header, payload):
         """Sends a request; the answer comes with :meth:`answer`."""

@@ -6,7 +6,7 @@ use super::follow::Message;
 use crate::error::Result;
 use crate::wire::{
     AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, NameRow, PairRow, RegionRow,
-    RequestHeader, TickRow, TransformRow, TransformVelRow,
+    RequestHeader, TickRow, TransformRow, TransformVelRow, VertexHeader, VertexRow,
 };
 
 /// What to listen to beside ticks.
@@ -68,6 +68,11 @@ pub trait Link: Debug {
     /// # Errors
     /// `Error::Io`.
     fn send(&mut self, header: &FrameHeader, rows: Rows<'_>) -> Result<()>;
+    /// Hands vertices of one body over, ahead of the frame that they belong with.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn send_vertices(&mut self, header: &VertexHeader, rows: &[VertexRow]) -> Result<()>;
     /// Sleeps until the daemon has sent something, a signal came, or `timeout_ns` have passed.
     ///
     /// # Errors

@@ -7,13 +7,16 @@ mod connect;
 mod follow;
 mod link;
 mod step;
+mod vertices;
 
 pub use connect::ClientOptions;
 pub(crate) use connect::random_u64;
 pub use follow::{Message, View};
 pub use link::{Link, Rows, Topics};
 pub use step::StepError;
+pub use vertices::Part;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
@@ -86,6 +89,8 @@ pub struct Client {
     source: Option<String>,
     hello: Hello,
     frame: FrameId,
+    /// Version of the last vertices sent, by body.
+    versions: BTreeMap<u64, u64>,
     requests: u64,
     follow: follow::Follow,
     patience: Patience,
@@ -122,6 +127,7 @@ impl Client {
                 epoch: 0,
                 seq: 0,
             },
+            versions: BTreeMap::new(),
             requests: 0,
             follow: follow::Follow::default(),
             patience: Patience::new(0),
@@ -187,6 +193,8 @@ impl Client {
     /// Begins a new epoch: the world was reset, every pair of the source's bodies ends with the next frame.
     pub fn reset_epoch(&mut self) {
         self.frame.epoch += 1;
+        // What the daemon had of vertices is void with it.
+        self.versions.clear();
     }
 
     fn send_flagged(&mut self, info: &FrameInfo, rows: Rows<'_>, flags: u32) -> Result<FrameId> {

@@ -19,7 +19,7 @@ use crate::time::Clock;
 use crate::transport::client::{Link, Message, Rows, Topics};
 use crate::wire::{
     AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, MessageHeader, NameRow, PairRow,
-    RegionRow, RequestHeader, TickRow, TransformRow, TransformVelRow,
+    RegionRow, RequestHeader, TickRow, TransformRow, TransformVelRow, VertexHeader, VertexRow,
 };
 
 /// Between two looks for a daemon.
@@ -40,6 +40,7 @@ pub struct IoxLink {
     requests: Option<Asker>,
     transforms: Sender<TransformRow>,
     transforms_vel: Sender<TransformVelRow>,
+    vertices: Option<Publisher<Ipc, [VertexRow], VertexHeader>>,
     wake: Notifier<Ipc>,
     ready: Listener<Ipc>,
     tick: Subscriber<Ipc, TickRow, ()>,
@@ -115,6 +116,7 @@ impl IoxLink {
             requests: None,
             transforms: None,
             transforms_vel: None,
+            vertices: None,
             wake,
             ready,
             tick,
@@ -176,13 +178,10 @@ fn not_found(place: &Place, why: &Error) -> Error {
     ))
 }
 
-fn send_frame<T>(
-    publisher: &Publisher<Ipc, [T], FrameHeader>,
-    header: &FrameHeader,
-    rows: &[T],
-) -> Result<()>
+fn send_frame<T, H>(publisher: &Publisher<Ipc, [T], H>, header: &H, rows: &[T]) -> Result<()>
 where
     T: std::fmt::Debug + ZeroCopySend + Copy,
+    H: std::fmt::Debug + ZeroCopySend + Copy + Default,
 {
     let mut sample = publisher
         .loan_slice_uninit(rows.len())
@@ -263,6 +262,19 @@ impl Link for IoxLink {
             }
         }
         self.wake(events::SENT);
+        Ok(())
+    }
+
+    fn send_vertices(&mut self, header: &VertexHeader, rows: &[VertexRow]) -> Result<()> {
+        if self.vertices.is_none() {
+            let service = qos::vertices(&self.node, &self.place, Open::Existing)?;
+            let rows = rows.len().max(qos::SLICE_LEN_START);
+            self.vertices = Some(qos::slice_publisher(&service, rows)?);
+        }
+        if let Some(port) = &self.vertices {
+            send_frame(port, header, rows)?;
+        }
+        // No wake-up: the frame that they belong with comes next.
         Ok(())
     }
 

@@ -18,7 +18,9 @@ use iceoryx2::service::port_factory::request_response::PortFactory as ReqRes;
 use super::place::Place;
 use crate::error::{Error, Result};
 use crate::limits::SOURCES_MAX;
-use crate::wire::{AnswerHeader, Hello, MessageHeader, RequestHeader, TickRow};
+use crate::wire::{
+    AnswerHeader, Hello, MessageHeader, RequestHeader, TickRow, VertexHeader, VertexRow,
+};
 
 /// The services of one thread.
 pub(super) type Ipc = ipc::Service;
@@ -31,6 +33,9 @@ const SOURCE_PUBLISHERS_MAX: usize = SOURCES_MAX + 8;
 const SOURCE_SUBSCRIBERS_MAX: usize = 4;
 /// Frames of one source that wait for the daemon; then the oldest goes (world counts the gap).
 pub(super) const SOURCE_BUFFER: usize = 4;
+/// Vertex messages of one source that wait for the daemon, one a body and version; then the oldest goes, and its body
+/// is unknown until all of its vertices come again.
+pub(super) const VERTEX_BUFFER: usize = 64;
 /// Publishers of results: the daemon, its successor, a tunnel.
 const RESULT_PUBLISHERS_MAX: usize = 3;
 /// Readers of `tick`: every source that waits for its result, and as many onlookers.
@@ -144,6 +149,31 @@ pub(super) fn frames<T: Debug + ZeroCopySend>(
             .max_subscribers(SOURCE_SUBSCRIBERS_MAX)
             .subscriber_max_buffer_size(SOURCE_BUFFER)
             .subscriber_max_borrowed_samples(SOURCE_BUFFER)
+            .history_size(0)
+            .enable_safe_overflow(true)
+            .max_nodes(NODES_MAX),
+    };
+    open_slice(&name, builder, open)
+}
+
+/// `vertices`: of one body a message. No history, as of frames.
+pub(super) fn vertices(
+    node: &Node<Ipc>,
+    place: &Place,
+    open: Open,
+) -> Result<PubSub<Ipc, [VertexRow], VertexHeader>> {
+    let name = place.service("vertices");
+    let builder = node
+        .service_builder(&service_name(&name)?)
+        .publish_subscribe::<[VertexRow]>()
+        .user_header::<VertexHeader>();
+    let builder = match open {
+        Open::Existing => builder,
+        Open::Create => builder
+            .max_publishers(SOURCE_PUBLISHERS_MAX)
+            .max_subscribers(SOURCE_SUBSCRIBERS_MAX)
+            .subscriber_max_buffer_size(VERTEX_BUFFER)
+            .subscriber_max_borrowed_samples(VERTEX_BUFFER)
             .history_size(0)
             .enable_safe_overflow(true)
             .max_nodes(NODES_MAX),

@@ -31,7 +31,8 @@ use crate::transport::patience::Patience;
 use crate::transport::{Door, ICEORYX2_VERSION, RequestToken, Wake};
 use crate::wire::{
     AnswerHeader, BodyRow, ContactRow, Demand, Hello, Inbox, MessageHeader, NameRow, Outbox,
-    PairRow, RegionRow, RequestHeader, TickRow, TransformRow, TransformVelRow, WIRE_VERSION,
+    PairRow, RegionRow, RequestHeader, TickRow, TransformRow, TransformVelRow, VertexHeader,
+    VertexRow, WIRE_VERSION,
 };
 
 /// How a server opens.
@@ -96,6 +97,7 @@ pub struct Server {
     answers: RequestServer<Ipc, [u8], RequestHeader, [u8], AnswerHeader>,
     transforms: In<TransformRow>,
     transforms_vel: In<TransformVelRow>,
+    vertices: In<VertexRow, VertexHeader>,
     wake: Listener<Ipc>,
     ready: Notifier<Ipc>,
     contacts: Out<ContactRow>,
@@ -175,6 +177,7 @@ impl Server {
             answers,
             transforms: In::open(&node, place, "transforms").map_err(held)?,
             transforms_vel: In::open(&node, place, "transforms_vel").map_err(held)?,
+            vertices: In::open_vertices(&node, place).map_err(held)?,
             wake: wake
                 .listener_builder()
                 .create()

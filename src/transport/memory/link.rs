@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::{Peer, Rows as Queued, SOURCE_BUFFER, Shared};
+use super::{Peer, Rows as Queued, SOURCE_BUFFER, Shared, VERTEX_BUFFER};
 use crate::error::Result;
 use crate::transport::client::{Link, Message, Rows, Topics};
 use crate::wire::{
     AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, NameRow, PairRow, RegionRow,
-    RequestHeader, TickRow,
+    RequestHeader, TickRow, VertexHeader, VertexRow,
 };
 
 /// A client's ports in memory; a clean leave when dropped.
@@ -96,6 +96,19 @@ impl Link for MemoryLink {
         state.wake.notified = true;
         drop(state);
         self.shared.to_server.notify_all();
+        Ok(())
+    }
+
+    fn send_vertices(&mut self, header: &VertexHeader, rows: &[VertexRow]) -> Result<()> {
+        let mut state = self.shared.lock();
+        if let Some(peer) = state.peers.get_mut(&self.peer) {
+            if peer.vertices.len() == VERTEX_BUFFER {
+                peer.vertices.pop_front();
+            }
+            peer.vertices.push_back((*header, rows.to_vec()));
+            peer.session = header.session;
+        }
+        // No wake-up: the frame that they belong with comes next.
         Ok(())
     }
 

@@ -16,11 +16,13 @@ use crate::transport::client::{Message, Topics};
 use crate::transport::{RequestToken, Wake};
 use crate::wire::{
     AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, NameRow, PairRow, RegionRow,
-    RequestHeader, TickRow, TransformRow, TransformVelRow,
+    RequestHeader, TickRow, TransformRow, TransformVelRow, VertexHeader, VertexRow,
 };
 
 /// Frames of one source that wait for the daemon; then the oldest goes. As over shared memory.
 const SOURCE_BUFFER: usize = 4;
+/// Vertex messages of one source that wait for the daemon; then the oldest goes. As over shared memory.
+const VERTEX_BUFFER: usize = 64;
 /// Messages that wait for one reader; then the oldest goes. As over shared memory.
 const RESULT_BUFFER: usize = 8;
 
@@ -57,6 +59,7 @@ struct Peer {
     session: u64,
     left: bool,
     frames: VecDeque<(FrameHeader, Rows)>,
+    vertices: VecDeque<(VertexHeader, Vec<VertexRow>)>,
     ready: bool,
     hello: Option<Hello>,
     tick: VecDeque<TickRow>,

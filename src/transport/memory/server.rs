@@ -131,6 +131,16 @@ fn take_frames(peer: &mut Peer, inbox: &mut Inbox, now_ns: u64, waited: bool, ro
             Rows::Moving(rows) => frame.set_transforms_vel(&rows),
         }
     }
+    for (header, rows) in peer.vertices.drain(..) {
+        let frame = inbox.push_vertices();
+        frame.header = header;
+        (frame.received_ns, frame.waited) = (now_ns, waited);
+        if rows.len() > limits::DEFORMING_VERTICES_MAX {
+            frame.refused = Some(RejectReason::OverLimit);
+        } else {
+            frame.set_rows(&rows);
+        }
+    }
 }
 
 impl Door for MemoryServer {

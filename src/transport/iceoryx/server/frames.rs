@@ -14,29 +14,81 @@ use crate::error::Result;
 use crate::time::Clock;
 use crate::transport::iceoryx::place::Place;
 use crate::transport::iceoryx::qos::{self, Ipc, Open, failed};
-use crate::wire::{Frame, FrameHeader, Inbox, RejectReason};
+use crate::wire::{Frame, FrameHeader, Inbox, RejectReason, VertexHeader, VertexRow};
 
-/// One of the two frame services. Drop order: samples, then the port, then the service.
-pub(super) struct In<T>
+/// One of the services that sources send on. Drop order: samples, then the port, then the service.
+pub(super) struct In<T, H = FrameHeader>
 where
     T: Debug + ZeroCopySend + 'static,
+    H: Debug + ZeroCopySend + 'static,
 {
     /// Samples of the drain in progress: kept until its end, so that one source gives at most its queue.
-    kept: Vec<Sample<Ipc, [T], FrameHeader>>,
-    pub(super) subscriber: Subscriber<Ipc, [T], FrameHeader>,
-    service: PubSub<Ipc, [T], FrameHeader>,
+    kept: Vec<Sample<Ipc, [T], H>>,
+    pub(super) subscriber: Subscriber<Ipc, [T], H>,
+    service: PubSub<Ipc, [T], H>,
 }
 
 /// What is the same for every frame of a drain.
+#[derive(Clone, Copy)]
 struct Stamped {
     now_ns: u64,
     waited: bool,
-    rows_max: usize,
+}
+
+impl Stamped {
+    /// A frame of the inbox for what came under this header; its session.
+    fn take<T>(
+        self,
+        inbox: &mut Inbox,
+        header: FrameHeader,
+        rows: Option<&[T]>,
+        copy: impl Fn(&mut Frame, &[T]),
+    ) -> u64 {
+        let frame = inbox.push();
+        frame.header = header;
+        (frame.received_ns, frame.waited) = (self.now_ns, self.waited);
+        match rows {
+            Some(rows) => copy(frame, rows),
+            None => frame.refused = Some(RejectReason::OverLimit),
+        }
+        header.session
+    }
+
+    fn take_vertices(
+        self,
+        inbox: &mut Inbox,
+        header: VertexHeader,
+        rows: Option<&[VertexRow]>,
+    ) -> u64 {
+        let frame = inbox.push_vertices();
+        frame.header = header;
+        (frame.received_ns, frame.waited) = (self.now_ns, self.waited);
+        match rows {
+            Some(rows) => frame.set_rows(rows),
+            None => frame.refused = Some(RejectReason::OverLimit),
+        }
+        header.session
+    }
 }
 
 impl<T: Debug + ZeroCopySend + 'static> In<T> {
     pub(super) fn open(node: &Node<Ipc>, place: &Place, topic: &str) -> Result<Self> {
-        let service = qos::frames::<T>(node, place, topic, Open::Create)?;
+        Self::of(qos::frames::<T>(node, place, topic, Open::Create)?, topic)
+    }
+}
+
+impl In<VertexRow, VertexHeader> {
+    pub(super) fn open_vertices(node: &Node<Ipc>, place: &Place) -> Result<Self> {
+        Self::of(qos::vertices(node, place, Open::Create)?, "vertices")
+    }
+}
+
+impl<T, H> In<T, H>
+where
+    T: Debug + ZeroCopySend + 'static,
+    H: Debug + ZeroCopySend + Copy + 'static,
+{
+    fn of(service: PubSub<Ipc, [T], H>, topic: &str) -> Result<Self> {
         let subscriber = service
             .subscriber_builder()
             // one source with broken files must not silence the others
@@ -50,15 +102,15 @@ impl<T: Debug + ZeroCopySend + 'static> In<T> {
         })
     }
 
-    /// Copies what is there into the inbox.
+    /// Hands over what is there, header and rows; no rows where there are more than `rows_max`.
     ///
+    /// * `take` - yields the session.
     /// * returns - receives that failed.
     fn drain(
         &mut self,
-        inbox: &mut Inbox,
-        stamp: &Stamped,
+        rows_max: usize,
         sessions: &mut BTreeMap<u128, u64>,
-        copy: impl Fn(&mut Frame, &[T]),
+        mut take: impl FnMut(H, Option<&[T]>) -> u64,
     ) -> u64 {
         let mut errors = 0;
         loop {
@@ -66,18 +118,11 @@ impl<T: Debug + ZeroCopySend + 'static> In<T> {
                 Ok(Some(sample)) => {
                     let header = *sample.user_header();
                     let publisher = sample.header().publisher_id().value();
-                    sessions.insert(publisher, header.session);
-                    let frame = inbox.push();
-                    frame.header = header;
-                    frame.received_ns = stamp.now_ns;
-                    frame.waited = stamp.waited;
                     // the count is the sender's word: checked before it makes a slice
                     let rows = usize::try_from(sample.header().number_of_elements());
-                    if rows.is_ok_and(|rows| rows <= stamp.rows_max) {
-                        copy(frame, sample.payload());
-                    } else {
-                        frame.refused = Some(RejectReason::OverLimit);
-                    }
+                    let fits = rows.is_ok_and(|rows| rows <= rows_max);
+                    let session = take(header, fits.then(|| sample.payload()));
+                    sessions.insert(publisher, session);
                     self.kept.push(sample);
                 }
                 // every source has given its whole queue: the fair end of a drain
@@ -110,23 +155,28 @@ impl Server {
             self.note_gone_publishers();
         }
         let known = self.sessions.len();
-        let stamp = Stamped {
-            now_ns,
-            waited,
-            rows_max: self.options.frame_rows_max,
-        };
+        let stamp = Stamped { now_ns, waited };
         let Self {
             transforms,
             transforms_vel,
+            vertices,
             sessions,
             receive_errors,
+            options,
             ..
         } = self;
-        *receive_errors += transforms.drain(inbox, &stamp, sessions, |frame, rows| {
-            frame.set_transforms(rows);
+        let rows_max = options.frame_rows_max;
+        *receive_errors += transforms.drain(rows_max, sessions, |header, rows| {
+            stamp.take(inbox, header, rows, Frame::set_transforms)
         });
-        *receive_errors += transforms_vel.drain(inbox, &stamp, sessions, |frame, rows| {
-            frame.set_transforms_vel(rows);
+        *receive_errors += transforms_vel.drain(rows_max, sessions, |header, rows| {
+            stamp.take(inbox, header, rows, Frame::set_transforms_vel)
+        });
+        // After the frames: vertices are sent before the frame that they belong with, so those of what was drained
+        // above are there.
+        let rows_max = crate::limits::DEFORMING_VERTICES_MAX;
+        *receive_errors += vertices.drain(rows_max, sessions, |header, rows| {
+            stamp.take_vertices(inbox, header, rows)
         });
         // who came and left between the look and the drain must be looked at again
         self.peers_changed |= self.sessions.len() > known;
@@ -140,6 +190,7 @@ impl Server {
             sessions,
             transforms,
             transforms_vel,
+            vertices,
             ..
         } = self;
         alive.clear();
@@ -154,6 +205,10 @@ impl Server {
                 alive.push(p.publisher_id.value());
                 CallbackProgression::Continue
             });
+        vertices.service.dynamic_config().list_publishers(|p| {
+            alive.push(p.publisher_id.value());
+            CallbackProgression::Continue
+        });
         let there = |publisher: &u128| alive.contains(publisher);
         gone.extend(sessions.keys().filter(|publisher| !there(publisher)));
     }
@@ -163,7 +218,7 @@ impl Server {
             let Some(session) = self.sessions.remove(&publisher) else {
                 continue;
             };
-            // a client may have a port on both services: its session ends with the last
+            // a client may have a port on several services: its session ends with the last
             if !self.sessions.values().any(|s| *s == session) {
                 inbox.end_session(session);
             }

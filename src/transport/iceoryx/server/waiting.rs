@@ -22,6 +22,7 @@ impl Server {
         let some = |has: std::result::Result<bool, _>| has.unwrap_or(true);
         some(self.transforms.subscriber.has_samples())
             || some(self.transforms_vel.subscriber.has_samples())
+            || some(self.vertices.subscriber.has_samples())
             || some(self.answers.has_requests())
     }
 
