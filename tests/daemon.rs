@@ -15,6 +15,8 @@ mod live;
 mod bad_input;
 #[path = "daemon/bullets.rs"]
 mod bullets;
+#[path = "daemon/cloths.rs"]
+mod cloths;
 #[path = "daemon/edits.rs"]
 mod edits;
 #[path = "daemon/ends.rs"]

@@ -16,13 +16,16 @@ use crate::tick::EditBatch;
 use crate::time::Clock;
 use crate::transport::RequestToken;
 use crate::wire::GapFound;
-use crate::world::Edit;
+use crate::world::{BuiltTree, Edit, WornTree};
 
 use super::shapes::place;
 
 /// The answer to a request whose building broke down; the panic itself is told on stderr.
 const INTERNAL: &str =
     "an internal error of the daemon while it read the request: nothing was changed; see its log";
+
+/// Stands for the asker of a tree: the daemon itself.
+pub(super) const TREE: RequestToken = RequestToken(u64::MAX);
 
 /// What is on its way to the worker, and who waits for it.
 struct Asked(RequestToken, Work);
@@ -32,6 +35,8 @@ enum Work {
     Read(usize, Vec<u8>),
     /// A question, with the bodies it is about.
     Measure(Box<GapQuestion>),
+    /// A tree that has become loose; nobody waits for an answer.
+    Tree(Box<WornTree>),
 }
 
 /// What the worker made of a request.
@@ -40,6 +45,8 @@ pub(super) enum Done {
     Batch(EditBatch),
     /// The bodies are to be looked up: names of A and B.
     Gap(String, String),
+    /// A tree to be put in place.
+    Tree(Box<BuiltTree>),
     /// An answer, and what is odd about it.
     Found(Box<GapFound>, Vec<String>),
 }
@@ -106,6 +113,11 @@ impl Builder {
         self.hand(token, Work::Measure(Box::new(question)));
     }
 
+    /// Hands over a tree to be built.
+    pub(super) fn build_tree(&mut self, worn: WornTree) {
+        self.hand(TREE, Work::Tree(Box::new(worn)));
+    }
+
     fn hand(&mut self, token: RequestToken, work: Work) {
         let asked = self.asked.as_ref();
         let sent = asked.is_some_and(|asked| asked.send(Asked(token, work)).is_ok());
@@ -154,6 +166,7 @@ impl Against {
                 let found = Box::new(question.answer(self.clock.as_ref()));
                 return Ok(Done::Found(found, question.warnings));
             }
+            Work::Tree(worn) => return Ok(Done::Tree(Box::new(worn.build()))),
         };
         let cut = payload.split_at_checked(json_len);
         let (json, blobs) = cut.ok_or("the request is shorter than its header says")?;

@@ -21,7 +21,7 @@ use crate::transport::{BodyChange, Door, RequestToken, Wake};
 use crate::wire::{Answer, Inbox, TickRow};
 use crate::world::Edit;
 
-use builder::{Builder, Done};
+use builder::{Builder, Done, TREE};
 
 pub use shapes::{Shapes, body_note, build_shapes};
 pub use watchdog::Watchdog;
@@ -47,6 +47,8 @@ pub struct Daemon<'a> {
     ready: Vec<EditBatch>,
     /// A tick is wanted at once.
     tick_asked: bool,
+    /// A worker builds a tree.
+    tree_asked: bool,
     /// Raised each round, and each heartbeat of a long tick.
     progress: Arc<AtomicU64>,
 }
@@ -82,6 +84,7 @@ impl<'a> Daemon<'a> {
             due: Inbox::default(),
             ready: Vec::new(),
             tick_asked: false,
+            tree_asked: false,
             progress: Arc::default(),
         })
     }
@@ -166,8 +169,19 @@ impl<'a> Daemon<'a> {
             let json_len = usize::try_from(header.json_len).unwrap_or(usize::MAX);
             builder.ask(token, json_len, payload);
         });
+        if !self.tree_asked
+            && let Some(worn) = self.engine.worn_tree()
+        {
+            self.tree_asked = true;
+            self.builder.build_tree(worn);
+        }
         while let Some((token, built)) = self.builder.finished() {
-            if let Some(answer) = self.take_built(token, built) {
+            if token == TREE {
+                self.tree_asked = false;
+                if let Ok(Done::Tree(tree)) = built {
+                    self.engine.take_tree(*tree);
+                }
+            } else if let Some(answer) = self.take_built(token, built) {
                 self.answer(token, &answer);
             }
         }
@@ -194,6 +208,8 @@ impl<'a> Daemon<'a> {
                     ..Answer::default()
                 });
             }
+            // Its asker is the daemon.
+            Ok(Done::Tree(_)) => return None,
             Ok(Done::Gap(a, b)) => {
                 // The bodies as the last tick left them.
                 let header = self.engine.outbox().tick.header;

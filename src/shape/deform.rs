@@ -1,6 +1,6 @@
 //! Shapes that deform: one of a mesh, for one body alone.
 
-use super::{Geometry, Mesh, Shape, ShapeError};
+use super::{Geometry, Mesh, NewTree, Shape, ShapeError};
 
 impl Shape {
     /// The same shape as one whose vertices can be moved, of its own.
@@ -61,6 +61,14 @@ impl Shape {
         match &mut self.geometry {
             Geometry::Mesh(mesh) => mesh.refit(packs_max),
             _ => 0,
+        }
+    }
+
+    /// See [`Mesh::take_tree`].
+    pub(crate) fn take_tree(&mut self, new: NewTree) -> bool {
+        match &mut self.geometry {
+            Geometry::Mesh(mesh) => mesh.take_tree(new),
+            _ => false,
         }
     }
 

@@ -17,7 +17,7 @@ mod tree;
 mod turn;
 
 use deform::Deform;
-pub(crate) use deform::{NoVertex, can_be_vertices};
+pub(crate) use deform::{NewTree, NoVertex, TreeJob, can_be_vertices};
 pub(crate) use inside::Inside;
 pub(crate) use normals::Cone;
 use obb::ObbTree;

@@ -8,6 +8,7 @@ use super::Engine;
 use super::floor::CLOSING_NS;
 use crate::narrow::Wanted;
 use crate::time::Meter;
+use crate::world::{BuiltTree, WornTree};
 
 /// The last tick's budget after its outbox was handed over.
 #[derive(Clone, Copy, Debug, Default)]
@@ -21,6 +22,17 @@ pub(super) struct Rest {
 }
 
 impl Engine {
+    /// A tree that has become loose, to be built by a worker; see [`crate::world::World::worn_tree`].
+    #[must_use]
+    pub fn worn_tree(&self) -> Option<WornTree> {
+        self.world.worn_tree()
+    }
+
+    /// Puts a built tree in place, between two ticks; pairs of the body then start from its root. Whether it was taken.
+    pub fn take_tree(&mut self, built: BuiltTree) -> bool {
+        self.world.take_tree(built)
+    }
+
     /// Works on what the last tick left undone, within its budget of time and for at most `slice_ns`; what is found
     /// goes out with the next tick. Returns whether there is more to do and time to do it.
     ///

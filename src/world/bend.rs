@@ -46,7 +46,7 @@ impl Vertices {
 
 impl Body {
     /// The one shape of a body that deforms.
-    fn bending_shape(&mut self) -> Option<&mut Shape> {
+    pub(super) fn bending_shape(&mut self) -> Option<&mut Shape> {
         self.vertices.as_ref()?;
         // Somebody who measures the body at this moment holds it as it was.
         let placed = Arc::make_mut(&mut self.shapes).first_mut()?;

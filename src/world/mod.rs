@@ -25,6 +25,7 @@ mod rules;
 mod source;
 mod tag;
 mod travel;
+mod trees;
 mod validate;
 
 use std::sync::Arc;
@@ -37,6 +38,7 @@ pub use filters::{Because, Filters};
 pub use path::{Leg, Path};
 pub use source::SourceState;
 pub use tag::Tag;
+pub use trees::{BuiltTree, WornTree};
 
 use crate::config::Config;
 use crate::error::{Error, Result};

@@ -89,7 +89,7 @@ def test_a_sheet_that_is_pushed_into_a_box_collides_in_just_those_steps_in_which
         assert result.state == "unknown", "no vertices yet"
         assert status(client, result, "cloth")[0] == layout.BodyStatus.NOT_RECEIVED
         for step in range(120):
-            depth = 0.5 + 0.2 * np.sin(0.15 * step)
+            depth = 0.5 + 0.2 * np.sin(0.15 * step + 0.05)
             client.send_vertices("cloth", dent(vertices, depth))
             result = client.step(POSES, timeout_s=5)
             # The middle is lowest; there the box's top is 0.5 m below.
@@ -147,6 +147,8 @@ def test_a_client_that_comes_after_one_that_was_killed_has_to_send_all_vertices(
     first.send_vertices("cloth", vertices)
     assert first.step(POSES, timeout_s=5).state == "clear"
     first.close()
+    # Until its end is heard, another is refused.
+    time.sleep(1.0)
     with sweepd.Client(instance, "sim", quat_order="wxyz", listen=LISTEN) as client:
         result = client.step(POSES, timeout_s=5)
         assert result.state == "unknown"

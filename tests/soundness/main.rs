@@ -45,6 +45,7 @@ fn law_4_6_bodies_that_deform_hold_it_too_with_all_kinds_of_shapes_and_at_any_bu
     let wanted: u64 = std::env::var("SWEEPD_PAIR_TICKS").map_or(600, |s| s.parse().unwrap());
     let first: u64 = std::env::var("SWEEPD_SEED").map_or(0, |s| s.parse().unwrap());
     let run = run_all(wanted, first, |b| b >= kinds::BENDING);
+    assert!(run.trees > 0, "no tree was built anew");
     assert!(run.overlapping * 5 > run.pair_ticks, "too few overlap");
     assert!(run.close * 20 > run.pair_ticks, "too few are close");
 }

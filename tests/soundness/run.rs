@@ -12,6 +12,8 @@ use sweepd::wire::{
 };
 
 use crate::bends;
+use sweepd::world::{BuiltTree, WornTree};
+
 use crate::couples::{Body, Couple, any_scene, gap_of, take_meshes};
 use crate::kinds::{NAMES, Solid};
 use crate::oracle::rng::Rng;
@@ -29,6 +31,8 @@ pub struct Run {
     undecided: [u64; 4],
     /// Ticks after which the last engine went on and was not done.
     went_on: u64,
+    /// Trees put in place that were built anew.
+    pub trees: u64,
     by_kind: BTreeMap<(usize, usize), u64>,
     within_rounding: u64,
 }
@@ -54,6 +58,7 @@ impl Run {
             couple.place(&mut rng);
         }
         let mut inbox = Inbox::default();
+        let mut built_trees: [Option<BuiltTree>; 4] = [const { None }; 4];
         for tick in 1..=TICKS {
             fill(&mut inbox, &couples, &clock, tick);
             let whole = run(&mut engines[0], &inbox, &clock, Budget::UNLIMITED)
@@ -84,6 +89,13 @@ impl Run {
             self.went_on += u64::from(engines[3].work_on(rng.bits() % 20_000));
             clock.step_each_read(0);
             engines[3].validate().unwrap();
+            // Trees are built from copies of one tick and put in place after another.
+            for (engine, built) in engines.iter_mut().zip(&mut built_trees) {
+                match built.take() {
+                    Some(tree) => self.trees += u64::from(engine.take_tree(tree)),
+                    None => *built = engine.worn_tree().map(WornTree::build),
+                }
+            }
             for couple in &mut couples {
                 couple.step(&mut rng);
             }
@@ -194,6 +206,7 @@ impl Run {
             share(self.undecided[3]),
             self.went_on
         );
+        println!("{} trees were built anew", self.trees);
     }
 }
 

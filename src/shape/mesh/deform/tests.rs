@@ -187,3 +187,37 @@ fn rows_that_are_no_vertices_are_told_apart() {
     }
     assert_eq!(can_be_vertices(&[[0.0, 2e9, 0.0]]), Err(NoVertex::TooFar));
 }
+
+#[test]
+fn a_tree_that_was_built_elsewhere_holds_what_has_moved_meanwhile() {
+    let mut mesh = ball(10).into_deforming().unwrap();
+    assert!(mesh.worn_tree().is_none());
+    // Twisted until its boxes are half as large again.
+    let twisted = rows(&mesh, |_, v| {
+        let (sin, cos) = (4.0 * v.z).sin_cos();
+        Point::new(
+            3.0 * (cos * v.x - sin * v.y),
+            0.4 * (sin * v.x + cos * v.y),
+            v.z,
+        )
+    });
+    mesh.bend(0, &twisted);
+    assert!(mesh.worn_tree().is_none(), "nobody has measured them yet");
+    mesh.refit(usize::MAX);
+    let (job, late) = (mesh.worn_tree().unwrap(), mesh.worn_tree().unwrap());
+    let moved = rows(&mesh, |i, v| wave(i, v, 0.02));
+    let step = mesh.bend(0, &moved);
+    mesh.refit(7);
+    let revision = mesh.tree_revision();
+    assert!(mesh.take_tree(job.build()));
+    assert_eq!(mesh.tree_revision(), revision + 1);
+    assert!(mesh.lag_m() >= step && mesh.lag_m() <= step * (1.0 + 1e-9));
+    boxes_hold(&mesh);
+    mesh.refit(5);
+    boxes_hold(&mesh);
+    mesh.refit(usize::MAX);
+    assert_eq!(mesh.lag_m(), 0.0);
+    boxes_hold(&mesh);
+    assert!(mesh.worn_tree().is_none());
+    assert!(!mesh.take_tree(late.build()), "of a tree that is gone");
+}
