@@ -18,8 +18,8 @@ use crate::ids::{BodyId, BodySlot, PairSlot};
 use crate::time::{Meter, Share};
 use crate::world::World;
 
-/// Packs of eight boxes between two looks at the meter: some microseconds.
-const PACKS_PER_SLICE: usize = 32;
+/// Packs of eight boxes between two looks at the meter: a quarter of a microsecond.
+const PACKS_PER_SLICE: usize = 8;
 /// What a pack costs, in tests of a box against a pack: when the clock is to be read.
 const PACK_COST: u64 = 2;
 

@@ -102,7 +102,7 @@ pub fn any(rng: &mut Rng, kind: usize, s: f64) -> (Solid, ShapeSpec) {
         }
         7 | 11 => mesh(some_solid(rng).scaled(Vec3::new(s, s, s)), true),
         8 => mesh(some_surface(rng).scaled(Vec3::new(s, s, s)), false),
-        12 => mesh(meshes::patch(rng, 5).scaled(Vec3::new(s, s, s)), false),
+        12 => mesh(meshes::patch(rng, 9).scaled(Vec3::new(s, s, s)), false),
         HALF_SPACE => {
             let normal = rng.direction();
             let spec = ShapeSpec::HalfSpace {
