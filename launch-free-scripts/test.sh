@@ -21,7 +21,7 @@ fi
 cargo test --no-fail-fast
 # Tests against oracles count their cases by build: the large counts run here.
 cargo test --release --no-fail-fast --test engine --test soundness --test exact_pairs --test mesh_pairs \
-  --test broad_phase --test geometry_cases --test mesh_manifolds --test sweep
+  --test broad_phase --test geometry_cases --test mesh_manifolds --test sweep --test regions
 
 if [ "${1:-}" != --rust-only ]; then
   cargo build --quiet --release --bin sweepd

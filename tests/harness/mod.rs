@@ -168,13 +168,21 @@ impl Drive {
         self.bend();
     }
 
-    /// A wave goes through the meshes that deform.
-    fn bend(&mut self) {
+    /// The newest vertices of each body that deforms, by the order of bodies: a wave goes through them.
+    pub fn bent(&self) -> Vec<Vec<[f32; 3]>> {
         #[allow(clippy::cast_precision_loss, reason = "small counts")]
         let phase = (self.seq % 150) as f32 * (std::f32::consts::TAU / 150.0);
-        for (body, rest) in &self.bending {
+        let wave = |&[x, y, z]: &[f32; 3]| [x, y, z + 0.05 * (5.0 * x + phase).sin()];
+        let all = self.bending.iter();
+        all.map(|(_, rest)| rest.iter().map(wave).collect())
+            .collect()
+    }
+
+    fn bend(&mut self) {
+        let bent = self.bent();
+        for ((body, _), rows) in self.bending.iter().zip(&bent) {
             let frame = self.inbox.push_vertices();
-            let count = u32::try_from(rest.len()).unwrap();
+            let count = u32::try_from(rows.len()).unwrap();
             frame.header = VertexHeader {
                 session: 11,
                 epoch: 1,
@@ -188,8 +196,7 @@ impl Drive {
                 schema: WIRE_VERSION,
                 ..VertexHeader::default()
             };
-            let wave = |&[x, y, z]: &[f32; 3]| [x, y, z + 0.05 * (5.0 * x + phase).sin()];
-            frame.rows.extend(rest.iter().map(wave));
+            frame.rows.extend_from_slice(rows);
         }
     }
 

@@ -108,9 +108,9 @@ fn scene(things: &[Thing; 2], poses: &[Pose; 2]) -> String {
         } else {
             pose.translation.vector.into()
         };
-        let moves = !floor;
+        let (moves, deforms) = (!floor, thing.deforms);
         text += &format!(
-            "[[body]]\nname = \"b{k}\"\nmoves = {moves}\nposition = {at:?}\nshape = {}\n",
+            "[[body]]\nname = \"b{k}\"\nmoves = {moves}\ndeforms = {deforms}\nposition = {at:?}\nshape = {}\n",
             thing.text()
         );
     }
@@ -203,7 +203,13 @@ impl Run {
         for (at, pose) in moving.iter().enumerate() {
             self.drive.set(at, pose);
         }
-        self.drive.send(budget, ASKED).clone()
+        let out = self.drive.send(budget, ASKED).clone();
+        let bent = self.drive.bent();
+        let deforming = self.things.iter_mut().filter(|thing| thing.deforms);
+        for (thing, vertices) in deforming.zip(&bent) {
+            thing.bend(vertices);
+        }
+        out
     }
 
     /// Checks a tick; returns points checked.
@@ -293,6 +299,28 @@ impl Run {
     }
 }
 
+/// A mesh that deforms, and anything.
+fn bending(rng: &mut Rng) -> [Thing; 2] {
+    let soft = |rng: &mut Rng| {
+        let soup = match rng.below(3) {
+            0 => meshes::bumpy_sphere(7, 8, 0.1),
+            1 => meshes::torus(1.0, 0.3, 9, 6),
+            _ => meshes::cuboid(Vec3::new(1.0, 0.6, 0.3)),
+        };
+        Thing {
+            deforms: true,
+            ..Thing::new(vec![(Part::Mesh(soup), Vec3::zeros())])
+        }
+    };
+    let hard = |part| Thing::new(vec![(part, Vec3::zeros())]);
+    match rng.below(4) {
+        0 => [soft(rng), soft(rng)],
+        1 => [soft(rng), hard(mesh(rng))],
+        2 => [hard(cuboid(rng)), soft(rng)],
+        _ => [hard(Part::Floor), soft(rng)],
+    }
+}
+
 fn budget(rng: &mut Rng) -> Budget {
     match rng.below(8) {
         0 => Budget::UNLIMITED,
@@ -303,17 +331,23 @@ fn budget(rng: &mut Rng) -> Budget {
 }
 
 fn sweep(seed: u64, kinds: std::ops::Range<usize>) {
+    sweep_of(seed, |rng| {
+        let kind = kinds.start + rng.below(kinds.len());
+        things(rng, kind)
+    });
+}
+
+fn sweep_of(seed: u64, mut make: impl FnMut(&mut Rng) -> [Thing; 2]) {
     let (mut points, mut cut, mut complete) = (0, 0, 0);
     for case in 0..CASES {
         let mut rng = Rng::new(seed + case);
-        let kind = kinds.start + rng.below(kinds.len());
-        let things = things(&mut rng, kind);
+        let things = make(&mut rng);
         let mut run = Run::new(&things, &place(&mut rng, &things));
         let size = run.things[1].radius;
         for tick in 0..TICKS {
             let budget = budget(&mut rng);
             let out = run.send(budget);
-            let what = format!("seed {} kind {kind} tick {tick} {budget:?}", seed + case);
+            let what = format!("seed {} tick {tick} {budget:?}", seed + case);
             points += run.check(&out, &what);
             let done = out
                 .regions
@@ -336,6 +370,11 @@ fn every_point_that_two_meshes_share_is_in_a_region_at_any_budget_and_in_motion(
 #[test]
 fn so_is_every_point_of_convex_shapes_planes_and_bodies_of_several_shapes() {
     sweep(20_000, 4..8);
+}
+
+#[test]
+fn regions_of_meshes_that_deform_hold_all_that_is_shared_at_any_budget() {
+    sweep_of(30_000, bending);
 }
 
 /// The largest radius, over the mean of the two radii.

@@ -63,6 +63,8 @@ impl Part {
 pub struct Thing {
     pub parts: Vec<(Part, Vec3)>,
     pub radius: f64,
+    /// Its one mesh deforms.
+    pub deforms: bool,
 }
 
 impl Thing {
@@ -74,7 +76,19 @@ impl Thing {
                 .fold(0.0, f64::max)
         };
         let radius = parts.iter().map(far).fold(0.0, f64::max);
-        Self { parts, radius }
+        Self {
+            parts,
+            radius,
+            deforms: false,
+        }
+    }
+
+    /// Takes the vertices of its one mesh.
+    pub fn bend(&mut self, vertices: &[[f32; 3]]) {
+        if let [(Part::Mesh(soup), _)] = &mut self.parts[..] {
+            let point = |v: &[f32; 3]| Point::from(v.map(f64::from));
+            soup.vertices = vertices.iter().map(point).collect();
+        }
     }
 
     pub fn text(&self) -> String {
