@@ -122,6 +122,23 @@ pub enum RosKind {
     Odometry,
 }
 
+/// From where somebody looks: pairs in view have turns before others when the budget does not reach for all.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Viewpoint {
+    /// The body that carries it; `None`: it stands in the scene.
+    pub body: Option<String>,
+    /// The eye, in the frame of that body or of the scene, metres.
+    pub position: [f64; 3],
+    /// Where it looks, same frame, unit.
+    pub direction: [f64; 3],
+    /// Half of what is seen across, radians.
+    pub half_angle_rad: f64,
+    /// How many times as much what is right ahead counts as what is not seen; 1 to `limits::VIEW_WEIGHT_MAX`.
+    pub weight: f64,
+    /// How far away half of that is left, metres; `None`: however far.
+    pub half_m: Option<f64>,
+}
+
 /// How a daemon runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
@@ -137,6 +154,8 @@ pub struct Config {
     pub broad_phase: Option<BroadMethod>,
     /// Beyond this reach a stale body makes no new pairs, metres.
     pub stale_reach_m: f64,
+    /// From where somebody looks.
+    pub viewpoint: Option<Viewpoint>,
     /// Sizes of messages and sets.
     pub limits: Limits,
 }
@@ -182,6 +201,7 @@ impl Default for Config {
             late_ns: 5_000_000,
             broad_phase: None,
             stale_reach_m: 1.0,
+            viewpoint: None,
             limits: Limits::default(),
         }
     }

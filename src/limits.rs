@@ -61,6 +61,8 @@ pub const QUATERNION_NORM_TOLERANCE: f64 = 1e-2;
 pub const PRIORITY_MIN: f64 = 0.01;
 /// See [`PRIORITY_MIN`].
 pub const PRIORITY_MAX: f64 = 100.0;
+/// Greatest `weight` of a viewpoint, for the same reason.
+pub const VIEW_WEIGHT_MAX: f64 = 100.0;
 /// Poses between two ticks that the path of a continuous body follows; beyond it only its box knows of them, and its
 /// pairs are told as open. More than one comes only where frames are partial, or a tick takes longer than a frame.
 pub const LEGS_MAX: usize = 8;

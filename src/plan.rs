@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use crate::broad::Method;
-use crate::config::Config;
+use crate::config::{Config, Viewpoint};
 use crate::ids::BodySlot;
 use crate::limits::LEGS_MAX;
 use crate::shape::Geometry;
@@ -156,6 +156,20 @@ impl Facts {
     }
 }
 
+/// The order of work of a scene with a viewpoint.
+fn weighted_by(viewpoint: &Viewpoint) -> Choice {
+    let on = viewpoint.body.as_deref();
+    let on = on.unwrap_or("no body: a place of the scene");
+    Choice {
+        part: "order of work",
+        chosen: format!(
+            "by age, priority and approach, and up to {} times as much in view",
+            viewpoint.weight
+        ),
+        why: format!("the scene has a viewpoint, on {on}"),
+    }
+}
+
 fn choices(facts: &Facts, method: Method, config: &Config) -> Vec<Choice> {
     let chosen = match method {
         Method::BruteForce => "every pair of boxes",
@@ -192,6 +206,7 @@ fn choices(facts: &Facts, method: Method, config: &Config) -> Vec<Choice> {
             facts.shapes[0], facts.shapes[1]
         ),
     });
+    choices.extend(config.viewpoint.as_ref().map(weighted_by));
     if facts.continuous > 0 {
         choices.push(Choice {
             part: "swept tests",

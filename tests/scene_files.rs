@@ -28,6 +28,11 @@ fn the_example_scene_is_read_with_every_key() {
     assert_eq!(scene.config.budget.time_ns, Some(2_000_000));
     assert_eq!(scene.config.budget.units, Some(100_000));
     assert_eq!(scene.config.limits.bodies, 1000);
+    let viewpoint = scene.config.viewpoint.as_ref().unwrap();
+    assert_eq!(
+        (viewpoint.body.as_deref(), viewpoint.half_m),
+        (Some("camera"), Some(2.0))
+    );
     assert_eq!(scene.sources[0].timeout_ns, 200_000_000);
     assert_eq!(scene.sources[1].timeout_ns, 500_000_000);
     assert_eq!(scene.bodies.len(), 13);
@@ -175,7 +180,7 @@ fn each_wrong_body_and_setting_is_one_error_with_file_line_and_mend() {
         }
         seen.push(cases.len());
     }
-    assert_eq!(seen, [39, 25]);
+    assert_eq!(seen, [39, 30]);
 }
 
 #[test]

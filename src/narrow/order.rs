@@ -3,7 +3,7 @@
 use crate::ids::PairSlot;
 use crate::math::f32_down;
 use crate::time::Meter;
-use crate::world::World;
+use crate::world::{Body, Gaze, World};
 
 use super::Narrow;
 use super::memo::Memo;
@@ -31,6 +31,9 @@ const PARTS_MAX: usize = 64;
 /// What it takes at most to rank a pair and to part the list a first time, nanoseconds (measured: 4 to 10).
 pub(super) const RANK_NS: u64 = 16;
 
+/// The same where the scene has a viewpoint: two bodies are looked up and an angle is taken.
+pub(super) const RANK_SEEN_NS: u64 = 160;
+
 /// The fastest approach counts as this many times the age: what comes nearer by much more than its size since it was
 /// last asked is up to four times as urgent as what does not.
 const CLOSING_WEIGHT: f64 = 4.0;
@@ -38,7 +41,8 @@ const CLOSING_WEIGHT: f64 = 4.0;
 /// What the order of work asks of a pair, side by side for all pairs: the records it comes from are far apart.
 ///
 /// Urgency is age times weight, so nothing starves: a pair that is undecided comes before every pair that is undecided
-/// for the first time after at most `CLOSING_WEIGHT` times the ratio of the greatest to the least priority, in ticks.
+/// for the first time after at most `CLOSING_WEIGHT` times the ratio of the greatest to the least priority, times the
+/// weight of the scene's viewpoint, in ticks.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Urgency {
     /// First tick without a verdict; 0: decided.
@@ -83,14 +87,16 @@ impl Urgency {
 
     /// Place in the order of work, the least first: one bit whether it is no contact of last tick, then age times
     /// weight, the greatest first (positive floats order like their bits).
-    fn rank(self, tick: u64) -> u64 {
+    ///
+    /// * `seen` - weight of the place where it is (`Gaze::weight`); 1 without a viewpoint.
+    fn rank(self, tick: u64, seen: f64) -> u64 {
         let age = match self.since {
             0 => 0,
             since => tick.saturating_sub(since),
         };
         let fresh_contact = self.touched && age == 0;
         #[allow(clippy::cast_precision_loss, reason = "an order needs no more bits")]
-        let urgency = (age + 1) as f64 * f64::from(self.weight);
+        let urgency = (age + 1) as f64 * f64::from(self.weight) * seen;
         u64::from(!fresh_contact) << 63 | (!urgency.to_bits() >> 1)
     }
 }
@@ -144,16 +150,23 @@ impl Line {
 
 impl Narrow {
     /// Begins a list of work: gathers the ranks, orders nothing yet.
-    pub(super) fn line_up(&mut self, work: &[PairSlot], order: Order) -> Line {
+    pub(super) fn line_up(&mut self, work: &[PairSlot], order: Order, world: &World) -> Line {
         self.keyed.clear();
         if order != Order::AsFound {
             // Room for every pair at once: how many are undecided creeps up for long where work is cut off.
             if self.keyed.capacity() < work.len() {
                 self.keyed.reserve(self.hot.len());
             }
-            let (urgencies, tick) = (&self.urgencies, self.tick);
-            let ranked = |&slot: &PairSlot| (urgencies[slot.index()].rank(tick), slot);
-            self.keyed.extend(work.iter().map(ranked));
+            let (urgencies, hot, tick) = (&self.urgencies, &self.hot, self.tick);
+            let rank = |slot: PairSlot, seen| (urgencies[slot.index()].rank(tick, seen), slot);
+            match world.gaze() {
+                None => self.keyed.extend(work.iter().map(|&slot| rank(slot, 1.0))),
+                Some(gaze) => self.keyed.extend(work.iter().map(|&slot| {
+                    let hot = &hot[slot.index()];
+                    let bodies = world.body(hot.a).zip(world.body(hot.b));
+                    rank(slot, bodies.map_or(1.0, |pair| seen(&gaze, pair)))
+                })),
+            }
         }
         Line::new(order, work.len())
     }
@@ -181,6 +194,12 @@ impl Narrow {
         }
         meter.refresh();
     }
+}
+
+/// How much a pair counts by where it is: at its smaller body.
+fn seen(gaze: &Gaze, (a, b): (&Body, &Body)) -> f64 {
+    let smaller = if a.radius < b.radius { a } else { b };
+    gaze.weight(&(smaller.pose * smaller.centre), smaller.radius)
 }
 
 #[cfg(test)]
@@ -226,7 +245,7 @@ mod tests {
             urgency(0, 4.0, false),
             urgency(0, 1.0, false),
         ];
-        assert!(order.is_sorted_by_key(|urgency| urgency.rank(100)));
+        assert!(order.is_sorted_by_key(|urgency| urgency.rank(100, 1.0)));
     }
 
     #[test]

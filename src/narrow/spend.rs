@@ -10,7 +10,7 @@ use super::contacts::ContactSet;
 use super::cursor::{Cursor, Room, Turn};
 use super::memo::{Witness, bent, changed_since};
 use super::mesh::{Goal, has_front};
-use super::order::{Order, RANK_NS};
+use super::order::{Order, RANK_NS, RANK_SEEN_NS};
 use super::query::{add_manifold, is_simple, retest, shape_gap, shape_pose, sound, witness_of};
 use super::{NONE, Narrow, Wanted};
 
@@ -90,10 +90,15 @@ impl Narrow {
         mut turn: impl FnMut(&mut Self, PairSlot, &mut Meter<'m>) -> bool,
     ) -> Vec<PairSlot> {
         // To rank them all takes a while too, and nothing can be done in what is left then.
-        if work.is_empty() || !meter.open() || !meter.has_ns(work.len() as u64 * RANK_NS) {
+        let rank_ns = if world.gaze().is_some() {
+            RANK_SEEN_NS
+        } else {
+            RANK_NS
+        };
+        if work.is_empty() || !meter.open() || !meter.has_ns(work.len() as u64 * rank_ns) {
             return work;
         }
-        let mut line = self.line_up(&work, order);
+        let mut line = self.line_up(&work, order, world);
         while !work.is_empty() && meter.open() {
             let (mut at, mut left) = (0, 0);
             while at < work.len() {

@@ -11,6 +11,7 @@ use crate::scene::node::{Fault, Node, Value};
 use crate::scene::read_body::{BodyDraft, SOURCE_NAME_BYTES_MAX, read_body, title};
 use crate::scene::read_ros::{no_lockstep, read_ros};
 use crate::scene::read_rule::read_rule;
+use crate::scene::read_viewpoint::read_viewpoint;
 use crate::scene::resolve::resolve;
 use crate::scene::table::{Table, list, mend_name, shortened};
 use crate::scene::{Origin, Scene, SourceSpec};
@@ -25,7 +26,15 @@ const RATE_HZ_MAX: f64 = 100_000.0;
 /// Longest `frame_id`, bytes.
 const FRAME_ID_BYTES_MAX: usize = 63;
 
-const KEYS: &[&str] = &["frame_id", "run", "limits", "source", "body", "rule"];
+const KEYS: &[&str] = &[
+    "frame_id",
+    "run",
+    "limits",
+    "viewpoint",
+    "source",
+    "body",
+    "rule",
+];
 const RUN_KEYS: &[&str] = &[
     "mode",
     "on_frame",
@@ -140,7 +149,7 @@ fn read(text: &str, file: &str, base: &Path) -> std::result::Result<Scene, Fault
     let frame_id = table.name("frame_id", FRAME_ID_BYTES_MAX)?;
     let sources = read_sources(table.take("source"))?;
     let limits = read_limits(table.take("limits"))?;
-    let config = read_run(table.take("run"), limits, &sources)?;
+    let mut config = read_run(table.take("run"), limits, &sources)?;
 
     let mut drafts = Vec::new();
     for (place, node) in items(table.take("body"), "body")?.into_iter().enumerate() {
@@ -158,6 +167,10 @@ fn read(text: &str, file: &str, base: &Path) -> std::result::Result<Scene, Fault
         shape_lines: lines_of_shapes(text, &drafts),
     };
     let bodies = resolve(drafts, &sources, &config.limits, base)?;
+    if let Some(node) = table.take("viewpoint") {
+        let names: Vec<&str> = bodies.iter().map(|body| body.name.as_str()).collect();
+        config.viewpoint = Some(read_viewpoint(node, &names)?);
+    }
     Ok(Scene {
         frame_id: frame_id.unwrap_or_else(|| "world".to_owned()),
         config,

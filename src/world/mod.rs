@@ -17,6 +17,7 @@ mod edit_check;
 mod edit_links;
 mod edit_rules;
 mod filters;
+mod gaze;
 mod lists;
 mod names;
 mod path;
@@ -35,12 +36,13 @@ pub use bend::Vertices;
 pub use body::{Body, ChangeSet, Motion, PlacedShape, Removed};
 pub use edit::{Applied, Edit};
 pub use filters::{Because, Filters};
+pub use gaze::Gaze;
 pub use path::{Leg, Path};
 pub use source::SourceState;
 pub use tag::Tag;
 pub use trees::{BuiltTree, WornTree};
 
-use crate::config::Config;
+use crate::config::{Config, Viewpoint};
 use crate::error::{Error, Result};
 use crate::ids::{BodyId, BodySlot, SourceSlot};
 use crate::math::Aabb;
@@ -106,6 +108,7 @@ pub struct World {
     tick: u64,
     now_ns: u64,
     stale_reach_m: f64,
+    viewpoint: Option<Viewpoint>,
     bodies_limit: usize,
 }
 
@@ -195,6 +198,7 @@ impl World {
             tick: 0,
             now_ns,
             stale_reach_m: config.stale_reach_m,
+            viewpoint: config.viewpoint.clone(),
             bodies_limit: config.limits.bodies,
         }
     }

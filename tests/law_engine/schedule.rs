@@ -78,6 +78,75 @@ fn law_4_7_a_pair_has_turns_by_its_priority_and_none_waits_longer_than_its_share
     assert!(rest.iter().all(|turns| *turns >= TICKS / 16), "{turns:?}");
 }
 
+/// Pairs 20 m from one another along x, seen as a viewpoint says; how many turns each has had, all moving in each tick.
+///
+/// * `camera_m` - x of a body that stands aside of them and looks along y.
+fn turns_in_view(viewpoint: &str, camera_m: Option<f64>) -> Vec<usize> {
+    const PAIRS: usize = 24;
+    let mut bodies = Vec::new();
+    for pair in 0..PAIRS {
+        let (id, x) = (2 * pair as u64 + 1, 20.0 * pair as f64);
+        let [dx, dy, dz] = offset(2.1, 0.0);
+        bodies.push(ball(id, [x, 0.0, 0.0], 1.0));
+        bodies.push(ball(id + 1, [x + dx, dy, dz], 1.0));
+    }
+    let shape = "{ type = \"sphere\", radius = 0.1 }";
+    bodies.extend(camera_m.map(|x| body(900, [x, -60.0, 0.0], shape, "")));
+    let mut rig = Rig::new(&scene(&format!("[viewpoint]\n{viewpoint}\n"), &bodies));
+    if camera_m.is_some() {
+        let quarter = 0.5_f64.sqrt();
+        rig.row(900).orientation = [0.0, 0.0, quarter, quarter];
+    }
+    rig.send(ALL);
+    let mut turns = vec![0; PAIRS];
+    let mut oldest = 0;
+    for tick in 0..200 {
+        for pair in 0..PAIRS {
+            put(&mut rig, pair, offset(2.1, 0.15 * tick as f64));
+        }
+        rig.send(Budget::units(4));
+        for (turns, decided) in turns.iter_mut().zip(decided(&rig, PAIRS)) {
+            *turns += usize::from(decided);
+        }
+        oldest = oldest.max(rig.out.tick.oldest_undecided_ticks);
+    }
+    assert!(turns.iter().all(|turns| *turns >= 10), "{turns:?}");
+    assert!(oldest <= 24, "{oldest} ticks without a verdict: {turns:?}");
+    turns
+}
+
+#[test]
+fn law_4_7_what_is_in_view_has_turns_before_what_is_not_and_its_middle_before_its_edge() {
+    // From the side onto the tenth pair; at 60 m, 0.7 rad to each side reach over two neighbours.
+    let view = "position = [200.0, -60.0, 0.0]\ndirection = [0.0, 2.0, 0.0]\nhalf_angle_rad = 0.7\nweight = 8.0";
+    let turns = turns_in_view(view, None);
+    let unseen = [&turns[..7], &turns[14..]].concat();
+    let mean = unseen.iter().sum::<usize>() as f64 / unseen.len() as f64;
+    assert!(turns[10] as f64 > 2.5 * mean, "{turns:?}");
+    assert!(turns[8].min(turns[12]) as f64 > 1.5 * mean, "{turns:?}");
+    assert!(turns[10] > turns[8].max(turns[12]), "{turns:?}");
+}
+
+#[test]
+fn law_4_7_of_what_is_in_view_the_near_has_turns_before_the_far() {
+    let view = "position = [-5.0, 0.0, 0.0]\nhalf_angle_rad = 1.0\nweight = 20.0\nhalf_m = 20.0";
+    let turns = turns_in_view(view, None);
+    let mean = |turns: &[usize]| turns.iter().sum::<usize>() as f64 / turns.len() as f64;
+    let thirds = [&turns[..8], &turns[8..16], &turns[16..]].map(mean);
+    assert!(thirds[0] > 1.5 * thirds[1], "{turns:?}");
+    assert!(thirds[1] > thirds[2], "{turns:?}");
+}
+
+#[test]
+fn law_4_7_a_viewpoint_is_where_the_body_that_carries_it_is() {
+    let view = "body = \"b900\"\nhalf_angle_rad = 0.3\nweight = 8.0";
+    let most = |x: f64| {
+        let turns = turns_in_view(view, Some(x));
+        (0..turns.len()).max_by_key(|pair| turns[*pair]).unwrap()
+    };
+    assert_eq!((most(100.0), most(360.0)), (5, 18));
+}
+
 #[test]
 fn law_4_7_what_comes_nearer_is_asked_before_what_moves_away() {
     let mut rig = pairs(&[1.0, 1.0]);

@@ -1,0 +1,65 @@
+//! Reads the viewpoint of a scene.
+
+use std::f64::consts::PI;
+
+use crate::config::Viewpoint;
+use crate::limits::{COORDINATE_MAX_M, EXTENT_MAX_M, EXTENT_MIN_M, VIEW_WEIGHT_MAX};
+use crate::math::Vec3;
+use crate::scene::node::{Fault, Node};
+use crate::scene::read_body::BODY_NAME_BYTES_MAX;
+use crate::scene::table::{Table, mend_name, shortened};
+
+/// What is in view counts this many times as much, where the scene does not say.
+const WEIGHT_DEFAULT: f64 = 4.0;
+/// Half of what is seen across, where the scene does not say: 60 degrees in all.
+const HALF_ANGLE_RAD_DEFAULT: f64 = PI / 6.0;
+/// Narrower, and nothing but what stands around the eye is ever seen.
+const HALF_ANGLE_RAD_MIN: f64 = 1e-3;
+
+/// Reads `[viewpoint]`.
+///
+/// * `bodies` - names of the scene's bodies.
+pub(crate) fn read_viewpoint(node: Node, bodies: &[&str]) -> Result<Viewpoint, Fault> {
+    let keys = &[
+        "body",
+        "position",
+        "direction",
+        "half_angle_rad",
+        "weight",
+        "half_m",
+    ];
+    let mut table = Table::open(node, "[viewpoint]", keys)?;
+    let at = table.at("body");
+    let body = table.name("body", BODY_NAME_BYTES_MAX)?;
+    if let Some(name) = body.as_deref().filter(|name| !bodies.contains(name)) {
+        let text = format!(
+            "the viewpoint is on body \"{}\", which is not there: {}",
+            shortened(name),
+            mend_name(name, bodies, "[[body]]")
+        );
+        return Err(Fault::new(at, text));
+    }
+    let at = table.at("position");
+    let position = table.triple("position")?.unwrap_or_default();
+    if position.iter().any(|x| x.abs() > COORDINATE_MAX_M) {
+        let text =
+            format!("position is beyond {COORDINATE_MAX_M} m: move the scene's origin nearer");
+        return Err(Fault::new(at, text));
+    }
+    let at = table.at("direction");
+    let direction = Vec3::from(table.triple("direction")?.unwrap_or([1.0, 0.0, 0.0]));
+    let Some(direction) = direction.try_normalize(f64::MIN_POSITIVE) else {
+        let text = "direction of the viewpoint has no length: write where it looks, as [1, 0, 0]";
+        return Err(Fault::new(at, text));
+    };
+    let half_angle_rad = table.number_within("half_angle_rad", HALF_ANGLE_RAD_MIN, PI)?;
+    let weight = table.number_within("weight", 1.0, VIEW_WEIGHT_MAX)?;
+    Ok(Viewpoint {
+        body,
+        position,
+        direction: direction.into(),
+        half_angle_rad: half_angle_rad.unwrap_or(HALF_ANGLE_RAD_DEFAULT),
+        weight: weight.unwrap_or(WEIGHT_DEFAULT),
+        half_m: table.number_within("half_m", EXTENT_MIN_M, EXTENT_MAX_M)?,
+    })
+}
