@@ -10,6 +10,10 @@ const CURVE_BITS: u32 = 3 * AXIS_BITS;
 const INDEX_BITS: u32 = 28;
 /// Octaves of size: the longest sides from 2^-32 to 2^31 metres, all others at the ends.
 const OCTAVES: usize = 64;
+/// Those below a metre.
+const OCTAVES_BELOW_ONE: i32 = 32;
+/// Cells of the curve along the side of a small body, at most: finer ones put nobody in a better place.
+const CELLS_A_SIDE: f64 = 8.0;
 /// Octaves that share a class. Boxes of a block then differ by a factor of 4 at most, and scenes whose sizes lie about
 /// a power of two are not torn in two.
 const OCTAVES_A_CLASS: usize = 2;
@@ -51,6 +55,7 @@ impl Sorter {
         }
         // Few bodies far away must not make the cells coarse for all: four deviations, the rest at the edge.
         let cells = f64::from(1_u32 << AXIS_BITS);
+        let finest = cells_a_metre(&seen, count);
         for k in 0..3 {
             let mean = sum[k] / f64::from(count.max(1));
             let reach = 4.0
@@ -64,7 +69,8 @@ impl Sorter {
             )]
             {
                 self.low[k] = from as f32;
-                self.scale[k] = (cells / (to - from).max(f64::from(f32::MIN_POSITIVE))) as f32;
+                let even = cells / (to - from).max(f64::from(f32::MIN_POSITIVE));
+                self.scale[k] = even.min(finest) as f32;
             }
         }
         self.lay_classes(&seen);
@@ -225,6 +231,22 @@ pub(super) fn split(middles: &mut [([f32; 3], u32)], fill: usize) {
     split(other, fill);
 }
 
+/// Most cells of the curve a metre: where bodies lie in a sheet or a line, finer cells across it would part neighbours
+/// by what is less than their size.
+///
+/// * `seen` - how many of `count` boxes have their longest side in each octave.
+fn cells_a_metre(seen: &[u32; OCTAVES], count: u32) -> f64 {
+    let mut left = count / 4;
+    for (octave, bodies) in seen.iter().enumerate() {
+        if *bodies > left {
+            let exponent = i32::try_from(octave).unwrap_or(0) - OCTAVES_BELOW_ONE;
+            return CELLS_A_SIDE / f64::from(exponent).exp2();
+        }
+        left -= bodies;
+    }
+    f64::INFINITY
+}
+
 /// The octave of the longest side.
 fn octave(one: &[f32; 6]) -> usize {
     let side = (one[3] - one[0]).max(one[4] - one[1]).max(one[5] - one[2]);
@@ -279,6 +301,33 @@ mod tests {
         let mut seen: Vec<u32> = order.iter().map(|(_, index)| *index).collect();
         seen.sort_unstable();
         assert_eq!(seen, (0..65).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn in_a_thin_sheet_height_does_not_part_neighbours() {
+        let mut boxes = Vec::new();
+        for i in 0..4096_u16 {
+            let (x, y) = (f32::from(i % 64), f32::from(i / 64));
+            boxes.push(cube([x, y, f32::from(i * 37 % 101) * 1e-3], 0.9));
+        }
+        let mut sorter = Sorter::default();
+        sorter.frame(&boxes);
+        let order: Vec<u32> = sorter.along_curve(&boxes).map(|(_, index)| index).collect();
+        // Sixteen in a row stand in a square of four by four, or nearly so.
+        let spread = |k: usize| {
+            let blocks = order.chunks_exact(16).map(|block| {
+                let at = block.iter().map(|index| boxes[*index as usize][k]);
+                let (low, high) = at.fold((f32::MAX, f32::MIN), |(l, h), x| (l.min(x), h.max(x)));
+                high - low
+            });
+            blocks.sum::<f32>() / 256.0
+        };
+        assert!(
+            spread(0) < 6.0 && spread(1) < 6.0,
+            "{} {}",
+            spread(0),
+            spread(1)
+        );
     }
 
     #[test]
