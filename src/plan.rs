@@ -156,14 +156,14 @@ impl Facts {
     }
 }
 
-/// The order of work of a scene with a viewpoint.
+/// What a viewpoint does to the order of work.
 fn weighted_by(viewpoint: &Viewpoint) -> Choice {
     let on = viewpoint.body.as_deref();
     let on = on.unwrap_or("no body: a place of the scene");
     Choice {
-        part: "order of work",
+        part: "viewpoint",
         chosen: format!(
-            "by age, priority and approach, and up to {} times as much in view",
+            "what is in view counts up to {} times as much in the order of work",
             viewpoint.weight
         ),
         why: format!("the scene has a viewpoint, on {on}"),
