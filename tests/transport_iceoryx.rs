@@ -87,10 +87,13 @@ fn kill_and_reap(mut child: Child) {
 #[test]
 #[ignore = "played by children of the other tests"]
 fn child_process() {
-    let place = Place::new("cell").unwrap().under(
-        std::env::var(ROOT).expect("started by another test"),
-        std::env::var(PREFIX).unwrap(),
-    );
+    // Nobody has started it: all ignored tests are run.
+    let Ok(root) = std::env::var(ROOT) else {
+        return;
+    };
+    let place = Place::new("cell")
+        .unwrap()
+        .under(root, std::env::var(PREFIX).unwrap());
     let part = std::env::var(PART).unwrap();
     if part == "daemon" {
         let daemon = StandIn::iceoryx(&place, Manners::default());
