@@ -8,15 +8,21 @@
     clippy::cast_precision_loss,
     clippy::cast_possible_truncation,
     clippy::unwrap_used,
-    reason = "a bench"
+    unreachable_pub,
+    missing_debug_implementations,
+    dead_code,
+    reason = "a bench, which uses a part of the tests' oracle"
 )]
 
 mod common;
+#[path = "../tests/oracle/mod.rs"]
+mod oracle;
 
 use std::path::Path;
 use std::sync::Arc;
 
 use common::{provenance, quantile, row, save};
+use oracle::meshes::{bumpy_sphere, trimesh};
 use sweepd::daemon::build_shapes;
 use sweepd::ids::BodyId;
 use sweepd::math::{Point, Pose, Vec3};
@@ -28,32 +34,6 @@ use sweepd::wire::{
     Demand, FrameHeader, Inbox, TickCause, Verdict, VertexFrame, VertexHeader, VertexRow,
     WIRE_VERSION, frame_flags, name_bytes, vertex_flags,
 };
-
-/// A bumpy sphere of 19,880 triangles, diameter 2 m, as a scene says it.
-fn bumpy() -> String {
-    let (rows, columns) = (71_u32, 142_u32);
-    let mut vertices = vec![[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]];
-    for i in 1..rows {
-        let theta = std::f64::consts::PI * f64::from(i) / f64::from(rows);
-        for j in 0..columns {
-            let phi = std::f64::consts::TAU * f64::from(j) / f64::from(columns);
-            let r = 1.0 + 0.06 * (3.0 * theta).sin() * (4.0 * phi).cos();
-            let (s, c) = theta.sin_cos();
-            vertices.push([r * s * phi.cos(), r * s * phi.sin(), r * c]);
-        }
-    }
-    let at = |i: u32, j: u32| 2 + (i - 1) * columns + j % columns;
-    let mut faces = Vec::new();
-    for j in 0..columns {
-        faces.push([0, at(1, j), at(1, j + 1)]);
-        faces.push([1, at(rows - 1, j + 1), at(rows - 1, j)]);
-        for i in 1..rows - 1 {
-            let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
-            faces.extend([[a, b, c], [a, c, d]]);
-        }
-    }
-    format!("{{ type = \"trimesh\", vertices = {vertices:?}, faces = {faces:?} }}")
-}
 
 /// An engine with the two bodies, and what is sent.
 struct Rig {
@@ -232,7 +212,8 @@ fn a_third(text: &str, table: &mut Table) {
 
 fn main() {
     let quick = std::env::args().any(|arg| arg == "--quick");
-    let mesh = bumpy();
+    // 19,880 triangles, diameter about 2 m.
+    let mesh = trimesh(&bumpy_sphere(71, 142, 0.06), None);
     let text = format!(
         "[[source]]\nname = \"feed\"\ntimeout_ms = 1000000\n\
          [[body]]\nname = \"soft\"\nid = 1\ndeforms = true\nshape = {mesh}\n\

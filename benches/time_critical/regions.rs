@@ -9,14 +9,12 @@ use std::sync::Arc;
 
 use sweepd::broad::{BroadPhase, Method};
 use sweepd::builtin::Random;
-use sweepd::config::Config;
 use sweepd::ids::PairSlot;
 use sweepd::limits::REGION_TESTS_PER_PAIR;
 use sweepd::math::{Point, Pose, Quat, Vec3, relative};
 use sweepd::narrow::mesh::{Goal, Walk};
 use sweepd::narrow::{Narrow, Order, Region, Wanted};
 use sweepd::pairs::{PairDelta, PairSet};
-use sweepd::scene::{Scene, SourceSpec};
 use sweepd::shape::{Geometry, Shape};
 use sweepd::time::{Clock, Meter, SystemClock};
 use sweepd::wire::{FrameHeader, Inbox, WIRE_VERSION, frame_flags, name_bytes};
@@ -25,7 +23,7 @@ use sweepd::world::{PlacedShape, World};
 use crate::common::{provenance, quantile, row, save};
 use crate::oracle::Triangle;
 use crate::oracle::shared::crossings;
-use crate::stage::{DIAMETER_M, body};
+use crate::stage::{DIAMETER_M, body, scene};
 
 const SEED: u64 = 29;
 /// Overlaps, share of the diameter, and pairs of each.
@@ -50,17 +48,7 @@ struct Alone {
 
 impl Alone {
     fn new(shapes: [&Arc<Shape>; 2], poses: &[Pose; 2]) -> Self {
-        let scene = Scene {
-            frame_id: "world".to_owned(),
-            config: Config::default(),
-            sources: vec![SourceSpec {
-                name: "feed".to_owned(),
-                timeout_ns: 1 << 60,
-                ros2: None,
-            }],
-            bodies: vec![body(1), body(2)],
-            ..Scene::default()
-        };
+        let scene = scene(vec![body(1), body(2)]);
         let placed = shapes.map(|shape| {
             let shape = Arc::clone(shape);
             let pose = Pose::identity();

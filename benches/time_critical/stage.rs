@@ -55,6 +55,21 @@ fn bumpy(kind: usize) -> Mesh {
     Mesh::new(vertices, faces, None).unwrap()
 }
 
+/// A scene of these bodies, all of one source.
+pub fn scene(bodies: Vec<BodySpec>) -> Scene {
+    Scene {
+        frame_id: "world".to_owned(),
+        config: Config::default(),
+        sources: vec![SourceSpec {
+            name: "feed".to_owned(),
+            timeout_ns: 1 << 60,
+            ros2: None,
+        }],
+        bodies,
+        ..Scene::default()
+    }
+}
+
 /// Built once: their trees take a while.
 pub fn shapes() -> Vec<Arc<Shape>> {
     let shape = |mesh: Mesh| Shape {
@@ -98,18 +113,7 @@ impl Stage {
         let courses: Vec<Course> = (0..PAIRS)
             .map(|k| course(k, percent, &mut random))
             .collect();
-        let specs = (0..2 * PAIRS).map(|k| body(k as u64 + 1)).collect();
-        let scene = Scene {
-            frame_id: "world".to_owned(),
-            config: Config::default(),
-            sources: vec![SourceSpec {
-                name: "feed".to_owned(),
-                timeout_ns: 1 << 60,
-                ros2: None,
-            }],
-            bodies: specs,
-            ..Scene::default()
-        };
+        let scene = scene((0..2 * PAIRS).map(|k| body(k as u64 + 1)).collect());
         let placed: Vec<Arc<[PlacedShape]>> = (0..2 * PAIRS)
             .map(|k| {
                 let shape = Arc::clone(&shapes[(k / 2 + k % 2) % shapes.len()]);

@@ -150,7 +150,13 @@ impl Line {
 
 impl Narrow {
     /// Begins a list of work: gathers the ranks, orders nothing yet.
-    pub(super) fn line_up(&mut self, work: &[PairSlot], order: Order, world: &World) -> Line {
+    pub(super) fn line_up(
+        &mut self,
+        work: &[PairSlot],
+        order: Order,
+        world: &World,
+        gaze: Option<Gaze>,
+    ) -> Line {
         self.keyed.clear();
         if order != Order::AsFound {
             // Room for every pair at once: how many are undecided creeps up for long where work is cut off.
@@ -159,7 +165,7 @@ impl Narrow {
             }
             let (urgencies, hot, tick) = (&self.urgencies, &self.hot, self.tick);
             let rank = |slot: PairSlot, seen| (urgencies[slot.index()].rank(tick, seen), slot);
-            match world.gaze() {
+            match gaze {
                 None => self.keyed.extend(work.iter().map(|&slot| rank(slot, 1.0))),
                 Some(gaze) => self.keyed.extend(work.iter().map(|&slot| {
                     let hot = &hot[slot.index()];

@@ -90,7 +90,8 @@ impl Narrow {
         mut turn: impl FnMut(&mut Self, PairSlot, &mut Meter<'m>) -> bool,
     ) -> Vec<PairSlot> {
         // To rank them all takes a while too, and nothing can be done in what is left then.
-        let rank_ns = if world.gaze().is_some() {
+        let gaze = world.gaze();
+        let rank_ns = if gaze.is_some() {
             RANK_SEEN_NS
         } else {
             RANK_NS
@@ -98,7 +99,7 @@ impl Narrow {
         if work.is_empty() || !meter.open() || !meter.has_ns(work.len() as u64 * rank_ns) {
             return work;
         }
-        let mut line = self.line_up(&work, order, world);
+        let mut line = self.line_up(&work, order, world, gaze);
         while !work.is_empty() && meter.open() {
             let (mut at, mut left) = (0, 0);
             while at < work.len() {

@@ -74,7 +74,8 @@ impl Order {
     /// Finds every overlap and reports what differs from the last tick.
     pub(super) fn update_afresh<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Done) {
         let bodies = tick.members.bounded();
-        if self.afresh.ticks.is_multiple_of(FRAME_TICKS) {
+        let look_again = self.afresh.ticks.is_multiple_of(FRAME_TICKS);
+        if look_again {
             self.origin = middle(bodies.iter().map(|slot| tick.proxies.aabb(*slot)));
         }
         self.level.run(TakeAll {
@@ -82,7 +83,7 @@ impl Order {
             bodies,
             proxies: tick.proxies,
         });
-        self.lay_along_curve(bodies);
+        self.lay_along_curve(bodies, look_again);
         work.tests += self.level.run(Sweep { order: self });
         self.ask_open(tick.proxies);
         let Afresh { held, found, .. } = &mut self.afresh;
@@ -110,11 +111,13 @@ impl Order {
     }
 
     /// Deals the bodies to blocks along the curve; a class begins with a block of its own.
-    fn lay_along_curve(&mut self, bodies: &[BodySlot]) {
+    ///
+    /// * `look_again` - at where they are and how large, for the frame of the curve.
+    fn lay_along_curve(&mut self, bodies: &[BodySlot], look_again: bool) {
         self.boxes.clear();
         self.boxes
             .extend(self.afresh.boxes.iter().map(Down::corners));
-        if self.afresh.ticks.is_multiple_of(FRAME_TICKS) {
+        if look_again {
             self.sorter.frame(&self.boxes);
         }
         let most = bodies.len() / WIDTH + super::sort::CLASSES_MAX + 1;

@@ -189,6 +189,7 @@ impl Mesh {
 mod tests {
     use super::*;
     use crate::math::Point;
+    use crate::shape::mesh::tests::ball;
 
     fn tetrahedron() -> Mesh {
         let corners = [
@@ -219,27 +220,7 @@ mod tests {
 
     #[test]
     fn the_cone_of_a_box_of_a_ball_holds_its_normals_and_is_narrower_than_that_of_its_parent() {
-        let (rows, columns) = (20_u32, 40_u32);
-        let mut vertices = vec![Point::new(0.0, 0.0, 1.0), Point::new(0.0, 0.0, -1.0)];
-        for i in 1..rows {
-            let theta = PI * f64::from(i) / f64::from(rows);
-            for j in 0..columns {
-                let phi = 2.0 * PI * f64::from(j) / f64::from(columns);
-                let (s, c) = theta.sin_cos();
-                vertices.push(Point::new(s * phi.cos(), s * phi.sin(), c));
-            }
-        }
-        let at = |i: u32, j: u32| 2 + (i - 1) * columns + j % columns;
-        let mut faces = Vec::new();
-        for j in 0..columns {
-            faces.push([0, at(1, j), at(1, j + 1)]);
-            faces.push([1, at(rows - 1, j + 1), at(rows - 1, j)]);
-            for i in 1..rows - 1 {
-                let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
-                faces.extend([[a, b, c], [a, c, d]]);
-            }
-        }
-        let mesh = Mesh::new(vertices, faces, None).unwrap();
+        let mesh = ball(20, 0.0);
         assert!(mesh.normals(BoxId::ROOT).half_rad >= PI);
         let mut narrow = 0;
         let mut stack = vec![(BoxId::ROOT, Vec::<Cone>::new())];

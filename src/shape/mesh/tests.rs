@@ -210,3 +210,35 @@ fn the_box_of_a_large_mesh_holds_it_and_is_hardly_larger() {
         }
     }
 }
+
+/// A ball of 4 n (n - 1) triangles, closed, with bumps of this size.
+pub(super) fn ball(n: u32, bump: f64) -> Mesh {
+    let (mut vertices, mut faces) = (vec![Point::new(0.0, 0.0, 1.0)], Vec::new());
+    for row in 1..n {
+        for column in 0..2 * n {
+            let (theta, phi) = (
+                std::f64::consts::PI * f64::from(row) / f64::from(n),
+                std::f64::consts::PI * f64::from(column) / f64::from(n),
+            );
+            let r = 1.0 + bump * (5.0 * theta).sin() * (3.0 * phi).cos();
+            vertices.push(Point::new(
+                r * theta.sin() * phi.cos(),
+                r * theta.sin() * phi.sin(),
+                r * theta.cos(),
+            ));
+        }
+    }
+    let last = u32::try_from(vertices.len()).unwrap();
+    vertices.push(Point::new(0.0, 0.0, -1.0));
+    let at = |row: u32, column: u32| 1 + (row - 1) * 2 * n + column % (2 * n);
+    for column in 0..2 * n {
+        faces.push([0, at(1, column), at(1, column + 1)]);
+        faces.push([last, at(n - 1, column + 1), at(n - 1, column)]);
+        for row in 1..n - 1 {
+            let (a, b) = (at(row, column), at(row, column + 1));
+            let (c, d) = (at(row + 1, column + 1), at(row + 1, column));
+            faces.extend([[a, d, c], [a, c, b]]);
+        }
+    }
+    Mesh::new(vertices, faces, None).unwrap()
+}

@@ -8,39 +8,8 @@
 )]
 
 use super::*;
+use crate::shape::mesh::tests::ball;
 use crate::shape::{Inside, Node};
-
-/// A bumpy ball of 3 n n triangles and more, closed.
-fn ball(n: u32) -> Mesh {
-    let (mut vertices, mut faces) = (vec![Point::new(0.0, 0.0, 1.0)], Vec::new());
-    for row in 1..n {
-        for column in 0..2 * n {
-            let (theta, phi) = (
-                std::f64::consts::PI * f64::from(row) / f64::from(n),
-                std::f64::consts::PI * f64::from(column) / f64::from(n),
-            );
-            let r = 1.0 + 0.1 * (5.0 * theta).sin() * (3.0 * phi).cos();
-            vertices.push(Point::new(
-                r * theta.sin() * phi.cos(),
-                r * theta.sin() * phi.sin(),
-                r * theta.cos(),
-            ));
-        }
-    }
-    let last = u32::try_from(vertices.len()).unwrap();
-    vertices.push(Point::new(0.0, 0.0, -1.0));
-    let at = |row: u32, column: u32| 1 + (row - 1) * 2 * n + column % (2 * n);
-    for column in 0..2 * n {
-        faces.push([0, at(1, column), at(1, column + 1)]);
-        faces.push([last, at(n - 1, column + 1), at(n - 1, column)]);
-        for row in 1..n - 1 {
-            let (a, b) = (at(row, column), at(row, column + 1));
-            let (c, d) = (at(row + 1, column + 1), at(row + 1, column));
-            faces.extend([[a, d, c], [a, c, b]]);
-        }
-    }
-    Mesh::new(vertices, faces, None).unwrap()
-}
 
 fn rows(mesh: &Mesh, of: impl Fn(usize, &Point) -> Point) -> Vec<[f32; 3]> {
     let moved = mesh.vertices().iter().enumerate();
@@ -83,7 +52,7 @@ fn wave(i: usize, v: &Point, by: f64) -> Point {
 
 #[test]
 fn boxes_hold_their_triangles_wherever_a_refit_stops_and_whatever_comes_meanwhile() {
-    let mut mesh = ball(12).into_deforming().unwrap();
+    let mut mesh = ball(12, 0.1).into_deforming().unwrap();
     assert_eq!(mesh.lag_m(), 0.0);
     boxes_hold(&mesh);
     let mut sum = 0.0;
@@ -124,7 +93,7 @@ fn boxes_hold_their_triangles_wherever_a_refit_stops_and_whatever_comes_meanwhil
 
 #[test]
 fn inside_tests_are_of_the_newest_vertices_with_boxes_of_any_age() {
-    let mut mesh = ball(8).into_deforming().unwrap();
+    let mut mesh = ball(8, 0.1).into_deforming().unwrap();
     let far = Vec3::new(5.0, 0.0, 0.0);
     let moved = rows(&mesh, |_, v| v + far);
     mesh.bend(0, &moved);
@@ -141,7 +110,7 @@ fn inside_tests_are_of_the_newest_vertices_with_boxes_of_any_age() {
 
 #[test]
 fn there_and_back_counts_twice_and_the_radius_is_that_of_now() {
-    let mut mesh = ball(6).into_deforming().unwrap();
+    let mut mesh = ball(6, 0.1).into_deforming().unwrap();
     let radius = mesh.radius();
     let rest = rows(&mesh, |_, v| *v);
     let there = rows(&mesh, |_, v| v + Vec3::z() * 0.01);
@@ -190,7 +159,7 @@ fn rows_that_are_no_vertices_are_told_apart() {
 
 #[test]
 fn a_tree_that_was_built_elsewhere_holds_what_has_moved_meanwhile() {
-    let mut mesh = ball(10).into_deforming().unwrap();
+    let mut mesh = ball(10, 0.1).into_deforming().unwrap();
     assert!(mesh.worn_tree().is_none());
     // Twisted until its boxes are half as large again.
     let twisted = rows(&mesh, |_, v| {
