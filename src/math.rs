@@ -257,6 +257,16 @@ pub(crate) fn from_glam_vec(v: glamx::DVec3) -> Vec3 {
     Vec3::new(v.x, v.y, v.z)
 }
 
+/// The lower ten bits of a number, two zeros between any two: a share of a place on the Morton curve (Morton 1966).
+#[must_use]
+pub(crate) fn morton_bits(cell: u32) -> u32 {
+    let mut bits = cell & 0x3FF;
+    bits = (bits | bits << 16) & 0x0300_00FF;
+    bits = (bits | bits << 8) & 0x0300_F00F;
+    bits = (bits | bits << 4) & 0x030C_30C3;
+    (bits | bits << 2) & 0x0924_9249
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -301,5 +311,11 @@ mod tests {
             relative(&a, &b).translation.vector,
             Vec3::new(0.25, 0.5, 0.125)
         );
+    }
+
+    #[test]
+    fn bits_of_the_curve_are_spread_by_three() {
+        assert_eq!(morton_bits(0b11), 0b1001);
+        assert_eq!(morton_bits(0x3FF), 0x0924_9249);
     }
 }

@@ -1,5 +1,6 @@
 //! The order: classes of size, largest first, and within a class the Morton curve.
 
+use crate::math::morton_bits;
 use crate::simd::boxes::WIDTH;
 
 /// Bits of the curve on each axis. A cell is then an eighth of a block's side at a million bodies.
@@ -108,7 +109,7 @@ impl Sorter {
                 reason = "the cast saturates, NaN becomes 0: a place on a curve, not a bound"
             )]
             let cell = (cell as u32).min((1 << AXIS_BITS) - 1);
-            key |= u64::from(spread(cell)) << k;
+            key |= u64::from(morton_bits(cell)) << k;
         }
         key
     }
@@ -263,15 +264,6 @@ pub(super) fn centre(one: &[f32; 6]) -> [f32; 3] {
     })
 }
 
-/// Two zeros between any two bits (Morton 1966).
-fn spread(cell: u32) -> u32 {
-    let mut bits = cell & 0x3FF;
-    bits = (bits | bits << 16) & 0x0300_00FF;
-    bits = (bits | bits << 8) & 0x0300_F00F;
-    bits = (bits | bits << 4) & 0x030C_30C3;
-    (bits | bits << 2) & 0x0924_9249
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -328,11 +320,5 @@ mod tests {
             spread(0),
             spread(1)
         );
-    }
-
-    #[test]
-    fn bits_are_spread_by_three() {
-        assert_eq!(spread(0b11), 0b1001);
-        assert_eq!(spread(0x3FF), 0x0924_9249);
     }
 }

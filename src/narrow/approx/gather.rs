@@ -6,7 +6,7 @@
 //! Refused: greedy merging by least growth (the square of the spots, and no smaller spheres).
 
 use crate::limits::REGIONS_PER_PAIR_MAX as REGIONS_MAX;
-use crate::math::{Point, Vec3};
+use crate::math::{Point, Vec3, morton_bits};
 
 use super::spot::Spot;
 
@@ -41,14 +41,14 @@ fn condense(all: &mut Vec<Spot>) {
     let size = (high - low).map(|side| side.max(f64::MIN_POSITIVE));
     all.sort_unstable_by_key(|spot| {
         let share = (spot.centre - low).component_div(&size);
-        share.iter().fold(0_u64, |key, x| {
+        share.iter().fold(0_u32, |key, x| {
             #[allow(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
                 reason = "0 to 1023"
             )]
-            let cell = (x * 1023.0).clamp(0.0, 1023.0) as u64;
-            key << 1 | spread(cell)
+            let cell = (x * 1023.0).clamp(0.0, 1023.0) as u32;
+            key << 1 | morton_bits(cell)
         })
     });
     let together = |x: &Spot, y: &Spot| {
@@ -75,11 +75,6 @@ fn condense(all: &mut Vec<Spot>) {
         }
         all.truncate(to);
     }
-}
-
-/// The ten bits of a number, two places between each and the next.
-fn spread(cell: u64) -> u64 {
-    (0..10).fold(0, |key, bit| key | (cell >> bit & 1) << (3 * bit))
 }
 
 /// Cuts the largest spots while there are few.
