@@ -2,7 +2,7 @@
 //! both, in one run, tick by tick in turn. Timed on both sides: taking the poses in, broad phase, narrow phase,
 //! contacts; on ours also the filled outbox with all rows.
 //!
-//! `cargo bench --bench engine [-- --quick]`
+//! `cargo bench --bench engine [-- --quick | --case N]`; a single case, counted from 0, is printed and not saved.
 
 #![allow(
     clippy::unwrap_used,
@@ -153,6 +153,12 @@ const SEED: u64 = 11;
 
 fn main() {
     let quick = std::env::args().any(|arg| arg == "--quick");
+    let case = std::env::args().skip_while(|arg| arg != "--case").nth(1);
+    if let Some((bodies, moving, percent, ticks)) = case.map(|n| CASES[n.parse::<usize>().unwrap()])
+    {
+        println!("{}", run(bodies, moving, percent, ticks));
+        return;
+    }
     let mut csv = String::from(
         "machine,commit,compiler,seed,bodies,density_per_m3,moving_percent,speed_percent,ticks,ours_median_us,\
          ours_p99_us,rapier_median_us,rapier_p99_us,ratio_median,ours_colliding,rapier_colliding,ours_contacts,\

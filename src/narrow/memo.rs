@@ -196,6 +196,13 @@ fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f64 {
     if then == now {
         return 0.0;
     }
+    if !(a.unbounded || b.unbounded) {
+        return if a.radius < b.radius {
+            displacement(&then.inverse(), &now.inverse(), &a.centre, a.radius)
+        } else {
+            displacement(then, now, &b.centre, b.radius)
+        };
+    }
     match (half_space_of(a), half_space_of(b)) {
         (Some(normal), _) => plane_motion(&normal, then, now, &b.centre, b.radius),
         (None, Some(normal)) => plane_motion(
@@ -205,11 +212,7 @@ fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f64 {
             &a.centre,
             a.radius,
         ),
-        (None, None) if a.unbounded || b.unbounded => f64::INFINITY,
-        (None, None) if a.radius < b.radius => {
-            displacement(&then.inverse(), &now.inverse(), &a.centre, a.radius)
-        }
-        (None, None) => displacement(then, now, &b.centre, b.radius),
+        (None, None) => f64::INFINITY,
     }
 }
 

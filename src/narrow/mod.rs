@@ -26,6 +26,7 @@ mod cursor;
 mod finding;
 mod memo;
 mod order;
+mod pass;
 mod pool;
 mod query;
 mod refit;

@@ -10,7 +10,8 @@ use super::contacts::ContactSet;
 use super::cursor::{Cursor, Room, Turn};
 use super::memo::{Witness, bent, changed_since};
 use super::mesh::{Goal, has_front};
-use super::order::{Order, RANK_NS, RANK_SEEN_NS};
+use super::order::Order;
+use super::pass::Pass;
 use super::query::{add_manifold, is_simple, retest, shape_gap, shape_pose, sound, witness_of};
 use super::{NONE, Narrow, Wanted};
 
@@ -40,9 +41,15 @@ impl Narrow {
         } else {
             Goal::Verdict
         };
-        self.undecided = self.spend_on(work, wanted.order, world, meter, |narrow, slot, meter| {
-            let idle = narrow.hot[slot.index()].verdict != Verdict::Possible;
-            let done = idle || narrow.work(slot, goal, world, meter);
+        let pass = Pass {
+            world,
+            order: wanted.order,
+            idle: |narrow: &Self, slot: PairSlot| {
+                narrow.hot[slot.index()].verdict != Verdict::Possible
+            },
+        };
+        self.undecided = self.spend_on(work, &pass, meter, |narrow, slot, meter| {
+            let done = (pass.idle)(narrow, slot) || narrow.work(slot, goal, world, meter);
             narrow.memos[slot.index()].queued = !done;
             done
         });
@@ -66,66 +73,23 @@ impl Narrow {
             Goal::Gap
         };
         let work = std::mem::take(&mut self.refresh);
-        self.refresh = self.spend_on(work, wanted.order, world, meter, |narrow, slot, meter| {
-            let reported = matches!(
-                narrow.hot[slot.index()].verdict,
-                Verdict::Near | Verdict::Colliding
-            );
-            let idle = !reported || narrow.fresh(slot, wanted.contacts);
-            let done = idle || narrow.work(slot, goal, world, meter);
+        let pass = Pass {
+            world,
+            order: wanted.order,
+            idle: |narrow: &Self, slot: PairSlot| {
+                let reported = matches!(
+                    narrow.hot[slot.index()].verdict,
+                    Verdict::Near | Verdict::Colliding
+                );
+                !reported || narrow.fresh(slot, wanted.contacts)
+            },
+        };
+        self.refresh = self.spend_on(work, &pass, meter, |narrow, slot, meter| {
+            let done = (pass.idle)(narrow, slot) || narrow.work(slot, goal, world, meter);
             narrow.memos[slot.index()].refreshing = !done;
             done
         });
         self.refresh.is_empty()
-    }
-
-    /// Gives each pair a turn, in order, and those that need more further turns, while the meter is open; returns the
-    /// pairs that are not done.
-    fn spend_on<'m>(
-        &mut self,
-        mut work: Vec<PairSlot>,
-        order: Order,
-        world: &World,
-        meter: &mut Meter<'m>,
-        mut turn: impl FnMut(&mut Self, PairSlot, &mut Meter<'m>) -> bool,
-    ) -> Vec<PairSlot> {
-        // To rank them all takes a while too, and nothing can be done in what is left then.
-        let gaze = world.gaze();
-        let rank_ns = if gaze.is_some() {
-            RANK_SEEN_NS
-        } else {
-            RANK_NS
-        };
-        if work.is_empty() || !meter.open() || !meter.has_ns(work.len() as u64 * rank_ns) {
-            return work;
-        }
-        let mut line = self.line_up(&work, order, world, gaze);
-        while !work.is_empty() && meter.open() {
-            let (mut at, mut left) = (0, 0);
-            while at < work.len() {
-                self.order_next(&mut line, at, world, meter);
-                if !meter.open() {
-                    break;
-                }
-                let slot = self.keyed.get(at).map_or(work[at], |&(_, slot)| slot);
-                if !turn(self, slot, meter) {
-                    work[left] = slot;
-                    left += 1;
-                }
-                at += 1;
-            }
-            // Who had no turn keeps its place behind those who had.
-            let behind = work.len() - at;
-            for (to, &(_, slot)) in work[at..].iter_mut().zip(self.keyed.iter().skip(at)) {
-                *to = slot;
-            }
-            work.copy_within(at.., left);
-            work.truncate(left + behind);
-            // Further rounds keep the order of the first.
-            self.keyed.clear();
-            line.finish(work.len());
-        }
-        work
     }
 
     /// When somebody begins to listen, pairs at rest owe them what was left out before.

@@ -25,6 +25,7 @@ impl Narrow {
         // Above this share a straight walk over the 24-byte records beats chasing each body's list.
         if changed * 4 > world.slots_len() {
             for slot in 0..self.hot.len() {
+                self.ask_ahead_of_walk(slot, world);
                 if self.hot[slot].live {
                     #[allow(
                         clippy::cast_possible_truncation,

@@ -5,6 +5,7 @@
 //! it stands where its body stood in the frame before.
 
 use super::World;
+use super::ahead::AHEAD;
 use super::filters::KEEPS;
 use super::source::{Standing, owns, stand};
 use crate::ids::{BodyId, BodySlot, SourceSlot};
@@ -183,7 +184,12 @@ impl World {
         self.sources[source.index()].pose_frame = number;
         rows.resize(transforms.len(), NO_BODY);
         let mut refused = 0;
-        for (row, place) in transforms.iter().zip(rows.iter_mut()) {
+        for (at, row) in transforms.iter().enumerate() {
+            if let Some(&ahead) = rows.get(at + AHEAD) {
+                self.ask_ahead(ahead);
+                self.ask_ahead_for_entry(ahead);
+            }
+            let place = &mut rows[at];
             let id = BodyId(row.body);
             let predicted = self.body(*place).is_some_and(|body| body.id == id);
             let found = if predicted {

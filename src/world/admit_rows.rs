@@ -5,6 +5,7 @@
 
 use super::World;
 use super::admit::{NO_BODY, Times};
+use super::ahead::AHEAD;
 use super::tag::Tag;
 use crate::ids::BodyId;
 use crate::ids::{BodySlot, SourceSlot};
@@ -29,6 +30,10 @@ impl World {
         let young = deadline_ns > self.now_ns;
         let mut refused = 0;
         for (at, (row, &slot)) in frame.transforms.iter().zip(rows).enumerate() {
+            self.ask_along(at, |step| rows.get(step).map(|slot| [*slot]));
+            if let Some(&ahead) = rows.get(at + AHEAD) {
+                self.ask_ahead_for_entry(ahead);
+            }
             if slot == NO_BODY {
                 continue;
             }

@@ -9,6 +9,7 @@
 mod admit;
 mod admit_rows;
 mod age;
+mod ahead;
 mod bend;
 mod body;
 mod census;
@@ -32,6 +33,7 @@ mod validate;
 use std::sync::Arc;
 
 pub use admit::Admission;
+pub use ahead::AHEAD;
 pub use bend::Vertices;
 pub use body::{Body, ChangeSet, Motion, PlacedShape, Removed};
 pub use edit::{Applied, Edit};

@@ -160,9 +160,17 @@ impl<'a> Pair<'a> {
     }
 }
 
+/// Squares of lengths that lost nothing by underflow and are far from overflow.
+const SQUARE_MIN: f64 = 1e-280;
+const SQUARE_MAX: f64 = 1e280;
+
 /// `v` at length 1; `None` for zero and what is not finite.
 #[inline]
 pub(super) fn unit(v: &Vec3) -> Option<Vec3> {
+    let square = v.norm_squared();
+    if (SQUARE_MIN..SQUARE_MAX).contains(&square) {
+        return Some(v / square.sqrt());
+    }
     // Scaled first, so that 1e-170 m does not become 0 when squared.
     let largest = v.amax();
     if largest > 0.0 && largest.is_finite() {

@@ -1,0 +1,111 @@
+//! Passes over many pairs: turns in order while the meter is open, and pairs asked for ahead, since what a turn reads
+//! lies in several places, all far apart.
+
+use crate::ids::PairSlot;
+use crate::simd::boxes::prefetch;
+use crate::time::Meter;
+use crate::world::{AHEAD, World};
+
+use super::Narrow;
+use super::order::{Order, RANK_NS, RANK_SEEN_NS};
+
+/// One pass over a list of work.
+pub(super) struct Pass<'a, Idle> {
+    pub(super) world: &'a World,
+    pub(super) order: Order,
+    /// Whether nothing is left to do for a pair.
+    pub(super) idle: Idle,
+}
+
+impl Narrow {
+    /// Gives each pair a turn, in order, and those that need more further turns, while the meter is open; returns the
+    /// pairs that are not done.
+    pub(super) fn spend_on<'m>(
+        &mut self,
+        mut work: Vec<PairSlot>,
+        pass: &Pass<'_, impl Fn(&Self, PairSlot) -> bool>,
+        meter: &mut Meter<'m>,
+        mut turn: impl FnMut(&mut Self, PairSlot, &mut Meter<'m>) -> bool,
+    ) -> Vec<PairSlot> {
+        let (world, order) = (pass.world, pass.order);
+        // To rank them all takes a while too, and nothing can be done in what is left then.
+        let gaze = world.gaze();
+        let rank_ns = if gaze.is_some() {
+            RANK_SEEN_NS
+        } else {
+            RANK_NS
+        };
+        if work.is_empty() || !meter.open() || !meter.has_ns(work.len() as u64 * rank_ns) {
+            return work;
+        }
+        let mut line = self.line_up(&work, order, world, gaze);
+        while !work.is_empty() && meter.open() {
+            let (mut at, mut left) = (0, 0);
+            while at < work.len() {
+                self.order_next(&mut line, at, world, meter);
+                if !meter.open() {
+                    break;
+                }
+                let next = |at: usize| match self.keyed.get(at) {
+                    Some(&(_, slot)) => Some(slot),
+                    None => work.get(at).copied(),
+                };
+                let Some(slot) = next(at) else { break };
+                self.ask_along(at, next, world, |slot| !(pass.idle)(self, slot));
+                if !turn(self, slot, meter) {
+                    work[left] = slot;
+                    left += 1;
+                }
+                at += 1;
+            }
+            // Who had no turn keeps its place behind those who had.
+            let behind = work.len() - at;
+            for (to, &(_, slot)) in work[at..].iter_mut().zip(self.keyed.iter().skip(at)) {
+                *to = slot;
+            }
+            work.copy_within(at.., left);
+            work.truncate(left + behind);
+            // Further rounds keep the order of the first.
+            self.keyed.clear();
+            line.finish(work.len());
+        }
+        work
+    }
+
+    /// At step `at` of a pass: asks for the pairs, bodies and shapes of the steps to come.
+    ///
+    /// * `next` - the pair of a step.
+    /// * `wants` - whether its bodies will be looked at.
+    #[inline]
+    fn ask_along(
+        &self,
+        at: usize,
+        next: impl Fn(usize) -> Option<PairSlot>,
+        world: &World,
+        wants: impl Fn(PairSlot) -> bool,
+    ) {
+        if let Some(slot) = next(at + 2 * AHEAD) {
+            self.ask_ahead(slot);
+        }
+        world.ask_along(at, |step| {
+            let slot = next(step).filter(|slot| wants(*slot))?;
+            let hot = &self.hot[slot.index()];
+            Some([hot.a, hot.b])
+        });
+    }
+
+    /// At place `at` of the straight walk over all pairs: asks for those to come whose certificates are spent.
+    #[inline]
+    pub(super) fn ask_ahead_of_walk(&self, at: usize, world: &World) {
+        let ahead = at + AHEAD;
+        let Some(hot) = self.hot.get(ahead).filter(|hot| hot.live) else {
+            return;
+        };
+        if self.spent_m[hot.a.index()] + self.spent_m[hot.b.index()] < hot.expiry_m {
+            return;
+        }
+        prefetch(&self.memos[ahead]);
+        world.ask_ahead(hot.a);
+        world.ask_ahead(hot.b);
+    }
+}
