@@ -6,6 +6,7 @@ mod make;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 pub(super) use make::join;
 use make::{make, said};
@@ -39,6 +40,9 @@ use crate::wire::{
 
 /// The node's name where nobody says another.
 const NODE_NAME: &str = "sweepd";
+/// How long the participant outlives its node.
+const FAREWELL: Duration = Duration::from_millis(100);
+
 /// How the node opens.
 #[derive(Clone, Debug)]
 pub struct RosOptions {
@@ -222,6 +226,13 @@ impl RosNode {
             let _told_by_its_panic = thread.map(JoinHandle::join);
         }
         let _told_by_its_panic = self.spinning.take().map(JoinHandle::join);
+        // The node has said that it goes. Who missed that can ask again only while the participant lives; who cannot
+        // ask shows the name until its lease ends.
+        #[allow(
+            clippy::disallowed_methods,
+            reason = "the end of the process, with nothing left to wait on"
+        )]
+        std::thread::sleep(FAREWELL);
         drop(self.context.take());
     }
 }
