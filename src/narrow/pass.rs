@@ -28,16 +28,19 @@ impl Narrow {
         mut turn: impl FnMut(&mut Self, PairSlot, &mut Meter<'m>) -> bool,
     ) -> Vec<PairSlot> {
         let (world, order) = (pass.world, pass.order);
-        // To rank them all takes a while too, and nothing can be done in what is left then.
+        if work.is_empty() || !meter.open() {
+            return work;
+        }
         let gaze = world.gaze();
         let rank_ns = if gaze.is_some() {
             RANK_SEEN_NS
         } else {
             RANK_NS
         };
-        if work.is_empty() || !meter.open() || !meter.has_ns(work.len() as u64 * rank_ns) {
-            return work;
-        }
+        // To rank them all takes a while too. Where nothing could be done in what is left then, they come as they
+        // stand: by the last ranking, then the new ones.
+        let ranked = meter.has_ns(work.len() as u64 * rank_ns);
+        let order = if ranked { order } else { Order::AsFound };
         let mut line = self.line_up(&work, order, world, gaze);
         while !work.is_empty() && meter.open() {
             let (mut at, mut left) = (0, 0);
@@ -65,6 +68,10 @@ impl Narrow {
             }
             work.copy_within(at.., left);
             work.truncate(left + behind);
+            if !ranked {
+                // Else whom no turn decides would have them all.
+                work.rotate_left(left);
+            }
             // Further rounds keep the order of the first.
             self.keyed.clear();
             line.finish(work.len());
@@ -86,6 +93,9 @@ impl Narrow {
     ) {
         if let Some(slot) = next(at + 2 * AHEAD) {
             self.ask_ahead(slot);
+        }
+        if let Some(slot) = next(at + AHEAD).filter(|slot| wants(*slot)) {
+            self.ask_ahead_for_contacts(slot);
         }
         world.ask_along(at, |step| {
             let slot = next(step).filter(|slot| wants(*slot))?;

@@ -92,7 +92,7 @@ const DECAY_SHIFT: u32 = 5;
 /// a tick later. What is kept back for nothing is used after publishing.
 const SAFETY_SHARE: u64 = 2;
 /// Kept back beside it, nanoseconds: the query that is under way at the deadline, and closing the work lists.
-pub(super) const CLOSING_NS: u64 = 20_000;
+const CLOSING_NS: u64 = 20_000;
 
 impl Default for Floor {
     fn default() -> Self {

@@ -5,10 +5,12 @@
 //! used here.
 
 use super::Engine;
-use super::floor::CLOSING_NS;
 use crate::narrow::Wanted;
 use crate::time::Meter;
 use crate::world::{BuiltTree, WornTree};
+
+/// Kept back of the tick's end, nanoseconds: the query that is under way then, and closing the work lists.
+const LAST_NS: u64 = 10_000;
 
 /// The last tick's budget after its outbox was handed over.
 #[derive(Clone, Copy, Debug, Default)]
@@ -42,7 +44,7 @@ impl Engine {
             return false;
         };
         let start_ns = self.clock.monotonic_ns();
-        let left_ns = end_ns.saturating_sub(start_ns + CLOSING_NS);
+        let left_ns = end_ns.saturating_sub(start_ns + LAST_NS);
         if left_ns == 0 {
             return false;
         }

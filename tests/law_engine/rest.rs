@@ -18,6 +18,8 @@ fn two(at: [f64; 2]) -> Rig {
     rig
 }
 
+/// What a tick keeps back of its end for the query under way.
+const LAST_NS: u64 = 10_000;
 const TOUCHING: [f64; 2] = [1.2, 1.2];
 const APART: [f64; 2] = [1.5, 1.5];
 
@@ -84,4 +86,30 @@ fn law_4_5_no_work_goes_on_past_the_deadline_nor_under_a_budget_of_units() {
     assert!(!rig.engine.work_on(u64::MAX));
     rig.send(NONE);
     assert_eq!(rig.verdict(1, 2), Verdict::Possible);
+}
+
+#[test]
+fn law_4_5_time_that_does_not_reach_to_rank_the_pairs_is_used_all_the_same() {
+    let count = 200;
+    let bodies: Vec<String> = (1..=2 * count)
+        .map(|id| ball(id, ((id - 1) / 2) as f64 * 10.0, ""))
+        .collect();
+    let mut rig = Rig::new(&scene("", &bodies));
+    let second = |rig: &mut Rig, [x, y]: [f64; 2]| {
+        for pair in 0..count {
+            let at = Pose::translation(pair as f64 * 10.0 + x, y, 0.0);
+            rig.place(2 * pair + 2, &at);
+        }
+    };
+    second(&mut rig, APART);
+    rig.send(ALL);
+    rig.engine.note_sent(1_000_000);
+    second(&mut rig, TOUCHING);
+    rig.send(SHORT);
+    assert_eq!(rig.out.tick.possible, count);
+    // One microsecond is left, and the clock stands.
+    rig.clock.advance(900_000 - LAST_NS - 1_000);
+    assert!(!rig.engine.work_on(u64::MAX), "all is decided");
+    rig.send(NONE);
+    assert_eq!(rig.out.tick.colliding, count);
 }

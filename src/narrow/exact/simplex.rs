@@ -183,13 +183,15 @@ fn consider(
 pub(super) fn normal_of(a: &Vec3, b: &Vec3, c: &Vec3) -> Vec3 {
     let (ab, bc, ca) = (b - a, c - b, a - c);
     let (x, y, z) = (ab.norm_squared(), bc.norm_squared(), ca.norm_squared());
-    if x >= y && x >= z {
-        bc.cross(&ca)
+    // Chosen first and multiplied once: which side is longest no processor guesses.
+    let (one, other) = if x >= y && x >= z {
+        (bc, ca)
     } else if y >= z {
-        ca.cross(&ab)
+        (ca, ab)
     } else {
-        ab.cross(&bc)
-    }
+        (ab, bc)
+    };
+    one.cross(&other)
 }
 
 /// Weights of the projection of the origin onto the plane of a triangle, if it falls inside.
