@@ -9,7 +9,11 @@ use super::forced::Forced;
 use super::members::{IN, Members, UNBOUNDED};
 use crate::ids::{BodyId, BodySlot, PairKey, PairSlot};
 use crate::pairs::{Ended, PairDelta, PairPolicy, PairSet};
+use crate::simd::boxes::prefetch;
 use crate::wire::EndCause;
+
+/// How many pairs ahead memory is asked for.
+const AHEAD: usize = 8;
 
 /// What an update has found so far; memory is kept over updates.
 #[derive(Clone, Debug, Default)]
@@ -60,6 +64,17 @@ impl<X: Proxies, P: PairPolicy> Judge<'_, X, P> {
         self.members.is_bounded(low)
             && self.members.is_bounded(high)
             && self.proxies.aabb(low).overlaps(self.proxies.aabb(high))
+    }
+
+    /// Asks for the boxes of a pair to be brought near.
+    #[inline]
+    fn prefetch(&self, key: PairKey) {
+        let (low, high) = key.slots();
+        for slot in [low, high] {
+            if self.members.is_bounded(slot) {
+                prefetch(self.proxies.aabb(slot));
+            }
+        }
     }
 
     /// Whether a pair that is not stored must be.
@@ -114,14 +129,27 @@ impl Found {
         judge: &Judge<'_, impl Proxies, impl PairPolicy>,
         pairs: &mut PairSet,
     ) {
-        for key in parted {
+        // Each step for all pairs before the next one: memory for the steps to come is asked for meanwhile.
+        let mut doomed = std::mem::take(&mut self.doomed);
+        self.slots.clear();
+        for (at, key) in parted.iter().enumerate() {
+            pairs.prefetch_find(parted, at);
+            if let Some(ahead) = parted.get(at + AHEAD) {
+                judge.prefetch(*ahead);
+            }
             let Some(slot) = pairs.find(*key) else {
                 continue;
             };
             if let Some(cause) = judge.ends(*key, false) {
-                self.end(slot, cause, judge.members, pairs);
+                doomed.push((slot, cause));
+                self.slots.push(slot);
             }
         }
+        for (at, (slot, cause)) in doomed.drain(..).enumerate() {
+            pairs.prefetch_remove(&self.slots, at);
+            self.end(slot, cause, judge.members, pairs);
+        }
+        self.doomed = doomed;
     }
 
     /// Stores what begins and fills the delta.
@@ -137,7 +165,10 @@ impl Found {
         self.truncated.clear();
         self.truncated.extend_from_slice(pairs.truncated());
         pairs.forget_missing();
-        for (_, key) in &self.fresh {
+        for (at, (_, key)) in self.fresh.iter().enumerate() {
+            if let Some((_, ahead)) = self.fresh.get(at + AHEAD) {
+                pairs.prefetch_insert(*ahead);
+            }
             match pairs.insert(*key) {
                 Some(slot) => delta.began.push(slot),
                 None => pairs.miss(*key),
@@ -156,7 +187,11 @@ impl Found {
         self.fresh.clear();
         self.began.sort_unstable();
         self.began.dedup();
-        for key in &self.began {
+        for (at, key) in self.began.iter().enumerate() {
+            pairs.prefetch_find(&self.began, at);
+            if let Some(ahead) = self.began.get(at + AHEAD) {
+                judge.prefetch(*ahead);
+            }
             if pairs.find(*key).is_none() && judge.begins(*key) {
                 self.fresh.push((judge.members.rank(*key), *key));
             }

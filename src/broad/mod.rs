@@ -124,7 +124,7 @@ impl BroadPhase {
         }
     }
 
-    /// Sets whether the order works every tick from scratch, or none; without it: as counted work says. All give the
+    /// Sets whether the order works every tick without candidates, or none; else as counted work says. All give the
     /// same pairs and events.
     pub fn use_afresh(&mut self, afresh: bool) {
         if let Engine::Order(order) = &mut self.engine {

@@ -1,27 +1,43 @@
 //! Where what has a key stands: an open table from keys to places, so that a lookup does not walk lists.
 //!
-//! In: a hash of the key, and what tells the key or the hash at a place. The table holds places only, four bytes each;
-//! the keys are read from where they stand. For pairs: a body of a dense scene has tens of them, and there the walks
-//! took 71 % of a tick of the broad phase. Fixed hash, never iterated: nothing depends on its order.
+//! In: a hash of the key, and what tells the key at a place. The table holds a place and half of its mixed hash, eight
+//! bytes in all; a key is read from where it stands only where that half fits, so that to put in and to take out reads
+//! nothing but the table. For pairs: a body of a dense scene has tens of them, and there walks through lists took 71 %
+//! of a tick of the broad phase. Fixed hash, never iterated: nothing depends on its order.
 //!
 //! Linear probing with deletion by shifting back (Knuth, TAOCP 3, section 6.4, algorithm R).
 
+use crate::simd::boxes::prefetch;
+
 /// No place.
 const NONE: u32 = u32::MAX;
+/// An entry without a place.
+const EMPTY: Entry = Entry {
+    mixed: 0,
+    place: NONE,
+};
 /// Least size of the table.
 const LEAST: usize = 16;
+
+/// A place, and the upper half of the mixed hash of its key.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(8))]
+struct Entry {
+    mixed: u32,
+    place: u32,
+}
 
 /// The table.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Index {
-    table: Vec<u32>,
+    table: Vec<Entry>,
     len: usize,
 }
 
 impl Index {
     /// Empties it, keeps the memory.
     pub(crate) fn clear(&mut self) {
-        self.table.fill(NONE);
+        self.table.fill(EMPTY);
         self.len = 0;
     }
 
@@ -33,55 +49,67 @@ impl Index {
         if self.table.is_empty() {
             return None;
         }
-        let mut at = self.home(hash);
+        let mixed = mix(hash);
+        let mut at = self.home(mixed);
         loop {
-            let place = self.table[at];
-            if place == NONE {
+            let entry = self.table[at];
+            if entry.place == NONE {
                 return None;
             }
-            if is_it(place) {
-                return Some(place);
+            if entry.mixed == mixed && is_it(entry.place) {
+                return Some(entry.place);
             }
             at = (at + 1) & (self.table.len() - 1);
         }
     }
 
+    /// Asks for where a key is looked for first to be brought near.
+    #[inline]
+    pub(crate) fn prefetch(&self, hash: u64) {
+        if let Some(entry) = self.table.get(self.home(mix(hash))) {
+            prefetch(entry);
+        }
+    }
+
+    /// What stands where a key is looked for first: its place, or another's.
+    #[inline]
+    pub(crate) fn guess(&self, hash: u64) -> Option<u32> {
+        let entry = self.table.get(self.home(mix(hash)))?;
+        (entry.place != NONE).then_some(entry.place)
+    }
+
     /// Notes the place of a key that is not in the table.
     ///
     /// * `places` - so many there is room for in what holds the keys: the table grows when that does, at no other time.
-    /// * `hash_of` - the hash of the key at a place that is in the table.
-    pub(crate) fn insert(
-        &mut self,
-        hash: u64,
-        place: u32,
-        places: usize,
-        hash_of: impl Fn(u32) -> u64,
-    ) {
+    pub(crate) fn insert(&mut self, hash: u64, place: u32, places: usize) {
         // At most half full: runs stay short.
         if 2 * (self.len + 1) > self.table.len() {
             let size = (2 * places.max(self.len + 1))
                 .next_power_of_two()
                 .max(LEAST);
-            let old = std::mem::replace(&mut self.table, vec![NONE; size]);
-            for place in old.into_iter().filter(|place| *place != NONE) {
-                self.put(hash_of(place), place);
+            let old = std::mem::replace(&mut self.table, vec![EMPTY; size]);
+            for entry in old.into_iter().filter(|entry| entry.place != NONE) {
+                self.put(entry);
             }
         }
-        self.put(hash, place);
+        self.put(Entry {
+            mixed: mix(hash),
+            place,
+        });
         self.len += 1;
     }
 
     /// Takes out a key that is in the table.
     ///
     /// * `place` - where it stands.
-    pub(crate) fn remove(&mut self, hash: u64, place: u32, hash_of: impl Fn(u32) -> u64) {
+    pub(crate) fn remove(&mut self, hash: u64, place: u32) {
         if self.table.is_empty() {
             return;
         }
         let last = self.table.len() - 1;
-        let mut hole = self.home(hash);
-        while self.table[hole] != place {
-            if self.table[hole] == NONE {
+        let mut hole = self.home(mix(hash));
+        while self.table[hole].place != place {
+            if self.table[hole].place == NONE {
                 debug_assert!(false, "only what is in the table is taken out");
                 return;
             }
@@ -91,46 +119,57 @@ impl Index {
         let mut at = hole;
         loop {
             at = (at + 1) & last;
-            let place = self.table[at];
-            if place == NONE {
+            let entry = self.table[at];
+            if entry.place == NONE {
                 break;
             }
-            let home = self.home(hash_of(place));
+            let home = self.home(entry.mixed);
             let reaches = at.wrapping_sub(home) & last;
             if reaches >= (at.wrapping_sub(hole) & last) {
-                self.table[hole] = place;
+                self.table[hole] = entry;
                 hole = at;
             }
         }
-        self.table[hole] = NONE;
+        self.table[hole] = EMPTY;
         self.len -= 1;
     }
 
     /// Writes to the first free place from a key's home on.
-    fn put(&mut self, hash: u64, place: u32) {
-        let mut at = self.home(hash);
-        while self.table[at] != NONE {
+    fn put(&mut self, entry: Entry) {
+        let mut at = self.home(entry.mixed);
+        while self.table[at].place != NONE {
             at = (at + 1) & (self.table.len() - 1);
         }
-        self.table[at] = place;
+        self.table[at] = entry;
     }
 
-    /// Where a key is looked for first: the upper bits of a product with 2^64 over the golden ratio.
+    /// Where a key is looked for first: the upper bits of its mixed hash. There are never 2^32 entries.
     #[inline]
-    fn home(&self, hash: u64) -> usize {
-        let bits = self.table.len().trailing_zeros();
-        let product = hash.wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        // Both halves count: keys are made of small numbers, so the product's middle would be poor.
-        let mixed = (product ^ (product >> 32)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        usize::try_from(mixed >> (u64::BITS - bits)).unwrap_or(0)
+    fn home(&self, mixed: u32) -> usize {
+        // An empty table has no entry there.
+        let bits = self.table.len().max(1).trailing_zeros();
+        mixed.checked_shr(u32::BITS - bits).unwrap_or(0) as usize
     }
 
     /// Checks that the table knows so many keys.
     pub(crate) fn validate(&self, len: usize) -> Result<(), String> {
-        let used = self.table.iter().filter(|place| **place != NONE).count();
+        let used = self
+            .table
+            .iter()
+            .filter(|entry| entry.place != NONE)
+            .count();
         if used == len && self.len == len {
             return Ok(());
         }
         Err(format!("the index holds {used} places of {len}"))
     }
+}
+
+/// The upper half of a product with 2^64 over the golden ratio.
+#[inline]
+fn mix(hash: u64) -> u32 {
+    let product = hash.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    // Both halves count: keys are made of small numbers, so the product's middle would be poor.
+    let mixed = (product ^ (product >> 32)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    u32::try_from(mixed >> 32).unwrap_or(0)
 }

@@ -3,6 +3,8 @@
 use super::index::Index;
 use crate::ids::{BodySlot, PairKey, PairSlot};
 
+mod ahead;
+
 /// No pair.
 const NONE: u32 = u32::MAX;
 
@@ -213,9 +215,7 @@ impl PairSet {
             }
         }
         self.nodes[at as usize] = node;
-        let (nodes, places) = (&self.nodes, self.nodes.capacity());
-        let hash = |at: u32| nodes[at as usize].key.bits();
-        self.index.insert(key.bits(), at, places, hash);
+        self.index.insert(key.bits(), at, self.nodes.capacity());
         self.len += 1;
         Some(PairSlot(at))
     }
@@ -239,9 +239,7 @@ impl PairSet {
                 after.prev[its_side] = prev;
             }
         }
-        let nodes = &self.nodes;
-        let hash = |at: u32| nodes[at as usize].key.bits();
-        self.index.remove(node.key.bits(), slot.0, hash);
+        self.index.remove(node.key.bits(), slot.0);
         self.nodes[slot.index()].live = false;
         self.resting.push(slot.0);
         self.len -= 1;

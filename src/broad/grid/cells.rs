@@ -140,11 +140,8 @@ impl Cells {
             self.cells.push(cell);
             small(self.cells.len() - 1)
         };
-        let (cells, room) = (&self.cells, self.cells.capacity());
-        self.table.insert(hash(power, at), place, room, |place| {
-            let cell = &cells[place as usize];
-            hash(cell.power, cell.at)
-        });
+        let room = self.cells.capacity();
+        self.table.insert(hash(power, at), place, room);
         place
     }
 
@@ -175,11 +172,7 @@ impl Cells {
             self.cells[cell as usize].first = next;
             if next == NONE && self.shape.is_none() {
                 let Cell { power, at, .. } = self.cells[cell as usize];
-                let cells = &self.cells;
-                self.table.remove(hash(power, at), cell, |place| {
-                    let cell = &cells[place as usize];
-                    hash(cell.power, cell.at)
-                });
+                self.table.remove(hash(power, at), cell);
                 self.free_cells.push(cell);
             }
         }

@@ -1,4 +1,4 @@
-//! Which way of working a tick takes: candidates that last, or everything from scratch (`afresh`).
+//! Which way of working a tick takes: candidates that last, or none (`afresh`).
 //!
 //! In: counted work, never time, so that a replay chooses alike. Out: a choice, with hysteresis. The weights were
 //! measured once; they decide about cost alone.
@@ -11,19 +11,20 @@ const TAKE: u64 = 10;
 const TEST: u64 = 15;
 const RENEW: u64 = 200;
 const LANE: u64 = 1500;
-/// ... and from scratch a body, a box compared with a block, an overlap.
-const BODY: u64 = 80;
-const MEET: u64 = 7;
-const OVERLAP: u64 = 35;
-/// Boxes compared with a block from scratch, a body, where that is not known yet.
-const MEETS_USUAL: u64 = 5;
+/// ... and without candidates a body, a box compared with a block.
+const BODY: u64 = 25;
+const MEET: u64 = 12;
+/// Boxes compared with a block without candidates, a body, where that is not known yet: so many, and one for so many
+/// blocks that a block's query meets, in sixteenths.
+const MEETS_LEAST: u64 = 2;
+const MEETS_SHARE: u64 = 128;
 /// Ticks that a mean of the work is taken over ...
 const MEAN_TICKS: u64 = 16;
 /// ... and ticks after a sort of all that do not count: bodies have yet to learn their margins.
 const SETTLE_TICKS: u64 = 16;
 /// Below so many bodies either way takes next to nothing.
 const BODIES_MIN: u64 = 64;
-/// Ticks from scratch before candidates are tried again; twice as many each time that they prove no better.
+/// Ticks without candidates before these are tried again; twice as many each time that they prove no better.
 const SPELL_MIN: u32 = 128;
 const SPELL_MAX: u32 = 2048;
 /// A trial of candidates that lasted so many ticks was no failure.
@@ -39,13 +40,13 @@ pub(super) struct Gear {
     /// Mean work of a tick with candidates, and how many ticks it is a mean of.
     mean: u64,
     ticks: u64,
-    /// Ticks left from scratch, and how many there will be the next time.
+    /// Ticks left without candidates, and how many there will be the next time.
     left: u32,
     spell: u32,
     /// Ticks since the last spell began or ended.
     since: u32,
     calm: u32,
-    /// Boxes compared with a block from scratch, a body, by the last such tick.
+    /// Boxes compared with a block without candidates, a body, by the last such tick; 0 before the first.
     meets: u64,
 }
 
@@ -59,23 +60,17 @@ impl Default for Gear {
             spell: SPELL_MIN,
             since: TRIAL_TICKS,
             calm: 0,
-            meets: MEETS_USUAL,
+            meets: 0,
         }
     }
 }
 
 impl Gear {
-    /// Whether this tick is to be worked from scratch.
+    /// Whether this tick is to be worked without candidates.
     ///
     /// * `on` - whether the last one was.
-    /// * `overlaps` - how many pairs of boxes overlapped.
-    pub(super) fn choose(
-        &mut self,
-        on: bool,
-        moved: usize,
-        bodies: usize,
-        overlaps: usize,
-    ) -> bool {
+    /// * `usual` - blocks that a block's query meets, in sixteenths.
+    pub(super) fn choose(&mut self, on: bool, moved: usize, bodies: usize, usual: u64) -> bool {
         if let Some(forced) = self.forced {
             return forced;
         }
@@ -93,8 +88,13 @@ impl Gear {
             }
             !calm && self.left > 0
         } else {
-            let (bodies, overlaps) = (bodies as u64, overlaps as u64);
-            let scratch = bodies * (BODY + self.meets * MEET) + overlaps * OVERLAP;
+            let bodies = bodies as u64;
+            let meets = if self.meets > 0 {
+                self.meets
+            } else {
+                MEETS_LEAST + usual / MEETS_SHARE
+            };
+            let scratch = bodies * (BODY + meets * MEET);
             // A fifth more: a change costs as much as some ticks.
             self.ticks >= SETTLE_TICKS + MEAN_TICKS
                 && bodies >= BODIES_MIN
@@ -115,7 +115,7 @@ impl Gear {
         chosen
     }
 
-    /// Takes the work of a tick from scratch.
+    /// Takes the work of a tick without candidates.
     pub(super) fn note_scratch(&mut self, bodies: usize, work: &Work) {
         self.meets = work.tests / (bodies as u64).max(1) + 1;
     }
@@ -151,11 +151,11 @@ mod tests {
         }
     }
 
-    /// Runs ticks in which all of 1,000 bodies move; returns how many were worked from scratch.
+    /// Runs ticks in which all of 1,000 bodies move; returns how many were worked without candidates.
     fn run(gear: &mut Gear, on: &mut bool, ticks: u32, work: &Work) -> u32 {
         let mut scratch = 0;
         for _ in 0..ticks {
-            *on = gear.choose(*on, 1000, 1000, 800);
+            *on = gear.choose(*on, 1000, 1000, 300);
             if *on {
                 scratch += 1;
             } else {
@@ -183,7 +183,7 @@ mod tests {
         run(&mut gear, &mut on, 40, &work(10_000, 900));
         assert!(on);
         for _ in 0..CALM_TICKS {
-            on = gear.choose(on, 10, 1000, 800);
+            on = gear.choose(on, 10, 1000, 300);
         }
         assert!(!on);
     }

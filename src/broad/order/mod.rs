@@ -15,10 +15,10 @@
 //!   seldom sorted anew.
 //! * **Exact.** Boxes are f32, rounded outward, relative to an f64 origin amid the scene; where rounding could tell
 //!   otherwise than the f64 boxes, those are asked. So the pairs are those of the f64 boxes at any offset.
-//! * **From scratch** (`afresh`): where no fat box lasts, nothing is kept but the list of overlaps.
-//! * **Modes** (few or many moved; renewal, sorting anew, from scratch) are chosen by counted work with weights that
-//!   were measured once, so that a replay chooses alike. They decide about cost alone: pairs, slots and events are the
-//!   same.
+//! * **Without candidates** (`afresh`, `met`): where no fat box lasts, nothing is kept but lanes and overlaps.
+//! * **Modes** (few or many moved; renewal, sorting anew, without candidates) are chosen by counted work with weights
+//!   that were measured once, so that a replay chooses alike. They decide about cost alone: pairs, slots and events are
+//!   the same.
 //!
 //! Refused: three lists of sorted ends (see `sap`: exponent 1.5 to 2 as soon as motion is incoherent); a list of pairs
 //! as the one home of candidates (each renewal would insert, remove and look up single pairs; matrices are overwritten,
@@ -37,10 +37,12 @@ use crate::simd::boxes::{Boxes16, Down, Hold, Level, WIDTH};
 mod afresh;
 mod fatten;
 mod gear;
+mod lay;
 mod links;
 mod load;
 mod look;
 mod mend;
+mod met;
 mod place;
 mod renew;
 mod sort;
@@ -201,7 +203,7 @@ impl Order {
     /// Bodies with a box left (and may be about to come again). Their pairs are ended by the caller.
     pub(super) fn leave(&mut self, left: &[BodySlot]) {
         if self.afresh.on {
-            self.forget_held(left);
+            self.leave_afresh(left);
             return;
         }
         for slot in left {
@@ -214,10 +216,11 @@ impl Order {
         self.tick = self.tick.wrapping_add(1);
         let (moved, bodies) = (tick.moved.len(), tick.members.bounded().len());
         let was = self.afresh.on;
-        if (self.afresh.gear).choose(was, moved, bodies, self.hits) {
-            if !was {
-                self.begin_afresh();
-            }
+        self.homeless.clear();
+        let came = tick.members.touched().iter().copied();
+        let came = came.filter(|s| tick.members.has(*s, CAME) && tick.members.is_bounded(*s));
+        self.homeless.extend(came);
+        if (self.afresh.gear).choose(was, moved, bodies, self.usual) {
             self.update_afresh(&mut tick, work);
             self.afresh.gear.note_scratch(bodies, work);
             return;
@@ -225,10 +228,6 @@ impl Order {
         if was {
             self.end_afresh();
         }
-        self.homeless.clear();
-        let came = tick.members.touched().iter().copied();
-        let came = came.filter(|s| tick.members.has(*s, CAME) && tick.members.is_bounded(*s));
-        self.homeless.extend(came);
         let anew = was || self.homeless.len() * MANY_CAME > tick.members.bounded().len();
         // With hysteresis: to list all candidates again costs as much as some ticks.
         let share = if self.listed { STILL_MANY } else { MANY_MOVED };
@@ -260,7 +259,7 @@ impl Order {
         self.afresh.gear.note(moved, lanes, work);
     }
 
-    /// Sets whether every tick is worked from scratch, or none; `None`: as counted work says.
+    /// Sets whether every tick is worked without candidates, or none; `None`: as counted work says.
     pub(super) fn use_afresh(&mut self, afresh: Option<bool>) {
         self.afresh.gear.forced = afresh;
     }

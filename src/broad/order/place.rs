@@ -13,7 +13,7 @@ use crate::simd::boxes::{Boxes16, Down, Hold, Portable, WIDTH};
 /// cost as much as a sort is at most twice as dear as the best plan.
 const WORN_PER_BODY: u64 = 20;
 /// One block in so many stays empty after a sort, for bodies that find no free lane where they belong.
-const ATTIC: usize = 16;
+pub(super) const ATTIC: usize = 16;
 /// How far from its place on the curve a body may find a free lane, blocks.
 const STRAY: usize = 20;
 
@@ -80,9 +80,7 @@ impl Order {
     pub(super) fn settle<P: Proxies>(&mut self, tick: &Tick<'_, P>) -> bool {
         for at in 0..self.homeless.len() {
             let slot = self.homeless[at];
-            let one = outward(Portable, tick.proxies.aabb(slot), &self.origin);
-            let near = self.lane_near(&one.corners());
-            let Some(rank) = near.map(|(_, rank)| rank).or_else(|| self.lane_in_attic()) else {
+            let Some((rank, one)) = self.lane_for(slot, tick.proxies) else {
                 return false;
             };
             // How it got here says nothing of where it goes.
@@ -92,8 +90,25 @@ impl Order {
         true
     }
 
-    /// Gives a body a free lane.
+    /// A free lane for a body, the nearer the better, and its box.
+    pub(super) fn lane_for<P: Proxies>(&self, slot: BodySlot, proxies: &P) -> Option<(u32, Down)> {
+        let one = outward(Portable, proxies.aabb(slot), &self.origin);
+        let near = self.lane_near(&one.corners());
+        let rank = near
+            .map(|(_, rank)| rank)
+            .or_else(|| self.lane_in_attic())?;
+        Some((rank, one))
+    }
+
+    /// Gives a body a free lane, where it is to be renewed.
     pub(super) fn seat(&mut self, slot: BodySlot, rank: u32, one: Down) {
+        self.sit(slot, rank, one);
+        let (block, lane) = parts(rank);
+        self.mark(block, 1 << lane);
+    }
+
+    /// Gives a body a free lane.
+    pub(super) fn sit(&mut self, slot: BodySlot, rank: u32, one: Down) {
         let (block, lane) = parts(rank);
         grow(&mut self.rank_of, slot.index(), NONE);
         self.rank_of[slot.index()] = rank;
@@ -102,7 +117,6 @@ impl Order {
         self.len += 1;
         self.lanes_changed += 1;
         self.exact[rank as usize] = one;
-        self.mark(block, 1 << lane);
     }
 
     /// A free lane in an attic block.
@@ -205,7 +219,7 @@ impl Order {
     }
 
     /// Room for the blocks of so many bodies.
-    fn reserve_blocks(&mut self, bodies: usize) {
+    pub(super) fn reserve_blocks(&mut self, bodies: usize) {
         // How many blocks there are hangs on how many classes begin one: room for the most there can be.
         let most = bodies / FILL + CLASSES_MAX;
         let most = most + most / ATTIC + 1;
@@ -320,7 +334,7 @@ pub(super) fn far_from(one: &[f32; 6], home: &[f32; 6]) -> f32 {
 }
 
 /// Grows a list by body so that it has an entry for one.
-fn grow<T: Clone>(list: &mut Vec<T>, index: usize, value: T) {
+pub(super) fn grow<T: Clone>(list: &mut Vec<T>, index: usize, value: T) {
     if list.len() <= index {
         list.resize(index + 1, value);
     }

@@ -26,6 +26,8 @@ pub(super) struct Tree {
     dirty: Vec<u32>,
     /// Nodes still to be looked at in a query: level, node.
     stack: Vec<(u8, u32)>,
+    /// Lowest nodes that the blocks of a lowest node may meet.
+    nodes: Vec<u32>,
 }
 
 impl Tree {
@@ -73,6 +75,7 @@ impl Tree {
         let nodes = self.bounds.len() / WIDTH + WIDTH * LEVELS_MAX;
         self.stack.reserve(nodes.saturating_sub(self.stack.len()));
         self.dirty.reserve(nodes.saturating_sub(self.dirty.len()));
+        self.nodes.reserve(nodes.saturating_sub(self.nodes.len()));
     }
 
     /// The bound of a block.
@@ -124,15 +127,19 @@ impl Tree {
     /// Appends the blocks whose bound meets a box.
     #[inline(always)]
     pub(super) fn query<L: Lanes>(&mut self, lanes: L, one: &[f32; 6], found: &mut Vec<u32>) {
-        self.query_from(lanes, one, 0, found);
+        self.query_from(lanes, one, 0, 0, found);
     }
 
-    /// As [`Tree::query`], of the blocks from one on.
+    /// As [`Tree::query`], in ascending order.
+    ///
+    /// * `floor` - the level of the nodes that are looked for: 0 for blocks, 1 for the lowest nodes, below the root.
+    /// * `first` - none before this one.
     #[inline(always)]
-    pub(super) fn query_from<L: Lanes>(
+    fn query_from<L: Lanes>(
         &mut self,
         lanes: L,
         one: &[f32; 6],
+        floor: u8,
         first: u32,
         found: &mut Vec<u32>,
     ) {
@@ -142,16 +149,53 @@ impl Tree {
         while let Some((level, node)) = self.stack.pop() {
             let mut hits = lanes.meets(&self.levels[usize::from(level)][node as usize], one);
             // Children that hold none but earlier blocks.
-            let early = (first >> (4 * u32::from(level))).saturating_sub(node * LANES);
+            let early = (first >> (4 * u32::from(level - floor))).saturating_sub(node * LANES);
+            hits &= u16::MAX.checked_shl(early).unwrap_or(0);
+            if level == floor {
+                while hits != 0 {
+                    found.push(node * LANES + hits.trailing_zeros());
+                    hits &= hits - 1;
+                }
+            }
+            // The highest first, so that the lowest is looked at first.
+            while hits != 0 {
+                let child = u16::BITS - 1 - hits.leading_zeros();
+                hits ^= 1 << child;
+                self.stack.push((level - 1, node * LANES + child));
+            }
+        }
+    }
+
+    /// Notes the lowest nodes from one on that it meets, for [`Tree::query_among`] of its blocks: a walk down the tree
+    /// that sixteen blocks share.
+    #[inline(always)]
+    pub(super) fn query_nodes<L: Lanes>(&mut self, lanes: L, node: usize) {
+        let mut nodes = std::mem::take(&mut self.nodes);
+        nodes.clear();
+        if self.height > 1 {
+            let bound = self.levels[1][node / WIDTH].get(node % WIDTH);
+            #[allow(
+                clippy::cast_possible_truncation,
+                reason = "a node of at most 2^20 / 16"
+            )]
+            self.query_from(lanes, &bound, 1, node as u32, &mut nodes);
+        } else {
+            nodes.push(0);
+        }
+        self.nodes = nodes;
+    }
+
+    /// Appends the blocks whose bound meets that of a block of the node noted last, from the block on, ascending.
+    #[inline(always)]
+    pub(super) fn query_among<L: Lanes>(&self, lanes: L, block: u32, found: &mut Vec<u32>) {
+        let bound = &self.bounds[block as usize];
+        for node in &self.nodes {
+            let mut hits = lanes.meets(&self.levels[0][*node as usize], bound);
+            let early = block.saturating_sub(node * LANES);
             hits &= u16::MAX.checked_shl(early).unwrap_or(0);
             while hits != 0 {
-                let child = node * LANES + hits.trailing_zeros();
+                found.push(node * LANES + hits.trailing_zeros());
                 hits &= hits - 1;
-                if level == 0 {
-                    found.push(child);
-                } else {
-                    self.stack.push((level - 1, child));
-                }
             }
         }
     }

@@ -108,6 +108,11 @@ pub(crate) fn prefetch<T>(place: &T) {
             // SAFETY: a prefetch faults on no address, and this one lies inside `place`; SSE is part of x86-64.
             unsafe { _mm_prefetch::<_MM_HINT_T0>(first.add(at)) };
         }
+        // What is not laid along the lines of the cache ends in another one half of the time.
+        if align_of::<T>() < 64 && size_of::<T>() > 0 {
+            // SAFETY: as above.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(first.add(size_of::<T>() - 1)) };
+        }
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = place;

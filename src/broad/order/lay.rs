@@ -1,0 +1,237 @@
+//! Where bodies without candidates stand: they are laid along the curve, and every box is written to its lane.
+//!
+//! In: every box. Out: lanes, the tree over their blocks, and how much more of space the blocks take than they did.
+
+use super::afresh::{Afresh, FRAME_TICKS};
+use super::links::{room, spare};
+use super::place::{ATTIC, grow, middle};
+use super::sort::{FILL, Sorter};
+use super::tree::NO_BOUND;
+use super::{BodySlot, NONE, Order, Proxies, Tick, ones, small};
+use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work, prefetch};
+
+/// How many bodies ahead boxes are asked for, and how many blocks.
+const AHEAD: usize = 16;
+const AHEAD_BLOCKS: usize = 2;
+
+impl Order {
+    /// How many times more a block is met than when it was laid, in the mean, by the space it takes.
+    pub(super) fn grown(&self) -> f64 {
+        let side = self.afresh.side;
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (block, before) in self.afresh.reach.iter().enumerate() {
+            let times = reach(self.tree.bound(block), side) / before;
+            if times.is_finite() {
+                sum += f64::from(times);
+                count += 1.0;
+            }
+        }
+        if count > 0.0 { sum / count } else { 1.0 }
+    }
+
+    /// Deals the bodies to blocks anew, each block compact.
+    pub(super) fn lay_anew<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
+        let bodies = tick.members.bounded();
+        let look_again = self.afresh.framed >= FRAME_TICKS;
+        if look_again {
+            self.origin = middle(bodies.iter().map(|slot| tick.proxies.aabb(*slot)));
+            self.afresh.framed = 0;
+        }
+        self.level.run(TakeAll {
+            order: self,
+            bodies,
+            proxies: tick.proxies,
+        });
+        let boxes = std::mem::take(&mut self.boxes);
+        if look_again {
+            self.sorter.frame(&boxes);
+        }
+        // What is spoilt in a tick is not worth being dealt to compact blocks.
+        let compact = self.afresh.spoilt == 0;
+        self.deal_along(bodies, &boxes, compact);
+        self.boxes = boxes;
+        self.level.run(BoundAll { order: self });
+        let blocks = self.live.len();
+        self.measure();
+        let Afresh {
+            gone, near, open, ..
+        } = &mut self.afresh;
+        gone.clear();
+        gone.resize(blocks, 0);
+        room(near, blocks);
+        room(open, bodies.len());
+        spare(&mut self.carried, self.hits, bodies.len());
+    }
+
+    /// Deals the bodies to blocks along the curve; a class begins with a block of its own.
+    ///
+    /// * `compact` - in compact blocks, each with a free lane.
+    fn deal_along(&mut self, bodies: &[BodySlot], boxes: &[[f32; 6]], compact: bool) {
+        self.live.clear();
+        self.keys.clear();
+        self.slot_of.clear();
+        self.fat.clear();
+        self.reserve_blocks(bodies.len());
+        if let Some(last) = bodies.iter().max() {
+            grow(&mut self.rank_of, last.index(), NONE);
+        }
+        let mut sorter = std::mem::take(&mut self.sorter);
+        if compact {
+            for (key, index) in sorter.sort(boxes) {
+                self.deal_to(bodies, boxes, (*key, *index), FILL);
+            }
+        } else {
+            for at in sorter.along_curve(boxes) {
+                self.deal_to(bodies, boxes, at, WIDTH);
+            }
+        }
+        self.sorter = sorter;
+        self.sorted = self.live.len();
+        self.len = bodies.len();
+        let blocks = self.sorted + self.sorted / ATTIC + 1;
+        for list in [&mut self.live, &mut self.dirty, &mut self.renewing] {
+            list.resize(blocks, 0);
+        }
+        self.slot_of.resize(blocks * WIDTH, NONE);
+        self.exact.resize(blocks * WIDTH, Down::EMPTY);
+        self.fat.resize(blocks, Boxes16::EMPTY);
+        self.homes.resize(blocks, NO_BOUND);
+        self.tree.reset(blocks);
+        self.tree.reserve();
+    }
+
+    /// Gives a body the next lane.
+    ///
+    /// * `at` - its key, its index.
+    /// * `fill` - bodies of a block.
+    #[inline]
+    fn deal_to(&mut self, bodies: &[BodySlot], boxes: &[[f32; 6]], at: (u64, u32), fill: usize) {
+        let ((key, index), last) = (at, self.live.last());
+        let lane = last.map_or(fill, |live| live.trailing_ones() as usize);
+        let same = |first: &u64| Sorter::class_of(*first) == Sorter::class_of(key);
+        let starts = lane == fill || !self.keys.last().is_some_and(same);
+        let lane = if starts { 0 } else { lane };
+        if starts {
+            self.keys.push(key);
+            self.live.push(0);
+            self.fat.push(Boxes16::EMPTY);
+            self.slot_of.resize(self.live.len() * WIDTH, NONE);
+        }
+        let (block, body) = (self.live.len() - 1, bodies[index as usize]);
+        let rank = block * WIDTH + lane;
+        self.live[block] |= 1 << lane;
+        self.slot_of[rank] = body.0;
+        self.rank_of[body.index()] = small(rank);
+        self.fat[block].set(lane, &boxes[index as usize]);
+    }
+
+    /// Notes the space that each block takes.
+    fn measure(&mut self) {
+        let blocks = self.live.len();
+        let (mut sum, mut count) = (0.0_f64, 0.0_f64);
+        for block in 0..blocks {
+            let bound = self.tree.bound(block);
+            let sides = (0..3).map(|k| bound[k + 3] - bound[k]).sum::<f32>();
+            if sides.is_finite() {
+                sum += f64::from(sides);
+                count += 3.0;
+            }
+        }
+        #[allow(clippy::cast_possible_truncation, reason = "a cost")]
+        let side = (sum / count.max(1.0)) as f32;
+        self.afresh.side = side;
+        let Afresh { reach: reaches, .. } = &mut self.afresh;
+        reaches.clear();
+        reaches.extend((0..blocks).map(|block| reach(self.tree.bound(block), side)));
+        self.afresh.excess = 0.0;
+        self.afresh.laid = 0;
+    }
+}
+
+/// The space where the middle of a box with such sides meets a bound; none of an empty one.
+fn reach(bound: &[f32; 6], side: f32) -> f32 {
+    (0..3)
+        .map(|k| (bound[k + 3] - bound[k] + side).max(0.0))
+        .product()
+}
+
+/// Takes every box, in the order of the members, as corners.
+struct TakeAll<'a, P> {
+    order: &'a mut Order,
+    bodies: &'a [BodySlot],
+    proxies: &'a P,
+}
+
+impl<P: Proxies> Work for TakeAll<'_, P> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let origin = self.order.origin;
+        let boxes = &mut self.order.boxes;
+        boxes.clear();
+        boxes.reserve(self.bodies.len());
+        for (at, slot) in self.bodies.iter().enumerate() {
+            if let Some(ahead) = self.bodies.get(at + AHEAD) {
+                prefetch(self.proxies.aabb(*ahead));
+            }
+            let aabb = self.proxies.aabb(*slot);
+            let (min, max) = (aabb.min.coords.as_ref(), aabb.max.coords.as_ref());
+            boxes.push(lanes.outward(min, max, &origin).corners());
+        }
+    }
+}
+
+/// Writes every box to its lane, and brings the tree up to date.
+pub(super) struct TakeLanes<'a, P> {
+    pub(super) order: &'a mut Order,
+    pub(super) proxies: &'a P,
+}
+
+impl<P: Proxies> Work for TakeLanes<'_, P> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let (order, proxies) = (self.order, self.proxies);
+        let origin = order.origin;
+        for block in 0..order.live.len() {
+            let ahead = order.slot_of[block * WIDTH..].chunks_exact(WIDTH);
+            if let Some(ahead) = ahead.clone().nth(AHEAD_BLOCKS) {
+                for slot in ahead.iter().filter(|slot| **slot != NONE) {
+                    prefetch(proxies.aabb(BodySlot(*slot)));
+                }
+            }
+            for lane in ones(order.live[block]) {
+                let rank = block * WIDTH + lane;
+                let aabb = proxies.aabb(BodySlot(order.slot_of[rank]));
+                let (min, max) = (aabb.min.coords.as_ref(), aabb.max.coords.as_ref());
+                let one = lanes.outward(min, max, &origin).corners();
+                order.fat[block].set(lane, &one);
+            }
+            let bound = lanes.bound(&order.fat[block], u16::MAX);
+            order.tree.set(block, bound);
+        }
+        order.tree.refit(lanes);
+    }
+}
+
+/// Bounds every block, and brings the tree up to date.
+struct BoundAll<'a> {
+    order: &'a mut Order,
+}
+
+impl Work for BoundAll<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let order = self.order;
+        for block in 0..order.live.len() {
+            let bound = lanes.bound(&order.fat[block], u16::MAX);
+            order.homes[block] = bound;
+            order.tree.set(block, bound);
+        }
+        order.tree.refit(lanes);
+    }
+}

@@ -1,0 +1,376 @@
+//! Which lanes of which blocks overlap, found anew: a matrix of bits for each two blocks with any.
+//!
+//! In: boxes in their lanes, the tree over the blocks. Out: the overlaps of a tick in the order of blocks, so that
+//! those of two ticks with the same lanes differ by their bits alone.
+
+use super::links::{Matrix, room, small, spare};
+use super::{BodySlot, Order, ones, parts};
+use crate::ids::PairKey;
+use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch, slack};
+
+/// The overlaps of a tick.
+#[derive(Debug, Default)]
+pub(super) struct Met {
+    /// By block: where its records begin; and where the last ends.
+    firsts: Vec<u32>,
+    /// By record: the other block, which is not before its own. Ascending within a block.
+    others: Vec<u32>,
+    /// ... and lanes of the other by lane of its own. Within one block only bits above the row's own.
+    hits: Vec<Matrix>,
+}
+
+impl Clone for Met {
+    fn clone(&self) -> Self {
+        let mut met = Self::default();
+        met.clone_from(self);
+        met
+    }
+
+    /// Keeps the memory.
+    fn clone_from(&mut self, from: &Self) {
+        self.firsts.clone_from(&from.firsts);
+        self.others.clone_from(&from.others);
+        self.hits.clone_from(&from.hits);
+    }
+}
+
+impl Met {
+    /// Without any.
+    pub(super) fn clear(&mut self) {
+        self.firsts.clear();
+        self.others.clear();
+        self.hits.clear();
+    }
+
+    /// Room for more than it, or another of its size, holds: how many records there are differs from tick to tick, and
+    /// room is made when their number grows.
+    pub(super) fn spare_for(&mut self, records: usize, blocks: usize) {
+        room(&mut self.firsts, blocks + 1);
+        spare(&mut self.others, records, blocks);
+        spare(&mut self.hits, records, blocks);
+    }
+
+    /// Records.
+    pub(super) fn len(&self) -> usize {
+        self.others.len()
+    }
+
+    /// Blocks.
+    fn blocks(&self) -> usize {
+        self.firsts.len().saturating_sub(1)
+    }
+
+    /// The records of a block.
+    #[inline(always)]
+    fn of(&self, block: usize) -> std::ops::Range<usize> {
+        self.firsts[block] as usize..self.firsts[block + 1] as usize
+    }
+
+    /// What follows belongs to the next block.
+    #[inline(always)]
+    fn open_block(&mut self) {
+        self.firsts.push(small(self.others.len()));
+    }
+
+    /// The record of two ranks' blocks, and row and lane in it.
+    fn place(&self, ranks: [u32; 2]) -> Option<(usize, usize, usize)> {
+        let (a, row) = parts(ranks[0].min(ranks[1]));
+        let (b, lane) = parts(ranks[0].max(ranks[1]));
+        let mine = self.of(a);
+        let at = self.others[mine.clone()].binary_search(&small(b)).ok()?;
+        Some((mine.start + at, row, lane))
+    }
+
+    /// Whether two ranks overlap.
+    pub(super) fn has(&self, ranks: [u32; 2]) -> bool {
+        let place = self.place(ranks);
+        place.is_some_and(|(at, row, lane)| self.hits[at][row] >> lane & 1 == 1)
+    }
+
+    /// Takes the overlap of two ranks out; whether it was there.
+    pub(super) fn take_out(&mut self, ranks: [u32; 2]) -> bool {
+        let Some((at, row, lane)) = self.place(ranks) else {
+            return false;
+        };
+        let bits = &mut self.hits[at][row];
+        let was = *bits >> lane & 1 == 1;
+        *bits &= !(1 << lane);
+        was
+    }
+
+    /// How many there are.
+    pub(super) fn hits(&self) -> usize {
+        let rows = self.hits.iter().flatten();
+        rows.map(|row| row.count_ones() as usize).sum()
+    }
+
+    /// Writes every overlap down as two body slots, and forgets it; not those of lanes that lost their body.
+    pub(super) fn drain_into(
+        &mut self,
+        gone: &[u16],
+        slot_of: &[u32],
+        carried: &mut Vec<(u32, u32)>,
+    ) {
+        for block in 0..self.blocks() {
+            for at in self.of(block) {
+                let other = self.others[at] as usize;
+                let left = without(&self.hits[at], gone[block], gone[other]);
+                each(&left, |row, lane| {
+                    let pair = (slot_of[block * WIDTH + row], slot_of[other * WIDTH + lane]);
+                    carried.push(pair);
+                });
+            }
+        }
+        self.clear();
+    }
+}
+
+/// Reports what is in one of two ticks alone, whose lanes are the same but for those whose body left before the second.
+///
+/// * `lists` - what began, what parted.
+pub(super) fn tell_difference(
+    [before, now]: [&Met; 2],
+    gone: &[u16],
+    slot_of: &[u32],
+    [began, parted]: [&mut Vec<PairKey>; 2],
+) {
+    const NONE: Matrix = [0; WIDTH];
+    for block in 0..now.blocks() {
+        let (mut old, mut new) = (before.of(block), now.of(block));
+        loop {
+            let last = |met: &Met, rest: &std::ops::Range<usize>| {
+                rest.clone().next().map_or(u32::MAX, |at| met.others[at])
+            };
+            let heads = [last(before, &old), last(now, &new)];
+            let other = heads[0].min(heads[1]);
+            if other == u32::MAX {
+                break;
+            }
+            let was = old.next_if(heads[0] == other);
+            let is = new.next_if(heads[1] == other);
+            let was = was.map_or(&NONE, |at| &before.hits[at]);
+            let is = is.map_or(&NONE, |at| &now.hits[at]);
+            let other = other as usize;
+            let mut was = *was;
+            if gone[block] | gone[other] != 0 {
+                was = without(&was, gone[block], gone[other]);
+            }
+            if was == *is {
+                continue;
+            }
+            let key = |row: usize, lane: usize| {
+                let slots = [block * WIDTH + row, other * WIDTH + lane];
+                let [one, other] = slots.map(|rank| BodySlot(slot_of[rank]));
+                PairKey::new(one, other)
+            };
+            each(&minus(is, &was), |row, lane| began.push(key(row, lane)));
+            each(&minus(&was, is), |row, lane| parted.push(key(row, lane)));
+        }
+    }
+}
+
+/// The next of a range, if it is wanted.
+trait NextIf {
+    fn next_if(&mut self, wanted: bool) -> Option<usize>;
+}
+
+impl NextIf for std::ops::Range<usize> {
+    #[inline(always)]
+    fn next_if(&mut self, wanted: bool) -> Option<usize> {
+        if wanted { self.next() } else { None }
+    }
+}
+
+/// Reports every overlap.
+pub(super) fn tell_all(met: &Met, slot_of: &[u32], began: &mut Vec<PairKey>) {
+    tell_some(met, slot_of, began, |hits, _, _| *hits);
+}
+
+/// Reports every overlap of some lanes.
+pub(super) fn tell_asked(met: &Met, asked: &[u16], slot_of: &[u32], began: &mut Vec<PairKey>) {
+    tell_some(met, slot_of, began, |hits, block, other| {
+        minus(hits, &without(hits, asked[block], asked[other]))
+    });
+}
+
+/// Reports what is left of each record.
+fn tell_some(
+    met: &Met,
+    slot_of: &[u32],
+    began: &mut Vec<PairKey>,
+    left: impl Fn(&Matrix, usize, usize) -> Matrix,
+) {
+    for block in 0..met.blocks() {
+        for at in met.of(block) {
+            let other = met.others[at] as usize;
+            each(&left(&met.hits[at], block, other), |row, lane| {
+                let slots = [block * WIDTH + row, other * WIDTH + lane];
+                let [one, other] = slots.map(|rank| BodySlot(slot_of[rank]));
+                began.push(PairKey::new(one, other));
+            });
+        }
+    }
+}
+
+/// The bits that lie neither in some rows nor in some columns.
+#[inline(always)]
+fn without(hits: &Matrix, rows: u16, columns: u16) -> Matrix {
+    let mut left = [0; WIDTH];
+    for (row, line) in hits.iter().enumerate() {
+        let stays = if rows >> row & 1 == 1 { 0 } else { u16::MAX };
+        left[row] = line & !columns & stays;
+    }
+    left
+}
+
+/// The bits of the one that are not in the other.
+#[inline(always)]
+fn minus(one: &Matrix, other: &Matrix) -> Matrix {
+    let mut left = [0; WIDTH];
+    for row in 0..WIDTH {
+        left[row] = one[row] & !other[row];
+    }
+    left
+}
+
+/// Row and lane of each bit.
+#[inline(always)]
+fn each(hits: &Matrix, mut with: impl FnMut(usize, usize)) {
+    for (row, line) in hits.iter().enumerate() {
+        for lane in ones(*line) {
+            with(row, lane);
+        }
+    }
+}
+
+/// Finds the overlaps of what stands in the lanes; returns how many boxes were compared with a block.
+pub(super) struct Sweep<'a> {
+    pub(super) order: &'a mut Order,
+}
+
+impl Work for Sweep<'_> {
+    type Out = u64;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> u64 {
+        let order = self.order;
+        let mut near = std::mem::take(&mut order.afresh.near);
+        let mut open = std::mem::take(&mut order.afresh.open);
+        let mut met = std::mem::take(&mut order.afresh.found);
+        met.clear();
+        let mut tests = 0;
+        for block in 0..order.live.len() {
+            met.open_block();
+            if block.is_multiple_of(WIDTH) {
+                order.tree.query_nodes(lanes, block / WIDTH);
+            }
+            if order.live[block] == 0 {
+                continue;
+            }
+            near.clear();
+            order.tree.query_among(lanes, small(block), &mut near);
+            tests += near.len() as u64;
+            for (at, other) in near.iter().enumerate() {
+                if let Some(next) = near.get(at + 2) {
+                    prefetch(&order.fat[*next as usize]);
+                }
+                let mut hits = [0; WIDTH];
+                tests += order.cross(lanes, [block, *other as usize], &mut hits, &mut open);
+                if hits.iter().fold(0, |all, row| all | row) != 0 {
+                    met.others.push(*other);
+                    met.hits.push(hits);
+                }
+            }
+        }
+        met.open_block();
+        order.afresh.near = near;
+        order.afresh.open = open;
+        order.afresh.found = met;
+        tests
+    }
+}
+
+impl Order {
+    /// Finds the overlaps of two blocks, or within one; returns how many boxes were compared with a block.
+    #[inline(always)]
+    fn cross<L: Lanes>(
+        &self,
+        lanes: L,
+        [block, other]: [usize; 2],
+        hits: &mut Matrix,
+        open: &mut Vec<[u32; 2]>,
+    ) -> u64 {
+        if block == other {
+            let live = self.live[block];
+            let by = slack(farthest(self.tree.bound(block)));
+            for lane in ones(live) {
+                // Each pair once, and none of a body with itself.
+                let above = u16::MAX << lane << 1;
+                hits[lane] = self.meet(lanes, [block, lane], other, above, by, open);
+            }
+            return u64::from(live.count_ones());
+        }
+        let rows = lanes.meets(&self.fat[block], self.tree.bound(other));
+        if rows == 0 {
+            return 0;
+        }
+        // The fewer of those that come near the other block are compared with it.
+        let columns = lanes.meets(&self.fat[other], self.tree.bound(block));
+        let counts = [rows.count_ones(), columns.count_ones()];
+        if counts[0] <= counts[1] {
+            let by = slack(farthest(self.tree.bound(block)));
+            for row in ones(rows) {
+                hits[row] = self.meet(lanes, [block, row], other, u16::MAX, by, open);
+            }
+            return u64::from(counts[0]);
+        }
+        let by = slack(farthest(self.tree.bound(other)));
+        for lane in ones(columns) {
+            let met = self.meet(lanes, [other, lane], block, u16::MAX, by, open);
+            for row in ones(met) {
+                hits[row] |= 1 << lane;
+            }
+        }
+        u64::from(counts[1])
+    }
+
+    /// The lanes of a block that a box meets as they are rounded; what is not sure is noted as open.
+    ///
+    /// * `by` - the slack of the box, or more.
+    #[inline(always)]
+    fn meet<L: Lanes>(
+        &self,
+        lanes: L,
+        [block, lane]: [usize; 2],
+        other: usize,
+        among: u16,
+        by: f32,
+        open: &mut Vec<[u32; 2]>,
+    ) -> u16 {
+        let (one, theirs) = (self.fat[block].get(lane), &self.fat[other]);
+        let met = lanes.meets(theirs, &one) & among;
+        if met != 0 {
+            // Drawn in by its slack: what meets that surely overlaps it, as `Lanes::parts` tells.
+            let [x, y, z, u, v, w] = one;
+            let less = [x + by, y + by, z + by, u - by, v - by, w - by];
+            let sure = lanes.meets(theirs, &less);
+            for theirs in ones(met & !sure) {
+                let ranks = [block * WIDTH + lane, other * WIDTH + theirs];
+                open.push(ranks.map(small));
+            }
+        }
+        met
+    }
+}
+
+/// How far the farthest face of a box is from the origin; of a block's bound, at least as far as that of any of its
+/// boxes. To reckon it once a block costs less than once a box.
+#[inline(always)]
+fn farthest(one: &[f32; 6]) -> f32 {
+    let mut largest = 0.0_f32;
+    for face in one {
+        let far = face.abs();
+        largest = if far > largest { far } else { largest };
+    }
+    largest
+}
