@@ -5,6 +5,9 @@
 //! along the motion of each of its six faces (so that what turns or grows is followed too) for some ticks, and padded
 //! by a margin that the body learns from its own escapes.
 //!
+//! A body that trembles about its place keeps all places that it has been at, and a little more: its fat box and its
+//! core are those of its whole motion, as tight as they can be and stay.
+//!
 //! The same motion inward leaves a core that the box goes on holding meanwhile. Two bodies whose cores overlap are
 //! surely a pair: as long as each keeps to its hold, nobody compares their boxes. In a pile at rest, or in a heap, that
 //! is nearly every pair.
@@ -30,6 +33,13 @@ const WILD_TICKS: u32 = 1;
 const WILD_AFTER: u8 = 2;
 /// After so many tight boxes a wild body is tried with a fat one again.
 const WILD_RETRY: u8 = 40;
+/// Bodies that left their fat boxes so often in a row, by little and by faces that were not swept, are at rest, ...
+const REST_AFTER: u8 = 2;
+/// ... until they leave so often in a row at once, or have been about by more than `MARGIN_MAX`.
+const REST_TRIES: u8 = 12;
+/// What the places of a body at rest are widened by, as a share of what they span: enough for most of what is to come
+/// after some ten ticks, and little beside what the body's neighbours have.
+const REST_SHARE: f32 = 0.25;
 /// What a body has learned about its motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gait {
@@ -41,6 +51,8 @@ pub(super) struct Gait {
     margin: f32,
     /// Times in a row that it left at once.
     wild: u8,
+    /// Times in a row that it left as a body at rest does; above `REST_AFTER` it is one.
+    rest: u8,
 }
 
 impl Gait {
@@ -50,6 +62,7 @@ impl Gait {
         born: u32::MAX,
         margin: 0.0,
         wild: 0,
+        rest: 0,
     };
 
     /// The hold of a body whose box is `now`, and what is learned from how long the last one held.
@@ -84,6 +97,12 @@ impl Gait {
         if self.wild >= WILD_AFTER || !side.is_finite() {
             return hold(fat, core);
         }
+        if self.rest >= REST_AFTER {
+            if let Some(hold) = self.stay(&before, held, side) {
+                return hold;
+            }
+            (self.rest, self.margin) = (0, side * MARGIN_MAX);
+        }
         #[allow(
             clippy::cast_precision_loss,
             reason = "ages of ticks, small or of no meaning"
@@ -109,6 +128,36 @@ impl Gait {
         hold(fat, core)
     }
 
+    /// The hold of a body at rest: where it has been, and a little more where it came beyond; `None` where that spans
+    /// too much.
+    #[inline(always)]
+    fn stay(&mut self, before: &Down, held: &Hold, side: f32) -> Option<Hold> {
+        // The first time, and where the hold is lost, the last two places are all that is known.
+        let knows = self.rest > REST_AFTER && !held.fat.faces[0].is_nan();
+        let (mut fat, mut core) = (self.anchor, NO_CORE);
+        for k in [0, 1, 2, 4, 5, 6] {
+            let (was, now) = (before.faces[k], self.anchor.faces[k]);
+            let (low, high) = if knows {
+                (held.fat.faces[k], held.core.faces[k])
+            } else {
+                (f32::INFINITY, f32::NEG_INFINITY)
+            };
+            let was = if knows { now } else { was };
+            let (least, most) = if was < now { (was, now) } else { (now, was) };
+            let from = if least < low { least } else { low };
+            let to = if most > high { most } else { high };
+            let span = to - from;
+            if span > side * MARGIN_MAX {
+                return None;
+            }
+            let more = span * REST_SHARE + side * MARGIN_MIN;
+            fat.faces[k] = if least < low { from - more } else { from };
+            core.faces[k] = if most > high { to + more } else { to };
+        }
+        self.rest = self.rest.max(REST_AFTER + 1);
+        Some(hold(fat, core))
+    }
+
     /// Ticks since its fat box was made.
     #[inline(always)]
     pub(super) fn age(&self, tick: u32) -> u32 {
@@ -126,6 +175,9 @@ impl Gait {
         tick: u32,
         ahead: u32,
     ) -> bool {
+        if self.rest > REST_AFTER {
+            return false;
+        }
         #[allow(clippy::cast_precision_loss, reason = "ages of ticks, small")]
         let share = ahead as f32 / self.age(tick).max(1) as f32;
         let mut then = *now;
@@ -154,6 +206,18 @@ impl Gait {
             far |= before - face > most;
             astray |= (face < held.fat.faces[k]) & (swept <= self.margin);
             astray |= (face > held.core.faces[k]) & (shrunk <= self.margin);
+        }
+        let small = self.margin * 4.0 <= most;
+        if self.rest > REST_AFTER {
+            // At once, and it may be on its way; later, it is still at rest.
+            let tries = self.rest + 1;
+            self.rest = match age {
+                1 if tries > REST_AFTER + REST_TRIES => 0,
+                1 => tries,
+                _ => REST_AFTER + 1,
+            };
+        } else {
+            self.rest = if astray && small { self.rest + 1 } else { 0 };
         }
         if astray {
             let twice = self.margin * 2.0;
@@ -259,6 +323,35 @@ mod tests {
             }
         }
         assert!(renewals < 12, "{renewals}");
+    }
+
+    #[test]
+    fn a_body_at_rest_keeps_to_the_places_that_it_has_been_at() {
+        let (mut gait, mut held, mut late) = (Gait::NEW, Hold::EMPTY, 0);
+        let mut state = 7_u32;
+        for tick in 0..2000_u32 {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let now = shifted(((state >> 8) as f32 / 8_388_608.0 - 1.0) * 0.004);
+            if tick == 0 || !(holds(&held.fat, &now) && holds(&now, &held.core)) {
+                held = gait.renew(&now, tick, HORIZON, &held);
+                late += u32::from(tick >= 100);
+                assert!(holds(&held.fat, &now) && holds(&now, &held.core));
+            }
+        }
+        // It spans 0.008; a margin on either side of a place would have to be as much.
+        let span = held.core.faces[0] - held.fat.faces[0];
+        assert!(late <= 2 && span < 0.014, "{late} {span}");
+        assert!(!gait.leaves(Portable, &shifted(0.003), &held, 2016, HORIZON));
+        // Off it goes: it is followed again.
+        let mut renewals = 0;
+        for tick in 2000..2100_u32 {
+            let now = shifted(0.02 * (tick - 1999) as f32);
+            if !(holds(&held.fat, &now) && holds(&now, &held.core)) {
+                held = gait.renew(&now, tick, HORIZON, &held);
+                renewals += 1;
+            }
+        }
+        assert!(renewals < 30, "{renewals}");
     }
 
     #[test]

@@ -11,6 +11,9 @@ const ALONG_AGE: u32 = HORIZON / 2;
 /// Stretches of blocks at least, that the turns go round; a stretch is a quarter at most.
 const STRETCHES: usize = 3 * HORIZON as usize;
 
+/// One in so many did not move, and all are taken.
+const NEARLY_ALL: usize = 16;
+
 /// How many blocks ahead boxes are asked for: a block takes some 100 ns, memory about as long.
 const AHEAD: usize = 2;
 
@@ -19,8 +22,8 @@ impl Order {
     pub(super) fn load<P: Proxies>(&mut self, tick: &Tick<'_, P>, many: bool) {
         self.worklist.clear();
         if many {
-            if tick.moved.len() >= self.len {
-                // As good as all: a box that did not change is taken again.
+            if tick.moved.len() + tick.moved.len() / NEARLY_ALL >= self.len {
+                // As good as all: a box that did not change is taken again, which costs less than to find out which.
                 self.dirty.copy_from_slice(&self.live);
             } else {
                 for slot in tick.moved {
