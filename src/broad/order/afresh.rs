@@ -22,7 +22,7 @@ use crate::simd::boxes::prefetch;
 
 /// Ticks between two looks at where the bodies are and how large, for the frame of the curve: a frame that is out of
 /// date costs time, nothing else.
-pub(super) const FRAME_TICKS: u32 = 32;
+pub(super) const FRAME_TICKS: u32 = 256;
 /// Boxes compared with a block in the time that laying a body anew takes.
 const LAY_TESTS: f64 = 12.0;
 /// Where what was laid is spoilt in a tick, it is not even looked at in so many ticks.
@@ -40,6 +40,8 @@ pub(super) struct Afresh {
     /// Ticks since the frame of the curve was laid, and since the bodies were.
     pub(super) framed: u32,
     pub(super) laid: u32,
+    /// The bodies, who are still the same, were sorted in the last tick: so that no tick has all the work of laying.
+    pub(super) sorted: bool,
     /// Ticks left in which bodies are laid without a look.
     pub(super) spoilt: u32,
     /// Overlaps of the last tick, and of this one.
@@ -56,6 +58,8 @@ pub(super) struct Afresh {
     /// Boxes compared with a block in the tick that they were laid in; and those beyond since.
     pub(super) usual: u64,
     pub(super) excess: f64,
+    /// ... and in the last tick.
+    pub(super) last: f64,
 }
 
 impl Order {
@@ -69,6 +73,7 @@ impl Order {
         // Lanes change without them: what was learned would be another body's.
         self.gaits.clear();
         self.afresh.on = true;
+        self.afresh.sorted = false;
         self.afresh.held.clear();
         self.afresh.framed = FRAME_TICKS;
     }
@@ -130,6 +135,7 @@ impl Order {
             self.live[block] &= !(1 << lane);
             self.fat[block].set(lane, &[f32::NAN; 6]);
             self.afresh.gone[block] |= 1 << lane;
+            self.afresh.sorted = false;
             self.len -= 1;
         }
     }
@@ -141,7 +147,17 @@ impl Order {
             return false;
         }
         let came = self.homeless.len();
-        if came * MANY_CAME > tick.members.bounded().len() {
+        #[allow(clippy::cast_precision_loss, reason = "a cost")]
+        let (usual, most) = (self.afresh.usual as f64, self.len as f64 * LAY_TESTS);
+        // Blocks do not shrink: what the last tick asked too much this one will at least, and need not be tried.
+        let worn = self.afresh.excess + self.afresh.last > most;
+        self.afresh.sorted &= came == 0;
+        if self.afresh.sorted || came * MANY_CAME > tick.members.bounded().len() {
+            return false;
+        }
+        let same = came == 0 && self.afresh.gone.iter().all(|lanes| *lanes == 0);
+        let ahead = worn && same && self.afresh.framed < FRAME_TICKS;
+        if worn && !ahead {
             return false;
         }
         for at in 0..came {
@@ -154,11 +170,12 @@ impl Order {
             order: self,
             proxies: tick.proxies,
         });
-        let grown = self.grown() - 1.0;
-        #[allow(clippy::cast_precision_loss, reason = "a cost")]
-        let (usual, most) = (self.afresh.usual as f64, self.len as f64 * LAY_TESTS);
-        self.afresh.excess += grown.max(0.0) * usual;
-        if self.afresh.excess <= most {
+        self.afresh.last = (self.grown() - 1.0).max(0.0) * usual;
+        self.afresh.excess += self.afresh.last;
+        if ahead {
+            self.sort_ahead(tick);
+        }
+        if ahead || self.afresh.excess <= most {
             return true;
         }
         if self.afresh.laid == 1 {

@@ -29,6 +29,17 @@ impl Order {
         if count > 0.0 { sum / count } else { 1.0 }
     }
 
+    /// Sorts the bodies for the next tick.
+    pub(super) fn sort_ahead<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
+        self.level.run(TakeAll {
+            order: self,
+            bodies: tick.members.bounded(),
+            proxies: tick.proxies,
+        });
+        self.sorter.sort(&self.boxes);
+        self.afresh.sorted = true;
+    }
+
     /// Deals the bodies to blocks anew, each block compact.
     pub(super) fn lay_anew<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
         let bodies = tick.members.bounded();
@@ -77,8 +88,11 @@ impl Order {
         }
         let mut sorter = std::mem::take(&mut self.sorter);
         if compact {
-            for (key, index) in sorter.sort(boxes) {
-                self.deal_to(bodies, boxes, (*key, *index), FILL);
+            if !std::mem::take(&mut self.afresh.sorted) {
+                sorter.sort(boxes);
+            }
+            for at in sorter.sorted() {
+                self.deal_to(bodies, boxes, *at, FILL);
             }
         } else {
             for at in sorter.along_curve(boxes) {
@@ -143,7 +157,7 @@ impl Order {
         let Afresh { reach: reaches, .. } = &mut self.afresh;
         reaches.clear();
         reaches.extend((0..blocks).map(|block| reach(self.tree.bound(block), side)));
-        self.afresh.excess = 0.0;
+        (self.afresh.excess, self.afresh.last) = (0.0, 0.0);
         self.afresh.laid = 0;
     }
 }

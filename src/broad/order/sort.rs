@@ -169,6 +169,11 @@ impl Sorter {
         &self.order
     }
 
+    /// What the last sort yielded.
+    pub(super) fn sorted(&self) -> &[(u64, u32)] {
+        &self.order
+    }
+
     /// One pass, stable.
     fn pass(&mut self, shift: u32) {
         let digits = 1_usize << DIGIT_BITS;
