@@ -1,99 +1,165 @@
 //! Budgets above the floor: how far a tick overshoots, on the wall and on the thread's CPU clock, and how much of what
-//! is left above the floor is used while work remains (before and after
-//! publishing; and before alone). Scene: `pool(4000, 11)`, each body 1 % of its size a tick, pairs and
-//! contacts asked for.
+//! is left above the floor is used while work remains (before and after publishing; and before alone).
 //!
-//! `cargo bench --bench budget [-- --quick]`
+//! Scenes: `pool`, `pool(4000, 11)`, each body 1 % of its size a tick, pairs and contacts asked for; `meshes`, 200 pairs
+//! of meshes of 19,880 triangles (`benches/time_critical`), 0.5 % of their diameter a tick, the same asked for; and
+//! `meshes_regions`, the same with a reader of `regions`.
+//!
+//! `cargo bench --bench budget [-- --quick] [SCENE..]`; rows of scenes that are not named stay as they are
 
 #![allow(clippy::cast_precision_loss, reason = "a bench")]
 
 mod common;
+#[allow(
+    dead_code,
+    unreachable_pub,
+    missing_debug_implementations,
+    clippy::unwrap_used,
+    reason = "shared with another bench"
+)]
+#[path = "time_critical/stage.rs"]
+mod stage;
 
-use common::{Bench, Flight, provenance, quantile, row, save};
+use std::sync::Arc;
+
+use common::{Bench, Flight, kept_rows, provenance, quantile, row, save};
+use stage::{Courses, bodies, shapes};
 use sweepd::builtin::pool;
+use sweepd::shape::Shape;
 use sweepd::time::Budget;
-use sweepd::wire::{Demand, Stage};
+use sweepd::wire::{Demand, Stage, TransformRow};
+
+const SEED: u64 = 11;
+const SCENES: [&str; 3] = ["pool", "meshes", "meshes_regions"];
+/// Ticks before those that count.
+const WARM_UP: usize = 40;
+
+/// What moves the bodies of a scene.
+enum Motion {
+    Flight(Box<Flight>, Vec<TransformRow>),
+    Courses(Courses),
+}
+
+impl Motion {
+    fn next(&mut self) -> Vec<TransformRow> {
+        match self {
+            Self::Flight(flight, rows) => {
+                flight.advance(0..flight.poses.len());
+                for (to, pose) in rows.iter_mut().zip(&flight.poses) {
+                    *to = row(to.body, pose);
+                }
+                rows.clone()
+            }
+            Self::Courses(courses) => {
+                courses.advance();
+                courses.rows().collect()
+            }
+        }
+    }
+}
+
+fn start(scene: &str, meshes: &[Arc<Shape>]) -> (Bench, Motion) {
+    if scene == "pool" {
+        let bench = Bench::new(&pool(4_000, SEED));
+        let flight = Flight::new(&bench.scene, 0.75 * 0.01, SEED);
+        let rows = bench.rows.clone();
+        return (bench, Motion::Flight(Box::new(flight), rows));
+    }
+    let (scene, placed) = bodies(meshes);
+    (
+        Bench::of(scene, placed),
+        Motion::Courses(Courses::new(0.5, SEED)),
+    )
+}
 
 fn main() {
     let quick = std::env::args().any(|arg| arg == "--quick");
-    let (seed, bodies) = (11, 4_000);
+    let named = |scene: &str| std::env::args().any(|arg| arg == scene);
+    let all = !SCENES.iter().any(|scene| named(scene));
     let ticks = if quick { 60 } else { 400 };
-    let mut csv = String::from(
-        "machine,commit,compiler,seed,bodies,above_floor_us,ticks,floor_us,overshoot_wall_p50_us,overshoot_wall_p99_us,\
-         overshoot_cpu_p50_us,overshoot_cpu_p99_us,used_percent,used_before_publishing_percent,\
-         undecided_percent\n",
-    );
+    let meshes = shapes();
+    let columns = "machine,commit,compiler,seed,scene,bodies,above_floor_us,ticks,floor_us,publish_p50_us,\
+         overshoot_wall_p50_us,overshoot_wall_p99_us,overshoot_cpu_p50_us,overshoot_cpu_p99_us,used_percent,\
+         used_before_publishing_percent,undecided_percent\n";
+    let mut csv = String::from(columns);
     let from = provenance();
-    for above_us in [100, 250, 500, 1_000, 2_000, 5_000_u64] {
-        let mut bench = Bench::new(&pool(bodies, seed));
-        let mut flight = Flight::new(&bench.scene, 0.75 * 0.01, seed);
-        let mut rows = bench.rows.clone();
-        let mut floors = Vec::new();
-        let (mut wall, mut cpu) = (Vec::new(), Vec::new());
-        let (mut used, mut told, mut offered) = (0_u64, 0_u64, 0_u64);
-        let (mut open, mut all) = (0_u64, 0_u64);
-        for tick in 0..ticks + 40 {
-            flight.advance(0..flight.poses.len());
-            for (to, pose) in rows.iter_mut().zip(&flight.poses) {
-                *to = row(to.body, pose);
-            }
-            // The budget a user would set: the floor as published so far, and so much above it.
-            let floor_ns = if floors.is_empty() {
-                5_000_000
-            } else {
-                quantile(&mut floors, 0.5)
-            };
-            let budget_ns = floor_ns + above_us * 1_000;
-            let took = bench.tick(
-                &rows,
-                true,
-                Budget::time_ns(budget_ns),
-                Demand {
-                    regions: false,
-                    bodies: false,
-                    body_verdicts: false,
-                    ..Demand::ALL
-                },
-            );
-            let out = &bench.out().tick;
-            if floors.len() == 64 {
-                floors.remove(0);
-            }
-            floors.push(out.floor_ns);
-            if tick < 40 {
-                continue;
-            }
-            // Below its own floor a tick takes the floor: then there is nothing to overshoot by.
-            let limit_ns = budget_ns.max(out.floor_ns);
-            wall.push(took.wall_ns.saturating_sub(limit_ns));
-            cpu.push(took.cpu_ns.saturating_sub(limit_ns));
-            if out.possible > 0 && budget_ns > out.floor_ns {
-                used += out.stage_ns[usize::from(Stage::Narrow.code())] + took.rest_ns;
-                told += out.stage_ns[usize::from(Stage::Narrow.code())];
-                offered += budget_ns - out.floor_ns;
-            }
-            open += out.possible;
-            all += out.candidates;
+    for scene in SCENES {
+        if !all && !named(scene) {
+            csv += &kept_rows("budget.csv", columns, |cells| cells[4] == scene);
+            continue;
         }
-        let us = |ns: u64| ns as f64 / 1e3;
-        let share = |part: u64, whole: u64| {
-            if whole == 0 {
-                f64::NAN
-            } else {
-                100.0 * part as f64 / whole as f64
-            }
-        };
-        csv += &format!(
-            "{from},{seed},{bodies},{above_us},{ticks},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.2}\n",
-            us(quantile(&mut floors, 0.5)),
-            us(quantile(&mut wall, 0.5)),
-            us(quantile(&mut wall, 0.99)),
-            us(quantile(&mut cpu, 0.5)),
-            us(quantile(&mut cpu, 0.99)),
-            share(used, offered),
-            share(told, offered),
-            share(open, all)
-        );
+        for above_us in [100, 250, 500, 1_000, 2_000, 5_000_u64] {
+            let line = run(scene, &meshes, above_us, ticks);
+            eprintln!("{line}");
+            csv += &format!("{from},{SEED},{line}\n");
+        }
     }
     save("budget.csv", &csv);
+}
+
+/// One scene within one budget; its columns from `scene` on.
+fn run(scene: &str, meshes: &[Arc<Shape>], above_us: u64, ticks: usize) -> String {
+    let (mut bench, mut motion) = start(scene, meshes);
+    let demand = Demand {
+        regions: scene == "meshes_regions",
+        bodies: false,
+        body_verdicts: false,
+        ..Demand::ALL
+    };
+    let mut floors = Vec::new();
+    let (mut wall, mut cpu, mut publish) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut used, mut told, mut offered) = (0_u64, 0_u64, 0_u64);
+    let (mut open, mut all) = (0_u64, 0_u64);
+    for tick in 0..ticks + WARM_UP {
+        let rows = motion.next();
+        // The budget a user would set: the floor as published so far, and so much above it.
+        let floor_ns = if floors.is_empty() {
+            5_000_000
+        } else {
+            quantile(&mut floors, 0.5)
+        };
+        let budget_ns = floor_ns + above_us * 1_000;
+        let took = bench.tick(&rows, true, Budget::time_ns(budget_ns), demand);
+        let out = &bench.out().tick;
+        if floors.len() == 64 {
+            floors.remove(0);
+        }
+        floors.push(out.floor_ns);
+        if tick < WARM_UP {
+            continue;
+        }
+        publish.push(out.stage_ns[usize::from(Stage::Publish.code())]);
+        // Below its own floor a tick takes the floor: then there is nothing to overshoot by.
+        let limit_ns = budget_ns.max(out.floor_ns);
+        wall.push(took.wall_ns.saturating_sub(limit_ns));
+        cpu.push(took.cpu_ns.saturating_sub(limit_ns));
+        if out.possible > 0 && budget_ns > out.floor_ns {
+            used += out.stage_ns[usize::from(Stage::Narrow.code())] + took.rest_ns;
+            told += out.stage_ns[usize::from(Stage::Narrow.code())];
+            offered += budget_ns - out.floor_ns;
+        }
+        open += out.possible;
+        all += out.candidates;
+    }
+    let us = |ns: u64| ns as f64 / 1e3;
+    let share = |part: u64, whole: u64| {
+        if whole == 0 {
+            f64::NAN
+        } else {
+            100.0 * part as f64 / whole as f64
+        }
+    };
+    format!(
+        "{scene},{},{above_us},{ticks},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.2}",
+        bench.scene.bodies.len(),
+        us(quantile(&mut floors, 0.5)),
+        us(quantile(&mut publish, 0.5)),
+        us(quantile(&mut wall, 0.5)),
+        us(quantile(&mut wall, 0.99)),
+        us(quantile(&mut cpu, 0.5)),
+        us(quantile(&mut cpu, 0.99)),
+        share(used, offered),
+        share(told, offered),
+        share(open, all)
+    )
 }

@@ -27,17 +27,19 @@ pub const CONTACT_ROWS_DEFAULT: usize = 1 << 16;
 pub const REGION_ROWS_DEFAULT: usize = 1 << 14;
 /// Regions of one body pair: what a response can take in at a glance; more are taken together.
 pub const REGIONS_PER_PAIR_MAX: usize = 8;
-/// Pairs of boxes that are looked at for the regions of one shape pair, some 0.5 us each; the rest is told as one
-/// region.
+/// Pairs of boxes that are looked at for the regions of one shape pair within the budget, some 0.5 us each; where there
+/// are more, the roots are split instead.
 pub const REGION_LOOKS_MAX: usize = 4096;
 /// Shape pairs that are looked at for the regions of one body pair; of more only the bodies' boxes are.
 pub const REGION_SHAPE_PAIRS_MAX: usize = 256;
-/// Tests spent on the regions of one pair, some 1 us each: publishing is part of the floor. At a quarter of the work
-/// the median radius is 25 % of the diameter with none, 14 % with 16, 9 % with 64, 6 % with 256
-/// (`benches/time_critical`).
+/// Tests spent on the regions of one pair in one tick, some 1 us each, out of the budget. At a quarter of the work the
+/// median radius is 24 % of the diameter with none, 14 % with 16, 9 % with 64 (`benches/time_critical`).
 pub const REGION_TESTS_PER_PAIR: u32 = 64;
-/// Tests spent on regions in one tick, shared by its pairs: some 4 ms at most.
-pub const REGION_TESTS_PER_TICK: u32 = 1 << 12;
+/// Pairs of boxes that publishing looks at for the regions of one shape pair that the budget did not reach, some 0.5 us
+/// each; where a front has more, the regions are those of its roots. Part of the floor.
+pub const REGION_LOOKS_FREE: usize = 64;
+/// The same for all pairs of one tick, shared by them: some 1 ms at most.
+pub const REGION_LOOKS_PER_TICK: usize = 1 << 11;
 /// Contacts of one shape pair.
 pub const MANIFOLD_POINTS_MAX: usize = 4;
 /// Contacts of one body pair, deepest first.

@@ -144,6 +144,14 @@ pub struct Share {
     end_ns: Option<u64>,
 }
 
+/// What a [`Meter`] keeps back for a job that comes later.
+#[derive(Clone, Copy, Debug, Default)]
+#[must_use = "what is kept back is to be released"]
+pub struct Reserve {
+    units: u64,
+    ns: u64,
+}
+
 /// Spends a budget: counts units and, now and then, looks at the clock.
 pub struct Meter<'a> {
     clock: &'a dyn Clock,
@@ -265,6 +273,25 @@ impl<'a> Meter<'a> {
         }
     }
 
+    /// Keeps one of `parts` parts of what is left now back, until it is released.
+    pub fn reserve(&mut self, parts: u64) -> Reserve {
+        let units = self.units_left / parts;
+        self.units_left -= units;
+        let mut ns = 0;
+        if let Some(end_ns) = self.deadline_ns.as_mut() {
+            ns = end_ns.saturating_sub(self.clock.monotonic_ns()) / parts;
+            *end_ns -= ns;
+        }
+        Reserve { units, ns }
+    }
+
+    /// Opens again for what was kept back.
+    pub fn release(&mut self, reserve: Reserve) {
+        self.units_left = self.units_left.saturating_add(reserve.units);
+        self.deadline_ns = self.deadline_ns.map(|end_ns| end_ns + reserve.ns);
+        self.look();
+    }
+
     /// Whether a share is not used up.
     #[must_use]
     pub fn within(&self, share: Share) -> bool {
@@ -328,6 +355,26 @@ mod tests {
         assert!(meter.open());
         clock.advance(100);
         assert!(meter.open(), "the clock is read when work is charged");
+        meter.charge_dear(1);
+        assert!(!meter.open());
+    }
+
+    #[test]
+    fn what_a_meter_keeps_back_is_there_when_it_is_released() {
+        let clock = ManualClock::new(0);
+        let mut meter = Meter::new(&clock, Some(800), Some(16));
+        let kept = meter.reserve(8);
+        meter.charge_dear(14);
+        assert!(!meter.open());
+        meter.release(kept);
+        assert!(meter.open());
+        let kept = meter.reserve(2);
+        clock.advance(400);
+        meter.charge_dear(0);
+        assert!(!meter.open(), "half of the time is kept back");
+        meter.release(kept);
+        assert!(meter.open());
+        clock.advance(400);
         meter.charge_dear(1);
         assert!(!meter.open());
     }

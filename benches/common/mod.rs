@@ -21,6 +21,7 @@ use sweepd::wire::{
     Demand, FrameHeader, Inbox, Outbox, TickCause, TransformRow, WIRE_VERSION, frame_flags,
     name_bytes,
 };
+use sweepd::world::PlacedShape;
 
 /// An engine and the frame it is fed with.
 pub struct Bench {
@@ -45,14 +46,13 @@ impl Bench {
     pub fn new(text: &str) -> Self {
         let scene = Scene::parse(text, "bench", Path::new(".")).unwrap();
         let shapes = build_shapes(&scene).unwrap();
+        Self::of(scene, shapes.bodies)
+    }
+
+    /// * `shapes` - of each body of the scene.
+    pub fn of(scene: Scene, shapes: Vec<Arc<[PlacedShape]>>) -> Self {
         let clock = Arc::new(SystemClock);
-        let engine = Engine::new(
-            &scene,
-            shapes.bodies,
-            1,
-            Arc::clone(&clock) as Arc<dyn Clock>,
-        )
-        .unwrap();
+        let engine = Engine::new(&scene, shapes, 1, Arc::clone(&clock) as Arc<dyn Clock>).unwrap();
         let moving = scene.bodies.iter().filter(|body| body.moves);
         let rows = moving.map(|body| row(body.id.0, &body.pose)).collect();
         Self {
@@ -221,6 +221,21 @@ pub fn provenance() -> String {
         run("git", &["rev-parse", "--short", "HEAD"]),
         run("rustc", &["--version"]).replace(',', " ")
     )
+}
+
+/// Rows of a CSV that was saved before, if it has these columns, of which `keep` says so by their cells.
+pub fn kept_rows(name: &str, columns: &str, keep: impl Fn(&[&str]) -> bool) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("benches/results")
+        .join(name);
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let Some(rows) = text.strip_prefix(columns) else {
+        return String::new();
+    };
+    let kept = rows
+        .lines()
+        .filter(|row| keep(&row.split(',').collect::<Vec<_>>()));
+    kept.map(|row| format!("{row}\n")).collect()
 }
 
 /// Writes a CSV beside the bench, and to standard output.

@@ -62,6 +62,7 @@ const LIMITS: [Limit; 6] = [
 const WANTED: Wanted = Wanted {
     contacts: false,
     bounds: false,
+    regions: false,
     order: Order::Aged,
 };
 

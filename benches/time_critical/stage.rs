@@ -13,7 +13,7 @@ use sweepd::pairs::{PairDelta, PairSet};
 use sweepd::scene::{BodySpec, PlacedSpec, Scene, SourceSpec};
 use sweepd::shape::{Geometry, Mesh, Shape, ShapeSpec};
 use sweepd::time::{Clock, Meter, SystemClock};
-use sweepd::wire::{FrameHeader, Inbox, WIRE_VERSION, frame_flags, name_bytes};
+use sweepd::wire::{FrameHeader, Inbox, TransformRow, WIRE_VERSION, frame_flags, name_bytes};
 use sweepd::world::{PlacedShape, World};
 
 use crate::common::row;
@@ -92,6 +92,55 @@ struct Course {
     turn: Quat,
 }
 
+/// How all pairs move.
+pub struct Courses(Vec<Course>);
+
+impl Courses {
+    /// * `percent` - motion of a surface point a tick, percent of the diameter; each pair 0.2 to 3 times that.
+    pub fn new(percent: f64, seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let all = (0..PAIRS).map(|k| course(k, percent, &mut random));
+        Self(all.collect())
+    }
+
+    /// One tick.
+    pub fn advance(&mut self) {
+        for course in &mut self.0 {
+            course.distance += course.speed;
+            if !(course.range[0]..=course.range[1]).contains(&course.distance) {
+                course.speed = -course.speed;
+                course.distance += 2.0 * course.speed;
+            }
+            course.turn = Quat::new_normalize(
+                (Quat::from_scaled_axis(course.spin) * course.turn).into_inner(),
+            );
+        }
+    }
+
+    /// Poses of the `k`th pair.
+    pub fn poses(&self, k: usize) -> [Pose; 2] {
+        [self.0[k].a, self.0[k].b()]
+    }
+
+    /// A frame of all bodies: two a pair, ids from 1.
+    pub fn rows(&self) -> impl Iterator<Item = TransformRow> {
+        (0_u64..)
+            .zip(&self.0)
+            .flat_map(|(k, course)| [row(2 * k + 1, &course.a), row(2 * k + 2, &course.b())])
+    }
+}
+
+/// All bodies with their shapes: the two of a pair have different ones.
+pub fn bodies(shapes: &[Arc<Shape>]) -> (Scene, Vec<Arc<[PlacedShape]>>) {
+    let scene = scene((0..2 * PAIRS).map(|k| body(k as u64 + 1)).collect());
+    let placed = (0..2 * PAIRS).map(|k| {
+        let shape = Arc::clone(&shapes[(k / 2 + k % 2) % shapes.len()]);
+        let pose = Pose::identity();
+        Arc::from(vec![PlacedShape { shape, pose }])
+    });
+    (scene, placed.collect())
+}
+
 /// The scene, its rooms, and its motion.
 pub struct Stage {
     pub world: World,
@@ -101,7 +150,7 @@ pub struct Stage {
     broad: BroadPhase,
     delta: PairDelta,
     inbox: Inbox,
-    courses: Vec<Course>,
+    courses: Courses,
     shapes: Vec<Arc<Shape>>,
     tick: u64,
 }
@@ -109,20 +158,7 @@ pub struct Stage {
 impl Stage {
     /// * `percent` - motion of a surface point a tick, percent of the diameter; each pair 0.2 to 3 times that.
     pub fn new(shapes: &[Arc<Shape>], percent: f64, seed: u64) -> Self {
-        let mut random = Random::new(seed);
-        let courses: Vec<Course> = (0..PAIRS)
-            .map(|k| course(k, percent, &mut random))
-            .collect();
-        let scene = scene((0..2 * PAIRS).map(|k| body(k as u64 + 1)).collect());
-        let placed: Vec<Arc<[PlacedShape]>> = (0..2 * PAIRS)
-            .map(|k| {
-                let shape = Arc::clone(&shapes[(k / 2 + k % 2) % shapes.len()]);
-                Arc::from(vec![PlacedShape {
-                    shape,
-                    pose: Pose::identity(),
-                }])
-            })
-            .collect();
+        let (scene, placed) = bodies(shapes);
         let clock = SystemClock;
         let world = World::new(&scene, placed, clock.boottime_ns()).unwrap();
         let mut stage = Self {
@@ -133,7 +169,7 @@ impl Stage {
             broad: BroadPhase::new(Method::SweepAndPrune),
             delta: PairDelta::default(),
             inbox: Inbox::default(),
-            courses,
+            courses: Courses::new(percent, seed),
             shapes: shapes.to_vec(),
             tick: 0,
         };
@@ -143,16 +179,7 @@ impl Stage {
 
     /// Moves every pair by one tick and lets the rooms before the narrow phase follow.
     pub fn advance(&mut self) {
-        for course in &mut self.courses {
-            course.distance += course.speed;
-            if !(course.range[0]..=course.range[1]).contains(&course.distance) {
-                course.speed = -course.speed;
-                course.distance += 2.0 * course.speed;
-            }
-            course.turn = Quat::new_normalize(
-                (Quat::from_scaled_axis(course.spin) * course.turn).into_inner(),
-            );
-        }
+        self.courses.advance();
         self.admit();
     }
 
@@ -174,7 +201,8 @@ impl Stage {
     }
 
     pub fn pose(&self, pair: usize) -> Pose {
-        relative(&self.courses[pair].a, &self.courses[pair].b())
+        let [a, b] = self.courses.poses(pair);
+        relative(&a, &b)
     }
 
     pub fn couple(&self, pair: usize) -> [&Shape; 2] {
@@ -214,10 +242,7 @@ impl Stage {
             ..FrameHeader::default()
         };
         frame.received_ns = self.clock.boottime_ns();
-        for (k, course) in (0_u64..).zip(&self.courses) {
-            frame.transforms.push(row(2 * k + 1, &course.a));
-            frame.transforms.push(row(2 * k + 2, &course.b()));
-        }
+        frame.transforms.extend(self.courses.rows());
         self.world.begin_tick(self.tick);
         for frame in self.inbox.frames() {
             self.world.admit(frame, self.clock.boottime_ns());

@@ -20,8 +20,9 @@
 //! new poses: only its proofs are shorter by the motion since. So work narrows the regions, motion widens them, and a
 //! pair that was never worked on has them too.
 //!
-//! Nothing of it runs while nobody listens, and none of it counts as work: it is part of publishing, bounded for each
-//! pair and each tick.
+//! Splitting is the last work of the budget, counted like any other (`refine`). Publishing does no test: it copies what
+//! splitting has made at these poses, or looks at a few boxes of the front, or at the roots alone. Nothing of it runs
+//! while nobody listens.
 //!
 //! Source: Dingliana and O'Sullivan 2000, Graceful degradation of collision handling in physically based animation
 //! (RTR3 section 17.6.1): when time runs out, respond from the level reached. There the level is of spheres, and their
@@ -29,6 +30,8 @@
 
 mod collect;
 mod gather;
+mod pace;
+mod refine;
 mod spot;
 
 use std::collections::BinaryHeap;
@@ -41,11 +44,14 @@ use crate::wire::{BodyStatus, Level, Verdict};
 use crate::world::{Body, World};
 
 use super::finding::Finding;
+use super::memo::bent;
 use super::mesh::CarriedFront;
 use super::sweep::Passage;
 use super::{NONE, Narrow};
 
 use gather::{Ball, SPOTS_MAX, cut, gather};
+use pace::Pace;
+pub(super) use refine::Kept;
 pub(in crate::narrow) use spot::{Slab, Spot};
 
 /// Contacts found by now that guesses are made of; more of a pair are passed over.
@@ -98,22 +104,31 @@ pub(super) struct Approx {
     clipped: bool,
 }
 
-/// The regions of a pair that was complete, and where.
-#[derive(Debug)]
-pub(super) struct Kept {
-    rel: Pose,
-    contacts_tick: u64,
-    clipped: bool,
-    all: Vec<Region>,
+/// How a pair stands when its regions are asked for.
+struct Standing<'a> {
+    a: &'a Body,
+    b: &'a Body,
+    finding: Finding<'a>,
+    /// Both are where their poses say: what they share now is told.
+    placed: bool,
+    /// Its contacts are exact at these poses.
+    complete: bool,
 }
 
-impl Default for Kept {
-    fn default() -> Self {
-        Self {
-            rel: Pose::identity(),
-            contacts_tick: 0,
-            clipped: false,
-            all: Vec::with_capacity(limits::REGIONS_PER_PAIR_MAX),
+/// Where regions were made, and of what.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    rel: Pose,
+    bent_m: f64,
+    complete: bool,
+}
+
+impl Standing<'_> {
+    fn place(&self) -> Place {
+        Place {
+            rel: relative(&self.a.pose, &self.b.pose),
+            bent_m: bent(self.a, self.b),
+            complete: self.complete,
         }
     }
 }
@@ -139,21 +154,18 @@ impl Approx {
 }
 
 impl Narrow {
-    /// Where a pair may touch; `None` for one that is proved apart at this tick's poses and on the way to them.
+    /// Where a pair may touch; `None` for one that is proved apart at this tick's poses and on the way to them. No test
+    /// is done for it.
     ///
-    /// * `tests` - boxes that may be tested against packs to split what is large; some 1 us each.
+    /// * `looks` - pairs of boxes of one shape pair that may be looked at, where splitting has made nothing that holds;
+    ///   where there are more, only the roots are.
     ///
-    /// Cost: some 0.5 us for each pair of boxes that is not proved apart, at most
-    /// [`limits::REGION_LOOKS_MAX`] of them; next to nothing of a pair that is complete and has not moved since. No
-    /// allocation after the first.
-    pub fn regions(&mut self, slot: PairSlot, world: &World, tests: u32) -> Option<Regions<'_>> {
+    /// Cost: some 0.5 us a look and 5 us for the rest; next to nothing of a pair that was split at these poses, or is
+    /// complete and has not moved since. No allocation after the first.
+    pub fn regions(&mut self, slot: PairSlot, world: &World, looks: usize) -> Option<Regions<'_>> {
         let mut approx = std::mem::take(&mut self.approx);
         approx.ready();
-        let found = self.find_regions(slot, world, tests, &mut approx);
-        let new = found.filter(|_| !approx.balls.is_empty());
-        if let Some((true, _)) = new {
-            self.keep_regions(slot, world, &approx);
-        }
+        let found = self.copy_or_find(slot, world, looks, &mut approx);
         self.approx = approx;
         let (complete, level) = found?;
         Some(Regions {
@@ -164,13 +176,35 @@ impl Narrow {
         })
     }
 
-    fn find_regions(
-        &self,
+    fn copy_or_find(
+        &mut self,
         slot: PairSlot,
         world: &World,
-        tests: u32,
+        looks: usize,
         approx: &mut Approx,
     ) -> Option<(bool, Level)> {
+        let of = self.standing(slot, world)?;
+        let level = of.finding.level;
+        if !of.placed {
+            approx.all.push(boxes(of.a, of.b));
+            Self::round_up(&of, approx);
+            return Some((false, Level::Boxes));
+        }
+        if let Some(kept) = self.kept_regions(slot, &of.place()) {
+            approx.regions.extend_from_slice(&kept.all);
+            approx.clipped = kept.clipped;
+            return Some((kept.complete, level));
+        }
+        self.find_regions(slot, &of, &mut Pace::coarse(looks), approx);
+        let place = of.place();
+        if place.complete {
+            self.keep_regions(slot, &place, approx, None);
+        }
+        Some((place.complete, level))
+    }
+
+    /// `None` for a pair that is proved apart at this tick's poses and on the way to them.
+    fn standing<'a>(&'a self, slot: PairSlot, world: &'a World) -> Option<Standing<'a>> {
         let finding = self.finding(slot)?;
         let (a, b) = (world.body(finding.a)?, world.body(finding.b)?);
         let open = matches!(finding.verdict, Verdict::Possible | Verdict::Colliding);
@@ -184,58 +218,39 @@ impl Narrow {
         let collides = finding.verdict == Verdict::Colliding;
         // On the way it may have touched anywhere: of one that collides now, what it shares now is told.
         let placed = open && at_pose(a) && at_pose(b) && (collides || !swept);
-        let colliding = placed && collides;
-        let complete = colliding && current && !contacts.is_empty();
-        if complete && let Some(kept) = self.kept_regions(slot, &relative(&a.pose, &b.pose)) {
-            approx.regions.extend_from_slice(&kept.all);
-            approx.clipped = kept.clipped;
-            return Some((true, finding.level));
+        Some(Standing {
+            a,
+            b,
+            placed,
+            complete: placed && collides && current && !contacts.is_empty(),
+            finding,
+        })
+    }
+
+    /// Makes the regions of a pair that is where its poses say; what was made before the pace was cut is not all.
+    fn find_regions(
+        &self,
+        slot: PairSlot,
+        of: &Standing<'_>,
+        pace: &mut Pace<'_, '_>,
+        approx: &mut Approx,
+    ) {
+        self.collect(slot, of, pace, approx);
+        if !pace.cut {
+            Self::round_up(of, approx);
         }
-        let level = if placed {
-            self.collect(slot, (a, b), complete, tests, approx);
-            finding.level
-        } else {
-            approx.all.push(boxes(a, b));
-            Level::Boxes
-        };
+    }
+
+    /// Puts a few spheres round all spots, with a guess in each.
+    fn round_up(of: &Standing<'_>, approx: &mut Approx) {
         cut(&mut approx.all);
         gather(&mut approx.all, &mut approx.balls);
-        let guess = Guess::of(&finding, a, b);
+        let guess = Guess::of(&of.finding, of.a, of.b);
         for ball in &approx.balls {
             let spots = &approx.all[ball.from..ball.to];
             approx
                 .regions
                 .push(guess.region(ball, spots, &approx.found));
-        }
-        Some((complete, level))
-    }
-
-    /// What was found of a pair that has been at rest since.
-    fn kept_regions(&self, slot: PairSlot, rel: &Pose) -> Option<&Kept> {
-        let memo = self.memos.get(slot.index())?;
-        let kept = self.kept.get(memo.regions)?;
-        (kept.rel == *rel && kept.contacts_tick == memo.contacts_tick).then_some(kept)
-    }
-
-    /// Keeps the regions of a pair that is complete: at rest they stay what they are.
-    fn keep_regions(&mut self, slot: PairSlot, world: &World, approx: &Approx) {
-        let (Some(hot), Some(memo)) =
-            (self.hot.get(slot.index()), self.memos.get_mut(slot.index()))
-        else {
-            return;
-        };
-        let (Some(a), Some(b)) = (world.body(hot.a), world.body(hot.b)) else {
-            return;
-        };
-        if memo.regions == NONE {
-            memo.regions = self.kept.take(Kept::default);
-        }
-        if let Some(kept) = self.kept.get_mut(memo.regions) {
-            kept.rel = relative(&a.pose, &b.pose);
-            kept.contacts_tick = memo.contacts_tick;
-            kept.clipped = approx.clipped;
-            kept.all.clear();
-            kept.all.extend_from_slice(&approx.regions);
         }
     }
 

@@ -24,6 +24,8 @@ pub(super) struct Hot {
     pub(super) visited: u32,
     pub(super) verdict: Verdict,
     pub(super) live: bool,
+    /// A shape of either is a mesh.
+    pub(super) meshed: bool,
     /// What [`Narrow::finding`] or the contacts say may differ from what was last told.
     pub(super) stirred: bool,
 }
@@ -77,8 +79,10 @@ pub(super) struct Memo {
     pub(super) cursor: u32,
     pub(super) front: u32,
     pub(super) contacts: u32,
-    /// Regions of the pair when it was last complete.
+    /// Regions of the pair as they were last made to be kept.
     pub(super) regions: u32,
+    /// Turns of work that the pair has had.
+    pub(super) turns: u32,
 }
 
 /// Where a pair is nearest or deepest: the shapes, triangles and points.
@@ -129,6 +133,7 @@ impl Memo {
             front: NONE,
             contacts: NONE,
             regions: NONE,
+            turns: 0,
         }
     }
 
@@ -246,6 +251,11 @@ fn half_space_of(body: &Body) -> Option<Vec3> {
     }
 }
 
+fn meshed(body: &Body) -> bool {
+    let mut shapes = body.shapes.iter();
+    shapes.any(|placed| matches!(placed.shape.geometry, Geometry::Mesh(_)))
+}
+
 impl Narrow {
     /// Starts the memory of a pair that has begun.
     pub(super) fn meet(&mut self, slot: PairSlot, world: &World, pairs: &PairSet) {
@@ -273,6 +283,7 @@ impl Narrow {
             visited: 0,
             verdict: Verdict::Apart,
             live: true,
+            meshed: meshed(body_a) || meshed(body_b),
             stirred: true,
         };
         self.counts[usize::from(Verdict::Apart.code())] += 1;
@@ -359,6 +370,7 @@ impl Hot {
             visited: 0,
             verdict: Verdict::Apart,
             live: false,
+            meshed: false,
             stirred: true,
         }
     }

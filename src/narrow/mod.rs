@@ -9,7 +9,8 @@
 //! 2. `widen`: the pairs of bodies that moved are compared with their certificates. A certificate is an interval
 //!    with the bodies' motion accumulators at its test; while the motion since does not use it up, the pair costs one
 //!    comparison. Pairs of which nothing moved are not visited at all.
-//! 3. `spend`: pairs without a verdict first, oldest first; then bounds and contacts of those that are reported.
+//! 3. `spend`: pairs without a verdict first, oldest first; then bounds and contacts of those that are reported; then
+//!    the regions in which open pairs may touch.
 //!
 //! Refused: a verdict from an older pose without widening (unsound), a queue per pair for convex shapes (one query
 //! decides them), throwing interrupted work away (it is resumed at its first pose, and widened from there).
@@ -114,7 +115,7 @@ pub struct Narrow {
     /// The contacts that a set had before, while ids are handed on.
     before: Vec<Contact>,
     approx: Approx,
-    /// Regions of pairs that were complete.
+    /// Regions that were split, or of pairs that were complete.
     kept: Pool<Kept>,
     counts: [u64; Verdict::ALL.len()],
     counters: Counters,
@@ -131,6 +132,8 @@ pub struct Wanted {
     pub contacts: bool,
     /// Fresh intervals of reported pairs; without it a verdict is enough.
     pub bounds: bool,
+    /// Regions of pairs that may touch, split as far as the budget goes.
+    pub regions: bool,
     /// How work is ordered.
     pub order: Order,
 }
@@ -204,12 +207,19 @@ impl Narrow {
     }
 
     fn spend_on_pairs(&mut self, world: &World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
+        let kept = Self::keep_back_for_regions(wanted, meter);
         let half = self.has_sweeps().then(|| meter.half());
         let swept = self.spend_on_sweeps(world, wanted, meter, half);
         let decided = self.spend_on_verdicts(world, wanted, meter);
         let swept = swept || self.spend_on_sweeps(world, wanted, meter, None);
         self.close_sweeps(world);
-        decided && swept && self.spend_on_reports(world, wanted, meter)
+        let done = decided && swept && self.spend_on_reports(world, wanted, meter);
+        meter.release(kept);
+        self.spend_on_regions(world, wanted, meter);
+        // With what splitting did not take.
+        done || (swept
+            && self.spend_on_verdicts(world, wanted, meter)
+            && self.spend_on_reports(world, wanted, meter))
     }
 
     /// As [`Narrow::spend`], after the tick's findings were taken: what is found now is told in the next tick.

@@ -113,7 +113,8 @@ pub(super) struct Line {
 }
 
 impl Line {
-    fn new(order: Order, len: usize) -> Self {
+    /// A list of so many, of which nothing is in order yet.
+    pub(super) fn new(order: Order, len: usize) -> Self {
         let ready = if order == Order::AsFound { len } else { 0 };
         let mut ends = [0; PARTS_MAX];
         ends[0] = len;

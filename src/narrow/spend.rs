@@ -125,6 +125,8 @@ impl Narrow {
         let (Some(a), Some(b)) = (world.body(hot.a), world.body(hot.b)) else {
             return true;
         };
+        let turns = &mut self.memos[slot.index()].turns;
+        *turns = turns.wrapping_add(1);
         let mut open = false;
         if let ([one], [other]) = (&*a.shapes, &*b.shapes)
             && is_simple(&one.shape, &other.shape)

@@ -1,6 +1,6 @@
 //! Rows of `regions`: where pairs that touch, or may, do so.
 
-use crate::limits::{REGION_TESTS_PER_PAIR, REGION_TESTS_PER_TICK, REGIONS_PER_PAIR_MAX};
+use crate::limits::{REGION_LOOKS_FREE, REGION_LOOKS_PER_TICK, REGIONS_PER_PAIR_MAX};
 use crate::math::ROUND;
 use crate::narrow::Region;
 use crate::wire::{MessageHeader, Outbox, RegionRow, region_flags};
@@ -12,8 +12,8 @@ use super::{Publisher, View};
 const CLASS_MAX: u8 = 2;
 
 impl Publisher {
-    /// Fills `regions`; returns how many rows did not fit, one for each pair left out. Whole pairs are kept: colliding
-    /// ones first, the deepest first.
+    /// Fills `regions` with what the budget has made of them, or what a few looks tell; returns how many rows did not
+    /// fit, one for each pair left out. Whole pairs are kept: colliding ones first, the deepest first.
     pub(super) fn fill_regions(
         &mut self,
         view: &mut View<'_>,
@@ -31,8 +31,7 @@ impl Publisher {
             open.filter(|(_, row)| row.slot.is_some() && row.class() <= CLASS_MAX)
                 .map(|(at, _)| at),
         );
-        let count = u32::try_from(chosen.len().max(1)).unwrap_or(u32::MAX);
-        let tests = (REGION_TESTS_PER_TICK / count).min(REGION_TESTS_PER_PAIR);
+        let looks = (REGION_LOOKS_PER_TICK / chosen.len().max(1)).min(REGION_LOOKS_FREE);
         let most = self.limits.region_rows.max(REGIONS_PER_PAIR_MAX);
         let ranked = chosen.len() * REGIONS_PER_PAIR_MAX > most;
         if ranked {
@@ -57,7 +56,7 @@ impl Publisher {
             else {
                 continue;
             };
-            let Some(found) = view.narrow.regions(slot, view.world, tests) else {
+            let Some(found) = view.narrow.regions(slot, view.world, looks) else {
                 continue;
             };
             let mut flags = if found.complete {

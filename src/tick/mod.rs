@@ -271,6 +271,7 @@ impl Engine {
         let wanted = Wanted {
             contacts: demand.contacts || demand.regions,
             bounds: demand.pairs || demand.contacts || demand.regions,
+            regions: demand.regions,
             order,
         };
         let woke_ns = laps.woke_ns();

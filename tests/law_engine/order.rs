@@ -78,8 +78,8 @@ fn law_4_5_the_same_inputs_in_any_order_and_any_broad_phase_give_the_same_bits_a
                 rig.send(Budget::units(units));
                 let out = &rig.out;
                 let said = format!(
-                    "{:?}\n{:?}\n{:?}\n{:?}\n{:?}",
-                    out.pairs, out.contacts, out.bodies, out.body_verdicts, out.tick
+                    "{:?}\n{:?}\n{:?}\n{:?}\n{:?}\n{:?}",
+                    out.pairs, out.contacts, out.regions, out.bodies, out.body_verdicts, out.tick
                 );
                 match want.get(tick as usize) {
                     None => want.push(said),

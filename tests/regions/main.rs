@@ -10,6 +10,7 @@
     reason = "tests"
 )]
 
+mod budget;
 #[path = "../harness/mod.rs"]
 mod harness;
 #[path = "../oracle/mod.rs"]

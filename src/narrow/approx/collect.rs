@@ -1,18 +1,19 @@
 //! The spots of a body pair: shape pair by shape pair, from fronts, trees, boxes and contacts that were found.
 
 use crate::ids::PairSlot;
-use crate::limits::{REGION_LOOKS_MAX, REGION_SHAPE_PAIRS_MAX};
+use crate::limits::REGION_SHAPE_PAIRS_MAX;
 use crate::math::{Pose, ROUND, Vec3, relative};
 use crate::narrow::Narrow;
 use crate::narrow::contacts::Contact;
 use crate::narrow::mesh::{CarriedFront, PlaneScan, Scan, behind};
 use crate::narrow::query::{shape_pose, sphere_bound};
 use crate::shape::{Cone, Geometry, Mesh, Obb, Shape};
-use crate::world::{Body, PlacedShape};
+use crate::world::PlacedShape;
 
 use super::gather::{SPOTS_MAX, push};
+use super::pace::Pace;
 use super::spot::Spot;
-use super::{Approx, FOUND_MAX, boxes};
+use super::{Approx, FOUND_MAX, Standing, boxes};
 
 /// Spots smaller than this share of the smaller body's radius are not split: they are no larger than what a sphere
 /// round a few of them is too large by.
@@ -35,17 +36,17 @@ impl Narrow {
     pub(super) fn collect(
         &self,
         slot: PairSlot,
-        (a, b): (&Body, &Body),
-        complete: bool,
-        tests: u32,
+        of: &Standing<'_>,
+        pace: &mut Pace<'_, '_>,
         approx: &mut Approx,
     ) {
+        let Standing { a, b, complete, .. } = *of;
         let rel = relative(&a.pose, &b.pose);
         if a.shapes.len() * b.shapes.len() > REGION_SHAPE_PAIRS_MAX {
             approx.clipped = true;
             push(&mut approx.all, boxes(a, b));
         } else {
-            let (mut tests, mut place) = (tests, 0);
+            let mut place = 0;
             for one in a.shapes.iter() {
                 for other in b.shapes.iter() {
                     let front = self.front_at(slot, place);
@@ -61,7 +62,7 @@ impl Narrow {
                         slop_m: 32.0 * ROUND * size,
                         complete,
                     };
-                    self.collect_shapes(&pair, front, a.radius.min(b.radius), &mut tests, approx);
+                    self.collect_shapes(&pair, front, a.radius.min(b.radius), pace, approx);
                 }
             }
         }
@@ -85,20 +86,20 @@ impl Narrow {
         pair: &Pair<'_>,
         front: Option<&CarriedFront>,
         size_m: f64,
-        tests: &mut u32,
+        pace: &mut Pace<'_, '_>,
         approx: &mut Approx,
     ) {
         let (one, other) = (&*pair.one.shape, &*pair.other.shape);
         match (&one.geometry, &other.geometry) {
             (Geometry::HalfSpace { normal, offset }, Geometry::Mesh(mesh)) => {
-                pair.take_plane(mesh, (*normal, *offset), false, tests, approx);
+                pair.take_plane(mesh, (*normal, *offset), false, pace, approx);
             }
             (Geometry::Mesh(mesh), Geometry::HalfSpace { normal, offset }) => {
-                pair.take_plane(mesh, (*normal, *offset), true, tests, approx);
+                pair.take_plane(mesh, (*normal, *offset), true, pace, approx);
             }
             (Geometry::Mesh(_), _) | (_, Geometry::Mesh(_)) => {
                 if let Some(scan) = Scan::new(one, other, &pair.pos12) {
-                    self.take_surfaces(pair, &scan, front, size_m, tests, approx);
+                    self.take_surfaces(pair, &scan, front, size_m, pace, approx);
                 }
             }
             // Their contacts are all there is.
@@ -118,27 +119,28 @@ impl Narrow {
         scan: &Scan<'_>,
         front: Option<&CarriedFront>,
         size_m: f64,
-        tests: &mut u32,
+        pace: &mut Pace<'_, '_>,
         approx: &mut Approx,
     ) {
         approx.raw.clear();
-        let (mut looks, mut full) = (0, false);
-        let known = front.is_some_and(|front| {
-            scan.of_front(front, &self.front_store, |spot| {
-                looks += 1;
-                if looks > REGION_LOOKS_MAX {
-                    return;
-                }
+        let (mut many, mut full) = (0, false);
+        let known = front.filter(|front| scan.unproved(front, &self.front_store, |_, _| many += 1));
+        let looked_at = known.filter(|_| pace.allows(many));
+        if let Some(front) = looked_at {
+            scan.unproved(front, &self.front_store, |a, b| {
+                let spot = pace.look().then(|| scan.spot(a, b)).flatten();
+                let Some(spot) = spot else { return };
                 if approx.raw.len() == SPOTS_MAX {
                     full = true;
                     pair.flush(scan, approx);
                 }
                 approx.raw.push(spot);
-            })
-        });
-        if !known || looks > REGION_LOOKS_MAX {
-            approx.clipped |= looks > REGION_LOOKS_MAX;
-            approx.raw.truncate(SPOTS_MAX - 1);
+            });
+            if pace.cut {
+                return;
+            }
+        } else {
+            approx.clipped |= known.is_some();
             approx.raw.extend(scan.whole());
         }
         for front in front.into_iter().filter(|_| !pair.complete) {
@@ -155,7 +157,7 @@ impl Narrow {
         {
             pair.put(spot.of_any_normal(), approx);
         }
-        if full || (pair.complete && known) {
+        if full || (pair.complete && looked_at.is_some()) {
             pair.flush(scan, approx);
             return;
         }
@@ -164,17 +166,19 @@ impl Narrow {
         let Approx { raw, heap, .. } = approx;
         heap.clear();
         heap.extend(raw.drain(..));
-        while *tests > 0 && heap.len() + raw.len() < SPOTS_MAX {
+        while heap.len() + raw.len() < SPOTS_MAX {
             if heap.peek().is_none_or(|spot| spot.radius_m <= enough_m) {
                 break;
             }
             let Some(spot) = heap.pop() else { break };
             if scan.is_leaf(spot.boxes) {
                 raw.push(spot);
-                continue;
+            } else if pace.test() {
+                scan.split(spot.boxes, |part| heap.push(part));
+            } else {
+                raw.push(spot);
+                break;
             }
-            *tests -= 1;
-            scan.split(spot.boxes, |part| heap.push(part));
         }
         raw.extend(heap.drain());
         pair.flush(scan, approx);
@@ -239,7 +243,7 @@ impl Pair<'_> {
         mesh: &Mesh,
         (normal, offset): (Vec3, f64),
         is_b: bool,
-        tests: &mut u32,
+        pace: &mut Pace<'_, '_>,
         approx: &mut Approx,
     ) {
         let (mesh_from_plane, mesh_from_one) = if is_b {
@@ -253,15 +257,19 @@ impl Pair<'_> {
         // From A to B: into the mesh where the half-space is A.
         let out = if is_b { -down } else { down };
         let mut heap = std::mem::take(&mut approx.heap);
-        PlaneScan::new(mesh, down, offset, self.slop_m).spots(&mut heap, tests, |spot| {
-            let seen = Spot {
-                centre: to_one * spot.centre,
-                along: to_one.rotation * spot.along,
-                cone: Cone::of(out).turned(turn.matrix()),
-                ..spot
-            };
-            self.put(seen, approx);
-        });
+        PlaneScan::new(mesh, down, offset, self.slop_m).spots(
+            &mut heap,
+            || pace.test(),
+            |spot| {
+                let seen = Spot {
+                    centre: to_one * spot.centre,
+                    along: to_one.rotation * spot.along,
+                    cone: Cone::of(out).turned(turn.matrix()),
+                    ..spot
+                };
+                self.put(seen, approx);
+            },
+        );
         approx.heap = heap;
     }
 }

@@ -72,22 +72,18 @@ impl<'a> Scan<'a> {
         self.spot(BoxId::ROOT, BoxId::ROOT)
     }
 
-    /// Every spot of what a front has not proved apart at this pose; false: it does not know.
-    pub(in crate::narrow) fn of_front(
+    /// Visits every pair of boxes that a front has not proved apart at this pose; false: it does not know.
+    pub(in crate::narrow) fn unproved(
         &self,
         front: &CarriedFront,
         store: &FrontStore,
-        mut take: impl FnMut(Spot),
+        visit: impl FnMut(BoxId, BoxId),
     ) -> bool {
         if !front.names_boxes_of(self.shapes.0, self.shapes.1) {
             return false;
         }
         let moved_m = front.moved_m(self.shapes.0, self.shapes.1, &self.at.pos12);
-        front.unproved(store, moved_m, |a, b| {
-            if let Some(spot) = self.spot(a, b) {
-                take(spot);
-            }
-        })
+        front.unproved(store, moved_m, visit)
     }
 
     /// The spots of the smaller boxes that a pair of boxes holds, but for those that are apart. One test.
@@ -220,19 +216,18 @@ impl<'a> PlaneScan<'a> {
         })
     }
 
-    /// All that lies behind the plane, mesh's frame, the largest boxes split while `tests` last.
+    /// All that lies behind the plane, mesh's frame, the largest boxes split while there is a `test` for each.
     pub(in crate::narrow) fn spots(
         &self,
         heap: &mut BinaryHeap<Spot>,
-        tests: &mut u32,
+        mut test: impl FnMut() -> bool,
         mut take: impl FnMut(Spot),
     ) {
         heap.clear();
         heap.extend(self.spot(BoxId::ROOT));
         while let Some(spot) = heap.pop() {
             match self.mesh.obb().held(spot.boxes.0) {
-                Held::Pack(pack) if *tests > 0 => {
-                    *tests -= 1;
+                Held::Pack(pack) if test() => {
                     let mask = self.mesh.obb().packs()[pack as usize].mask;
                     heap.extend(lanes(mask).filter_map(|lane| self.spot(BoxId::new(pack, lane))));
                 }

@@ -1,0 +1,215 @@
+//! Splitting regions out of the budget, and what is kept of them.
+//!
+//! It comes after verdicts, bounds and contacts: what these find out narrows regions too, and stays proved when the
+//! pair moves. A reader of `regions` wants them most where the budget does not reach for all of that, so one part of
+//! [`KEPT_PARTS`] is kept back for them while pairs are open, and given to the others again where they do not need it.
+//!
+//! Pairs have their turn by how long ago they were asked last. A test that splits a box drops what is apart at these
+//! poses, and no proof of it is kept; so a pair that moves starts from what its front knows, and one at rest keeps its
+//! regions. Refused: proofs of these too (a front has them already, and goes where it matters), and regions widened by
+//! motion (what has come to touch elsewhere would be in none).
+
+use crate::ids::PairSlot;
+use crate::limits::REGIONS_PER_PAIR_MAX;
+use crate::math::Pose;
+use crate::narrow::order::{Line, RANK_SEEN_NS};
+use crate::narrow::{NONE, Narrow, Order, Wanted};
+use crate::time::{Meter, Reserve};
+use crate::wire::Verdict;
+use crate::world::World;
+
+use super::pace::{CLOSING_NS, Pace};
+use super::{Approx, Place, Region};
+
+/// One part of so many of the budget is kept back for regions while somebody reads them: at a quarter of the work 16
+/// tests of a pair take its median radius from 24 to 14 % of the diameter, and an eighth of the work costs its verdict
+/// next to nothing (`benches/time_critical`).
+const KEPT_PARTS: u64 = 8;
+
+/// The regions of a pair, and where they were made.
+#[derive(Debug)]
+pub(in crate::narrow) struct Kept {
+    rel: Pose,
+    bent_m: f64,
+    /// Turns of work that the pair had had.
+    turns: u32,
+    contacts_tick: u64,
+    /// Last tick in which the pair had its turn of splitting.
+    asked: u64,
+    /// Tests behind them; `None`: they were made by looks alone.
+    tests: Option<u32>,
+    /// No test was left to be done.
+    whole: bool,
+    pub(super) complete: bool,
+    pub(super) clipped: bool,
+    pub(super) all: Vec<Region>,
+}
+
+impl Default for Kept {
+    fn default() -> Self {
+        Self {
+            rel: Pose::identity(),
+            bent_m: 0.0,
+            turns: 0,
+            contacts_tick: 0,
+            asked: 0,
+            tests: None,
+            whole: false,
+            complete: false,
+            clipped: false,
+            all: Vec::with_capacity(REGIONS_PER_PAIR_MAX),
+        }
+    }
+}
+
+impl Kept {
+    /// Whether they hold all that the two share here.
+    fn holds(&self, here: &Place, contacts_tick: u64) -> bool {
+        !self.all.is_empty()
+            && self.bent_m.to_bits() == here.bent_m.to_bits()
+            && self.rel == here.rel
+            && (!self.complete || self.contacts_tick == contacts_tick)
+    }
+}
+
+impl Narrow {
+    /// Keeps back what a reader of `regions` is to have.
+    pub(in crate::narrow) fn keep_back_for_regions(
+        wanted: Wanted,
+        meter: &mut Meter<'_>,
+    ) -> Reserve {
+        if wanted.regions && wanted.order != Order::AsFound {
+            meter.reserve(KEPT_PARTS)
+        } else {
+            Reserve::default()
+        }
+    }
+
+    /// Splits what pairs with meshes may share, pair by pair, while the meter is open.
+    pub(in crate::narrow) fn spend_on_regions(
+        &mut self,
+        world: &World,
+        wanted: Wanted,
+        meter: &mut Meter<'_>,
+    ) {
+        let ranked_ns = self.active.len() as u64 * RANK_SEEN_NS;
+        if !wanted.regions || !meter.open() || !meter.has_ns(ranked_ns + CLOSING_NS) {
+            return;
+        }
+        let mut line = self.line_up_for_regions(world, wanted.order);
+        let mut at = 0;
+        while at < self.keyed.len() {
+            self.order_next(&mut line, at, world, meter);
+            if !meter.open() || !meter.has_ns(2 * CLOSING_NS) {
+                break;
+            }
+            self.refine_regions(self.keyed[at].1, world, meter);
+            at += 1;
+        }
+        self.keyed.clear();
+    }
+
+    /// One turn of splitting of a pair that may touch.
+    pub fn refine_regions(&mut self, slot: PairSlot, world: &World, meter: &mut Meter<'_>) {
+        let mut approx = std::mem::take(&mut self.approx);
+        approx.ready();
+        let mut pace = Pace::metered(meter);
+        let of = self.standing(slot, world).filter(|of| of.placed);
+        let here = of.map(|of| {
+            self.find_regions(slot, &of, &mut pace, &mut approx);
+            of.place()
+        });
+        if let Some(here) = here {
+            self.keep_regions(slot, &here, &approx, Some(&pace));
+        }
+        self.approx = approx;
+    }
+
+    /// What was made of a pair before and still holds: what splitting has made, and of a complete pair whatever was.
+    pub(super) fn kept_regions(&self, slot: PairSlot, here: &Place) -> Option<&Kept> {
+        let memo = self.memos.get(slot.index())?;
+        let kept = self.kept.get(memo.regions)?;
+        let serves = kept.tests.is_some() || (kept.complete && here.complete);
+        (serves && kept.holds(here, memo.contacts_tick)).then_some(kept)
+    }
+
+    /// Keeps the regions just made, unless those of more tests hold.
+    ///
+    /// * `pace` - what splitting took; `None`: they were made by looks alone.
+    pub(super) fn keep_regions(
+        &mut self,
+        slot: PairSlot,
+        here: &Place,
+        approx: &Approx,
+        pace: Option<&Pace<'_, '_>>,
+    ) {
+        let tick = self.tick;
+        let Some(memo) = self.memos.get_mut(slot.index()) else {
+            return;
+        };
+        if memo.regions == NONE {
+            memo.regions = self.kept.take(Kept::default);
+            if let Some(kept) = self.kept.get_mut(memo.regions) {
+                (kept.asked, kept.tests) = (0, None);
+                kept.all.clear();
+            }
+        }
+        let (contacts_tick, turns) = (memo.contacts_tick, memo.turns);
+        let Some(kept) = self.kept.get_mut(memo.regions) else {
+            return;
+        };
+        let tests = pace.map(|pace| pace.tests);
+        if pace.is_some() {
+            kept.asked = tick;
+        }
+        let as_well = kept.turns == turns
+            && kept.complete == here.complete
+            && kept.tests > tests
+            && kept.holds(here, contacts_tick);
+        if as_well || pace.is_some_and(|pace| pace.cut) {
+            return;
+        }
+        (kept.rel, kept.bent_m) = (here.rel, here.bent_m);
+        (kept.turns, kept.contacts_tick) = (turns, contacts_tick);
+        (kept.tests, kept.whole) = (tests, pace.is_some_and(|pace| !pace.stopped));
+        (kept.complete, kept.clipped) = (here.complete, approx.clipped);
+        kept.all.clear();
+        kept.all.extend_from_slice(&approx.regions);
+    }
+
+    /// Gathers the pairs that are to be split, by when they were asked last.
+    fn line_up_for_regions(&mut self, world: &World, order: Order) -> Line {
+        let mut keyed = std::mem::take(&mut self.keyed);
+        keyed.clear();
+        if keyed.capacity() < self.active.len() {
+            keyed.reserve(self.hot.len());
+        }
+        let owing = self.active.iter().filter_map(|&slot| {
+            let asked = self.owes_regions(slot, world)?;
+            Some((asked, slot))
+        });
+        keyed.extend(owing);
+        let line = Line::new(order, keyed.len());
+        self.keyed = keyed;
+        line
+    }
+
+    /// When a pair was asked last (0: never), if splitting can make its regions smaller.
+    fn owes_regions(&self, slot: PairSlot, world: &World) -> Option<u64> {
+        let hot = self.hot.get(slot.index())?;
+        let open = matches!(hot.verdict, Verdict::Possible | Verdict::Colliding);
+        if !open || !hot.meshed {
+            return None;
+        }
+        let memo = &self.memos[slot.index()];
+        let Some(kept) = self.kept.get(memo.regions) else {
+            return Some(0);
+        };
+        let here = &self.standing(slot, world).filter(|of| of.placed)?.place();
+        let done = kept.whole
+            && kept.complete == here.complete
+            && (kept.complete || kept.turns == memo.turns)
+            && kept.holds(here, memo.contacts_tick);
+        (!done).then_some(kept.asked)
+    }
+}
