@@ -5,6 +5,8 @@
 mod builder;
 mod settings;
 mod shapes;
+#[cfg(test)]
+mod tests;
 mod watchdog;
 
 use std::sync::Arc;
@@ -19,7 +21,7 @@ use crate::tick::{EditBatch, Engine, TickInput};
 use crate::time::{Budget, Clock};
 use crate::transport::{BodyChange, Door, RequestToken, Wake};
 use crate::wire::{Answer, Inbox, TickRow};
-use crate::world::Edit;
+use crate::world::{Edit, TreeOf};
 
 use builder::{Builder, Done, TREE};
 
@@ -47,8 +49,8 @@ pub struct Daemon<'a> {
     ready: Vec<EditBatch>,
     /// A tick is wanted at once.
     tick_asked: bool,
-    /// A worker builds a tree.
-    tree_asked: bool,
+    /// The tree that the worker builds.
+    tree_asked: Option<TreeOf>,
     /// Raised each round, and each heartbeat of a long tick.
     progress: Arc<AtomicU64>,
 }
@@ -84,7 +86,7 @@ impl<'a> Daemon<'a> {
             due: Inbox::default(),
             ready: Vec::new(),
             tick_asked: false,
-            tree_asked: false,
+            tree_asked: None,
             progress: Arc::default(),
         })
     }
@@ -169,23 +171,33 @@ impl<'a> Daemon<'a> {
             let json_len = usize::try_from(header.json_len).unwrap_or(usize::MAX);
             builder.ask(token, json_len, payload);
         });
-        if !self.tree_asked
+        if self.tree_asked.is_none()
             && let Some(worn) = self.engine.worn_tree()
         {
-            self.tree_asked = true;
+            self.tree_asked = Some(worn.of());
             self.builder.build_tree(worn);
         }
         while let Some((token, built)) = self.builder.finished() {
             if token == TREE {
-                self.tree_asked = false;
-                if let Ok(Done::Tree(tree)) = built {
-                    self.engine.take_tree(*tree);
-                }
+                self.settle_tree(built);
             } else if let Some(answer) = self.take_built(token, built) {
                 self.answer(token, &answer);
             }
         }
         Ok(())
+    }
+
+    /// Takes the tree that the worker has built, or tells once that it could not.
+    fn settle_tree(&mut self, built: std::result::Result<Done, String>) {
+        let asked = self.tree_asked.take();
+        if let Ok(Done::Tree(tree)) = built {
+            self.engine.take_tree(*tree);
+        } else if let Some(name) = asked.and_then(|of| self.engine.refuse_tree(of)) {
+            tracing::error!(
+                "the tree of body \"{name}\" could not be built anew: its boxes are refitted as before, and its next \
+                 vertices are tried; see the panic above"
+            );
+        }
     }
 
     /// Takes what the worker made of a request; its answer, where there is one already.

@@ -7,7 +7,7 @@
 use super::Engine;
 use crate::narrow::Wanted;
 use crate::time::Meter;
-use crate::world::{BuiltTree, WornTree};
+use crate::world::{BuiltTree, TreeOf, WornTree};
 
 /// Kept back of the tick's end, nanoseconds: the query that is under way then, and closing the work lists.
 const LAST_NS: u64 = 10_000;
@@ -33,6 +33,11 @@ impl Engine {
     /// Puts a built tree in place, between two ticks; pairs of the body then start from its root. Whether it was taken.
     pub fn take_tree(&mut self, built: BuiltTree) -> bool {
         self.world.take_tree(built)
+    }
+
+    /// A tree could not be built; see [`crate::world::World::refuse_tree`].
+    pub fn refuse_tree(&mut self, of: TreeOf) -> Option<String> {
+        self.world.refuse_tree(of)
     }
 
     /// Works on what the last tick left undone, within its budget of time and for at most `slice_ns`; what is found

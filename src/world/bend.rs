@@ -26,6 +26,18 @@ pub struct Vertices {
     pub refused: Option<RejectReason>,
     /// Box and radius in the scene, by which a put tells whether it is another shape.
     pub(super) rest: (Aabb, f64),
+    /// How often they have been taken.
+    pub(super) updates: u64,
+    /// The last tree that was asked for could not be built.
+    pub(super) unbuilt: Option<Unbuilt>,
+}
+
+/// A tree that could not be built: it is not asked for again before there are other vertices, twice as many updates
+/// later each time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Unbuilt {
+    pub(super) times: u32,
+    pub(super) until: u64,
 }
 
 impl Vertices {
@@ -35,6 +47,8 @@ impl Vertices {
             version: None,
             refused: None,
             rest: (shape.aabb, shape.radius),
+            updates: 0,
+            unbuilt: None,
         }
     }
 
@@ -165,6 +179,7 @@ impl World {
         body.motion.bend(step_m, &body.pose, &body.centre, radius);
         if let Some(vertices) = body.vertices.as_mut() {
             (vertices.version, vertices.refused) = (Some(frame.header.version), None);
+            vertices.updates += 1;
         }
         if !self.entries[slot.index()].refused {
             body.reject = None;

@@ -42,7 +42,7 @@ pub use gaze::Gaze;
 pub use path::{Leg, Path};
 pub use source::SourceState;
 pub use tag::Tag;
-pub use trees::{BuiltTree, WornTree};
+pub use trees::{BuiltTree, TreeOf, WornTree};
 
 use crate::config::{Config, Viewpoint};
 use crate::error::{Error, Result};

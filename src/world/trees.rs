@@ -2,65 +2,120 @@
 //!
 //! In: the wear of a tree. Out: a job that holds all it needs, for a worker; what it made goes in between two ticks.
 
-use super::World;
+use super::bend::{Unbuilt, Vertices};
+use super::{Body, World};
 use crate::ids::BodyId;
 use crate::shape::{NewTree, TreeJob};
+
+/// Times that the wait for a tree that cannot be built is doubled, at most.
+const DOUBLINGS_MAX: u32 = 16;
 
 /// A tree to be built.
 #[derive(Clone, Debug)]
 pub struct WornTree {
+    of: TreeOf,
+    job: TreeJob,
+}
+
+/// Of which body, and which of its vertices.
+#[derive(Clone, Copy, Debug)]
+pub struct TreeOf {
     body: BodyId,
     generation: u32,
-    job: TreeJob,
+    updates: u64,
 }
 
 /// One that was.
 #[derive(Clone, Debug)]
 pub struct BuiltTree {
-    body: BodyId,
-    generation: u32,
+    of: TreeOf,
     tree: NewTree,
 }
 
 impl WornTree {
+    /// What it is of, for [`World::refuse_tree`] when it cannot be built.
+    #[must_use]
+    pub fn of(&self) -> TreeOf {
+        self.of
+    }
+
     /// Builds it: milliseconds for 20,000 triangles.
     #[must_use]
     pub fn build(self) -> BuiltTree {
         BuiltTree {
-            body: self.body,
-            generation: self.generation,
+            of: self.of,
             tree: self.job.build(),
         }
+    }
+
+    /// The same with a face of no vertices: it cannot be built.
+    #[cfg(test)]
+    pub(crate) fn spoil(mut self) -> Self {
+        self.job.spoil();
+        self
     }
 }
 
 impl World {
     /// A copy of what a worker needs to build the tree anew of a body that has deformed far from the shape its tree was
-    /// built for; `None`: no tree is worn.
+    /// built for; `None`: no tree is worn, or none but those that could not be built of these vertices.
     ///
     /// Cost: nothing to speak of for each body that deforms; of one that is worn, a copy of its vertices and faces.
     #[must_use]
     pub fn worn_tree(&self) -> Option<WornTree> {
         let worn = |slot: &_| {
             let body = self.body(*slot)?;
+            let vertices = body.vertices.as_deref().filter(|of| of.can_be_built())?;
             let job = body.shapes.first()?.shape.mesh()?.worn_tree()?;
-            Some(WornTree {
+            let of = TreeOf {
                 body: body.id,
                 generation: body.generation,
-                job,
-            })
+                updates: vertices.updates,
+            };
+            Some(WornTree { of, job })
         };
         self.deforming.iter().find_map(worn)
     }
 
     /// Puts a tree in place, between two ticks. Whether it was taken: its body may be another by now.
     pub fn take_tree(&mut self, built: BuiltTree) -> bool {
-        let Some(slot) = self.slot_of(built.body) else {
-            return false;
-        };
+        let shape = self.bent_body(built.of).and_then(Body::bending_shape);
+        let taken = shape.is_some_and(|shape| shape.take_tree(built.tree));
+        let vertices = self
+            .bent_body(built.of)
+            .and_then(|body| body.vertices.as_mut());
+        if let Some(vertices) = vertices.filter(|_| taken) {
+            vertices.unbuilt = None;
+        }
+        taken
+    }
+
+    /// A tree could not be built: its boxes are refitted as before, and it is not asked for again until the body has
+    /// other vertices, nor then, if that fails too, until twice as many updates later each time.
+    ///
+    /// * returns - the body's name when this is the first time since it was put or a tree of it was built: to be told.
+    pub fn refuse_tree(&mut self, of: TreeOf) -> Option<String> {
+        let body = self.bent_body(of)?;
+        let vertices = body.vertices.as_mut()?;
+        let times = vertices.unbuilt.map_or(0, |unbuilt| unbuilt.times);
+        vertices.unbuilt = Some(Unbuilt {
+            times: (times + 1).min(DOUBLINGS_MAX),
+            until: of.updates + (1 << times),
+        });
+        (times == 0).then(|| body.name.to_string())
+    }
+
+    /// The body, if it is still the same.
+    fn bent_body(&mut self, of: TreeOf) -> Option<&mut Body> {
+        let slot = self.slot_of(of.body)?;
         let body = self.bodies[slot.index()].as_mut();
-        let body = body.filter(|body| body.generation == built.generation);
-        let shape = body.and_then(super::Body::bending_shape);
-        shape.is_some_and(|shape| shape.take_tree(built.tree))
+        body.filter(|body| body.generation == of.generation)
+    }
+}
+
+impl Vertices {
+    /// Whether a tree may be asked for.
+    fn can_be_built(&self) -> bool {
+        (self.unbuilt).is_none_or(|unbuilt| self.updates >= unbuilt.until)
     }
 }

@@ -30,6 +30,12 @@ pub(crate) struct NewTree {
 }
 
 impl TreeJob {
+    /// Lets it fail.
+    #[cfg(test)]
+    pub(crate) fn spoil(&mut self) {
+        self.faces[0] = [u32::MAX; 3];
+    }
+
     /// Builds the tree.
     ///
     /// Cost: O(n log n), some 0.3 us a triangle.
