@@ -1,4 +1,26 @@
 //! The order of work: who has a turn first when the budget does not reach for all.
+//!
+//! Urgency is a time of waiting times a weight: for its turn, or up to [`HEAD_START`] ticks for its verdict, whichever
+//! is more; last tick's contacts count as if they had waited so long. So nothing starves, neither behind contacts that
+//! are to be confirmed each tick nor behind pairs that no turn decides:
+//!
+//! **A pair that waits for a verdict has a turn after at most `w max(H + 2, R + 1) + R` ticks**, with
+//! - `H` = [`HEAD_START`], 16;
+//! - `R`: ticks that it takes to give each pair a turn that waits for one, `N / K` rounded up, of `N` pairs that wait
+//!   at the same time, and `K` turns a tick: one for each unit of the budget where all bodies are single convex shapes;
+//!   else one for each 4,096 (more than the longest turn of a mesh pair), and never less than one. Of the units, what
+//!   is kept back for others does not count: an eighth while `regions` are read, half while meshes deform, and half of
+//!   the rest while bodies are swept;
+//! - `w`: the greatest weight of a pair over the least: the ratio of their priorities, times [`CLOSING_WEIGHT`], 4,
+//!   times the weight of the scene's viewpoint.
+//!
+//! For who goes before a pair that has waited `T >= w max(H + 2, R + 1)` ticks has waited itself for at least
+//! `T / w - 1 >= R`: its weight is at most `w` times as much, and no head start makes up for it. So within the next `R`
+//! ticks nobody goes before it twice, and nobody at all who was not waiting at their begin: `N` turns are enough.
+//! (`tests/law_engine/schedule.rs` holds runs against it.) A turn decides a convex pair. A mesh pair may need several,
+//! and motion may undo them faster than a budget renews them; its turns grow while it waits (`carry`).
+//!
+//! Reports (bounds, contacts) have what verdicts leave, in the same order.
 
 use crate::ids::PairSlot;
 use crate::math::f32_down;
@@ -38,29 +60,47 @@ pub(super) const RANK_SEEN_NS: u64 = 160;
 /// last asked is up to four times as urgent as what does not.
 const CLOSING_WEIGHT: f64 = 4.0;
 
+/// Ticks of waiting for a verdict that count, and what last tick's contacts are given on top of their own: a contact is
+/// mostly confirmed by one test. Without an end a pair that no turn decides would be ahead of all others for ever.
+const HEAD_START: u32 = 16;
+
 /// What the order of work asks of a pair, side by side for all pairs: the records it comes from are far apart.
 ///
-/// Urgency is age times weight, so nothing starves: a pair that is undecided comes before every pair that is undecided
-/// for the first time after at most `CLOSING_WEIGHT` times the ratio of the greatest to the least priority, times the
-/// weight of the scene's viewpoint, in ticks.
+/// Ticks are cut to 32 bits: only differences are asked for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Urgency {
-    /// First tick without a verdict; 0: decided.
-    since: u64,
+    /// First tick without a verdict.
+    since: u32,
+    /// Tick in which it had its last turn, or was put on a list of work.
+    turn: u32,
     /// Priority times the factor for its approach, positive.
     weight: f32,
+    /// It has no verdict.
+    undecided: bool,
     /// The witness of the last test touched.
     touched: bool,
 }
+
+const _: () = assert!(size_of::<Urgency>() == 16, "four to a cache line");
 
 impl Default for Urgency {
     fn default() -> Self {
         Self {
             since: 0,
+            turn: 0,
             weight: 1.0,
+            undecided: false,
             touched: false,
         }
     }
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "only differences are asked"
+)]
+fn cut(tick: u64) -> u32 {
+    tick as u32
 }
 
 impl Urgency {
@@ -81,23 +121,28 @@ impl Urgency {
 
     /// Takes the pair's verdict.
     pub(super) fn settle(&mut self, memo: &Memo) {
-        self.since = memo.undecided_since;
+        self.since = cut(memo.undecided_since);
+        self.undecided = memo.undecided_since != 0;
         self.touched = memo.witness.is_some_and(|w| w.best_m <= 0.0);
     }
 
-    /// Place in the order of work, the least first: one bit whether it is no contact of last tick, then age times
-    /// weight, the greatest first (positive floats order like their bits).
+    /// The pair has a turn in this tick, or is put on a list: from here on it waits.
+    pub(super) fn note_turn(&mut self, tick: u64) {
+        self.turn = cut(tick);
+    }
+
+    /// Place in the order of work, the least first: waiting times weight, the greatest first (positive floats order like
+    /// their bits).
     ///
     /// * `seen` - weight of the place where it is (`Gaze::weight`); 1 without a viewpoint.
     fn rank(self, tick: u64, seen: f64) -> u64 {
-        let age = match self.since {
-            0 => 0,
-            since => tick.saturating_sub(since),
-        };
+        let since = |then: u32| cut(tick).wrapping_sub(then);
+        let age = if self.undecided { since(self.since) } else { 0 };
+        let waits = age.min(HEAD_START).max(since(self.turn));
         let fresh_contact = self.touched && age == 0;
-        #[allow(clippy::cast_precision_loss, reason = "an order needs no more bits")]
-        let urgency = (age + 1) as f64 * f64::from(self.weight) * seen;
-        u64::from(!fresh_contact) << 63 | (!urgency.to_bits() >> 1)
+        let head_start = if fresh_contact { HEAD_START } else { 0 };
+        let ticks = f64::from(waits) + f64::from(head_start) + 1.0;
+        !(ticks * f64::from(self.weight) * seen).to_bits()
     }
 }
 
@@ -236,23 +281,43 @@ mod tests {
         assert_eq!(none.ready, 0);
     }
 
-    #[test]
-    fn last_ticks_contacts_come_first_then_age_times_weight() {
-        let urgency = |since, weight: f32, touched| Urgency {
-            since,
+    fn urgency(since: Option<u32>, turn: u32, weight: f32, touched: bool) -> Urgency {
+        Urgency {
+            since: since.unwrap_or(0),
+            turn,
             weight,
+            undecided: since.is_some(),
             touched,
-        };
+        }
+    }
+
+    #[test]
+    fn last_ticks_contacts_have_a_head_start_then_waiting_times_weight() {
         let order = [
-            urgency(0, 1.0, true),
-            urgency(100, 0.5, true),
-            urgency(90, 1.0, true),
-            urgency(98, 3.0, false),
-            urgency(95, 1.0, false),
-            urgency(0, 4.0, false),
-            urgency(0, 1.0, false),
+            // Waited for long, and so before contacts.
+            urgency(Some(70), 70, 1.0, false),
+            urgency(None, 100, 1.0, true),
+            urgency(Some(98), 98, 4.0, false),
+            urgency(Some(90), 90, 1.0, true),
+            urgency(Some(100), 100, 0.5, true),
+            urgency(Some(95), 95, 1.0, false),
+            urgency(None, 100, 4.0, false),
+            urgency(None, 100, 1.0, false),
         ];
-        assert!(order.is_sorted_by_key(|urgency| urgency.rank(100, 1.0)));
+        let ranks = order.map(|urgency| urgency.rank(100, 1.0));
+        assert!(ranks.is_sorted(), "{ranks:?}");
+    }
+
+    #[test]
+    fn a_pair_that_no_turn_decides_counts_as_no_older_than_the_head_start() {
+        let hopeless = urgency(Some(1), 1_000, 1.0, false);
+        let waits = |turn| urgency(Some(turn), turn, 1.0, false).rank(1_000, 1.0);
+        assert_eq!(hopeless.rank(1_000, 1.0), waits(1_000 - HEAD_START));
+        assert!(waits(1_000 - HEAD_START - 1) < hopeless.rank(1_000, 1.0));
+        // Ticks beyond 32 bits.
+        let late = u64::from(u32::MAX) + 10;
+        let older = urgency(Some(u32::MAX - 5), u32::MAX - 5, 1.0, false);
+        assert!(older.rank(late, 1.0) < urgency(Some(3), 3, 1.0, false).rank(late, 1.0));
     }
 
     #[test]

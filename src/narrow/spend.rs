@@ -25,8 +25,7 @@ struct Answer {
 impl Narrow {
     /// Gives undecided pairs their verdicts, in slices; whether none is left.
     ///
-    /// Nothing starves: a pair's turn comes by its age, so a pair that stays undecided becomes the oldest after at most
-    /// as many ticks as it takes to decide those that were older.
+    /// Nothing starves: see `order` for how long a pair waits for a turn at most.
     pub(super) fn spend_on_verdicts(
         &mut self,
         world: &World,
@@ -125,6 +124,7 @@ impl Narrow {
         let (Some(a), Some(b)) = (world.body(hot.a), world.body(hot.b)) else {
             return true;
         };
+        self.urgencies[slot.index()].note_turn(self.tick);
         let turns = &mut self.memos[slot.index()].turns;
         *turns = turns.wrapping_add(1);
         let mut open = false;

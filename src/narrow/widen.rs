@@ -91,11 +91,13 @@ impl Narrow {
         {
             memo.queued = true;
             self.undecided.push(slot);
+            self.urgencies[slot.index()].note_turn(self.tick);
         }
         let reported = matches!(verdict, Verdict::Near | Verdict::Colliding);
         if reported && reachable && !(memo.tight && memo.rest) && !memo.refreshing {
             memo.refreshing = true;
             self.refresh.push(slot);
+            self.urgencies[slot.index()].note_turn(self.tick);
         }
         self.settle(slot, verdict);
     }

@@ -3,6 +3,8 @@
 use sweepd::time::Budget;
 use sweepd::wire::Verdict;
 
+use crate::oracle::meshes::{bumpy_sphere, trimesh};
+use crate::oracle::rng::Rng;
 use crate::rig::{ALL, Rig, body, scene};
 
 /// Where the second ball of a pair stands, seen from the first: at this distance, off all axes, so that their boxes
@@ -46,6 +48,135 @@ fn decided(rig: &Rig, pairs: usize) -> Vec<bool> {
         rows.any(|row| row.body_a == a && row.verdict == possible)
     };
     (0..pairs).map(|pair| !open(pair)).collect()
+}
+
+/// Ticks that a pair waits for a turn at most, as `narrow/order.rs` states it.
+///
+/// * `pairs` - that wait at the same time; `turns` - a tick; `ratio` - of the greatest weight to the least.
+fn longest_wait(pairs: u64, turns: u64, ratio: u64) -> u64 {
+    let round = pairs.div_ceil(turns);
+    ratio * (16 + 2).max(round + 1) + round
+}
+
+/// The factor of what comes nearer.
+const CLOSING: u64 = 4;
+
+#[test]
+fn law_4_7_with_random_motion_priorities_and_a_viewpoint_no_pair_waits_longer_than_is_stated() {
+    const PAIRS: usize = 30;
+    const UNITS: u64 = 3;
+    let mut rng = Rng::new(41);
+    let mut bodies = Vec::new();
+    for pair in 0..PAIRS {
+        let (id, x) = (2 * pair as u64 + 1, 20.0 * pair as f64);
+        let priority = if rng.below(2) == 0 { 1.0 } else { 2.0 };
+        let [dx, dy, dz] = offset(2.1, 0.0);
+        bodies.push(ball(id, [x, 0.0, 0.0], 1.0));
+        bodies.push(ball(id + 1, [x + dx, dy, dz], priority));
+    }
+    let view = "[viewpoint]\nposition = [200.0, -60.0, 0.0]\ndirection = [0.0, 1.0, 0.0]\nhalf_angle_rad = 0.7\nweight = 2.0\n";
+    let mut rig = Rig::new(&scene(view, &bodies));
+    rig.send(ALL);
+    let mut waits = [0_u64; PAIRS];
+    let (mut longest, mut waiting) = (0, 0);
+    for _ in 0..1_500 {
+        for pair in 0..PAIRS {
+            // In and out of contact, some at rest: half of all that moves is in touch at its last test.
+            if rng.below(4) > 0 {
+                put(
+                    &mut rig,
+                    pair,
+                    offset(rng.range(1.9, 2.15), rng.range(0.0, 6.0)),
+                );
+            }
+        }
+        rig.send(Budget::units(UNITS));
+        let decided = decided(&rig, PAIRS);
+        waiting = waiting.max(decided.iter().filter(|decided| !**decided).count());
+        // A turn decides a convex pair.
+        for (wait, decided) in waits.iter_mut().zip(decided) {
+            *wait = if decided { 0 } else { *wait + 1 };
+            longest = longest.max(*wait);
+        }
+        assert!(longest >= rig.out.tick.oldest_undecided_ticks);
+    }
+    let most = longest_wait(waiting as u64 + UNITS, UNITS, 2 * CLOSING * 2);
+    assert!(
+        waiting > PAIRS / 2 && longest > 5,
+        "{waiting} waited, {longest} ticks"
+    );
+    assert!(longest <= most, "{longest} of {most} ticks");
+}
+
+#[test]
+fn bug_contacts_that_were_confirmed_each_tick_kept_all_others_waiting() {
+    const PAIRS: usize = 20;
+    const CONTACTS: usize = 12;
+    const UNITS: u64 = 4;
+    let mut rig = pairs(&[1.0; PAIRS]);
+    let place = |rig: &mut Rig, tick: usize| {
+        for pair in 0..PAIRS {
+            // What touches, touches by less than it moves in a tick.
+            let distance_m = if pair < CONTACTS { 1.999 } else { 2.1 };
+            put(rig, pair, offset(distance_m, 0.15 * tick as f64));
+        }
+    };
+    place(&mut rig, 0);
+    rig.send(ALL);
+    let most = longest_wait(PAIRS as u64, UNITS, CLOSING);
+    for tick in 1..400 {
+        place(&mut rig, tick);
+        rig.send(Budget::units(UNITS));
+        let oldest = rig.out.tick.oldest_undecided_ticks;
+        assert!(oldest <= most, "{oldest} of {most} ticks in tick {tick}");
+    }
+}
+
+#[test]
+fn bug_pairs_that_no_turn_decided_kept_all_others_waiting() {
+    const MESHES: usize = 4;
+    const BALLS: usize = 6;
+    const UNITS: u64 = 40;
+    let mesh = trimesh(&bumpy_sphere(24, 48, 0.05), None);
+    let mut bodies = Vec::new();
+    for pair in 0..MESHES + BALLS {
+        let (id, x) = (2 * pair as u64 + 1, 20.0 * pair as f64);
+        let [dx, dy, dz] = offset(2.1, 0.0);
+        for (id, at) in [(id, [x, 0.0, 0.0]), (id + 1, [x + dx, dy, dz])] {
+            bodies.push(if pair < MESHES {
+                body(id, at, &mesh, "")
+            } else {
+                ball(id, at, 1.0)
+            });
+        }
+    }
+    let mut rig = Rig::new(&scene("", &bodies));
+    rig.send(ALL);
+    let most = longest_wait((MESHES + BALLS) as u64, 1, CLOSING);
+    let mut rng = Rng::new(42);
+    let (mut waits, mut open) = ([0_u64; MESHES + BALLS], 0);
+    for tick in 0..400 {
+        for pair in 0..MESHES + BALLS {
+            put(&mut rig, pair, offset(2.1, 0.15 * f64::from(tick)));
+            // What turns so far has nothing left of what was proved.
+            let [x, y, z, w] = *rng.rotation().as_vector().as_ref();
+            rig.row(2 * pair as u64 + 2).orientation = [x, y, z, w];
+        }
+        rig.send(Budget::units(UNITS));
+        let decided = decided(&rig, MESHES + BALLS);
+        open += decided[..MESHES]
+            .iter()
+            .filter(|decided| !**decided)
+            .count();
+        for (wait, decided) in waits.iter_mut().zip(decided).skip(MESHES) {
+            *wait = if decided { 0 } else { *wait + 1 };
+            assert!(*wait <= most, "{wait} of {most} ticks in tick {tick}");
+        }
+    }
+    assert!(
+        open > 200 * MESHES,
+        "the meshes are to be too much for the budget: {open}"
+    );
 }
 
 #[test]
