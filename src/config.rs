@@ -85,6 +85,39 @@ impl BroadMethod {
     }
 }
 
+/// How a pair of surfaces is searched: the order in which pairs of their boxes are tested, and what is kept of it.
+///
+/// Bounds and contact sets are found in one order by all of them: best first, and to the end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MeshSearch {
+    /// Certificates are carried from pose to pose; depth first, the deepest overlap first.
+    #[default]
+    Carried,
+    /// As `Carried`, but each pose starts from the roots.
+    Restart,
+    /// Each pose starts from the roots, level by level (Hubbard 1996): a baseline.
+    BreadthFirst,
+    /// Each pose starts from the roots, deepest overlap of all first (a plain priority queue): a baseline.
+    Priority,
+}
+
+impl MeshSearch {
+    /// Every search, with the name that it is chosen by.
+    pub const NAMED: &'static [(Self, &'static str)] = &[
+        (Self::Carried, "carried"),
+        (Self::Restart, "restart"),
+        (Self::BreadthFirst, "breadth_first"),
+        (Self::Priority, "priority"),
+    ];
+
+    /// The search of a name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        let found = Self::NAMED.iter().find(|(_, known)| *known == name);
+        found.map(|(search, _)| *search)
+    }
+}
+
 /// What happens to a body that is too old.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -152,6 +185,8 @@ pub struct Config {
     pub late_ns: u64,
     /// The broad phase that the scene asks for; `None`: the plan chooses.
     pub broad_phase: Option<BroadMethod>,
+    /// How pairs of surfaces are searched; `None`: the scene leaves it to the daemon, which carries certificates.
+    pub mesh_search: Option<MeshSearch>,
     /// Beyond this reach a stale body makes no new pairs, metres.
     pub stale_reach_m: f64,
     /// From where somebody looks.
@@ -200,6 +235,7 @@ impl Default for Config {
             heartbeat_ns: limits::HEARTBEAT_MS_DEFAULT * 1_000_000,
             late_ns: 5_000_000,
             broad_phase: None,
+            mesh_search: None,
             stale_reach_m: 1.0,
             viewpoint: None,
             limits: Limits::default(),

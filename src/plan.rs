@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use crate::broad::Method;
-use crate::config::{Config, Viewpoint};
+use crate::config::{Config, MeshSearch, Viewpoint};
 use crate::ids::BodySlot;
 use crate::limits::LEGS_MAX;
 use crate::shape::Geometry;
@@ -170,6 +170,26 @@ fn weighted_by(viewpoint: &Viewpoint) -> Choice {
     }
 }
 
+fn searched(asked: Option<MeshSearch>) -> Choice {
+    let chosen = match asked.unwrap_or_default() {
+        MeshSearch::Carried => {
+            "certificates carried from pose to pose, depth first to a verdict, best first to bounds"
+        }
+        MeshSearch::Restart => "depth first to a verdict, from the roots at each pose",
+        MeshSearch::BreadthFirst => "breadth-first queue, from the roots at each pose",
+        MeshSearch::Priority => "priority queue, from the roots at each pose",
+    };
+    Choice {
+        part: "search of mesh pairs",
+        chosen: chosen.to_owned(),
+        why: match asked {
+            Some(_) => "the scene asks for it",
+            None => "the least work at any speed that was measured but the fastest",
+        }
+        .to_owned(),
+    }
+}
+
 fn choices(facts: &Facts, method: Method, config: &Config) -> Vec<Choice> {
     let chosen = match method {
         Method::BruteForce => "every pair of boxes",
@@ -206,6 +226,9 @@ fn choices(facts: &Facts, method: Method, config: &Config) -> Vec<Choice> {
             facts.shapes[0], facts.shapes[1]
         ),
     });
+    if facts.shapes[1] > 0 {
+        choices.push(searched(config.mesh_search));
+    }
     choices.extend(config.viewpoint.as_ref().map(weighted_by));
     if facts.continuous > 0 {
         choices.push(Choice {

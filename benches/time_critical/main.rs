@@ -87,7 +87,7 @@ impl Subject {
         match name {
             "walk" => Self::Restart(Box::new(Restart::new(false))),
             "walk_witness" => Self::Restart(Box::new(Restart::new(true))),
-            _ => Self::Engine(*Search::ALL.iter().find(|s| s.name() == name).unwrap()),
+            _ => Self::Engine(Search::named(name).unwrap()),
         }
     }
 

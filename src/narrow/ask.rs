@@ -12,7 +12,7 @@ use super::Counters;
 use super::arena::Arena;
 use super::cursor::{Cursor, Room, Turn};
 use super::memo::{Witness, bent};
-use super::mesh::{FrontStore, Goal};
+use super::mesh::{FrontStore, Goal, Search};
 
 /// What is known of two bodies after a query of their own.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +43,7 @@ pub fn gap_between(a: &Body, b: &Body, report_m: f64, meter: &mut Meter<'_>) -> 
     let (mut counters, mut fronts) = (Counters::default(), FrontStore::default());
     let (mut contacts, mut found) = (Arena::default(), Vec::new());
     let mut room = Room {
+        search: Search::default(),
         fronts: &mut fronts,
         contacts: &mut contacts,
         found: &mut found,

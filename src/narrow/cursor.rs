@@ -12,7 +12,7 @@ use super::arena::{Arena, Run};
 use super::contacts::Contact;
 use super::exact::Warm;
 use super::memo::Witness;
-use super::mesh::{CarriedFront, FrontStore, Goal, MeshQuery};
+use super::mesh::{CarriedFront, FrontStore, Goal, MeshQuery, Search};
 use super::query::{
     add_manifold, is_simple, leaf_contact, shape_gap, shape_pose, sound, sphere_bound, witness_of,
 };
@@ -55,6 +55,8 @@ pub(super) struct Room<'a> {
     pub(super) contacts: &'a mut Arena<Contact>,
     /// Contacts of the query at hand.
     pub(super) found: &'a mut Vec<Contact>,
+    /// How surfaces are searched.
+    pub(super) search: Search,
 }
 
 impl Default for Cursor {
@@ -198,6 +200,7 @@ impl Cursor {
             return true;
         }
         if !std::mem::replace(&mut self.under_way, true) {
+            self.meshes.set_search(room.search);
             (self.meshes).start(room.fronts, &one.shape, &other.shape, &pos12);
         }
         counters.slices += 1;

@@ -227,6 +227,7 @@ impl Narrow {
             cursor.start((rel, bent(a, b)), credit_m, self.tick, goal);
         }
         let mut room = Room {
+            search: self.search,
             fronts: &mut self.front_store,
             contacts: &mut self.found_store,
             found: &mut self.found,

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use crate::config::{BroadMethod, Config, Limits, Mode};
+use crate::config::{BroadMethod, Config, Limits, MeshSearch, Mode};
 use crate::error::{Error, Result};
 use crate::limits;
 use crate::scene::node::{Fault, Node, Value};
@@ -45,6 +45,7 @@ const RUN_KEYS: &[&str] = &[
     "late_ms",
     "stale_reach_m",
     "broad_phase",
+    "mesh_search",
 ];
 const LIMIT_KEYS: &[&str] = &[
     "bodies",
@@ -297,29 +298,35 @@ fn read_run(
     if let Some(reach_m) = table.number_within("stale_reach_m", 0.0, limits::EXTENT_MAX_M)? {
         config.stale_reach_m = reach_m;
     }
-    config.broad_phase = read_broad_phase(&mut table)?;
+    config.broad_phase = read_named(&mut table, "broad_phase", BroadMethod::NAMED)?;
+    config.mesh_search = read_named(&mut table, "mesh_search", MeshSearch::NAMED)?;
     Ok(config)
 }
 
-/// `broad_phase = "auto"`, or the name of a method.
-fn read_broad_phase(table: &mut Table) -> std::result::Result<Option<BroadMethod>, Fault> {
-    let at = table.at("broad_phase");
-    let Some(word) = table.text("broad_phase")? else {
+/// `"auto"`, or the name of a method.
+fn read_named<T: Copy>(
+    table: &mut Table,
+    key: &str,
+    named: &[(T, &str)],
+) -> std::result::Result<Option<T>, Fault> {
+    let at = table.at(key);
+    let Some(word) = table.text(key)? else {
         return Ok(None);
     };
     if word == "auto" {
         return Ok(None);
     }
-    let names = BroadMethod::NAMED.iter().map(|(_, name)| *name);
     let unknown = || {
+        let names: Vec<_> = named.iter().map(|(_, name)| *name).collect();
         let text = format!(
-            "broad_phase is \"{}\": write \"auto\" or one of {}",
+            "{key} is \"{}\": write \"auto\" or one of {}",
             shortened(&word),
-            names.collect::<Vec<_>>().join(", ")
+            names.join(", ")
         );
         Fault::new(at, text)
     };
-    BroadMethod::named(&word).map(Some).ok_or_else(unknown)
+    let found = named.iter().find(|(_, name)| *name == word);
+    found.map(|(method, _)| Some(*method)).ok_or_else(unknown)
 }
 
 /// `mode = "on_all"`, `on_frame = "SOURCE"` or `rate = HZ`; one of them.

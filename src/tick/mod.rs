@@ -91,6 +91,8 @@ impl Engine {
         let limits = scene.config.limits;
         let world = World::new(scene, shapes, clock.boottime_ns())?;
         let plan = Plan::of(&world, &scene.config);
+        let mut narrow = Narrow::new(limits.contacts_per_pair);
+        narrow.set_search(scene.config.mesh_search.unwrap_or_default());
         Ok(Self {
             broad: BroadPhase::new(plan.method()),
             method: plan.method(),
@@ -99,7 +101,7 @@ impl Engine {
             whole: ChangeSet::default(),
             pairs: PairSet::new(limits.pairs),
             delta: PairDelta::default(),
-            narrow: Narrow::new(limits.contacts_per_pair),
+            narrow,
             publisher: Publisher::new(limits),
             out: Outbox {
                 plan: plan.to_json(),

@@ -45,6 +45,8 @@ impl Engine {
             (self.checked + 1).min(self.tick),
             self.tick,
         );
+        self.narrow
+            .set_search(self.config.mesh_search.unwrap_or_default());
         self.publisher.forget_slots();
         Some(format!(
             "a structure did not hold and was built anew: {why}"

@@ -23,6 +23,7 @@ mod order;
 mod rest;
 mod rig;
 mod schedule;
+mod search;
 mod shapes;
 mod state;
 mod verdicts;

@@ -32,6 +32,7 @@ pub struct MeshQuery {
     pos12: Pose,
     /// Which trees the places in `half_space` are of.
     trees: [u32; 2],
+    search: Search,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -52,11 +53,17 @@ impl Default for MeshQuery {
             half_space: HalfSpaceWalk::default(),
             pos12: Pose::identity(),
             trees: [0; 2],
+            search: Search::default(),
         }
     }
 }
 
 impl MeshQuery {
+    /// How surfaces are searched from the next start on.
+    pub fn set_search(&mut self, search: Search) {
+        self.search = search;
+    }
+
     /// Starts a query; from here on [`MeshQuery::interval`] is sound.
     ///
     /// * `pos12` - pose of `b` seen from `a`, unit quaternion.
@@ -78,7 +85,12 @@ impl MeshQuery {
         match (Side::of(a), Side::of(b)) {
             (Some(Side::Convex(_)), Some(Side::Convex(_))) => {}
             (Some(_), Some(_)) => {
-                self.front.start(store, a, b, pos12, Search::Restart);
+                // A query has one pose: there is nothing to carry.
+                let search = match self.search {
+                    Search::Carried => Search::Restart,
+                    other => other,
+                };
+                self.front.start(store, a, b, pos12, search);
                 self.kind = Kind::Surfaces;
             }
             (None, Some(Side::Mesh(mesh))) => self.start_half_space(a, mesh, pos12, false),

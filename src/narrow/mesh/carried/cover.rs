@@ -3,6 +3,7 @@
 
 use std::cmp::Ordering;
 
+pub use crate::config::MeshSearch as Search;
 use crate::narrow::arena::{Arena, Run};
 use crate::shape::BoxId;
 
@@ -107,41 +108,6 @@ impl PartialEq for Open {
 }
 
 impl Eq for Open {}
-
-/// How a front goes about a pair.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Search {
-    /// Certificates are carried from pose to pose; depth first, the deepest overlap first.
-    #[default]
-    Carried,
-    /// As `Carried`, but each pose starts from the roots.
-    Restart,
-    /// Each pose starts from the roots, level by level (Hubbard 1996): the baseline.
-    BreadthFirst,
-    /// Each pose starts from the roots, deepest overlap of all first (a plain priority queue): the baseline.
-    Priority,
-}
-
-impl Search {
-    /// All of them.
-    pub const ALL: [Self; 4] = [
-        Self::Carried,
-        Self::Restart,
-        Self::BreadthFirst,
-        Self::Priority,
-    ];
-
-    /// What it is called.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Carried => "carried",
-            Self::Restart => "restart",
-            Self::BreadthFirst => "breadth_first",
-            Self::Priority => "priority",
-        }
-    }
-}
 
 /// The pairs of one front that may touch, in the order of a search.
 #[derive(Debug, Default)]
