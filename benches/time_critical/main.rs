@@ -7,7 +7,7 @@
 //! the end over the other trees.
 //!
 //! `cargo bench --bench time_critical [-- --quick] [--cold] [METHOD..]`, and `-- regions` for approximate contacts
-//! alone (see `regions`).
+//! alone (see `regions`); `-- peers FOLDER` is a part of `benches/mesh_peers.py`.
 
 #![allow(
     clippy::cast_precision_loss,
@@ -22,6 +22,7 @@
 mod common;
 #[path = "../../tests/oracle/mod.rs"]
 mod oracle;
+mod peers;
 mod regions;
 mod restart;
 mod stage;
@@ -193,6 +194,10 @@ fn main() {
         .collect();
     let ticks = if quick { 20 } else { 99 };
     let shapes = shapes();
+    if let Some(at) = only.iter().position(|name| name == "peers") {
+        peers::run(&shapes, std::path::Path::new(&only[at + 1]));
+        return;
+    }
     if only.iter().any(|name| name == "regions") {
         regions::run(&shapes, quick);
         return;
