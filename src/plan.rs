@@ -184,7 +184,7 @@ fn searched(asked: Option<MeshSearch>) -> Choice {
         chosen: chosen.to_owned(),
         why: match asked {
             Some(_) => "the scene asks for it",
-            None => "the least work at any speed that was measured but the fastest",
+            None => "the least work at every speed that was measured",
         }
         .to_owned(),
     }
