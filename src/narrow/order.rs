@@ -131,8 +131,8 @@ impl Urgency {
         self.turn = cut(tick);
     }
 
-    /// Place in the order of work, the least first: waiting times weight, the greatest first (positive floats order like
-    /// their bits).
+    /// Place in the order of work, the least first: waiting times weight, the greatest first (positive floats order
+    /// like their bits).
     ///
     /// * `seen` - weight of the place where it is (`Gaze::weight`); 1 without a viewpoint.
     fn rank(self, tick: u64, seen: f64) -> u64 {
