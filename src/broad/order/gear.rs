@@ -22,6 +22,13 @@ const MEETS_SHARE: u64 = 128;
 const MEAN_TICKS: u64 = 16;
 /// ... and ticks after a sort of all that do not count: bodies have yet to learn their margins.
 const SETTLE_TICKS: u64 = 16;
+/// After so many ticks candidates that take twice as much as none are given up without a longer look, ...
+const EARLY_TICKS: u64 = 8;
+/// ... by the mean of so many ...
+const EARLY_MEAN: u64 = 4;
+const HOPELESS: u64 = 2;
+/// ... and not tried again for so many ticks: a trial costs several times what it tries to save.
+const SPELL_LONG: u32 = 512;
 /// Below so many bodies either way takes next to nothing.
 const BODIES_MIN: u64 = 64;
 /// Ticks without candidates before these are tried again; twice as many each time that they prove no better.
@@ -80,6 +87,7 @@ impl Gear {
         } else {
             self.calm.saturating_add(1)
         };
+        let mut hopeless = false;
         let chosen = if on {
             self.left = self.left.saturating_sub(1);
             let calm = self.calm >= CALM_TICKS;
@@ -95,10 +103,11 @@ impl Gear {
                 MEETS_LEAST + usual / MEETS_SHARE
             };
             let scratch = bodies * (BODY + meets * MEET);
+            let seen = self.ticks.saturating_sub(self.counted_from());
+            hopeless = seen >= EARLY_MEAN && self.mean > scratch * HOPELESS;
             // A fifth more: a change costs as much as some ticks.
-            self.ticks >= SETTLE_TICKS + MEAN_TICKS
-                && bodies >= BODIES_MIN
-                && self.mean * 5 > scratch * 6
+            let settled = self.ticks >= SETTLE_TICKS + MEAN_TICKS;
+            bodies >= BODIES_MIN && (hopeless || (settled && self.mean * 5 > scratch * 6))
         };
         if chosen != on {
             if chosen {
@@ -108,11 +117,23 @@ impl Gear {
                 } else {
                     SPELL_MIN
                 };
+                if hopeless {
+                    self.spell = self.spell.max(SPELL_LONG);
+                }
                 self.left = self.spell;
             }
             (self.since, self.ticks, self.mean) = (0, 0, 0);
         }
         chosen
+    }
+
+    /// The tick after which the mean begins: early ones count until bodies have settled.
+    fn counted_from(&self) -> u64 {
+        if self.ticks > SETTLE_TICKS {
+            SETTLE_TICKS
+        } else {
+            EARLY_TICKS
+        }
     }
 
     /// Takes the work of a tick without candidates.
@@ -131,10 +152,10 @@ impl Gear {
         }
         let cost = moved as u64 * TAKE + work.tests * TEST + work.renewed * RENEW + lanes * LANE;
         self.ticks += 1;
-        if self.ticks <= SETTLE_TICKS {
+        if self.ticks <= EARLY_TICKS {
             return;
         }
-        let share = (self.ticks - SETTLE_TICKS).min(MEAN_TICKS);
+        let share = (self.ticks - self.counted_from()).min(MEAN_TICKS);
         self.mean = (self.mean * (share - 1) + cost) / share;
     }
 }
@@ -175,6 +196,16 @@ mod tests {
         let calm = work(2_000, 60);
         run(&mut gear, &mut on, SPELL_MAX + 1, &calm);
         assert_eq!(run(&mut gear, &mut on, 1000, &calm), 0);
+    }
+
+    #[test]
+    fn candidates_that_take_twice_as_much_are_given_up_early() {
+        let (mut gear, mut on) = (Gear::default(), false);
+        let wild = work(10_000, 900);
+        assert_eq!(run(&mut gear, &mut on, 100, &wild), 88);
+        let left = SPELL_LONG - 88;
+        assert_eq!(run(&mut gear, &mut on, left, &wild), left);
+        assert_eq!(run(&mut gear, &mut on, 1, &wild), 0);
     }
 
     #[test]
