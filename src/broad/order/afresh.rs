@@ -14,7 +14,8 @@
 
 use super::gear::Gear;
 use super::lay::TakeLanes;
-use super::met::{Met, Sweep, tell_all, tell_asked, tell_difference};
+use super::met::{Met, tell_all, tell_asked, tell_difference};
+use super::sweep::{Scratch, Sweep};
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, Work as Done, parts};
 use crate::broad::members::{ASKED, CAME, Members};
 use crate::ids::PairKey;
@@ -49,7 +50,7 @@ pub(super) struct Afresh {
     pub(super) found: Met,
     /// Ranks of boxes for which rounding leaves it open.
     pub(super) open: Vec<[u32; 2]>,
-    pub(super) near: Vec<u32>,
+    pub(super) scratch: Scratch,
     /// By block: lanes whose body has left since the last tick.
     pub(super) gone: Vec<u16>,
     /// By block: the space from which it is met, when it was laid; and the mean side of a block then.
@@ -248,7 +249,7 @@ impl Order {
         proxies: &P,
     ) -> Result<(), String> {
         let bodies = members.bounded();
-        let held = self.afresh.held.hits();
+        let held = self.afresh.held.count();
         if bodies.len() != self.len || held != self.hits {
             return Err(format!(
                 "{} bodies have lanes, {} boxes are in; {held} overlaps, {} counted",

@@ -65,11 +65,14 @@ impl Order {
         let blocks = self.live.len();
         self.measure();
         let Afresh {
-            gone, near, open, ..
+            gone,
+            scratch,
+            open,
+            ..
         } = &mut self.afresh;
         gone.clear();
         gone.resize(blocks, 0);
-        room(near, blocks);
+        scratch.reserve(blocks);
         room(open, bodies.len());
         spare(&mut self.carried, self.hits, bodies.len());
     }

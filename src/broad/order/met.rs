@@ -4,9 +4,9 @@
 //! those of two ticks with the same lanes differ by their bits alone.
 
 use super::links::{Matrix, room, small, spare};
-use super::{BodySlot, Order, ones, parts};
+use super::{BodySlot, ones, parts};
 use crate::ids::PairKey;
-use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch, slack};
+use crate::simd::boxes::WIDTH;
 
 /// The overlaps of a tick.
 #[derive(Debug, Default)]
@@ -17,6 +17,8 @@ pub(super) struct Met {
     others: Vec<u32>,
     /// ... and lanes of the other by lane of its own. Within one block only bits above the row's own.
     hits: Vec<Matrix>,
+    /// Bits in all of them.
+    count: usize,
 }
 
 impl Clone for Met {
@@ -31,6 +33,7 @@ impl Clone for Met {
         self.firsts.clone_from(&from.firsts);
         self.others.clone_from(&from.others);
         self.hits.clone_from(&from.hits);
+        self.count = from.count;
     }
 }
 
@@ -40,6 +43,7 @@ impl Met {
         self.firsts.clear();
         self.others.clear();
         self.hits.clear();
+        self.count = 0;
     }
 
     /// Room for more than it, or another of its size, holds: how many records there are differs from tick to tick, and
@@ -68,8 +72,21 @@ impl Met {
 
     /// What follows belongs to the next block.
     #[inline(always)]
-    fn open_block(&mut self) {
+    pub(super) fn open_block(&mut self) {
         self.firsts.push(small(self.others.len()));
+    }
+
+    /// A record of the block at hand; its overlaps are counted by [`Met::add`].
+    #[inline(always)]
+    pub(super) fn push(&mut self, other: u32, hits: Matrix) {
+        self.others.push(other);
+        self.hits.push(hits);
+    }
+
+    /// Counts overlaps.
+    #[inline(always)]
+    pub(super) fn add(&mut self, overlaps: usize) {
+        self.count += overlaps;
     }
 
     /// The record of two ranks' blocks, and row and lane in it.
@@ -95,11 +112,17 @@ impl Met {
         let bits = &mut self.hits[at][row];
         let was = *bits >> lane & 1 == 1;
         *bits &= !(1 << lane);
+        self.count -= usize::from(was);
         was
     }
 
     /// How many there are.
     pub(super) fn hits(&self) -> usize {
+        self.count
+    }
+
+    /// How many there are, counted again.
+    pub(super) fn count(&self) -> usize {
         let rows = self.hits.iter().flatten();
         rows.map(|row| row.count_ones() as usize).sum()
     }
@@ -241,136 +264,4 @@ fn each(hits: &Matrix, mut with: impl FnMut(usize, usize)) {
             with(row, lane);
         }
     }
-}
-
-/// Finds the overlaps of what stands in the lanes; returns how many boxes were compared with a block.
-pub(super) struct Sweep<'a> {
-    pub(super) order: &'a mut Order,
-}
-
-impl Work for Sweep<'_> {
-    type Out = u64;
-
-    #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) -> u64 {
-        let order = self.order;
-        let mut near = std::mem::take(&mut order.afresh.near);
-        let mut open = std::mem::take(&mut order.afresh.open);
-        let mut met = std::mem::take(&mut order.afresh.found);
-        met.clear();
-        let mut tests = 0;
-        for block in 0..order.live.len() {
-            met.open_block();
-            if block.is_multiple_of(WIDTH) {
-                order.tree.query_nodes(lanes, block / WIDTH);
-            }
-            if order.live[block] == 0 {
-                continue;
-            }
-            near.clear();
-            order.tree.query_among(lanes, small(block), &mut near);
-            tests += near.len() as u64;
-            for (at, other) in near.iter().enumerate() {
-                if let Some(next) = near.get(at + 2) {
-                    prefetch(&order.fat[*next as usize]);
-                }
-                let mut hits = [0; WIDTH];
-                tests += order.cross(lanes, [block, *other as usize], &mut hits, &mut open);
-                if hits.iter().fold(0, |all, row| all | row) != 0 {
-                    met.others.push(*other);
-                    met.hits.push(hits);
-                }
-            }
-        }
-        met.open_block();
-        order.afresh.near = near;
-        order.afresh.open = open;
-        order.afresh.found = met;
-        tests
-    }
-}
-
-impl Order {
-    /// Finds the overlaps of two blocks, or within one; returns how many boxes were compared with a block.
-    #[inline(always)]
-    fn cross<L: Lanes>(
-        &self,
-        lanes: L,
-        [block, other]: [usize; 2],
-        hits: &mut Matrix,
-        open: &mut Vec<[u32; 2]>,
-    ) -> u64 {
-        if block == other {
-            let live = self.live[block];
-            let by = slack(farthest(self.tree.bound(block)));
-            for lane in ones(live) {
-                // Each pair once, and none of a body with itself.
-                let above = u16::MAX << lane << 1;
-                hits[lane] = self.meet(lanes, [block, lane], other, above, by, open);
-            }
-            return u64::from(live.count_ones());
-        }
-        let rows = lanes.meets(&self.fat[block], self.tree.bound(other));
-        if rows == 0 {
-            return 0;
-        }
-        // The fewer of those that come near the other block are compared with it.
-        let columns = lanes.meets(&self.fat[other], self.tree.bound(block));
-        let counts = [rows.count_ones(), columns.count_ones()];
-        if counts[0] <= counts[1] {
-            let by = slack(farthest(self.tree.bound(block)));
-            for row in ones(rows) {
-                hits[row] = self.meet(lanes, [block, row], other, u16::MAX, by, open);
-            }
-            return u64::from(counts[0]);
-        }
-        let by = slack(farthest(self.tree.bound(other)));
-        for lane in ones(columns) {
-            let met = self.meet(lanes, [other, lane], block, u16::MAX, by, open);
-            for row in ones(met) {
-                hits[row] |= 1 << lane;
-            }
-        }
-        u64::from(counts[1])
-    }
-
-    /// The lanes of a block that a box meets as they are rounded; what is not sure is noted as open.
-    ///
-    /// * `by` - the slack of the box, or more.
-    #[inline(always)]
-    fn meet<L: Lanes>(
-        &self,
-        lanes: L,
-        [block, lane]: [usize; 2],
-        other: usize,
-        among: u16,
-        by: f32,
-        open: &mut Vec<[u32; 2]>,
-    ) -> u16 {
-        let (one, theirs) = (self.fat[block].get(lane), &self.fat[other]);
-        let met = lanes.meets(theirs, &one) & among;
-        if met != 0 {
-            // Drawn in by its slack: what meets that surely overlaps it, as `Lanes::parts` tells.
-            let [x, y, z, u, v, w] = one;
-            let less = [x + by, y + by, z + by, u - by, v - by, w - by];
-            let sure = lanes.meets(theirs, &less);
-            for theirs in ones(met & !sure) {
-                let ranks = [block * WIDTH + lane, other * WIDTH + theirs];
-                open.push(ranks.map(small));
-            }
-        }
-        met
-    }
-}
-
-/// How far the farthest face of a box is from the origin; of a block's bound, at least as far as that of any of its
-/// boxes. To reckon it once a block costs less than once a box.
-#[inline(always)]
-fn farthest(one: &[f32; 6]) -> f32 {
-    let mut largest = 0.0_f32;
-    for face in one {
-        let far = face.abs();
-        largest = if far > largest { far } else { largest };
-    }
-    largest
 }

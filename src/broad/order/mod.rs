@@ -15,7 +15,7 @@
 //!   seldom sorted anew.
 //! * **Exact.** Boxes are f32, rounded outward, relative to an f64 origin amid the scene; where rounding could tell
 //!   otherwise than the f64 boxes, those are asked. So the pairs are those of the f64 boxes at any offset.
-//! * **Without candidates** (`afresh`, `met`): where no fat box lasts, nothing is kept but lanes and overlaps.
+//! * **Without candidates** (`afresh`, `sweep`, `met`): where no fat box lasts, nothing is kept but lanes and overlaps.
 //! * **Modes** (few or many moved; renewal, sorting anew, without candidates) are chosen by counted work with weights
 //!   that were measured once, so that a replay chooses alike. They decide about cost alone: pairs, slots and events are
 //!   the same.
@@ -46,6 +46,7 @@ mod met;
 mod place;
 mod renew;
 mod sort;
+mod sweep;
 mod tree;
 mod validate;
 

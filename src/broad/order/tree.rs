@@ -185,18 +185,39 @@ impl Tree {
         self.nodes = nodes;
     }
 
-    /// Appends the blocks whose bound meets that of a block of the node noted last, from the block on, ascending.
+    /// The blocks whose bound meets that of a block of the node noted last, from the block on, ascending.
+    ///
+    /// * `children` - memory kept over calls: lowest nodes, and which of their blocks.
     #[inline(always)]
-    pub(super) fn query_among<L: Lanes>(&self, lanes: L, block: u32, found: &mut Vec<u32>) {
+    pub(super) fn query_among<L: Lanes>(
+        &self,
+        lanes: L,
+        block: u32,
+        children: &mut Vec<(u32, u16)>,
+        found: &mut Vec<u32>,
+    ) {
         let bound = &self.bounds[block as usize];
+        // How many blocks a node has near is a guess that fails: it is neither in this loop nor in the next.
+        children.clear();
+        children.resize(self.nodes.len() + 1, (0, 0));
+        let (mut kept, mut blocks) = (0, 0);
         for node in &self.nodes {
-            let mut hits = lanes.meets(&self.levels[0][*node as usize], bound);
             let early = block.saturating_sub(node * LANES);
-            hits &= u16::MAX.checked_shl(early).unwrap_or(0);
-            while hits != 0 {
-                found.push(node * LANES + hits.trailing_zeros());
-                hits &= hits - 1;
-            }
+            let after = u16::MAX.checked_shl(early).unwrap_or(0);
+            let hits = lanes.meets(&self.levels[0][*node as usize], bound) & after;
+            children[kept] = (node * LANES, hits);
+            kept += usize::from(hits != 0);
+            blocks += hits.count_ones() as usize;
+        }
+        found.clear();
+        found.resize(blocks, 0);
+        let (mut at, (mut first, mut left)) = (0, children[0]);
+        for found in found {
+            *found = first + left.trailing_zeros();
+            left &= left.wrapping_sub(1);
+            at += usize::from(left == 0);
+            let next = children[at];
+            (first, left) = if left == 0 { next } else { (first, left) };
         }
     }
 
