@@ -16,7 +16,7 @@ mod harness;
 use harness::{Drive, exact_gap};
 use sweepd::builtin::{Pattern, pile, pool};
 use sweepd::time::Budget;
-use sweepd::wire::{Demand, State, Verdict};
+use sweepd::wire::{BroadCause, BroadMode, Demand, State, Verdict};
 
 /// Every pair of bodies by brute force against what was published; returns (colliding, possible).
 fn compare(drive: &Drive) -> (usize, usize) {
@@ -144,4 +144,28 @@ fn a_scene_apart_is_clear_and_one_in_contact_is_colliding() {
     };
     assert!((contact.gap_m + 0.5).abs() < 1e-12);
     assert_eq!(contact.normal, [1.0, 0.0, 0.0]);
+}
+
+#[test]
+fn the_tick_tells_how_the_broad_phase_worked_and_why() {
+    let told = |drive: &Drive| {
+        let tick = &drive.out().tick;
+        let mode = BroadMode::from_code(tick.broad_mode).unwrap();
+        let cause = BroadCause::from_code(tick.broad_cause).unwrap();
+        (mode, cause, tick.broad_renewed)
+    };
+    let mut drive = Drive::new(&pool(300, 1), Pattern::Wander, 3);
+    drive.step(0, Budget::UNLIMITED, Demand::ALL);
+    let first = (BroadMode::Sort, BroadCause::ManyCame, 300);
+    assert_eq!(told(&drive), first, "all of a new scene are sorted");
+    // All move, and then none does.
+    drive.step(1, Budget::UNLIMITED, Demand::ALL);
+    let (mode, cause, _) = told(&drive);
+    assert_eq!((mode, cause), (BroadMode::List, BroadCause::ManyMoved));
+    drive.idle(Budget::UNLIMITED, Demand::ALL);
+    let still = (BroadMode::Sparse, BroadCause::FewMoved, 0);
+    assert_eq!(told(&drive), still);
+    let mut few = Drive::new(&pool(10, 1), Pattern::Wander, 3);
+    few.step(0, Budget::UNLIMITED, Demand::ALL);
+    assert_eq!(told(&few), (BroadMode::Whole, BroadCause::None, 0));
 }

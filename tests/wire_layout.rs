@@ -15,11 +15,11 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use sweepd::wire::{
-    AnswerHeader, BodyRow, BodyStatus, ContactKind, ContactRow, EndCause, Event, FrameHeader,
-    Hello, Level, MessageHeader, NameRow, PairRow, Reason, RegionRow, RejectReason, RequestHeader,
-    SourceRow, Stage, State, TickCause, TickRow, TransformRow, TransformVelRow, Verdict,
-    VertexHeader, VertexRow, WIRE_VERSION, contact_flags, frame_flags, pair_flags, region_flags,
-    vertex_flags,
+    AnswerHeader, BodyRow, BodyStatus, BroadCause, BroadMode, ContactKind, ContactRow, EndCause,
+    Event, FrameHeader, Hello, Level, MessageHeader, NameRow, PairRow, Reason, RegionRow,
+    RejectReason, RequestHeader, SourceRow, Stage, State, TickCause, TickRow, TransformRow,
+    TransformVelRow, Verdict, VertexHeader, VertexRow, WIRE_VERSION, contact_flags, frame_flags,
+    pair_flags, region_flags, vertex_flags,
 };
 
 struct Layout {
@@ -62,7 +62,7 @@ fn layouts() -> Vec<Layout> {
         BodyRow { body position orientation stamp_ns received_ns age_ns generation source status verdict reject reserved }
         NameRow { body source generation len reserved name }
         SourceRow { name session epoch seq stamp_ns age_ns frames skipped refused clock_id alive paused reserved }
-        TickRow { header sent_ns elapsed_ns budget_ns budget_units floor_ns units stage_ns rejects bodies unknown candidates colliding possible near ignored missed cancelled_events worst_a worst_b widest_m oldest_undecided_ticks reasons cause overrun sources_len cause_source rebuilds sources }
+        TickRow { header sent_ns elapsed_ns budget_ns budget_units floor_ns units stage_ns rejects bodies unknown candidates colliding possible near ignored missed cancelled_events worst_a worst_b widest_m oldest_undecided_ticks reasons cause overrun sources_len cause_source rebuilds broad_renewed broad_mode broad_cause reserved sources }
         Hello { magic boot_id pid uid wire_version reserved sweepd_version iceoryx2_version }
         RequestHeader { json_len request schema reserved }
         AnswerHeader { boot_id request schema ok }
@@ -80,7 +80,7 @@ macro_rules! codes {
 
 fn codes() -> Vec<(&'static str, Vec<(&'static str, u32)>)> {
     let mut all = codes! {
-        Verdict State Reason TickCause Event EndCause RejectReason BodyStatus Level ContactKind Stage
+        Verdict State Reason TickCause BroadMode BroadCause Event EndCause RejectReason BodyStatus Level ContactKind Stage
     };
     all.push((
         "FrameFlags",

@@ -95,6 +95,44 @@ enum {
     SWEEPD_TICK_CAUSE_EDIT = 3,
 };
 
+/* How the broad phase worked a tick. */
+enum {
+    /* The method has one way. */
+    SWEEPD_BROAD_MODE_WHOLE = 0,
+    /* Few bodies moved: their candidates were compared one by one. */
+    SWEEPD_BROAD_MODE_SPARSE = 1,
+    /* Many moved: all candidates were compared, as a list. */
+    SWEEPD_BROAD_MODE_LIST = 2,
+    /* All bodies were sorted anew, and their candidates found anew. */
+    SWEEPD_BROAD_MODE_SORT = 3,
+    /* No candidates are kept: overlaps were found among all boxes. */
+    SWEEPD_BROAD_MODE_SCRATCH = 4,
+};
+
+/* Why the broad phase worked a tick as it did. */
+enum {
+    /* There was nothing to choose. */
+    SWEEPD_BROAD_CAUSE_NONE = 0,
+    /* Less than a tenth of the bodies moved (a fourteenth, once they are listed). */
+    SWEEPD_BROAD_CAUSE_FEW_MOVED = 1,
+    /* More moved. */
+    SWEEPD_BROAD_CAUSE_MANY_MOVED = 2,
+    /* More than an eighth of the bodies came in. */
+    SWEEPD_BROAD_CAUSE_MANY_CAME = 3,
+    /* The order has worn: its blocks met too many others, or a body found no free place. */
+    SWEEPD_BROAD_CAUSE_WORN = 4,
+    /* By counted work, candidates took more than none would. */
+    SWEEPD_BROAD_CAUSE_COST = 5,
+    /* ... and are not tried again yet. */
+    SWEEPD_BROAD_CAUSE_SPELL = 6,
+    /* Candidates are tried again. */
+    SWEEPD_BROAD_CAUSE_TRIAL = 7,
+    /* Few have moved for some ticks: candidates will last. */
+    SWEEPD_BROAD_CAUSE_CALM = 8,
+    /* It was asked for. */
+    SWEEPD_BROAD_CAUSE_FORCED = 9,
+};
+
 /* Bits of PairRow::events; a row may carry an end and a begin, in that order but where passed says
  * otherwise. */
 enum {
@@ -800,6 +838,14 @@ typedef struct sweepd_tick_row {
     uint8_t cause_source;
     /* Where validate failed and a structure was rebuilt, times in this boot. */
     uint64_t rebuilds;
+    /* Bodies whose fat box the broad phase made anew. */
+    uint32_t broad_renewed;
+    /* BroadMode: how the broad phase worked. */
+    uint8_t broad_mode;
+    /* BroadCause: why. */
+    uint8_t broad_cause;
+    /* Zero. */
+    uint8_t reserved[2];
     /* The sources, in the scene's order. */
     sweepd_source_row sources[SWEEPD_SOURCES_MAX];
 } sweepd_tick_row;
@@ -831,8 +877,12 @@ SWEEPD_ASSERT(offsetof(sweepd_tick_row, overrun) == 405);
 SWEEPD_ASSERT(offsetof(sweepd_tick_row, sources_len) == 406);
 SWEEPD_ASSERT(offsetof(sweepd_tick_row, cause_source) == 407);
 SWEEPD_ASSERT(offsetof(sweepd_tick_row, rebuilds) == 408);
-SWEEPD_ASSERT(offsetof(sweepd_tick_row, sources) == 416);
-SWEEPD_ASSERT(sizeof(sweepd_tick_row) == 2080);
+SWEEPD_ASSERT(offsetof(sweepd_tick_row, broad_renewed) == 416);
+SWEEPD_ASSERT(offsetof(sweepd_tick_row, broad_mode) == 420);
+SWEEPD_ASSERT(offsetof(sweepd_tick_row, broad_cause) == 421);
+SWEEPD_ASSERT(offsetof(sweepd_tick_row, reserved) == 422);
+SWEEPD_ASSERT(offsetof(sweepd_tick_row, sources) == 424);
+SWEEPD_ASSERT(sizeof(sweepd_tick_row) == 2088);
 
 /* Type name "sweepd.Hello", 64 bytes. What a client reads before anything else. This layout is
  * frozen for ever. */

@@ -16,7 +16,7 @@ use crate::ids::{BodyId, BodySlot, PairKey};
 use crate::math::Aabb;
 use crate::pairs::{PairDelta, PairPolicy, PairSet};
 use crate::simd::boxes::Level;
-use crate::wire::EndCause;
+use crate::wire::{BroadCause, BroadMode, EndCause};
 use crate::world::ChangeSet;
 
 mod brute;
@@ -65,6 +65,10 @@ pub struct Work {
     pub renewed: u64,
     /// Cells that bodies were put in.
     pub cells: u64,
+    /// Which way of working was chosen.
+    pub mode: BroadMode,
+    /// Why.
+    pub cause: BroadCause,
 }
 
 /// The method at work.

@@ -9,8 +9,8 @@ use crate::error::{Error, Result};
 use crate::time::{Clock, SystemClock};
 use crate::transport::client::{Heard, Message, Restarted, Topics, View};
 use crate::wire::{
-    BodyRow, BodyStatus, ContactRow, EndCause, Event, Level, NameRow, PairRow, Reason,
-    RejectReason, Stage, State, TickCause, TickRow, Verdict, name_str, pair_flags,
+    BodyRow, BodyStatus, BroadCause, BroadMode, ContactRow, EndCause, Event, Level, NameRow,
+    PairRow, Reason, RejectReason, Stage, State, TickCause, TickRow, Verdict, name_str, pair_flags,
 };
 
 use super::args::MonitorArgs;
@@ -204,6 +204,11 @@ fn tick_json(view: &View, names: &Names, args: &MonitorArgs) -> Value {
         "state": state_word(tick),
         "reasons": reasons(tick),
         "cause": TickCause::from_code(tick.cause).map_or("?", TickCause::word),
+        "broad": {
+            "mode": BroadMode::from_code(tick.broad_mode).map_or("?", BroadMode::word),
+            "cause": BroadCause::from_code(tick.broad_cause).map_or("?", BroadCause::word),
+            "renewed": tick.broad_renewed,
+        },
         "bodies": tick.bodies,
         "unknown": tick.unknown,
         "candidates": tick.candidates,

@@ -361,6 +361,9 @@ impl Engine {
         row.overrun = u8::from(overrun);
         row.missed = self.missed;
         row.rebuilds = self.rebuilds;
+        let broad = self.broad.work();
+        row.broad_renewed = u32::try_from(broad.renewed).unwrap_or(u32::MAX);
+        (row.broad_mode, row.broad_cause) = (broad.mode.code(), broad.cause.code());
     }
 }
 

@@ -109,6 +109,60 @@ code! {
 }
 
 code! {
+    /// How the broad phase worked a tick.
+    BroadMode {
+        /// The method has one way.
+        Whole = 0 => "whole",
+        /// Few bodies moved: their candidates were compared one by one.
+        Sparse = 1 => "sparse",
+        /// Many moved: all candidates were compared, as a list.
+        List = 2 => "list",
+        /// All bodies were sorted anew, and their candidates found anew.
+        Sort = 3 => "sort",
+        /// No candidates are kept: overlaps were found among all boxes.
+        Scratch = 4 => "scratch",
+    }
+}
+
+impl Default for BroadMode {
+    fn default() -> Self {
+        Self::Whole
+    }
+}
+
+code! {
+    /// Why the broad phase worked a tick as it did.
+    BroadCause {
+        /// There was nothing to choose.
+        None = 0 => "none",
+        /// Less than a tenth of the bodies moved (a fourteenth, once they are listed).
+        FewMoved = 1 => "few_moved",
+        /// More moved.
+        ManyMoved = 2 => "many_moved",
+        /// More than an eighth of the bodies came in.
+        ManyCame = 3 => "many_came",
+        /// The order has worn: its blocks met too many others, or a body found no free place.
+        Worn = 4 => "worn",
+        /// By counted work, candidates took more than none would.
+        Cost = 5 => "cost",
+        /// ... and are not tried again yet.
+        Spell = 6 => "spell",
+        /// Candidates are tried again.
+        Trial = 7 => "trial",
+        /// Few have moved for some ticks: candidates will last.
+        Calm = 8 => "calm",
+        /// It was asked for.
+        Forced = 9 => "forced",
+    }
+}
+
+impl Default for BroadCause {
+    fn default() -> Self {
+        Self::None
+    }
+}
+
+code! {
     /// Bits of `PairRow::events`; a row may carry an end and a begin, in that order but where `Passed` says otherwise.
     Event {
         /// First tick in which the pair is certified colliding.

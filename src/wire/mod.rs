@@ -10,11 +10,13 @@ mod request;
 #[cfg(feature = "ros2")]
 pub mod ros;
 mod rows;
+mod tick;
 mod vertices;
 
 pub use codes::{
-    BodyStatus, ContactKind, EndCause, Event, Level, Reason, RejectReason, Stage, State, TickCause,
-    Verdict, contact_flags, frame_flags, pair_flags, region_flags, vertex_flags,
+    BodyStatus, BroadCause, BroadMode, ContactKind, EndCause, Event, Level, Reason, RejectReason,
+    Stage, State, TickCause, Verdict, contact_flags, frame_flags, pair_flags, region_flags,
+    vertex_flags,
 };
 pub use frame::{Frame, Inbox, name_bytes, name_str};
 pub use outbox::{Demand, Outbox};
@@ -22,9 +24,9 @@ pub use region::RegionRow;
 pub use request::{Answer, AnswerHeader, GapFound, RequestHeader};
 pub use rows::{
     BODY_NAME_LEN, BodyRow, ContactRow, FrameHeader, Hello, MessageHeader, NameRow, PairRow,
-    REJECTS_LEN, SOURCE_NAME_LEN, SOURCES_MAX, STAGES_LEN, SourceRow, TickRow, TransformRow,
-    TransformVelRow,
+    SOURCE_NAME_LEN, SOURCES_MAX, TransformRow, TransformVelRow,
 };
+pub use tick::{REJECTS_LEN, STAGES_LEN, SourceRow, TickRow};
 pub use vertices::{VertexFrame, VertexHeader, VertexRow};
 
 /// Version of every layout here; it stands in service names and type names, and in each header.

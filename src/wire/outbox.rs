@@ -1,7 +1,8 @@
 //! The outbox of a tick, and the demand that says which parts of it anybody reads.
 
 use super::region::RegionRow;
-use super::rows::{BodyRow, ContactRow, MessageHeader, NameRow, PairRow, TickRow};
+use super::rows::{BodyRow, ContactRow, MessageHeader, NameRow, PairRow};
+use super::tick::TickRow;
 
 /// What is listened to; what nobody listens to is not computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

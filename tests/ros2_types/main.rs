@@ -17,8 +17,8 @@ use std::path::Path;
 
 use sweepd::wire::ros;
 use sweepd::wire::{
-    ContactKind, EndCause, Event, Level, Reason, RejectReason, Stage, State, TickCause, Verdict,
-    contact_flags, frame_flags, pair_flags,
+    BroadCause, BroadMode, ContactKind, EndCause, Event, Level, Reason, RejectReason, Stage, State,
+    TickCause, Verdict, contact_flags, frame_flags, pair_flags,
 };
 use trace::{Kind, trace};
 
@@ -105,6 +105,8 @@ fn the_constants_of_the_messages_are_the_codes_of_the_wire() {
         (
             "Tick",
             named("", codes!(TickCause))
+                .chain(named("BROAD_MODE_", codes!(BroadMode)))
+                .chain(named("BROAD_CAUSE_", codes!(BroadCause)))
                 .chain(named("STAGE_", codes!(Stage)))
                 .chain(named("REJECT_", codes!(RejectReason)))
                 .chain(named(

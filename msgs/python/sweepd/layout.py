@@ -446,6 +446,14 @@ class TickRow(_Row):
         ("cause_source", ctypes.c_uint8),
         # Where validate failed and a structure was rebuilt, times in this boot.
         ("rebuilds", ctypes.c_uint64),
+        # Bodies whose fat box the broad phase made anew.
+        ("broad_renewed", ctypes.c_uint32),
+        # BroadMode: how the broad phase worked.
+        ("broad_mode", ctypes.c_uint8),
+        # BroadCause: why.
+        ("broad_cause", ctypes.c_uint8),
+        # Zero.
+        ("reserved", ctypes.c_uint8 * 2),
         # The sources, in the scene's order.
         ("sources", SourceRow * SOURCES_MAX),
     ]
@@ -573,6 +581,46 @@ class TickCause(IntEnum):
     HEARTBEAT = 2
     # A scene edit was applied.
     EDIT = 3
+
+
+class BroadMode(IntEnum):
+    """How the broad phase worked a tick."""
+
+    # The method has one way.
+    WHOLE = 0
+    # Few bodies moved: their candidates were compared one by one.
+    SPARSE = 1
+    # Many moved: all candidates were compared, as a list.
+    LIST = 2
+    # All bodies were sorted anew, and their candidates found anew.
+    SORT = 3
+    # No candidates are kept: overlaps were found among all boxes.
+    SCRATCH = 4
+
+
+class BroadCause(IntEnum):
+    """Why the broad phase worked a tick as it did."""
+
+    # There was nothing to choose.
+    NONE = 0
+    # Less than a tenth of the bodies moved (a fourteenth, once they are listed).
+    FEW_MOVED = 1
+    # More moved.
+    MANY_MOVED = 2
+    # More than an eighth of the bodies came in.
+    MANY_CAME = 3
+    # The order has worn: its blocks met too many others, or a body found no free place.
+    WORN = 4
+    # By counted work, candidates took more than none would.
+    COST = 5
+    # ... and are not tried again yet.
+    SPELL = 6
+    # Candidates are tried again.
+    TRIAL = 7
+    # Few have moved for some ticks: candidates will last.
+    CALM = 8
+    # It was asked for.
+    FORCED = 9
 
 
 class Event(IntEnum):

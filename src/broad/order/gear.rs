@@ -4,6 +4,7 @@
 //! measured once; they decide about cost alone.
 
 use super::{MANY_MOVED, Work};
+use crate::wire::BroadCause;
 
 /// Weights, in nanoseconds of the machine that they were measured on: a box taken, a candidate compared, a fat box
 /// renewed, a lane given up or taken ...
@@ -44,6 +45,8 @@ const CALM_TICKS: u32 = 4;
 pub(super) struct Gear {
     /// The choice, where it is not left to counted work.
     pub(super) forced: Option<bool>,
+    /// Why the last tick was worked without candidates, or the first one with them again.
+    pub(super) cause: BroadCause,
     /// Mean work of a tick with candidates, and how many ticks it is a mean of.
     mean: u64,
     ticks: u64,
@@ -61,6 +64,7 @@ impl Default for Gear {
     fn default() -> Self {
         Self {
             forced: None,
+            cause: BroadCause::None,
             mean: 0,
             ticks: 0,
             left: 0,
@@ -79,6 +83,7 @@ impl Gear {
     /// * `usual` - blocks that a block's query meets, in sixteenths.
     pub(super) fn choose(&mut self, on: bool, moved: usize, bodies: usize, usual: u64) -> bool {
         if let Some(forced) = self.forced {
+            self.cause = BroadCause::Forced;
             return forced;
         }
         self.since = self.since.saturating_add(1);
@@ -94,7 +99,12 @@ impl Gear {
             if calm {
                 self.spell = SPELL_MIN;
             }
-            !calm && self.left > 0
+            self.cause = match (calm, self.left) {
+                (true, _) => BroadCause::Calm,
+                (false, 0) => BroadCause::Trial,
+                (false, _) => BroadCause::Spell,
+            };
+            self.cause == BroadCause::Spell
         } else {
             let bodies = bodies as u64;
             let meets = if self.meets > 0 {
@@ -107,6 +117,7 @@ impl Gear {
             hopeless = seen >= EARLY_MEAN && self.mean > scratch * HOPELESS;
             // A fifth more: a change costs as much as some ticks.
             let settled = self.ticks >= SETTLE_TICKS + MEAN_TICKS;
+            self.cause = BroadCause::Cost;
             bodies >= BODIES_MIN && (hopeless || (settled && self.mean * 5 > scratch * 6))
         };
         if chosen != on {

@@ -33,6 +33,7 @@ use super::Work;
 use super::members::{ASKED, CAME, Members};
 use crate::ids::{BodySlot, PairKey};
 use crate::simd::boxes::{Boxes16, Down, Hold, Level, WIDTH};
+use crate::wire::{BroadCause, BroadMode};
 
 mod afresh;
 mod fatten;
@@ -222,6 +223,7 @@ impl Order {
         let came = came.filter(|s| tick.members.has(*s, CAME) && tick.members.is_bounded(*s));
         self.homeless.extend(came);
         if (self.afresh.gear).choose(was, moved, bodies, self.usual) {
+            (work.mode, work.cause) = (BroadMode::Scratch, self.afresh.gear.cause);
             self.update_afresh(&mut tick, work);
             self.afresh.gear.note_scratch(bodies, work);
             return;
@@ -229,7 +231,8 @@ impl Order {
         if was {
             self.end_afresh();
         }
-        let anew = was || self.homeless.len() * MANY_CAME > tick.members.bounded().len();
+        let many_came = self.homeless.len() * MANY_CAME > tick.members.bounded().len();
+        let anew = was || many_came;
         // With hysteresis: to list all candidates again costs as much as some ticks.
         let share = if self.listed { STILL_MANY } else { MANY_MOVED };
         let many = tick.moved.len() * share > self.len;
@@ -242,6 +245,12 @@ impl Order {
             }
         }
         if anew || self.is_worn() || !self.settle(&tick) {
+            work.mode = BroadMode::Sort;
+            work.cause = match (was, many_came) {
+                (true, _) => self.afresh.gear.cause,
+                (false, true) => BroadCause::ManyCame,
+                (false, false) => BroadCause::Worn,
+            };
             self.listed = false;
             self.sort_anew(&mut tick, work);
             self.look_at_all(&mut tick, work);
@@ -249,8 +258,10 @@ impl Order {
             self.renew(&mut tick, work);
             self.restore(&mut tick);
             if many {
+                (work.mode, work.cause) = (BroadMode::List, BroadCause::ManyMoved);
                 self.look_at_all(&mut tick, work);
             } else {
+                (work.mode, work.cause) = (BroadMode::Sparse, BroadCause::FewMoved);
                 self.look_at_moved(&mut tick, work);
             }
         }

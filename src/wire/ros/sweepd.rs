@@ -333,6 +333,12 @@ pub struct Tick {
     pub cause_source: u8,
     /// Structures rebuilt in this boot.
     pub rebuilds: u64,
+    /// Bodies whose fat box was made anew.
+    pub broad_renewed: u32,
+    /// `BroadMode`.
+    pub broad_mode: u8,
+    /// `BroadCause`.
+    pub broad_cause: u8,
     /// The sources.
     pub sources: Vec<Source>,
     /// Messages of this node that were not sent.

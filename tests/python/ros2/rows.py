@@ -7,7 +7,7 @@ from sweepd import layout
 
 BOOT = "boot_id tick scene_rev oldest_stamp_ns newest_stamp_ns truncated state".split()
 TICK = """sent_ns elapsed_ns budget_ns budget_units floor_ns units bodies unknown candidates colliding possible near ignored
-missed cancelled_events worst_a worst_b widest_m oldest_undecided_ticks reasons cause overrun cause_source rebuilds""".split()
+missed cancelled_events worst_a worst_b widest_m oldest_undecided_ticks reasons cause overrun cause_source rebuilds broad_renewed broad_mode broad_cause""".split()
 SOURCE = "session epoch seq stamp_ns clock_id age_ns frames skipped refused alive paused".split()
 PAIR = """body_a body_b gap_min_m gap_max_m gap_best_m closing_mps toi_min toi_max begin_first_tick
 begin_last_tick end_first_tick end_last_tick certified_tick bound_age_ticks verdict certified_verdict events end_cause level flags""".split()
