@@ -18,7 +18,7 @@ use super::namesakes::Namesakes;
 use super::parcel::{Next, Parcel, Parcels};
 use super::services::open;
 use super::shared::{Say, Shared};
-use super::speak::{Book, Speaker};
+use super::speak::Speaker;
 use super::topics::{Out, publisher};
 use super::wheel::{Sent, Wheel};
 use crate::config::RosKind;
@@ -308,11 +308,10 @@ impl Outlet {
     }
 
     fn take_names(&mut self, scene_rev: u64, rows: &[NameRow]) {
-        let book = Book::of(rows);
+        let book = self.speaker.book.next(rows);
         self.shared.set_book(Arc::new(book.clone()));
+        self.boxes.retain(|id, _| book.holds(*id));
         self.speaker.book = book;
-        let book = &self.speaker.book;
-        self.boxes.retain(|id, _| !book.name(*id).is_empty());
         let now = self.shared.now();
         for message in self.speaker.names(now, self.boot_id, scene_rev) {
             self.publish(&self.publishers.names, message);

@@ -1,6 +1,6 @@
 //! From rows to messages: names looked up, ticks of many rows cut into messages of at most 128 KB. Pure.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use super::parcel::Parcel;
 use crate::wire::ros::{
@@ -20,11 +20,17 @@ const CONTACT_BYTES: usize = 248;
 /// As [`PAIR_BYTES`].
 const NAME_BYTES: usize = 40;
 
+/// Names kept of bodies that have left: the row that ends a pair comes after its body has gone, later still where it
+/// did not fit.
+const GONE_MAX: usize = 1024;
+
 /// Names of bodies by id and ids by name, as of one scene revision.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Book {
     by_id: BTreeMap<u64, NameRow>,
     by_name: BTreeMap<String, u64>,
+    /// Bodies that have left, the newest last. An id stays with its name for a boot, so none of these is ever wrong.
+    gone: VecDeque<NameRow>,
 }
 
 impl Book {
@@ -38,12 +44,28 @@ impl Book {
         book
     }
 
-    /// The name of a body; empty for one that is not (or no more) in the scene.
-    pub(super) fn name(&self, body: u64) -> &str {
-        self.by_id.get(&body).map_or("", name_of)
+    /// The next revision of this book, which keeps the names of those that have left.
+    pub(super) fn next(&self, rows: &[NameRow]) -> Self {
+        let mut next = Self::of(rows);
+        let left = self.gone.iter().chain(self.by_id.values());
+        next.gone = left.filter(|row| !next.holds(row.body)).copied().collect();
+        let over = next.gone.len().saturating_sub(GONE_MAX);
+        next.gone.drain(..over);
+        next
     }
 
-    /// The id of a name.
+    /// Whether a body is in the scene.
+    pub(super) fn holds(&self, body: u64) -> bool {
+        self.by_id.contains_key(&body)
+    }
+
+    /// The name of a body, in the scene or not long gone; else empty.
+    pub(super) fn name(&self, body: u64) -> &str {
+        let gone = || self.gone.iter().rfind(|row| row.body == body);
+        self.by_id.get(&body).or_else(gone).map_or("", name_of)
+    }
+
+    /// The id of a name in the scene.
     pub(super) fn id(&self, name: &str) -> Option<u64> {
         self.by_name.get(name).copied()
     }

@@ -65,6 +65,16 @@ def test_bodies_are_put_disabled_attached_and_removed(scene):
     assert not answer.success and "crate" in answer.message
 
 
+def test_the_end_of_a_removed_bodys_pair_has_both_names(scene):
+    room, sender, _ = scene
+    pairs = room.hear(Pairs, "/sweepd/pairs")
+    room.until(lambda: pairs and any(p.verdict == p.COLLIDING for p in pairs[-1].pairs), "the pair", then=lambda: sender.send(CLOSE))
+    assert room.call(RemoveBody, "/sweepd/remove_body", RemoveBody.Request(name="left")).success
+    ends = lambda: [p for m in pairs for p in m.pairs if p.events & p.END]  # noqa: E731
+    (end,) = room.until(ends, "its end", then=lambda: sender.send({"right": (0.5, 0, 0)}))
+    assert (end.name_a, end.name_b, end.end_cause) == ("left", "right", end.END_REMOVED)
+
+
 def test_a_mesh_is_put_and_wrong_shapes_are_refused_with_the_reason(scene):
     room, sender, states = scene
     corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]

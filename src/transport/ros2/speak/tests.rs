@@ -90,3 +90,22 @@ fn a_state_says_its_reasons_in_words_and_its_worst_pair_by_name() {
         (3, 1, "cell")
     );
 }
+
+#[test]
+fn the_name_of_a_body_that_has_left_is_kept_for_rows_that_end_its_pairs() {
+    let first = Book::of(&[named(1, "arm"), named(2, "crate")]);
+    let second = first.next(&[named(1, "arm")]);
+    assert_eq!((second.name(2), second.name(1)), ("crate", "arm"));
+    // It is no body of the scene any more: neither listed nor found by its name.
+    assert_eq!((second.id("crate"), second.holds(2)), (None, false));
+    assert_eq!(second.rows().count(), 1);
+    let back = second.next(&[named(1, "arm"), named(2, "crate")]);
+    assert_eq!((back.id("crate"), back.gone.len()), (Some(2), 0));
+    // Those that left last are kept.
+    let many: Vec<NameRow> = (3..3 + 2 * GONE_MAX as u64)
+        .map(|id| named(id, "x"))
+        .collect();
+    let late = second.next(&many).next(&[]);
+    assert_eq!((late.gone.len(), late.name(2)), (GONE_MAX, ""));
+    assert_eq!(late.name(2 + 2 * GONE_MAX as u64), "x");
+}
