@@ -152,6 +152,7 @@ fn cast(scene: &Scene, shapes: &Shapes) -> RosScene {
         bodies: (scene.bodies.iter().zip(&shapes.bodies))
             .map(|(spec, placed)| body_note(spec, spec.id, placed))
             .collect(),
+        ..RosScene::default()
     }
 }
 

@@ -35,6 +35,7 @@ mod wheel;
 
 pub use mend::{LastingNode, Opener};
 pub use node::{RosNode, RosOptions};
+pub use params::Kept;
 
 use super::{BodyChange, BodyNote};
 use crate::config::{Config, RosSource};
@@ -50,6 +51,10 @@ pub struct RosScene {
     pub sources: Vec<RosSourceSpec>,
     /// Its bodies.
     pub bodies: Vec<BodyNote>,
+    /// Parameters set while a node of it ran.
+    pub kept: Kept,
+    /// Whether a node of it has run before in this daemon.
+    pub again: bool,
 }
 
 /// A source of the scene.

@@ -155,6 +155,7 @@ impl RosNode {
             namesakes,
             names: names.clone(),
             sources: scene.sources.clone(),
+            kept: scene.kept.clone(),
         };
         let mut open = Self {
             shelf,

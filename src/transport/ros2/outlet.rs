@@ -15,6 +15,8 @@ use super::lines::{Arrival, Line, of_body};
 use super::markers::{Boxes, collisions, markers};
 use super::names::Names;
 use super::namesakes::Namesakes;
+use super::params::Kept;
+use super::params_file::Value;
 use super::parcel::{Next, Parcel, Parcels};
 use super::services::open;
 use super::shared::{Say, Shared};
@@ -174,6 +176,7 @@ pub(super) struct Outlet {
     /// Makes full names of the topics of bodies that come.
     pub(super) names: Names,
     pub(super) sources: Vec<RosSourceSpec>,
+    pub(super) kept: Kept,
 }
 
 /// What somebody listens to, as of the last look.
@@ -195,10 +198,7 @@ impl Outlet {
         loop {
             self.follow_edits();
             self.look_who_listens();
-            // The crate keeps this parameter to itself: its set action is never called.
-            let sim_time = self.node.get_parameter("use_sim_time");
-            self.shared
-                .set_sim_time(matches!(sim_time, Some(ParameterValue::Boolean(true))));
+            self.follow_sim_time();
             self.diagnose();
             if let Some(text) = self.namesakes.look() {
                 self.shared.say(Say::Warn, &text);
@@ -218,6 +218,16 @@ impl Outlet {
             }
         }
         self.node.stop_spinner();
+    }
+
+    /// The crate keeps this parameter to itself: its set action is never called.
+    fn follow_sim_time(&self) {
+        let value = self.node.get_parameter("use_sim_time");
+        let on = matches!(value, Some(ParameterValue::Boolean(true)));
+        if on != self.shared.sim_time() {
+            self.shared.set_sim_time(on);
+            self.kept.keep("use_sim_time", Value::Flag(on));
+        }
     }
 
     /// Boxes and subscriptions of bodies that edits put: only this thread has the node.

@@ -6,7 +6,9 @@
 
 mod rules;
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use ros2_client::ParameterValue;
 
@@ -14,6 +16,7 @@ use rules::{Rule, count, milliseconds, plain, some_ns};
 
 use super::RosScene;
 use super::params_file::{Setting as Said, Value};
+use super::services::open;
 use crate::config::{Config, Mode};
 use crate::transport::Setting;
 
@@ -135,6 +138,21 @@ pub(super) enum Effect {
     None,
 }
 
+/// What was set while a node ran, by name: a node that is opened in its place begins with it.
+#[derive(Clone, Debug, Default)]
+pub struct Kept(Arc<Mutex<BTreeMap<String, Value>>>);
+
+impl Kept {
+    /// Takes a value.
+    pub(super) fn keep(&self, name: &str, value: Value) {
+        open(&self.0).insert(name.to_owned(), value);
+    }
+
+    fn value(&self, name: &str) -> Option<Value> {
+        open(&self.0).get(name).cloned()
+    }
+}
+
 /// All parameters of a node.
 #[derive(Debug)]
 pub(super) struct Table {
@@ -142,6 +160,7 @@ pub(super) struct Table {
     /// Sources by name, and whether one can lead in lockstep.
     sources: Vec<(String, bool)>,
     running: AtomicBool,
+    kept: Kept,
 }
 
 impl Table {
@@ -166,10 +185,12 @@ impl Table {
                 .map(|s| (s.name.clone(), s.ros2.is_none()))
                 .collect(),
             running: AtomicBool::new(false),
+            kept: scene.kept.clone(),
         }
     }
 
-    /// Takes what was said at the start, in order; the last wins.
+    /// Takes what was said at the start, in order; the last wins. What was set while another node ran in this daemon
+    /// came later still, and wins over that.
     ///
     /// * returns - what was said of parameters that the node does not have.
     ///
@@ -201,7 +222,19 @@ impl Table {
                 .map_err(|why| format!("{}: {why}", setting.said))?;
             self.specs[place].value = value;
         }
+        for spec in &mut self.specs {
+            if let Some(value) = self.kept.value(&spec.name) {
+                spec.value = value;
+            }
+        }
         Ok(unknown)
+    }
+
+    /// Keeps a value that somebody set while the node runs.
+    pub(super) fn keep(&self, name: &str, value: &ParameterValue) {
+        if let Some(value) = plain(value) {
+            self.kept.keep(name, value);
+        }
     }
 
     /// From now on sets are those of others.

@@ -11,6 +11,8 @@ import pytest
 import rclpy
 from conftest import LATCHED, RELIABLE
 from frames import Sender
+from parameters import put
+from rcl_interfaces.srv import GetParameters
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSLivelinessPolicy, QoSProfile, QoSReliabilityPolicy
@@ -116,6 +118,25 @@ def test_a_daemon_that_was_stopped_and_continued_is_heard_again_and_the_gap_is_t
     late = room.node("late")
     names = room.hear(Names, "/sweepd/names", LATCHED, node=late)
     room.until(lambda: names and len(names[-1].names) == 3, "the names, too")
+
+
+def test_parameters_set_while_running_hold_in_the_node_that_is_opened_anew(room):
+    daemon = room.daemon(HANDS, ros_args=["-p", "ros.allow_edits:=true", "-p", "budget_ms:=7.0"])
+    node = room.node()
+    ticks = room.hear(Tick, "/sweepd/tick")
+    room.until(lambda: ticks and ticks[-1].budget_ns == 7_000_000, "the budget of the start")
+    assert put(room, budget_ms=4.0, mode="rate=20", timeout_ms__sim=400.0, ros_max_contacts=11) == [(True, "")] * 4
+    room.until(lambda: ticks[-1].budget_ns == 4_000_000, "the budget that was set")
+    daemon.send(signal.SIGSTOP)
+    room.spin(1.0)
+    daemon.send(signal.SIGCONT)
+    stopped = ticks[-1].sent_ns
+    room.until(lambda: "opened anew" in daemon.log and ticks[-1].sent_ns > stopped + 2 * 10**9, "ticks of the new node", seconds=25)
+    assert ticks[-1].budget_ns == 4_000_000
+    node = room.node("late")
+    request = GetParameters.Request(names=["budget_ms", "mode", "timeout_ms.sim", "ros_max_contacts"])
+    budget, mode, timeout, contacts = room.call(GetParameters, "/sweepd/get_parameters", request, node=node, seconds=25).values
+    assert (budget.double_value, mode.string_value, timeout.double_value, contacts.integer_value) == (4.0, "rate=20", 400.0, 11)
 
 
 def test_a_restarted_sender_is_a_new_session_and_its_pairs_end(room):

@@ -54,6 +54,7 @@ pub(super) fn make(
         .parameter_set_action(Box::new(move |name, value| {
             let effect = taken.effect(name, value);
             if taken.is_running() {
+                taken.keep(name, value);
                 shared.say(Say::Info, &format!("parameter {name} is now {value:?}"));
             }
             shared.take(effect);

@@ -148,3 +148,21 @@ fn a_value_does_what_its_name_says() {
         Effect::Tick(Setting::Mode(Mode::Rate(50.0)))
     );
 }
+
+#[test]
+fn what_was_set_while_it_ran_is_what_the_next_node_begins_with() {
+    let scene = RosScene::default();
+    let mut first = Table::of(&scene);
+    let start = [said("budget_ms", Value::Real(3.0)), said("ros_max_pairs", Value::Whole(5))];
+    first.start(&start, "/sweepd").unwrap();
+    first.run();
+    first.keep("budget_ms", &ParameterValue::Double(4.0));
+    let mut second = Table::of(&scene);
+    second.start(&start, "/sweepd").unwrap();
+    let value = |name: &str| {
+        let mut specs = second.specs().iter();
+        specs.find(|spec| spec.name == name).unwrap().value.clone()
+    };
+    assert_eq!(value("budget_ms"), Value::Real(4.0));
+    assert_eq!(value("ros_max_pairs"), Value::Whole(5));
+}
