@@ -3,9 +3,12 @@
 //! In: parcels of the tick thread. Out: topics; who listens to them. A message that DDS does not take at once is
 //! counted, not waited for.
 
+mod publishers;
+
 use std::sync::Arc;
 use std::time::Duration;
 
+pub(super) use publishers::Publishers;
 use ros2_client::{Context, Node, ParameterValue, Publisher};
 use serde::Serialize;
 
@@ -21,139 +24,17 @@ use super::parcel::{Next, Parcel, Parcels};
 use super::services::open;
 use super::shared::{Say, Shared};
 use super::speak::Speaker;
-use super::topics::{Out, publisher};
 use super::wheel::{Sent, Wheel};
 use crate::config::RosKind;
-use crate::error::{Error, Result};
+use crate::error::Error;
 use crate::time::{Clock as _, SystemClock};
 use crate::transport::{BodyChange, BodyNote};
-use crate::wire::ros;
 use crate::wire::{Demand, NameRow, TickRow};
 
 /// Longest sleep: how soon a new reader is noticed.
 const SLEEP: Duration = Duration::from_millis(100);
-/// Messages of names kept for late joiners: a scene of 100,000 bodies.
-const NAMES_DEPTH: usize = 64;
 /// Between two messages of diagnostics, nanoseconds: what `/diagnostics` is read at.
 const DIAGNOSTICS_NS: u64 = 1_000_000_000;
-/// Bytes of a state, and of a tick of a few sources: a reader that has stopped may hold 16 and 8 thousand of them, at
-/// 400 Hz for the 20 s until its lease ends. These topics keep one writer, because a new one would look like a new
-/// node.
-const STATE_BYTES: usize = 512;
-/// As [`STATE_BYTES`].
-const TICK_BYTES: usize = 1024;
-/// Bytes of the largest messages.
-const CHUNK_BYTES: usize = 128 << 10;
-
-/// The publishers.
-pub(super) struct Publishers {
-    state: Publisher<ros::State>,
-    tick: Publisher<ros::Tick>,
-    pairs: Wheel<ros::Pairs>,
-    contacts: Wheel<ros::Contacts>,
-    names: Publisher<ros::Names>,
-    diagnostics: Publisher<ros::DiagnosticArray>,
-    markers: Wheel<ros::MarkerArray>,
-    collisions: Wheel<ros::GzContacts>,
-}
-
-impl Publishers {
-    /// Creates them.
-    ///
-    /// * `reliable` - whether pairs and contacts that were lost are sent again.
-    ///
-    /// # Errors
-    /// `Error::Usage` when remaps collide; `Error::Io` when DDS refuses.
-    pub(super) fn create(
-        node: &mut Node,
-        context: &Context,
-        names: &mut Names,
-        heartbeat_ns: u64,
-        reliable: bool,
-    ) -> Result<Self> {
-        let mut claim = |name: &str| names.claim(name).map_err(Error::Usage);
-        // Silence of the node itself is told by the deadline and by the lease.
-        let watched = |bytes| Out {
-            deadline: Some(Duration::from_nanos(heartbeat_ns.saturating_mul(2))),
-            bytes,
-            ..Out::RELIABLE
-        };
-        let large = Out {
-            reliable,
-            bytes: CHUNK_BYTES,
-            ..Out::RELIABLE
-        };
-        let latched = Out {
-            latched: true,
-            depth: NAMES_DEPTH,
-            ..large
-        };
-        let latched = Out {
-            reliable: true,
-            ..latched
-        };
-        Ok(Self {
-            contacts: Wheel::new(
-                node,
-                context,
-                (&claim("~/contacts")?, ("sweepd_msgs", "Contacts")),
-                large,
-            )?,
-            pairs: Wheel::new(
-                node,
-                context,
-                (&claim("~/pairs")?, ("sweepd_msgs", "Pairs")),
-                large,
-            )?,
-            names: publisher(
-                node,
-                context,
-                (&claim("~/names")?, ("sweepd_msgs", "Names")),
-                latched,
-            )?,
-            markers: Wheel::new(
-                node,
-                context,
-                (&claim("~/markers")?, ("visualization_msgs", "MarkerArray")),
-                Out {
-                    bytes: CHUNK_BYTES,
-                    ..Out::RELIABLE
-                },
-            )?,
-            collisions: Wheel::new(
-                node,
-                context,
-                (&claim("~/collisions")?, ("ros_gz_interfaces", "Contacts")),
-                large,
-            )?,
-            diagnostics: publisher(
-                node,
-                context,
-                (
-                    &claim("/diagnostics")?,
-                    ("diagnostic_msgs", "DiagnosticArray"),
-                ),
-                Out {
-                    depth: 10,
-                    ..Out::RELIABLE
-                },
-            )?,
-            state: publisher(
-                node,
-                context,
-                (&claim("~/state")?, ("sweepd_msgs", "State")),
-                watched(STATE_BYTES),
-            )?,
-            tick: publisher(
-                node,
-                context,
-                (&claim("~/tick")?, ("sweepd_msgs", "Tick")),
-                watched(TICK_BYTES),
-            )?,
-        })
-    }
-}
-
 /// The sending thread's own things.
 pub(super) struct Outlet {
     pub(super) node: Node,
@@ -342,9 +223,9 @@ impl Outlet {
                 pen.write(&mut out.pairs, message);
             }
         }
-        self.publish(&self.publishers.state, self.speaker.state(&parcel.tick));
+        pen.write(&mut out.state, self.speaker.state(&parcel.tick));
         let tick = self.speaker.tick(&parcel.tick, self.shared.counts());
-        self.publish(&self.publishers.tick, tick);
+        pen.write(&mut out.tick, tick);
     }
 
     fn publish<M: Serialize>(&self, to: &Publisher<M>, message: M) {

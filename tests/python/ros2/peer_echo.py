@@ -1,6 +1,6 @@
 """A plain ROS 2 node that listens to sweepd and counts: `peer_echo.py [--seconds N] [--pause S]`, a line at the end.
 
-`--pause` waits so long in each callback: a slow reader.
+`--pause` waits so long in each callback: a slow reader. `--ticks` listens to `~/tick`, too.
 """
 
 import argparse
@@ -9,11 +9,12 @@ import time
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from sweepd_msgs.msg import Contacts, State
+from sweepd_msgs.msg import Contacts, State, Tick
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--seconds", type=float, default=5)
 parser.add_argument("--pause", type=float, default=0)
+parser.add_argument("--ticks", action="store_true")
 args = parser.parse_args()
 
 rclpy.init()
@@ -33,6 +34,8 @@ def state(_message):
 
 node.create_subscription(Contacts, "/sweepd/contacts", contact, 10)
 node.create_subscription(State, "/sweepd/state", state, 10)
+if args.ticks:
+    node.create_subscription(Tick, "/sweepd/tick", lambda message: None, 10)
 executor = SingleThreadedExecutor()
 executor.add_node(node)
 until = time.monotonic() + args.seconds

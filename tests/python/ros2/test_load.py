@@ -198,6 +198,45 @@ def test_a_slow_and_a_stopped_reader_do_not_hurt_the_healthy_one_for_a_minute(ro
     print(f"tick time beside / alone: {beside / alone:.3f}")
 
 
+class Hurry(threading.Thread):
+    """Steps over shared memory, some 1,500 frames a second."""
+
+    def __init__(self, client):
+        super().__init__(daemon=True)
+        self.client, self.run_on = client, True
+
+    def run(self):
+        step = 0
+        while self.run_on:
+            step += 1
+            self.client.send({"left": ((0, 0, 0), (0, 0, 0, 1)), "right": ((5, 0.001 * (step % 9), 0), (0, 0, 0, 1))})
+            time.sleep(0.0004)
+
+
+def test_a_stopped_reader_does_not_mute_the_ticks_of_a_fast_daemon(room):
+    """8,192 ticks may wait for a reader that has stopped, which is 8 s at 1 kHz; its lease ends after 20 s."""
+    room.daemon(HANDS)
+    room.node()
+    ticks = room.hear(Tick, "/sweepd/tick", keep=lambda t: (t.tick_header.tick, t.sends_dropped))
+    stopped = room.python("peer_echo.py", "--seconds", 3600, "--ticks")
+    hurry = Hurry(room.client("sim", listen=()))
+    hurry.start()
+    room.until(lambda: ticks, "ticks")
+    room.spin(4)
+    stopped.send_signal(signal.SIGSTOP)
+    begin, start = len(ticks), time.monotonic()
+    first = ticks[-1][0]
+    room.until(lambda: ticks[-1][0] > first + 14_000, "14,000 ticks later", seconds=90)
+    took = time.monotonic() - start
+    hurry.run_on = False
+    hurry.join()
+    numbers = [tick for tick, _ in ticks[begin - 1 :]]
+    gap = max(b - a for a, b in zip(numbers, numbers[1:]))
+    print(f"heard {len(numbers)} of {numbers[-1] - numbers[0]} ticks in {took:.1f} s, at most {gap} in a row not, "
+          f"told as dropped {ticks[-1][1] - ticks[begin - 1][1]}")  # fmt: skip
+    assert numbers == sorted(set(numbers)) and gap < 2_000
+
+
 def test_an_idle_node_is_small(room):
     daemon = room.daemon(HANDS)
     node = room.node()

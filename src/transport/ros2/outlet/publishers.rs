@@ -1,0 +1,131 @@
+//! The topics that go out, each with its quality of service and the bound of what its writer keeps.
+
+use std::time::Duration;
+
+use ros2_client::{Context, Node, Publisher};
+
+use super::super::names::Names;
+use super::super::topics::{Out, publisher};
+use super::super::wheel::Wheel;
+use crate::error::{Error, Result};
+use crate::wire::ros;
+
+/// Messages of names kept for late joiners: a scene of 100,000 bodies.
+const NAMES_DEPTH: usize = 64;
+/// Bytes of a state, and of a tick of a few sources: a reader that has stopped may hold 16 and 8 thousand of them,
+/// which is 20 s at 400 Hz, and its lease has ended. So these topics keep one writer, as watchers of a node expect;
+/// only above 400 Hz, and only beside a stopped reader, does a new one go on.
+const STATE_BYTES: usize = 512;
+/// As [`STATE_BYTES`].
+const TICK_BYTES: usize = 1024;
+/// Bytes of the largest messages.
+const CHUNK_BYTES: usize = 128 << 10;
+
+/// The publishers.
+pub(in super::super) struct Publishers {
+    pub(super) state: Wheel<ros::State>,
+    pub(super) tick: Wheel<ros::Tick>,
+    pub(super) pairs: Wheel<ros::Pairs>,
+    pub(super) contacts: Wheel<ros::Contacts>,
+    pub(super) names: Publisher<ros::Names>,
+    pub(super) diagnostics: Publisher<ros::DiagnosticArray>,
+    pub(super) markers: Wheel<ros::MarkerArray>,
+    pub(super) collisions: Wheel<ros::GzContacts>,
+}
+
+impl Publishers {
+    /// Creates them.
+    ///
+    /// * `reliable` - whether pairs and contacts that were lost are sent again.
+    ///
+    /// # Errors
+    /// `Error::Usage` when remaps collide; `Error::Io` when DDS refuses.
+    pub(in super::super) fn create(
+        node: &mut Node,
+        context: &Context,
+        names: &mut Names,
+        heartbeat_ns: u64,
+        reliable: bool,
+    ) -> Result<Self> {
+        let mut claim = |name: &str| names.claim(name).map_err(Error::Usage);
+        // Silence of the node itself is told by the deadline and by the lease.
+        let watched = |bytes| Out {
+            deadline: Some(Duration::from_nanos(heartbeat_ns.saturating_mul(2))),
+            bytes,
+            ..Out::RELIABLE
+        };
+        let large = Out {
+            reliable,
+            bytes: CHUNK_BYTES,
+            ..Out::RELIABLE
+        };
+        let latched = Out {
+            latched: true,
+            depth: NAMES_DEPTH,
+            ..large
+        };
+        let latched = Out {
+            reliable: true,
+            ..latched
+        };
+        Ok(Self {
+            contacts: Wheel::new(
+                node,
+                context,
+                (&claim("~/contacts")?, ("sweepd_msgs", "Contacts")),
+                large,
+            )?,
+            pairs: Wheel::new(
+                node,
+                context,
+                (&claim("~/pairs")?, ("sweepd_msgs", "Pairs")),
+                large,
+            )?,
+            names: publisher(
+                node,
+                context,
+                (&claim("~/names")?, ("sweepd_msgs", "Names")),
+                latched,
+            )?,
+            markers: Wheel::new(
+                node,
+                context,
+                (&claim("~/markers")?, ("visualization_msgs", "MarkerArray")),
+                Out {
+                    bytes: CHUNK_BYTES,
+                    ..Out::RELIABLE
+                },
+            )?,
+            collisions: Wheel::new(
+                node,
+                context,
+                (&claim("~/collisions")?, ("ros_gz_interfaces", "Contacts")),
+                large,
+            )?,
+            diagnostics: publisher(
+                node,
+                context,
+                (
+                    &claim("/diagnostics")?,
+                    ("diagnostic_msgs", "DiagnosticArray"),
+                ),
+                Out {
+                    depth: 10,
+                    ..Out::RELIABLE
+                },
+            )?,
+            state: Wheel::new(
+                node,
+                context,
+                (&claim("~/state")?, ("sweepd_msgs", "State")),
+                watched(STATE_BYTES),
+            )?,
+            tick: Wheel::new(
+                node,
+                context,
+                (&claim("~/tick")?, ("sweepd_msgs", "Tick")),
+                watched(TICK_BYTES),
+            )?,
+        })
+    }
+}
