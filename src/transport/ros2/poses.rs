@@ -209,12 +209,16 @@ impl Source {
             member.fault = fault;
             let Some(result) = result else { continue };
             member.told_ns = receipt.now_ns;
+            // A chain is as old as its oldest link (law 3.8); that there is no pose is news of now.
+            let earliest = found.as_ref().ok().and_then(|found| found.received_ns);
+            let since_ns = earliest.filter(|_| result.is_ok()).map(|(_, ns)| ns);
             updates.push(Update {
                 member: place,
                 result,
                 velocity: None,
                 stamp_ns: found.as_ref().map_or(0, |found| found.stamp_ns),
                 received_ns: receipt.now_ns,
+                since_ns: since_ns.unwrap_or(receipt.now_ns),
                 waited: receipt.waited,
             });
         }
@@ -331,6 +335,7 @@ impl Source {
             velocity,
             stamp_ns,
             received_ns: receipt.now_ns,
+            since_ns: receipt.now_ns,
             waited: receipt.waited,
         });
         back

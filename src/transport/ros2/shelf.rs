@@ -11,6 +11,10 @@ use crate::wire::{
     frame_flags,
 };
 
+/// Frames that the poses of a drain are spread over by age: a body counts as older than it is by at most a quarter of
+/// the time between the ages of the youngest and the oldest, and those differ by less than the time-out.
+const FRAMES_OF_AGES: u64 = 4;
+
 /// A pose of one body that came on a common topic, or why it is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Update {
@@ -24,6 +28,8 @@ pub(super) struct Update {
     pub(super) stamp_ns: u64,
     /// Receipt, nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) received_ns: u64,
+    /// From when its age counts: receipt of the oldest that it is made of, nanoseconds of `CLOCK_BOOTTIME`.
+    pub(super) since_ns: u64,
     /// Whether it waited while the process stood still.
     pub(super) waited: bool,
 }
@@ -162,22 +168,51 @@ impl Shelf {
             spare.push(frame);
         }
         for group in groups.iter_mut().filter(|group| !group.touched.is_empty()) {
-            group.fill(inbox.push());
+            group.fill(inbox);
         }
     }
 }
 
 impl Group {
-    /// One partial frame of what is new; its age is that of its oldest pose.
-    fn fill(&mut self, frame: &mut Frame) {
+    /// What is new as partial frames, one for each span of ages, the oldest first: a frame has one age, that of its
+    /// oldest pose, and nobody is to be much older than he is.
+    fn fill(&mut self, inbox: &mut Inbox) {
+        let ages = self.touched.iter().filter_map(|&member| {
+            let update = self.newest.get(member).and_then(Option::as_ref)?;
+            Some(update.since_ns)
+        });
+        let (oldest_ns, youngest_ns) = ages.fold((u64::MAX, 0), |(least, most), since_ns| {
+            (least.min(since_ns), most.max(since_ns))
+        });
+        let span_ns = youngest_ns.saturating_sub(oldest_ns) / FRAMES_OF_AGES + 1;
+        let mut touched = std::mem::take(&mut self.touched);
+        let mut until_ns = oldest_ns;
+        while !touched.is_empty() {
+            until_ns = until_ns.saturating_add(span_ns);
+            let due = |update: &Option<Update>| update.is_none_or(|u| u.since_ns < until_ns);
+            let newest = &self.newest;
+            if touched
+                .iter()
+                .any(|&member| newest.get(member).is_none_or(due))
+            {
+                self.fill_one(&mut touched, until_ns, inbox.push());
+            }
+        }
+        self.touched = touched;
+    }
+
+    /// One partial frame of those whose ages count from before `until_ns`.
+    fn fill_one(&mut self, touched: &mut Vec<usize>, until_ns: u64, frame: &mut Frame) {
         self.seq += 1;
-        let (mut received_ns, mut newest_stamp_ns) = (u64::MAX, 0);
-        for member in self.touched.drain(..) {
+        let (mut received_ns, mut since_ns, mut newest_stamp_ns) = (u64::MAX, u64::MAX, 0);
+        touched.retain(|&member| {
             let body = self.bodies.get(member).copied().unwrap_or_default();
-            let Some(update) = self.newest.get_mut(member).and_then(Option::take) else {
-                continue;
+            let slot = self.newest.get_mut(member);
+            let Some(update) = slot.and_then(|slot| slot.take_if(|u| u.since_ns < until_ns)) else {
+                return self.newest.get(member).is_some_and(Option::is_some);
             };
             received_ns = received_ns.min(update.received_ns);
+            since_ns = since_ns.min(update.since_ns);
             newest_stamp_ns = newest_stamp_ns.max(update.stamp_ns);
             frame.waited |= update.waited;
             match update.result {
@@ -188,14 +223,15 @@ impl Group {
                 }
                 Err(reason) => frame.refused_bodies.push((body, reason)),
             }
-        }
+            false
+        });
         frame.received_ns = received_ns;
         frame.header = FrameHeader {
             session: self.session,
             epoch: self.epoch,
             seq: self.seq,
             // Frames that waited while the process stood still say nothing of their age.
-            sent_ns: if frame.waited { 0 } else { received_ns },
+            sent_ns: if frame.waited { 0 } else { since_ns },
             stamp_ns: newest_stamp_ns,
             source: self.name,
             flags: frame_flags::PARTIAL,
@@ -221,6 +257,7 @@ mod tests {
             velocity: None,
             stamp_ns,
             received_ns: 100 - stamp_ns,
+            since_ns: 90,
             waited: false,
         }
     }
@@ -247,8 +284,8 @@ mod tests {
         assert_eq!(frame.stamps_ns, [7, 6]);
         assert_eq!(frame.refused_bodies, [(12, RejectReason::BadChain)]);
         assert_eq!(
-            (frame.received_ns, frame.header.flags),
-            (93, frame_flags::PARTIAL)
+            (frame.received_ns, frame.header.sent_ns, frame.header.flags),
+            (93, 90, frame_flags::PARTIAL)
         );
         inbox.clear();
         shelf.drain(&mut inbox);
@@ -292,5 +329,42 @@ mod tests {
             ),
             (2, 1, 3.0)
         );
+    }
+
+    #[test]
+    fn bodies_of_old_chains_have_frames_of_their_own_that_others_do_not_age_with() {
+        let shelf = Shelf::default();
+        shelf.add_group(name_bytes("tf"), 9, vec![1, 2, 3, 4]);
+        let aged = |member, since_ns| Update {
+            received_ns: 1000,
+            since_ns,
+            ..update(member, 1.0, 5)
+        };
+        shelf.merge(
+            0,
+            &[aged(0, 1000), aged(1, 500), aged(2, 990), aged(3, 700)],
+        );
+        let mut inbox = Inbox::default();
+        shelf.drain(&mut inbox);
+        let seen: Vec<_> = (inbox.frames().iter())
+            .map(|frame| {
+                let bodies: Vec<u64> = frame.transforms.iter().map(|row| row.body).collect();
+                (
+                    frame.header.seq,
+                    frame.header.sent_ns,
+                    frame.received_ns,
+                    bodies,
+                )
+            })
+            .collect();
+        let wanted = [
+            (1, 500, 1000, vec![2]),
+            (2, 700, 1000, vec![4]),
+            (3, 990, 1000, vec![1, 3]),
+        ];
+        assert_eq!(seen, wanted);
+        shelf.merge(0, &[aged(0, 1010)]);
+        shelf.drain(&mut inbox);
+        assert_eq!(inbox.frames().last().map(|frame| frame.header.seq), Some(4));
     }
 }

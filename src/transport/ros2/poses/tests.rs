@@ -191,3 +191,18 @@ fn odometry_brings_its_velocity_into_the_scenes_frame() {
     );
     assert!((velocity[5] - 1.0).abs() < 1e-12);
 }
+
+#[test]
+fn law_3_8_a_chain_is_as_old_as_its_oldest_link() {
+    let mut one = tf("tool");
+    one.take_links(&link("world", "base", 0), false, at(MS));
+    one.take_links(&link("base", "tool", 0), false, at(400 * MS));
+    let said = look(&mut one, 400 * MS);
+    assert!(said[0].result.is_ok());
+    assert_eq!((said[0].since_ns, said[0].received_ns), (MS, 400 * MS));
+    // Beyond the time-out there is no pose, and that is said at once.
+    one.take_links(&link("base", "tool", 0), false, at(900 * MS));
+    let said = look(&mut one, 900 * MS);
+    assert!(said[0].result.is_err());
+    assert_eq!(said[0].since_ns, 900 * MS);
+}
