@@ -21,6 +21,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Parser;
+use tracing::level_filters::LevelFilter;
 
 use crate::error::{Error, Result};
 use crate::scene::Scene;
@@ -42,7 +43,7 @@ pub fn main() -> ExitCode {
         }
     };
     install_panic_line();
-    start_log(cli.verbose, cli.quiet);
+    start_log(cli.verbose, cli.quiet, ros::log_level(ros_words.as_deref()));
     match dispatch(cli.command, ros_words.as_deref()) {
         Ok(code) => code,
         Err(error) => {
@@ -132,13 +133,14 @@ fn install_panic_line() {
     }));
 }
 
-fn start_log(verbose: u8, quiet: bool) {
-    let level = match (quiet, verbose) {
-        (true, _) => tracing::Level::ERROR,
-        (false, 0) => tracing::Level::INFO,
-        (false, 1) => tracing::Level::DEBUG,
-        (false, _) => tracing::Level::TRACE,
-    };
+/// * `asked` - the level said by name, which beats both flags.
+fn start_log(verbose: u8, quiet: bool, asked: Option<LevelFilter>) {
+    let level = asked.unwrap_or(match (quiet, verbose) {
+        (true, _) => LevelFilter::ERROR,
+        (false, 0) => LevelFilter::INFO,
+        (false, 1) => LevelFilter::DEBUG,
+        (false, _) => LevelFilter::TRACE,
+    });
     let log = tracing_subscriber::fmt()
         .with_max_level(level)
         .with_writer(std::io::stderr)

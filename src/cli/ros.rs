@@ -4,6 +4,8 @@
 
 use std::ffi::OsString;
 
+use tracing::level_filters::LevelFilter;
+
 use crate::daemon::Shapes;
 #[cfg(feature = "ros2")]
 use crate::daemon::body_note;
@@ -43,6 +45,26 @@ pub(super) fn split(words: impl Iterator<Item = OsString>) -> (Vec<OsString>, Op
         }
     }
     (plain, ros)
+}
+
+/// The level of the log that `--log-level` asks for; words that cannot be read are refused later.
+#[cfg(feature = "ros2")]
+pub(super) fn log_level(ros_words: Option<&[String]>) -> Option<LevelFilter> {
+    let args = RosArgs::parse(ros_words?).ok()?;
+    Some(match args.log_level?.as_str() {
+        "debug" => LevelFilter::DEBUG,
+        "info" => LevelFilter::INFO,
+        "warn" => LevelFilter::WARN,
+        "error" => LevelFilter::ERROR,
+        // What ends the daemon is told without the log.
+        _ => LevelFilter::OFF,
+    })
+}
+
+/// There is none.
+#[cfg(not(feature = "ros2"))]
+pub(super) fn log_level(_: Option<&[String]>) -> Option<LevelFilter> {
+    None
 }
 
 /// What was asked of ROS 2.
@@ -177,6 +199,20 @@ pub(super) fn door(_node: &mut Option<Node>) -> Option<&mut dyn Door> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(feature = "ros2")]
+    #[test]
+    fn the_log_follows_the_level_that_ros_users_ask_for() {
+        let level = |line: &str| {
+            let words: Vec<String> = line.split_whitespace().map(str::to_owned).collect();
+            log_level(Some(&words))
+        };
+        assert_eq!(level("-p x:=1 --log-level warn"), Some(LevelFilter::WARN));
+        assert_eq!(level("--log-level sweepd:=FATAL"), Some(LevelFilter::OFF));
+        assert_eq!(level("--log-level unset"), None);
+        assert_eq!(level("--log-level loud"), None);
+        assert_eq!(log_level(None), None);
+    }
 
     #[test]
     fn sections_are_taken_out_and_closed_by_two_dashes() {

@@ -98,10 +98,7 @@ impl RosNode {
             .start(&said(&options.args)?, &names.full_node())
             .map_err(Error::Usage)?;
         let table = Arc::new(table);
-        let least = match options.args.log_level.as_deref() {
-            None | Some("debug" | "info") => Say::Info,
-            Some(_) => Say::Warn,
-        };
+        let least = Say::least(options.args.log_level.as_deref());
         let book = Book::of(&first_names(scene));
         let timeouts_ns: Vec<u64> = scene.sources.iter().map(|s| s.timeout_ns).collect();
         let shared = Arc::new(Shared::new(names.node(), book.clone(), &timeouts_ns, least));

@@ -137,7 +137,7 @@ impl Outlet {
         let line = topic.and_then(|topic| of_body(&mut self.node, &self.context, kind, &topic));
         line.map_err(|e| {
             let text = format!("body {}: no poses of it can come: {e}", body.name);
-            self.shared.say(Say::Warn, &text);
+            self.shared.say(Say::Error, &text);
         })
         .ok()
     }

@@ -27,6 +27,22 @@ pub(super) enum Say {
     Info,
     /// To be looked at.
     Warn,
+    /// Something does not work.
+    Error,
+    /// Nothing works.
+    Fatal,
+}
+
+impl Say {
+    /// The least level that is said for the word of `--log-level`.
+    pub(super) fn least(word: Option<&str>) -> Self {
+        match word {
+            Some("warn") => Self::Warn,
+            Some("error") => Self::Error,
+            Some("fatal") => Self::Fatal,
+            _ => Self::Info,
+        }
+    }
 }
 
 /// Shared by the threads of the node.
@@ -302,6 +318,7 @@ impl Shared {
         match level {
             Say::Info => tracing::info!("{text}"),
             Say::Warn => tracing::warn!("{text}"),
+            Say::Error | Say::Fatal => tracing::error!("{text}"),
         }
         if level < self.least {
             return;
@@ -316,6 +333,8 @@ impl Shared {
                 level: match level {
                     Say::Info => Log::INFO,
                     Say::Warn => Log::WARN,
+                    Say::Error => Log::ERROR,
+                    Say::Fatal => Log::FATAL,
                 },
                 name: self.node.clone(),
                 msg: text.to_owned(),

@@ -8,10 +8,14 @@ from pathlib import Path
 
 import pytest
 from frames import Sender
+from parameters import set_parameter
+from rcl_interfaces.msg import Log
 from rclpy.duration import Duration
 from rclpy.qos import QoSDurabilityPolicy, QoSReliabilityPolicy
 from scenes import HANDS
 from sweepd_msgs.msg import Pairs, State, Tick
+from sweepd_msgs.srv import RemoveBody
+from topics import SCENE as TOPICS
 
 OUT = {"state": "State", "tick": "Tick", "pairs": "Pairs", "contacts": "Contacts", "names": "Names"}
 
@@ -98,6 +102,24 @@ def test_loopback_is_said_at_the_start_with_the_variable_that_opens_it(room):
     daemon = room.daemon(HANDS)
     room.node()
     room.until(lambda: "ROS_AUTOMATIC_DISCOVERY_RANGE" in daemon.log, "the hint")
+
+
+@pytest.mark.parametrize(("level", "heard"), [("info", {"INFO", "WARN"}), ("warn", {"WARN"}), ("error", set())])
+def test_the_log_level_holds_for_rosout_and_for_stderr(room, level, heard):
+    daemon = room.daemon(HANDS, ros_args=["--log-level", level, "-p", "ros.allow_edits:=true"])
+    node = room.node()
+    logs = room.hear(Log, "/rosout")
+    ticks = room.hear(Tick, "/sweepd/tick")
+    room.until(lambda: ticks and node.count_publishers("/rosout") > 1, "the node, and its way to /rosout")
+    # each set is a line of level INFO, each edit of a body that is not there one of level WARN
+    wanted = {"INFO": Log.INFO, "WARN": Log.WARN}
+    for number in range(10):
+        set_parameter(room, "ros_max_pairs", 100 + number)
+        assert not room.call(RemoveBody, "/sweepd/remove_body", RemoveBody.Request(name="nobody")).success
+        room.spin(0.05)
+    said = {name for name, code in wanted.items() if any(log.name == "sweepd" and log.level == code for log in logs)}
+    assert said == heard, [(log.level, log.msg) for log in logs]
+    assert {name for name in wanted if name in daemon.log} == heard, daemon.log
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

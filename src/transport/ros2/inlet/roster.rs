@@ -48,7 +48,7 @@ impl Inlet {
                 Ok(()) => self.lines.push(line),
                 Err(e) => {
                     let text = format!("body {}: no poses of it can come: {e}", body.name);
-                    self.shared.say(Say::Warn, &text);
+                    self.shared.say(Say::Error, &text);
                 }
             }
         }
