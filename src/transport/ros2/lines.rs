@@ -166,14 +166,19 @@ pub(super) fn of_body(
 
 /// Subscribes to what the scene needs, each topic once.
 ///
+/// * `again` - another node of the scene has run: a body that an edit has brought since may have a topic that cannot be
+///   heard, and must not keep the node from opening.
+/// * returns - the lines, and what was wrong with topics that are not heard.
+///
 /// # Errors
-/// `Error::Usage` when a name is none; `Error::Io` when DDS refuses.
+/// `Error::Usage` when a name is none, or is that of another topic; `Error::Io` when DDS refuses.
 pub(super) fn subscribe(
     node: &mut Node,
     context: &Context,
     names: &mut Names,
     sources: &[Source],
-) -> Result<Vec<Line>> {
+    again: bool,
+) -> Result<(Vec<Line>, Vec<String>)> {
     let own = names.claim("~/transforms").map_err(Error::Usage)?;
     let kind = ("sweepd_msgs", "BodyTransforms");
     let own = subscription(node, context, (&own, kind), FRAMES)?;
@@ -181,12 +186,13 @@ pub(super) fn subscribe(
     let kind = ("rosgraph_msgs", "Clock");
     let clock = subscription(node, context, (&clock, kind), NEWEST)?;
     let mut lines = vec![Line::Transforms(own), Line::Clock(clock)];
+    let mut odd = Vec::new();
     let mut trees: Vec<(String, bool, Vec<usize>)> = Vec::new();
     for (place, source) in sources.iter().enumerate() {
-        let topic = |full: &str| names.resolve(full).map_err(Error::Usage);
         if source.kind == RosKind::Tf {
             for (given, fixed) in [(&source.topic, false), (&source.static_topic, true)] {
-                let full = topic(given)?;
+                let kind = if fixed { "fixed links" } else { "links" };
+                let full = names.share(given, kind).map_err(Error::Usage)?;
                 match trees.iter_mut().find(|(known, ..)| *known == full) {
                     Some((.., places)) => places.push(place),
                     None => trees.push((full, fixed, vec![place])),
@@ -195,9 +201,15 @@ pub(super) fn subscribe(
             continue;
         }
         for (member, given) in source.topics().enumerate() {
-            let mut line = of_body(node, context, source.kind, &topic(given)?)?;
-            line.feed(place, member);
-            lines.push(line);
+            let full = names.claim(given).map_err(Error::Usage);
+            match full.and_then(|full| of_body(node, context, source.kind, &full)) {
+                Ok(mut line) => {
+                    line.feed(place, member);
+                    lines.push(line);
+                }
+                Err(e) if again => odd.push(format!("topic {given}: no poses can come: {e}")),
+                Err(e) => return Err(e),
+            }
         }
     }
     for (full, fixed, sources) in trees {
@@ -209,5 +221,5 @@ pub(super) fn subscribe(
             sources,
         });
     }
-    Ok(lines)
+    Ok((lines, odd))
 }

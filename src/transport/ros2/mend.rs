@@ -140,7 +140,10 @@ fn watch(
         drop(broken);
         let mut told = false;
         let node = loop {
-            let scene = open(scene).clone();
+            let scene = RosScene {
+                again: true,
+                ..open(scene).clone()
+            };
             match opener(&scene) {
                 Ok(node) => break node,
                 Err(e) if !told => {

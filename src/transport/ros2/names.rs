@@ -10,8 +10,8 @@ pub struct Names {
     args: RosArgs,
     node: String,
     namespace: String,
-    /// Full names given out, and what for.
-    taken: BTreeMap<String, String>,
+    /// Full names given out: the name that was asked for, and what for.
+    taken: BTreeMap<String, (String, String)>,
 }
 
 impl Names {
@@ -53,15 +53,26 @@ impl Names {
     /// # Errors
     /// One text, when it is no name or another thing has it.
     pub fn claim(&mut self, name: &str) -> Result<String, String> {
+        self.share(name, name)
+    }
+
+    /// As [`Self::claim`], for one of several things of a kind that read the same topic.
+    ///
+    /// # Errors
+    /// One text, when it is no name or a thing of another kind has it.
+    pub fn share(&mut self, name: &str, kind: &str) -> Result<String, String> {
         let full = self.resolve(name)?;
-        if let Some(other) = self.taken.insert(full.clone(), name.to_owned())
-            && other != name
-        {
-            return Err(format!(
-                "--ros-args: `{name}` and `{other}` would both be {full}: remap one of them to another name"
-            ));
+        match self.taken.get(&full) {
+            Some((other, taken_for)) if taken_for != kind => Err(format!(
+                "`{name}` and `{other}` would both be {full}: name or remap (--ros-args -r) one of them otherwise"
+            )),
+            Some(_) => Ok(full),
+            None => {
+                let given = (name.to_owned(), kind.to_owned());
+                self.taken.insert(full.clone(), given);
+                Ok(full)
+            }
         }
-        Ok(full)
     }
 
     /// The full name after expansion and remaps.
@@ -133,6 +144,21 @@ mod tests {
             error.contains("~/pairs") && error.contains("~/contacts"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn things_of_one_kind_share_a_topic_and_others_do_not() {
+        let mut names = names("-r /tf:=~/transforms -r /left/pose:=/right/pose");
+        names.share("/links", "links").unwrap();
+        assert_eq!(names.share("links", "links").unwrap(), "/links");
+        assert!(names.claim("/links").is_err());
+        names.claim("~/transforms").unwrap();
+        assert!(names.share("/tf", "links").is_err());
+        names.claim("/left/pose").unwrap();
+        let error = names.claim("/right/pose").unwrap_err();
+        assert!(error.contains("/left/pose"), "{error}");
+        // What was refused has taken nothing away.
+        assert_eq!(names.claim("/left/pose").unwrap(), "/right/pose");
     }
 
     #[test]

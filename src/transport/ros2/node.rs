@@ -94,7 +94,7 @@ impl RosNode {
     ) -> Result<Self> {
         let mut names = Names::new(&options.args, NODE_NAME).map_err(Error::Usage)?;
         let mut table = Table::of(scene);
-        let unknown = table
+        let mut odd = table
             .start(&said(&options.args)?, &names.full_node())
             .map_err(Error::Usage)?;
         let table = Arc::new(table);
@@ -114,7 +114,8 @@ impl RosNode {
         let reliable = table.is_word("out_reliability", "reliable");
         let publishers =
             Publishers::create(&mut node, &context, &mut names, heartbeat_ns, reliable)?;
-        let lines = subscribe(&mut node, &context, &mut names, &sources)?;
+        let (lines, unheard) = subscribe(&mut node, &context, &mut names, &sources, scene.again)?;
+        odd.extend(unheard);
         let services = Services::create(&mut node, &mut names, table.flag("ros.allow_edits"))?;
         shared.set_rosout(Some(node.rosout_writer()));
         let spinner = node
@@ -168,7 +169,7 @@ impl RosNode {
         };
         open.start(spinner, inlet, outlet)?;
         open.greet(options.network, &names);
-        for text in unknown {
+        for text in odd {
             open.shared.say(Say::Warn, &text);
         }
         Ok(open)

@@ -133,7 +133,7 @@ impl Outlet {
         if kind == RosKind::Tf {
             return None;
         }
-        let topic = self.names.resolve(&body.topic).map_err(Error::Usage);
+        let topic = self.names.claim(&body.topic).map_err(Error::Usage);
         let line = topic.and_then(|topic| of_body(&mut self.node, &self.context, kind, &topic));
         line.map_err(|e| {
             let text = format!("body {}: no poses of it can come: {e}", body.name);

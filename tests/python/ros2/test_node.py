@@ -90,6 +90,21 @@ def test_what_cannot_be_honoured_is_refused_at_the_start(room, arguments, words)
 
 
 @pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["-r", "/tf:=~/transforms"], ["/tf", "~/transforms"]),
+        (["-r", "/tf:=/tf_static"], ["/tf", "/tf_static"]),
+        (["-r", "/tracker/person:=/cart/odom"], ["/tracker/person", "/cart/odom"]),
+        (["-r", "~/pairs:=/tf"], ["/tf", "~/pairs"]),
+    ],
+)
+def test_a_remap_of_a_sources_topic_onto_another_is_refused_at_the_start(room, arguments, words):
+    daemon = room.daemon(TOPICS, ros_args=arguments)
+    assert daemon.process.wait(timeout=15) == 2
+    assert "would both be" in daemon.log and all(word in daemon.log for word in words), daemon.log
+
+
+@pytest.mark.parametrize(
     ("name", "value"), [("RMW_IMPLEMENTATION", "rmw_zenoh_cpp"), ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"), ("ROS_DOMAIN_ID", "many")]
 )  # fmt: skip
 def test_an_environment_that_cannot_be_honoured_is_refused_by_name(room, name, value):
