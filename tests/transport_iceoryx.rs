@@ -293,6 +293,30 @@ fn a_busy_poll_finds_frames_and_ends_at_its_time() {
 }
 
 #[test]
+fn bug_a_wait_of_less_than_a_microsecond_ends() {
+    let (ended, end) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        let files = Files::new();
+        let mut server = Server::open(ServerOptions {
+            spin_ns: 0,
+            ..ServerOptions::new(files.place.clone(), 7)
+        })
+        .unwrap();
+        let clock = SystemClock;
+        let link = sweepd::transport::iceoryx::IoxLink::open(&files.place, &clock, u64::MAX);
+        let mut link = link.unwrap();
+        for timeout_ns in (1..2_000).step_by(37) {
+            server.wait(timeout_ns, &clock).unwrap();
+            sweepd::transport::client::Link::wait(&mut link, timeout_ns).unwrap();
+        }
+        ended.send(()).unwrap();
+    });
+    // Whoever sleeps for ever is not woken by anything here.
+    let end = end.recv_timeout(Duration::from_secs(60));
+    assert!(end.is_ok(), "a wait does not end");
+}
+
+#[test]
 fn a_client_without_a_daemon_times_out_and_makes_nothing() {
     let files = Files::new();
     let none = ClientOptions {

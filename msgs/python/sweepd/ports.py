@@ -160,7 +160,8 @@ class Ports:
 
     def wait(self, timeout_s):
         """Sleeps until the daemon has sent something, or the time is up."""
-        self._ready.timed_wait(iox2.Duration.from_secs_f64(max(timeout_s, 0.0)))
+        # iceoryx2 0.10 hands the system whole microseconds, rounded down, and 0 is for ever
+        self._ready.timed_wait(iox2.Duration.from_secs_f64(max(timeout_s, 2e-6)))
 
     def subscribe(self, topic, row):
         """Listens to a message kind from now on."""

@@ -12,7 +12,7 @@ use iceoryx2::prelude::{AllocationStrategy, EventId, Node, PayloadHeader, ZeroCo
 
 use super::lock;
 use super::place::Place;
-use super::qos::{self, Ipc, Open, events, failed};
+use super::qos::{self, Ipc, Open, SLEEP_MIN, events, failed};
 use crate::error::{Error, Result};
 use crate::limits;
 use crate::time::Clock;
@@ -279,10 +279,13 @@ impl Link for IoxLink {
     }
 
     fn wait(&mut self, timeout_ns: u64) -> Result<()> {
-        match self
-            .ready
-            .timed_wait(|_| {}, Duration::from_nanos(timeout_ns))
-        {
+        let timeout = Duration::from_nanos(timeout_ns);
+        let heard = if timeout < SLEEP_MIN {
+            self.ready.try_wait(|_| {})
+        } else {
+            self.ready.timed_wait(|_| {}, timeout)
+        };
+        match heard {
             Ok(_) | Err(ListenerWaitError::InterruptSignal) => Ok(()),
             Err(e) => Err(failed("ready", e)),
         }

@@ -2,6 +2,7 @@
 //! number changed here needs all old clients to leave first.
 
 use std::fmt::Debug;
+use std::time::Duration;
 
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::prelude::{
@@ -76,6 +77,10 @@ pub(super) mod events {
     /// Largest id.
     pub(in super::super) const MAX: usize = 15;
 }
+
+/// Shortest sleep on a port: iceoryx2 0.10 hands the system a time in whole microseconds, rounded down, and 0 is for
+/// ever.
+pub(super) const SLEEP_MIN: Duration = Duration::from_micros(1);
 
 /// Whether a service is made when it is missing. Clients only open: after a removed root a client that creates would
 /// make a second, silent set of services.

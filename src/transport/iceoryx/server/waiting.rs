@@ -9,7 +9,7 @@ use super::Server;
 use crate::error::Result;
 use crate::time::Clock;
 use crate::transport::Wake;
-use crate::transport::iceoryx::qos::{events, failed};
+use crate::transport::iceoryx::qos::{SLEEP_MIN, events, failed};
 
 /// Looks between two readings of the clock: as long as one reading takes.
 const LOOKS_PER_READING: u32 = 8;
@@ -74,7 +74,7 @@ impl Server {
             events::DEAD | events::CREATED | events::DROPPED => wake.peers_changed = true,
             _ => wake.notified = true,
         };
-        let heard = if timeout.is_zero() {
+        let heard = if timeout < SLEEP_MIN {
             self.wake.try_wait(note)
         } else {
             self.wake.timed_wait(note, timeout)
