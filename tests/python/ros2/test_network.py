@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 
+import conftest
 import pytest
 from conftest import own_network
 from frames import Sender
@@ -67,8 +68,8 @@ class Lan:
         self.done.wait()
         return self._results.pop()
 
-    def start(self, args, env):
-        return self.run(lambda: subprocess.Popen(args, env=env))
+    def start(self, args, env, **more):
+        return self.run(lambda: subprocess.Popen(args, env=env, **more))
 
     def close(self):
         self._jobs.append(None)
@@ -143,6 +144,37 @@ def test_in_loopback_mode_nothing_leaves_the_host_while_ros_runs_on_another(room
     assert sent, "the rclpy node of this host is heard on the cable, so the ear works"
     assert from_daemon == []
     assert not [data for _, data in sent if b"colliding" in data or b"clear" in data]
+
+
+@pytest.mark.parametrize(("reach", "heard"), [("SUBNET", True), ("LOCALHOST", False)])
+def test_the_variable_that_is_said_opens_the_node_to_other_hosts(room, lan, reach, heard):
+    daemon = room.daemon(HANDS, env={"ROS_AUTOMATIC_DISCOVERY_RANGE": reach})
+    env = room.env | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
+    beside = os.path.join(os.path.dirname(__file__), "peer_echo.py")
+    other = lan.start([sys.executable, beside, "--seconds", "9"], env, stdout=subprocess.PIPE, text=True)
+    said, _ = other.communicate(timeout=40)
+    print(f"{reach}: the other host says: {said.strip()}")
+    assert (int(said.split()[1]) > 0) == heard
+    assert ("on every network of this host" if heard else "on this host only") in daemon.log
+
+
+def test_a_loopback_that_carries_the_multicast_flag_is_warned_of_with_what_to_do(room, monkeypatch):
+    # /sys is that of the name space it was mounted in: the daemon gets one of the test's own
+    own_sys = room.folder / "own_sys.sh"
+    own_sys.write_text(f"#!/bin/sh\nexec unshare -m sh -c 'mount -t sysfs none /sys && exec \"$0\" \"$@\"' {conftest.SWEEPD} \"$@\"\n")
+    own_sys.chmod(0o755)
+    monkeypatch.setattr(conftest, "SWEEPD", str(own_sys))
+    ip("link", "set", "lo", "multicast", "on")
+    room.node()
+    daemon = room.daemon(HANDS)
+    words = "ip link set lo multicast off"
+    room.until(lambda: words in daemon.log and "MULTICAST" in daemon.log, "a warning")
+    assert daemon.stop()[0] == 0
+    subprocess.run(words.split(), check=True)
+    daemon = room.daemon(HANDS)
+    room.until(lambda: "on this host only" in daemon.log, "the greeting")
+    room.spin(0.5)
+    assert "MULTICAST" not in daemon.log
 
 
 def rtps_data(guid_prefix, writer, number, payload):

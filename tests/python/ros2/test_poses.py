@@ -5,7 +5,7 @@ import math
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from frames import Sender, pose
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TransformStamped
 from sweepd_msgs.msg import BodyTransforms, State, Tick
 from tf2_msgs.msg import TFMessage
 from topics import SCENE, Feeder
@@ -69,6 +69,58 @@ def test_stamps_too_far_apart_along_a_chain_make_the_body_unknown_and_are_publis
     room.until(lambda: states[-1].word == "unknown", "unknown above the limit", then=feeder)
     feeder.shift_ns = {}
     room.until(lambda: states[-1].word == "clear", "clear again", then=feeder)
+
+
+def test_a_source_over_shared_memory_and_sources_over_ros_2_move_bodies_of_one_scene(fed):
+    room, feeder, states = fed
+    feeder.skip = {"box"}
+    room.until(lambda: states[-1].word == "unknown", "the box is stale", then=feeder)
+    client = room.client("sim", listen=())
+    at = [4.0]
+
+    def both():
+        feeder()
+        client.send({"box": ((at[0], 0, 0), (0, 0, 0, 1))})
+
+    room.until(lambda: states[-1].word == "clear", "clear: the box comes over shared memory", then=both)
+    at[0] = 2.05
+    state = room.until(lambda: states[-1].word == "colliding" and states[-1], "the box meets person", then=both)
+    assert {state.worst_name_a, state.worst_name_b} == {"box", "person"}
+
+
+def test_links_come_from_another_topic_where_the_scene_says_so(room):
+    """As Gazebo's bridge sends poses of models: a TFMessage, not on /tf."""
+    room.daemon('frame_id = "world"\n[run]\nrate = 50\n[[source]]\nname = "gz"\ntimeout_ms = 500\n'
+                'ros2 = { type = "tf", topic = "/model/robot/pose" }\n'
+                '[[body]]\nname = "robot"\nsource = "gz"\nshape = { type = "sphere", radius = 0.1 }\n')  # fmt: skip
+    node = room.node()
+    states = room.hear(State, "/sweepd/state")
+    reader = room.client(None, listen=("bodies",))
+    ours, others = (node.create_publisher(TFMessage, topic, 10) for topic in ("/model/robot/pose", "/tf"))
+
+    def send():
+        for publisher, x in ((ours, 1.5), (others, 9.0)):
+            link = TransformStamped(child_frame_id="robot")
+            link.header.frame_id = "world"
+            link.header.stamp = node.get_clock().now().to_msg()
+            link.transform.translation.x, link.transform.rotation.w = x, 1.0
+            publisher.publish(TFMessage(transforms=[link]))
+
+    room.until(lambda: states and states[-1].word == "clear", "clear: the robot is known", then=send)
+    for _ in range(20):
+        send()
+        assert bodies(room, reader, ["robot"])["robot"]["position"].tolist() == [1.5, 0, 0]
+
+
+def test_fixed_links_that_were_sent_before_the_daemon_came_are_taken(room):
+    node = room.node()
+    feeder = Feeder(room, node)
+    feeder()
+    room.spin(1.0)
+    room.daemon(SCENE)
+    states = room.hear(State, "/sweepd/state")
+    # the hand hangs on a link that is said once, before
+    room.until(lambda: states and states[-1].word == "clear", "clear: every body is known", then=feeder)
 
 
 def test_a_pose_in_another_frame_than_the_scenes_is_refused_and_told(fed):

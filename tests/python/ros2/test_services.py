@@ -5,6 +5,7 @@ import json
 import pytest
 from conftest import LATCHED
 from frames import Sender, pose
+from rcl_interfaces.msg import Log
 from scenes import HANDS
 from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
 from geometry_msgs.msg import Point
@@ -63,6 +64,25 @@ def test_bodies_are_put_disabled_attached_and_removed(scene):
     room.until(lambda: "crate" not in {n.name for n in names[-1].names}, "the name gone", then=lambda: sender.send(FAR))
     answer = room.call(RemoveBody, "/sweepd/remove_body", RemoveBody.Request(name="crate"))
     assert not answer.success and "crate" in answer.message
+
+
+def test_each_edit_is_logged_done_or_refused(scene):
+    room, _, _ = scene
+    logs = room.hear(Log, "/rosout")
+    said = lambda level, *words: any(log.name == "sweepd" and log.level == level and all(w in log.msg for w in words) for log in logs)  # noqa: E731
+    room.until(lambda: not room.call(RemoveBody, "/sweepd/remove_body", RemoveBody.Request(name="nobody")).success
+               and said(Log.WARN, "was refused", "nobody"), "a line on a refused edit")  # fmt: skip
+    hung = AttachBody.Request(name="right", to="left", pose=pose((0, 0, 2)))
+    ignore = SetFilter.Request(action=SetFilter.Request.IGNORE, a="left", b="right", reason="test")
+    for kind, request, words in [
+        (PutBody, still(-1.3, name="crate"), ("put", "crate")), (EnableBody, EnableBody.Request(name="crate"), ("enable", "crate")),
+        (SetFilter, ignore, ("left", "right")), (Reset, Reset.Request(source="sim"), ("reset", "sim")),
+        (AttachBody, hung, ("attach", "right")), (RemoveBody, RemoveBody.Request(name="crate"), ("remove", "crate")),
+    ]:  # fmt: skip
+        name = "".join(("_" if c.isupper() else "") + c.lower() for c in kind.__name__).lstrip("_")
+        answer = room.call(kind, f"/sweepd/{name}", request)
+        assert answer.success, (name, answer.message)
+        room.until(lambda: said(Log.INFO, "edit over ROS 2", *words), f"a line on {words}")
 
 
 def test_the_end_of_a_removed_bodys_pair_has_both_names(scene):
