@@ -1,22 +1,23 @@
 //! `~/markers` for RViz and Foxglove, and `~/collisions` as Gazebo says them. In: a parcel. Out: four list markers with
-//! ids that stay (boxes, contact points, normals, pairs not decided), each within a message of 128 KB. Pure.
+//! ids that stay (boxes, contact points, normals, pairs not decided), each within a message of 128 KB; where they do
+//! not hold all there is, a text that says so. Pure.
 
 use std::collections::BTreeMap;
 
 use super::parcel::Parcel;
 use super::speak::{Book, Speaker};
 use crate::math::{Point as At, Pose, pose_from};
-use crate::wire::ros::marker_kind::{ADD, LINE_LIST, SPHERE_LIST};
+use crate::wire::ros::marker_kind::{ADD, LINE_LIST, SPHERE_LIST, TEXT_VIEW_FACING};
 use crate::wire::ros::{
     ColorRgba, Duration, GzContact, GzContacts, GzEntity, Marker, MarkerArray, Point,
 };
 use crate::wire::ros::{Header, Quaternion};
-use crate::wire::{BodyRow, BodyStatus, ContactKind, Verdict};
+use crate::wire::{BodyRow, BodyStatus, ContactKind, ContactRow, Verdict};
 
 /// Boxes drawn: of the bodies of worst verdict first; each is 24 points with a colour, 1 KB.
 const BOXES_MAX: usize = 80;
-/// Points and normals drawn, each 60 to 120 bytes.
-const CONTACTS_MAX: usize = 300;
+/// Points and normals drawn, each 60 to 120 bytes, and contacts of `~/collisions`: the deepest.
+pub(super) const CONTACTS_MAX: usize = 300;
 /// Pairs not decided drawn.
 const PAIRS_MAX: usize = 200;
 /// Thickness of lines and points, metres: seen at the scale of a robot.
@@ -25,6 +26,8 @@ const LINE_M: f64 = 0.005;
 const POINT_M: f64 = 0.02;
 /// Length of a drawn normal, metres.
 const NORMAL_M: f64 = 0.1;
+/// Height of letters, metres.
+const TEXT_M: f64 = 0.1;
 /// A marker stays for so many of its periods without a new one.
 const PERIODS_KEPT: u64 = 3;
 
@@ -40,6 +43,7 @@ const YELLOW: ColorRgba = colour(0.9, 0.9, 0.1);
 const GREEN: ColorRgba = colour(0.2, 0.8, 0.3);
 const GREY: ColorRgba = colour(0.5, 0.5, 0.5);
 const BLUE: ColorRgba = colour(0.2, 0.4, 1.0);
+const WHITE: ColorRgba = colour(1.0, 1.0, 1.0);
 
 /// The markers of a tick.
 pub(super) fn markers(
@@ -72,10 +76,10 @@ pub(super) fn markers(
         ..Marker::default()
     };
     let mut bodies = blank("boxes", LINE_LIST, LINE_M, GREEN);
-    draw_boxes(&parcel.bodies, boxes, &mut bodies);
+    let (drawn, boxed, worst) = draw_boxes(&parcel.bodies, boxes, &mut bodies);
     let mut points = blank("contact_points", SPHERE_LIST, POINT_M, RED);
     let mut normals = blank("normals", LINE_LIST, LINE_M, BLUE);
-    for row in parcel.contacts.iter().take(CONTACTS_MAX) {
+    for row in deepest(parcel.contacts.iter()) {
         let contact = row.kind == ContactKind::Contact.code();
         points.points.push(row.point_a.into());
         points.colors.push(if contact { RED } else { YELLOW });
@@ -96,18 +100,61 @@ pub(super) fn markers(
             possible.points.push(Point::from(*b));
         }
     }
-    MarkerArray {
-        markers: vec![bodies, points, normals, possible],
+    let contacts = count(parcel.contacts.len()) + parcel.contacts_header.truncated;
+    let text = left_out(&[
+        (drawn, boxed, "boxes, of the worst verdicts"),
+        (points.points.len(), contacts, "contact points, the deepest"),
+        (
+            possible.points.len() / 2,
+            parcel.tick.possible,
+            "pairs not decided",
+        ),
+    ]);
+    let mut all = vec![bodies, points, normals, possible];
+    if let Some(text) = text {
+        let mut note = blank("left_out", TEXT_VIEW_FACING, TEXT_M, WHITE);
+        note.text = text;
+        note.pose.position = worst.into();
+        all.push(note);
     }
+    MarkerArray { markers: all }
+}
+
+fn count(rows: usize) -> u64 {
+    u64::try_from(rows).unwrap_or(u64::MAX)
+}
+
+/// What is not drawn, in words: how many are, of how many, of what.
+fn left_out(layers: &[(usize, u64, &str)]) -> Option<String> {
+    let cut = layers.iter().filter(|(drawn, all, _)| count(*drawn) < *all);
+    let words: Vec<String> = cut
+        .map(|(drawn, all, what)| format!("{drawn} of {all} {what}"))
+        .collect();
+    (!words.is_empty()).then(|| format!("drawn: {}", words.join("\n")))
+}
+
+/// The deepest contacts, at most [`CONTACTS_MAX`], in their order.
+fn deepest<'a>(rows: impl Iterator<Item = &'a ContactRow>) -> Vec<&'a ContactRow> {
+    let mut kept: Vec<(usize, &ContactRow)> = rows.enumerate().collect();
+    if kept.len() > CONTACTS_MAX {
+        kept.sort_by(|(_, one), (_, other)| one.gap_m.total_cmp(&other.gap_m));
+        kept.truncate(CONTACTS_MAX);
+        kept.sort_by_key(|(place, _)| *place);
+    }
+    kept.into_iter().map(|(_, row)| row).collect()
 }
 
 /// The oriented boxes of bodies, worst verdict first.
-fn draw_boxes(rows: &[BodyRow], boxes: &Boxes, marker: &mut Marker) {
+///
+/// * returns - how many are drawn, of how many, and where the worst body is, metres.
+fn draw_boxes(rows: &[BodyRow], boxes: &Boxes, marker: &mut Marker) -> (usize, u64, [f64; 3]) {
     let mut order: Vec<&BodyRow> = rows
         .iter()
         .filter(|row| boxes.contains_key(&row.body))
         .collect();
     order.sort_by_key(|row| (std::cmp::Reverse(row.verdict), row.body));
+    let worst = order.first().map_or([0.0; 3], |row| row.position);
+    let found = (order.len().min(BOXES_MAX), count(order.len()), worst);
     for row in order.into_iter().take(BOXES_MAX) {
         let Some((centre, half)) = boxes.get(&row.body) else {
             continue;
@@ -130,6 +177,7 @@ fn draw_boxes(rows: &[BodyRow], boxes: &Boxes, marker: &mut Marker) {
             marker.colors.push(colour);
         });
     }
+    found
 }
 
 /// The twelve edges of a box.
@@ -165,14 +213,17 @@ fn edges(pose: &Pose, centre: &[f64; 3], half: &[f64; 3], mut each: impl FnMut(P
 }
 
 /// The contacts of a tick as Gazebo's bridge says them, a contact a pair.
-pub(super) fn collisions(header: Header, book: &Book, parcel: &Parcel) -> GzContacts {
+///
+/// * returns - the message, and how many contacts it leaves out: the type has no place to say so.
+pub(super) fn collisions(header: Header, book: &Book, parcel: &Parcel) -> (GzContacts, u64) {
     let mut all: Vec<GzContact> = Vec::new();
     let mut last = None;
     let real = parcel
         .contacts
         .iter()
         .filter(|row| row.kind == ContactKind::Contact.code());
-    for row in real.take(CONTACTS_MAX) {
+    let cut = count(real.clone().count().saturating_sub(CONTACTS_MAX));
+    for row in deepest(real) {
         let entity = |id: u64| GzEntity {
             id,
             name: book.name(id).to_owned(),
@@ -193,10 +244,11 @@ pub(super) fn collisions(header: Header, book: &Book, parcel: &Parcel) -> GzCont
             contact.depths.push(-row.gap_m);
         }
     }
-    GzContacts {
+    let message = GzContacts {
         header,
         contacts: all,
-    }
+    };
+    (message, cut + parcel.contacts_header.truncated)
 }
 
 #[cfg(test)]
@@ -251,9 +303,11 @@ mod tests {
                 ("boxes", 0, boxes),
                 ("contact_points", 0, contacts),
                 ("normals", 0, 6),
-                ("possible", 0, 2)
+                ("possible", 0, 2),
+                ("left_out", 0, 0)
             ]
         );
+        assert_eq!(all[4].text, "drawn: 80 of 200 boxes, of the worst verdicts");
         assert_eq!(
             (all[0].lifetime.sec, all[0].lifetime.nanosec),
             (0, 300_000_000)
@@ -269,11 +323,40 @@ mod tests {
 
     #[test]
     fn collisions_are_grouped_by_pair_and_depth_is_positive() {
-        let all = collisions(Header::default(), &Book::default(), &parcel(3)).contacts;
+        let (message, cut) = collisions(Header::default(), &Book::default(), &parcel(3));
+        let all = message.contacts;
+        assert_eq!(cut, 0);
         let depths: Vec<_> = all
             .iter()
             .map(|c| (c.collision2.id, c.depths.clone()))
             .collect();
         assert_eq!(depths, [(2, vec![0.5, 0.25]), (3, vec![0.125])]);
+    }
+
+    #[test]
+    fn what_does_not_fit_is_counted_and_the_deepest_are_kept() {
+        let mut full = parcel(3);
+        let row = full.contacts[0];
+        full.contacts = (1..=400)
+            .map(|n| ContactRow {
+                gap_m: -f64::from(n),
+                ..row
+            })
+            .collect();
+        full.contacts_header.truncated = 7;
+        full.tick.possible = 1;
+        let boxes: Boxes = (1..=3).map(|id| (id, ([0.0; 3], [1.0; 3]))).collect();
+        let all = markers(&Speaker::default(), &full, &boxes, 1).markers;
+        assert_eq!(all[4].text, "drawn: 300 of 407 contact points, the deepest");
+        let (message, cut) = collisions(Header::default(), &Book::default(), &full);
+        let depths = &message.contacts[0].depths;
+        assert_eq!(
+            (cut, depths.len(), depths[0], depths[299]),
+            (107, 300, 101.0, 400.0)
+        );
+        full.contacts.truncate(CONTACTS_MAX);
+        full.contacts_header.truncated = 0;
+        let all = markers(&Speaker::default(), &full, &boxes, 1).markers;
+        assert_eq!(all.len(), 4, "all of it is drawn");
     }
 }

@@ -149,6 +149,7 @@ impl RosNode {
             told: (TickRow::default(), 0),
             shown_ns: 0,
             boxes: boxes(scene),
+            left_out: 0,
             read: Read::default(),
             namesakes,
             names: names.clone(),

@@ -15,7 +15,7 @@ use serde::Serialize;
 use super::RosSourceSpec;
 use super::diagnose::Diagnoser;
 use super::lines::{Arrival, Line, of_body};
-use super::markers::{Boxes, collisions, markers};
+use super::markers::{Boxes, CONTACTS_MAX, collisions, markers};
 use super::names::Names;
 use super::namesakes::Namesakes;
 use super::params::Kept;
@@ -52,6 +52,8 @@ pub(super) struct Outlet {
     /// When markers were last sent, nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) shown_ns: u64,
     pub(super) boxes: Boxes,
+    /// Contacts that the newest `~/collisions` does not hold.
+    pub(super) left_out: u64,
     pub(super) read: Read,
     pub(super) namesakes: Namesakes,
     /// Makes full names of the topics of bodies that come.
@@ -164,9 +166,11 @@ impl Outlet {
     /// Markers at their own rate, collisions each tick; where somebody listens.
     fn show(&mut self, parcel: &Parcel) {
         let mut pen = Pen::of(&mut self.node, &self.context, &self.shared);
+        self.left_out = 0;
         if self.read.collisions && parcel.holds.contacts {
             let header = self.speaker.header(parcel.tick.header.oldest_stamp_ns);
-            let message = collisions(header, &self.speaker.book, parcel);
+            let (message, left_out) = collisions(header, &self.speaker.book, parcel);
+            self.left_out = left_out;
             pen.write(&mut self.publishers.collisions, message);
         }
         let Some(period_ns) = self.shared.markers_period_ns() else {
@@ -191,7 +195,14 @@ impl Outlet {
         }
         *told_ns = now_ns;
         let now = self.shared.now();
-        let (counts, faults) = (self.shared.counts(), self.shared.faults());
+        let (counts, mut faults) = (self.shared.counts(), self.shared.faults());
+        if self.left_out > 0 {
+            let text = "contacts are left out of ~/collisions, which holds the deepest";
+            faults.push(format!(
+                "{} {text} {CONTACTS_MAX}: ~/contacts tells how many there are, and ros_max_contacts sets how many it holds",
+                self.left_out
+            ));
+        }
         let message = self
             .diagnoser
             .diagnose(now, &self.name, row, counts, &faults);

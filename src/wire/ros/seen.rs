@@ -55,6 +55,8 @@ pub mod marker_kind {
     pub const LINE_LIST: i32 = 5;
     /// A sphere a point.
     pub const SPHERE_LIST: i32 = 7;
+    /// Text that faces whoever looks.
+    pub const TEXT_VIEW_FACING: i32 = 9;
     /// Action: put it there, or change it.
     pub const ADD: i32 = 0;
     /// Action: take all away.
@@ -137,7 +139,7 @@ pub struct Marker {
     pub texture: Texture,
     /// Not used.
     pub uv_coordinates: Vec<UvCoordinate>,
-    /// Not used.
+    /// What a text says.
     pub text: String,
     /// Not used.
     pub mesh_resource: String,

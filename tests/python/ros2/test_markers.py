@@ -6,9 +6,11 @@ import math
 import numpy as np
 import pytest
 from conftest import LATCHED
+from diagnostic_msgs.msg import DiagnosticArray
 from frames import Sender
 from parameters import set_parameter
 from ros_gz_interfaces.msg import Contacts as GzContacts
+from scenes import cloud
 from sweepd_msgs.msg import Contact, Contacts, Names, Pairs, State, Tick
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -281,3 +283,24 @@ def test_collisions_are_off_unless_asked_and_then_those_of_the_contacts(room):
         sender.send(TOUCH)
         room.spin(0.05)
     assert len(collisions) == start
+
+
+def test_what_is_not_drawn_and_what_collisions_leave_out_is_told(room):
+    """Thirty spheres in one place: 435 contacts, of which 300 are shown."""
+    room.daemon(cloud(100), ros_args=["-p", "publish_collisions:=true"])
+    node = room.node()
+    sender = Sender(node)
+    together = {f"b{n:04}": (0.001 * n if n < 30 else 10.0 * n, 0, 0) for n in range(100)}
+    feed = lambda: sender.send(together)  # noqa: E731
+    shown = room.hear(MarkerArray, "/sweepd/markers")
+    collisions, said = room.hear(GzContacts, "/sweepd/collisions"), room.hear(DiagnosticArray, "/diagnostics")
+    notes = lambda: [m.text for m in shown[-1].markers if m.ns == "left_out"] if shown else []  # noqa: E731
+    room.until(lambda: "300 of 435 contact points" in "".join(notes()), "a text with the contacts", then=feed)
+    assert "80 of 100 boxes" in notes()[0]
+    (note,) = [m for m in shown[-1].markers if m.ns == "left_out"]
+    assert note.type == Marker.TEXT_VIEW_FACING and note.color.a > 0 and note.scale.z > 0
+    room.until(lambda: collisions and sum(len(c.depths) for c in collisions[-1].contacts) == 300, "300 contacts", then=feed)
+    room.until(lambda: any("135 contacts are left out of ~/collisions" in s.message for m in said[-2:] for s in m.status), "a word on the rest",
+               then=feed)  # fmt: skip
+    depths = sorted(depth for contact in collisions[-1].contacts for depth in contact.depths)
+    assert depths[0] > 0.98, "spheres of 1 m within 3 cm: the deepest are kept"
