@@ -111,7 +111,7 @@ impl RosNode {
             shelf.add_group(source.name, options.session, source.bodies());
         }
         let heartbeat_ns = scene.config.heartbeat_ns;
-        let reliable = table.is_word("out_reliability", "reliable");
+        let reliable = shared.reliable();
         let publishers =
             Publishers::create(&mut node, &context, &mut names, heartbeat_ns, reliable)?;
         let (lines, unheard) = subscribe(&mut node, &context, &mut names, &sources, scene.again)?;

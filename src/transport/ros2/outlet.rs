@@ -145,6 +145,9 @@ impl Outlet {
     }
 
     fn look_who_listens(&mut self) {
+        let reliable = self.shared.reliable();
+        self.publishers
+            .set_reliable(&mut self.node, &self.context, reliable);
         let (out, node) = (&self.publishers, &self.node);
         let markers = self.shared.markers_period_ns().is_some() && out.markers.is_read(node);
         let collisions = self.shared.collisions() && out.collisions.is_read(node);

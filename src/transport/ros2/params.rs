@@ -100,7 +100,7 @@ fn of_node() -> Vec<Spec> {
         Spec::new("ros_max_pairs", Value::Whole(1000), rows(), always),
         Spec::new("ros_max_contacts", Value::Whole(500), rows(), always),
         Spec::new("markers_rate_hz", Value::Real(10.0), rate, always),
-        Spec::new("out_reliability", reliable, Rule::Word(words), at_start),
+        Spec::new("out_reliability", reliable, Rule::Word(words), always),
         flag("publish_markers", true, always),
         flag("publish_collisions", false, always),
         flag("ros.allow_edits", false, at_start),
@@ -123,6 +123,8 @@ pub(super) enum Own {
     MarkersPeriod(u64),
     /// Whether `~/collisions` is published.
     Collisions(bool),
+    /// Whether lost messages of `~/pairs`, `~/contacts` and `~/collisions` are sent again.
+    Reliable(bool),
 }
 
 /// What setting a parameter does.
@@ -263,13 +265,6 @@ impl Table {
             .any(|spec| spec.name == name && spec.value == Value::Flag(true))
     }
 
-    /// The word of this name, as of the start.
-    pub(super) fn is_word(&self, name: &str, word: &str) -> bool {
-        self.specs
-            .iter()
-            .any(|spec| spec.name == name && spec.value == Value::Text(word.to_owned()))
-    }
-
     /// Whether a value may be set now.
     ///
     /// # Errors
@@ -314,6 +309,9 @@ impl Table {
             ("publish_markers", Some(Value::Flag(on))) => Effect::Own(Own::Markers(on)),
             ("markers_rate_hz", Some(Value::Real(hz))) => {
                 Effect::Own(Own::MarkersPeriod(some_ns(1e3 / hz).unwrap_or(0)))
+            }
+            ("out_reliability", Some(Value::Text(word))) => {
+                Effect::Own(Own::Reliable(word == "reliable"))
             }
             ("publish_collisions", Some(Value::Flag(on))) => Effect::Own(Own::Collisions(on)),
             (name, Some(Value::Real(ms))) => {

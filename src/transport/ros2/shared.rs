@@ -61,6 +61,7 @@ pub(super) struct Shared {
     markers: AtomicBool,
     markers_period_ns: AtomicU64,
     collisions: AtomicBool,
+    reliable: AtomicBool,
     sim_time: AtomicBool,
     /// The newest of `/clock`, nanoseconds; 0: none yet.
     pub(super) sim_now_ns: AtomicU64,
@@ -107,6 +108,7 @@ impl Shared {
             markers: AtomicBool::new(false),
             markers_period_ns: AtomicU64::new(0),
             collisions: AtomicBool::new(false),
+            reliable: AtomicBool::new(true),
             sim_time: AtomicBool::new(false),
             sim_now_ns: AtomicU64::new(0),
             settings: Mutex::new(Vec::new()),
@@ -140,6 +142,7 @@ impl Shared {
                 Own::Markers(on) => self.markers.store(on, Ordering::Relaxed),
                 Own::MarkersPeriod(ns) => self.markers_period_ns.store(ns, Ordering::Relaxed),
                 Own::Collisions(on) => self.collisions.store(on, Ordering::Relaxed),
+                Own::Reliable(on) => self.reliable.store(on, Ordering::Relaxed),
             },
             Effect::None => {}
         }
@@ -176,6 +179,11 @@ impl Shared {
     /// Whether `~/collisions` is published.
     pub(super) fn collisions(&self) -> bool {
         self.collisions.load(Ordering::Relaxed)
+    }
+
+    /// Whether lost messages of large topics are sent again.
+    pub(super) fn reliable(&self) -> bool {
+        self.reliable.load(Ordering::Relaxed)
     }
 
     /// Takes whether time is that of `/clock`.

@@ -77,6 +77,23 @@ impl<M: Serialize> Wheel<M> {
             || self.next.as_ref().is_some_and(read)
     }
 
+    /// Sets whether lost messages are sent again, which a writer keeps for its life: another one takes its place. Where
+    /// DDS makes none, the old one stays until the next call.
+    pub(super) fn set_reliable(&mut self, node: &mut Node, context: &Context, reliable: bool) {
+        if self.out.reliable == reliable {
+            return;
+        }
+        self.out.reliable = reliable;
+        match self.make(node, context) {
+            Some(writer) => {
+                self.current = writer;
+                (self.before, self.next) = (None, None);
+                (self.stuck, self.sent) = (false, 0);
+            }
+            None => self.out.reliable = !reliable,
+        }
+    }
+
     /// Publishes, on a new writer if need be.
     pub(super) fn publish(
         &mut self,

@@ -1,7 +1,7 @@
 """Parameters: given at the start, read and set by others while the node runs, refused with a reason; simulated time."""
 
 import pytest
-from conftest import RELIABLE
+from conftest import BEST_EFFORT, LATCHED, RELIABLE
 from frames import Sender
 from parameters import put, value
 from rcl_interfaces.msg import Log, Parameter, ParameterEvent, ParameterType
@@ -48,14 +48,34 @@ def test_wrong_values_are_refused_with_a_reason_and_atomic_sets_are_all_or_nothi
     room.daemon(HANDS, ros_args=EDITS)
     room.node()
     for name, one in [("budget_ms", -2.0), ("ros_max_contacts", -1), ("markers_rate_hz", 0.0), ("mode", "fast"),
-                      ("mode", "on_frame=nobody"), ("publish_markers", "yes"), ("out_reliability", "best_effort"),
+                      ("mode", "on_frame=nobody"), ("publish_markers", "yes"), ("out_reliability", "often"), ("ros.allow_edits", False),
                       ("no_such_parameter", 1)]:  # fmt: skip
-        ((done, reason),) = put(room, **{name: one})
+        ((done, reason),) = put(room, **{name.replace(".", "__"): one})
         assert not done and reason, (name, one)
     both = [Parameter(name="ros_max_contacts", value=value(7)), Parameter(name="budget_ms", value=value(-5.0))]
     answer = room.call(SetParametersAtomically, "/sweepd/set_parameters_atomically", SetParametersAtomically.Request(parameters=both))
     assert not answer.result.successful and answer.result.reason
-    assert get(room, "budget_ms") == [-1.0]
+    assert get(room, "budget_ms", "ros_max_contacts") == [-1.0, 500], "the good one of the two is not taken either"
+    both[1] = Parameter(name="budget_ms", value=value(5.0))
+    answer = room.call(SetParametersAtomically, "/sweepd/set_parameters_atomically", SetParametersAtomically.Request(parameters=both))
+    assert answer.result.successful and get(room, "budget_ms", "ros_max_contacts") == [5.0, 7]
+
+
+def test_the_reliability_of_large_topics_is_set_while_running(room):
+    room.daemon(HANDS)
+    node = room.node()
+    sender = Sender(node)
+    feed = lambda: sender.send(CLOSE)  # noqa: E731
+    strict, loose = room.hear(Pairs, "/sweepd/pairs", RELIABLE), room.hear(Pairs, "/sweepd/pairs", BEST_EFFORT)
+    room.until(lambda: strict and loose, "pairs for both readers", then=feed)
+    assert put(room, out_reliability="best_effort") == [(True, "")]
+    room.spin(1.0)
+    start, heard = len(strict), len(loose)
+    room.until(lambda: len(loose) > heard + 20, "pairs for the reader that asks for no more", then=feed)
+    assert len(strict) == start, "one that asks for reliable messages does not match"
+    assert put(room, out_reliability="reliable") == [(True, "")]
+    heard = len(loose)
+    room.until(lambda: len(strict) > start + 20 and len(loose) > heard + 20, "pairs for both again", then=feed)
 
 
 def test_what_is_set_takes_effect_and_is_told(room):
@@ -102,9 +122,11 @@ def test_a_value_that_cannot_be_meant_is_refused_at_the_start(room, arguments, w
 
 
 def test_an_unknown_parameter_is_told(room):
-    daemon = room.daemon(HANDS, ros_args=["-p", "no_such_parameter:=1"])
     room.node()
+    logs = room.hear(Log, "/rosout", LATCHED)
+    daemon = room.daemon(HANDS, ros_args=["-p", "no_such_parameter:=1"])
     room.until(lambda: "no_such_parameter" in daemon.log and "ros_max_contacts" in daemon.log, "a word on it, and what there is")
+    room.until(lambda: any("no_such_parameter" in log.msg and log.level == Log.WARN for log in logs), "and on /rosout")
 
 
 def test_limits_of_rows_are_parameters(room):

@@ -128,4 +128,11 @@ impl Publishers {
             )?,
         })
     }
+
+    /// Sets whether pairs and contacts that were lost are sent again.
+    pub(super) fn set_reliable(&mut self, node: &mut Node, context: &Context, reliable: bool) {
+        self.pairs.set_reliable(node, context, reliable);
+        self.contacts.set_reliable(node, context, reliable);
+        self.collisions.set_reliable(node, context, reliable);
+    }
 }
