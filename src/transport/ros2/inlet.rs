@@ -7,7 +7,7 @@ mod roster;
 use std::sync::Arc;
 use std::time::Duration;
 
-use ros2_client::{MessageInfo, Subscription};
+use ros2_client::{Gid, MessageInfo, Subscription};
 use rustdds::mio1::{Events, Poll, Token, Waker};
 use serde::de::DeserializeOwned;
 
@@ -120,6 +120,7 @@ impl Inlet {
                 now_ns,
                 waited: now_ns.saturating_sub(round_ns) > silence_ns.max(self.heartbeat_ns * 3 / 2),
                 ros_now_ns: self.shared.now().to_ns(),
+                from: Gid::ZERO,
             };
             round_ns = now_ns;
             more = self.round(receipt);
@@ -205,7 +206,11 @@ impl Inlet {
                 from,
                 fixed,
                 sources: places,
-            } => drain(from, shared, |message, _| {
+            } => drain(from, shared, |message, info| {
+                let receipt = Receipt {
+                    from: info.publisher_gid(),
+                    ..receipt
+                };
                 for &place in places.iter() {
                     if let Some(source) = sources.get_mut(place)
                         && source.take_links(&message, *fixed, receipt)

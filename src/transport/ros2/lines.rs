@@ -96,38 +96,53 @@ pub(super) struct Feeder {
     pub(super) member: usize,
     /// The topic's full name.
     pub(super) topic: String,
-    /// The two publishers last heard, and when, nanoseconds of `CLOCK_BOOTTIME`.
-    heard: [Option<(Gid, u64)>; 2],
+    /// Who sends on it.
+    heard: Heard,
 }
-
-/// Two publishers within this time make a body jump between them, nanoseconds.
-const TOGETHER_NS: u64 = 1_000_000_000;
 
 impl Feeder {
     /// A message came.
     pub(super) fn hear(&mut self, info: &MessageInfo, now_ns: u64) {
-        let gid = info.publisher_gid();
-        let [first, second] = &mut self.heard;
-        match first {
-            Some((own, at)) if *own == gid => *at = now_ns,
-            _ => {
-                *second = first.take();
-                *first = Some((gid, now_ns));
-            }
-        }
+        self.heard.hear(info.publisher_gid(), now_ns);
     }
 
     /// What is wrong with who sends.
     pub(super) fn fault(&self, now_ns: u64) -> Option<String> {
-        let fresh = |heard: &Option<(Gid, u64)>| {
-            heard.is_some_and(|(_, at)| now_ns.saturating_sub(at) < TOGETHER_NS)
-        };
-        self.heard.iter().all(fresh).then(|| {
+        self.heard.are_two(now_ns).then(|| {
             format!(
                 "topic {}: two publishers send poses of one body: stop one of them",
                 self.topic
             )
         })
+    }
+}
+
+/// The two publishers last heard of one thing, and when, nanoseconds of `CLOCK_BOOTTIME`.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Heard([Option<(Gid, u64)>; 2]);
+
+/// Two publishers within this time make a body jump between them, nanoseconds.
+const TOGETHER_NS: u64 = 1_000_000_000;
+
+impl Heard {
+    /// One sent something.
+    pub(super) fn hear(&mut self, from: Gid, now_ns: u64) {
+        let [first, second] = &mut self.0;
+        match first {
+            Some((own, at)) if *own == from => *at = now_ns,
+            _ => {
+                *second = first.take();
+                *first = Some((from, now_ns));
+            }
+        }
+    }
+
+    /// Whether both send now.
+    pub(super) fn are_two(&self, now_ns: u64) -> bool {
+        let fresh = |heard: &Option<(Gid, u64)>| {
+            heard.is_some_and(|(_, at)| now_ns.saturating_sub(at) < TOGETHER_NS)
+        };
+        self.0.iter().all(fresh)
     }
 }
 
@@ -153,7 +168,7 @@ pub(super) fn of_body(
         source: usize::MAX,
         member: usize::MAX,
         topic: topic.to_owned(),
-        heard: [None, None],
+        heard: Heard::default(),
     };
     Ok(if kind == RosKind::Pose {
         let kind = ("geometry_msgs", "PoseStamped");

@@ -1,14 +1,18 @@
 //! From messages of common types to poses of bodies. In: links of `/tf`, stamped poses, odometry. Out: [`Update`]s
-//! for the bodies concerned, or the reason why a body's place is not known. Pure: no DDS, no clock.
+//! for the bodies concerned, or the reason why a body's place is not known. Pure: no DDS beyond the names of
+//! publishers, no clock.
 
 mod judge;
 mod roster;
 mod stamps;
 
 use judge::judge;
-use stamps::{off, older};
+use stamps::{off, older, rivalry};
+
+use ros2_client::Gid;
 
 use super::RosScene;
+use super::lines::Heard;
 use super::shelf::Update;
 use super::tf::{Missing, Taken, Tree};
 use crate::config::RosKind;
@@ -25,6 +29,8 @@ pub(super) struct Receipt {
     pub(super) waited: bool,
     /// The node's time, which is what senders stamp with, nanoseconds; 0: not known.
     pub(super) ros_now_ns: u64,
+    /// Who sent it.
+    pub(super) from: Gid,
 }
 
 /// In place of the id of a body that has left: no body has it.
@@ -65,6 +71,8 @@ pub(super) struct Source {
     /// The scene's frame, by name and by its number in the tree.
     root: (String, usize),
     tree: Tree,
+    /// Who sends the link of each frame, by its number in the tree.
+    heard: Vec<Heard>,
     members: Vec<Member>,
     /// Widest skew of a chain at the last look, nanoseconds; `None`: no chain.
     pub(super) skew_ns: Option<u64>,
@@ -96,6 +104,7 @@ impl Source {
                 members,
                 root: (scene.frame_id.clone(), root),
                 tree,
+                heard: Vec::new(),
                 skew_ns: None,
                 refused: 0,
                 passing: None,
@@ -157,6 +166,9 @@ impl Source {
                 Taken::Older(by_ns) => Some(older(what, by_ns)),
                 Taken::Newer | Taken::Refused | Taken::WentBack => None,
             };
+            // Those that never change are said again by whoever starts anew.
+            let rivals = !fixed && taken != Taken::Refused && self.has_rivals(what.1, receipt);
+            let odd = if rivals { Some(rivalry(what)) } else { odd };
             back |= taken == Taken::WentBack;
             self.refused += u64::from(matches!(taken, Taken::Older(_) | Taken::Refused));
             self.tell(odd, receipt);

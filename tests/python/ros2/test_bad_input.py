@@ -154,6 +154,17 @@ def test_a_body_fed_by_two_publishers_of_its_topic_is_told(room):
     desk.told("/tracker/person", "two publishers", feed=both)
 
 
+def test_a_frame_of_tf_that_two_publishers_link_is_told(room):
+    desk = Desk(room)
+    other = room.node("other").create_publisher(TFMessage, "/tf", 10)
+
+    def both():
+        desk.feeder()
+        other.publish(TFMessage(transforms=[desk.feeder.link("elbow", "mount", (0.0, 0.0, 0.7))]))
+
+    desk.told("frame elbow", "two publishers", feed=both)
+
+
 def test_a_body_fed_by_another_source_is_told_and_its_own_wins(room):
     desk = Desk(room)
 

@@ -6,6 +6,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from frames import Sender, pose
 from geometry_msgs.msg import PoseStamped, TransformStamped
+from parameters import set_parameter
 from sweepd_msgs.msg import BodyTransforms, State, Tick
 from tf2_msgs.msg import TFMessage
 from topics import SCENE, Feeder
@@ -69,6 +70,20 @@ def test_stamps_too_far_apart_along_a_chain_make_the_body_unknown_and_are_publis
     room.until(lambda: states[-1].word == "unknown", "unknown above the limit", then=feeder)
     feeder.shift_ns = {}
     room.until(lambda: states[-1].word == "clear", "clear again", then=feeder)
+
+
+def test_a_link_that_is_stamped_ahead_on_purpose_needs_a_wider_max_skew(room):
+    """As AMCL stamps map to odom: a second ahead, by its transform_tolerance."""
+    room.daemon(SCENE, ros_args=["-p", "ros.allow_edits:=true"])
+    node = room.node()
+    states, said = room.hear(State, "/sweepd/state"), room.hear(DiagnosticArray, "/diagnostics")
+    feeder = Feeder(room, node)
+    feeder.shift_ns = {"base": 10**9}
+    room.until(lambda: any("body hand" in s.message and "stamped ahead on purpose" in s.message for m in said[-2:] for s in m.status),
+               "a word on what to raise", then=feeder)  # fmt: skip
+    assert states[-1].word == "unknown" and "rejected" in states[-1].reason_words
+    set_parameter(room, "max_skew_ms", 1200.0)
+    room.until(lambda: states[-1].word == "clear", "clear with it", then=feeder)
 
 
 def test_a_source_over_shared_memory_and_sources_over_ros_2_move_bodies_of_one_scene(fed):

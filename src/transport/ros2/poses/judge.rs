@@ -22,7 +22,7 @@ pub(super) fn judge(
                     "a link of its chain is older than the source's time-out".to_owned()
                 } else {
                     format!(
-                        "the stamps of its chain lie {:.3} s apart, more than max_skew {:.3} s",
+                        "the stamps of its chain lie {:.3} s apart, more than max_skew {:.3} s; raise max_skew_ms where a link is stamped ahead on purpose",
                         seconds(found.skew_ns),
                         seconds(max_skew_ns)
                     )

@@ -1,7 +1,8 @@
-//! Stamps that cannot be right, in words: out of order, or far from the node's own time.
+//! Stamps and senders that cannot be right, in words: out of order, far from the node's own time, two for one frame.
 //!
 //! Stamps are carried and never trusted for ages (law 4.8), so none of this changes a pose; whoever sends them is told.
 
+use super::super::lines::Heard;
 use super::{Receipt, Source, seconds};
 
 /// How long something that passes is told of, nanoseconds: as long as it takes a person to look.
@@ -17,12 +18,31 @@ impl Source {
         }
     }
 
+    /// Takes who sent the link of a frame; whether another one sends it, too.
+    pub(super) fn has_rivals(&mut self, frame: &str, receipt: Receipt) -> bool {
+        let Some(frame) = self.tree.id(frame) else {
+            return false;
+        };
+        if self.heard.len() <= frame {
+            self.heard.resize(frame + 1, Heard::default());
+        }
+        self.heard.get_mut(frame).is_some_and(|heard| {
+            heard.hear(receipt.from, receipt.now_ns);
+            heard.are_two(receipt.now_ns)
+        })
+    }
+
     /// What was wrong with stamps a moment ago.
     pub(super) fn passing(&self, now_ns: u64) -> Option<String> {
         let fresh = |(_, at): &&(String, u64)| now_ns.saturating_sub(*at) < TOLD_NS;
         let passing = self.passing.as_ref().filter(fresh);
         passing.map(|(text, _)| text.clone())
     }
+}
+
+/// Two publishers send links of one frame.
+pub(super) fn rivalry((kind, name): (&str, &str)) -> String {
+    format!("{kind} {name}: two publishers send links of it: stop one of them")
 }
 
 /// A stamp lies before the newest one of the same body or link: the message is passed over.
@@ -68,6 +88,7 @@ mod tests {
             now_ns: 5,
             waited: false,
             ros_now_ns,
+            from: ros2_client::Gid::ZERO,
         };
         let said = |stamp_ns, now_ns| off(("body", "b"), stamp_ns, receipt(now_ns), S / 2);
         assert!(

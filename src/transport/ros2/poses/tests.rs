@@ -47,6 +47,7 @@ fn at(now_ns: u64) -> Receipt {
         now_ns,
         waited: false,
         ros_now_ns: 0,
+        from: Gid::ZERO,
     }
 }
 
@@ -205,4 +206,27 @@ fn law_3_8_a_chain_is_as_old_as_its_oldest_link() {
     let said = look(&mut one, 900 * MS);
     assert!(said[0].result.is_err());
     assert_eq!(said[0].since_ns, 900 * MS);
+}
+
+#[test]
+fn a_frame_that_two_publishers_link_is_told_and_a_sender_that_starts_anew_is_not_for_long() {
+    let mut one = tf("tool");
+    let from = |number, now_ns| Receipt {
+        from: Gid::from([number; 16]),
+        ..at(now_ns)
+    };
+    let told = |one: &Source, now_ns| {
+        one.faults(9, now_ns)
+            .iter()
+            .any(|f| f.contains("two publishers"))
+    };
+    one.take_links(&link("world", "tool", MS), false, from(1, MS));
+    one.take_links(&link("world", "base", MS), false, from(2, MS));
+    assert!(!told(&one, 2 * MS), "each its own frame");
+    one.take_links(&link("world", "tool", 2 * MS), true, from(2, 2 * MS));
+    assert!(!told(&one, 2 * MS), "a link that never changes");
+    one.take_links(&link("world", "tool", 3 * MS), false, from(2, 3 * MS));
+    assert!(told(&one, 4 * MS));
+    one.take_links(&link("world", "tool", 5000 * MS), false, from(2, 5000 * MS));
+    assert!(!told(&one, 5000 * MS), "the other has stopped");
 }
