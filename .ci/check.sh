@@ -7,5 +7,8 @@ cargo fmt --all -- --check
 cargo fmt --manifest-path benches/peers/Cargo.toml -- --check
 cargo clippy --all-targets -- -D warnings
 cargo clippy --all-targets --no-default-features -- -D warnings
+# The lean daemon links nothing of DDS.
+lean=$(cargo tree --no-default-features -e normal --prefix none)
+if grep -E '^(rustdds|ros2-client) ' <<<"$lean"; then echo "there without the feature ros2" >&2; exit 1; fi
 RUSTDOCFLAGS="-D warnings" cargo doc --no-deps
 for script in launch-free-scripts/*.sh .ci/run .ci/*.sh; do bash -n "$script"; done

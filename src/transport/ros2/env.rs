@@ -8,6 +8,8 @@ pub struct Network {
     pub domain: u16,
     /// Whether anything leaves this host.
     pub range: Range,
+    /// Whether `ROS_LOCALHOST_ONLY` keeps it on this host, whatever the range says.
+    pub pinned: bool,
 }
 
 /// How far the node reaches.
@@ -63,6 +65,7 @@ impl Network {
             } else {
                 range
             },
+            pinned: localhost_only,
         })
     }
 }
@@ -117,7 +120,8 @@ mod tests {
             network,
             Network {
                 domain: 0,
-                range: Range::Localhost
+                range: Range::Localhost,
+                pinned: false,
             }
         );
         let network = read(
@@ -131,7 +135,8 @@ mod tests {
             network,
             Ok(Network {
                 domain: 42,
-                range: Range::Subnet
+                range: Range::Subnet,
+                pinned: false,
             })
         );
     }
@@ -143,7 +148,8 @@ mod tests {
             ("ROS_LOCALHOST_ONLY", "1"),
             ("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET"),
         ];
-        assert_eq!(read(None, &both).unwrap().range, Range::Localhost);
+        let pinned = read(None, &both).unwrap();
+        assert_eq!((pinned.range, pinned.pinned), (Range::Localhost, true));
         assert!(read(None, &[("ROS_STATIC_PEERS", "127.0.0.1;")]).is_ok());
         assert!(read(None, &[("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")]).is_ok());
     }

@@ -190,6 +190,9 @@ impl RosNode {
     /// Says where the node is, and what opens it.
     fn greet(&self, network: Network, names: &Names) {
         let reach = match network.range {
+            Range::Localhost if network.pinned => {
+                "on this host only, because ROS_LOCALHOST_ONLY=1 says so; without it ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET opens it to the network"
+            }
             Range::Localhost => {
                 "on this host only; ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET opens it to the network"
             }

@@ -171,6 +171,7 @@ mod tests {
         let network = Network {
             domain,
             range: Range::Localhost,
+            pinned: false,
         };
         let context = join(network).unwrap();
         let name = NodeName::new("/", name).unwrap();

@@ -1,5 +1,6 @@
 """Load: many bodies, many contacts, readers that are slow or stopped. Minutes long ones run with SWEEPD_CI_SLOW=1."""
 
+import math
 import signal
 import statistics
 import struct
@@ -56,7 +57,7 @@ def check_cloud(room, seconds):
     # the same frames over shared memory, by a daemon of its own
     room.plain_daemon(cloud(BODIES))
     paths = Cloud(BODIES)
-    compared, differences, found = 0, 0, 0
+    compared, differences, found, wrong = 0, 0, 0, 0
     import sweepd
 
     with sweepd.Client(f"{room.instance}_plain", "sim", quat_order="xyzw", timeout_s=15, listen=("pairs",)) as client:
@@ -67,12 +68,17 @@ def check_cloud(room, seconds):
                 continue
             frame["position"] = paths.positions(seq)
             ours = client.step(frame, timeout_s=10).pairs
-            near = {(int(r["body_a"]), int(r["body_b"])) for r in ours if r["verdict"] == 4}
-            theirs = {(a, b) for a, b, verdict, *_ in whole[tick] if verdict == 4}
+            near = {(int(r["body_a"]), int(r["body_b"])): (r["gap_min_m"], r["gap_max_m"]) for r in ours if r["verdict"] == 4}
+            theirs = {(a, b): gaps for a, b, verdict, *gaps in whole[tick] if verdict == 4}
             compared, found = compared + 1, found + len(theirs)
-            differences += near != theirs
-    print(f"{compared} ticks compared with shared memory, {found} colliding pairs, {differences} ticks differ")
-    assert differences == 0 and compared > 0.9 * frames and found > 10 * compared
+            differences += near.keys() != theirs.keys()
+            # two spheres of 0.5 m: the gap is known, and both intervals hold it
+            at = dict(zip(ids, frame["position"]))
+            for pair in near.keys() & theirs.keys():
+                gap = math.dist(at[pair[0]], at[pair[1]]) - 1.0
+                wrong += any(low > gap + 1e-9 or high < gap - 1e-9 or high - low > 1e-6 for low, high in (near[pair], theirs[pair]))
+    print(f"{compared} ticks compared with shared memory, {found} colliding pairs, {differences} ticks differ, {wrong} gaps are wrong")
+    assert differences == 0 and wrong == 0 and compared > 0.9 * frames and found > 10 * compared
 
 
 def test_pairs_of_five_hundred_bodies_are_those_of_shared_memory(room):
@@ -242,8 +248,11 @@ def test_an_idle_node_is_small(room):
     node = room.node()
     room.until(lambda: "sweepd" in node.get_node_names(), "the node")
     room.spin(2)
-    before, start = daemon.cpu_s(), time.monotonic()
-    time.sleep(10)
-    share = (daemon.cpu_s() - before) / (time.monotonic() - start)
-    print(f"idle: {100 * share:.2f} % of a core, {daemon.memory_kb()} KiB resident")
-    assert daemon.memory_kb() <= 40 * 1024 and share < 0.05
+    shares = []
+    for _ in range(5):
+        before, start = daemon.cpu_s(), time.monotonic()
+        time.sleep(3)
+        shares.append((daemon.cpu_s() - before) / (time.monotonic() - start))
+    print(f"idle: {[round(100 * share, 2) for share in shares]} % of a core, {daemon.memory_kb()} KiB resident")
+    # others on the machine make the same work take longer: the quietest span is the node's own
+    assert daemon.memory_kb() <= 40 * 1024 and min(shares) <= 0.01

@@ -119,6 +119,12 @@ def test_loopback_is_said_at_the_start_with_the_variable_that_opens_it(room):
     room.until(lambda: "ROS_AUTOMATIC_DISCOVERY_RANGE" in daemon.log, "the hint")
 
 
+def test_a_variable_that_is_set_is_not_advised(room):
+    daemon = room.daemon(HANDS, env={"ROS_LOCALHOST_ONLY": "1", "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"})
+    room.node()
+    room.until(lambda: "on this host only, because ROS_LOCALHOST_ONLY=1 says so" in daemon.log, "what keeps it here")
+
+
 @pytest.mark.parametrize(("level", "heard"), [("info", {"INFO", "WARN"}), ("warn", {"WARN"}), ("error", set())])
 def test_the_log_level_holds_for_rosout_and_for_stderr(room, level, heard):
     daemon = room.daemon(HANDS, ros_args=["--log-level", level, "-p", "ros.allow_edits:=true"])
