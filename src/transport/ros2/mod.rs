@@ -29,6 +29,7 @@ mod shared;
 mod shelf;
 mod sockets;
 mod speak;
+mod strangers;
 mod tf;
 mod topics;
 mod wheel;

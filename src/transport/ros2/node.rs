@@ -31,6 +31,7 @@ use super::shared::{Say, Shared};
 use super::shelf::Shelf;
 use super::sockets;
 use super::speak::{Book, Speaker};
+use super::strangers::Strangers;
 use crate::error::{Error, Result};
 use crate::time::Clock;
 use crate::transport::{BodyChange, BodyNote, Door, RequestToken, Setting as Applied, Wake};
@@ -150,6 +151,7 @@ impl RosNode {
             shown_ns: 0,
             boxes: boxes(scene),
             left_out: 0,
+            strangers: Strangers::of(&context, &names, scene),
             read: Read::default(),
             namesakes,
             names: names.clone(),
@@ -169,10 +171,7 @@ impl RosNode {
             ticks_asked: Vec::new(),
         };
         open.start(spinner, inlet, outlet)?;
-        open.greet(options.network, &names);
-        for text in odd {
-            open.shared.say(Say::Warn, &text);
-        }
+        open.greet(options.network, &names, &odd);
         Ok(open)
     }
 
@@ -187,8 +186,8 @@ impl RosNode {
         Ok(())
     }
 
-    /// Says where the node is, and what opens it.
-    fn greet(&self, network: Network, names: &Names) {
+    /// Says where the node is, what opens it, and what was odd at the start.
+    fn greet(&self, network: Network, names: &Names, odd: &[String]) {
         let reach = match network.range {
             Range::Localhost if network.pinned => {
                 "on this host only, because ROS_LOCALHOST_ONLY=1 says so; without it ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET opens it to the network"
@@ -215,6 +214,9 @@ impl RosNode {
                 Say::Warn,
                 "ROS_DISTRO is humble, whose graph this build does not speak (Iron and later): topics work, node names may not",
             );
+        }
+        for text in odd {
+            self.shared.say(Say::Warn, text);
         }
     }
 

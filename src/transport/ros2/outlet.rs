@@ -24,6 +24,7 @@ use super::parcel::{Next, Parcel, Parcels};
 use super::services::open;
 use super::shared::{Say, Shared};
 use super::speak::Speaker;
+use super::strangers::Strangers;
 use super::wheel::{Sent, Wheel};
 use crate::config::RosKind;
 use crate::error::Error;
@@ -54,6 +55,7 @@ pub(super) struct Outlet {
     pub(super) boxes: Boxes,
     /// Contacts that the newest `~/collisions` does not hold.
     pub(super) left_out: u64,
+    pub(super) strangers: Strangers,
     pub(super) read: Read,
     pub(super) namesakes: Namesakes,
     /// Makes full names of the topics of bodies that come.
@@ -83,7 +85,8 @@ impl Outlet {
             self.look_who_listens();
             self.follow_sim_time();
             self.diagnose();
-            if let Some(text) = self.namesakes.look() {
+            let strange = self.strangers.watch(SystemClock.boottime_ns());
+            for text in self.namesakes.look().into_iter().chain(strange) {
                 self.shared.say(Say::Warn, &text);
             }
             match self.parcels.next(SLEEP) {
@@ -199,6 +202,7 @@ impl Outlet {
         *told_ns = now_ns;
         let now = self.shared.now();
         let (counts, mut faults) = (self.shared.counts(), self.shared.faults());
+        faults.extend_from_slice(self.strangers.found());
         if self.left_out > 0 {
             let text = "contacts are left out of ~/collisions, which holds the deepest";
             faults.push(format!(

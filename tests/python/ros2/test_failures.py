@@ -9,9 +9,11 @@ import time
 
 import pytest
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from conftest import LATCHED, RELIABLE
 from frames import Sender
 from parameters import put
+from rcl_interfaces.msg import Log
 from rcl_interfaces.srv import GetParameters
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -206,10 +208,15 @@ def test_another_type_on_our_topic_does_no_harm(room):
         stranger.create_subscription(String, "/sweepd/tick", print, qos)
     right = room.node("right")
     states = room.hear(State, "/sweepd/state", node=right)
+    logs, said = room.hear(Log, "/rosout", node=right), room.hear(DiagnosticArray, "/diagnostics", node=right)
     sender = Sender(right)
     room.until(lambda: states and states[-1].word == "clear", "clear beside it",
                then=lambda: (wrong.publish(String(data="x" * 1000)), sender.send(FAR)))  # fmt: skip
     assert daemon.process.poll() is None
+    for topic, count, ours in (("/sweepd/transforms", 2, "BodyTransforms"), ("/sweepd/tick", 2, "Tick")):
+        words = f"topic {topic}: {count} endpoints of other nodes have type std_msgs/msg/String there, and this node sweepd_msgs/msg/{ours}"
+        room.until(lambda: any(words in log.msg and log.level == Log.WARN for log in logs), f"{words} on /rosout")
+        room.until(lambda: any(words in status.message for message in said[-2:] for status in message.status), f"{words} in the diagnostics")
     stranger.destroy_node()
     rclpy.shutdown(context=context)
 
