@@ -6,8 +6,7 @@ use crate::narrow::{Contact, Finding, Witness};
 use crate::wire::{ContactKind, ContactRow, Level, MessageHeader, Outbox, Verdict, contact_flags};
 use crate::world::Body;
 
-use super::kept::{Kept, Span};
-use super::listing::Row;
+use super::kept::Span;
 use super::{AHEAD, Publisher, View};
 
 impl Publisher {
@@ -37,14 +36,21 @@ impl Publisher {
             {
                 view.narrow.ask_ahead_for_contacts(slot);
             }
-            let row = self.listing.rows[at];
+            let row = &self.listing.rows[at];
             let sent = !cut || self.chosen.get(at) == Some(&true);
-            self.listing.rows[at].in_contacts = match row.slot {
+            let span = match row.slot {
                 Some(slot) if sent && row.contacts > 0 => {
-                    self.keep_or_make(view, &mut kept, (slot, &row), out)
+                    if !row.fresh && row.in_contacts.len == row.contacts {
+                        kept.keep(&mut out.contacts, row.in_contacts)
+                    } else {
+                        let was = row.in_contacts;
+                        view.narrow.name_contacts(slot, &mut self.next_contact);
+                        kept.make(&mut out.contacts, was, |out| push_rows(view, slot, out))
+                    }
                 }
                 _ => Span::default(),
             };
+            self.listing.rows[at].in_contacts = span;
         }
         kept.finish(&mut out.contacts);
         self.kept_contacts = kept;
@@ -54,23 +60,6 @@ impl Publisher {
             ..header
         };
         left_out
-    }
-
-    /// The contacts of a pair that has some, as they were or as they are now; returns where they stand.
-    fn keep_or_make(
-        &mut self,
-        view: &mut View<'_>,
-        kept: &mut Kept<ContactRow>,
-        (slot, row): (PairSlot, &Row),
-        out: &mut Outbox,
-    ) -> Span {
-        if !row.fresh && row.in_contacts.len == row.contacts {
-            return kept.keep(&mut out.contacts, row.in_contacts);
-        }
-        view.narrow.name_contacts(slot, &mut self.next_contact);
-        kept.make(&mut out.contacts, row.in_contacts, |out| {
-            push_rows(view, slot, out);
-        })
     }
 
     /// Chooses the pairs whose contacts fit: the deepest, of equally deep ones those with the smaller ids.

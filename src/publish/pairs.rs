@@ -46,9 +46,9 @@ impl Publisher {
             {
                 view.narrow.ask_ahead(slot);
             }
-            let row = rows[at];
+            let row = &rows[at];
             let span = if row.fresh {
-                let make = |out: &mut Vec<PairRow>| out.push(self.pair_row(view, &row));
+                let make = |out: &mut Vec<PairRow>| out.push(self.pair_row(view, row));
                 kept.make(&mut out.pairs, row.in_pairs, make)
             } else {
                 kept.keep(&mut out.pairs, row.in_pairs)

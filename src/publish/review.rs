@@ -40,28 +40,32 @@ impl Publisher {
         let mut kept = 0;
         for at in 0..self.listing.rows.len() {
             ask_ahead(&self.listing, view, at);
-            let mut row = self.listing.rows[at];
+            let row = &mut self.listing.rows[at];
             let Some(slot) = row.slot else { continue };
-            if !row.may_last() || view.narrow.is_stirred(slot) {
+            if row.may_last() && !view.narrow.is_stirred(slot) {
+                row.fresh = false;
+                self.survey.take(row, None);
+                self.listing.see(slot, view.tick);
+                // Most stay where they are: nothing is copied until one has left.
+                if kept != at {
+                    self.listing.rows[kept] = self.listing.rows[at];
+                }
+            } else {
+                let was = *row;
                 let Some(now) = self.look(view, slot) else {
                     continue;
                 };
-                if now.ids != row.ids {
+                if now.ids != was.ids {
                     // The slot holds another pair now.
                     self.listing.add(now);
                     continue;
                 }
-                row = Row {
-                    in_pairs: row.in_pairs,
-                    in_contacts: row.in_contacts,
+                self.listing.rows[kept] = Row {
+                    in_pairs: was.in_pairs,
+                    in_contacts: was.in_contacts,
                     ..now
                 };
-            } else {
-                row.fresh = false;
-                self.listing.see(slot, view.tick);
-                self.survey.take(&row, None);
             }
-            self.listing.rows[kept] = row;
             kept += 1;
         }
         self.listing.rows.truncate(kept);
