@@ -317,6 +317,28 @@ fn bug_a_wait_of_less_than_a_microsecond_ends() {
 }
 
 #[test]
+fn bug_a_wait_ends_at_its_time_and_not_at_the_next_tick_of_the_systems_timer() {
+    let files = Files::new();
+    let mut server = Server::open(ServerOptions {
+        spin_ns: 0,
+        ..ServerOptions::new(files.place.clone(), 7)
+    })
+    .unwrap();
+    let clock = SystemClock;
+    while server.wait(0, &clock).unwrap() != sweepd::transport::Wake::default() {}
+    // With 250 ticks a second each of these took 4 ms or more; the least says what the wait is meant to be, whatever
+    // else runs.
+    let timeout_ns = 2_300_000;
+    let took = (0..50).map(|_| {
+        let before_ns = clock.monotonic_ns();
+        server.wait(timeout_ns, &clock).unwrap();
+        clock.monotonic_ns() - before_ns
+    });
+    let least_ns = took.min().unwrap();
+    assert!((timeout_ns..3_300_000).contains(&least_ns), "{least_ns}");
+}
+
+#[test]
 fn a_client_without_a_daemon_times_out_and_makes_nothing() {
     let files = Files::new();
     let none = ClientOptions {

@@ -16,10 +16,12 @@ use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::server::Server as RequestServer;
 use iceoryx2::prelude::{
-    AllocationStrategy, BackpressureStrategy, Node, PortFactory as _, ZeroCopySend,
+    AllocationStrategy, BackpressureStrategy, Node, PortFactory as _, SignalHandlingMode,
+    ZeroCopySend,
 };
 use iceoryx2::service::port_factory::event::PortFactory as EventFactory;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory as PubSub;
+use iceoryx2::waitset::{WaitSet, WaitSetBuilder};
 
 use super::lock::{Holder, InstanceLock, RootLock};
 use super::place::Place;
@@ -99,6 +101,8 @@ pub struct Server {
     transforms_vel: In<TransformVelRow>,
     vertices: In<VertexRow, VertexHeader>,
     wake: Listener<Ipc>,
+    /// To sleep on it; holds a port only meanwhile.
+    sleeper: WaitSet<Ipc>,
     ready: Notifier<Ipc>,
     contacts: Out<ContactRow>,
     regions: Out<RegionRow>,
@@ -180,6 +184,10 @@ impl Server {
             vertices: In::open_vertices(&node, place).map_err(held)?,
             wake: wake
                 .listener_builder()
+                .create()
+                .map_err(|e| failed("wake", e))?,
+            sleeper: WaitSetBuilder::new()
+                .signal_handling_mode(SignalHandlingMode::Disabled)
                 .create()
                 .map_err(|e| failed("wake", e))?,
             ready: ready

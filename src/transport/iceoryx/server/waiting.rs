@@ -4,18 +4,24 @@ use std::time::Duration;
 
 use iceoryx2::port::EventActivation;
 use iceoryx2::port::listener::ListenerWaitError;
+use iceoryx2::prelude::CallbackProgression;
+use iceoryx2::waitset::WaitSetRunResult;
 
 use super::Server;
 use crate::error::Result;
 use crate::time::Clock;
 use crate::transport::Wake;
-use crate::transport::iceoryx::qos::{SLEEP_MIN, events, failed};
+use crate::transport::iceoryx::qos::{events, failed};
 
 /// Looks between two readings of the clock: as long as one reading takes.
 const LOOKS_PER_READING: u32 = 8;
 /// A thread that finds something in every spin, or never sleeps, still looks at the wake-up port so often, nanoseconds:
 /// it tells who came and left, and costs a system call.
 const LISTEN_EVERY_NS: u64 = 1_000_000;
+/// Shortest wait on a set of ports; they are for whole milliseconds.
+const SET_WAIT_MIN: Duration = Duration::from_millis(1);
+/// What is left of a wait is slept in such slices: who comes meanwhile is heard at the end of one.
+const SLICE: Duration = Duration::from_micros(100);
 
 impl Server {
     fn pending(&self) -> bool {
@@ -56,8 +62,48 @@ impl Server {
         if look_ns > 0 && now_ns < until_ns {
             self.patience.missed();
         }
-        self.listened_ns = now_ns;
-        self.listen(Duration::from_nanos(until_ns.saturating_sub(now_ns)))
+        self.sleep_until(until_ns, clock)
+    }
+
+    /// Sleeps until something comes or the time is up, to a tenth of a millisecond.
+    ///
+    /// Not by the wake-up port's own time-out: the system counts that in ticks of its timer, 4 ms with the usual 250 Hz,
+    /// and rounds it up, so that 100 beats a second were 70. A wait on a set of ports is for whole milliseconds; the rest
+    /// is slept in slices.
+    fn sleep_until(&mut self, until_ns: u64, clock: &dyn Clock) -> Result<Wake> {
+        loop {
+            self.listened_ns = clock.monotonic_ns();
+            let left = Duration::from_nanos(until_ns.saturating_sub(self.listened_ns));
+            let mut interrupted = false;
+            if left >= SET_WAIT_MIN {
+                interrupted = self.wait_on_set(left)?;
+            } else if !left.is_zero() {
+                #[allow(
+                    clippy::disallowed_methods,
+                    reason = "less than a wait on ports is for"
+                )]
+                std::thread::sleep(left.min(SLICE));
+            }
+            let mut wake = self.listen()?;
+            wake.interrupted |= interrupted;
+            if wake != Wake::default() || left.is_zero() {
+                return Ok(wake);
+            }
+        }
+    }
+
+    /// Waits for whole milliseconds of a time, or until something comes; returns whether a signal came.
+    fn wait_on_set(&self, time: Duration) -> Result<bool> {
+        let whole = Duration::from_millis(u64::try_from(time.as_millis()).unwrap_or(u64::MAX));
+        let port = (self.sleeper.attach_notification(&self.wake)).map_err(|e| failed("wake", e))?;
+        let ran = self
+            .sleeper
+            .wait_and_process_once_with_timeout(|_| CallbackProgression::Continue, whole);
+        drop(port);
+        match ran {
+            Ok(ran) => Ok(ran == WaitSetRunResult::Interrupt),
+            Err(e) => Err(failed("wake", e)),
+        }
     }
 
     fn listen_now_and_then(&mut self, now_ns: u64) -> Result<Wake> {
@@ -65,21 +111,17 @@ impl Server {
             return Ok(Wake::default());
         }
         self.listened_ns = now_ns;
-        self.listen(Duration::ZERO)
+        self.listen()
     }
 
-    pub(super) fn listen(&mut self, timeout: Duration) -> Result<Wake> {
+    /// Takes what stands in the wake-up port.
+    pub(super) fn listen(&mut self) -> Result<Wake> {
         let mut wake = Wake::default();
         let note = |activation: EventActivation| match activation.id.as_value() {
             events::DEAD | events::CREATED | events::DROPPED => wake.peers_changed = true,
             _ => wake.notified = true,
         };
-        let heard = if timeout < SLEEP_MIN {
-            self.wake.try_wait(note)
-        } else {
-            self.wake.timed_wait(note, timeout)
-        };
-        match heard {
+        match self.wake.try_wait(note) {
             Ok(_) => {}
             Err(ListenerWaitError::InterruptSignal) => {
                 wake.interrupted = true;
