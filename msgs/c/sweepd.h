@@ -786,9 +786,9 @@ typedef struct sweepd_tick_row {
     sweepd_message_header header;
     /* When the tick ended, nanoseconds of CLOCK_BOOTTIME. */
     uint64_t sent_ns;
-    /* From wake-up to the outbox filled, nanoseconds. */
+    /* From wake-up to the outbox filled, and what the last sending took, nanoseconds. */
     uint64_t elapsed_ns;
-    /* Work budget in time, nanoseconds; u64::MAX: none. */
+    /* Time this tick had from wake-up on: the budget, or less by a frame's deadline; ns; u64::MAX: no end. */
     uint64_t budget_ns;
     /* Work budget in units; u64::MAX: none. */
     uint64_t budget_units;
@@ -814,7 +814,7 @@ typedef struct sweepd_tick_row {
     uint64_t near;
     /* Pairs of bodies that a rule, neighbour or rigid group ignores. */
     uint64_t ignored;
-    /* Ticks of this boot that ended after their budget. */
+    /* Ticks of this boot that ended after their budget or a frame's deadline. */
     uint64_t missed;
     /* Begins and their ends that were never sent, because rows did not fit. */
     uint64_t cancelled_events;
@@ -830,7 +830,7 @@ typedef struct sweepd_tick_row {
     uint32_t reasons;
     /* TickCause. */
     uint8_t cause;
-    /* 1: ended after its budget. */
+    /* 1: ended after its budget or a frame's deadline. */
     uint8_t overrun;
     /* Sources in use in sources. */
     uint8_t sources_len;

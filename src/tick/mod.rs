@@ -3,6 +3,7 @@
 //!
 //! In: [`TickInput`] (frames, edits, demand, budget, and why this tick). Out: a filled [`Outbox`].
 
+mod end;
 mod floor;
 mod input;
 mod look;
@@ -18,17 +19,18 @@ use crate::broad::{BroadPhase, Method};
 use crate::config::Config;
 use crate::error::Result;
 use crate::ids::SourceSlot;
-use crate::narrow::{Narrow, Order, Wanted};
+use crate::narrow::{Narrow, Wanted};
 use crate::pairs::{PairDelta, PairSet};
 use crate::plan::Plan;
 use crate::publish::{Publisher, View};
 use crate::scene::Scene;
-use crate::time::{Budget, Clock, Meter};
+use crate::time::{Clock, Meter};
 use crate::wire::{
-    Demand, Inbox, MessageHeader, Outbox, Reason, RejectReason, Stage, State, TickRow, WIRE_VERSION,
+    Demand, MessageHeader, Outbox, Reason, RejectReason, Stage, State, TickRow, WIRE_VERSION,
 };
-use crate::world::{ChangeSet, PlacedShape, World};
+use crate::world::{Admission, ChangeSet, PlacedShape, World};
 
+use end::End;
 use floor::{Floor, Laps};
 use rest::Rest;
 
@@ -61,6 +63,7 @@ pub struct Engine {
     tick: u64,
     /// Time of this tick, nanoseconds of `CLOCK_BOOTTIME`.
     now_ns: u64,
+    end: End,
     missed: u64,
     rebuilds: u64,
 }
@@ -114,6 +117,7 @@ impl Engine {
             rest: Rest::default(),
             tick: 0,
             now_ns: 0,
+            end: End::default(),
             missed: 0,
             rebuilds: 0,
             world,
@@ -163,6 +167,7 @@ impl Engine {
         self.tick += 1;
         self.outcomes.clear();
         self.delta.clear();
+        self.end = End::of(input.woke_ns, input.budget);
         Laps::start(Arc::clone(&self.clock), input.woke_ns)
     }
 
@@ -185,7 +190,9 @@ impl Engine {
             });
         }
         for frame in input.inbox.frames() {
-            self.world.admit(frame, now_ns);
+            if let Admission::Admitted { .. } = self.world.admit(frame, now_ns) {
+                self.end.shorten(frame, now_ns);
+            }
         }
         for vertices in input.inbox.vertices() {
             self.world.admit_vertices(vertices, now_ns);
@@ -198,23 +205,6 @@ impl Engine {
         if !input.edits.is_empty() {
             self.replan();
         }
-    }
-
-    /// The earliest deadline that a frame of this tick carries, `CLOCK_MONOTONIC` nanoseconds.
-    fn frames_deadline_ns(&self, inbox: &Inbox, woke_ns: u64) -> Option<u64> {
-        let frames = inbox.frames().iter();
-        let deadlines = frames.filter_map(|frame| {
-            let header = &frame.header;
-            let own = (header.deadline_ns != 0).then_some(header.deadline_ns);
-            let waited_ns = self.now_ns.saturating_sub(frame.received_ns);
-            let left = (header.time_left_ns != 0).then(|| {
-                woke_ns
-                    .saturating_add(header.time_left_ns)
-                    .saturating_sub(waited_ns)
-            });
-            earliest(own, left)
-        });
-        deadlines.min()
     }
 
     fn replan(&mut self) {
@@ -256,41 +246,26 @@ impl Engine {
     /// Spends what the budget leaves above the floor; returns the units spent.
     fn narrow_within(&mut self, input: &mut TickInput<'_>, laps: &Laps) -> u64 {
         let budget = input.budget;
-        let order = match budget {
-            Budget {
-                time_ns: None,
-                units: None,
-            } => Order::AsFound,
-            Budget {
-                time_ns: Some(_), ..
-            } => Order::Aged,
-            Budget {
-                time_ns: None,
-                units: Some(_),
-            } => Order::Counted,
-        };
         let demand = input.demand;
         let wanted = Wanted {
             contacts: demand.contacts || demand.regions,
             bounds: demand.pairs || demand.contacts || demand.regions,
             regions: demand.regions,
-            order,
+            order: self.end.order(budget),
         };
-        let woke_ns = laps.woke_ns();
-        let own_ns = budget.time_ns.map(|time_ns| woke_ns + time_ns);
-        let end_ns = earliest(own_ns, self.frames_deadline_ns(input.inbox, woke_ns));
+        let end_ns = self.end.at_ns();
         let deadline_ns = end_ns.map(|end_ns| {
             let left_ns = end_ns.saturating_sub(self.clock.monotonic_ns());
             end_ns - self.floor.reserve_ns(left_ns).min(end_ns)
         });
-        let row = self.bare_tick(input);
-        let mut quiet = |_: &TickRow| {};
-        let pulse: &mut dyn FnMut(&TickRow) = match input.pulse.as_mut() {
-            Some(pulse) => *pulse,
-            None => &mut quiet,
-        };
-        let mut beat = || pulse(&row);
+        let mut row = self.bare_tick(input);
         let clock = Arc::clone(&self.clock);
+        let mut beat = || {
+            if let Some(pulse) = input.pulse.as_mut() {
+                row.sent_ns = clock.boottime_ns();
+                pulse(&row);
+            }
+        };
         let mut meter = Meter::new(clock.as_ref(), deadline_ns, budget.units).with_beat(
             laps.woke_ns(),
             self.config.heartbeat_ns,
@@ -303,7 +278,8 @@ impl Engine {
         units
     }
 
-    /// The tick that goes out alone while this one takes longer than a heartbeat.
+    /// The tick that goes out alone while this one takes longer than a heartbeat. It has this tick's number, an earlier
+    /// `sent_ns`, and no sources: it is the result of no frame. What counts up in a boot is as it was.
     fn bare_tick(&self, input: &TickInput<'_>) -> TickRow {
         TickRow {
             header: MessageHeader {
@@ -314,12 +290,18 @@ impl Engine {
                 schema: WIRE_VERSION,
                 ..MessageHeader::default()
             },
+            budget_ns: self.end.budget_ns(),
+            budget_units: input.budget.units.unwrap_or(u64::MAX),
+            rejects: *self.world.rejects(),
             bodies: self.world.counts().bodies,
+            unknown: self.world.counts().unknown,
             candidates: self.pairs.len() as u64,
             reasons: Reason::Undecided.bit(),
             cause: input.cause.code(),
             cause_source: place(input.cause_source),
-            sent_ns: self.clock.boottime_ns(),
+            missed: self.missed,
+            cancelled_events: self.out.tick.cancelled_events,
+            rebuilds: self.rebuilds,
             ..TickRow::default()
         }
     }
@@ -342,9 +324,8 @@ impl Engine {
     fn finish(&mut self, input: &TickInput<'_>, laps: &Laps, units: u64) {
         let floor_ns = self.floor.learn(laps);
         let elapsed_ns = laps.elapsed_ns() + self.floor.last_send_ns();
-        let budget_ns = input.budget.time_ns.unwrap_or(u64::MAX);
-        // Below its floor a tick takes the floor: told by the flag, not counted as missed by fault of the work.
-        let overrun = elapsed_ns > budget_ns;
+        // Below its floor a tick takes the floor, and is late as any other: who waits for it wants to know.
+        let overrun = self.end.is_over(elapsed_ns);
         self.missed += u64::from(overrun);
         let row = &mut self.out.tick;
         laps.fill(&mut row.stage_ns);
@@ -352,7 +333,7 @@ impl Engine {
         row.stage_ns[usize::from(Stage::Rest.code())] = std::mem::take(&mut self.rest.spent_ns);
         row.sent_ns = self.clock.boottime_ns();
         row.elapsed_ns = elapsed_ns;
-        row.budget_ns = budget_ns;
+        row.budget_ns = self.end.budget_ns();
         row.budget_units = input.budget.units.unwrap_or(u64::MAX);
         row.floor_ns = floor_ns;
         row.units = units + std::mem::take(&mut self.rest.units);
@@ -364,13 +345,6 @@ impl Engine {
         let broad = self.broad.work();
         row.broad_renewed = u32::try_from(broad.renewed).unwrap_or(u32::MAX);
         (row.broad_mode, row.broad_cause) = (broad.mode.code(), broad.cause.code());
-    }
-}
-
-fn earliest(one: Option<u64>, other: Option<u64>) -> Option<u64> {
-    match (one, other) {
-        (Some(one), Some(other)) => Some(one.min(other)),
-        (one, other) => one.or(other),
     }
 }
 

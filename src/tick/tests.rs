@@ -12,8 +12,8 @@ use std::sync::Arc;
 use super::*;
 use crate::builtin::Random;
 use crate::daemon::build_shapes;
-use crate::time::ManualClock;
-use crate::wire::{FrameHeader, TickCause, TransformRow, frame_flags, name_bytes};
+use crate::time::{Budget, ManualClock};
+use crate::wire::{FrameHeader, Inbox, TickCause, TransformRow, frame_flags, name_bytes};
 use crate::world::Edit;
 
 const BODIES: u64 = 60;

@@ -53,9 +53,9 @@ pub struct TickRow {
     pub header: MessageHeader,
     /// When the tick ended, nanoseconds of `CLOCK_BOOTTIME`.
     pub sent_ns: u64,
-    /// From wake-up to the outbox filled, nanoseconds.
+    /// From wake-up to the outbox filled, and what the last sending took, nanoseconds.
     pub elapsed_ns: u64,
-    /// Work budget in time, nanoseconds; `u64::MAX`: none.
+    /// Time this tick had from wake-up on: the budget, or less by a frame's deadline; ns; `u64::MAX`: no end.
     pub budget_ns: u64,
     /// Work budget in units; `u64::MAX`: none.
     pub budget_units: u64,
@@ -81,7 +81,7 @@ pub struct TickRow {
     pub near: u64,
     /// Pairs of bodies that a rule, neighbour or rigid group ignores.
     pub ignored: u64,
-    /// Ticks of this boot that ended after their budget.
+    /// Ticks of this boot that ended after their budget or a frame's deadline.
     pub missed: u64,
     /// Begins and their ends that were never sent, because rows did not fit.
     pub cancelled_events: u64,
@@ -97,7 +97,7 @@ pub struct TickRow {
     pub reasons: u32,
     /// `TickCause`.
     pub cause: u8,
-    /// 1: ended after its budget.
+    /// 1: ended after its budget or a frame's deadline.
     pub overrun: u8,
     /// Sources in use in `sources`.
     pub sources_len: u8,

@@ -15,11 +15,13 @@
 mod oracle;
 
 mod ask;
+mod deadline;
 mod edits;
 mod events;
 mod limits;
 mod motion;
 mod order;
+mod pulse;
 mod rest;
 mod rig;
 mod schedule;

@@ -11,7 +11,7 @@ use sweepd::tick::{EditBatch, Engine, TickInput};
 use sweepd::time::{Budget, Clock, ManualClock};
 use sweepd::wire::{
     Demand, Event, FrameHeader, Inbox, Outbox, PairRow, Reason, RejectReason, State, TickCause,
-    TransformRow, Verdict, VertexFrame, WIRE_VERSION, frame_flags, name_bytes, pair_flags,
+    TickRow, TransformRow, Verdict, VertexFrame, WIRE_VERSION, frame_flags, name_bytes, pair_flags,
 };
 use sweepd::world::Edit;
 
@@ -70,6 +70,13 @@ pub(crate) struct Rig {
     /// What goes with the next frame.
     pub(crate) vertices: Vec<VertexFrame>,
     pub(crate) out: Outbox,
+    /// What the next frames say of their ticks' end; 0: nothing.
+    pub(crate) deadline_ns: u64,
+    pub(crate) time_left_ns: u64,
+    /// Between a frame's receipt and its tick.
+    pub(crate) waited_ns: u64,
+    /// Ticks that went out alone while the last one was under way.
+    pub(crate) pulses: Vec<TickRow>,
     /// Whether the whole structure is checked after each tick.
     pub(crate) checked: bool,
     seq: u64,
@@ -100,6 +107,10 @@ impl Rig {
             velocities: Vec::new(),
             vertices: Vec::new(),
             out: Outbox::default(),
+            deadline_ns: 0,
+            time_left_ns: 0,
+            waited_ns: 0,
+            pulses: Vec::new(),
             checked: true,
             seq: 0,
             inbox: Inbox::default(),
@@ -195,12 +206,15 @@ impl Rig {
             flags: self.flags,
             schema: WIRE_VERSION,
             stamp_ns: self.seq * FRAME_NS,
+            deadline_ns: self.deadline_ns,
+            time_left_ns: self.time_left_ns,
             ..FrameHeader::default()
         };
         frame.received_ns = self.clock.boottime_ns();
         frame.set_transforms(&self.rows);
         frame.velocities.clone_from(&self.velocities);
         self.take_vertices();
+        self.clock.advance(self.waited_ns);
     }
 
     fn take_vertices(&mut self) {
@@ -210,6 +224,8 @@ impl Rig {
     }
 
     fn tick(&mut self, budget: Budget, edits: &[EditBatch], cause: TickCause) -> &Outbox {
+        self.pulses.clear();
+        let mut pulse = |row: &TickRow| self.pulses.push(*row);
         let input = TickInput {
             inbox: &self.inbox,
             edits,
@@ -218,7 +234,7 @@ impl Rig {
             cause,
             cause_source: None,
             woke_ns: self.clock.monotonic_ns(),
-            pulse: None,
+            pulse: Some(&mut pulse),
         };
         self.out.clone_from(self.engine.tick(input));
         if self.checked {

@@ -394,9 +394,9 @@ class TickRow(_Row):
         ("header", MessageHeader),
         # When the tick ended, nanoseconds of CLOCK_BOOTTIME.
         ("sent_ns", ctypes.c_uint64),
-        # From wake-up to the outbox filled, nanoseconds.
+        # From wake-up to the outbox filled, and what the last sending took, nanoseconds.
         ("elapsed_ns", ctypes.c_uint64),
-        # Work budget in time, nanoseconds; u64::MAX: none.
+        # Time this tick had from wake-up on: the budget, or less by a frame's deadline; ns; u64::MAX: no end.
         ("budget_ns", ctypes.c_uint64),
         # Work budget in units; u64::MAX: none.
         ("budget_units", ctypes.c_uint64),
@@ -422,7 +422,7 @@ class TickRow(_Row):
         ("near", ctypes.c_uint64),
         # Pairs of bodies that a rule, neighbour or rigid group ignores.
         ("ignored", ctypes.c_uint64),
-        # Ticks of this boot that ended after their budget.
+        # Ticks of this boot that ended after their budget or a frame's deadline.
         ("missed", ctypes.c_uint64),
         # Begins and their ends that were never sent, because rows did not fit.
         ("cancelled_events", ctypes.c_uint64),
@@ -438,7 +438,7 @@ class TickRow(_Row):
         ("reasons", ctypes.c_uint32),
         # TickCause.
         ("cause", ctypes.c_uint8),
-        # 1: ended after its budget.
+        # 1: ended after its budget or a frame's deadline.
         ("overrun", ctypes.c_uint8),
         # Sources in use in sources.
         ("sources_len", ctypes.c_uint8),

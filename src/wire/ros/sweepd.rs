@@ -283,9 +283,9 @@ pub struct Tick {
     pub tick_header: TickHeader,
     /// When the tick ended, nanoseconds of `CLOCK_BOOTTIME`.
     pub sent_ns: u64,
-    /// From wake-up to the outbox filled, nanoseconds.
+    /// From wake-up to the outbox filled, and what the last sending took, nanoseconds.
     pub elapsed_ns: u64,
-    /// Work budget in time, nanoseconds.
+    /// Time this tick had from wake-up on: the budget, or less by a frame's deadline; nanoseconds.
     pub budget_ns: u64,
     /// Work budget in units.
     pub budget_units: u64,
@@ -311,7 +311,7 @@ pub struct Tick {
     pub near: u64,
     /// Pairs ignored.
     pub ignored: u64,
-    /// Ticks that ended after their budget.
+    /// Ticks that ended after their budget or a frame's deadline.
     pub missed: u64,
     /// Events that were never sent.
     pub cancelled_events: u64,
@@ -327,7 +327,7 @@ pub struct Tick {
     pub reasons: u32,
     /// `TickCause`.
     pub cause: u8,
-    /// Ended after its budget.
+    /// Ended after its budget or a frame's deadline.
     pub overrun: bool,
     /// Place of the source that caused it.
     pub cause_source: u8,

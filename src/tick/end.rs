@@ -1,0 +1,62 @@
+//! When a tick is to end: its budget of time, shortened by the deadlines that its frames carry.
+
+use crate::narrow::Order;
+use crate::time::Budget;
+use crate::wire::Frame;
+
+/// The time of a tick, nanoseconds of `CLOCK_MONOTONIC`.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct End {
+    woke_ns: u64,
+    /// `None`: nothing limits it.
+    end_ns: Option<u64>,
+}
+
+impl End {
+    /// Of the budget alone.
+    pub(super) fn of(woke_ns: u64, budget: Budget) -> Self {
+        let end_ns = budget.time_ns.map(|ns| woke_ns.saturating_add(ns));
+        Self { woke_ns, end_ns }
+    }
+
+    /// Shortens it by what a frame says, where it says so; never lengthens it. For frames that were admitted only: who
+    /// is refused has no say in how long others' answers may take.
+    ///
+    /// * `now_ns` - `CLOCK_BOOTTIME`: the time that a frame has left counts from its receipt.
+    pub(super) fn shorten(&mut self, frame: &Frame, now_ns: u64) {
+        let header = &frame.header;
+        let waited_ns = match frame.received_ns {
+            0 => 0,
+            received_ns => now_ns.saturating_sub(received_ns),
+        };
+        let left_ns = self.woke_ns.saturating_add(header.time_left_ns);
+        let own = (header.deadline_ns != 0).then_some(header.deadline_ns);
+        let left = (header.time_left_ns != 0).then(|| left_ns.saturating_sub(waited_ns));
+        let earliest = [self.end_ns, own, left].into_iter().flatten().min();
+        self.end_ns = earliest;
+    }
+
+    /// When it is; `None`: nothing limits it.
+    pub(super) fn at_ns(self) -> Option<u64> {
+        self.end_ns
+    }
+
+    /// The time it leaves from wake-up on, for the tick's row.
+    pub(super) fn budget_ns(self) -> u64 {
+        (self.end_ns).map_or(u64::MAX, |end_ns| end_ns.saturating_sub(self.woke_ns))
+    }
+
+    /// Whether a tick of this length ends after it.
+    pub(super) fn is_over(self, elapsed_ns: u64) -> bool {
+        (self.end_ns).is_some_and(|end_ns| self.woke_ns.saturating_add(elapsed_ns) > end_ns)
+    }
+
+    /// The order of work for it. Where work may be cut off each pair is to have its turn, whoever cuts it.
+    pub(super) fn order(self, budget: Budget) -> Order {
+        match (budget.time_ns, budget.units) {
+            (None, Some(_)) => Order::Counted,
+            _ if self.end_ns.is_some() => Order::Aged,
+            _ => Order::AsFound,
+        }
+    }
+}

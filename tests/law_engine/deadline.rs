@@ -1,0 +1,189 @@
+//! 4.5: a frame's own deadline shortens the time of its tick and never lengthens it; what ends late is flagged and
+//! counted. Each look at the clock takes a microsecond here, so that work takes time.
+
+use sweepd::math::Pose;
+use sweepd::time::{Budget, Clock};
+use sweepd::wire::{RejectReason, TickRow, Verdict, frame_flags};
+
+use crate::rig::{ALL, FRAME_NS, Rig, ball, scene};
+
+const LOOK_NS: u64 = 1_000;
+const PAIRS: u64 = 400;
+/// Where the second ball of a pair stands, seen from the first: boxes overlap in both places.
+const TOUCHING: [f64; 2] = [1.2, 1.2];
+const APART: [f64; 2] = [1.5, 1.5];
+/// Time for some 250 of the queries, a look each.
+const SHORT_NS: u64 = 300_000;
+const LONG_NS: u64 = 1_000_000_000;
+
+/// Pairs of balls far from one another, all of them apart and decided.
+fn pairs() -> Rig {
+    let balls: Vec<String> = (1..=2 * PAIRS)
+        .map(|id| ball(id, ((id - 1) / 2) as f64 * 10.0, ""))
+        .collect();
+    let mut rig = Rig::new(&scene("", &balls));
+    rig.checked = false;
+    put(&mut rig, APART);
+    rig.send(ALL);
+    assert_eq!((rig.out.tick.candidates, rig.out.tick.possible), (PAIRS, 0));
+    rig
+}
+
+fn put(rig: &mut Rig, [x, y]: [f64; 2]) {
+    for pair in 0..PAIRS {
+        let at = Pose::translation(pair as f64 * 10.0 + x, y, 0.0);
+        rig.place(2 * pair + 2, &at);
+    }
+}
+
+/// All pairs move into one another: each is open again.
+fn collide(rig: &mut Rig, budget: Budget) -> TickRow {
+    put(rig, TOUCHING);
+    rig.clock.step_each_read(LOOK_NS);
+    rig.send(budget);
+    rig.clock.step_each_read(0);
+    rig.out.tick
+}
+
+/// So long after the next tick's wake-up, but for some looks at the clock.
+fn after(rig: &Rig, ns: u64) -> u64 {
+    rig.clock.monotonic_ns() + FRAME_NS + ns
+}
+
+/// The tick was cut off at about `SHORT_NS`, and in time.
+fn assert_short(row: &TickRow) {
+    assert!(
+        (SHORT_NS - 10 * LOOK_NS..=SHORT_NS).contains(&row.budget_ns),
+        "{} ns",
+        row.budget_ns
+    );
+    assert!(row.elapsed_ns <= row.budget_ns, "{} ns", row.elapsed_ns);
+    assert!((200..300).contains(&row.units), "{} units", row.units);
+    assert_eq!(row.possible + row.colliding, PAIRS);
+    assert!(row.possible > 100);
+    assert_eq!((row.overrun, row.missed), (0, 0));
+}
+
+#[test]
+fn law_4_5_a_frames_deadline_shortens_a_budget_and_ends_a_tick_without_one() {
+    for budget in [ALL, Budget::time_ns(LONG_NS)] {
+        let mut rig = pairs();
+        rig.deadline_ns = after(&rig, SHORT_NS);
+        assert_short(&collide(&mut rig, budget));
+    }
+}
+
+#[test]
+fn law_4_5_the_time_that_a_frame_has_left_counts_from_its_receipt() {
+    for budget in [ALL, Budget::time_ns(LONG_NS)] {
+        let mut rig = pairs();
+        (rig.time_left_ns, rig.waited_ns) = (SHORT_NS + 200_000, 200_000);
+        assert_short(&collide(&mut rig, budget));
+    }
+}
+
+#[test]
+fn law_4_5_a_frames_deadline_never_lengthens_the_budget() {
+    let budget = Budget::time_ns(SHORT_NS);
+    let plain = collide(&mut pairs(), budget);
+    assert_eq!(plain.budget_ns, SHORT_NS);
+    assert!(plain.possible > 100);
+    let mut rig = pairs();
+    rig.deadline_ns = after(&rig, LONG_NS);
+    rig.time_left_ns = LONG_NS;
+    let row = collide(&mut rig, budget);
+    assert_eq!(
+        (row.budget_ns, row.units, row.elapsed_ns),
+        (SHORT_NS, plain.units, plain.elapsed_ns)
+    );
+    // Nor does it give more work units than are allowed.
+    let mut rig = pairs();
+    rig.deadline_ns = after(&rig, LONG_NS);
+    assert_eq!(collide(&mut rig, Budget::units(7)).units, 7);
+}
+
+#[test]
+fn law_4_5_the_earlier_of_two_frames_deadlines_holds() {
+    let mut rig = pairs();
+    put(&mut rig, TOUCHING);
+    let ends = [LONG_NS, SHORT_NS, 2 * LONG_NS].map(|ns| after(&rig, 2 * FRAME_NS + ns));
+    rig.clock.step_each_read(LOOK_NS);
+    rig.send_several(3, |at, rig| rig.deadline_ns = ends[at], ALL);
+    rig.clock.step_each_read(0);
+    assert_short(&rig.out.tick);
+}
+
+#[test]
+fn law_4_5_a_deadline_that_is_missed_is_told_with_a_budget_and_without_one() {
+    for budget in [ALL, Budget::time_ns(LONG_NS)] {
+        let mut rig = pairs();
+        rig.deadline_ns = 1;
+        let row = collide(&mut rig, budget);
+        assert_eq!((row.overrun, row.missed, row.budget_ns), (1, 1, 0));
+        // The tick takes its floor all the same, and no pair is left out.
+        assert_eq!((row.units, row.possible), (0, PAIRS));
+        assert_eq!(rig.verdict(1, 2), Verdict::Possible);
+        assert_eq!(rig.out.pairs.len() as u64, PAIRS);
+        rig.deadline_ns = 0;
+        let row = collide(&mut rig, ALL);
+        assert_eq!((row.overrun, row.missed, row.budget_ns), (0, 1, u64::MAX));
+        assert_eq!(row.colliding, PAIRS);
+    }
+}
+
+#[test]
+fn law_4_5_below_its_floor_a_tick_takes_the_floor_and_is_flagged_and_above_it_it_ends_in_time() {
+    let mut rig = pairs();
+    let mut missed = 0;
+    let mut floor_ns = 0;
+    for budget_ns in [0, 1, LOOK_NS] {
+        let row = collide(&mut rig, Budget::time_ns(budget_ns));
+        missed += 1;
+        assert_eq!((row.overrun, row.missed), (1, missed));
+        assert!(row.floor_ns > budget_ns && row.elapsed_ns >= row.floor_ns);
+        assert_eq!(row.possible, PAIRS, "all of them are told");
+        floor_ns = row.floor_ns;
+    }
+    // The looks that the narrow phase takes to find that it has no time.
+    let looks_ns = 10 * LOOK_NS;
+    let mut units = 0;
+    for above_ns in (looks_ns..SHORT_NS).step_by(7_000) {
+        put(&mut rig, APART);
+        rig.send(ALL);
+        let row = collide(&mut rig, Budget::time_ns(floor_ns + above_ns));
+        assert_eq!((row.overrun, row.missed), (0, missed), "{above_ns} ns");
+        units += row.units;
+    }
+    assert!(units > PAIRS);
+}
+
+#[test]
+fn law_4_5_a_frame_that_is_refused_shortens_nobodys_tick() {
+    let mut rig = pairs();
+    rig.deadline_ns = 1;
+    rig.flags = frame_flags::FULL | frame_flags::PAUSED;
+    let row = collide(&mut rig, ALL);
+    assert_eq!(rig.rejects(RejectReason::BadLayout), 1);
+    assert_eq!((row.overrun, row.missed, row.budget_ns), (0, 0, u64::MAX));
+}
+
+#[test]
+fn law_4_7_where_only_frames_deadlines_end_the_work_each_pair_has_its_turn_too() {
+    let mut rig = pairs();
+    let mut decided: Vec<bool> = (0..PAIRS).map(|_| false).collect();
+    let mut least = PAIRS;
+    for tick in 0..120 {
+        put(&mut rig, if tick % 2 == 0 { TOUCHING } else { APART });
+        rig.deadline_ns = after(&rig, 100_000);
+        rig.clock.step_each_read(LOOK_NS);
+        rig.send(ALL);
+        rig.clock.step_each_read(0);
+        least = least.min(rig.out.tick.possible);
+        for (pair, decided) in (0..).zip(&mut decided) {
+            *decided |= rig.verdict(2 * pair + 1, 2 * pair + 2) != Verdict::Possible;
+        }
+    }
+    assert!(least > PAIRS / 2, "{least} pairs open: not cut off");
+    let never = decided.iter().filter(|decided| !**decided).count();
+    assert_eq!(never, 0, "pairs without a verdict in 120 ticks");
+}

@@ -1,0 +1,80 @@
+//! 4.4: a tick that takes longer than a heartbeat is told of meanwhile, by a `tick` alone. Each look at the clock takes a
+//! millisecond here.
+
+use sweepd::math::Pose;
+use sweepd::time::{Budget, Clock};
+use sweepd::wire::{MessageHeader, Reason, RejectReason, State, WIRE_VERSION};
+
+use crate::rig::{ALL, Rig, ball, scene};
+
+const LOOK_NS: u64 = 1_000_000;
+const HEARTBEAT_NS: u64 = 100_000_000;
+const PAIRS: u64 = 450;
+
+fn pairs() -> Rig {
+    let balls: Vec<String> = (1..=2 * PAIRS)
+        .map(|id| ball(id, ((id - 1) / 2) as f64 * 10.0, ""))
+        .collect();
+    let mut rig = Rig::new(&scene("", &balls));
+    rig.checked = false;
+    for pair in 0..PAIRS {
+        let at = Pose::translation(pair as f64 * 10.0 + 1.2, 1.2, 0.0);
+        rig.place(2 * pair + 2, &at);
+    }
+    rig
+}
+
+#[test]
+fn law_4_4_a_tick_longer_than_a_heartbeat_sends_tick_alone_between_its_slices() {
+    let mut rig = pairs();
+    // Something to carry: a row of a body that is not there.
+    rig.rows[0].body = 9_999;
+    rig.send(Budget::time_ns(0));
+    rig.rows[0].body = 1;
+    let before = rig.out.tick;
+    assert!(rig.pulses.is_empty(), "it took no time");
+    rig.clock.step_each_read(LOOK_NS);
+    let woke_ns = rig.clock.monotonic_ns();
+    rig.send(ALL);
+    rig.clock.step_each_read(0);
+    let row = rig.out.tick;
+    assert!(row.elapsed_ns > 4 * HEARTBEAT_NS);
+    assert_eq!(row.colliding, PAIRS);
+    assert!((3..=6).contains(&rig.pulses.len()), "{}", rig.pulses.len());
+    let mut last_ns = woke_ns;
+    for pulse in &rig.pulses {
+        let wanted = MessageHeader {
+            boot_id: row.header.boot_id,
+            tick: row.header.tick,
+            scene_rev: row.header.scene_rev,
+            state: State::Unknown.code(),
+            schema: WIRE_VERSION,
+            ..MessageHeader::default()
+        };
+        assert_eq!(pulse.header, wanted);
+        assert_eq!(pulse.reasons, Reason::Undecided.bit());
+        assert_eq!((pulse.bodies, pulse.candidates), (2 * PAIRS, PAIRS));
+        assert_eq!(pulse.cause, row.cause);
+        // Nobody's frame has its result in it.
+        assert_eq!((pulse.sources_len, row.sources_len), (0, 1));
+        // What counts up in a boot does not fall back.
+        assert_eq!(pulse.missed, before.missed);
+        assert_eq!(pulse.rejects, row.rejects);
+        assert!(pulse.sent_ns > last_ns);
+        // Ten milliseconds for looks of a frame, and of the stages before.
+        let late_ns = pulse.sent_ns - last_ns;
+        assert!(late_ns <= HEARTBEAT_NS + 30 * LOOK_NS, "{late_ns} ns");
+        last_ns = pulse.sent_ns;
+    }
+    assert_eq!(rig.rejects(RejectReason::UnknownBody), 1);
+    assert!(row.sent_ns > last_ns, "the tick itself is the newest");
+}
+
+#[test]
+fn law_4_4_a_tick_that_ends_within_a_heartbeat_sends_nothing_beside() {
+    let mut rig = pairs();
+    rig.clock.step_each_read(LOOK_NS / 10);
+    rig.send(ALL);
+    assert!(rig.out.tick.elapsed_ns > HEARTBEAT_NS / 4);
+    assert!(rig.pulses.is_empty());
+}
