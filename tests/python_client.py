@@ -31,6 +31,23 @@ if part == "alone":
 client = sweepd.Client("cell", "sim", timeout_s=5, **where)
 assert client.names == {"box": 1}, client.names
 
+if part == "long":
+    # each tick is told of twice, alone, before it is there
+    reader = sweepd.Client("cell", None, timeout_s=5, **where)
+    told, last = 0, 0
+    for x in range(1, 21):
+        result = client.step({"box": ((x, 0, 0), (0, 0, 0, 1))}, timeout_s=5)
+        assert result.pairs["gap_best_m"].tolist() == [float(x)], (x, result.pairs)
+        while last < result.tick.header.tick:
+            seen = reader.wait(5)
+            if seen.state == "unknown":
+                told += 1
+                assert seen.tick.sources_len == 0
+            else:
+                last = seen.tick.header.tick
+    assert told == 40, told
+    sys.exit()
+
 if part == "restart":
     client.step({"box": ((1, 0, 0), (0, 0, 0, 1))}, timeout_s=5)
     print("STEPPED", flush=True)

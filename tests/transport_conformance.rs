@@ -162,6 +162,42 @@ fn a_step_returns_the_result_of_exactly_its_frame<B: Backend>() {
     }
 }
 
+fn a_tick_that_is_told_of_while_it_is_under_way_is_followed_by_itself<B: Backend>() {
+    let backend = B::new();
+    let manners = Manners {
+        long_ticks: true,
+        heartbeat_ns: SECOND_NS / 2,
+        ..Manners::default()
+    };
+    let _daemon = backend.daemon(manners);
+    let mut client = backend.client(Some("sim"));
+    client.subscribe(Topics::ALL).unwrap();
+    let mut reader = backend.client(None);
+    reader.subscribe(Topics::ALL).unwrap();
+    // Twice told of, then itself, under one number.
+    let (mut told, mut last) = (0, 0);
+    for x in 1..=20 {
+        step(&mut client, 3, f64::from(x)).unwrap();
+        assert!(!client.view().is_under_way());
+        let pairs = &client.view().pairs().expect("its pairs").rows;
+        assert_eq!(pairs[0].gap_best_m, f64::from(x));
+        while last < client.view().tick().header.tick {
+            assert_eq!(reader.wait_tick(5 * SECOND_NS).unwrap(), Heard::Tick);
+            let view = reader.view();
+            let number = view.tick().header.tick;
+            if view.is_under_way() {
+                told += 1;
+                assert_eq!(view.tick().sources_len, 0);
+            } else {
+                last = number;
+            }
+            let pairs = view.pairs().map_or(number, |pairs| pairs.header.tick);
+            assert_eq!(pairs, number, "of another tick");
+        }
+    }
+    assert_eq!(told, 40);
+}
+
 fn velocities_come_on_a_type_of_their_own<B: Backend>() {
     let backend = B::new();
     let daemon = backend.daemon(Manners::default());
@@ -590,6 +626,7 @@ macro_rules! both {
 both! {
     vertices_come_with_the_frame_that_they_belong_with
     a_step_returns_the_result_of_exactly_its_frame
+    a_tick_that_is_told_of_while_it_is_under_way_is_followed_by_itself
     velocities_come_on_a_type_of_their_own
     a_frame_that_was_passed_over_is_said_to_be_skipped
     a_late_joiner_gets_the_newest_state_from_an_idle_daemon

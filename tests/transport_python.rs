@@ -72,6 +72,19 @@ fn the_python_client_says_that_there_is_no_daemon() {
 }
 
 #[test]
+fn the_python_client_passes_over_what_is_told_of_a_tick_that_is_under_way() {
+    let Some(python) = python() else { return };
+    let files = Files::new();
+    let manners = Manners {
+        long_ticks: true,
+        heartbeat_ns: 500_000_000,
+        ..Manners::default()
+    };
+    let _daemon = StandIn::iceoryx(&files.place, manners);
+    assert_done(start(&python, &files, "long"));
+}
+
+#[test]
 fn the_python_client_hears_of_a_restart_and_goes_on() {
     let Some(python) = python() else { return };
     let files = Files::new();

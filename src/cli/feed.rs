@@ -138,6 +138,9 @@ impl Heeded {
     /// Says on stderr what a person who feeds would want to know: silence, a restart, frames that are not used.
     fn look(&mut self, client: &mut Client, source: &str) -> Result<()> {
         while client.latest()? != Heard::Silence {}
+        if client.view().is_under_way() {
+            return Ok(());
+        }
         let tick = *client.view().tick();
         let (boot_id, number) = (tick.header.boot_id, tick.header.tick);
         let silent = (boot_id, number) == (self.boot_id, self.tick);

@@ -22,8 +22,9 @@ use sweepd::time::{Clock, SystemClock};
 use sweepd::transport::iceoryx::{Place, Server, ServerOptions};
 use sweepd::transport::{Door, RequestToken};
 use sweepd::wire::{
-    ContactRow, Frame, FrameHeader, Inbox, MessageHeader, NameRow, Outbox, PairRow, RegionRow,
-    RejectReason, TickCause, TickRow, TransformRow, Verdict, VertexHeader, WIRE_VERSION,
+    ContactRow, Frame, FrameHeader, Inbox, MessageHeader, NameRow, Outbox, PairRow, Reason,
+    RegionRow, RejectReason, State, TickCause, TickRow, TransformRow, Verdict, VertexHeader,
+    WIRE_VERSION,
 };
 
 pub const SECOND_NS: u64 = 1_000_000_000;
@@ -109,6 +110,8 @@ pub struct Manners {
     /// Before its first tick it sleeps so long.
     pub nap: Duration,
     pub heartbeat_ns: u64,
+    /// Each tick with frames is told of, alone, before it is there.
+    pub long_ticks: bool,
 }
 
 impl Default for Manners {
@@ -117,6 +120,7 @@ impl Default for Manners {
             boot_id: 7,
             nap: Duration::ZERO,
             heartbeat_ns: 20_000_000,
+            long_ticks: false,
         }
     }
 }
@@ -211,6 +215,9 @@ fn serve(door: &mut dyn Door, manners: Manners, stop: &AtomicBool, log: &Mutex<L
         for frame in inbox.frames() {
             admit(&mut outbox.tick, frame);
             outbox.tick.cause = TickCause::Frame.code();
+            if manners.long_ticks {
+                tell_of(door, &outbox.tick);
+            }
             tick(door, &mut outbox, demand, frame);
         }
         if inbox.frames().is_empty() {
@@ -280,8 +287,25 @@ fn admit(tick: &mut TickRow, frame: &Frame) {
     tick.sources_len = tick.sources_len.max(u8::try_from(at + 1).unwrap());
 }
 
+/// The next tick is under way: a tick alone, as a daemon sends it each heartbeat.
+fn tell_of(door: &mut dyn Door, last: &TickRow) {
+    let mut bare = TickRow {
+        header: last.header,
+        rejects: last.rejects,
+        reasons: Reason::Undecided.bit(),
+        ..TickRow::default()
+    };
+    bare.header.tick += 1;
+    bare.header.state = State::Unknown.code();
+    for _ in 0..2 {
+        bare.sent_ns = SystemClock.boottime_ns();
+        door.publish_tick(&bare).unwrap();
+    }
+}
+
 fn tick(door: &mut dyn Door, outbox: &mut Outbox, demand: sweepd::wire::Demand, frame: &Frame) {
     outbox.tick.header.tick += 1;
+    outbox.tick.sent_ns = SystemClock.boottime_ns();
     outbox.tick.bodies = frame.transforms.len() as u64;
     let header: MessageHeader = outbox.tick.header;
     (outbox.pairs_header, outbox.contacts_header) = (header, header);

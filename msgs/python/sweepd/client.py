@@ -349,7 +349,8 @@ class Client:
             old = self._tick and self._tick.header
             if old and old.boot_id != new.boot_id:
                 self._restart(old, tick)
-            if old and new.tick <= old.tick:
+            # a tick that takes longer than a heartbeat is told of under its own number before it is there itself
+            if old and (new.tick, tick.sent_ns) <= (old.tick, self._tick.sent_ns):
                 continue
             self._tick = tick
             for topic in self._topics:
@@ -398,12 +399,19 @@ class Client:
         }
         return Result(self._tick, messages)
 
+    @staticmethod
+    def _is_under_way(tick):
+        # no tick that has ended says so: undecided pairs alone are no reason for unknown
+        return tick.header.state == layout.State.UNKNOWN and tick.reasons == layout.Reason.UNDECIDED
+
     def _why_no_result(self, seq, before, timeout_s):
         text = f"no result of frame {seq} of `{self._source}` within {timeout_s} s"
         tick = self._tick
         if tick is None or (before is not None and tick.header.tick == before.header.tick):
             return f"{text}: no tick came at all; is the daemon running?"
-        if self._row(tick) is None:
+        if self._is_under_way(tick):
+            text += "; a tick is still under way"
+        elif self._row(tick) is None:
             known = ", ".join(_text(row.name) for row in tick.sources[: tick.sources_len])
             text += f"; the scene has no such source, it has: {known}"
         for reason in layout.RejectReason:

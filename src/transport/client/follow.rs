@@ -3,7 +3,9 @@
 use super::link::Link;
 use super::{BOOTS_OVER_MAX, Heard, Restarted, ends_of};
 use crate::error::Result;
-use crate::wire::{BodyRow, ContactRow, MessageHeader, NameRow, PairRow, RegionRow, TickRow};
+use crate::wire::{
+    BodyRow, ContactRow, MessageHeader, NameRow, PairRow, Reason, RegionRow, State, TickRow,
+};
 
 /// A message as it was received.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,6 +40,15 @@ impl View {
     #[must_use]
     pub fn tick(&self) -> &TickRow {
         &self.tick
+    }
+
+    /// Whether the tick is still under way, and longer than a heartbeat: nothing belongs to it yet, and it is the
+    /// result of no frame.
+    #[must_use]
+    pub fn is_under_way(&self) -> bool {
+        // No tick that has ended says so: undecided pairs alone are no reason for `unknown`.
+        self.tick.header.state == State::Unknown.code()
+            && self.tick.reasons == Reason::Undecided.bit()
     }
 
     /// The pairs of this very tick; `None`: not listened to when it began, or overtaken in the queue.
@@ -160,7 +171,9 @@ impl Follow {
             if old.boot_id != 0 && old.boot_id != new.boot_id {
                 return Ok(Heard::Restarted(self.restart(tick)));
             }
-            if new.tick <= old.tick {
+            // A tick that takes longer than a heartbeat is told of under its own number before it is there itself.
+            let (seen, next) = (&self.view.tick, &tick);
+            if (next.header.tick, next.sent_ns) <= (seen.header.tick, seen.sent_ns) {
                 continue;
             }
             self.view.tick = tick;

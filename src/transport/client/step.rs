@@ -121,7 +121,9 @@ impl Client {
         }
         let mut why = String::new();
         let sources = usize::from(tick.sources_len);
-        if source_row(tick, source).is_none() {
+        if self.view().is_under_way() {
+            why += "; a tick is still under way";
+        } else if source_row(tick, source).is_none() {
             let known: Vec<_> = tick
                 .sources
                 .iter()

@@ -1,0 +1,224 @@
+//! Goal: the daemon's loop keeps the law of time. Method: daemon, door and client in this process and on one thread,
+//! rounds run one by one, and a clock turned by hand.
+#![allow(
+    clippy::unwrap_used,
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    reason = "tests"
+)]
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::Arc;
+
+use sweepd::daemon::{Daemon, build_shapes};
+use sweepd::scene::Scene;
+use sweepd::time::{Clock, ManualClock};
+use sweepd::transport::client::{Client, FrameInfo, Heard, Rows, Topics};
+use sweepd::transport::memory::{Hub, MemoryServer};
+use sweepd::wire::{Reason, State, TickCause, TickRow, TransformRow};
+
+const MS: u64 = 1_000_000;
+const HEARTBEAT_NS: u64 = 100 * MS;
+const TIMEOUT_NS: u64 = 5_000 * MS;
+const MODES: [&str; 3] = ["on_frame = \"sim\"", "mode = \"on_all\"", "rate = 20"];
+
+/// Balls of radius 1 m of source `sim`.
+fn scene(run: &str, balls: usize) -> Scene {
+    let mut text = format!(
+        "[run]\n{run}\n[[source]]\nname = \"sim\"\ntimeout_ms = {}\n",
+        TIMEOUT_NS / MS
+    );
+    for ball in 1..=balls {
+        let _ = write!(
+            text,
+            "[[body]]\nname = \"b{ball}\"\nid = {ball}\nshape = {{ type = \"sphere\", radius = 1.0 }}\n"
+        );
+    }
+    Scene::parse(&text, "scene.toml", Path::new(".")).unwrap()
+}
+
+/// Pairs of balls far from one another; `apart` of their centres, on both of two axes.
+fn pairs(balls: usize, apart: f64) -> Vec<TransformRow> {
+    let row = |at: usize| TransformRow {
+        body: at as u64 + 1,
+        position: [
+            (at / 2) as f64 * 10.0 + (at % 2) as f64 * apart,
+            (at % 2) as f64 * apart,
+            0.0,
+        ],
+        orientation: [0.0, 0.0, 0.0, 1.0],
+        ..TransformRow::default()
+    };
+    (0..balls).map(row).collect()
+}
+
+const TOUCHING: f64 = 1.2;
+const APART: f64 = 1.5;
+
+/// A client that hears each tick.
+struct Ear {
+    client: Client,
+}
+
+impl Ear {
+    fn of(hub: &Hub, clock: &Arc<ManualClock>) -> Self {
+        let link = Box::new(hub.link());
+        let clock = Arc::clone(clock) as Arc<dyn Clock>;
+        let mut client = Client::over(link, clock, Some("sim"), 0).unwrap();
+        client.subscribe(Topics::ALL).unwrap();
+        Self { client }
+    }
+
+    fn send(&mut self, rows: &[TransformRow]) {
+        let info = FrameInfo::default();
+        self.client.send(&info, Rows::Poses(rows)).unwrap();
+    }
+
+    /// The ticks that have come since, each with whether its pairs came with it.
+    fn heard(&mut self) -> Vec<(TickRow, bool)> {
+        let mut heard = Vec::new();
+        while self.client.wait_tick(0).unwrap() == Heard::Tick {
+            let view = self.client.view();
+            heard.push((*view.tick(), view.pairs().is_some()));
+        }
+        heard
+    }
+}
+
+fn state(tick: &TickRow) -> State {
+    State::from_code(tick.header.state).unwrap()
+}
+
+#[test]
+fn law_4_4_while_a_tick_takes_longer_than_a_heartbeat_clients_hear_that_it_is_under_way() {
+    const BALLS: usize = 800;
+    let (hub, clock) = (Hub::new(), Arc::new(ManualClock::new(1_000 * MS)));
+    let scene = scene(MODES[0], BALLS);
+    let mut door = MemoryServer::open(&hub, 7, HEARTBEAT_NS).unwrap();
+    let shapes = build_shapes(&scene).unwrap();
+    let mut daemon = Daemon::new(&scene, shapes, 7, clock.clone(), &mut door).unwrap();
+    let mut ear = Ear::of(&hub, &clock);
+    ear.send(&pairs(BALLS, APART));
+    daemon.round(None).unwrap();
+    let first = ear.heard();
+    assert_eq!(first.len(), 1, "it took no time");
+    ear.send(&pairs(BALLS, TOUCHING));
+    // Each look at the clock takes a millisecond: some 400 queries.
+    clock.step_each_read(MS);
+    let start_ns = clock.monotonic_ns();
+    daemon.round(None).unwrap();
+    clock.step_each_read(0);
+    let heard = ear.heard();
+    let (last, beats) = heard.split_last().unwrap();
+    assert!((3..=6).contains(&beats.len()), "{} beats", beats.len());
+    let mut before_ns = start_ns;
+    for (tick, with_pairs) in beats {
+        assert_eq!(state(tick), State::Unknown);
+        assert_eq!(tick.reasons, Reason::Undecided.bit());
+        assert!(tick.sent_ns - before_ns <= HEARTBEAT_NS + 30 * MS);
+        // All is read after the tick: what belongs to it is there already, and nothing of the tick before.
+        assert!(*with_pairs);
+        assert_eq!(tick.header.tick, last.0.header.tick);
+        assert_eq!(tick.sources_len, 0);
+        before_ns = tick.sent_ns;
+    }
+    let (tick, with_pairs) = last;
+    assert_eq!(state(tick), State::Colliding);
+    assert_eq!((tick.colliding, tick.sources[0].seq), (BALLS as u64 / 2, 2));
+    assert!(with_pairs);
+}
+
+#[test]
+fn law_4_4_in_lockstep_a_heartbeat_judges_ages_and_spends_no_units() {
+    const BALLS: usize = 20;
+    for budget in ["budget_units = 3", "budget_ms = 1000.0"] {
+        let (hub, clock) = (Hub::new(), Arc::new(ManualClock::new(1_000 * MS)));
+        let scene = scene(&format!("{}\n{budget}", MODES[0]), BALLS);
+        let mut door = MemoryServer::open(&hub, 7, HEARTBEAT_NS).unwrap();
+        let shapes = build_shapes(&scene).unwrap();
+        let mut daemon = Daemon::new(&scene, shapes, 7, clock.clone(), &mut door).unwrap();
+        let mut ear = Ear::of(&hub, &clock);
+        ear.send(&pairs(BALLS, TOUCHING));
+        // No time is left for any pair, or for three of them.
+        clock.step_each_read(if budget.contains("units") {
+            0
+        } else {
+            100 * MS
+        });
+        daemon.round(None).unwrap();
+        clock.step_each_read(0);
+        let (frame, _) = ear.heard().pop().unwrap();
+        assert_eq!(frame.cause, TickCause::Frame.code());
+        let open = frame.possible;
+        assert!(open >= BALLS as u64 / 2 - 3, "{open} open");
+        for _ in 0..5 {
+            clock.advance(HEARTBEAT_NS);
+            daemon.round(None).unwrap();
+            let (beat, _) = ear.heard().pop().unwrap();
+            assert_eq!(beat.cause, TickCause::Heartbeat.code());
+            assert_eq!((beat.units, beat.possible), (0, open), "{budget}");
+            assert_eq!(beat.budget_units, 0);
+        }
+        // Of old data nothing is decided, and that it is old is told.
+        clock.advance(TIMEOUT_NS);
+        daemon.round(None).unwrap();
+        let (late, _) = ear.heard().pop().unwrap();
+        assert_eq!((late.units, late.unknown), (0, BALLS as u64));
+        assert_eq!(state(&late), State::Unknown);
+        assert_ne!(late.reasons & Reason::Stale.bit(), 0);
+        // The next frame has its units again.
+        ear.send(&pairs(BALLS, TOUCHING));
+        daemon.round(None).unwrap();
+        let (frame, _) = ear.heard().pop().unwrap();
+        assert!(frame.units > 0, "{budget}");
+    }
+}
+
+#[test]
+fn law_3_8_a_machine_that_was_suspended_wakes_to_a_tick_that_says_its_data_is_old_in_each_mode() {
+    const HOUR_NS: u64 = 3_600_000 * MS;
+    for mode in MODES {
+        let (hub, clock) = (Hub::new(), Arc::new(ManualClock::new(1_000 * MS)));
+        let scene = scene(mode, 2);
+        let mut door = MemoryServer::open(&hub, 7, HEARTBEAT_NS).unwrap();
+        let shapes = build_shapes(&scene).unwrap();
+        let mut daemon = Daemon::new(&scene, shapes, 7, clock.clone(), &mut door).unwrap();
+        let mut ear = Ear::of(&hub, &clock);
+        let far = pairs(2, 20.0);
+        let mut word = None;
+        for _ in 0..20 {
+            clock.advance(50 * MS);
+            ear.send(&far);
+            daemon.round(None).unwrap();
+            word = ear.heard().pop().map(|(tick, _)| state(&tick)).or(word);
+        }
+        assert_eq!(word, Some(State::Clear), "{mode}");
+        // CLOCK_BOOTTIME has run on meanwhile.
+        clock.advance(HOUR_NS);
+        daemon.round(None).unwrap();
+        let heard = ear.heard();
+        let [(tick, _)] = &heard[..] else {
+            panic!("{mode}: {} ticks", heard.len())
+        };
+        assert_eq!((state(tick), tick.unknown), (State::Unknown, 2), "{mode}");
+        assert_ne!(tick.reasons & Reason::Stale.bit(), 0, "{mode}");
+        // What was sent before it slept, and is only received now, makes nothing known either.
+        clock.advance(10 * MS);
+        ear.send(&far);
+        clock.advance(HOUR_NS);
+        for _ in 0..3 {
+            daemon.round(None).unwrap();
+            for (tick, _) in ear.heard() {
+                assert_eq!(state(&tick), State::Unknown, "{mode}");
+            }
+            clock.advance(HEARTBEAT_NS);
+        }
+        // A fresh frame does.
+        ear.send(&far);
+        clock.advance(50 * MS);
+        daemon.round(None).unwrap();
+        let (tick, _) = ear.heard().pop().unwrap();
+        assert_eq!(state(&tick), State::Clear, "{mode}");
+    }
+}
