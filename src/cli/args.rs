@@ -77,7 +77,8 @@ pub(super) struct RunArgs {
     /// Never go to sleep: microseconds less latency for a whole core.
     #[arg(long, conflicts_with = "spin")]
     pub(super) busy_poll: bool,
-    /// End with exit code 5 when the tick thread makes no progress for this long, such as `10s`, or `none`.
+    /// End with exit code 5 when the tick thread makes no progress for this long, such as `10s`, or `none`; a second
+    /// more than the heartbeat at least.
     #[arg(long, value_name = "TIME", value_parser = duration, default_value = "10s")]
     pub(super) watchdog: Limit,
     /// End after so many ticks; until a signal otherwise.

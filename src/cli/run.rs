@@ -17,6 +17,9 @@ use super::{load_scene, ros};
 
 /// Exit code when the watchdog ends the process.
 const EXIT_WATCHDOG: i32 = 5;
+/// Beyond a heartbeat, after which a long tick shows progress; an idle daemon does so each 100 ms, and a busy machine
+/// may keep it waiting for its turn.
+const WATCHDOG_BEYOND_NS: u64 = 1_000_000_000;
 
 /// Runs the daemon until a signal, or for the ticks asked for.
 pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBool) -> Result<bool> {
@@ -25,6 +28,7 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     let mut scene = load_scene(&args.scene)?;
     apply(args, &mut scene)?;
     asked.check(&scene)?;
+    check_watchdog(args, &scene)?;
     let shapes = build_shapes(&scene)?;
     for warning in scene.notes().iter().chain(&shapes.warnings) {
         tracing::warn!("{warning}");
@@ -83,6 +87,20 @@ fn give_up() {
         std::thread::park_timeout(Duration::from_millis(10));
     }
     std::process::exit(EXIT_WATCHDOG);
+}
+
+/// Less than a daemon may well stand still would end one that is healthy.
+fn check_watchdog(args: &RunArgs, scene: &Scene) -> Result<()> {
+    let least_ns = scene.config.heartbeat_ns.saturating_add(WATCHDOG_BEYOND_NS);
+    match args.watchdog {
+        Limit::Of(limit_ns) if limit_ns < least_ns => Err(Error::Usage(format!(
+            "--watchdog: {} ms is less than a healthy daemon may stand still with this scene's heartbeat; give {} ms or \
+             more, or `none`",
+            limit_ns / 1_000_000,
+            least_ns.div_ceil(1_000_000)
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// Flags override the scene.

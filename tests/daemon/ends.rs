@@ -1,6 +1,7 @@
 //! How daemons end and begin: signals, kills, a second one on the same instance.
 
 use rustix::process::Signal;
+use std::io::Write as _;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::CommandExt;
 use std::process::Stdio;
@@ -9,7 +10,9 @@ use std::time::Duration;
 use sweepd::transport::client::{FrameInfo, Heard, Rows, StepError};
 use sweepd::wire::{EndCause, Event};
 
-use crate::live::{Desk, SECOND_NS, TWO_SPHERES, at, finish, output, step, tick_until, until};
+use crate::live::{
+    Desk, SECOND_NS, TWO_SPHERES, at, finish, output, step, sweepd, tick_until, until,
+};
 
 /// What `sweepd list --json` says of an instance.
 fn listed(instance: &str) -> Option<serde_json::Value> {
@@ -137,6 +140,61 @@ fn a_killed_daemon_started_again_is_told_to_the_client_with_the_ends_of_its_pair
     tick_until(&mut desk.client(None), "the next", |_| true);
     drop(next);
     assert_eq!(desk.files(), Vec::<std::path::PathBuf>::new());
+}
+
+/// A pipe that takes not a byte more, and the end that nobody reads.
+fn full_pipe() -> (std::io::PipeReader, std::io::PipeWriter) {
+    use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+    let (reader, mut writer) = std::io::pipe().unwrap();
+    let flags = fcntl_getfl(&writer).unwrap();
+    fcntl_setfl(&writer, flags | OFlags::NONBLOCK).unwrap();
+    for piece in [&[b'.'; 4096][..], b"."] {
+        while writer.write(piece).is_ok() {}
+    }
+    fcntl_setfl(&writer, flags).unwrap();
+    (reader, writer)
+}
+
+#[test]
+fn a_daemon_whose_tick_thread_is_stuck_ends_with_code_5_and_the_next_one_starts() {
+    let desk = Desk::new();
+    let scene = desk.scene(TWO_SPHERES);
+    // Its first line of log is never taken: the thread that writes it is stuck for good.
+    let (_unread, log) = full_pipe();
+    let child = sweepd()
+        .args(["run", scene.to_str().unwrap(), "--watchdog", "2s"])
+        .args(["--instance", &desk.instance])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(log)
+        .spawn()
+        .unwrap();
+    assert_eq!(finish(child).status.code(), Some(5));
+    let mut next = desk.run(TWO_SPHERES, &[]);
+    step(&mut desk.source("sim"), &[at(1, 0.0), at(2, 0.5)]);
+    assert_eq!(next.stop().0.code(), Some(0), "{}", next.stderr());
+    assert_eq!(desk.files(), Vec::<std::path::PathBuf>::new());
+}
+
+#[test]
+fn a_watchdog_that_would_take_an_idle_daemon_for_a_stuck_one_is_refused() {
+    let desk = Desk::new();
+    for (scene, watchdog, least) in [
+        (TWO_SPHERES.to_owned(), "50ms", "1100 ms"),
+        (
+            TWO_SPHERES.replace("[run]", "[run]\nheartbeat_ms = 9500"),
+            "10s",
+            "10500 ms",
+        ),
+    ] {
+        let mut daemon = desk.run(&scene, &["--watchdog", watchdog]);
+        assert_eq!(daemon.end().0.code(), Some(2), "{}", daemon.stderr());
+        let text = daemon.stderr();
+        assert!(
+            text.contains("--watchdog") && text.contains(least),
+            "{text}"
+        );
+    }
 }
 
 #[test]
