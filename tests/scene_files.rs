@@ -191,7 +191,7 @@ fn a_file_that_cannot_be_read_is_told_by_its_name() {
             .to_string()
             .contains("tests/data/scenes/none.toml: the scene file cannot be read")
     );
-    assert_eq!(error.exit_code(), 4);
+    assert_eq!(error.exit_code(), 2);
     let error = Scene::load(Path::new("tests/data/meshes/wedge.stl")).unwrap_err();
     assert_eq!(error.exit_code(), 2);
 }
@@ -203,7 +203,10 @@ fn a_mesh_that_fails_when_it_is_built_names_file_line_and_body() {
     std::fs::write(folder.join("empty.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\n").unwrap();
     std::fs::write(folder.join("broken.obj"), "v 0 0 0\nv 1 oops 0\n").unwrap();
     let mut results = Vec::new();
-    for file in ["empty.obj", "broken.obj"] {
+    // A binary STL whose head speaks of ten million triangles.
+    let head = [&[0; 80][..], &10_000_000_u32.to_le_bytes(), &[0; 100]].concat();
+    std::fs::write(folder.join("huge.stl"), head).unwrap();
+    for file in ["empty.obj", "broken.obj", "huge.stl"] {
         let text = ball("first", "") + &shaped(&format!("type = \"trimesh\", file = \"{file}\""));
         let scene = Scene::parse(&text, "scene.toml", &folder).unwrap();
         results.push(
@@ -224,6 +227,11 @@ fn a_mesh_that_fails_when_it_is_built_names_file_line_and_body() {
             && results[1].contains("broken.obj:2: \"oops\""),
         "{}",
         results[1]
+    );
+    assert_eq!(
+        results[2],
+        "scene.toml:9: body \"b\": the mesh has 10000000 triangles, more than 8000000: simplify it, or split it over \
+         several bodies"
     );
 }
 

@@ -5,11 +5,11 @@ use serde_json::json;
 use crate::daemon::build_shapes;
 use crate::error::Result;
 use crate::plan::Plan;
+use crate::scene::Scene;
 use crate::time::{Clock, SystemClock};
 use crate::world::{Body, World};
 
 use super::args::CheckArgs;
-use super::load_scene;
 use super::out::Out;
 
 /// Ignored pairs listed at most.
@@ -17,7 +17,7 @@ const IGNORED_SHOWN: usize = 10_000;
 
 /// Prints the plan, what was left out, ignored pairs and warnings.
 pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
-    let scene = load_scene(&args.scene)?;
+    let scene = Scene::load(&args.scene)?;
     let shapes = build_shapes(&scene)?;
     let mut warnings = scene.notes();
     warnings.extend(shapes.warnings);

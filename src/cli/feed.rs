@@ -12,8 +12,8 @@ use crate::transport::client::{Client, FrameInfo, Heard, Rows};
 use crate::wire::{REJECTS_LEN, RejectReason, TransformRow, name_str};
 
 use super::args::FeedArgs;
+use super::connect;
 use super::out::Out;
-use super::{connect, load_scene};
 
 /// Bodies of a written scene when no count is given.
 const COUNT_DEFAULT: usize = 200;
@@ -48,7 +48,7 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
             args.rate
         )));
     }
-    let scene = load_scene(path)?;
+    let scene = Scene::load(path)?;
     let source = source_of(&scene, args.source.as_deref())?;
     let name = scene.sources[source].name.clone();
     let mut bodies = Bodies::of(&scene, source, args);

@@ -15,7 +15,6 @@ mod ros;
 mod run;
 mod screen;
 
-use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,7 +23,6 @@ use clap::Parser;
 use tracing::level_filters::LevelFilter;
 
 use crate::error::{Error, Result};
-use crate::scene::Scene;
 use crate::time::{Clock as _, SystemClock};
 use crate::transport::client::Client;
 use args::{Cli, Command};
@@ -112,14 +110,6 @@ fn connect(
             done => return done.map(Some),
         }
     }
-}
-
-/// The scene of a command; one that cannot be read is the user's to mend, as one that is wrong.
-fn load_scene(path: &Path) -> Result<Scene> {
-    Scene::load(path).map_err(|error| match error {
-        Error::Io { message, .. } => Error::Scene(message),
-        other => other,
-    })
 }
 
 /// A panic says one line; it unwinds, so that transports close.

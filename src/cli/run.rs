@@ -13,7 +13,7 @@ use crate::transport::iceoryx::{Place, Server, ServerOptions, spawn_cleaner};
 use crate::transport::{Both, Door};
 
 use super::args::{Limit, RunArgs};
-use super::{load_scene, ros};
+use super::ros;
 
 /// Exit code when the watchdog ends the process.
 const EXIT_WATCHDOG: i32 = 5;
@@ -25,7 +25,7 @@ const WATCHDOG_BEYOND_NS: u64 = 1_000_000_000;
 pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBool) -> Result<bool> {
     let place = Place::new(&args.which.instance)?;
     let asked = ros::Asked::read(args, ros_words)?;
-    let mut scene = load_scene(&args.scene)?;
+    let mut scene = Scene::load(&args.scene)?;
     apply(args, &mut scene)?;
     asked.check(&scene)?;
     check_watchdog(args, &scene)?;

@@ -60,17 +60,13 @@ impl Scene {
     /// Reads and checks a scene file; mesh files must exist, and are read when shapes are built.
     ///
     /// # Errors
-    /// `Error::Scene` with file, line, body and the mend, at the first mistake; `Error::Io` when the file itself cannot
-    /// be read.
+    /// `Error::Scene` with file, line, body and the mend, at the first mistake, or when the file itself cannot be read.
     pub fn load(path: &Path) -> Result<Self> {
         let shown = path.display().to_string();
         let unreadable = |e: std::io::Error| {
-            Error::io(
-                format!(
-                    "{shown}: the scene file cannot be read ({e}): check the path and its rights"
-                ),
-                e,
-            )
+            Error::Scene(format!(
+                "{shown}: the scene file cannot be read ({e}): check the path and its rights"
+            ))
         };
         let size = std::fs::metadata(path).map_err(unreadable)?.len();
         if size > FILE_BYTES_MAX {
