@@ -1,4 +1,4 @@
-//! Scores the public narrow-phase cases through the batch code, by the rules they came with.
+//! Scores the public narrow-phase cases through `sweepd query --batch`, by the rules they came with.
 //!
 //! Truth: 50-digit arithmetic with certified bounds. Checked: sign, error by class, angle, interval and width.
 #![allow(
@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 use serde_json::Value;
 
 const CASES: &str = include_str!("data/cases_public.jsonl");
+const CASES_FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/cases_public.jsonl");
 
 fn number(v: &Value, key: &str) -> f64 {
     v[key]
@@ -52,10 +53,13 @@ fn quantile(values: &[f64], q: f64) -> f64 {
 }
 
 fn score(cases: &str) -> BTreeMap<String, Class> {
-    let mut out = Vec::new();
-    let whole = sweepd::query::batch::run(cases.as_bytes(), &mut out).unwrap();
-    assert!(whole, "every case can be read");
-    let answers: Vec<Value> = String::from_utf8(out)
+    let ended = std::process::Command::new(env!("CARGO_BIN_EXE_sweepd"))
+        .args(["query", "--batch", CASES_FILE])
+        .output()
+        .unwrap();
+    assert!(ended.status.success(), "every case can be read");
+    assert!(ended.stderr.is_empty());
+    let answers: Vec<Value> = String::from_utf8(ended.stdout)
         .unwrap()
         .lines()
         .map(|l| serde_json::from_str(l).unwrap())

@@ -334,3 +334,79 @@ fn the_byte_table_in_the_readme_has_the_layout_and_the_codes_of_the_daemon() {
         assert_eq!(theirs, ours, "{name}");
     }
 }
+
+/// What stands in quotes after `mark`, the last before or the first after `place`, with nothing of another row between.
+fn quoted<'a>(text: &'a str, place: &str, before: bool, mark: &str) -> &'a str {
+    let at = text.find(place).unwrap_or_else(|| panic!("no `{place}`"));
+    let (from, between) = if before {
+        let from = text[..at].rfind(mark).unwrap();
+        (from, &text[from..at])
+    } else {
+        let from = at + text[at..].find(mark).unwrap();
+        (from, &text[at + place.len()..from])
+    };
+    assert!(
+        !between.contains('}') && !between.contains("class ") && !between.contains("###"),
+        "`{place}` has no `{mark}` of its own"
+    );
+    let quote = mark.chars().last().unwrap();
+    text[from + mark.len()..].split(quote).next().unwrap()
+}
+
+#[test]
+fn every_side_gives_a_row_the_same_type_name() {
+    let read = |path: &Path| std::fs::read_to_string(path).unwrap();
+    let wire = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/wire");
+    let mut rust = String::new();
+    for entry in std::fs::read_dir(wire).unwrap().flatten() {
+        if entry.path().is_file() {
+            rust += &read(&entry.path());
+        }
+    }
+    let c = read(&msgs().join("c/sweepd.h"));
+    let python = read(&msgs().join("python/sweepd/layout.py"));
+    let page = read(&msgs().join("README.md"));
+    let mut names = Vec::new();
+    for layout in layouts() {
+        let name = layout.name;
+        let ours = quoted(
+            &rust,
+            &format!("pub struct {name} {{"),
+            true,
+            "#[type_name(\"",
+        );
+        let c_type = screaming(name).to_lowercase();
+        let theirs = [
+            quoted(
+                &c,
+                &format!("typedef struct sweepd_{c_type} {{"),
+                true,
+                "Type name \"",
+            ),
+            quoted(
+                &python,
+                &format!("\nclass {name}(_Row):"),
+                false,
+                "TYPE_NAME = \"",
+            ),
+            quoted(&page, &format!("\n### {name}\n"), false, "Type name `"),
+        ];
+        assert_eq!(theirs, [ours; 3], "{name}");
+        let size = format!("{} bytes", layout.size);
+        assert!(
+            c.contains(&format!("Type name \"{ours}\", {size}")),
+            "{name}"
+        );
+        assert!(
+            page.contains(&format!("Type name `{ours}`, {size}")),
+            "{name}"
+        );
+        names.push(ours);
+    }
+    let count = names.len();
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), count, "two rows of one name");
+    // The attribute is what iceoryx2 goes by, on both sides of a service.
+    assert!(names.iter().all(|name| name.starts_with("sweepd.")));
+}

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use rustix::process::Signal;
 use sweepd::transport::client::{Client, Heard};
 use sweepd::wire::State;
 
@@ -133,6 +134,37 @@ fn with_work_of_its_own_it_leaves_the_rest_of_each_frame_to_the_daemon_and_tells
     assert!(figures("until the result was there")[0] >= 1.0, "{text}");
     assert!(text.contains("of 40 frames over 10.0 ms"), "{text}");
     assert!(text.contains("; 0 without a result"), "{text}");
+}
+
+#[test]
+fn a_signal_ends_it_with_code_0_also_while_it_waits_for_a_daemon() {
+    let desk = Desk::new();
+    let scene = desk.scene(TWO_SPHERES);
+    let scene = scene.to_str().unwrap();
+    for signal in [Signal::INT, Signal::TERM] {
+        let mut waiting = desk.start("feed", &[scene, "--wait", "60s"]);
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        waiting.signal(signal);
+        assert_eq!(waiting.end().0.code(), Some(0), "{}", waiting.stderr());
+    }
+    let mut daemon = desk.run(TWO_SPHERES, &[]);
+    let mut reader = desk.client(None);
+    for signal in [Signal::INT, Signal::TERM] {
+        // Once a second, and with work of its own: also in its long sleeps.
+        for more in [
+            &["--rate", "1"][..],
+            &["--rate", "20", "--work", "5ms..10ms"],
+        ] {
+            let mut feed = desk.start("feed", &[&[scene], more].concat());
+            tick_until(&mut reader, "its frames", |tick| tick.sources[0].alive == 1);
+            feed.signal(signal);
+            assert_eq!(feed.end().0.code(), Some(0), "{}", feed.stderr());
+            tick_until(&mut reader, "its end", |tick| tick.sources[0].alive == 0);
+        }
+    }
+    drop(reader);
+    assert_eq!(daemon.stop().0.code(), Some(0), "{}", daemon.stderr());
+    assert_eq!(desk.files(), Vec::<std::path::PathBuf>::new());
 }
 
 #[test]

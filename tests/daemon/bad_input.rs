@@ -10,7 +10,8 @@ use sweepd::wire::{
 };
 
 use crate::live::{
-    Desk, Running, SECOND_NS, TWO_SPHERES, at, rejected, send, state, step, tick_until, words,
+    Desk, Running, SECOND_NS, TWO_SPHERES, at, rejected, send, state, step, tick_until, until,
+    words,
 };
 
 /// `a` (1) and `c` (3) of `sim`, `b` (2) of `arm`, at a rate.
@@ -235,6 +236,85 @@ fn a_second_client_of_a_source_is_refused_while_the_first_lives_and_admitted_aft
     }
     tick_until(&mut second, "its poses", |tick| {
         state(tick) == State::Colliding
+    });
+}
+
+#[test]
+fn the_place_of_a_killed_source_is_free_again_within_a_second() {
+    let desk = Desk::new();
+    let daemon = desk.run(TWO_SPHERES, &["--mode", "rate=100"]);
+    let mut reader = desk.client(None);
+    let path = desk.scene(TWO_SPHERES);
+    let mut feed = desk.start("feed", &[path.to_str().unwrap(), "--rate", "100"]);
+    let seen = tick_until(&mut reader, "its frames", |tick| tick.sources[0].frames > 5);
+    let mut next = desk.source("sim");
+    feed.kill();
+    // In ticks, a hundred a second: from the last one with a frame of the dead one, whose time-out is three seconds.
+    let (mut last, mut frames) = (seen.header.tick, seen.sources[0].frames);
+    let session = next.session();
+    let taken = loop {
+        send(&mut next, &[at(1, 0.0), at(2, 5.0)]);
+        let tick = tick_until(&mut reader, "a tick", |_| true);
+        let row = tick.sources[0];
+        if row.session == session {
+            break tick;
+        }
+        if row.frames > frames {
+            (last, frames) = (tick.header.tick, row.frames);
+        }
+    };
+    let waited = taken.header.tick - last;
+    assert!(waited <= 100, "{waited} ticks\n{}", daemon.stderr());
+}
+
+#[test]
+fn sixteen_sources_are_all_heard_a_seventeenth_is_refused_and_a_late_reader_has_all_at_once() {
+    use std::fmt::Write as _;
+    let mut text = String::from("[run]\nmode = \"on_all\"\n");
+    for number in 1..=16 {
+        let _ = write!(
+            text,
+            "[[source]]\nname = \"s{number}\"\ntimeout_ms = 5000\n\
+             [[body]]\nname = \"b{number}\"\nid = {number}\nsource = \"s{number}\"\n\
+             shape = {{ type = \"sphere\", radius = 0.5 }}\n"
+        );
+    }
+    let desk = Desk::new();
+    let _daemon = desk.run(&text, &[]);
+    let mut sources: Vec<Client> = (1..=16)
+        .map(|n| desk.client(Some(&format!("s{n}"))))
+        .collect();
+    let mut round = |x: f64| {
+        for (number, source) in (1_u64..).zip(&mut sources) {
+            #[allow(clippy::cast_precision_loss, reason = "sixteen")]
+            send(source, &[at(number, x * number as f64)]);
+        }
+    };
+    let mut reader = desk.source("nobody");
+    round(3.0);
+    tick_until(&mut reader, "all of them", |tick| {
+        usize::from(tick.sources_len) == 16
+            && tick.sources.iter().all(|row| row.alive == 1)
+            && state(tick) == State::Clear
+    });
+    round(0.9);
+    tick_until(&mut reader, "fifteen pairs", |tick| tick.colliding == 15);
+    // The scene has no seventeenth: its frames are counted, and no others are lost for it.
+    let mut more = desk.source("s17");
+    send(&mut more, &[at(1, 7.0)]);
+    let tick = tick_until(&mut reader, "refused", |tick| {
+        rejected(tick, RejectReason::UnknownSource) > 0
+    });
+    assert_eq!(tick.colliding, 15, "{}", words(&tick));
+    // Who comes late, while nobody sends, has all of it.
+    let mut late = desk.source("nobody");
+    let tick = tick_until(&mut late, "a tick", |_| true);
+    assert_eq!((tick.sources_len, tick.colliding), (16, 15));
+    until("names and pairs", || {
+        late.wait_tick(SECOND_NS).unwrap();
+        let view = late.view();
+        view.names().is_some_and(|names| names.rows.len() == 16)
+            && view.pairs().is_some_and(|pairs| pairs.rows.len() == 15)
     });
 }
 
