@@ -11,10 +11,11 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
+from needed import needed
 
-sweepd = pytest.importorskip("sweepd")
+np = needed("numpy")
+sweepd = needed("sweepd")
 
 SWEEPD = os.environ.get("SWEEPD")
 pytestmark = pytest.mark.skipif(not SWEEPD, reason="SWEEPD names no binary")
@@ -59,6 +60,30 @@ def daemon(tmp_path):
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
         assert process.wait(timeout=10) in (0, -signal.SIGKILL)
+
+
+@pytest.fixture
+def started(tmp_path):
+    """Starts a daemon with a scene; the name of its instance."""
+    processes = []
+
+    def start(text):
+        path = tmp_path / f"scene_{len(processes)}.toml"
+        path.write_text(text)
+        name = f"py_{os.getpid()}_{len(processes)}_{time.monotonic_ns() % 1_000_000}"
+        processes.append(subprocess.Popen([SWEEPD, "--quiet", "run", str(path), "--instance", name]))
+        return name
+
+    yield start
+    for process in processes:
+        process.send_signal(signal.SIGINT)
+    for process in processes:
+        assert process.wait(timeout=10) == 0
+
+
+@pytest.fixture
+def daemon_at_a_rate(started):
+    return started(SCENE.replace('on_frame = "sim"', "rate = 20"))
 
 
 def poses(x, turn=NO_TURN):
@@ -161,6 +186,111 @@ def test_a_killed_daemon_that_comes_back_is_told_as_a_restart(daemon):
             except sweepd.TimedOut:
                 pass
         raise AssertionError("the restarted daemon answered nothing")
+
+
+def test_a_frame_that_a_newer_one_overtook_is_said_to_be_skipped(daemon_at_a_rate, monkeypatch):
+    with sweepd.Client(daemon_at_a_rate, "sim", quat_order="wxyz") as client:
+        client.step(poses(3.0), timeout_s=5)
+        send = client.send
+
+        def twice(poses, **fields):
+            first = send(poses, **fields)
+            send(poses, **fields)
+            return first
+
+        monkeypatch.setattr(client, "send", twice)
+        skipped = []
+        for _ in range(20):
+            try:
+                # a tick may come between the two
+                client.step(poses(3.0), timeout_s=5)
+            except sweepd.Skipped as e:
+                skipped.append(e)
+        assert len(skipped) >= 10
+        assert all(f"frame {e.seq} was passed over" in str(e) for e in skipped)
+        monkeypatch.undo()
+        assert client.step(poses(3.0), timeout_s=5).state == "clear"
+
+
+def test_the_files_of_another_user_are_refused_and_it_is_told_whose_they_are(daemon, monkeypatch):
+    owner = os.geteuid()
+    sweepd.Client(daemon[0], None, quat_order="wxyz").close()
+    monkeypatch.setattr(os, "geteuid", lambda: owner + 1)
+    with pytest.raises(sweepd.Refused, match=f"belongs to user id {owner}, this process runs as {owner + 1}"):
+        sweepd.Client(daemon[0], None, quat_order="wxyz")
+
+
+BULLET = """
+frame_id = "world"
+[run]
+on_frame = "sim"
+[[source]]
+name = "sim"
+timeout_ms = 3000
+[[body]]
+name = "bullet"
+continuous = true
+shape = { type = "box", half_extents = [0.5, 0.01, 0.01] }
+[[body]]
+name = "post"
+position = [5.0, 0.4, 0.0]
+moves = false
+shape = { type = "sphere", radius = 0.05 }
+"""
+
+
+def test_velocities_tell_of_turns_that_poses_do_not_show(started):
+    """A rod that turns once round in a step touches a post that it does not touch when it does not turn."""
+    turns = {"turned": (0.0, 0.0, 2 * math.pi), "slid": (0.0, 0.0, 0.0)}
+    for shape in ("dict", "arrays", "loan"):
+        for word, angular in turns.items():
+            with sweepd.Client(started(BULLET), "sim", quat_order="wxyz") as client:
+                for step, x in enumerate([0.0, 0.0, 5.0, 5.0]):
+                    # the last step: at one place beside the post, one second apart, a turn
+                    spin = angular if step == 3 else (0.0, 0.0, 0.0)
+                    place = (x, 0.0, 0.0)
+                    if shape == "dict":
+                        frame = {"bullet": (place, NO_TURN, (0.0, 0.0, 0.0), spin)}
+                    elif shape == "arrays":
+                        frame = ([client.names["bullet"]], [place], [NO_TURN], [(0.0, 0.0, 0.0)], [spin])
+                    else:
+                        frame = client.loan(1, velocities=True)
+                        frame["transform"]["body"] = client.names["bullet"]
+                        frame["transform"]["position"] = place
+                        frame["transform"]["orientation"] = (0.0, 0.0, 0.0, 1.0)
+                        frame["linear"], frame["angular"] = 0.0, spin
+                    result = client.step(frame, timeout_s=5, stamp_ns=(step + 1) * 1_000_000_000)
+                wanted = "colliding" if word == "turned" else "clear"
+                assert result.state == wanted, (shape, word)
+
+
+def test_a_frame_has_velocities_of_all_its_bodies_or_of_none(daemon):
+    with sweepd.Client(daemon[0], "sim", quat_order="wxyz") as client:
+        some = poses(3.0)
+        some["left"] = (*some["left"], (0, 0, 0), (0, 0, 0))
+        with pytest.raises(sweepd.SweepdError, match="all its bodies, or of none"):
+            client.send(some)
+        with pytest.raises(sweepd.SweepdError, match="a position and a quaternion"):
+            client.send({"left": ((0, 0, 0), NO_TURN, (0, 0, 0))})
+
+
+def test_a_loan_goes_out_without_a_copy_and_is_read_only_then(daemon):
+    with sweepd.Client(daemon[0], "sim", quat_order="wxyz") as client:
+        names = client.names
+        for step in range(50):
+            rows = client.loan(2)
+            rows["body"] = names["left"], names["right"]
+            rows["position"] = (0.0, 0.0, 0.0), (0.8 if step % 2 else 1.2, 0.0, 0.0)
+            rows["orientation"] = 0.0, 0.0, 0.0, 1.0
+            result = client.step(rows, timeout_s=5)
+            assert result.state == ("colliding" if step % 2 else "clear")
+            with pytest.raises(ValueError, match="read-only"):
+                rows["body"] = 7
+        # what was not sent is forgotten, and other frames go out meanwhile
+        client.loan(2)
+        assert client.step(poses(0.5), timeout_s=5).state == "colliding"
+        client.loan(5000)
+        assert client.step(poses(3.0), timeout_s=5).state == "clear"
 
 
 def test_the_smallest_example_runs(daemon):

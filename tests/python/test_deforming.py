@@ -8,10 +8,11 @@ import signal
 import subprocess
 import time
 
-import numpy as np
 import pytest
+from needed import needed
 
-sweepd = pytest.importorskip("sweepd")
+np = needed("numpy")
+sweepd = needed("sweepd")
 
 from sweepd import layout  # noqa: E402
 

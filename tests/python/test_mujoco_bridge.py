@@ -18,10 +18,11 @@ from itertools import combinations
 from pathlib import Path
 
 import pytest
+from needed import needed
 
-np = pytest.importorskip("numpy")
-mujoco = pytest.importorskip("mujoco")
-tomllib = pytest.importorskip("tomllib")
+np = needed("numpy")
+mujoco = needed("mujoco")
+tomllib = needed("tomllib")
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "launch-free-scripts"
 sys.path.insert(0, str(SCRIPTS))

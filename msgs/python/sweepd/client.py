@@ -23,7 +23,10 @@ _TOPICS = {
     "plan": ctypes.c_uint8,
 }
 _POSE = np.dtype(layout.TransformRow)
+_MOVING = np.dtype(layout.TransformVelRow)
 _VERTEX = np.dtype(layout.VertexRow)
+_POSES = ("transforms", layout.TransformRow)
+_MOTION = ("transforms_vel", layout.TransformVelRow)
 
 
 def _text(chars):
@@ -144,8 +147,10 @@ class Client:
         """Sends a frame and does not wait. Returns its number.
 
         * ``poses``: ``{name: (position, quaternion)}``, or ``(ids, positions, quaternions)`` as arrays of shape
-          ``(n,)``, ``(n, 3)``, ``(n, 4)``; metres, quaternions in the order you said. An array made by ``rows()`` is
-          sent as it is.
+          ``(n,)``, ``(n, 3)``, ``(n, 4)``; metres, quaternions in the order you said. With velocities, of all bodies or
+          of none: ``{name: (position, quaternion, linear, angular)}``, or two more arrays of shape ``(n, 3)``; metres
+          and radians a second, in the scene's frame. An array made by ``rows()`` is copied once, as it is; one made by
+          ``loan()`` lies where it is read, and goes out without a copy.
         * ``partial``: these are some bodies of the source only.
         """
         flags = layout.FrameFlags.PARTIAL if partial else layout.FrameFlags.FULL
@@ -266,22 +271,47 @@ class Client:
             self._ports.wait(min(left, _LOOK_AGAIN_S))
 
     def rows(self, poses):
-        """Poses as an array of TransformRow, to be filled once and changed in place for later frames."""
-        if isinstance(poses, np.ndarray) and poses.dtype == _POSE:
+        """Poses as an array of TransformRow, to be filled once and changed in place for later frames.
+
+        With velocities (see ``send``) of TransformVelRow, whose field ``transform`` is the pose.
+        """
+        if isinstance(poses, np.ndarray) and poses.dtype in (_POSE, _MOVING):
             return poses
         if isinstance(poses, dict):
             ids = self._ids(poses)
-            positions = [pose[0] for pose in poses.values()]
-            quaternions = [pose[1] for pose in poses.values()]
+            columns = self._columns(poses)
         else:
-            ids, positions, quaternions = poses
-        rows = np.zeros(len(ids), _POSE)
-        rows["body"] = ids
+            ids, *columns = poses
+        if len(columns) not in (2, 4):
+            raise SweepdError("a pose is a position and a quaternion, or these, a linear and an angular velocity")
+        moving = len(columns) == 4
+        rows = np.zeros(len(ids), _MOVING if moving else _POSE)
+        pose = rows["transform"] if moving else rows
+        pose["body"] = ids
         if len(ids):
-            quaternions = np.asarray(quaternions, dtype=np.float64)
-            rows["position"] = positions
-            rows["orientation"] = np.roll(quaternions, -1, axis=-1) if self._wxyz else quaternions
+            quaternions = np.asarray(columns[1], dtype=np.float64)
+            pose["position"] = columns[0]
+            pose["orientation"] = np.roll(quaternions, -1, axis=-1) if self._wxyz else quaternions
+            if moving:
+                rows["linear"], rows["angular"] = columns[2:]
         return rows
+
+    def loan(self, count, *, velocities=False):
+        """An array of ``count`` rows that lies in shared memory, for one frame: fill every field and send or step it.
+
+        TransformRow, or with ``velocities`` TransformVelRow. What was in it is anything. ``orientation`` is x, y, z, w,
+        whatever order was said. Once sent it is the daemon's and read-only; there is one loan at a time, and a new one
+        takes the place of one that was not sent.
+        """
+        topic, row = _MOTION if velocities else _POSES
+        return self._ports.loan(topic, row, layout.FrameHeader, count)
+
+    @staticmethod
+    def _columns(poses):
+        kinds = {len(pose) for pose in poses.values()} or {2}
+        if len(kinds) > 1:
+            raise SweepdError("a frame has velocities of all its bodies, or of none")
+        return [[pose[at] for pose in poses.values()] for at in range(kinds.pop())]
 
     def _ids(self, poses):
         names = self.names
@@ -301,7 +331,8 @@ class Client:
             **fields,
         )
         self._name(header)
-        self._ports.send("transforms", layout.TransformRow, header, rows)
+        topic, row = _MOTION if rows.dtype == _MOVING else _POSES
+        self._ports.send(topic, row, header, rows)
         self._seq += 1
         return self._seq
 

@@ -103,6 +103,7 @@ class Ports:
         self._readers = {}
         self._client = None
         self._pending = []
+        self._loaned = None
         until = time.monotonic() + timeout_s
         while True:
             why = "its files are missing"
@@ -193,21 +194,38 @@ class Ports:
         header = layout.MessageHeader.from_buffer_copy(sample.user_header().contents)
         return header, _view(sample, kind)
 
-    def send(self, topic, row, header, rows, wake=True):
-        """Hands rows over and, where said, wakes the daemon."""
+    def _sender(self, topic, row, header, count):
         if topic not in self._senders:
-            service = self._topic(topic).publish_subscribe(iox2.Slice[row]).user_header(type(header)).open()
+            service = self._topic(topic).publish_subscribe(iox2.Slice[row]).user_header(header).open()
             self._senders[topic] = (
                 service.publisher_builder()
                 # a sample sent right after a growth is lost if its sender ends before it is mapped
-                .initial_max_slice_len(max(len(rows), _SLICE_LEN_START))
+                .initial_max_slice_len(max(count, _SLICE_LEN_START))
                 .allocation_strategy(iox2.AllocationStrategy.PowerOfTwo)
                 .backpressure_strategy(iox2.BackpressureStrategy.DiscardData)
                 .create()
             )
-        sample = self._senders[topic].loan_slice_uninit(len(rows))
+        return self._senders[topic]
+
+    def loan(self, topic, row, header, count):
+        """Rows in shared memory that :meth:`send` hands over as they are; the loan before is given back."""
+        self._loaned = None
+        sample = self._sender(topic, row, header, count).loan_slice_uninit(count)
+        kind = np.dtype(row)
+        memory = (ctypes.c_uint8 * (count * kind.itemsize)).from_address(sample.payload_ptr) if count else b""
+        rows = np.frombuffer(memory, dtype=kind)
+        self._loaned = (rows, sample)
+        return rows
+
+    def send(self, topic, row, header, rows, wake=True):
+        """Hands rows over and, where said, wakes the daemon."""
+        if self._loaned is not None and rows is self._loaned[0]:
+            sample, self._loaned = self._loaned[1], None
+            rows.flags.writeable = False
+        else:
+            sample = self._sender(topic, row, type(header), len(rows)).loan_slice_uninit(len(rows))
+            _fill(sample.payload_ptr, np.dtype(row), rows)
         ctypes.memmove(sample.user_header_ptr, ctypes.byref(header), ctypes.sizeof(header))
-        _fill(sample.payload_ptr, np.dtype(row), rows)
         sample.assume_init().send()
         if wake:
             self.wake(SENT)
@@ -247,6 +265,7 @@ class Ports:
 
     def close(self):
         """Frees the ports: samples and ports first, the node last."""
+        self._loaned = None
         self._pending, self._senders, self._readers = [], {}, {}
         self._client = self._tick = self._hello = self._ready = self._wake = self._node = None
 
