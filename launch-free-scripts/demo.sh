@@ -33,11 +33,25 @@ instance="demo_$$"
 work=$(mktemp -d)
 pids=()
 
+# Files in shared memory that our processes have mapped; iceoryx2 keeps one of its own for ever.
+mapped() {
+  for pid in "${pids[@]}"; do cat "/proc/$pid/maps" 2>/dev/null || true; done \
+    | grep -o '/dev/shm/[^ ]*' | grep -v global_mgmt | sort -u || true
+}
+
 finish() {
   trap - EXIT INT TERM
+  local files left
+  files=$(mapped)
   for pid in "${pids[@]}"; do kill -INT "$pid" 2>/dev/null || true; done
   for pid in "${pids[@]}"; do wait "$pid" 2>/dev/null || true; done
   rm -rf "$work"
+  left=$(for file in $files; do [ ! -e "$file" ] || echo "$file"; done
+    grep -ls "$instance/" /tmp/iceoryx2/services/* 2>/dev/null || true)
+  if [ -n "$left" ]; then
+    printf 'demo.sh: left behind: %s\n' $left >&2
+    exit 1
+  fi
 }
 trap finish EXIT
 trap 'exit 130' INT
@@ -68,13 +82,20 @@ if [ -n "$deadline" ]; then
   echo "done: daemon, source and monitor have ended, shared memory is clean"
   exit 0
 fi
+# Lines that hold this, of what was heard until the end.
+heard() { grep -c "$1" "$work/heard.jsonl" || true; }
+
 "$sweepd" feed --write-scene "$scene" --kind "$kind" --count "${count:-60}" --seed 7
 "$sweepd" check "$scene"
 "$sweepd" --quiet run "$scene" --instance "$instance" --budget 2ms & pids+=($!)
 "$sweepd" --quiet feed "$scene" --instance "$instance" --rate 100 & pids+=($!)
+"$sweepd" --quiet monitor --instance "$instance" --contacts --json >"$work/ticks.jsonl" & pids+=($!)
 timeout --foreground -s INT "$seconds" "$sweepd" monitor --instance "$instance" --contacts --pairs 12 || [ $? -eq 124 ]
 echo
 echo "one tick as JSON:"
 "$sweepd" monitor --instance "$instance" --json --ticks 1 --pairs 2
+echo
+cp "$work/ticks.jsonl" "$work/heard.jsonl"
+echo "$(heard '"tick":') ticks heard; with colliding pairs: $(heard '"colliding":[1-9]'); with contacts: $(heard '"contacts":\[{')"
 finish
 echo "done: daemon, source and monitor have ended, shared memory is clean"

@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# The demo as a user meets it: collisions and contacts are seen, it ends by itself and at Ctrl-C, and nothing is left: no
+# process, no file in shared memory.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+fail() { cat "$log"; echo "demo: $*" >&2; exit 1; }
+
+./launch-free-scripts/demo.sh --seconds 4 | tee "$log" || fail "it failed"
+grep -Eq 'with colliding pairs: [1-9][0-9]*; with contacts: [1-9]' "$log" || fail "no collisions, or no contacts"
+
+# Ctrl-C: a signal to the whole process group, as a terminal sends it.
+set -m
+./launch-free-scripts/demo.sh --seconds 100 >"$log" 2>&1 & demo=$!
+set +m
+for _ in $(seq 600); do
+  grep -q ' colliding' "$log" && break
+  kill -0 "$demo" 2>/dev/null || fail "it ended before Ctrl-C"
+  sleep 0.1
+done
+kill -INT -- "-$demo"
+code=0
+wait "$demo" || code=$?
+[ "$code" = 130 ] || fail "Ctrl-C ended it with code $code"
+! grep 'left behind' "$log" || fail "Ctrl-C left files"
+# Its processes have its instance, which its process number names, among their arguments.
+! ps -eo args | grep "[d]emo_$demo" || fail "Ctrl-C left processes"
+echo "the demo ended at Ctrl-C, and left nothing"
