@@ -7,8 +7,11 @@
 //! * `socket_echo` - two bare wake-ups of this machine, for comparison: a Unix datagram to another process and back.
 //!
 //! Method: a daemon without geometry in a process of its own (this program again) answers each frame with a tick and
-//! one pair a body; the tick says how long it took from wake-up to the outbox filled, which is taken off. CSV on
-//! standard output: `cargo bench --bench shm_latency [-- FRAMES]`.
+//! one pair a body; the tick says how long it took from wake-up to the outbox filled, which is taken off.
+//! `preempted` are the times that the scheduler took the core from client or daemon: a polling row in which it is not
+//! near 0 tells of who else wanted the cores.
+//!
+//! `cargo bench --bench shm_latency [-- FRAMES]`
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -18,12 +21,15 @@
     reason = "a bench ends at the first failure"
 )]
 
+mod common;
+
 use std::io::{BufRead, BufReader, Read};
 use std::os::unix::net::UnixDatagram;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use common::{provenance, save};
 use sweepd::time::{Clock, SystemClock};
 use sweepd::transport::Door;
 use sweepd::transport::client::{ClientOptions, FrameInfo, Rows, Topics};
@@ -49,7 +55,7 @@ fn spin_ns(how: &str) -> Option<u64> {
 }
 
 /// A Unix datagram to another process and back: what two wake-ups cost on this machine.
-fn echo(frames: usize) {
+fn echo(frames: usize) -> String {
     let root = std::env::temp_dir().join(format!("swbench_echo_{}", std::process::id()));
     std::fs::create_dir_all(&root).unwrap();
     let (here, there) = (root.join("here"), root.join("there"));
@@ -65,6 +71,7 @@ fn echo(frames: usize) {
         .unwrap();
     let clock = SystemClock;
     let mut byte = [1];
+    let before = preempted("self") + preempted(&other.id().to_string());
     let mut latencies_ns: Vec<_> = (0..frames)
         .map(|_| {
             let sent_ns = clock.monotonic_ns();
@@ -73,10 +80,11 @@ fn echo(frames: usize) {
             clock.monotonic_ns() - sent_ns
         })
         .collect();
+    let switches = preempted("self") + preempted(&other.id().to_string());
     socket.send_to(&[0], &there).unwrap();
     other.wait().unwrap();
     let _left = std::fs::remove_dir_all(&root);
-    report("socket_echo", 0, &mut latencies_ns);
+    report("socket_echo", 0, &mut latencies_ns, switches - before)
 }
 
 /// The other side of [`echo`], until a 0 comes.
@@ -162,11 +170,21 @@ fn at(sorted: &[u64], share: f64) -> f64 {
     us
 }
 
-fn report(how: &str, bodies: u64, latencies_ns: &mut [u64]) {
+/// How often the scheduler took the core from a process that wanted to go on.
+fn preempted(process: &str) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let mut lines = status.lines();
+    let count = lines.find_map(|line| line.strip_prefix("nonvoluntary_ctxt_switches:"));
+    count
+        .and_then(|count| count.trim().parse().ok())
+        .unwrap_or(0)
+}
+
+fn report(how: &str, bodies: u64, latencies_ns: &mut [u64], preempted: u64) -> String {
     latencies_ns.sort_unstable();
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
-    println!(
-        "{how},{bodies},{},{:.1},{:.1},{:.1},{:.1},{}",
+    let line = format!(
+        "{how},{bodies},{},{:.1},{:.1},{:.1},{:.1},{},{preempted}",
         latencies_ns.len(),
         at(latencies_ns, 0.5),
         at(latencies_ns, 0.9),
@@ -174,9 +192,11 @@ fn report(how: &str, bodies: u64, latencies_ns: &mut [u64]) {
         at(latencies_ns, 0.999),
         load.split(' ').next().unwrap_or("")
     );
+    eprintln!("{line}");
+    line
 }
 
-fn measure(how: &str, bodies: u64, frames: usize) {
+fn measure(how: &str, bodies: u64, frames: usize) -> String {
     let root = std::env::temp_dir().join(format!("swbench_{}", std::process::id()));
     let root = root.to_str().unwrap().to_owned();
     let mut daemon = Command::new(std::env::current_exe().unwrap())
@@ -213,9 +233,14 @@ fn measure(how: &str, bodies: u64, frames: usize) {
         .collect();
     let clock = SystemClock;
     let mut latencies_ns = Vec::with_capacity(frames);
+    let switches = || preempted("self") + preempted(&daemon.id().to_string());
+    let mut before = 0;
     for frame in 0..FRAMES_WARM + frames {
         if how == "event_1khz" {
             std::thread::park_timeout(Duration::from_millis(1));
+        }
+        if frame == FRAMES_WARM {
+            before = switches();
         }
         let sent_ns = clock.monotonic_ns();
         client
@@ -227,11 +252,12 @@ fn measure(how: &str, bodies: u64, frames: usize) {
             latencies_ns.push(took_ns.saturating_sub(client.view().tick().elapsed_ns));
         }
     }
-    report(how, bodies, &mut latencies_ns);
+    let line = report(how, bodies, &mut latencies_ns, switches() - before);
     drop(client);
     drop(daemon.stdin.take());
     daemon.wait().unwrap();
     let _left = std::fs::remove_dir_all(&root);
+    line
 }
 
 fn main() {
@@ -246,15 +272,16 @@ fn main() {
         .iter()
         .find_map(|arg| arg.parse().ok())
         .unwrap_or(FRAMES_DEFAULT);
-    println!("how,bodies,frames,p50_us,p90_us,p99_us,p999_us,load");
-    echo(frames);
+    let from = provenance();
+    let mut csv = String::from(
+        "machine,commit,compiler,how,bodies,frames,p50_us,p90_us,p99_us,p999_us,load,preempted\n",
+    );
+    csv += &format!("{from},{}\n", echo(frames));
     for how in ["sleep", "event", "event_1khz", "polling"] {
         for bodies in [1, 100, 1_000, 10_000] {
-            measure(
-                how,
-                bodies,
-                if bodies > 1_000 { frames / 10 } else { frames },
-            );
+            let frames = if bodies > 1_000 { frames / 10 } else { frames };
+            csv += &format!("{from},{}\n", measure(how, bodies, frames));
         }
     }
+    save("shm_latency.csv", &csv);
 }

@@ -223,19 +223,22 @@ pub fn provenance() -> String {
     )
 }
 
-/// Rows of a CSV that was saved before, if it has these columns, of which `keep` says so by their cells.
+/// Rows of a CSV that was saved before, if it has these columns or all but the last ones, of which `keep` says so by their
+/// cells; what they lack is left empty.
 pub fn kept_rows(name: &str, columns: &str, keep: impl Fn(&[&str]) -> bool) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("benches/results")
         .join(name);
     let text = std::fs::read_to_string(path).unwrap_or_default();
-    let Some(rows) = text.strip_prefix(columns) else {
+    let (old, rows) = text.split_once('\n').unwrap_or_default();
+    let Some(new) = columns.trim_end().strip_prefix(old) else {
         return String::new();
     };
+    let empty = ",".repeat(new.matches(',').count());
     let kept = rows
         .lines()
         .filter(|row| keep(&row.split(',').collect::<Vec<_>>()));
-    kept.map(|row| format!("{row}\n")).collect()
+    kept.map(|row| format!("{row}{empty}\n")).collect()
 }
 
 /// Writes a CSV beside the bench, and to standard output.
