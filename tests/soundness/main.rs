@@ -3,8 +3,8 @@
 //! in each tick, with half of what the first one spent, to a deadline and on after its outbox was taken); each
 //! published verdict and interval against an oracle that shares no code with the narrow phase (`truth.rs`).
 //!
-//! `SWEEPD_PAIR_TICKS` says how many couples times ticks; default 1,500; `SWEEPD_SEED` where to
-//! start.
+//! `SWEEPD_PAIR_TICKS` says how many couples times ticks; default 1,500; `SWEEPD_SEED` where to start. The ignored ones
+//! are the same with 100,000 of them.
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
@@ -33,25 +33,54 @@ use run::{Run, TICKS};
 
 #[test]
 fn law_1_every_verdict_and_interval_holds_the_truth_at_any_budget_for_all_kinds_of_shapes() {
-    let wanted: u64 = std::env::var("SWEEPD_PAIR_TICKS").map_or(1_500, |s| s.parse().unwrap());
-    let first: u64 = std::env::var("SWEEPD_SEED").map_or(0, |s| s.parse().unwrap());
-    let run = run_all(wanted, first, |b| b < kinds::BENDING);
-    assert!(run.overlapping * 5 > run.pair_ticks, "too few overlap");
-    assert!(run.close * 10 > run.pair_ticks, "too few are close");
+    rigid(1_500);
+}
+
+#[test]
+#[ignore = "takes minutes; SWEEPD_CI_SLOW=1 .ci/run runs it"]
+fn law_1_the_same_in_100_000_pair_ticks() {
+    assert_large(&rigid(LARGE));
 }
 
 #[test]
 fn law_4_6_bodies_that_deform_hold_it_too_with_all_kinds_of_shapes_and_at_any_budget() {
-    let wanted: u64 = std::env::var("SWEEPD_PAIR_TICKS").map_or(600, |s| s.parse().unwrap());
-    let first: u64 = std::env::var("SWEEPD_SEED").map_or(0, |s| s.parse().unwrap());
-    let run = run_all(wanted, first, |b| b >= kinds::BENDING);
+    bending(600);
+}
+
+#[test]
+#[ignore = "takes minutes; SWEEPD_CI_SLOW=1 .ci/run runs it"]
+fn law_4_6_the_same_in_100_000_pair_ticks() {
+    assert_large(&bending(LARGE));
+}
+
+const LARGE: u64 = 100_000;
+
+/// As many as are asked for, and enough of each pair of kinds.
+fn assert_large(run: &Run) {
+    assert!(run.pair_ticks >= LARGE, "{} pair-ticks", run.pair_ticks);
+    assert!(run.fewest() >= 500, "{} of a pair of kinds", run.fewest());
+}
+
+fn rigid(wanted: u64) -> Run {
+    let run = run_all(wanted, |b| b < kinds::BENDING);
+    assert!(run.overlapping * 5 > run.pair_ticks, "too few overlap");
+    assert!(run.close * 10 > run.pair_ticks, "too few are close");
+    run
+}
+
+fn bending(wanted: u64) -> Run {
+    let run = run_all(wanted, |b| b >= kinds::BENDING);
     assert!(run.trees > 0, "no tree was built anew");
     assert!(run.overlapping * 5 > run.pair_ticks, "too few overlap");
     assert!(run.close * 20 > run.pair_ticks, "too few are close");
+    run
 }
 
 /// Runs scenes of all pairs of kinds of which the second is `wanted_kind`.
-fn run_all(wanted: u64, first: u64, wanted_kind: impl Fn(usize) -> bool) -> Run {
+fn run_all(wanted: u64, wanted_kind: impl Fn(usize) -> bool) -> Run {
+    let number = |name: &str| std::env::var(name).map(|text| text.parse::<u64>().unwrap());
+    let wanted = number("SWEEPD_PAIR_TICKS").unwrap_or(wanted);
+    let first = number("SWEEPD_SEED").unwrap_or(0);
     let mut kinds = Vec::new();
     for a in 0..KINDS {
         for b in a..KINDS {
