@@ -85,6 +85,9 @@ fn usage_is_refused_with_code_2_on_stderr_and_help_is_given_with_code_0_on_stdou
         assert!(out(&ended).contains("Usage: sweepd"), "{command}");
     }
     assert!(out(&output(&["--version"])).contains(env!("CARGO_PKG_VERSION")));
+    let help = out(&output(&["--help"])).replace('\n', " ");
+    let codes = "0 done, 1 a check failed, 2 usage or a bad scene, 3 timed out, 4 refused or could not run, 5 watchdog, 101";
+    assert!(help.contains(codes), "{help}");
 }
 
 #[test]

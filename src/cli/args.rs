@@ -27,7 +27,8 @@ Try it, in three terminals:
   sweepd feed pool.toml                              a source that moves them
   sweepd monitor                                     what touches what
 
-Exit codes: 0 done, 1 a check failed, 2 usage or a bad scene, 3 timed out, 4 refused or could not run, 101 internal error.
+Exit codes: 0 done, 1 a check failed, 2 usage or a bad scene, 3 timed out, 4 refused or could not run,
+5 watchdog, 101 internal error.
 Environment: NO_COLOR switches colours off. With --ros2: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY.";
 
 #[derive(Debug, Subcommand)]
