@@ -51,7 +51,7 @@ def check_cloud(room, seconds):
     # on a machine without a core to spare the sender may fall behind: the newest wins, and what gave way is counted
     assert numbers == sorted(set(numbers)) and missing_ticks <= dropped, "a tick was repeated, or lost without a word"
     assert used == sorted(set(used)) and told <= skipped + missing_ticks, "each frame has one tick, or it is told that it has none"
-    assert len(framed) > 0.9 * frames and ticks[-1][5] == 0
+    assert len(framed) > 0.5 * frames and ticks[-1][5] == 0
     missing = [tick for tick, cause, *_ in framed if tick not in whole]
     assert len(missing) <= dropped, "a tick whose pairs did not come is counted as dropped"
     # the same frames over shared memory, by a daemon of its own
