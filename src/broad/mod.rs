@@ -65,10 +65,8 @@ pub struct Work {
     pub renewed: u64,
     /// Cells that bodies were put in.
     pub cells: u64,
-    /// Which way of working was chosen.
-    pub mode: BroadMode,
-    /// Why.
-    pub cause: BroadCause,
+    /// Which way of working was chosen, and why; `None`: the method has one way.
+    pub way: Option<(BroadMode, BroadCause)>,
 }
 
 /// The method at work.

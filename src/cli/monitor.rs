@@ -204,11 +204,7 @@ fn tick_json(view: &View, names: &Names, args: &MonitorArgs) -> Value {
         "state": state_word(tick),
         "reasons": reasons(tick),
         "cause": TickCause::from_code(tick.cause).map_or("?", TickCause::word),
-        "broad": {
-            "mode": BroadMode::from_code(tick.broad_mode).map_or("?", BroadMode::word),
-            "cause": BroadCause::from_code(tick.broad_cause).map_or("?", BroadCause::word),
-            "renewed": tick.broad_renewed,
-        },
+        "broad": broad_json(tick),
         "bodies": tick.bodies,
         "unknown": tick.unknown,
         "candidates": tick.candidates,
@@ -253,6 +249,15 @@ fn tick_json(view: &View, names: &Names, args: &MonitorArgs) -> Value {
         ]);
     }
     line
+}
+
+/// How the broad phase worked.
+fn broad_json(tick: &TickRow) -> Value {
+    json!({
+        "mode": BroadMode::from_code(tick.broad_mode).map_or("?", BroadMode::word),
+        "cause": BroadCause::from_code(tick.broad_cause).map_or("?", BroadCause::word),
+        "renewed": tick.broad_renewed,
+    })
 }
 
 /// A number; JSON has no infinity: an open end is null.

@@ -26,7 +26,8 @@ use crate::publish::{Publisher, View};
 use crate::scene::Scene;
 use crate::time::{Clock, Meter};
 use crate::wire::{
-    Demand, MessageHeader, Outbox, Reason, RejectReason, Stage, State, TickRow, WIRE_VERSION,
+    BroadCause, BroadMode, Demand, MessageHeader, Outbox, Reason, RejectReason, Stage, State,
+    TickRow, WIRE_VERSION,
 };
 use crate::world::{Admission, ChangeSet, PlacedShape, World};
 
@@ -344,7 +345,8 @@ impl Engine {
         row.rebuilds = self.rebuilds;
         let broad = self.broad.work();
         row.broad_renewed = u32::try_from(broad.renewed).unwrap_or(u32::MAX);
-        (row.broad_mode, row.broad_cause) = (broad.mode.code(), broad.cause.code());
+        let (mode, cause) = broad.way.unwrap_or((BroadMode::Whole, BroadCause::None));
+        (row.broad_mode, row.broad_cause) = (mode.code(), cause.code());
     }
 }
 

@@ -124,12 +124,6 @@ code! {
     }
 }
 
-impl Default for BroadMode {
-    fn default() -> Self {
-        Self::Whole
-    }
-}
-
 code! {
     /// Why the broad phase worked a tick as it did.
     BroadCause {
@@ -153,12 +147,6 @@ code! {
         Calm = 8 => "calm",
         /// It was asked for.
         Forced = 9 => "forced",
-    }
-}
-
-impl Default for BroadCause {
-    fn default() -> Self {
-        Self::None
     }
 }
 

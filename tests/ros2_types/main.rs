@@ -54,6 +54,19 @@ macro_rules! codes {
     };
 }
 
+fn flags_of_pairs() -> [(&'static str, u64); 8] {
+    [
+        ("touching", u64::from(pair_flags::TOUCHING)),
+        ("estimate", u64::from(pair_flags::ESTIMATE)),
+        ("unknown_body", u64::from(pair_flags::UNKNOWN_BODY)),
+        ("held_body", u64::from(pair_flags::HELD_BODY)),
+        ("gone", u64::from(pair_flags::GONE)),
+        ("swept_hit", u64::from(pair_flags::SWEPT_HIT)),
+        ("swept_open", u64::from(pair_flags::SWEPT_OPEN)),
+        ("teleported", u64::from(pair_flags::TELEPORTED)),
+    ]
+}
+
 #[test]
 fn the_constants_of_the_messages_are_the_codes_of_the_wire() {
     let bits = |words: &'static [(&'static str, u64)]| words.iter().copied();
@@ -76,20 +89,7 @@ fn the_constants_of_the_messages_are_the_codes_of_the_wire() {
                 ))
                 .chain(named("END_", codes!(EndCause)))
                 .chain(named("", codes!(Level)))
-                .chain(named(
-                    "",
-                    [
-                        ("touching", u64::from(pair_flags::TOUCHING)),
-                        ("estimate", u64::from(pair_flags::ESTIMATE)),
-                        ("unknown_body", u64::from(pair_flags::UNKNOWN_BODY)),
-                        ("held_body", u64::from(pair_flags::HELD_BODY)),
-                        ("gone", u64::from(pair_flags::GONE)),
-                        ("swept_hit", u64::from(pair_flags::SWEPT_HIT)),
-                        ("swept_open", u64::from(pair_flags::SWEPT_OPEN)),
-                        ("teleported", u64::from(pair_flags::TELEPORTED)),
-                    ]
-                    .into_iter(),
-                ))
+                .chain(named("", flags_of_pairs().into_iter()))
                 .collect(),
         ),
         (
@@ -97,9 +97,11 @@ fn the_constants_of_the_messages_are_the_codes_of_the_wire() {
             named("", codes!(ContactKind))
                 .chain(named(
                     "",
-                    [("estimate", u64::from(contact_flags::ESTIMATE))].into_iter(),
+                    bits(&[
+                        ("estimate", contact_flags::ESTIMATE as u64),
+                        ("no_triangle", u32::MAX as u64),
+                    ]),
                 ))
-                .chain(named("", bits(&[("no_triangle", u32::MAX as u64)])))
                 .collect(),
         ),
         (

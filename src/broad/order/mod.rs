@@ -223,7 +223,7 @@ impl Order {
         let came = came.filter(|s| tick.members.has(*s, CAME) && tick.members.is_bounded(*s));
         self.homeless.extend(came);
         if (self.afresh.gear).choose(was, moved, bodies, self.usual) {
-            (work.mode, work.cause) = (BroadMode::Scratch, self.afresh.gear.cause);
+            work.way = Some((BroadMode::Scratch, self.afresh.gear.cause));
             self.update_afresh(&mut tick, work);
             self.afresh.gear.note_scratch(bodies, work);
             return;
@@ -245,12 +245,12 @@ impl Order {
             }
         }
         if anew || self.is_worn() || !self.settle(&tick) {
-            work.mode = BroadMode::Sort;
-            work.cause = match (was, many_came) {
+            let cause = match (was, many_came) {
                 (true, _) => self.afresh.gear.cause,
                 (false, true) => BroadCause::ManyCame,
                 (false, false) => BroadCause::Worn,
             };
+            work.way = Some((BroadMode::Sort, cause));
             self.listed = false;
             self.sort_anew(&mut tick, work);
             self.look_at_all(&mut tick, work);
@@ -258,10 +258,10 @@ impl Order {
             self.renew(&mut tick, work);
             self.restore(&mut tick);
             if many {
-                (work.mode, work.cause) = (BroadMode::List, BroadCause::ManyMoved);
+                work.way = Some((BroadMode::List, BroadCause::ManyMoved));
                 self.look_at_all(&mut tick, work);
             } else {
-                (work.mode, work.cause) = (BroadMode::Sparse, BroadCause::FewMoved);
+                work.way = Some((BroadMode::Sparse, BroadCause::FewMoved));
                 self.look_at_moved(&mut tick, work);
             }
         }
