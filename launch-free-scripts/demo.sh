@@ -32,6 +32,7 @@ root=$(dirname "$here")
 instance="demo_$$"
 work=$(mktemp -d)
 pids=()
+interrupted=''
 
 # Files in shared memory that our processes have mapped; iceoryx2 keeps one of its own for ever.
 mapped() {
@@ -43,6 +44,11 @@ finish() {
   trap - EXIT INT TERM
   local files left
   files=$(mapped)
+  # Ctrl-C goes to all of them: a second signal would cut short how they end.
+  for _ in $(seq 30); do
+    [ -n "$interrupted" ] && kill -0 "${pids[@]}" 2>/dev/null || break
+    sleep 0.1
+  done
   for pid in "${pids[@]}"; do kill -INT "$pid" 2>/dev/null || true; done
   for pid in "${pids[@]}"; do wait "$pid" 2>/dev/null || true; done
   rm -rf "$work"
@@ -53,8 +59,15 @@ finish() {
     exit 1
   fi
 }
+
+# Runs what is watched until it ends. Beside the script and not in front of it: of a Ctrl-C that a program in front takes
+# for its own end the shell hears nothing, and would go on.
+watch() {
+  "$@" & pids+=($!)
+  wait "$!"
+}
 trap finish EXIT
-trap 'exit 130' INT
+trap 'interrupted=yes; exit 130' INT
 trap 'exit 143' TERM
 
 # The lean build: shared memory only.
@@ -77,7 +90,7 @@ if [ -n "$deadline" ]; then
   "$sweepd" --quiet run "$scene" --instance "$instance" --mode on_frame=feed --budget none & pids+=($!)
   # Somebody who listens: else there is nothing to compute but verdicts.
   "$sweepd" --quiet monitor --instance "$instance" --contacts --json >"$work/ticks.jsonl" & pids+=($!)
-  "$sweepd" --quiet feed "$scene" --instance "$instance" --rate 50 --work 7ms..15ms --frames "$((seconds * 50))"
+  watch "$sweepd" --quiet feed "$scene" --instance "$instance" --rate 50 --work 7ms..15ms --frames "$((seconds * 50))"
   finish
   echo "done: daemon, source and monitor have ended, shared memory is clean"
   exit 0
@@ -90,7 +103,7 @@ heard() { grep -c "$1" "$work/heard.jsonl" || true; }
 "$sweepd" --quiet run "$scene" --instance "$instance" --budget 2ms & pids+=($!)
 "$sweepd" --quiet feed "$scene" --instance "$instance" --rate 100 & pids+=($!)
 "$sweepd" --quiet monitor --instance "$instance" --contacts --json >"$work/ticks.jsonl" & pids+=($!)
-timeout --foreground -s INT "$seconds" "$sweepd" monitor --instance "$instance" --contacts --pairs 12 || [ $? -eq 124 ]
+watch timeout --foreground -s INT "$seconds" "$sweepd" monitor --instance "$instance" --contacts --pairs 12 || [ $? -eq 124 ]
 echo
 echo "one tick as JSON:"
 "$sweepd" monitor --instance "$instance" --json --ticks 1 --pairs 2
