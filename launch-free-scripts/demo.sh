@@ -40,13 +40,18 @@ mapped() {
     | grep -o '/dev/shm/[^ ]*' | grep -v global_mgmt | sort -u || true
 }
 
+any_runs() {
+  for pid in "${pids[@]}"; do ! kill -0 "$pid" 2>/dev/null || return 0; done
+  return 1
+}
+
 finish() {
   trap - EXIT INT TERM
   local files left
   files=$(mapped)
   # Ctrl-C goes to all of them: a second signal would cut short how they end.
   for _ in $(seq 30); do
-    [ -n "$interrupted" ] && kill -0 "${pids[@]}" 2>/dev/null || break
+    [ -n "$interrupted" ] && any_runs || break
     sleep 0.1
   done
   for pid in "${pids[@]}"; do kill -INT "$pid" 2>/dev/null || true; done
