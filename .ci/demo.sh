@@ -11,9 +11,9 @@ fail() { cat "$log"; echo "demo: $*" >&2; exit 1; }
 ./launch-free-scripts/demo.sh --seconds 4 | tee "$log" || fail "it failed"
 grep -Eq 'with colliding pairs: [1-9][0-9]*; with contacts: [1-9]' "$log" || fail "no collisions, or no contacts"
 
-# Ctrl-C: a signal to the whole process group, as a terminal sends it.
+# Ctrl-C: a signal to the whole process group, as a terminal sends it; who starts this may have it ignored.
 set -m
-./launch-free-scripts/demo.sh --seconds 100 >"$log" 2>&1 & demo=$!
+env --default-signal=INT ./launch-free-scripts/demo.sh --seconds 100 >"$log" 2>&1 & demo=$!
 set +m
 for _ in $(seq 600); do
   grep -q ' colliding' "$log" && break
