@@ -779,7 +779,7 @@ SWEEPD_ASSERT(offsetof(sweepd_source_row, paused) == 101);
 SWEEPD_ASSERT(offsetof(sweepd_source_row, reserved) == 102);
 SWEEPD_ASSERT(sizeof(sweepd_source_row) == 104);
 
-/* Type name "sweepd.v1.Tick", 2080 bytes. The tick: published last, at least each heartbeat,
+/* Type name "sweepd.v1.Tick", 2088 bytes. The tick: published last, at least each heartbeat,
  * never truncated. */
 typedef struct sweepd_tick_row {
     /* As in every message; truncated here is the sum over all messages. */

@@ -76,7 +76,13 @@ fn law_4_5_the_same_inputs_in_any_order_and_any_broad_phase_give_the_same_bits_a
                     shuffle(&mut rig.rows, &mut rng);
                 }
                 rig.send(Budget::units(units));
-                let out = &rig.out;
+                let out = &mut rig.out;
+                // How a broad phase works is its own.
+                (
+                    out.tick.broad_renewed,
+                    out.tick.broad_mode,
+                    out.tick.broad_cause,
+                ) = (0, 0, 0);
                 let said = format!(
                     "{:?}\n{:?}\n{:?}\n{:?}\n{:?}\n{:?}",
                     out.pairs, out.contacts, out.regions, out.bodies, out.body_verdicts, out.tick

@@ -41,6 +41,7 @@ pub(super) struct Scratch {
     near: Vec<u32>,
     /// One more than there can be, which the last step reads.
     sides: [Side; TOGETHER + 1],
+    /// As long as the most there can be, and one more.
     hits: Vec<Hit>,
     matrices: [Matrix; TOGETHER],
 }
@@ -51,7 +52,7 @@ impl Default for Scratch {
             children: Vec::new(),
             near: Vec::new(),
             sides: [Side::default(); TOGETHER + 1],
-            hits: vec![Hit::default(); TOGETHER * WIDTH + 1],
+            hits: Vec::new(),
             matrices: [[0; WIDTH]; TOGETHER],
         }
     }
@@ -62,6 +63,7 @@ impl Scratch {
     pub(super) fn reserve(&mut self, blocks: usize) {
         room(&mut self.children, blocks / WIDTH + 1);
         room(&mut self.near, blocks);
+        self.hits.resize(TOGETHER * WIDTH + 1, Hit::default());
     }
 }
 

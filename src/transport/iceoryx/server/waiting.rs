@@ -67,9 +67,9 @@ impl Server {
 
     /// Sleeps until something comes or the time is up, to a tenth of a millisecond.
     ///
-    /// Not by the wake-up port's own time-out: the system counts that in ticks of its timer, 4 ms with the usual 250 Hz,
-    /// and rounds it up, so that 100 beats a second were 70. A wait on a set of ports is for whole milliseconds; the rest
-    /// is slept in slices.
+    /// Not by the wake-up port's own time-out: the system counts that in ticks of its timer, 4 ms with the usual
+    /// 250 Hz, and rounds it up, so that 100 beats a second were 70. A wait on a set of ports is for whole
+    /// milliseconds; the rest is slept in slices.
     fn sleep_until(&mut self, until_ns: u64, clock: &dyn Clock) -> Result<Wake> {
         loop {
             self.listened_ns = clock.monotonic_ns();
