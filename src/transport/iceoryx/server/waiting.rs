@@ -20,7 +20,9 @@ const LOOKS_PER_READING: u32 = 8;
 const LISTEN_EVERY_NS: u64 = 1_000_000;
 /// Shortest wait on a set of ports; they are for whole milliseconds.
 const SET_WAIT_MIN: Duration = Duration::from_millis(1);
-/// What is left of a wait is slept in such slices: who comes meanwhile is heard at the end of one.
+/// From so much on a millisecond more makes no difference, and an idle daemon wakes once.
+const LONG: Duration = Duration::from_millis(20);
+/// What is left of a shorter wait is slept in such slices: who comes meanwhile is heard at the end of one.
 const SLICE: Duration = Duration::from_micros(100);
 
 impl Server {
@@ -65,18 +67,21 @@ impl Server {
         self.sleep_until(until_ns, clock)
     }
 
-    /// Sleeps until something comes or the time is up, to a tenth of a millisecond.
+    /// Sleeps until something comes or the time is up: a long time to a millisecond, a short one to a tenth of that.
     ///
     /// Not by the wake-up port's own time-out: the system counts that in ticks of its timer, 4 ms with the usual
     /// 250 Hz, and rounds it up, so that 100 beats a second were 70. A wait on a set of ports is for whole
     /// milliseconds; the rest is slept in slices.
     fn sleep_until(&mut self, until_ns: u64, clock: &dyn Clock) -> Result<Wake> {
+        let mut long = None;
         loop {
             self.listened_ns = clock.monotonic_ns();
             let left = Duration::from_nanos(until_ns.saturating_sub(self.listened_ns));
+            let long = *long.get_or_insert(left >= LONG);
             let mut interrupted = false;
             if left >= SET_WAIT_MIN {
-                interrupted = self.wait_on_set(left)?;
+                let part = if long { left } else { whole(left) };
+                interrupted = self.wait_on_set(part)?;
             } else if !left.is_zero() {
                 #[allow(
                     clippy::disallowed_methods,
@@ -92,13 +97,12 @@ impl Server {
         }
     }
 
-    /// Waits for whole milliseconds of a time, or until something comes; returns whether a signal came.
+    /// Waits for a time, rounded up to milliseconds, or until something comes; returns whether a signal came.
     fn wait_on_set(&self, time: Duration) -> Result<bool> {
-        let whole = Duration::from_millis(u64::try_from(time.as_millis()).unwrap_or(u64::MAX));
         let port = (self.sleeper.attach_notification(&self.wake)).map_err(|e| failed("wake", e))?;
         let ran = self
             .sleeper
-            .wait_and_process_once_with_timeout(|_| CallbackProgression::Continue, whole);
+            .wait_and_process_once_with_timeout(|_| CallbackProgression::Continue, time);
         drop(port);
         match ran {
             Ok(ran) => Ok(ran == WaitSetRunResult::Interrupt),
@@ -131,4 +135,9 @@ impl Server {
         self.peers_changed |= wake.peers_changed;
         Ok(wake)
     }
+}
+
+/// The whole milliseconds of a time.
+fn whole(time: Duration) -> Duration {
+    Duration::from_millis(u64::try_from(time.as_millis()).unwrap_or(u64::MAX))
 }
