@@ -73,15 +73,14 @@ impl Server {
     /// 250 Hz, and rounds it up, so that 100 beats a second were 70. A wait on a set of ports is for whole
     /// milliseconds; the rest is slept in slices.
     fn sleep_until(&mut self, until_ns: u64, clock: &dyn Clock) -> Result<Wake> {
-        let mut long = None;
         loop {
             self.listened_ns = clock.monotonic_ns();
             let left = Duration::from_nanos(until_ns.saturating_sub(self.listened_ns));
-            let long = *long.get_or_insert(left >= LONG);
             let mut interrupted = false;
-            if left >= SET_WAIT_MIN {
-                let part = if long { left } else { whole(left) };
-                interrupted = self.wait_on_set(part)?;
+            if left >= LONG {
+                interrupted = self.wait_on_set(left)?;
+            } else if left >= SET_WAIT_MIN {
+                interrupted = self.wait_on_set(whole(left))?;
             } else if !left.is_zero() {
                 #[allow(
                     clippy::disallowed_methods,
