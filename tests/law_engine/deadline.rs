@@ -1,11 +1,10 @@
 //! 4.5: a frame's own deadline shortens the time of its tick and never lengthens it; what ends late is flagged and
 //! counted. Each look at the clock takes a microsecond here, so that work takes time.
 
-use sweepd::math::Pose;
 use sweepd::time::{Budget, Clock};
 use sweepd::wire::{RejectReason, TickRow, Verdict, frame_flags};
 
-use crate::rig::{ALL, FRAME_NS, Rig, ball, scene};
+use crate::rig::{ALL, FRAME_NS, Rig, ball_pairs, put_pairs};
 
 const LOOK_NS: u64 = 1_000;
 const PAIRS: u64 = 400;
@@ -16,24 +15,17 @@ const APART: [f64; 2] = [1.5, 1.5];
 const SHORT_NS: u64 = 300_000;
 const LONG_NS: u64 = 1_000_000_000;
 
-/// Pairs of balls far from one another, all of them apart and decided.
+/// Pairs of balls, all of them apart and decided.
 fn pairs() -> Rig {
-    let balls: Vec<String> = (1..=2 * PAIRS)
-        .map(|id| ball(id, ((id - 1) / 2) as f64 * 10.0, ""))
-        .collect();
-    let mut rig = Rig::new(&scene("", &balls));
-    rig.checked = false;
+    let mut rig = ball_pairs(PAIRS);
     put(&mut rig, APART);
     rig.send(ALL);
     assert_eq!((rig.out.tick.candidates, rig.out.tick.possible), (PAIRS, 0));
     rig
 }
 
-fn put(rig: &mut Rig, [x, y]: [f64; 2]) {
-    for pair in 0..PAIRS {
-        let at = Pose::translation(pair as f64 * 10.0 + x, y, 0.0);
-        rig.place(2 * pair + 2, &at);
-    }
+fn put(rig: &mut Rig, place: [f64; 2]) {
+    put_pairs(rig, PAIRS, place);
 }
 
 /// All pairs move into one another: each is open again.

@@ -1,26 +1,18 @@
 //! 4.4: a tick that takes longer than a heartbeat is told of meanwhile, by a `tick` alone. Each look at the clock takes a
 //! millisecond here.
 
-use sweepd::math::Pose;
 use sweepd::time::{Budget, Clock};
 use sweepd::wire::{MessageHeader, Reason, RejectReason, State, WIRE_VERSION};
 
-use crate::rig::{ALL, Rig, ball, scene};
+use crate::rig::{ALL, Rig, ball_pairs, put_pairs};
 
 const LOOK_NS: u64 = 1_000_000;
 const HEARTBEAT_NS: u64 = 100_000_000;
 const PAIRS: u64 = 450;
 
 fn pairs() -> Rig {
-    let balls: Vec<String> = (1..=2 * PAIRS)
-        .map(|id| ball(id, ((id - 1) / 2) as f64 * 10.0, ""))
-        .collect();
-    let mut rig = Rig::new(&scene("", &balls));
-    rig.checked = false;
-    for pair in 0..PAIRS {
-        let at = Pose::translation(pair as f64 * 10.0 + 1.2, 1.2, 0.0);
-        rig.place(2 * pair + 2, &at);
-    }
+    let mut rig = ball_pairs(PAIRS);
+    put_pairs(&mut rig, PAIRS, [1.2, 1.2]);
     rig
 }
 

@@ -23,6 +23,8 @@ pub(crate) const NONE: Budget = Budget {
     units: Some(0),
 };
 
+const PAIRS_APART_M: f64 = 10.0;
+
 /// A scene: what stands before the source, and its bodies.
 pub(crate) fn scene(head: &str, bodies: &[String]) -> String {
     let mut text =
@@ -46,6 +48,24 @@ pub(crate) fn ball(id: u64, x: f64, more: &str) -> String {
         "{ type = \"sphere\", radius = 1.0 }",
         more,
     )
+}
+
+/// Two balls for each of `pairs` pairs far from one another, in the same place: b1 and b2, b3 and b4, ...
+pub(crate) fn ball_pairs(pairs: u64) -> Rig {
+    let balls: Vec<String> = (1..=2 * pairs)
+        .map(|id| ball(id, ((id - 1) / 2) as f64 * PAIRS_APART_M, ""))
+        .collect();
+    let mut rig = Rig::new(&scene("", &balls));
+    rig.checked = false;
+    rig
+}
+
+/// Puts the second ball of each pair where it is seen from the first.
+pub(crate) fn put_pairs(rig: &mut Rig, pairs: u64, [x, y]: [f64; 2]) {
+    for pair in 0..pairs {
+        let at = Pose::translation(pair as f64 * PAIRS_APART_M + x, y, 0.0);
+        rig.place(2 * pair + 2, &at);
+    }
 }
 
 pub(crate) fn rule(action: PairAction, a: &str, b: &str, report_within_m: Option<f64>) -> Edit {
