@@ -37,6 +37,11 @@ fn options(files: &Files, source: Option<&str>) -> ClientOptions {
     }
 }
 
+fn server(files: &Files, spin_ns: u64) -> Server {
+    let options = ServerOptions::new(files.place.clone(), 7);
+    Server::open(ServerOptions { spin_ns, ..options }).unwrap()
+}
+
 #[test]
 fn a_step_over_shared_memory_returns_the_result_of_its_frame_and_nothing_is_left_behind() {
     let files = Files::new();
@@ -267,11 +272,7 @@ fn a_waker_wakes_the_tick_thread_from_another_thread() {
 #[test]
 fn a_busy_poll_finds_frames_and_ends_at_its_time() {
     let files = Files::new();
-    let mut server = Server::open(ServerOptions {
-        spin_ns: u64::MAX,
-        ..ServerOptions::new(files.place.clone(), 7)
-    })
-    .unwrap();
+    let mut server = server(&files, u64::MAX);
     let clock = SystemClock;
     let before_ns = clock.monotonic_ns();
     assert!(!server.wait(20_000_000, &clock).unwrap().notified);
@@ -297,11 +298,7 @@ fn bug_a_wait_of_less_than_a_microsecond_ends() {
     let (ended, end) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
         let files = Files::new();
-        let mut server = Server::open(ServerOptions {
-            spin_ns: 0,
-            ..ServerOptions::new(files.place.clone(), 7)
-        })
-        .unwrap();
+        let mut server = server(&files, 0);
         let clock = SystemClock;
         let link = sweepd::transport::iceoryx::IoxLink::open(&files.place, &clock, u64::MAX);
         let mut link = link.unwrap();
@@ -319,11 +316,7 @@ fn bug_a_wait_of_less_than_a_microsecond_ends() {
 #[test]
 fn bug_a_wait_ends_at_its_time_and_not_at_the_next_tick_of_the_systems_timer() {
     let files = Files::new();
-    let mut server = Server::open(ServerOptions {
-        spin_ns: 0,
-        ..ServerOptions::new(files.place.clone(), 7)
-    })
-    .unwrap();
+    let mut server = server(&files, 0);
     let clock = SystemClock;
     while server.wait(0, &clock).unwrap() != sweepd::transport::Wake::default() {}
     // With 250 ticks a second each of these took 4 ms or more; the least says what the wait is meant to be, whatever
