@@ -249,7 +249,7 @@ impl Order {
         proxies: &P,
     ) -> Result<(), String> {
         let bodies = members.bounded();
-        let held = self.afresh.held.count();
+        let held = self.afresh.held.recount();
         if bodies.len() != self.len || held != self.hits {
             return Err(format!(
                 "{} bodies have lanes, {} boxes are in; {held} overlaps, {} counted",

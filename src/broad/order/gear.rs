@@ -202,6 +202,7 @@ mod tests {
         let (mut gear, mut on) = (Gear::default(), false);
         let wild = work(10_000, 900);
         assert!(run(&mut gear, &mut on, 40, &wild) >= 1);
+        assert_eq!(gear.cause, BroadCause::Spell);
         assert!(run(&mut gear, &mut on, 10_000, &wild) > 9_700);
         // It has calmed: a trial finds that out and stays.
         let calm = work(2_000, 60);
@@ -213,10 +214,14 @@ mod tests {
     fn candidates_that_take_twice_as_much_are_given_up_early() {
         let (mut gear, mut on) = (Gear::default(), false);
         let wild = work(10_000, 900);
-        assert_eq!(run(&mut gear, &mut on, 100, &wild), 88);
-        let left = SPELL_LONG - 88;
+        assert_eq!(run(&mut gear, &mut on, 12, &wild), 0);
+        assert_eq!(run(&mut gear, &mut on, 1, &wild), 1);
+        assert_eq!(gear.cause, BroadCause::Cost);
+        let left = SPELL_LONG - 1;
         assert_eq!(run(&mut gear, &mut on, left, &wild), left);
+        assert_eq!(gear.cause, BroadCause::Spell);
         assert_eq!(run(&mut gear, &mut on, 1, &wild), 0);
+        assert_eq!(gear.cause, BroadCause::Trial);
     }
 
     #[test]
@@ -227,7 +232,10 @@ mod tests {
         for _ in 0..CALM_TICKS {
             on = gear.choose(on, 10, 1000, 300);
         }
-        assert!(!on);
+        assert_eq!((on, gear.cause), (false, BroadCause::Calm));
+        gear.forced = Some(true);
+        assert!(gear.choose(on, 10, 1000, 300));
+        assert_eq!(gear.cause, BroadCause::Forced);
     }
 
     #[test]

@@ -122,7 +122,7 @@ impl Met {
     }
 
     /// How many there are, counted again.
-    pub(super) fn count(&self) -> usize {
+    pub(super) fn recount(&self) -> usize {
         let rows = self.hits.iter().flatten();
         rows.map(|row| row.count_ones() as usize).sum()
     }
