@@ -28,12 +28,13 @@ def run_cloud(room, seconds):
     room.until(lambda: ticks and pairs, "ticks and pairs")
     mover = room.python("peer_mover.py", BODIES, frames)
     room.until(lambda: mover.poll() is not None, "the mover's end", seconds=seconds + 60)
-    print(mover.stdout.read().strip())
-    return ticks, pairs, frames
+    said = mover.stdout.read().strip()
+    print(said)
+    return ticks, pairs, frames, float(said.rpartition(" ")[2])
 
 
 def check_cloud(room, seconds):
-    ticks, pairs, frames = run_cloud(room, seconds)
+    ticks, pairs, frames, late_ms = run_cloud(room, seconds)
     numbers = [tick[0] for tick in ticks]
     missing_ticks = numbers[-1] - numbers[0] + 1 - len(numbers)
     dropped = ticks[-1][4]
@@ -48,10 +49,12 @@ def check_cloud(room, seconds):
              for tick, parts in chunks.items() if len(parts) == parts[min(parts)][0]}  # fmt: skip
     print(f"{len(ticks)} ticks heard, {missing_ticks} not; {len(framed)} of {frames} frames made a tick, {told} did not, "
           f"{skipped} of them told as skipped; sends told as dropped {dropped}, undecodable {ticks[-1][5]}")  # fmt: skip
-    # on a machine without a core to spare the sender may fall behind: the newest wins, and what gave way is counted
     assert numbers == sorted(set(numbers)) and missing_ticks <= dropped, "a tick was repeated, or lost without a word"
     assert used == sorted(set(used)) and told <= skipped + missing_ticks, "each frame has one tick, or it is told that it has none"
-    assert len(framed) > 0.5 * frames and ticks[-1][5] == 0
+    assert ticks[-1][5] == 0
+    # where the sender fell behind and hurried after, the newest wins: what gave way is counted, above
+    least = (0.9 if late_ms < 50 else 0.5) * frames
+    assert len(framed) > least
     missing = [tick for tick, cause, *_ in framed if tick not in whole]
     assert len(missing) <= dropped, "a tick whose pairs did not come is counted as dropped"
     # the same frames over shared memory, by a daemon of its own
@@ -78,7 +81,7 @@ def check_cloud(room, seconds):
                 gap = math.dist(at[pair[0]], at[pair[1]]) - 1.0
                 wrong += any(low > gap + 1e-9 or high < gap - 1e-9 or high - low > 1e-6 for low, high in (near[pair], theirs[pair]))
     print(f"{compared} ticks compared with shared memory, {found} colliding pairs, {differences} ticks differ, {wrong} gaps are wrong")
-    assert differences == 0 and wrong == 0 and compared > 0.9 * frames and found > 10 * compared
+    assert differences == 0 and wrong == 0 and compared > least and found > 10 * compared
 
 
 def test_pairs_of_five_hundred_bodies_are_those_of_shared_memory(room):
@@ -254,5 +257,5 @@ def test_an_idle_node_is_small(room):
         time.sleep(3)
         shares.append((daemon.cpu_s() - before) / (time.monotonic() - start))
     print(f"idle: {[round(100 * share, 2) for share in shares]} % of a core, {daemon.memory_kb()} KiB resident")
-    # 0.7 to 1.1 % by machine and by what others on it do: the bound is for a node that is not idle
-    assert daemon.memory_kb() <= 40 * 1024 and min(shares) <= 0.02
+    # 0.7 to 0.9 % where nothing else runs; what other programs do to the caches is not the node's
+    assert daemon.memory_kb() <= 40 * 1024 and min(shares) <= 0.015
