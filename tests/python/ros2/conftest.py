@@ -7,6 +7,7 @@ Needs the environment of launch-free-scripts/ros2_env.sh and `SWEEPD=path/to/swe
 
 import ctypes
 import itertools
+import math
 import os
 import signal
 import subprocess
@@ -183,15 +184,22 @@ class Room:
             self._executor.spin_once(timeout_sec=0.005)
         return value
 
-    def call(self, kind, name, request=None, seconds=PATIENCE_S, node=None):
-        """Calls a service and returns its answer."""
+    def call(self, kind, name, request=None, seconds=PATIENCE_S, node=None, each_s=math.inf):
+        """Calls a service and returns its answer; asks anew each `each_s`, for a question that may be asked twice."""
         node = node or (self.nodes[0] if self.nodes else self.node())
         client = node.create_client(kind, name)
         self.until(client.service_is_ready, f"service {name}", seconds)
-        future = client.call_async(request or kind.Request())
-        self.until(future.done, f"an answer of {name}", seconds)
+        futures, asked = [], -math.inf
+
+        def ask():
+            nonlocal asked
+            if time.monotonic() - asked >= each_s or not futures:
+                asked = time.monotonic()
+                futures.append(client.call_async(request or kind.Request()))
+
+        answered = self.until(lambda: [f for f in futures if f.done()], f"an answer of {name}", seconds, then=ask)
         node.destroy_client(client)
-        return future.result()
+        return answered[0].result()
 
     def close(self):
         for client in self._clients:
