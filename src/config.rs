@@ -185,6 +185,9 @@ pub struct Config {
     pub late_ns: u64,
     /// The broad phase that the scene asks for; `None`: the plan chooses.
     pub broad_phase: Option<BroadMethod>,
+    /// Threads that a tick may work with, its own with them, 1 to `limits::THREADS_MAX`; `None`: two, where the machine
+    /// has them. Any number gives the same answers.
+    pub threads: Option<usize>,
     /// How pairs of surfaces are searched; `None`: the scene leaves it to the daemon, which carries certificates.
     pub mesh_search: Option<MeshSearch>,
     /// Beyond this reach a stale body makes no new pairs, metres.
@@ -227,6 +230,15 @@ impl Default for Limits {
     }
 }
 
+impl Config {
+    /// Threads that a tick may work with on this machine.
+    #[must_use]
+    pub fn threads_here(&self) -> usize {
+        let two = || std::thread::available_parallelism().map_or(1, |cores| cores.get().min(2));
+        self.threads.unwrap_or_else(two)
+    }
+}
+
 impl Default for Config {
     fn default() -> Self {
         Self {
@@ -235,6 +247,7 @@ impl Default for Config {
             heartbeat_ns: limits::HEARTBEAT_MS_DEFAULT * 1_000_000,
             late_ns: 5_000_000,
             broad_phase: None,
+            threads: None,
             mesh_search: None,
             stale_reach_m: 1.0,
             viewpoint: None,

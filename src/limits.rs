@@ -2,6 +2,11 @@
 //!
 //! Scene files can lower (some: raise) these in `[limits]`; the values here are the defaults and the hard ends.
 
+/// Threads that one tick works with at most: the broad phase of a large scene gains little by more.
+pub const THREADS_MAX: usize = 8;
+/// Comparisons of boxes in a tick's search from which on other threads are asked: about half a millisecond. To wake
+/// another thread and to wait for it takes up to 50 us.
+pub const SHARED_TESTS_MIN: u64 = 36_000;
 /// Sources a daemon can have, and so the source rows of a tick. iceoryx2 reserves a connection for each.
 pub const SOURCES_MAX: usize = 16;
 /// Bodies a scene may hold. Slots are u32 and a pair key is two of them; beyond a million the floor of a tick

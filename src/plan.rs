@@ -18,6 +18,9 @@ const BRUTE_FORCE_MAX: usize = 24;
 /// With hysteresis: brute force stays until the scene has grown beyond this.
 const BRUTE_FORCE_STAY_MAX: usize = 32;
 
+/// From so many boxes on a search may take long enough to be shared (`limits::SHARED_TESTS_MIN`).
+const SHARED_MIN: usize = 5_000;
+
 /// What was chosen for a part, and why.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Choice {
@@ -210,6 +213,7 @@ fn choices(facts: &Facts, method: Method, config: &Config) -> Vec<Choice> {
         chosen: chosen.to_owned(),
         why,
     }];
+    choices.extend(shared(facts, method, config));
     let narrow = if facts.shapes[1] > 0 {
         format!(
             "exact convex queries, walks over {} triangles",
@@ -268,6 +272,19 @@ fn choices(facts: &Facts, method: Method, config: &Config) -> Vec<Choice> {
         .to_owned(),
     });
     choices
+}
+
+/// Whether other threads help the broad phase.
+fn shared(facts: &Facts, method: Method, config: &Config) -> Option<Choice> {
+    let many = method == Method::Order && facts.boxes >= SHARED_MIN;
+    (many && config.threads != Some(1)).then(|| Choice {
+        part: "threads",
+        chosen: match config.threads {
+            Some(threads) => format!("{threads} at most"),
+            None => "two, where the machine has them".to_owned(),
+        },
+        why: "a search among many boxes is shared where it takes half a millisecond".to_owned(),
+    })
 }
 
 fn left_out(facts: &Facts, method: Method, world: &World) -> Vec<LeftOut> {

@@ -16,9 +16,14 @@ use std::fmt::Write as _;
 
 use harness::Drive;
 use oracle::meshes::{torus, trimesh};
+use sweepd::broad::{BroadPhase, Method, Proxies};
 use sweepd::builtin::{Pattern, pile, pool};
+use sweepd::ids::{BodyId, BodySlot};
+use sweepd::math::{Aabb, Point, Vec3};
+use sweepd::pairs::{PairDelta, PairPolicy, PairSet};
 use sweepd::time::Budget;
 use sweepd::wire::Demand;
+use sweepd::world::ChangeSet;
 
 /// Rounds of a motion of which one must come without an allocation: what the scene needs is there then.
 const ROUNDS: u64 = 12;
@@ -138,6 +143,67 @@ fn bending(count: u32) -> String {
 /// The same, with every body that moves swept.
 fn swept(scene: &str) -> String {
     scene.replace("moves = true\n", "moves = true\ncontinuous = true\n")
+}
+
+/// Boxes that go round in circles, some of them into others.
+struct Circling(Vec<Aabb>);
+
+impl Circling {
+    fn put(&mut self, tick: u32) {
+        for (at, aabb) in (0_u32..).zip(&mut self.0) {
+            let angle = f64::from(at) + f64::from(tick) * 0.05;
+            let from = [f64::from(at % 50), f64::from(at / 50 % 50), angle.sin()];
+            aabb.min = Point::from(from) + Vec3::new(angle.cos(), angle.sin(), 0.0);
+            aabb.max = aabb.min + Vec3::new(1.0, 1.0, 1.0);
+        }
+    }
+}
+
+impl Proxies for Circling {
+    fn aabb(&self, slot: BodySlot) -> &Aabb {
+        &self.0[slot.index()]
+    }
+    fn unbounded(&self, _: BodySlot) -> bool {
+        false
+    }
+    fn id(&self, slot: BodySlot) -> BodyId {
+        BodyId(u64::from(slot.0) + 1)
+    }
+}
+
+impl PairPolicy for Circling {
+    fn allows(&self, _: BodySlot, _: BodySlot) -> bool {
+        true
+    }
+}
+
+#[test]
+fn a_search_shared_by_threads_allocates_nothing_in_the_tick_thread_after_warm_up() {
+    let mut boxes = Circling(vec![Aabb::empty(); 3_000]);
+    let mut broad = BroadPhase::new(Method::Order);
+    broad.use_afresh(true);
+    broad.use_threads(3, 0);
+    let mut changes = ChangeSet::default();
+    let (mut pairs, mut delta) = (PairSet::new(1 << 20), PairDelta::default());
+    changes.inserted.extend((0..3_000).map(BodySlot));
+    let mut last = u64::MAX;
+    for round in 0..ROUNDS {
+        COUNT.with(|count| count.set(0));
+        for tick in 0..126 {
+            boxes.put(tick);
+            ARMED.with(|armed| armed.set(round > 0));
+            broad.update(&changes, &boxes, &boxes, &mut pairs, &mut delta);
+            ARMED.with(|armed| armed.set(false));
+            changes.clear();
+            changes.moved.extend((0..3_000).map(BodySlot));
+        }
+        last = COUNT.with(Cell::get);
+        if round > 0 && last == 0 {
+            break;
+        }
+    }
+    assert!(pairs.len() > 3_000);
+    assert_eq!(last, 0, "allocations in the last round");
 }
 
 #[test]

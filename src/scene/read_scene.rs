@@ -45,6 +45,7 @@ const RUN_KEYS: &[&str] = &[
     "late_ms",
     "stale_reach_m",
     "broad_phase",
+    "threads",
     "mesh_search",
 ];
 const LIMIT_KEYS: &[&str] = &[
@@ -295,6 +296,8 @@ fn read_run(
         config.stale_reach_m = reach_m;
     }
     config.broad_phase = read_named(&mut table, "broad_phase", BroadMethod::NAMED)?;
+    let threads = table.whole("threads", 1, limits::THREADS_MAX as u64)?;
+    config.threads = threads.and_then(|threads| usize::try_from(threads).ok());
     config.mesh_search = read_named(&mut table, "mesh_search", MeshSearch::NAMED)?;
     Ok(config)
 }

@@ -19,6 +19,7 @@ use crate::broad::{BroadPhase, Method};
 use crate::config::Config;
 use crate::error::Result;
 use crate::ids::SourceSlot;
+use crate::limits;
 use crate::narrow::{Narrow, Wanted};
 use crate::pairs::{PairDelta, PairSet};
 use crate::plan::Plan;
@@ -94,11 +95,15 @@ impl Engine {
     ) -> Result<Self> {
         let limits = scene.config.limits;
         let world = World::new(scene, shapes, clock.boottime_ns())?;
-        let plan = Plan::of(&world, &scene.config);
+        let config = Config {
+            threads: Some(scene.config.threads_here()),
+            ..scene.config.clone()
+        };
+        let plan = Plan::of(&world, &config);
         let mut narrow = Narrow::new(limits.contacts_per_pair);
         narrow.set_search(scene.config.mesh_search.unwrap_or_default());
         Ok(Self {
-            broad: BroadPhase::new(plan.method()),
+            broad: broad_phase(plan.method(), &config),
             method: plan.method(),
             renew: false,
             checked: 0,
@@ -113,7 +118,7 @@ impl Engine {
                 ..Outbox::default()
             },
             outcomes: Vec::new(),
-            config: scene.config.clone(),
+            config,
             floor: Floor::default(),
             rest: Rest::default(),
             tick: 0,
@@ -225,7 +230,7 @@ impl Engine {
         let anew = renew || self.method != method;
         if anew {
             self.method = method;
-            self.broad = BroadPhase::new(method);
+            self.broad = broad_phase(method, &self.config);
             self.whole.clear();
             let inside = world.bodies().filter(|(_, body)| body.in_broad);
             self.whole.inserted.extend(inside.map(|(slot, _)| slot));
@@ -354,4 +359,11 @@ fn place(source: Option<usize>) -> u8 {
     source
         .and_then(|source| u8::try_from(source).ok())
         .unwrap_or(u8::MAX)
+}
+
+/// A broad phase without bodies.
+fn broad_phase(method: Method, config: &Config) -> BroadPhase {
+    let mut broad = BroadPhase::new(method);
+    broad.use_threads(config.threads.unwrap_or(1), limits::SHARED_TESTS_MIN);
+    broad
 }

@@ -1,5 +1,5 @@
 //! Goal: every broad phase gives the exact pairs and events in every scene class of the bench, the main one with every
-//! set of vector instructions, through churn of everything, and in the two cases that once gave double pairs.
+//! set of vector instructions and with several threads, through churn of everything, and in the two cases that once gave double pairs.
 //!
 //! Method: the bench's scenes at 2,000 bodies; in each frame the pair set is compared with an exact set found another
 //! way (strips and a sweep), and the events with the difference of two such sets. 2,000 frames a scene in release, 60
@@ -52,6 +52,7 @@ fn run(kind: Kind, bodies: usize, frames: usize) {
     rigs.extend(others.map(|method| Rig::of(method, bodies, far)));
     rigs.push(Rig::geared("lasting", &[false], bodies, far));
     rigs.push(Rig::geared("from scratch", &[true], bodies, far));
+    rigs.extend([2, 3].map(|threads| Rig::shared(threads, bodies, far)));
     let gears = &[true, false, false, true, true, true, false];
     rigs.push(Rig::geared("shifting", gears, bodies, far));
     for rig in &mut rigs {
@@ -202,6 +203,7 @@ fn soak_for_twenty_minutes() {
 /// Bodies come up to `most` and go to none, each round moving in another way; every tick is exact.
 fn soak(ticks: usize, most: usize, seed: u64) {
     let mut rig = Rig::new(Level::best(), most, false);
+    rig.use_threads(2);
     let mut rng = Rng::new(seed);
     let reach = (most as f64 / 0.7).cbrt();
     let mut boxes = vec![at([0.0; 3], 0.5); most];

@@ -77,6 +77,13 @@ impl Rig {
         }
     }
 
+    /// The main method from scratch in each tick, by so many threads.
+    pub fn shared(threads: usize, bodies: usize, far: bool) -> Self {
+        let mut rig = Self::geared(&format!("{threads} threads"), &[true], bodies, far);
+        rig.use_threads(threads);
+        rig
+    }
+
     /// Any method.
     pub fn of(method: Method, bodies: usize, far: bool) -> Self {
         let mut rng = Rng::new(bodies as u64);
@@ -99,6 +106,11 @@ impl Rig {
             delta: PairDelta::default(),
             told: BTreeSet::new(),
         }
+    }
+
+    /// Lets threads share whatever they can.
+    pub fn use_threads(&mut self, threads: usize) {
+        self.broad.use_threads(threads, 0);
     }
 
     /// All bodies come.

@@ -28,5 +28,6 @@ mod schedule;
 mod search;
 mod shapes;
 mod state;
+mod threads;
 mod verdicts;
 mod vertices;

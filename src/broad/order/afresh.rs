@@ -15,7 +15,8 @@
 use super::gear::Gear;
 use super::lay::TakeLanes;
 use super::met::{Met, tell_all, tell_asked, tell_difference};
-use super::sweep::{Scratch, Sweep};
+use super::sweep::Finds;
+use super::team::Team;
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, Work as Done, parts};
 use crate::broad::members::{ASKED, CAME, Members};
 use crate::ids::PairKey;
@@ -45,12 +46,11 @@ pub(super) struct Afresh {
     pub(super) sorted: bool,
     /// Ticks left in which bodies are laid without a look.
     pub(super) spoilt: u32,
-    /// Overlaps of the last tick, and of this one.
+    /// Overlaps of the last tick, and what was found in this one.
     pub(super) held: Met,
-    pub(super) found: Met,
-    /// Ranks of boxes for which rounding leaves it open.
-    pub(super) open: Vec<[u32; 2]>,
-    pub(super) scratch: Scratch,
+    pub(super) finds: Finds,
+    /// Threads that search beside this one.
+    pub(super) team: Team,
     /// By block: lanes whose body has left since the last tick.
     pub(super) gone: Vec<u16>,
     /// By block: the space from which it is met, when it was laid; and the mean side of a block then.
@@ -101,26 +101,33 @@ impl Order {
             }
             self.lay_anew(tick);
         }
-        let tests = self.level.run(Sweep { order: self });
+        let Afresh { finds, team, .. } = &mut self.afresh;
+        let lanes = (&mut self.live, &mut self.fat, &mut self.tree);
+        team.search(self.level, lanes, finds);
+        let tests = finds.tests;
         work.tests += tests;
         self.ask_open(tick.proxies);
-        self.hits = self.afresh.found.hits();
-        let (records, blocks) = (self.afresh.found.len(), self.live.len());
-        for met in [&mut self.afresh.found, &mut self.afresh.held] {
-            met.spare_for(records, blocks);
-        }
+        let Afresh {
+            held,
+            finds,
+            team,
+            gone,
+            ..
+        } = &mut self.afresh;
+        self.hits = finds.met.hits();
+        let (records, blocks) = (finds.met.len(), self.live.len());
+        held.spare_for(records, blocks);
+        finds.spare();
+        team.reserve(blocks, self.len);
         if stays {
-            let Afresh {
-                held, found, gone, ..
-            } = &mut self.afresh;
             let lists = [&mut *tick.began, &mut *tick.parted];
-            tell_difference([&*held, &*found], gone, &self.slot_of, lists);
+            tell_difference([&*held, &finds.met], gone, &self.slot_of, lists);
         } else {
             self.afresh.usual = tests;
             self.tell_carried(tick);
         }
         self.afresh.gone.fill(0);
-        std::mem::swap(&mut self.afresh.held, &mut self.afresh.found);
+        std::mem::swap(&mut self.afresh.held, &mut self.afresh.finds.met);
         self.tell_asked_afresh(tick.members, tick.began);
     }
 
@@ -187,11 +194,11 @@ impl Order {
 
     /// Asks the f64 boxes of what rounding leaves open.
     fn ask_open<P: Proxies>(&mut self, proxies: &P) {
-        let Afresh { open, found, .. } = &mut self.afresh;
+        let Finds { open, met, .. } = &mut self.afresh.finds;
         for ranks in open.drain(..) {
             let [one, other] = ranks.map(|rank| BodySlot(self.slot_of[rank as usize]));
             if !proxies.aabb(one).overlaps(proxies.aabb(other)) {
-                found.take_out(ranks);
+                met.take_out(ranks);
             }
         }
     }
@@ -204,8 +211,8 @@ impl Order {
 
     /// After the bodies were laid anew: of the overlaps found those that are new, of those remembered the others.
     fn tell_carried<P>(&mut self, tick: &mut Tick<'_, P>) {
-        let Afresh { held, found, .. } = &mut self.afresh;
-        held.clone_from(found);
+        let Afresh { held, finds, .. } = &mut self.afresh;
+        held.clone_from(&finds.met);
         for at in 0..self.carried.len() {
             if let Some(ahead) = self.carried.get(at + AHEAD) {
                 prefetch(&self.rank_of[ahead.0 as usize]);

@@ -3,7 +3,7 @@
 //! In: every box. Out: lanes, the tree over their blocks, and how much more of space the blocks take than they did.
 
 use super::afresh::{Afresh, FRAME_TICKS};
-use super::links::{room, spare};
+use super::links::spare;
 use super::place::{ATTIC, grow, middle};
 use super::sort::{FILL, Sorter};
 use super::tree::NO_BOUND;
@@ -64,16 +64,10 @@ impl Order {
         self.level.run(BoundAll { order: self });
         let blocks = self.live.len();
         self.measure();
-        let Afresh {
-            gone,
-            scratch,
-            open,
-            ..
-        } = &mut self.afresh;
+        let Afresh { gone, finds, .. } = &mut self.afresh;
         gone.clear();
         gone.resize(blocks, 0);
-        scratch.reserve(blocks);
-        room(open, bodies.len());
+        finds.reserve(blocks, bodies.len());
         spare(&mut self.carried, self.hits, bodies.len());
     }
 

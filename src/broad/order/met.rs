@@ -54,13 +54,23 @@ impl Met {
         spare(&mut self.hits, records, blocks);
     }
 
+    /// Puts the records of the blocks that follow behind its own.
+    pub(super) fn append(&mut self, next: &Self) {
+        let before = small(self.len());
+        self.firsts.pop();
+        self.firsts.extend(next.firsts.iter().map(|at| at + before));
+        self.others.extend_from_slice(&next.others);
+        self.hits.extend_from_slice(&next.hits);
+        self.count += next.count;
+    }
+
     /// Records.
     pub(super) fn len(&self) -> usize {
         self.others.len()
     }
 
     /// Blocks.
-    fn blocks(&self) -> usize {
+    pub(super) fn blocks(&self) -> usize {
         self.firsts.len().saturating_sub(1)
     }
 

@@ -16,6 +16,7 @@
 //! * **Exact.** Boxes are f32, rounded outward, relative to an f64 origin amid the scene; where rounding could tell
 //!   otherwise than the f64 boxes, those are asked. So the pairs are those of the f64 boxes at any offset.
 //! * **Without candidates** (`afresh`, `sweep`, `met`): where no fat box lasts, nothing is kept but lanes and overlaps.
+//! * **Threads** (`team`): a search without candidates among many boxes is shared; the same bits for any number.
 //! * **Modes** (few or many moved; renewal, sorting anew, without candidates) are chosen by counted work with weights
 //!   that were measured once, so that a replay chooses alike. They decide about cost alone: pairs, slots and events are
 //!   the same.
@@ -48,6 +49,7 @@ mod place;
 mod renew;
 mod sort;
 mod sweep;
+mod team;
 mod tree;
 mod validate;
 
@@ -274,6 +276,11 @@ impl Order {
     /// Sets whether every tick is worked without candidates, or none; `None`: as counted work says.
     pub(super) fn use_afresh(&mut self, afresh: Option<bool>) {
         self.afresh.gear.forced = afresh;
+    }
+
+    /// Sets how many threads search without candidates at most, and from how many comparisons in a tick on.
+    pub(super) fn use_threads(&mut self, most: usize, least: u64) {
+        self.afresh.team.set(most, least);
     }
 
     /// Reports every overlap of bodies whose pairs must be looked for, whatever moved.

@@ -7,10 +7,12 @@
 //! come near which block, how many they are and what they meet cannot be guessed: with a loop a pair of blocks, a
 //! branch guessed wrong took longer than the comparisons.
 
-use super::Order;
+use std::ops::Range;
+
 use super::links::{Matrix, room, small};
 use super::met::Met;
-use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch, slack};
+use super::tree::{Tree, Walk};
+use crate::simd::boxes::{Boxes16, Lanes, WIDTH, Work, prefetch, slack};
 
 /// Blocks near one that are worked on together: what the passes hand on stays in the first cache.
 const TOGETHER: usize = 64;
@@ -33,11 +35,54 @@ struct Hit {
     met: u16,
 }
 
+/// Where the boxes stand: what a search reads.
+#[derive(Clone, Copy)]
+pub(super) struct Field<'a> {
+    /// By block: lanes in use.
+    pub(super) live: &'a [u16],
+    /// By block: the boxes.
+    pub(super) fat: &'a [Boxes16],
+    pub(super) tree: &'a Tree,
+}
+
+/// What a search found, and its memory.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Finds {
+    /// The overlaps, of the searched blocks alone.
+    pub(super) met: Met,
+    /// Ranks of boxes for which rounding leaves it open.
+    pub(super) open: Vec<[u32; 2]>,
+    /// How many boxes were compared with a block.
+    pub(super) tests: u64,
+    scratch: Scratch,
+}
+
+impl Finds {
+    /// Room for a search among so many blocks and bodies.
+    pub(super) fn reserve(&mut self, blocks: usize, bodies: usize) {
+        self.scratch.reserve(blocks);
+        room(&mut self.open, bodies);
+    }
+
+    /// Room for more than it holds.
+    pub(super) fn spare(&mut self) {
+        let (records, blocks) = (self.met.len(), self.met.blocks());
+        self.met.spare_for(records, blocks);
+    }
+
+    /// Puts what was found among the blocks that follow behind.
+    pub(super) fn append(&mut self, next: &Self) {
+        self.met.append(&next.met);
+        self.open.extend_from_slice(&next.open);
+        self.tests += next.tests;
+    }
+}
+
 /// What the passes hand on, kept over calls.
 #[derive(Clone, Debug)]
-pub(super) struct Scratch {
-    /// Lowest nodes with blocks near one, and which; and those blocks.
-    children: Vec<(u32, u16)>,
+struct Scratch {
+    walk: Walk,
+    /// Blocks near one.
     near: Vec<u32>,
     /// One more than there can be, which the last step reads.
     sides: [Side; TOGETHER + 1],
@@ -49,7 +94,7 @@ pub(super) struct Scratch {
 impl Default for Scratch {
     fn default() -> Self {
         Self {
-            children: Vec::new(),
+            walk: Walk::default(),
             near: Vec::new(),
             sides: [Side::default(); TOGETHER + 1],
             hits: Vec::new(),
@@ -60,55 +105,63 @@ impl Default for Scratch {
 
 impl Scratch {
     /// Room for a block that is near every other.
-    pub(super) fn reserve(&mut self, blocks: usize) {
-        room(&mut self.children, blocks / WIDTH + 1);
+    fn reserve(&mut self, blocks: usize) {
+        self.walk.reserve(blocks);
         room(&mut self.near, blocks);
         self.hits.resize(TOGETHER * WIDTH + 1, Hit::default());
     }
 }
 
-/// Finds the overlaps of what stands in the lanes; returns how many boxes were compared with a block.
+/// Finds the overlaps of some blocks with themselves and with every block behind them.
 pub(super) struct Sweep<'a> {
-    pub(super) order: &'a mut Order,
+    pub(super) field: Field<'a>,
+    /// From a multiple of `WIDTH` on.
+    pub(super) blocks: Range<usize>,
+    pub(super) finds: &'a mut Finds,
 }
 
 impl Work for Sweep<'_> {
-    type Out = u64;
+    type Out = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) -> u64 {
-        let order = self.order;
-        let mut scratch = std::mem::take(&mut order.afresh.scratch);
-        let mut open = std::mem::take(&mut order.afresh.open);
-        let mut met = std::mem::take(&mut order.afresh.found);
+    fn run<L: Lanes>(self, lanes: L) {
+        let (field, finds) = (self.field, self.finds);
+        // Out of what is behind a reference, and back: the compiler keeps the ends of the lists in registers.
+        let mut scratch = std::mem::take(&mut finds.scratch);
+        let mut open = std::mem::take(&mut finds.open);
+        let mut met = std::mem::take(&mut finds.met);
         met.clear();
+        open.clear();
         let mut tests = 0;
-        for block in 0..order.live.len() {
+        for block in self.blocks {
             met.open_block();
             if block.is_multiple_of(WIDTH) {
-                order.tree.query_nodes(lanes, block / WIDTH);
+                let walk = &mut scratch.walk;
+                field.tree.query_nodes(lanes, block / WIDTH, walk);
             }
-            if order.live[block] == 0 {
+            if field.live[block] == 0 {
                 continue;
             }
             let mut near = std::mem::take(&mut scratch.near);
-            let children = &mut scratch.children;
-            (order.tree).query_among(lanes, small(block), children, &mut near);
+            let walk = &mut scratch.walk;
+            (field.tree).query_among(lanes, small(block), walk, &mut near);
             tests += near.len() as u64;
             for some in near.chunks(TOGETHER) {
-                let (sides, boxes) = scratch.sift(lanes, order, block, some);
-                let hits = scratch.compare(lanes, order, boxes);
-                met.add(scratch.enter(lanes, order, (block, sides), hits, &mut open));
+                let (sides, boxes) = scratch.sift(lanes, field, block, some);
+                let hits = scratch.compare(lanes, field, boxes);
+                met.add(scratch.enter(lanes, field, (block, sides), hits, &mut open));
                 scratch.record(block, sides, &mut met);
                 tests += boxes as u64;
             }
             scratch.near = near;
         }
         met.open_block();
-        order.afresh.scratch = scratch;
-        order.afresh.open = open;
-        order.afresh.found = met;
-        tests
+        *finds = Finds {
+            met,
+            open,
+            tests,
+            scratch,
+        };
     }
 }
 
@@ -119,18 +172,18 @@ impl Scratch {
     fn sift<L: Lanes>(
         &mut self,
         lanes: L,
-        order: &Order,
+        field: Field<'_>,
         block: usize,
         near: &[u32],
     ) -> (usize, usize) {
-        let (mine, bound) = (&order.fat[block], order.tree.bound(block));
+        let (mine, bound) = (&field.fat[block], field.tree.bound(block));
         let (mut kept, mut boxes) = (0, 0);
         for (at, other) in near.iter().enumerate() {
             if let Some(next) = near.get(at + AHEAD) {
-                prefetch(&order.fat[*next as usize]);
+                prefetch(&field.fat[*next as usize]);
             }
-            let rows = lanes.meets(mine, order.tree.bound(*other as usize));
-            let columns = lanes.meets(&order.fat[*other as usize], bound);
+            let rows = lanes.meets(mine, field.tree.bound(*other as usize));
+            let columns = lanes.meets(&field.fat[*other as usize], bound);
             let (few, many) = (rows.count_ones(), columns.count_ones());
             let rows_are_fewer = few <= many;
             let (block, other) = (small(block), *other);
@@ -156,12 +209,12 @@ impl Scratch {
 
     /// Compares each box of the sides with the block that it is near; returns how many met any.
     #[inline(always)]
-    fn compare<L: Lanes>(&mut self, lanes: L, order: &Order, boxes: usize) -> usize {
+    fn compare<L: Lanes>(&mut self, lanes: L, field: Field<'_>, boxes: usize) -> usize {
         let (mut at, mut left, mut kept) = (0, self.sides[0].lanes, 0);
         for _ in 0..boxes {
             let side = &self.sides[at];
             let lane = left.trailing_zeros();
-            let one = order.fat[side.block as usize].get(lane as usize);
+            let one = field.fat[side.block as usize].get(lane as usize);
             // Within a block each pair once, and none of a body with itself.
             let within = side.block == side.against;
             let among = if within {
@@ -169,7 +222,7 @@ impl Scratch {
             } else {
                 u16::MAX
             };
-            let met = lanes.meets(&order.fat[side.against as usize], &one) & among;
+            let met = lanes.meets(&field.fat[side.against as usize], &one) & among;
             #[allow(clippy::cast_possible_truncation, reason = "below 16, below TOGETHER")]
             let hit = Hit {
                 side: at as u16,
@@ -194,7 +247,7 @@ impl Scratch {
     fn enter<L: Lanes>(
         &mut self,
         lanes: L,
-        order: &Order,
+        field: Field<'_>,
         (block, sides): (usize, usize),
         hits: usize,
         open: &mut Vec<[u32; 2]>,
@@ -218,10 +271,10 @@ impl Scratch {
                 *line |= if rows & (1 << row) != 0 { columns } else { 0 };
             }
             // Drawn in by its slack: what meets that surely overlaps it, as `Lanes::parts` tells.
-            let by = slack(farthest(order.tree.bound(one)));
-            let [x, y, z, u, v, w] = order.fat[one].get(usize::from(hit.lane));
+            let by = slack(farthest(field.tree.bound(one)));
+            let [x, y, z, u, v, w] = field.fat[one].get(usize::from(hit.lane));
             let less = [x + by, y + by, z + by, u - by, v - by, w - by];
-            let mut doubt = hit.met & !lanes.meets(&order.fat[other], &less);
+            let mut doubt = hit.met & !lanes.meets(&field.fat[other], &less);
             while doubt != 0 {
                 let theirs = other * WIDTH + doubt.trailing_zeros() as usize;
                 open.push([one * WIDTH + usize::from(hit.lane), theirs].map(small));

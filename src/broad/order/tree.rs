@@ -1,6 +1,7 @@
 //! The implicit tree over blocks: each node holds the bounds of its sixteen children, the lowest nodes those of
 //! sixteen blocks. No pointers: child `i` of node `n` is node `16 n + i` one level down.
 
+use super::links::room;
 use crate::simd::boxes::{Boxes16, LANES, Lanes, Portable, WIDTH};
 
 const _: () = assert!(WIDTH == 1 << 4, "a level is four bits of a block's number");
@@ -24,10 +25,29 @@ pub(super) struct Tree {
     height: usize,
     /// Nodes of the level at hand whose bounds have changed, ascending.
     dirty: Vec<u32>,
-    /// Nodes still to be looked at in a query: level, node.
+    /// Of the queries of [`Tree::query`].
+    walk: Walk,
+}
+
+/// Memory of the queries of one thread.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Walk {
+    /// Nodes still to be looked at: level, node.
     stack: Vec<(u8, u32)>,
     /// Lowest nodes that the blocks of a lowest node may meet.
     nodes: Vec<u32>,
+    /// ... and those of them with blocks near one, and which.
+    children: Vec<(u32, u16)>,
+}
+
+impl Walk {
+    /// Room for a query that descends into every node above so many blocks.
+    pub(super) fn reserve(&mut self, blocks: usize) {
+        let nodes = blocks / WIDTH + WIDTH * LEVELS_MAX;
+        room(&mut self.stack, nodes);
+        room(&mut self.nodes, nodes);
+        room(&mut self.children, nodes);
+    }
 }
 
 impl Tree {
@@ -72,10 +92,9 @@ impl Tree {
 
     /// Room for a query that descends into every node.
     pub(super) fn reserve(&mut self) {
-        let nodes = self.bounds.len() / WIDTH + WIDTH * LEVELS_MAX;
-        self.stack.reserve(nodes.saturating_sub(self.stack.len()));
-        self.dirty.reserve(nodes.saturating_sub(self.dirty.len()));
-        self.nodes.reserve(nodes.saturating_sub(self.nodes.len()));
+        let blocks = self.bounds.len();
+        self.walk.reserve(blocks);
+        room(&mut self.dirty, blocks / WIDTH + WIDTH * LEVELS_MAX);
     }
 
     /// The bound of a block.
@@ -127,26 +146,29 @@ impl Tree {
     /// Appends the blocks whose bound meets a box.
     #[inline(always)]
     pub(super) fn query<L: Lanes>(&mut self, lanes: L, one: &[f32; 6], found: &mut Vec<u32>) {
-        self.query_from(lanes, one, 0, 0, found);
+        let mut stack = std::mem::take(&mut self.walk.stack);
+        self.query_from(lanes, one, 0, 0, (&mut stack, found));
+        self.walk.stack = stack;
     }
 
     /// As [`Tree::query`], in ascending order.
     ///
     /// * `floor` - the level of the nodes that are looked for: 0 for blocks, 1 for the lowest nodes, below the root.
     /// * `first` - none before this one.
+    /// * `stack`, `found` - memory kept over calls, and what is appended to.
     #[inline(always)]
     fn query_from<L: Lanes>(
-        &mut self,
+        &self,
         lanes: L,
         one: &[f32; 6],
         floor: u8,
         first: u32,
-        found: &mut Vec<u32>,
+        (stack, found): (&mut Vec<(u8, u32)>, &mut Vec<u32>),
     ) {
-        self.stack.clear();
+        stack.clear();
         #[allow(clippy::cast_possible_truncation, reason = "at most LEVELS_MAX levels")]
-        self.stack.push(((self.height - 1) as u8, 0));
-        while let Some((level, node)) = self.stack.pop() {
+        stack.push(((self.height - 1) as u8, 0));
+        while let Some((level, node)) = stack.pop() {
             let mut hits = lanes.meets(&self.levels[usize::from(level)][node as usize], one);
             // Children that hold none but earlier blocks.
             let early = (first >> (4 * u32::from(level - floor))).saturating_sub(node * LANES);
@@ -161,7 +183,7 @@ impl Tree {
             while hits != 0 {
                 let child = u16::BITS - 1 - hits.leading_zeros();
                 hits ^= 1 << child;
-                self.stack.push((level - 1, node * LANES + child));
+                stack.push((level - 1, node * LANES + child));
             }
         }
     }
@@ -169,8 +191,8 @@ impl Tree {
     /// Notes the lowest nodes from one on that it meets, for [`Tree::query_among`] of its blocks: a walk down the tree
     /// that sixteen blocks share.
     #[inline(always)]
-    pub(super) fn query_nodes<L: Lanes>(&mut self, lanes: L, node: usize) {
-        let mut nodes = std::mem::take(&mut self.nodes);
+    pub(super) fn query_nodes<L: Lanes>(&self, lanes: L, node: usize, walk: &mut Walk) {
+        let Walk { stack, nodes, .. } = walk;
         nodes.clear();
         if self.height > 1 {
             let bound = self.levels[1][node / WIDTH].get(node % WIDTH);
@@ -178,30 +200,30 @@ impl Tree {
                 clippy::cast_possible_truncation,
                 reason = "a node of at most 2^20 / 16"
             )]
-            self.query_from(lanes, &bound, 1, node as u32, &mut nodes);
+            self.query_from(lanes, &bound, 1, node as u32, (stack, nodes));
         } else {
             nodes.push(0);
         }
-        self.nodes = nodes;
     }
 
     /// The blocks whose bound meets that of a block of the node noted last, from the block on, ascending.
-    ///
-    /// * `children` - memory kept over calls: lowest nodes, and which of their blocks.
     #[inline(always)]
     pub(super) fn query_among<L: Lanes>(
         &self,
         lanes: L,
         block: u32,
-        children: &mut Vec<(u32, u16)>,
+        walk: &mut Walk,
         found: &mut Vec<u32>,
     ) {
         let bound = &self.bounds[block as usize];
+        let Walk {
+            nodes, children, ..
+        } = walk;
         // How many blocks a node has near is a guess that fails: it is neither in this loop nor in the next.
         children.clear();
-        children.resize(self.nodes.len() + 1, (0, 0));
+        children.resize(nodes.len() + 1, (0, 0));
         let (mut kept, mut blocks) = (0, 0);
-        for node in &self.nodes {
+        for node in nodes.iter() {
             let early = block.saturating_sub(node * LANES);
             let after = u16::MAX.checked_shl(early).unwrap_or(0);
             let hits = lanes.meets(&self.levels[0][*node as usize], bound) & after;

@@ -1,0 +1,396 @@
+//! Threads that search beside the tick's own, where the work is worth it.
+//!
+//! In: boxes in their lanes, the tree over the blocks. Out: the overlaps in the order of blocks, the same bits for any
+//! number of threads.
+//!
+//! How: each thread searches a run of blocks, and the runs' overlaps are put one behind the other. The runs are of
+//! equal work by what the last tick's runs took; where they end changes nothing but the time. What is read is lent to
+//! the others by moving it into a shared place for the while (three pointers), so nothing is copied and no thread sees
+//! it while it is written. The channels keep their room: a search allocates nothing.
+//!
+//! A thread that cannot be started, or that died, is done without: its run is searched by the tick's own.
+
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+use super::sweep::{Field, Finds, Sweep};
+use super::tree::Tree;
+use crate::limits::THREADS_MAX;
+use crate::simd::boxes::{Boxes16, Level, WIDTH};
+
+/// What is searched, while it is lent.
+#[derive(Debug, Default)]
+struct Lent {
+    live: Vec<u16>,
+    fat: Vec<Boxes16>,
+    tree: Tree,
+}
+
+impl Lent {
+    fn field(&self) -> Field<'_> {
+        Field {
+            live: &self.live,
+            fat: &self.fat,
+            tree: &self.tree,
+        }
+    }
+}
+
+/// What is lent, where its owner keeps it.
+type Own<'a> = (&'a mut Vec<u16>, &'a mut Vec<Boxes16>, &'a mut Tree);
+
+/// A run of blocks to be searched.
+#[derive(Debug)]
+struct Job {
+    lent: Arc<Lent>,
+    level: Level,
+    blocks: Range<usize>,
+    finds: Finds,
+}
+
+/// Another thread.
+#[derive(Debug)]
+struct Mate {
+    jobs: SyncSender<Job>,
+    done: Receiver<Finds>,
+    /// Its memory, while it has no job; and whether it has one.
+    finds: Finds,
+    busy: bool,
+}
+
+impl Mate {
+    /// `None` when the system gives no thread.
+    fn start() -> Option<Self> {
+        let (jobs, todo) = sync_channel::<Job>(1);
+        let (tell, done) = sync_channel(1);
+        let work = move || {
+            while let Ok(job) = todo.recv() {
+                let Job {
+                    lent,
+                    level,
+                    blocks,
+                    mut finds,
+                } = job;
+                level.run(Sweep {
+                    field: lent.field(),
+                    blocks,
+                    finds: &mut finds,
+                });
+                // Given back before it is told: the owner takes it as its own again.
+                drop(lent);
+                if tell.send(finds).is_err() {
+                    return;
+                }
+            }
+        };
+        let thread = std::thread::Builder::new().name("sweepd-search".to_owned());
+        if let Err(error) = thread.spawn(work) {
+            tracing::warn!("no thread for the broad phase, which goes on with fewer: {error}");
+            return None;
+        }
+        Some(Self {
+            jobs,
+            done,
+            finds: Finds::default(),
+            busy: false,
+        })
+    }
+}
+
+/// The other threads, and how the blocks are dealt to all.
+#[derive(Debug)]
+pub(super) struct Team {
+    /// Threads at most, the tick's own with them.
+    most: usize,
+    /// Boxes compared with a block in a tick from which on others are asked.
+    least: u64,
+    mates: Vec<Mate>,
+    lent: Arc<Lent>,
+    /// Where the runs of the last tick ended, and what they took.
+    ends: Vec<usize>,
+    took: Vec<u64>,
+}
+
+impl Default for Team {
+    /// The tick's own thread alone.
+    fn default() -> Self {
+        Self {
+            most: 1,
+            least: 0,
+            mates: Vec::new(),
+            lent: Arc::default(),
+            ends: Vec::new(),
+            took: Vec::new(),
+        }
+    }
+}
+
+impl Clone for Team {
+    /// As many threads, of its own.
+    fn clone(&self) -> Self {
+        Self {
+            most: self.most,
+            least: self.least,
+            ..Self::default()
+        }
+    }
+}
+
+impl Team {
+    /// Sets how many threads there are at most, and from how much work on they are used.
+    pub(super) fn set(&mut self, most: usize, least: u64) {
+        (self.most, self.least) = (most.clamp(1, THREADS_MAX), least);
+        self.mates.truncate(self.most - 1);
+    }
+
+    /// Room for another search among so many blocks and bodies.
+    pub(super) fn reserve(&mut self, blocks: usize, bodies: usize) {
+        for mate in &mut self.mates {
+            mate.finds.reserve(blocks, bodies);
+            mate.finds.spare();
+        }
+    }
+
+    /// Finds the overlaps of all blocks.
+    pub(super) fn search(&mut self, level: Level, (live, fat, tree): Own<'_>, finds: &mut Finds) {
+        let blocks = live.len();
+        let threads = if finds.tests >= self.least {
+            self.gather()
+        } else {
+            1
+        };
+        if threads == 1 {
+            let field = Field { live, fat, tree };
+            level.run(Sweep {
+                field,
+                blocks: 0..blocks,
+                finds,
+            });
+            return;
+        }
+        self.deal(blocks, threads);
+        self.lend((live, fat, tree));
+        for (at, mate) in self.mates.iter_mut().enumerate() {
+            mate.finds.reserve(blocks, 0);
+            let job = Job {
+                lent: Arc::clone(&self.lent),
+                level,
+                blocks: self.ends[at]..self.ends[at + 1],
+                finds: std::mem::take(&mut mate.finds),
+            };
+            mate.busy = mate.jobs.send(job).is_ok();
+        }
+        let field = self.lent.field();
+        level.run(Sweep {
+            field,
+            blocks: 0..self.ends[0],
+            finds,
+        });
+        self.took.clear();
+        self.took.push(finds.tests);
+        for (at, mate) in self.mates.iter_mut().enumerate() {
+            let told = if mate.busy {
+                mate.done.recv().ok()
+            } else {
+                None
+            };
+            mate.busy = told.is_some();
+            mate.finds = told.unwrap_or_default();
+            if !mate.busy {
+                mate.finds.reserve(blocks, 0);
+                level.run(Sweep {
+                    field: self.lent.field(),
+                    blocks: self.ends[at]..self.ends[at + 1],
+                    finds: &mut mate.finds,
+                });
+            }
+            self.took.push(mate.finds.tests);
+            finds.append(&mate.finds);
+        }
+        self.mates.retain(|mate| mate.busy);
+        self.take_back((live, fat, tree));
+    }
+
+    /// Starts the threads that are missing; returns how many there are, with the tick's own.
+    fn gather(&mut self) -> usize {
+        while self.mates.len() + 1 < self.most {
+            let Some(mate) = Mate::start() else {
+                self.most = self.mates.len() + 1;
+                break;
+            };
+            self.mates.push(mate);
+        }
+        self.mates.len() + 1
+    }
+
+    /// Deals runs of blocks, of equal work where it is known how much the last ones took.
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        clippy::cast_sign_loss,
+        reason = "a share of the blocks of a run; where runs end changes no result"
+    )]
+    fn deal(&mut self, blocks: usize, threads: usize) {
+        let known = self.took.len() == threads && self.ends.last() == Some(&blocks);
+        if !known {
+            self.ends.clear();
+            self.ends
+                .extend((1..=threads).map(|run| blocks * run / threads));
+            self.took.clear();
+            self.took.resize(threads, 1);
+        }
+        let all: u64 = self.took.iter().sum();
+        let mut ends = [blocks; THREADS_MAX];
+        for (end, run) in ends[..threads - 1].iter_mut().zip(1..) {
+            // The block before which the share of the work lies; it is even within a run.
+            let (mut left, mut from) = (all * run / threads as u64, 0);
+            for (to, took) in self.ends.iter().zip(&self.took) {
+                if left <= *took {
+                    let share = left as f64 / (*took).max(1) as f64;
+                    from += ((to - from) as f64 * share) as usize;
+                    break;
+                }
+                (left, from) = (left - took, *to);
+            }
+            *end = from / WIDTH * WIDTH;
+        }
+        self.ends.copy_from_slice(&ends[..threads]);
+    }
+
+    /// Exchanges what is lent with what is the owner's.
+    fn exchange(lent: &mut Lent, (live, fat, tree): Own<'_>) {
+        std::mem::swap(&mut lent.live, live);
+        std::mem::swap(&mut lent.fat, fat);
+        std::mem::swap(&mut lent.tree, tree);
+    }
+
+    fn lend(&mut self, own: Own<'_>) {
+        if Arc::get_mut(&mut self.lent).is_none() {
+            self.lent = Arc::default();
+        }
+        if let Some(lent) = Arc::get_mut(&mut self.lent) {
+            Self::exchange(lent, own);
+        }
+    }
+
+    fn take_back(&mut self, own: Own<'_>) {
+        if let Some(lent) = Arc::get_mut(&mut self.lent) {
+            Self::exchange(lent, own);
+            return;
+        }
+        // A thread died and has not let go yet: that is left to it, and the owner gets a copy.
+        let Lent { live, fat, tree } = &*self.lent;
+        (*own.0, *own.1, *own.2) = (live.clone(), fat.clone(), tree.clone());
+        self.lent = Arc::default();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BLOCKS: usize = 100;
+
+    /// Blocks of boxes along a line, each meeting some that follow, the first of them many; every seventh is empty.
+    fn stand() -> (Vec<u16>, Vec<Boxes16>, Tree) {
+        let (mut live, mut fat, mut tree) = (vec![0; BLOCKS], Vec::new(), Tree::default());
+        fat.resize(BLOCKS, Boxes16::EMPTY);
+        tree.reset(BLOCKS);
+        for block in (0..BLOCKS).filter(|block| block % 7 != 3) {
+            live[block] = u16::MAX;
+            for lane in 0..WIDTH {
+                let place = u16::try_from(block * 13 + lane * lane % 29).unwrap();
+                let wide = if block < 30 { 20.0 } else { 2.0 };
+                let (low, size) = (f32::from(place), f32::from(place % 5 + 1) * wide);
+                fat[block].set(lane, &[low, 0.0, 0.0, low + size, 1.0, 1.0]);
+            }
+        }
+        let level = Level::Portable;
+        level.run(Bound {
+            fat: &fat,
+            tree: &mut tree,
+        });
+        (live, fat, tree)
+    }
+
+    struct Bound<'a> {
+        fat: &'a [Boxes16],
+        tree: &'a mut Tree,
+    }
+
+    impl crate::simd::boxes::Work for Bound<'_> {
+        type Out = ();
+
+        fn run<L: crate::simd::boxes::Lanes>(self, lanes: L) {
+            for (block, boxes) in self.fat.iter().enumerate() {
+                self.tree.set(block, lanes.bound(boxes, u16::MAX));
+            }
+            self.tree.refit(lanes);
+        }
+    }
+
+    /// Everything that a search finds, in words.
+    fn search(team: &mut Team, stand: &mut (Vec<u16>, Vec<Boxes16>, Tree)) -> String {
+        let mut finds = Finds::default();
+        finds.reserve(BLOCKS, BLOCKS * WIDTH);
+        let before = stand.0.clone();
+        let own = (&mut stand.0, &mut stand.1, &mut stand.2);
+        team.search(Level::best(), own, &mut finds);
+        assert_eq!(stand.0, before, "what was lent is back");
+        assert!(finds.met.hits() > 1_000 && finds.met.recount() == finds.met.hits());
+        format!("{:?} {:?} {}", finds.met, finds.open, finds.tests)
+    }
+
+    #[test]
+    fn any_number_of_threads_finds_the_same_in_the_same_order() {
+        let mut stand = stand();
+        let alone = search(&mut Team::default(), &mut stand);
+        for threads in 2..=THREADS_MAX {
+            let mut team = Team::default();
+            team.set(threads, 0);
+            // The runs end elsewhere once it is known what they take.
+            let first: Vec<_> = (0..2)
+                .map(|_| {
+                    assert_eq!(search(&mut team, &mut stand), alone, "{threads} threads");
+                    team.ends.clone()
+                })
+                .collect();
+            assert_eq!(team.mates.len(), threads - 1);
+            assert_ne!(first[0], first[1], "{threads} threads");
+            team.set(2, 0);
+            assert_eq!(search(&mut team, &mut stand), alone);
+            assert_eq!(team.mates.len(), 1);
+        }
+    }
+
+    #[test]
+    fn little_work_is_not_shared() {
+        let mut stand = stand();
+        let mut team = Team::default();
+        team.set(3, u64::MAX);
+        search(&mut team, &mut stand);
+        assert!(team.mates.is_empty());
+    }
+
+    #[test]
+    fn the_run_of_a_thread_that_died_is_searched_all_the_same() {
+        let mut stand = stand();
+        let alone = search(&mut Team::default(), &mut stand);
+        let mut team = Team::default();
+        team.set(3, 0);
+        search(&mut team, &mut stand);
+        // One takes no job, another takes it and is gone.
+        team.mates[0].jobs = sync_channel(1).0;
+        let (jobs, todo) = sync_channel::<Job>(1);
+        let (_, done) = sync_channel(1);
+        (team.mates[1].jobs, team.mates[1].done) = (jobs, done);
+        let gone = std::thread::spawn(move || todo.recv().map(|job| job.lent));
+        assert_eq!(search(&mut team, &mut stand), alone);
+        // It still holds what it was lent: the bodies have another now.
+        assert!(gone.join().unwrap().is_ok());
+        assert!(team.mates.is_empty());
+        assert_eq!(search(&mut team, &mut stand), alone);
+        assert_eq!(team.mates.len(), 2, "others take their places");
+    }
+}
