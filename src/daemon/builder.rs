@@ -230,6 +230,13 @@ impl Against {
             Asking::Remove { name } => Edit::Remove { name },
             Asking::Enable { name, enabled } => Edit::Enable { name, enabled },
             Asking::Filter { name, group, mask } => Edit::Filter { name, group, mask },
+            Asking::Margin {
+                name,
+                report_within_m,
+            } => Edit::Margin {
+                name,
+                report_within_m,
+            },
             Asking::Rule(rule) => Edit::Rule(rule),
             Asking::DropRules { a, b } => Edit::DropRules { a, b },
             Asking::Attach { name, to, pose } => Edit::Attach { name, to, pose },

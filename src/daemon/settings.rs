@@ -35,13 +35,22 @@ impl Daemon<'_> {
                 self.engine.set_timeout(source, timeout_ns);
             }
             Setting::TickNow => self.tick_asked = true,
-            Setting::Reset => self.ready.push(EditBatch {
-                token: NOBODY,
-                validate: false,
-                edits: vec![Edit::Reset { source: None }],
-                warnings: Vec::new(),
+            Setting::Margin(report_within_m) => self.edit(Edit::Margin {
+                name: None,
+                report_within_m,
             }),
+            Setting::Reset => self.edit(Edit::Reset { source: None }),
         }
+    }
+
+    /// An edit of the next tick.
+    fn edit(&mut self, edit: Edit) {
+        self.ready.push(EditBatch {
+            token: NOBODY,
+            validate: false,
+            edits: vec![edit],
+            warnings: Vec::new(),
+        });
     }
 }
 

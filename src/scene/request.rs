@@ -11,6 +11,7 @@
 //!     { "remove": "old" },
 //!     { "enable": { "body": "box", "enabled": false } },
 //!     { "filter": { "body": "box", "group": 1, "mask": 4294967295 } },
+//!     { "margin": { "body": "box", "report_within_m": 0.2 } },
 //!     { "rule": { "action": "ignore", "a": "box", "b": "part", "reason": "glued" } },
 //!     { "drop_rules": { "a": "box", "b": "part" } },
 //!     { "attach": { "body": "box", "to": "part", "position": [0, 0, 1] } },
@@ -28,6 +29,7 @@
 
 use std::path::Path;
 
+use crate::limits::EXTENT_MAX_M;
 use crate::math::Pose;
 use crate::scene::node::{Fault, Node, Value};
 use crate::scene::read_body::{
@@ -91,6 +93,13 @@ pub enum Edit {
         group: Option<u32>,
         /// Groups it collides with; `None`: as they are.
         mask: Option<u32>,
+    },
+    /// Sets how near a pair must come to be told as near.
+    Margin {
+        /// The body's name; `None`: every body that is there.
+        name: Option<String>,
+        /// Distance, metres; `None`: what the body was put with.
+        report_within_m: Option<f64>,
     },
     /// Adds a pair rule behind all others, so that it wins over them.
     Rule(PairRule),
@@ -202,6 +211,7 @@ const VERBS: &[&str] = &[
     "remove",
     "enable",
     "filter",
+    "margin",
     "rule",
     "drop_rules",
     "attach",
@@ -238,6 +248,7 @@ fn read_edit(node: Node, blobs: &[u8]) -> Result<Edit, Fault> {
         }),
         "enable" => read_enable(entry.node),
         "filter" => read_filter(entry.node),
+        "margin" => read_margin(entry.node),
         "drop_rules" => read_drop(entry.node),
         "attach" => read_attach(entry.node),
         "reset" => {
@@ -293,6 +304,14 @@ fn read_filter(node: Node) -> Result<Edit, Fault> {
         return Err(Fault::new(None, text));
     }
     Ok(Edit::Filter { name, group, mask })
+}
+
+fn read_margin(node: Node) -> Result<Edit, Fault> {
+    let mut table = Table::open(node, "this edit", &["body", "report_within_m"])?;
+    Ok(Edit::Margin {
+        name: table.name("body", BODY_NAME_BYTES_MAX)?,
+        report_within_m: table.number_within("report_within_m", 0.0, EXTENT_MAX_M)?,
+    })
 }
 
 fn read_drop(node: Node) -> Result<Edit, Fault> {

@@ -62,6 +62,8 @@ pub enum Setting {
         /// Nanoseconds.
         timeout_ns: u64,
     },
+    /// How near pairs of the bodies that are there must come to be told as near, metres; `None`: as each was put.
+    Margin(Option<f64>),
     /// A tick at once.
     TickNow,
     /// Time went back for all: every pair ends, bodies that move are not received again.

@@ -1,4 +1,4 @@
-//! Scene edits at run time: put, remove, enable, filter, rules, attach, reset.
+//! Scene edits at run time: put, remove, enable, filter, margins, rules, attach, reset.
 //!
 //! In: one request, a list of [`Edit`]s with shapes already built. Out: all of it done and a new scene revision, or
 //! nothing done and a text that says what to change. An edit allocates; a tick without one does not.
@@ -46,6 +46,13 @@ pub enum Edit {
         group: Option<u32>,
         /// Groups it collides with; `None`: as they are.
         mask: Option<u32>,
+    },
+    /// Sets how near a pair must come to be told as near.
+    Margin {
+        /// The body's name; `None`: every body that is there.
+        name: Option<String>,
+        /// Distance, metres; `None`: what the body was put with.
+        report_within_m: Option<f64>,
     },
     /// Adds a pair rule behind all others, so that it wins over them.
     Rule(PairRule),
@@ -135,6 +142,10 @@ impl World {
             }
             Edit::Enable { name, enabled } => self.enable(name, *enabled),
             Edit::Filter { name, group, mask } => self.filter(name, *group, *mask),
+            Edit::Margin {
+                name,
+                report_within_m,
+            } => self.set_margins(name.as_deref(), *report_within_m),
             Edit::Rule(rule) => self.add_rule(rule),
             Edit::DropRules { a, b } => self.drop_rules(a, b),
             Edit::Attach { name, to, pose } => {

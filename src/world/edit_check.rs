@@ -10,7 +10,7 @@ use super::edit::Edit;
 use super::edit_rules::is_rule_of;
 use super::rules::sides_of;
 use crate::ids::BodyId;
-use crate::limits::{PRIORITY_MAX, PRIORITY_MIN, SHAPES_PER_BODY_MAX};
+use crate::limits::{EXTENT_MAX_M, PRIORITY_MAX, PRIORITY_MIN, SHAPES_PER_BODY_MAX};
 use crate::math::Pose;
 use crate::scene::{BodySpec, PairRule};
 use crate::wire::BODY_NAME_LEN;
@@ -33,6 +33,16 @@ struct Draft<'a> {
 
 /// What a body hangs on.
 type Hangs<'a> = Option<&'a str>;
+
+/// Whether a distance can be one that pairs are told as near within.
+fn is_margin(report_within_m: Option<f64>) -> Result<(), String> {
+    match report_within_m {
+        Some(metres) if !(0.0..=EXTENT_MAX_M).contains(&metres) => Err(format!(
+            "`report_within_m` is {metres}: write metres from 0 to {EXTENT_MAX_M}"
+        )),
+        _ => Ok(()),
+    }
+}
 
 impl World {
     /// Whether a request can be applied as a whole.
@@ -82,6 +92,15 @@ impl<'a> Draft<'a> {
                 Ok(())
             }
             Edit::Enable { name, .. } | Edit::Filter { name, .. } => self.must_have(name),
+            Edit::Margin {
+                name,
+                report_within_m,
+            } => {
+                if let Some(name) = name {
+                    self.must_have(name)?;
+                }
+                is_margin(*report_within_m)
+            }
             Edit::Rule(rule) => self.look_at_rule(rule),
             Edit::DropRules { a, b } => self.look_at_drop(a, b),
             Edit::Attach { name, to, pose } => {

@@ -1,8 +1,9 @@
-//! Edits that touch many bodies: pair rules, reset, and what the filters make of the scene afterwards.
+//! Edits that touch many bodies: pair rules, margins, reset, and what the filters make of the scene afterwards.
 
 use super::World;
 use super::census::slot_at;
 use super::rules::sides_of;
+use crate::ids::BodySlot;
 use crate::scene::PairRule;
 use crate::wire::EndCause;
 
@@ -44,6 +45,39 @@ impl World {
                 self.requery(slot);
             }
         }
+    }
+
+    /// Sets the distance that pairs of a body, or of all, are told as near within; whether any was another.
+    pub(super) fn set_margins(&mut self, name: Option<&str>, report_within_m: Option<f64>) -> bool {
+        let Some(name) = name else {
+            let slots = 0..self.bodies.len();
+            return slots.fold(false, |any, slot| {
+                self.set_margin(slot_at(slot), report_within_m) | any
+            });
+        };
+        let slot = self.slot_named(name);
+        slot.is_some_and(|slot| self.set_margin(slot, report_within_m))
+    }
+
+    fn set_margin(&mut self, slot: BodySlot, report_within_m: Option<f64>) -> bool {
+        let entry = &mut self.entries[slot.index()];
+        let put_m = entry.spec.as_ref().map(|spec| spec.report_within_m);
+        let Some(wanted_m) = report_within_m.or(put_m) else {
+            return false;
+        };
+        let body = self.bodies.get_mut(slot.index()).and_then(Option::as_mut);
+        let Some(body) = body.filter(|body| body.report_within_m.to_bits() != wanted_m.to_bits())
+        else {
+            return false;
+        };
+        body.report_within_m = wanted_m;
+        entry.edited |= put_m != Some(wanted_m);
+        if let Some(hot) = self.hot(slot) {
+            hot.report_within_m = wanted_m;
+        }
+        // Its pairs are judged anew; its box is widened as it must be now by the recount that follows.
+        self.requery(slot);
+        true
     }
 
     pub(super) fn reset(&mut self, source: Option<&str>) {

@@ -321,3 +321,27 @@ fn a_client_can_ask_for_a_check_of_every_structure_while_its_pairs_go_on() {
     assert_eq!(state(client.view().tick()), State::Colliding);
     assert_eq!(client.view().tick().rebuilds, 0);
 }
+
+#[test]
+fn a_margin_set_at_run_time_tells_pairs_as_near() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    // Two balls of 0.5 m, 0.5 m apart.
+    let apart = [at(1, 0.0), at(2, 1.5)];
+    step(&mut client, &apart);
+    assert_eq!(state(client.view().tick()), State::Clear);
+    for (edit, wanted) in [
+        (
+            r#"{"margin": {"body": "b", "report_within_m": 0.6}}"#,
+            State::Near,
+        ),
+        (r#"{"margin": {"body": "b"}}"#, State::Clear),
+        (r#"{"margin": {"report_within_m": 0.6}}"#, State::Near),
+        (r#"{"margin": {}}"#, State::Clear),
+    ] {
+        done(&mut client, edit);
+        step(&mut client, &apart);
+        assert_eq!(state(client.view().tick()), wanted, "{edit}");
+    }
+}

@@ -207,3 +207,46 @@ fn law_4_7_without_listeners_only_verdicts_are_worked_for() {
         "{queries} queries for a collision 1 m deep that stays"
     );
 }
+
+fn margin(name: Option<&str>, report_within_m: Option<f64>) -> Edit {
+    Edit::Margin {
+        name: name.map(ToOwned::to_owned),
+        report_within_m,
+    }
+}
+
+/// The verdict on two bodies that have a row, or may have none where they are farther apart than anybody asks for.
+fn told(rig: &Rig) -> Option<Verdict> {
+    rig.pair(1, 2).map(|_| rig.verdict(1, 2))
+}
+
+#[test]
+fn law_3_3_a_margin_set_at_run_time_is_that_of_a_body_put_with_it() {
+    // A gap of 0.5 m, in a world of two and in one whose broad phase keeps structures.
+    for crowd in [0, 60] {
+        let mut bodies = vec![ball(1, 0.0, ""), ball(2, 2.5, "report_within_m = 0.1\n")];
+        bodies.extend((3..3 + crowd).map(|id| ball(id, 10.0 * id as f64, "")));
+        let mut rig = Rig::new(&scene("", &bodies));
+        rig.send(ALL);
+        assert_eq!(told(&rig), None);
+        rig.edit(vec![margin(Some("b1"), Some(0.6))], ALL);
+        assert_eq!(told(&rig), Some(Verdict::Near));
+        // At rest, too: no pose is needed for what the edit says.
+        let frames: [(Edit, Option<Verdict>); 5] = [
+            (margin(Some("b1"), Some(0.4)), None),
+            (margin(None, Some(0.7)), Some(Verdict::Near)),
+            (margin(None, None), None),
+            (margin(Some("b2"), Some(5.0)), Some(Verdict::Near)),
+            (margin(Some("b2"), None), None),
+        ];
+        for (edit, wanted) in frames {
+            rig.edit(vec![edit.clone()], ALL);
+            rig.send(ALL);
+            let now = told(&rig).filter(|verdict| *verdict != Verdict::Apart);
+            assert_eq!(now, wanted, "{edit:?}");
+        }
+        let before = rig.out.tick.header.scene_rev;
+        rig.edit(vec![margin(None, None)], ALL);
+        assert_eq!(rig.out.tick.header.scene_rev, before, "nothing changed");
+    }
+}

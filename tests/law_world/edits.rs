@@ -414,3 +414,42 @@ fn a_scene_that_does_not_hold_together_is_no_world() {
     };
     assert!(new(vec![lost]).unwrap_err().to_string().contains("`x`"));
 }
+
+#[test]
+fn law_6_a_margin_that_is_none_or_of_nobody_is_refused_with_what_to_write() {
+    let mut bench = Bench::of(vec![moving("a", 1)]);
+    for (name, report_within_m, said) in [
+        (Some("a"), -0.1, "write metres from 0"),
+        (None, f64::NAN, "write metres from 0"),
+        (None, f64::INFINITY, "write metres from 0"),
+        (Some("z"), 0.1, "there is no body `z`"),
+    ] {
+        let text = bench.refused(&[Edit::Margin {
+            name: name.map(named),
+            report_within_m: Some(report_within_m),
+        }]);
+        assert!(text.contains(said), "{text}");
+    }
+}
+
+#[test]
+fn law_6_a_body_put_again_after_a_margin_was_set_has_its_own() {
+    let mut bench = Bench::of(vec![moving("a", 1)]);
+    let own_m = bench.body("a").report_within_m;
+    let margin = |report_within_m| Edit::Margin {
+        name: None,
+        report_within_m,
+    };
+    bench.edit(margin(Some(own_m + 0.5)));
+    assert_eq!(
+        bench.body("a").report_within_m.to_bits(),
+        (own_m + 0.5).to_bits()
+    );
+    bench.edit(put(moving("b", 2)));
+    assert_eq!(bench.body("b").report_within_m.to_bits(), own_m.to_bits());
+    bench.edit(put(moving("a", 1)));
+    assert_eq!(bench.body("a").report_within_m.to_bits(), own_m.to_bits());
+    let rev = bench.world.scene_rev();
+    bench.edit(margin(None));
+    assert_eq!(bench.world.scene_rev(), rev);
+}

@@ -1,8 +1,8 @@
 //! The node's parameters: what they are, which values they take, what they do. In: a scene, settings of the command
 //! line and of files, sets of anybody. Out: values, or why not; changes for the tick thread and the node's own.
 //!
-//! What touches safety (budget, mode, time-outs, skew) is changed while running only with `ros.allow_edits`, which is
-//! said at the start.
+//! What touches safety (budget, mode, time-outs, skew, margins) is changed while running only with `ros.allow_edits`,
+//! which is said at the start.
 
 mod rules;
 
@@ -18,8 +18,11 @@ use super::RosScene;
 use super::params_file::{Setting as Said, Value};
 use super::services::open;
 use crate::config::{Config, Mode};
+use crate::limits;
 use crate::transport::Setting;
 
+/// What -1 stands for.
+const NO_LIMIT: &str = "no limit";
 /// Longest time a parameter can name, milliseconds: a day.
 const TIME_MS_MAX: f64 = 86_400_000.0;
 /// Most rows a tick may have on a topic: 20 MB of contacts.
@@ -61,11 +64,16 @@ fn of_daemon(config: &Config) -> Vec<Spec> {
     let time_ms = || Rule::Real {
         min: 0.0,
         max: TIME_MS_MAX,
-        none: true,
+        none: Some(NO_LIMIT),
     };
     let units = Rule::Whole {
         max: i64::MAX,
-        none: true,
+        none: Some(NO_LIMIT),
+    };
+    let metres = Rule::Real {
+        min: 0.0,
+        max: limits::EXTENT_MAX_M,
+        none: Some("what each body was put with"),
     };
     let budget = config.budget;
     let given = budget.units.and_then(|units| i64::try_from(units).ok());
@@ -78,6 +86,7 @@ fn of_daemon(config: &Config) -> Vec<Spec> {
         spec("budget_units", given, units),
         spec("mode", mode, Rule::Mode),
         spec("max_skew_ms", Value::Real(-1.0), time_ms()),
+        spec("report_within_m", Value::Real(-1.0), metres),
     ]
 }
 
@@ -85,12 +94,12 @@ fn of_daemon(config: &Config) -> Vec<Spec> {
 fn of_node() -> Vec<Spec> {
     let rows = || Rule::Whole {
         max: ROWS_MAX,
-        none: false,
+        none: None,
     };
     let rate = Rule::Real {
         min: 0.1,
         max: 100.0,
-        none: false,
+        none: None,
     };
     let words = &["reliable", "best_effort"];
     let reliable = Value::Text(words[0].to_owned());
@@ -174,7 +183,7 @@ impl Table {
             let rule = Rule::Real {
                 min: 1.0,
                 max: TIME_MS_MAX,
-                none: false,
+                none: None,
             };
             let value = Value::Real(milliseconds(source.timeout_ns));
             let name = format!("timeout_ms.{}", source.name);
@@ -300,6 +309,9 @@ impl Table {
             }
             ("mode", Some(Value::Text(text))) => {
                 Mode::parse(&text).map_or(Effect::None, |mode| Effect::Tick(Setting::Mode(mode)))
+            }
+            ("report_within_m", Some(Value::Real(metres))) => {
+                Effect::Tick(Setting::Margin((metres >= 0.0).then_some(metres)))
             }
             ("max_skew_ms", Some(Value::Real(ms))) => Effect::Own(Own::MaxSkew(some_ns(ms))),
             ("ros_max_pairs", Some(Value::Whole(rows))) => Effect::Own(Own::MaxPairs(count(rows))),

@@ -36,7 +36,7 @@ def test_parameters_are_listed_described_and_read(room):
 def test_safety_parameters_are_refused_unless_edits_are_allowed(room):
     room.daemon(HANDS)
     room.node()
-    for name, one in [("budget_ms", 1.0), ("mode", "rate=10"), ("timeout_ms.sim", 100.0)]:
+    for name, one in [("budget_ms", 1.0), ("mode", "rate=10"), ("timeout_ms.sim", 100.0), ("report_within_m", 0.1)]:
         ((done, reason),) = put(room, **{name.replace(".", "__"): one})
         assert not done and "allow_edits" in reason, (name, reason)
     assert put(room, ros__allow_edits=True)[0][0] is False
@@ -139,6 +139,28 @@ def test_limits_of_rows_are_parameters(room):
     put(room, ros_max_contacts=5)
     cut = room.until(lambda: not contacts[-1].complete and contacts[-1], "cut", then=lambda: sender.send(together))
     assert len(cut.contacts) == 5 and cut.tick_header.truncated == 30 * 29 // 2 - 5
+
+
+def test_the_margin_of_near_pairs_is_a_parameter_given_at_the_start_and_set_while_running(room):
+    room.daemon(HANDS, ros_args=[*EDITS, "-p", "report_within_m:=0.6"])
+    node = room.node()
+    states = room.hear(State, "/sweepd/state")
+    sender = Sender(node)
+    # spheres of 0.5 m, 1.5 m apart: a gap of 0.5 m
+    apart = {"left": (0, 0, 0), "right": (1.5, 0, 0)}
+
+    def word(wanted, what):
+        room.until(lambda: states and states[-1].word == wanted, what, then=lambda: sender.send(apart))
+
+    word("near", "nearer than 0.6 m")
+    assert put(room, report_within_m=0.4) == [(True, "")]
+    word("clear", "farther than 0.4 m")
+    assert put(room, report_within_m=2.0) == [(True, "")]
+    word("near", "nearer than 2 m")
+    assert put(room, report_within_m=-1.0) == [(True, "")]
+    word("clear", "as the scene says")
+    ((done, reason),) = put(room, report_within_m=-0.5)
+    assert not done and "what each body was put with" in reason
 
 
 def test_simulated_time_is_that_of_the_clock_topic_and_a_jump_back_ends_every_pair(room):

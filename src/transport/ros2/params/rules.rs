@@ -8,10 +8,17 @@ use crate::config::Mode;
 /// Which values a parameter takes.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Rule {
-    /// A number from .. to; with `none`, -1 stands for no value.
-    Real { min: f64, max: f64, none: bool },
-    /// A whole number from .. to; with `none`, -1 stands for no value.
-    Whole { max: i64, none: bool },
+    /// A number from .. to; -1 stands for what `none` says.
+    Real {
+        min: f64,
+        max: f64,
+        none: Option<&'static str>,
+    },
+    /// A whole number from .. to; -1 stands for what `none` says.
+    Whole {
+        max: i64,
+        none: Option<&'static str>,
+    },
     /// true or false.
     Flag,
     /// One of these words.
@@ -32,19 +39,19 @@ impl Rule {
     ) -> Result<(), String> {
         match (self, value) {
             (Self::Real { min, max, none }, Value::Real(real)) => {
-                if (*min..=*max).contains(real) || (*none && same(*real, -1.0)) {
+                if (*min..=*max).contains(real) || (none.is_some() && same(*real, -1.0)) {
                     return Ok(());
                 }
-                let or_none = if *none { ", or -1 for no limit" } else { "" };
+                let or_none = none.map_or(String::new(), |what| format!(", or -1 for {what}"));
                 Err(format!(
                     "{name} is {real}: write a number from {min} to {max}{or_none}"
                 ))
             }
             (Self::Whole { max, none }, Value::Whole(whole)) => {
-                if (0..=*max).contains(whole) || (*none && *whole == -1) {
+                if (0..=*max).contains(whole) || (none.is_some() && *whole == -1) {
                     return Ok(());
                 }
-                let or_none = if *none { ", or -1 for no limit" } else { "" };
+                let or_none = none.map_or(String::new(), |what| format!(", or -1 for {what}"));
                 Err(format!(
                     "{name} is {whole}: write a whole number from 0 to {max}{or_none}"
                 ))

@@ -134,6 +134,19 @@ fn a_value_does_what_its_name_says() {
         Effect::Tick(Setting::BudgetTime(None))
     );
     assert_eq!(
+        table.effect("report_within_m", &real(0.2)),
+        Effect::Tick(Setting::Margin(Some(0.2)))
+    );
+    assert_eq!(
+        table.effect("report_within_m", &real(-1.0)),
+        Effect::Tick(Setting::Margin(None))
+    );
+    let told = table.check("report_within_m", &real(-0.5)).unwrap_err();
+    assert!(
+        told.contains("-1 for what each body was put with"),
+        "{told}"
+    );
+    assert_eq!(
         table.effect("timeout_ms.arm", &real(20.0)),
         Effect::Timeout(1, 20_000_000)
     );
