@@ -19,6 +19,10 @@ pub trait Runner {
     fn step(&mut self, scene: &Scene, first: bool) -> u64;
     /// The pairs after the last frame, sorted; those whose boxes do not overlap are dropped.
     fn pairs(&self, scene: &Scene) -> Vec<Pair>;
+    /// Whether it tells every pair, and not only those of a body that moved in the frame.
+    fn whole(&self) -> bool {
+        true
+    }
     /// What it did, in its own words.
     fn told(&self) -> String {
         String::new()

@@ -20,7 +20,8 @@ fn peer_box(b: &Box3) -> PeerBox {
     }
 }
 
-fn real(scene: &Scene, pairs: impl Iterator<Item = Pair>) -> Vec<Pair> {
+/// Of a peer's pairs those whose boxes overlap, sorted.
+pub fn real(scene: &Scene, pairs: impl Iterator<Item = Pair>) -> Vec<Pair> {
     let mut all: Vec<Pair> = pairs
         .map(|(a, b)| (a.min(b), a.max(b)))
         .filter(|(a, b)| overlap(&scene.boxes[*a as usize], &scene.boxes[*b as usize]))
