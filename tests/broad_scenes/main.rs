@@ -183,6 +183,39 @@ fn a_slot_that_another_body_takes_in_the_same_tick_keeps_no_pair() {
 }
 
 #[test]
+fn bodies_that_jump_together_keep_their_pair_without_an_event() {
+    let mut rig = Rig::geared("from scratch", &[true], 900, false);
+    let mut rng = Rng::new(8);
+    let mut place = || std::array::from_fn(|_| rng.between(0.0, 12.0) as f32);
+    // Threes that overlap, and stay together wherever they go.
+    let three =
+        |place: [f32; 3], k: usize| at([place[0] + 0.2 * k as f32, place[1], place[2]], 0.4);
+    let mut places: Vec<[f32; 3]> = (0..300).map(|_| place()).collect();
+    let all = |places: &[[f32; 3]]| -> Vec<_> {
+        let threes = places
+            .iter()
+            .flat_map(|at| (0..3).map(move |k| three(*at, k)));
+        threes.collect()
+    };
+    rig.start(&all(&places));
+    for tick in 0..300_u32 {
+        // Some jump, into lanes that others have just left; of some of them one body leaves and another comes.
+        let jump: Vec<u32> = (0..1 + tick % 25)
+            .map(|k| (tick * 31 + k * 7) % 300)
+            .collect();
+        for one in &jump {
+            places[*one as usize] = place();
+        }
+        let churned: Vec<u32> = jump.iter().step_by(9).map(|one| one * 3 + 1).collect();
+        let moved: Vec<u32> = (0..900).filter(|body| !churned.contains(body)).collect();
+        let now = all(&places);
+        rig.put(&now, &moved, &churned);
+        rig.tick(&exact::pairs(&now), &format!("tick {tick}"));
+        rig.validate();
+    }
+}
+
+#[test]
 fn motions_mixed_while_bodies_come_and_go_stay_exact() {
     soak(frames() / 4, 1500, 17);
 }

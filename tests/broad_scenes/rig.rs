@@ -178,8 +178,16 @@ impl Rig {
                 self.name
             );
         }
+        // Only a body that leaves and comes ends a pair and begins it in one update.
+        let anew = |body: u32| self.changes.removed.iter().any(|r| r.slot.0 == body);
         for began in &self.delta.began {
             let key = pair(self.pairs.get(*began).unwrap());
+            let ended = self.delta.ended.iter().any(|ended| pair(ended.key) == key);
+            assert!(
+                !ended || anew(key.0) || anew(key.1),
+                "{what}, {}: {key:?} ended and began",
+                self.name
+            );
             assert!(
                 self.told.insert(key),
                 "{what}, {}: {key:?} began twice",

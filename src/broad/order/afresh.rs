@@ -51,8 +51,11 @@ pub(super) struct Afresh {
     pub(super) finds: Finds,
     /// Threads that search beside this one.
     pub(super) team: Team,
-    /// By block: lanes whose body has left since the last tick.
+    /// By block: lanes whose body has left since the last tick, and lanes whose body has jumped away.
     pub(super) gone: Vec<u16>,
+    pub(super) jumped: Vec<u16>,
+    /// Bodies that jumped in the last tick.
+    pub(super) jumps: usize,
     /// By block: the space from which it is met, when it was laid; and the mean side of a block then.
     pub(super) reach: Vec<f32>,
     pub(super) side: f32,
@@ -122,6 +125,7 @@ impl Order {
         if stays {
             let lists = [&mut *tick.began, &mut *tick.parted];
             tell_difference([&*held, &finds.met], gone, &self.slot_of, lists);
+            self.tell_jumped(tick);
         } else {
             self.afresh.usual = tests;
             self.tell_carried(tick);
@@ -163,21 +167,21 @@ impl Order {
         if self.afresh.sorted || came * MANY_CAME > tick.members.bounded().len() {
             return false;
         }
-        let same = came == 0 && self.afresh.gone.iter().all(|lanes| *lanes == 0);
+        // Nor is an order of use a tick later where some jump in between: they would stretch what they are laid in.
+        let same =
+            came == 0 && self.afresh.jumps == 0 && self.afresh.gone.iter().all(|lanes| *lanes == 0);
         let ahead = worn && same && self.afresh.framed < FRAME_TICKS;
         if worn && !ahead {
             return false;
         }
-        for at in 0..came {
-            let Some((rank, one)) = self.lane_for(self.homeless[at], tick.proxies) else {
-                return false;
-            };
-            self.sit(self.homeless[at], rank, one);
-        }
-        self.level.run(TakeLanes {
+        let jumped = self.level.run(TakeLanes {
             order: self,
             proxies: tick.proxies,
         });
+        self.afresh.jumps = jumped;
+        if !self.seat_anew(jumped, tick) {
+            return false;
+        }
         self.afresh.last = (self.grown() - 1.0).max(0.0) * usual;
         self.afresh.excess += self.afresh.last;
         if ahead {

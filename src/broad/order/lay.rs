@@ -3,11 +3,11 @@
 //! In: every box. Out: lanes, the tree over their blocks, and how much more of space the blocks take than they did.
 
 use super::afresh::{Afresh, FRAME_TICKS};
-use super::links::spare;
+use super::links::{room, spare};
 use super::place::{ATTIC, grow, middle};
 use super::sort::{FILL, Sorter};
 use super::tree::NO_BOUND;
-use super::{BodySlot, NONE, Order, Proxies, Tick, ones, small};
+use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, ones, small};
 use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work, prefetch};
 
 /// How many bodies ahead boxes are asked for, and how many blocks.
@@ -64,9 +64,20 @@ impl Order {
         self.level.run(BoundAll { order: self });
         let blocks = self.live.len();
         self.measure();
-        let Afresh { gone, finds, .. } = &mut self.afresh;
-        gone.clear();
-        gone.resize(blocks, 0);
+        let Afresh {
+            gone,
+            jumped,
+            finds,
+            ..
+        } = &mut self.afresh;
+        for lanes in [gone, jumped] {
+            lanes.clear();
+            lanes.resize(blocks, 0);
+        }
+        // Who is seated anew in a tick, and where.
+        let seats = bodies.len() / MANY_CAME + 1;
+        room(&mut self.homeless, seats);
+        room(&mut self.worklist, 2 * seats);
         finds.reserve(blocks, bodies.len());
         spare(&mut self.carried, self.hits, bodies.len());
     }
@@ -193,19 +204,21 @@ impl<P: Proxies> Work for TakeAll<'_, P> {
     }
 }
 
-/// Writes every box to its lane, and brings the tree up to date.
+/// Writes every box to its lane, and brings the tree up to date; returns how many lie clear of where their block
+/// was.
 pub(super) struct TakeLanes<'a, P> {
     pub(super) order: &'a mut Order,
     pub(super) proxies: &'a P,
 }
 
 impl<P: Proxies> Work for TakeLanes<'_, P> {
-    type Out = ();
+    type Out = usize;
 
     #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) {
+    fn run<L: Lanes>(self, lanes: L) -> usize {
         let (order, proxies) = (self.order, self.proxies);
         let origin = order.origin;
+        let mut jumps = 0;
         for block in 0..order.live.len() {
             let ahead = order.slot_of[block * WIDTH..].chunks_exact(WIDTH);
             if let Some(ahead) = ahead.clone().nth(AHEAD_BLOCKS) {
@@ -220,10 +233,36 @@ impl<P: Proxies> Work for TakeLanes<'_, P> {
                 let one = lanes.outward(min, max, &origin).corners();
                 order.fat[block].set(lane, &one);
             }
+            let met = lanes.meets(&order.fat[block], order.tree.bound(block));
+            let jumped = order.live[block] & !met;
+            order.afresh.jumped[block] = jumped;
+            jumps += jumped.count_ones() as usize;
             let bound = lanes.bound(&order.fat[block], u16::MAX);
             order.tree.set(block, bound);
         }
         order.tree.refit(lanes);
+        jumps
+    }
+}
+
+/// Brings the bounds of some blocks, and the tree, up to date.
+pub(super) struct BoundSome<'a> {
+    pub(super) order: &'a mut Order,
+    /// Ascending.
+    pub(super) blocks: &'a [u32],
+}
+
+impl Work for BoundSome<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        for block in self.blocks {
+            let block = *block as usize;
+            let bound = lanes.bound(&self.order.fat[block], u16::MAX);
+            self.order.tree.set(block, bound);
+        }
+        self.order.tree.refit(lanes);
     }
 }
 

@@ -137,6 +137,38 @@ impl Met {
         rows.map(|row| row.count_ones() as usize).sum()
     }
 
+    /// Writes the overlaps of some lanes down as two body slots, and forgets them; not those of lanes that lost their
+    /// body.
+    pub(super) fn carry(
+        &mut self,
+        lanes: &[u16],
+        gone: &[u16],
+        slot_of: &[u32],
+        carried: &mut Vec<(u32, u32)>,
+    ) {
+        for block in 0..self.blocks() {
+            for at in self.of(block) {
+                let other = self.others[at] as usize;
+                if lanes[block] | lanes[other] == 0 {
+                    continue;
+                }
+                let all = self.hits[at];
+                let stays = without(&all, lanes[block], lanes[other]);
+                if stays == all {
+                    continue;
+                }
+                let goes = minus(&all, &stays);
+                each(&without(&goes, gone[block], gone[other]), |row, lane| {
+                    let pair = (slot_of[block * WIDTH + row], slot_of[other * WIDTH + lane]);
+                    carried.push(pair);
+                });
+                let lost = goes.iter().map(|row| row.count_ones() as usize);
+                self.count -= lost.sum::<usize>();
+                self.hits[at] = stays;
+            }
+        }
+    }
+
     /// Writes every overlap down as two body slots, and forgets it; not those of lanes that lost their body.
     pub(super) fn drain_into(
         &mut self,

@@ -39,6 +39,7 @@ use crate::wire::{BroadCause, BroadMode};
 mod afresh;
 mod fatten;
 mod gear;
+mod jump;
 mod lay;
 mod links;
 mod load;

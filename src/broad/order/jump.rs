@@ -1,0 +1,85 @@
+//! Bodies that jump clear of their block, while bodies stay in their lanes: they get others, and the rest stays as it is.
+//!
+//! Without candidates alone. A few bodies far from where they stood would stretch their blocks over the scene; to lay
+//! everything anew for them costs several times as much as to seat them.
+
+use super::afresh::Afresh;
+use super::lay::BoundSome;
+use super::{BodySlot, MANY_CAME, NONE, Order, PairKey, Proxies, Tick, ones, parts, small};
+use crate::simd::boxes::WIDTH;
+
+impl Order {
+    /// Gives who came and who jumped a lane; whether there was one for each.
+    ///
+    /// * `jumped` - how many the boxes just taken say have jumped.
+    pub(super) fn seat_anew<P: Proxies>(&mut self, jumped: usize, tick: &Tick<'_, P>) -> bool {
+        let came = self.homeless.len();
+        if came + jumped == 0 {
+            return true;
+        }
+        if (came + jumped) * MANY_CAME > tick.members.bounded().len() {
+            return false;
+        }
+        let mut blocks = std::mem::take(&mut self.worklist);
+        blocks.clear();
+        if jumped > 0 {
+            let Afresh {
+                held, gone, jumped, ..
+            } = &mut self.afresh;
+            held.carry(jumped, gone, &self.slot_of, &mut self.carried);
+            self.unseat(&mut blocks);
+        }
+        let mut all = true;
+        for at in 0..self.homeless.len() {
+            let slot = self.homeless[at];
+            let Some((rank, one)) = self.lane_for(slot, tick.proxies) else {
+                all = false;
+                break;
+            };
+            self.sit(slot, rank, one);
+            let (block, lane) = parts(rank);
+            self.fat[block].set(lane, &one.corners());
+            blocks.push(small(block));
+        }
+        blocks.sort_unstable();
+        blocks.dedup();
+        self.level.run(BoundSome {
+            order: self,
+            blocks: &blocks,
+        });
+        blocks.clear();
+        self.worklist = blocks;
+        all
+    }
+
+    /// Takes the lanes of those that jumped away; notes them as homeless, and their blocks.
+    fn unseat(&mut self, blocks: &mut Vec<u32>) {
+        for block in 0..self.live.len() {
+            let jumped = self.afresh.jumped[block];
+            if jumped == 0 {
+                continue;
+            }
+            for lane in ones(jumped) {
+                let slot = std::mem::replace(&mut self.slot_of[block * WIDTH + lane], NONE);
+                self.rank_of[slot as usize] = NONE;
+                self.fat[block].set(lane, &[f32::NAN; 6]);
+                self.homeless.push(BodySlot(slot));
+                self.len -= 1;
+            }
+            self.live[block] &= !jumped;
+            blocks.push(small(block));
+        }
+    }
+
+    /// Tells which pairs of bodies that jumped have parted. Those that have not are told as begun, which of a pair that
+    /// is stored means nothing.
+    pub(super) fn tell_jumped<P>(&mut self, tick: &mut Tick<'_, P>) {
+        for (one, other) in self.carried.drain(..) {
+            let ranks = [one, other].map(|slot| self.rank_of[slot as usize]);
+            if !self.afresh.finds.met.has(ranks) {
+                let key = PairKey::new(BodySlot(one), BodySlot(other));
+                tick.parted.push(key);
+            }
+        }
+    }
+}
