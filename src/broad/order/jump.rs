@@ -1,4 +1,4 @@
-//! Bodies that jump clear of their block, while bodies stay in their lanes: they get others, and the rest stays as it is.
+//! Bodies that jump clear of their block, while bodies stay in their lanes: they get others, the rest stays as it is.
 //!
 //! Without candidates alone. A few bodies far from where they stood would stretch their blocks over the scene; to lay
 //! everything anew for them costs several times as much as to seat them.
