@@ -49,6 +49,8 @@ pub(super) struct Gait {
     born: u32,
     /// What is added on every side, metres.
     margin: f32,
+    /// Times that it moved since, while few bodies do: so far it goes by moves, not by ticks. 0: in each tick.
+    moves: u32,
     /// Times in a row that it left at once.
     wild: u8,
     /// Times in a row that it left as a body at rest does; above `REST_AFTER` it is one.
@@ -61,6 +63,7 @@ impl Gait {
         anchor: Down { faces: [0.0; 8] },
         born: u32::MAX,
         margin: 0.0,
+        moves: 0,
         wild: 0,
         rest: 0,
     };
@@ -75,11 +78,12 @@ impl Gait {
         // The sum of lower faces and minus upper ones is minus three mean sides.
         let side = ((f[0] + f[4]) + (f[1] + f[5]) + (f[2] + f[6])) * (-1.0 / 3.0);
         let known = self.born != u32::MAX;
-        let age = if known {
-            tick.wrapping_sub(self.born)
-        } else {
-            0
+        let age = match (known, self.moves) {
+            (false, _) => 0,
+            (true, 0) => tick.wrapping_sub(self.born),
+            (true, moves) => moves.min(tick.wrapping_sub(self.born)),
         };
+        self.moves = 0;
         if age > 0 {
             self.learn(now, held, age, side);
         }
@@ -156,6 +160,12 @@ impl Gait {
         }
         self.rest = self.rest.max(REST_AFTER + 1);
         Some(hold(fat, core))
+    }
+
+    /// It moves, while few do.
+    #[inline(always)]
+    pub(super) fn note_move(&mut self) {
+        self.moves = self.moves.saturating_add(1);
     }
 
     /// Ticks since its fat box was made.
@@ -309,6 +319,20 @@ mod tests {
             holds(&after(-0.1), &core) && !holds(&after(1.0), &core),
             "what it leaves behind is not held for sure"
         );
+    }
+
+    #[test]
+    fn a_body_that_moves_now_and_then_stays_in_its_box_for_as_many_moves() {
+        let (mut gait, mut held, mut renewals) = (Gait::NEW, Hold::EMPTY, 0);
+        for step in 0..160_u32 {
+            let (tick, now) = (step * 100, shifted(0.02 * step as f32));
+            gait.note_move();
+            if step == 0 || !(holds(&held.fat, &now) && holds(&now, &held.core)) {
+                held = gait.renew(&now, tick, HORIZON, &held);
+                renewals += 1;
+            }
+        }
+        assert!((5..=14).contains(&renewals), "{renewals}");
     }
 
     #[test]

@@ -167,6 +167,7 @@ impl<P: Proxies> Work for LoadBodies<'_, '_, P> {
                 continue;
             }
             let (block, lane) = parts(rank);
+            order.gaits[rank as usize].note_move();
             if !order.take(lanes, tick.proxies, *slot, rank as usize) {
                 order.mark(block, 1 << lane);
             }

@@ -350,14 +350,14 @@ mod tests {
             let mut team = Team::default();
             team.set(threads, 0);
             // The runs end elsewhere once it is known what they take.
-            let first: Vec<_> = (0..2)
+            let ends: Vec<_> = (0..2)
                 .map(|_| {
                     assert_eq!(search(&mut team, &mut stand), alone, "{threads} threads");
                     team.ends.clone()
                 })
                 .collect();
             assert_eq!(team.mates.len(), threads - 1);
-            assert_ne!(first[0], first[1], "{threads} threads");
+            assert_ne!(ends[0], ends[1], "{threads} threads");
             team.set(2, 0);
             assert_eq!(search(&mut team, &mut stand), alone);
             assert_eq!(team.mates.len(), 1);
