@@ -20,7 +20,7 @@ use crate::limits::THREADS_MAX;
 use crate::simd::boxes::{Boxes16, Level, WIDTH};
 
 /// What is searched, while it is lent.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct Lent {
     live: Vec<u16>,
     fat: Vec<Boxes16>,
@@ -170,7 +170,7 @@ impl Team {
             return;
         }
         self.deal(blocks, threads);
-        self.lend((live, fat, tree));
+        self.exchange((live, fat, tree));
         for (at, mate) in self.mates.iter_mut().enumerate() {
             mate.finds.reserve(blocks, 0);
             let job = Job {
@@ -209,7 +209,7 @@ impl Team {
             finds.append(&mate.finds);
         }
         self.mates.retain(|mate| mate.busy);
-        self.take_back((live, fat, tree));
+        self.exchange((live, fat, tree));
     }
 
     /// Starts the threads that are missing; returns how many there are, with the tick's own.
@@ -258,31 +258,13 @@ impl Team {
         self.ends.copy_from_slice(&ends[..threads]);
     }
 
-    /// Exchanges what is lent with what is the owner's.
-    fn exchange(lent: &mut Lent, (live, fat, tree): Own<'_>) {
+    /// Exchanges what is lent with what is the owner's: lends it, and takes it back. Nobody else holds it then; but for
+    /// a thread that died and has not let go yet, which keeps its own.
+    fn exchange(&mut self, (live, fat, tree): Own<'_>) {
+        let lent = Arc::make_mut(&mut self.lent);
         std::mem::swap(&mut lent.live, live);
         std::mem::swap(&mut lent.fat, fat);
         std::mem::swap(&mut lent.tree, tree);
-    }
-
-    fn lend(&mut self, own: Own<'_>) {
-        if Arc::get_mut(&mut self.lent).is_none() {
-            self.lent = Arc::default();
-        }
-        if let Some(lent) = Arc::get_mut(&mut self.lent) {
-            Self::exchange(lent, own);
-        }
-    }
-
-    fn take_back(&mut self, own: Own<'_>) {
-        if let Some(lent) = Arc::get_mut(&mut self.lent) {
-            Self::exchange(lent, own);
-            return;
-        }
-        // A thread died and has not let go yet: that is left to it, and the owner gets a copy.
-        let Lent { live, fat, tree } = &*self.lent;
-        (*own.0, *own.1, *own.2) = (live.clone(), fat.clone(), tree.clone());
-        self.lent = Arc::default();
     }
 }
 
