@@ -4,7 +4,7 @@
 //! everything anew for them costs several times as much as to seat them.
 
 use super::afresh::Afresh;
-use super::lay::BoundSome;
+use super::lay::Bound;
 use super::{BodySlot, MANY_CAME, NONE, Order, PairKey, Proxies, Tick, ones, parts, small};
 use crate::simd::boxes::WIDTH;
 
@@ -43,9 +43,9 @@ impl Order {
         }
         blocks.sort_unstable();
         blocks.dedup();
-        self.level.run(BoundSome {
+        self.level.run(Bound {
             order: self,
-            blocks: &blocks,
+            blocks: blocks.iter().map(|block| *block as usize),
         });
         blocks.clear();
         self.worklist = blocks;

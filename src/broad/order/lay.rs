@@ -61,8 +61,14 @@ impl Order {
         let compact = self.afresh.spoilt == 0;
         self.deal_along(bodies, &boxes, compact);
         self.boxes = boxes;
-        self.level.run(BoundAll { order: self });
         let blocks = self.live.len();
+        self.level.run(Bound {
+            order: self,
+            blocks: 0..blocks,
+        });
+        for (block, home) in self.homes.iter_mut().enumerate() {
+            *home = *self.tree.bound(block);
+        }
         self.measure();
         let Afresh {
             gone,
@@ -246,42 +252,21 @@ impl<P: Proxies> Work for TakeLanes<'_, P> {
 }
 
 /// Brings the bounds of some blocks, and the tree, up to date.
-pub(super) struct BoundSome<'a> {
+pub(super) struct Bound<'a, B> {
     pub(super) order: &'a mut Order,
     /// Ascending.
-    pub(super) blocks: &'a [u32],
+    pub(super) blocks: B,
 }
 
-impl Work for BoundSome<'_> {
+impl<B: Iterator<Item = usize>> Work for Bound<'_, B> {
     type Out = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) {
         for block in self.blocks {
-            let block = *block as usize;
             let bound = lanes.bound(&self.order.fat[block], u16::MAX);
             self.order.tree.set(block, bound);
         }
         self.order.tree.refit(lanes);
-    }
-}
-
-/// Bounds every block, and brings the tree up to date.
-struct BoundAll<'a> {
-    order: &'a mut Order,
-}
-
-impl Work for BoundAll<'_> {
-    type Out = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) {
-        let order = self.order;
-        for block in 0..order.live.len() {
-            let bound = lanes.bound(&order.fat[block], u16::MAX);
-            order.homes[block] = bound;
-            order.tree.set(block, bound);
-        }
-        order.tree.refit(lanes);
     }
 }

@@ -158,10 +158,8 @@ impl Met {
                     continue;
                 }
                 let goes = minus(&all, &stays);
-                each(&without(&goes, gone[block], gone[other]), |row, lane| {
-                    let pair = (slot_of[block * WIDTH + row], slot_of[other * WIDTH + lane]);
-                    carried.push(pair);
-                });
+                let left = without(&goes, gone[block], gone[other]);
+                write_down(&left, [block, other], slot_of, carried);
                 let lost = goes.iter().map(|row| row.count_ones() as usize);
                 self.count -= lost.sum::<usize>();
                 self.hits[at] = stays;
@@ -180,14 +178,24 @@ impl Met {
             for at in self.of(block) {
                 let other = self.others[at] as usize;
                 let left = without(&self.hits[at], gone[block], gone[other]);
-                each(&left, |row, lane| {
-                    let pair = (slot_of[block * WIDTH + row], slot_of[other * WIDTH + lane]);
-                    carried.push(pair);
-                });
+                write_down(&left, [block, other], slot_of, carried);
             }
         }
         self.clear();
     }
+}
+
+/// Writes the overlaps of a record down as two body slots.
+#[inline(always)]
+fn write_down(
+    hits: &Matrix,
+    [block, other]: [usize; 2],
+    slot_of: &[u32],
+    carried: &mut Vec<(u32, u32)>,
+) {
+    each(hits, |row, lane| {
+        carried.push((slot_of[block * WIDTH + row], slot_of[other * WIDTH + lane]));
+    });
 }
 
 /// Reports what is in one of two ticks alone, whose lanes are the same but for those whose body left before the second.

@@ -25,11 +25,11 @@ pub(super) struct Tree {
     height: usize,
     /// Nodes of the level at hand whose bounds have changed, ascending.
     dirty: Vec<u32>,
-    /// Of the queries of [`Tree::query`].
-    walk: Walk,
+    /// Nodes still to be looked at in [`Tree::query`]: level, node.
+    stack: Vec<(u8, u32)>,
 }
 
-/// Memory of the queries of one thread.
+/// Memory of the queries for a run of blocks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Walk {
     /// Nodes still to be looked at: level, node.
@@ -43,11 +43,16 @@ pub(super) struct Walk {
 impl Walk {
     /// Room for a query that descends into every node above so many blocks.
     pub(super) fn reserve(&mut self, blocks: usize) {
-        let nodes = blocks / WIDTH + WIDTH * LEVELS_MAX;
+        let nodes = nodes_above(blocks);
         room(&mut self.stack, nodes);
         room(&mut self.nodes, nodes);
         room(&mut self.children, nodes);
     }
+}
+
+/// At least as many as nodes stand above so many blocks.
+fn nodes_above(blocks: usize) -> usize {
+    blocks / WIDTH + WIDTH * LEVELS_MAX
 }
 
 impl Tree {
@@ -93,8 +98,8 @@ impl Tree {
     /// Room for a query that descends into every node.
     pub(super) fn reserve(&mut self) {
         let blocks = self.bounds.len();
-        self.walk.reserve(blocks);
-        room(&mut self.dirty, blocks / WIDTH + WIDTH * LEVELS_MAX);
+        room(&mut self.stack, nodes_above(blocks));
+        room(&mut self.dirty, nodes_above(blocks));
     }
 
     /// The bound of a block.
@@ -146,9 +151,9 @@ impl Tree {
     /// Appends the blocks whose bound meets a box.
     #[inline(always)]
     pub(super) fn query<L: Lanes>(&mut self, lanes: L, one: &[f32; 6], found: &mut Vec<u32>) {
-        let mut stack = std::mem::take(&mut self.walk.stack);
+        let mut stack = std::mem::take(&mut self.stack);
         self.query_from(lanes, one, 0, 0, (&mut stack, found));
-        self.walk.stack = stack;
+        self.stack = stack;
     }
 
     /// As [`Tree::query`], in ascending order.
