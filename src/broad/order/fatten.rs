@@ -40,17 +40,16 @@ const REST_TRIES: u8 = 12;
 /// What the places of a body at rest are widened by, as a share of what they span: enough for most of what is to come
 /// after some ten ticks, and little beside what the body's neighbours have.
 const REST_SHARE: f32 = 0.25;
+
 /// What a body has learned about its motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gait {
     /// Its box when the fat one was made.
     anchor: Down,
-    /// Tick of that.
+    /// The order's beat then, less the times that the body has moved between beats; see [`Gait::note_move`].
     born: u32,
     /// What is added on every side, metres.
     margin: f32,
-    /// Times that it moved since, while few bodies do: so far it goes by moves, not by ticks. 0: in each tick.
-    moves: u32,
     /// Times in a row that it left at once.
     wild: u8,
     /// Times in a row that it left as a body at rest does; above `REST_AFTER` it is one.
@@ -63,27 +62,21 @@ impl Gait {
         anchor: Down { faces: [0.0; 8] },
         born: u32::MAX,
         margin: 0.0,
-        moves: 0,
         wild: 0,
         rest: 0,
     };
 
     /// The hold of a body whose box is `now`, and what is learned from how long the last one held.
     ///
-    /// * `horizon` - ticks to sweep for.
+    /// * `beat` - the order's.
+    /// * `horizon` - beats to sweep for.
     /// * `held` - the hold it had; where it still keeps to it, it is renewed along with others.
     #[inline(always)]
-    pub(super) fn renew(&mut self, now: &Down, tick: u32, horizon: u32, held: &Hold) -> Hold {
+    pub(super) fn renew(&mut self, now: &Down, beat: u32, horizon: u32, held: &Hold) -> Hold {
         let f = &now.faces;
         // The sum of lower faces and minus upper ones is minus three mean sides.
         let side = ((f[0] + f[4]) + (f[1] + f[5]) + (f[2] + f[6])) * (-1.0 / 3.0);
-        let known = self.born != u32::MAX;
-        let age = match (known, self.moves) {
-            (false, _) => 0,
-            (true, 0) => tick.wrapping_sub(self.born),
-            (true, moves) => moves.min(tick.wrapping_sub(self.born)),
-        };
-        self.moves = 0;
+        let age = self.age(beat);
         if age > 0 {
             self.learn(now, held, age, side);
         }
@@ -95,7 +88,7 @@ impl Gait {
         };
         let before = self.anchor;
         self.anchor = *now;
-        self.born = tick;
+        self.born = beat;
         let (mut fat, mut core) = (*now, NO_CORE);
         // An infinite box has no finite side: it is its own fat box.
         if self.wild >= WILD_AFTER || !side.is_finite() {
@@ -162,16 +155,20 @@ impl Gait {
         Some(hold(fat, core))
     }
 
-    /// It moves, while few do.
+    /// It moves between two beats: it alone grows older. So a body that moves now and then is swept by its moves, which
+    /// say how far it goes, and not by the time that it stood still.
     #[inline(always)]
     pub(super) fn note_move(&mut self) {
-        self.moves = self.moves.saturating_add(1);
+        self.born = self.born.wrapping_sub(1);
     }
 
-    /// Ticks since its fat box was made.
+    /// Times that it may have moved since its fat box was made; 0 without one.
     #[inline(always)]
-    pub(super) fn age(&self, tick: u32) -> u32 {
-        tick.wrapping_sub(self.born)
+    pub(super) fn age(&self, beat: u32) -> u32 {
+        match self.born {
+            u32::MAX => 0,
+            born => beat.wrapping_sub(born),
+        }
     }
 
     /// Whether a body that goes on as it came will have left its fat box some ticks from now. One that trembles about
@@ -182,14 +179,14 @@ impl Gait {
         lanes: L,
         now: &Down,
         held: &Hold,
-        tick: u32,
+        beat: u32,
         ahead: u32,
     ) -> bool {
         if self.rest > REST_AFTER {
             return false;
         }
         #[allow(clippy::cast_precision_loss, reason = "ages of ticks, small")]
-        let share = ahead as f32 / self.age(tick).max(1) as f32;
+        let share = ahead as f32 / self.age(beat).max(1) as f32;
         let mut then = *now;
         for (k, face) in then.faces.iter_mut().enumerate() {
             let out = (self.anchor.faces[k] - *face) * share;
@@ -325,10 +322,13 @@ mod tests {
     fn a_body_that_moves_now_and_then_stays_in_its_box_for_as_many_moves() {
         let (mut gait, mut held, mut renewals) = (Gait::NEW, Hold::EMPTY, 0);
         for step in 0..160_u32 {
-            let (tick, now) = (step * 100, shifted(0.02 * step as f32));
-            gait.note_move();
+            // All move in each hundredth tick, and this one in others of its own.
+            let (beat, now) = (1000 + step / 100, shifted(0.02 * step as f32));
+            if step % 100 != 0 {
+                gait.note_move();
+            }
             if step == 0 || !(holds(&held.fat, &now) && holds(&now, &held.core)) {
-                held = gait.renew(&now, tick, HORIZON, &held);
+                held = gait.renew(&now, beat, HORIZON, &held);
                 renewals += 1;
             }
         }

@@ -81,8 +81,8 @@ impl Order {
         for lane in ones(moved) {
             let rank = block * WIDTH + lane;
             let (gait, now, held) = (&self.gaits[rank], &self.exact[rank], &self.held[rank]);
-            let leaves = gait.age(self.tick) >= ALONG_AGE
-                && gait.leaves(lanes, now, held, self.tick, HORIZON);
+            let leaves = gait.age(self.beat) >= ALONG_AGE
+                && gait.leaves(lanes, now, held, self.beat, HORIZON);
             chosen |= u16::from(leaves) << lane;
         }
         chosen

@@ -87,6 +87,8 @@ pub(super) struct Order {
     /// Where the f32 boxes are measured from, metres.
     origin: [f64; 3],
     tick: u32,
+    /// Ticks in which as good as all may have moved: what bodies are aged by, but for moves of their own in between.
+    beat: u32,
     /// By body slot: block and lane as one number, or `NONE`.
     rank_of: Vec<u32>,
     /// By rank: the body slot, or `NONE`.
@@ -164,6 +166,8 @@ impl Order {
             level,
             origin: [0.0; 3],
             tick: 0,
+            // Half way round: no age comes near what stands for none.
+            beat: 1 << 31,
             rank_of: Vec::new(),
             slot_of: Vec::new(),
             live: Vec::new(),
@@ -240,6 +244,9 @@ impl Order {
         let share = if self.listed { STILL_MANY } else { MANY_MOVED };
         let many = tick.moved.len() * share > self.len;
         self.listed &= many;
+        if anew || many {
+            self.beat = self.beat.wrapping_add(1);
+        }
         if !anew {
             self.load(&tick, many);
             self.rehome();

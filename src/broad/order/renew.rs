@@ -160,7 +160,7 @@ impl Renew<'_> {
         for lane in ones(renewing) {
             let rank = block * WIDTH + lane;
             let now = order.exact[rank];
-            let hold = order.gaits[rank].renew(&now, order.tick, horizon, &order.held[rank]);
+            let hold = order.gaits[rank].renew(&now, order.beat, horizon, &order.held[rank]);
             order.held[rank] = hold;
             order.fat[block].set(lane, &hold.fat.corners());
             order.sure[block].set(lane, &sure(&hold));
