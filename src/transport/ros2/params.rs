@@ -310,9 +310,7 @@ impl Table {
             ("mode", Some(Value::Text(text))) => {
                 Mode::parse(&text).map_or(Effect::None, |mode| Effect::Tick(Setting::Mode(mode)))
             }
-            ("report_within_m", Some(Value::Real(metres))) => {
-                Effect::Tick(Setting::Margin((metres >= 0.0).then_some(metres)))
-            }
+            ("report_within_m", Some(Value::Real(metres))) => self.margin(name, metres),
             ("max_skew_ms", Some(Value::Real(ms))) => Effect::Own(Own::MaxSkew(some_ns(ms))),
             ("ros_max_pairs", Some(Value::Whole(rows))) => Effect::Own(Own::MaxPairs(count(rows))),
             ("ros_max_contacts", Some(Value::Whole(rows))) => {
@@ -335,6 +333,19 @@ impl Table {
             }
             _ => Effect::None,
         }
+    }
+
+    /// An edit of the scene: done when it is set, and for a value of the start by the first node of a daemon. One that
+    /// is opened in its place would undo what was edited since.
+    fn margin(&self, name: &str, metres: f64) -> Effect {
+        let report_within_m = (metres >= 0.0).then_some(metres);
+        if !self.is_running() {
+            if report_within_m.is_none() || self.kept.value(name).is_some() {
+                return Effect::None;
+            }
+            self.kept.keep(name, Value::Real(metres));
+        }
+        Effect::Tick(Setting::Margin(report_within_m))
     }
 }
 

@@ -133,14 +133,6 @@ fn a_value_does_what_its_name_says() {
         table.effect("budget_ms", &real(-1.0)),
         Effect::Tick(Setting::BudgetTime(None))
     );
-    assert_eq!(
-        table.effect("report_within_m", &real(0.2)),
-        Effect::Tick(Setting::Margin(Some(0.2)))
-    );
-    assert_eq!(
-        table.effect("report_within_m", &real(-1.0)),
-        Effect::Tick(Setting::Margin(None))
-    );
     let told = table.check("report_within_m", &real(-0.5)).unwrap_err();
     assert!(
         told.contains("-1 for what each body was put with"),
@@ -164,6 +156,29 @@ fn a_value_does_what_its_name_says() {
         table.effect("mode", &mode),
         Effect::Tick(Setting::Mode(Mode::Rate(50.0)))
     );
+}
+
+#[test]
+fn bug_a_node_opened_anew_does_not_undo_margins_that_were_edited_since() {
+    let scene = RosScene::default();
+    let margin = |table: &Table, metres| {
+        let value = ParameterValue::Double(metres);
+        let effect = table.effect("report_within_m", &value);
+        if table.is_running() {
+            table.keep("report_within_m", &value);
+        }
+        effect
+    };
+    let sets = |metres| Effect::Tick(Setting::Margin(metres));
+    let first = Table::of(&scene);
+    assert_eq!(margin(&first, -1.0), Effect::None, "as the bodies are");
+    assert_eq!(margin(&first, 0.3), sets(Some(0.3)), "said at the start");
+    // Opened anew with the same words, and after others were set.
+    assert_eq!(margin(&Table::of(&scene), 0.3), Effect::None);
+    first.run();
+    assert_eq!(margin(&first, 0.2), sets(Some(0.2)));
+    assert_eq!(margin(&first, -1.0), sets(None));
+    assert_eq!(margin(&Table::of(&scene), -1.0), Effect::None);
 }
 
 #[test]
