@@ -7,6 +7,7 @@
 #![allow(clippy::unwrap_used, reason = "a test")]
 #![allow(unreachable_pub, reason = "shared by tests")]
 
+mod common;
 mod harness;
 mod oracle;
 
@@ -14,13 +15,14 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::fmt::Write as _;
 
+use common::boxes::{Boxes, Everything};
 use harness::Drive;
 use oracle::meshes::{torus, trimesh};
-use sweepd::broad::{BroadPhase, Method, Proxies};
+use sweepd::broad::{BroadPhase, Method};
 use sweepd::builtin::{Pattern, pile, pool};
-use sweepd::ids::{BodyId, BodySlot};
+use sweepd::ids::BodySlot;
 use sweepd::math::{Aabb, Point, Vec3};
-use sweepd::pairs::{PairDelta, PairPolicy, PairSet};
+use sweepd::pairs::{PairDelta, PairSet};
 use sweepd::time::Budget;
 use sweepd::wire::Demand;
 use sweepd::world::ChangeSet;
@@ -145,41 +147,19 @@ fn swept(scene: &str) -> String {
     scene.replace("moves = true\n", "moves = true\ncontinuous = true\n")
 }
 
-/// Boxes that go round in circles, some of them into others.
-struct Circling(Vec<Aabb>);
-
-impl Circling {
-    fn put(&mut self, tick: u32) {
-        for (at, aabb) in (0_u32..).zip(&mut self.0) {
-            let angle = f64::from(at) + f64::from(tick) * 0.05;
-            let from = [f64::from(at % 50), f64::from(at / 50 % 50), angle.sin()];
-            aabb.min = Point::from(from) + Vec3::new(angle.cos(), angle.sin(), 0.0);
-            aabb.max = aabb.min + Vec3::new(1.0, 1.0, 1.0);
-        }
-    }
-}
-
-impl Proxies for Circling {
-    fn aabb(&self, slot: BodySlot) -> &Aabb {
-        &self.0[slot.index()]
-    }
-    fn unbounded(&self, _: BodySlot) -> bool {
-        false
-    }
-    fn id(&self, slot: BodySlot) -> BodyId {
-        BodyId(u64::from(slot.0) + 1)
-    }
-}
-
-impl PairPolicy for Circling {
-    fn allows(&self, _: BodySlot, _: BodySlot) -> bool {
-        true
+/// Boxes go round in circles, some of them into others.
+fn circle(boxes: &mut [Aabb], tick: u32) {
+    for (at, aabb) in (0_u32..).zip(boxes) {
+        let angle = f64::from(at) + f64::from(tick) * 0.05;
+        let from = [f64::from(at % 50), f64::from(at / 50 % 50), angle.sin()];
+        aabb.min = Point::from(from) + Vec3::new(angle.cos(), angle.sin(), 0.0);
+        aabb.max = aabb.min + Vec3::new(1.0, 1.0, 1.0);
     }
 }
 
 #[test]
 fn a_search_shared_by_threads_allocates_nothing_in_the_tick_thread_after_warm_up() {
-    let mut boxes = Circling(vec![Aabb::empty(); 3_000]);
+    let mut boxes = Boxes::new(3_000);
     let mut broad = BroadPhase::new(Method::Order);
     broad.use_afresh(true);
     broad.use_threads(3, 0);
@@ -190,9 +170,9 @@ fn a_search_shared_by_threads_allocates_nothing_in_the_tick_thread_after_warm_up
     for round in 0..ROUNDS {
         COUNT.with(|count| count.set(0));
         for tick in 0..126 {
-            boxes.put(tick);
+            circle(&mut boxes.all, tick);
             ARMED.with(|armed| armed.set(round > 0));
-            broad.update(&changes, &boxes, &boxes, &mut pairs, &mut delta);
+            broad.update(&changes, &boxes, &Everything, &mut pairs, &mut delta);
             ARMED.with(|armed| armed.set(false));
             changes.clear();
             changes.moved.extend((0..3_000).map(BodySlot));

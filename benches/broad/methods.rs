@@ -1,15 +1,16 @@
 //! Ours behind the trait that the peers share: one timed step a frame, and the pairs it left behind. What is timed is
 //! the whole `update` with its pair set and the events in order.
 
-use sweepd::broad::{BroadPhase, Method, Proxies, Work};
-use sweepd::ids::{BodyId, BodySlot};
+use sweepd::broad::{BroadPhase, Method, Work};
+use sweepd::ids::BodySlot;
 use sweepd::limits;
 use sweepd::math::{Aabb, Point};
-use sweepd::pairs::{PairDelta, PairPolicy, PairSet};
+use sweepd::pairs::{PairDelta, PairSet};
 use sweepd::time::{Clock, SystemClock};
 use sweepd::wire::EndCause;
 use sweepd::world::{ChangeSet, Removed};
 
+use super::common::boxes::{Boxes, Everything};
 use super::exact::Pair;
 use super::scenes::{Box3, Kind, Scene};
 
@@ -61,32 +62,9 @@ pub fn timed(work: impl FnOnce()) -> u64 {
     SystemClock.thread_cpu_ns() - from
 }
 
-/// Boxes as the world holds them.
-struct Bodies(Vec<Aabb>);
-
-impl Proxies for Bodies {
-    fn aabb(&self, slot: BodySlot) -> &Aabb {
-        &self.0[slot.index()]
-    }
-    fn unbounded(&self, _: BodySlot) -> bool {
-        false
-    }
-    fn id(&self, slot: BodySlot) -> BodyId {
-        BodyId(u64::from(slot.0) + 1)
-    }
-}
-
-struct Everything;
-
-impl PairPolicy for Everything {
-    fn allows(&self, _: BodySlot, _: BodySlot) -> bool {
-        true
-    }
-}
-
 struct Ours {
     broad: BroadPhase,
-    bodies: Bodies,
+    bodies: Boxes,
     changes: ChangeSet,
     pairs: PairSet,
     delta: PairDelta,
@@ -102,7 +80,7 @@ impl Ours {
     fn new(method: Method, scene: &Scene) -> Self {
         Self {
             broad: BroadPhase::new(method),
-            bodies: Bodies(vec![Aabb::empty(); scene.boxes.len()]),
+            bodies: Boxes::new(scene.boxes.len()),
             changes: ChangeSet::default(),
             pairs: PairSet::new(1 << 25),
             delta: PairDelta::default(),
@@ -117,7 +95,7 @@ impl Ours {
     fn take(&mut self, body: u32, b: &Box3) {
         // Boxes in f64 that are those of f32 moved: exact, for 1e7 leaves 29 bits behind the point.
         let point = |p: [f32; 3]| Point::from(p.map(|v| f64::from(v) + self.offset_m));
-        self.bodies.0[body as usize] = Aabb {
+        self.bodies.all[body as usize] = Aabb {
             min: point(b[0]),
             max: point(b[1]),
         };

@@ -2,44 +2,18 @@
 
 use std::collections::BTreeSet;
 
-use sweepd::broad::{BroadPhase, Method, Proxies, Work};
-use sweepd::ids::{BodyId, BodySlot, PairKey};
+use sweepd::broad::{BroadPhase, Method, Work};
+use sweepd::ids::{BodySlot, PairKey};
 use sweepd::math::{Aabb, Point};
-use sweepd::pairs::{PairDelta, PairPolicy, PairSet};
+use sweepd::pairs::{PairDelta, PairSet};
 use sweepd::simd::boxes::Level;
 use sweepd::wire::EndCause;
 use sweepd::world::{ChangeSet, Removed};
 
 use crate::common::Rng;
+use crate::common::boxes::{Boxes, Everything};
 use crate::exact::Pair;
 use crate::scenes::{Box3, Scene};
-
-pub struct Bodies {
-    boxes: Vec<Aabb>,
-    /// Shuffled, so that nothing hangs on slots being in the order of ids.
-    ids: Vec<u64>,
-    offset_m: f64,
-}
-
-impl Proxies for Bodies {
-    fn aabb(&self, slot: BodySlot) -> &Aabb {
-        &self.boxes[slot.index()]
-    }
-    fn unbounded(&self, _: BodySlot) -> bool {
-        false
-    }
-    fn id(&self, slot: BodySlot) -> BodyId {
-        BodyId(self.ids[slot.index()])
-    }
-}
-
-pub struct Everything;
-
-impl PairPolicy for Everything {
-    fn allows(&self, _: BodySlot, _: BodySlot) -> bool {
-        true
-    }
-}
 
 pub fn at(place: [f32; 3], half: f32) -> Box3 {
     [place.map(|x| x - half), place.map(|x| x + half)]
@@ -51,7 +25,8 @@ pub struct Rig {
     gears: &'static [bool],
     ticks: usize,
     broad: BroadPhase,
-    bodies: Bodies,
+    bodies: Boxes,
+    offset_m: f64,
     changes: ChangeSet,
     pairs: PairSet,
     pub delta: PairDelta,
@@ -87,20 +62,18 @@ impl Rig {
     /// Any method.
     pub fn of(method: Method, bodies: usize, far: bool) -> Self {
         let mut rng = Rng::new(bodies as u64);
-        let mut ids: Vec<u64> = (1..=bodies as u64).collect();
+        let mut boxes = Boxes::new(bodies);
+        // Shuffled, so that nothing hangs on slots being in the order of ids.
         for i in (1..bodies).rev() {
-            ids.swap(i, rng.below(i + 1));
+            boxes.ids.swap(i, rng.below(i + 1));
         }
         Self {
             name: format!("{method:?}"),
             gears: &[],
             ticks: 0,
             broad: BroadPhase::new(method),
-            bodies: Bodies {
-                boxes: vec![Aabb::empty(); bodies],
-                ids,
-                offset_m: if far { 1e7 } else { 0.0 },
-            },
+            bodies: boxes,
+            offset_m: if far { 1e7 } else { 0.0 },
             changes: ChangeSet::default(),
             pairs: PairSet::new(1 << 24),
             delta: PairDelta::default(),
@@ -138,10 +111,10 @@ impl Rig {
             .removed
             .extend(slots.map(|slot| Removed { slot, cause }));
         for body in moved.iter().chain(came) {
-            let offset_m = self.bodies.offset_m;
+            let offset_m = self.offset_m;
             let point = |p: [f32; 3]| Point::from(p.map(|v| f64::from(v) + offset_m));
             let [min, max] = boxes[*body as usize];
-            self.bodies.boxes[*body as usize] = Aabb {
+            self.bodies.all[*body as usize] = Aabb {
                 min: point(min),
                 max: point(max),
             };

@@ -8,6 +8,8 @@
     reason = "each test and bench includes this file and uses its own part; nobody else calls it"
 )]
 
+pub mod boxes;
+
 /// `SplitMix64` (Steele, Lea and Flood 2014): every seed is good, and equal on every machine.
 #[derive(Clone, Debug)]
 pub struct Rng(u64);
