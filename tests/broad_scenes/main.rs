@@ -142,6 +142,26 @@ fn pairs_that_are_sure_are_not_compared() {
 }
 
 #[test]
+fn blocks_stay_compact_while_bodies_come_and_go_and_all_are_sorted_over_some_ticks() {
+    let mut scene = Scene::new(Kind::Churn, 2000, 11);
+    let mut rig = Rig::geared("from scratch", &[true], 2000, false);
+    rig.start(&scene.boxes);
+    let laid = rig.work().tests;
+    let (mut sum, frames) = (0, 150);
+    for frame in 0..frames {
+        scene.step();
+        rig.take(&scene);
+        rig.tick(&exact::pairs(&scene.boxes), &format!("frame {frame}"));
+        sum += rig.work().tests;
+    }
+    rig.validate();
+    assert!(
+        sum * 2 < laid * frames * 3,
+        "{sum} comparisons in {frames} frames; {laid} in the first"
+    );
+}
+
+#[test]
 fn two_bodies_that_leave_their_fat_boxes_in_one_tick_are_one_pair() {
     let mut rig = Rig::new(Level::best(), 40, false);
     let mut boxes: Vec<_> = (0..40)

@@ -12,6 +12,7 @@
 //!
 //! Exact as the rest: boxes are rounded outward, and where rounding could tell otherwise the f64 boxes are asked.
 
+use super::ahead::{Ahead, SPLIT_TICKS_MAX, split_ticks};
 use super::gear::Gear;
 use super::lay::TakeLanes;
 use super::met::{Met, tell_all, tell_asked, tell_difference};
@@ -30,8 +31,22 @@ const LAY_TESTS: f64 = 12.0;
 /// Where what was laid is spoilt in a tick, it is not even looked at in so many ticks.
 const SPOILT_TICKS: u32 = 64;
 
+/// An order that is not ready when the blocks have grown so much more than they may is not waited for.
+const OVERDUE: f64 = 2.0;
+
 /// How many pairs ahead ranks are asked for.
 const AHEAD: usize = 16;
+
+/// What becomes of the lanes in a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Lay {
+    /// Bodies stay where they are.
+    Stays,
+    /// They are laid in the order that was sorted ahead.
+    Ahead,
+    /// They are sorted and laid at once.
+    Anew,
+}
 
 /// What lasts from tick to tick, and memory kept over calls.
 #[derive(Clone, Debug, Default)]
@@ -42,8 +57,10 @@ pub(super) struct Afresh {
     /// Ticks since the frame of the curve was laid, and since the bodies were.
     pub(super) framed: u32,
     pub(super) laid: u32,
-    /// The bodies, who are still the same, were sorted in the last tick: so that no tick has all the work of laying.
-    pub(super) sorted: bool,
+    /// The order that the bodies are to be laid in next.
+    pub(super) ahead: Ahead,
+    /// While they are laid: lanes of the last block that have been passed.
+    pub(super) dealt: usize,
     /// Ticks left in which bodies are laid without a look.
     pub(super) spoilt: u32,
     /// Overlaps of the last tick, and what was found in this one.
@@ -77,7 +94,7 @@ impl Order {
         // Lanes change without them: what was learned would be another body's.
         self.gaits.clear();
         self.afresh.on = true;
-        self.afresh.sorted = false;
+        self.afresh.ahead.stop();
         self.afresh.held.clear();
         self.afresh.framed = FRAME_TICKS;
     }
@@ -97,12 +114,15 @@ impl Order {
         }
         self.afresh.framed = self.afresh.framed.saturating_add(1);
         self.afresh.laid = self.afresh.laid.saturating_add(1);
-        let stays = was && self.stays(tick);
+        let lanes = if was { self.lanes(tick) } else { Lay::Anew };
+        let stays = lanes == Lay::Stays;
         if !stays {
             if was {
                 self.carry_held();
             }
-            self.lay_anew(tick);
+            if lanes == Lay::Anew || !self.lay_ahead(tick) {
+                self.lay_anew(tick);
+            }
         }
         let Afresh { finds, team, .. } = &mut self.afresh;
         let lanes = (&mut self.live, &mut self.fat, &mut self.tree);
@@ -147,32 +167,26 @@ impl Order {
             self.live[block] &= !(1 << lane);
             self.fat[block].set(lane, &[f32::NAN; 6]);
             self.afresh.gone[block] |= 1 << lane;
-            self.afresh.sorted = false;
             self.len -= 1;
         }
     }
 
     /// Gives who came a lane, takes every box, and tells whether the order is still good.
-    fn stays<P: Proxies>(&mut self, tick: &Tick<'_, P>) -> bool {
+    fn lanes<P: Proxies>(&mut self, tick: &Tick<'_, P>) -> Lay {
         if self.afresh.spoilt > 0 {
             self.afresh.spoilt -= 1;
-            return false;
+            return Lay::Anew;
         }
-        let came = self.homeless.len();
+        let (came, bodies) = (self.homeless.len(), tick.members.bounded().len());
         #[allow(clippy::cast_precision_loss, reason = "a cost")]
         let (usual, most) = (self.afresh.usual as f64, self.len as f64 * LAY_TESTS);
         // Blocks do not shrink: what the last tick asked too much this one will at least, and need not be tried.
         let worn = self.afresh.excess + self.afresh.last > most;
-        self.afresh.sorted &= came == 0;
-        if self.afresh.sorted || came * MANY_CAME > tick.members.bounded().len() {
-            return false;
-        }
-        // Nor is an order of use a tick later where some jump in between: they would stretch what they are laid in.
-        let same =
-            came == 0 && self.afresh.jumps == 0 && self.afresh.gone.iter().all(|lanes| *lanes == 0);
-        let ahead = worn && same && self.afresh.framed < FRAME_TICKS;
-        if worn && !ahead {
-            return false;
+        let changed = came + self.afresh.jumps;
+        let steady = changed * MANY_CAME * (SPLIT_TICKS_MAX + 1) <= bodies;
+        let late = worn && !(self.afresh.ahead.is_on() || steady);
+        if late || came * MANY_CAME > bodies {
+            return Lay::Anew;
         }
         let jumped = self.level.run(TakeLanes {
             order: self,
@@ -180,20 +194,34 @@ impl Order {
         });
         self.afresh.jumps = jumped;
         if !self.seat_anew(jumped, tick) {
-            return false;
+            return Lay::Anew;
         }
-        self.afresh.last = (self.grown() - 1.0).max(0.0) * usual;
-        self.afresh.excess += self.afresh.last;
-        if ahead {
-            self.sort_ahead(tick);
+        let last = (self.grown() - 1.0).max(0.0) * usual;
+        self.afresh.last = last;
+        self.afresh.excess += last;
+        let excess = self.afresh.excess;
+        if self.afresh.ahead.is_on() {
+            self.afresh.ahead.note_late(&self.homeless, bodies);
+            if self.afresh.ahead.is_ready() {
+                return Lay::Ahead;
+            }
+            let Afresh { ahead, .. } = &mut self.afresh;
+            ahead.go_on(&mut self.sorter, &self.boxes);
+        } else if steady {
+            // As many as they take next to nothing of: in fast motion an old order is worth little.
+            let ticks = split_ticks(most, last);
+            #[allow(clippy::cast_precision_loss, reason = "a few ticks")]
+            if excess + last * (ticks + 1) as f64 > most {
+                self.sort_ahead(tick, ticks);
+            }
         }
-        if ahead || self.afresh.excess <= most {
-            return true;
+        if excess <= most || (self.afresh.ahead.is_on() && excess <= most * OVERDUE) {
+            return Lay::Stays;
         }
         if self.afresh.laid == 1 {
             self.afresh.spoilt = SPOILT_TICKS;
         }
-        false
+        Lay::Anew
     }
 
     /// Asks the f64 boxes of what rounding leaves open.

@@ -20,23 +20,33 @@ impl Order {
         if (came + jumped) * MANY_CAME > tick.members.bounded().len() {
             return false;
         }
-        let mut blocks = std::mem::take(&mut self.worklist);
-        blocks.clear();
         if jumped > 0 {
             let Afresh {
                 held, gone, jumped, ..
             } = &mut self.afresh;
             held.carry(jumped, gone, &self.slot_of, &mut self.carried);
-            self.unseat(&mut blocks);
+            self.unseat();
         }
+        let homeless = std::mem::take(&mut self.homeless);
+        let all = self.seat_all(&homeless, tick.proxies);
+        self.homeless = homeless;
+        all
+    }
+
+    /// Gives bodies without one a lane each, and brings the bounds of all blocks that changed up to date; whether there
+    /// was a lane for each. Who has one keeps it.
+    pub(super) fn seat_all<P: Proxies>(&mut self, bodies: &[BodySlot], proxies: &P) -> bool {
+        let mut blocks = std::mem::take(&mut self.worklist);
         let mut all = true;
-        for at in 0..self.homeless.len() {
-            let slot = self.homeless[at];
-            let Some((rank, one)) = self.lane_for(slot, tick.proxies) else {
+        for slot in bodies {
+            if self.rank(*slot).is_some() {
+                continue;
+            }
+            let Some((rank, one)) = self.lane_for(*slot, proxies) else {
                 all = false;
                 break;
             };
-            self.sit(slot, rank, one);
+            self.sit(*slot, rank, one);
             let (block, lane) = parts(rank);
             self.fat[block].set(lane, &one.corners());
             blocks.push(small(block));
@@ -52,8 +62,8 @@ impl Order {
         all
     }
 
-    /// Takes the lanes of those that jumped away; notes them as homeless, and their blocks.
-    fn unseat(&mut self, blocks: &mut Vec<u32>) {
+    /// Takes the lanes of those that jumped away; notes them as homeless, and their blocks as changed.
+    fn unseat(&mut self) {
         for block in 0..self.live.len() {
             let jumped = self.afresh.jumped[block];
             if jumped == 0 {
@@ -67,7 +77,7 @@ impl Order {
                 self.len -= 1;
             }
             self.live[block] &= !jumped;
-            blocks.push(small(block));
+            self.worklist.push(small(block));
         }
     }
 

@@ -29,38 +29,77 @@ impl Order {
         if count > 0.0 { sum / count } else { 1.0 }
     }
 
-    /// Sorts the bodies for the next tick.
-    pub(super) fn sort_ahead<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
-        self.level.run(TakeAll {
-            order: self,
-            bodies: tick.members.bounded(),
-            proxies: tick.proxies,
-        });
-        self.sorter.sort(&self.boxes);
-        self.afresh.sorted = true;
-    }
-
     /// Deals the bodies to blocks anew, each block compact.
     pub(super) fn lay_anew<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
+        self.afresh.ahead.stop();
         let bodies = tick.members.bounded();
         let look_again = self.afresh.framed >= FRAME_TICKS;
         if look_again {
             self.origin = middle(bodies.iter().map(|slot| tick.proxies.aabb(*slot)));
             self.afresh.framed = 0;
         }
+        let mut boxes = std::mem::take(&mut self.boxes);
         self.level.run(TakeAll {
-            order: self,
-            bodies,
+            origin: self.origin,
+            bodies: bodies.iter().copied(),
             proxies: tick.proxies,
+            boxes: &mut boxes,
         });
-        let boxes = std::mem::take(&mut self.boxes);
         if look_again {
             self.sorter.frame(&boxes);
         }
+        let mut sorter = std::mem::take(&mut self.sorter);
+        self.clear_blocks(bodies);
         // What is spoilt in a tick is not worth being dealt to compact blocks.
-        let compact = self.afresh.spoilt == 0;
-        self.deal_along(bodies, &boxes, compact);
-        self.boxes = boxes;
+        if self.afresh.spoilt == 0 {
+            for (key, at) in sorter.sort(&boxes) {
+                let at = *at as usize;
+                self.deal_to(*key, FILL, Some((bodies[at], &boxes[at])));
+            }
+        } else {
+            for (key, at) in sorter.along_curve(&boxes) {
+                let at = at as usize;
+                self.deal_to(key, WIDTH, Some((bodies[at], &boxes[at])));
+            }
+        }
+        (self.sorter, self.boxes) = (sorter, boxes);
+        self.close_blocks(bodies.len());
+        self.bound_all(bodies.len());
+    }
+
+    /// Takes everything out of the blocks.
+    pub(super) fn clear_blocks(&mut self, bodies: &[BodySlot]) {
+        self.live.clear();
+        self.keys.clear();
+        self.slot_of.clear();
+        self.fat.clear();
+        self.len = 0;
+        self.reserve_blocks(bodies.len());
+        if let Some(last) = bodies.iter().max() {
+            grow(&mut self.rank_of, last.index(), NONE);
+        }
+    }
+
+    /// After the last body was dealt: the attic, and room for the tree.
+    pub(super) fn close_blocks(&mut self, bodies: usize) {
+        self.sorted = self.live.len();
+        self.len = bodies;
+        let blocks = self.sorted + self.sorted / ATTIC + 1;
+        for list in [&mut self.live, &mut self.dirty, &mut self.renewing] {
+            list.resize(blocks, 0);
+        }
+        self.slot_of.resize(blocks * WIDTH, NONE);
+        self.exact.resize(blocks * WIDTH, Down::EMPTY);
+        self.fat.resize(blocks, Boxes16::EMPTY);
+        self.homes.resize(blocks, NO_BOUND);
+        self.tree.reset(blocks);
+        self.tree.reserve();
+    }
+
+    /// Bounds every block, and takes that as what is usual from now on.
+    ///
+    /// * `bodies` - how many there are; room is made for as many.
+    pub(super) fn bound_all(&mut self, bodies: usize) {
         let blocks = self.live.len();
         self.level.run(Bound {
             order: self,
@@ -74,6 +113,7 @@ impl Order {
             gone,
             jumped,
             finds,
+            ahead,
             ..
         } = &mut self.afresh;
         for lanes in [gone, jumped] {
@@ -81,76 +121,37 @@ impl Order {
             lanes.resize(blocks, 0);
         }
         // Who is seated anew in a tick, and where.
-        let seats = bodies.len() / MANY_CAME + 1;
+        let seats = bodies / MANY_CAME + 1;
         room(&mut self.homeless, seats);
         room(&mut self.worklist, 2 * seats);
-        finds.reserve(blocks, bodies.len());
-        spare(&mut self.carried, self.hits, bodies.len());
+        ahead.reserve(bodies, seats);
+        finds.reserve(blocks, bodies);
+        spare(&mut self.carried, self.hits, bodies);
     }
 
-    /// Deals the bodies to blocks along the curve; a class begins with a block of its own.
+    /// Gives a body the next lane, or nobody: the bodies of a block are those that were sorted to it.
     ///
-    /// * `compact` - in compact blocks, each with a free lane.
-    fn deal_along(&mut self, bodies: &[BodySlot], boxes: &[[f32; 6]], compact: bool) {
-        self.live.clear();
-        self.keys.clear();
-        self.slot_of.clear();
-        self.fat.clear();
-        self.reserve_blocks(bodies.len());
-        if let Some(last) = bodies.iter().max() {
-            grow(&mut self.rank_of, last.index(), NONE);
-        }
-        let mut sorter = std::mem::take(&mut self.sorter);
-        if compact {
-            if !std::mem::take(&mut self.afresh.sorted) {
-                sorter.sort(boxes);
-            }
-            for at in sorter.sorted() {
-                self.deal_to(bodies, boxes, *at, FILL);
-            }
-        } else {
-            for at in sorter.along_curve(boxes) {
-                self.deal_to(bodies, boxes, at, WIDTH);
-            }
-        }
-        self.sorter = sorter;
-        self.sorted = self.live.len();
-        self.len = bodies.len();
-        let blocks = self.sorted + self.sorted / ATTIC + 1;
-        for list in [&mut self.live, &mut self.dirty, &mut self.renewing] {
-            list.resize(blocks, 0);
-        }
-        self.slot_of.resize(blocks * WIDTH, NONE);
-        self.exact.resize(blocks * WIDTH, Down::EMPTY);
-        self.fat.resize(blocks, Boxes16::EMPTY);
-        self.homes.resize(blocks, NO_BOUND);
-        self.tree.reset(blocks);
-        self.tree.reserve();
-    }
-
-    /// Gives a body the next lane.
-    ///
-    /// * `at` - its key, its index.
+    /// * `key` - of the stretch that it was sorted to.
     /// * `fill` - bodies of a block.
     #[inline]
-    fn deal_to(&mut self, bodies: &[BodySlot], boxes: &[[f32; 6]], at: (u64, u32), fill: usize) {
-        let ((key, index), last) = (at, self.live.last());
-        let lane = last.map_or(fill, |live| live.trailing_ones() as usize);
+    pub(super) fn deal_to(&mut self, key: u64, fill: usize, body: Option<(BodySlot, &[f32; 6])>) {
         let same = |first: &u64| Sorter::class_of(*first) == Sorter::class_of(key);
-        let starts = lane == fill || !self.keys.last().is_some_and(same);
-        let lane = if starts { 0 } else { lane };
+        let starts = self.afresh.dealt == fill || !self.keys.last().is_some_and(same);
         if starts {
             self.keys.push(key);
             self.live.push(0);
             self.fat.push(Boxes16::EMPTY);
             self.slot_of.resize(self.live.len() * WIDTH, NONE);
+            self.afresh.dealt = 0;
         }
-        let (block, body) = (self.live.len() - 1, bodies[index as usize]);
+        let (block, lane) = (self.live.len() - 1, self.afresh.dealt);
+        self.afresh.dealt += 1;
+        let Some((slot, one)) = body else { return };
         let rank = block * WIDTH + lane;
         self.live[block] |= 1 << lane;
-        self.slot_of[rank] = body.0;
-        self.rank_of[body.index()] = small(rank);
-        self.fat[block].set(lane, &boxes[index as usize]);
+        self.slot_of[rank] = slot.0;
+        self.rank_of[slot.index()] = small(rank);
+        self.fat[block].set(lane, one);
     }
 
     /// Notes the space that each block takes.
@@ -183,27 +184,32 @@ fn reach(bound: &[f32; 6], side: f32) -> f32 {
         .product()
 }
 
-/// Takes every box, in the order of the members, as corners.
-struct TakeAll<'a, P> {
-    order: &'a mut Order,
-    bodies: &'a [BodySlot],
-    proxies: &'a P,
+/// Takes boxes, in the order of some bodies, as corners.
+pub(super) struct TakeAll<'a, P, B> {
+    pub(super) origin: [f64; 3],
+    pub(super) bodies: B,
+    pub(super) proxies: &'a P,
+    pub(super) boxes: &'a mut Vec<[f32; 6]>,
 }
 
-impl<P: Proxies> Work for TakeAll<'_, P> {
+impl<P: Proxies, B: Iterator<Item = BodySlot> + Clone> Work for TakeAll<'_, P, B> {
     type Out = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) {
-        let origin = self.order.origin;
-        let boxes = &mut self.order.boxes;
+        let Self {
+            origin,
+            bodies,
+            proxies,
+            boxes,
+        } = self;
         boxes.clear();
-        boxes.reserve(self.bodies.len());
-        for (at, slot) in self.bodies.iter().enumerate() {
-            if let Some(ahead) = self.bodies.get(at + AHEAD) {
-                prefetch(self.proxies.aabb(*ahead));
+        let mut ahead = bodies.clone().skip(AHEAD);
+        for slot in bodies {
+            if let Some(ahead) = ahead.next() {
+                prefetch(proxies.aabb(ahead));
             }
-            let aabb = self.proxies.aabb(*slot);
+            let aabb = proxies.aabb(slot);
             let (min, max) = (aabb.min.coords.as_ref(), aabb.max.coords.as_ref());
             boxes.push(lanes.outward(min, max, &origin).corners());
         }

@@ -143,12 +143,24 @@ impl Sorter {
 
     /// Sorts; yields for each box, block by block, a key and its index. Keys ascend; all blocks of a stretch share one.
     pub(super) fn sort(&mut self, boxes: &[[f32; 6]]) -> &[(u64, u32)] {
+        self.begin(boxes);
+        self.split_some(boxes, 0, boxes.len());
+        &self.order
+    }
+
+    /// The first part of [`Sorter::sort`]: along the curve.
+    pub(super) fn begin(&mut self, boxes: &[[f32; 6]]) {
         let mut order = std::mem::take(&mut self.order);
         order.clear();
         order.extend(self.along_curve(boxes));
         self.order = order;
-        let mut from = 0;
-        while from < self.order.len() {
+    }
+
+    /// The rest, some of it: splits the bodies from one on, as many as asked for and what completes a stretch, into
+    /// blocks. Returns where it ended.
+    pub(super) fn split_some(&mut self, boxes: &[[f32; 6]], mut from: usize, some: usize) -> usize {
+        let to = (from + some).min(self.order.len());
+        while from < to {
             let class = Self::class_of(self.order[from].0);
             let most = &self.order[from..(from + STRETCH).min(self.order.len())];
             let len = most.partition_point(|(key, _)| Self::class_of(*key) == class);
@@ -166,7 +178,21 @@ impl Sorter {
             }
             from += len;
         }
-        &self.order
+        from
+    }
+
+    /// The frame of the curve, told by another origin.
+    ///
+    /// * `by` - the new origin less the old one.
+    pub(super) fn shift(&mut self, by: [f64; 3]) {
+        for (low, by) in self.low.iter_mut().zip(by) {
+            #[allow(
+                clippy::cast_possible_truncation,
+                reason = "a place on a curve, not a bound"
+            )]
+            let by = by as f32;
+            *low -= by;
+        }
     }
 
     /// What the last sort yielded.
