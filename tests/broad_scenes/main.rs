@@ -32,6 +32,7 @@ use rig::{Rig, at};
 use scenes::{Kind, Scene};
 use sweepd::broad::Method;
 use sweepd::simd::boxes::Level;
+use sweepd::wire::BroadMode;
 
 fn frames() -> usize {
     let told = std::env::var("SWEEPD_FRAMES").ok();
@@ -159,6 +160,34 @@ fn blocks_stay_compact_while_bodies_come_and_go_and_all_are_sorted_over_some_tic
         sum * 2 < laid * frames * 3,
         "{sum} comparisons in {frames} frames; {laid} in the first"
     );
+}
+
+#[test]
+fn candidates_are_tried_again_when_bodies_have_calmed_and_not_before() {
+    let mut scene = Scene::new(Kind::Gas, 1000, 11);
+    let mut rig = Rig::new(Level::best(), 1000, false);
+    rig.start(&scene.boxes);
+    let mut modes = Vec::new();
+    let mut frames = |rig: &mut Rig, scene: &mut Scene, frames: usize, move_on: bool| {
+        modes.clear();
+        for frame in 0..frames {
+            if move_on {
+                scene.step();
+            }
+            rig.take(scene);
+            rig.tick(&exact::pairs(&scene.boxes), &format!("frame {frame}"));
+            modes.push(rig.work().way.map(|(mode, _)| mode));
+        }
+        modes
+            .iter()
+            .filter(|mode| **mode == Some(BroadMode::Scratch))
+            .count()
+    };
+    frames(&mut rig, &mut scene, 100, true);
+    assert_eq!(frames(&mut rig, &mut scene, 800, true), 800, "no trial");
+    // All are told as moved, and none is elsewhere.
+    frames(&mut rig, &mut scene, 256, false);
+    assert_eq!(frames(&mut rig, &mut scene, 100, false), 0, "candidates");
 }
 
 #[test]

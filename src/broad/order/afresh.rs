@@ -16,6 +16,7 @@ use super::ahead::{Ahead, SPLIT_TICKS_MAX, split_ticks};
 use super::gear::Gear;
 use super::lay::TakeLanes;
 use super::met::{Met, tell_all, tell_asked, tell_difference};
+use super::probe::Probe;
 use super::sweep::Finds;
 use super::team::Team;
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, Work as Done, parts};
@@ -54,6 +55,7 @@ pub(super) struct Afresh {
     /// In use: the order keeps no candidates then.
     pub(super) on: bool,
     pub(super) gear: Gear,
+    pub(super) probe: Probe,
     /// Ticks since the frame of the curve was laid, and since the bodies were.
     pub(super) framed: u32,
     pub(super) laid: u32,

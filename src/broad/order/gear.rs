@@ -3,6 +3,7 @@
 //! In: counted work, never time, so that a replay chooses alike. Out: a choice, with hysteresis. The weights were
 //! measured once; they decide about cost alone.
 
+use super::probe::PROBE_TICKS;
 use super::{MANY_MOVED, Work};
 use crate::wire::BroadCause;
 
@@ -32,13 +33,37 @@ const HOPELESS: u64 = 2;
 const SPELL_LONG: u32 = 512;
 /// Below so many bodies either way takes next to nothing.
 const BODIES_MIN: u64 = 64;
-/// Ticks without candidates before these are tried again; twice as many each time that they prove no better.
+/// Ticks without candidates before these are tried again, if a probe promises anything: twice as many each time that
+/// they prove no better.
 const SPELL_MIN: u32 = 128;
+const _: () = assert!(
+    SPELL_MIN >= 2 * PROBE_TICKS,
+    "one probe at its begin, one at its end"
+);
 const SPELL_MAX: u32 = 2048;
 /// A trial of candidates that lasted so many ticks was no failure.
 const TRIAL_TICKS: u32 = 64;
 /// So many ticks in a row with few moved, and candidates are better without a trial.
 const CALM_TICKS: u32 = 4;
+
+/// What it hangs on whether candidates pay.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Footing {
+    /// Bodies that leave their fat boxes in a tick, of 1024.
+    pub(super) left: u64,
+    /// Boxes compared with a block in a search of all, for 1024 bodies.
+    pub(super) meets: u64,
+}
+
+impl Footing {
+    /// Whether candidates may pay now, who did not then: bodies keep longer to their fat boxes, or there is another
+    /// crowd of them.
+    fn promises(&self, then: &Self) -> bool {
+        let calmer = self.left * 4 < then.left * 3;
+        let (few, many) = (self.meets.min(then.meets), self.meets.max(then.meets));
+        calmer || many * 3 > few * 4
+    }
+}
 
 /// What the choice is made by.
 #[derive(Clone, Copy, Debug)]
@@ -58,6 +83,9 @@ pub(super) struct Gear {
     calm: u32,
     /// Boxes compared with a block without candidates, a body, by the last such tick; 0 before the first.
     meets: u64,
+    /// The footing on which candidates were given up, and the last one seen.
+    given_up: Option<Footing>,
+    seen: Option<Footing>,
 }
 
 impl Default for Gear {
@@ -72,6 +100,8 @@ impl Default for Gear {
             since: TRIAL_TICKS,
             calm: 0,
             meets: 0,
+            given_up: None,
+            seen: None,
         }
     }
 }
@@ -99,10 +129,15 @@ impl Gear {
             if calm {
                 self.spell = SPELL_MIN;
             }
-            self.cause = match (calm, self.left) {
+            let over = self.left == 0;
+            let in_vain = over && self.is_as_it_was();
+            if in_vain {
+                self.left = SPELL_MIN;
+            }
+            self.cause = match (calm, over && !in_vain) {
                 (true, _) => BroadCause::Calm,
-                (false, 0) => BroadCause::Trial,
-                (false, _) => BroadCause::Spell,
+                (false, true) => BroadCause::Trial,
+                (false, false) => BroadCause::Spell,
             };
             self.cause == BroadCause::Spell
         } else {
@@ -134,8 +169,40 @@ impl Gear {
                 self.left = self.spell;
             }
             (self.since, self.ticks, self.mean) = (0, 0, 0);
+            (self.given_up, self.seen) = (None, None);
         }
         chosen
+    }
+
+    /// Whether candidates were given up on the footing that was seen last.
+    fn is_as_it_was(&self) -> bool {
+        match (self.given_up, self.seen) {
+            (Some(then), Some(now)) => !now.promises(&then),
+            _ => false,
+        }
+    }
+
+    /// Whether a tick without candidates is one of a probe, and the first: there is one after candidates were given up,
+    /// and one before they may be tried again.
+    pub(super) fn probes(&self) -> Option<bool> {
+        let first = self.since < PROBE_TICKS;
+        if self.forced.is_some() || !(first || self.left <= PROBE_TICKS) {
+            return None;
+        }
+        Some(if first {
+            self.since == 0
+        } else {
+            self.left == PROBE_TICKS
+        })
+    }
+
+    /// Takes what a probe has come to.
+    pub(super) fn note_probe(&mut self, footing: Footing) {
+        if self.since < PROBE_TICKS {
+            self.given_up = Some(footing);
+        } else {
+            self.seen = Some(footing);
+        }
     }
 
     /// The tick after which the mean begins: early ones count until bodies have settled.
@@ -208,6 +275,46 @@ mod tests {
         let calm = work(2_000, 60);
         run(&mut gear, &mut on, SPELL_MAX + 1, &calm);
         assert_eq!(run(&mut gear, &mut on, 1000, &calm), 0);
+    }
+
+    #[test]
+    fn candidates_are_not_tried_again_on_the_footing_that_they_were_given_up_on() {
+        let (mut gear, mut on) = (Gear::default(), false);
+        let wild = work(10_000, 900);
+        run(&mut gear, &mut on, 40, &wild);
+        assert!(on);
+        // Two probes of `PROBE_TICKS`, each with a first tick, in each spell; what they come to is told here.
+        let probe = |gear: &mut Gear, spells: u32, footing: Footing| {
+            let (mut begun, mut ticks, mut trials) = (0, 0, 0);
+            for _ in 0..spells * SPELL_MIN {
+                trials += u32::from(!gear.choose(true, 1000, 1000, 300));
+                if let Some(begins) = gear.probes() {
+                    begun += u32::from(begins);
+                    ticks += 1;
+                    if ticks % PROBE_TICKS == 0 {
+                        gear.note_probe(footing);
+                    }
+                }
+            }
+            (begun, ticks, trials)
+        };
+        let then = Footing {
+            left: 100,
+            meets: 2000,
+        };
+        (gear.since, gear.left) = (u32::MAX, SPELL_MIN);
+        (gear.given_up, gear.seen) = (Some(then), None);
+        let alike = Footing {
+            left: 80,
+            meets: 2500,
+        };
+        assert_eq!(probe(&mut gear, 20, alike), (20, 20 * PROBE_TICKS, 0));
+        let calmer = Footing { left: 70, ..alike };
+        assert_eq!(probe(&mut gear, 1, calmer).2, 1);
+        assert_eq!(gear.cause, BroadCause::Trial);
+        for (meets, promises) in [(1400, true), (1600, false), (2600, false), (2700, true)] {
+            assert_eq!(Footing { meets, ..alike }.promises(&then), promises);
+        }
     }
 
     #[test]

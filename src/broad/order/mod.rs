@@ -16,7 +16,7 @@
 //! * **Exact.** Boxes are f32, rounded outward, relative to an f64 origin amid the scene; where rounding could tell
 //!   otherwise than the f64 boxes, those are asked. So the pairs are those of the f64 boxes at any offset.
 //! * **Without candidates** (`afresh`, `sweep`, `met`, `ahead`): where no fat box lasts, lanes and overlaps alone are
-//!   kept. Threads (`team`) share a large search.
+//!   kept, until a few bodies show that fat boxes would last (`probe`). Threads (`team`) share a large search.
 //! * **Modes** (few or many moved; renewal, sorting anew, without candidates) are chosen by counted work with weights
 //!   that were measured once, so that a replay chooses alike. They decide about cost alone: pairs, slots and events are
 //!   the same.
@@ -48,6 +48,7 @@ mod look;
 mod mend;
 mod met;
 mod place;
+mod probe;
 mod renew;
 mod sort;
 mod sweep;
@@ -234,6 +235,7 @@ impl Order {
             work.way = Some((BroadMode::Scratch, self.afresh.gear.cause));
             self.update_afresh(&mut tick, work);
             self.afresh.gear.note_scratch(bodies, work);
+            self.probe(&tick, work);
             return;
         }
         if was {

@@ -1,0 +1,105 @@
+//! Without candidates: what a few bodies would do with fat boxes.
+//!
+//! In: the boxes of some bodies, in each tick of a while. Out: how often they left fat boxes that nobody else sees, and
+//! what the search met meanwhile. Where both are as they were when candidates were given up, candidates are not tried
+//! again: a trial takes several times what the ticks about it take, a probe next to nothing.
+
+use super::fatten::{Gait, HORIZON};
+use super::gear::Footing;
+use super::{BodySlot, Order, Proxies, Tick, Work as Done};
+use crate::simd::boxes::{Down, Hold, Lanes, Portable};
+
+/// Ticks of a probe, and those of them until bodies have learned their margins, which do not count.
+pub(super) const PROBE_TICKS: u32 = 64;
+const LEARN_TICKS: u32 = 16;
+/// Bodies that are watched, at most twice as many.
+const SAMPLE: usize = 64;
+
+/// A body and the fat box that it would have.
+#[derive(Clone, Copy, Debug)]
+struct Watched {
+    slot: BodySlot,
+    gait: Gait,
+    hold: Hold,
+}
+
+/// What a probe has seen.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Probe {
+    ticks: u32,
+    /// Where the boxes are measured from, metres.
+    origin: [f64; 3],
+    bodies: Vec<Watched>,
+    /// Bodies that left their fat boxes, and those that could have.
+    left: u64,
+    watched: u64,
+    /// Boxes compared with a block, and bodies.
+    tests: u64,
+    all: u64,
+}
+
+impl Probe {
+    /// Begins anew, with some of these bodies.
+    fn begin(&mut self, origin: [f64; 3], bodies: &[BodySlot]) {
+        self.bodies.clear();
+        let some = bodies.iter().step_by((bodies.len() / SAMPLE).max(1));
+        self.bodies.extend(some.map(|slot| Watched {
+            slot: *slot,
+            gait: Gait::NEW,
+            hold: Hold::EMPTY,
+        }));
+        *self = Self {
+            origin,
+            bodies: std::mem::take(&mut self.bodies),
+            ..Self::default()
+        };
+    }
+
+    /// Looks at the bodies once.
+    fn look<P: Proxies>(&mut self, tick: &Tick<'_, P>, tests: u64) {
+        self.ticks += 1;
+        let counts = u64::from(self.ticks > LEARN_TICKS);
+        self.tests += counts * tests;
+        self.all += counts * tick.members.bounded().len() as u64;
+        for Watched { slot, gait, hold } in &mut self.bodies {
+            if !tick.members.is_bounded(*slot) {
+                continue;
+            }
+            let aabb = tick.proxies.aabb(*slot);
+            let corners = [aabb.min.coords.as_ref(), aabb.max.coords.as_ref()];
+            let mut now = Down::EMPTY;
+            let stays = Portable.take(corners, &self.origin, hold, &mut now);
+            if !stays {
+                *hold = gait.renew(&now, self.ticks, HORIZON, hold);
+            }
+            self.left += counts * u64::from(!stays);
+            self.watched += counts;
+        }
+    }
+
+    /// What it comes to.
+    fn footing(&self) -> Footing {
+        Footing {
+            left: self.left * 1024 / self.watched.max(1),
+            meets: self.tests * 1024 / self.all.max(1),
+        }
+    }
+}
+
+impl Order {
+    /// Goes on with the probe of this tick, if there is one.
+    pub(super) fn probe<P: Proxies>(&mut self, tick: &Tick<'_, P>, work: &Done) {
+        let Some(begins) = self.afresh.gear.probes() else {
+            return;
+        };
+        let probe = &mut self.afresh.probe;
+        if begins {
+            probe.begin(self.origin, tick.members.bounded());
+        }
+        probe.look(tick, work.tests);
+        if probe.ticks == PROBE_TICKS {
+            let footing = probe.footing();
+            self.afresh.gear.note_probe(footing);
+        }
+    }
+}
