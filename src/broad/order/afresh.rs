@@ -214,7 +214,7 @@ impl Order {
             let ticks = split_ticks(most, last);
             #[allow(clippy::cast_precision_loss, reason = "a few ticks")]
             if excess + last * (ticks + 1) as f64 > most {
-                self.sort_ahead(tick, ticks);
+                self.sort_ahead(ticks);
             }
         }
         if excess <= most || (self.afresh.ahead.is_on() && excess <= most * OVERDUE) {

@@ -6,11 +6,12 @@
 //! Who comes or jumps away in between belongs elsewhere than it was sorted to, and is seated behind the others.
 
 use super::afresh::FRAME_TICKS;
-use super::lay::TakeAll;
+use super::lay::TakeLanes;
 use super::links::room;
 use super::place::middle;
 use super::sort::{FILL, Sorter};
-use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick};
+use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, ones, parts};
+use crate::simd::boxes::WIDTH;
 
 /// Ticks that the bodies are split into blocks in, at most: what a tick has of it is then a tenth of its work.
 pub(super) const SPLIT_TICKS_MAX: usize = 4;
@@ -85,67 +86,67 @@ pub(super) fn split_ticks(most: f64, last: f64) -> usize {
 }
 
 impl Order {
-    /// Begins to sort the bodies by the boxes of this tick.
+    /// Begins to sort the bodies by the boxes of this tick, which their lanes hold.
     ///
     /// * `ticks` - how many the sort takes after this one.
-    pub(super) fn sort_ahead<P: Proxies>(&mut self, tick: &Tick<'_, P>, ticks: usize) {
-        let bodies = tick.members.bounded();
-        self.level.run(TakeAll {
-            origin: self.origin,
-            bodies: bodies.iter().copied(),
-            proxies: tick.proxies,
-            boxes: &mut self.boxes,
-        });
+    pub(super) fn sort_ahead(&mut self, ticks: usize) {
+        let ahead = &mut self.afresh.ahead;
+        ahead.bodies.clear();
+        self.boxes.clear();
+        for (block, live) in self.live.iter().enumerate() {
+            for lane in ones(*live) {
+                let slot = self.slot_of[block * WIDTH + lane];
+                ahead.bodies.push(BodySlot(slot));
+                self.boxes.push(self.fat[block].get(lane));
+            }
+        }
         if self.afresh.framed >= FRAME_TICKS {
             self.sorter.frame(&self.boxes);
         }
         self.sorter.begin(&self.boxes);
-        let ahead = &mut self.afresh.ahead;
         ahead.on = true;
         ahead.split = 0;
-        ahead.quota = bodies.len().div_ceil(ticks.max(1));
+        ahead.quota = ahead.bodies.len().div_ceil(ticks.max(1));
         ahead.late.clear();
-        ahead.bodies.clear();
-        ahead.bodies.extend_from_slice(bodies);
         if ticks == 0 {
             ahead.go_on(&mut self.sorter, &self.boxes);
         }
     }
 
-    /// Deals the bodies to blocks in the order sorted ahead, and seats who is late; `false` where there is no lane for
-    /// one.
+    /// Deals the bodies to blocks in the order sorted ahead, by the boxes that their lanes hold, and seats who is late;
+    /// `false` where there is no lane for one.
     pub(super) fn lay_ahead<P: Proxies>(&mut self, tick: &Tick<'_, P>) -> bool {
+        if self.afresh.framed >= FRAME_TICKS {
+            self.look_from_the_middle(tick);
+        }
         let mut ahead = std::mem::take(&mut self.afresh.ahead);
         ahead.stop();
         // Who has no lane is not dealt: who left, and who is late.
         for slot in &ahead.late {
             self.rank_of[slot.index()] = NONE;
         }
-        if self.afresh.framed >= FRAME_TICKS {
-            self.afresh.framed = 0;
-            let bodies = tick.members.bounded().iter();
-            let now = middle(bodies.map(|slot| tick.proxies.aabb(*slot)));
-            self.sorter
-                .shift(std::array::from_fn(|k| now[k] - self.origin[k]));
-            self.origin = now;
+        let (sorter, mut boxes) = (
+            std::mem::take(&mut self.sorter),
+            std::mem::take(&mut self.boxes),
+        );
+        let sorted = || {
+            sorter
+                .sorted()
+                .iter()
+                .map(|(key, at)| (*key, ahead.bodies[*at as usize]))
+        };
+        boxes.clear();
+        for (_, slot) in sorted() {
+            if let Some(rank) = self.rank(slot) {
+                let (block, lane) = parts(rank);
+                boxes.push(self.fat[block].get(lane));
+            }
         }
-        let mut boxes = std::mem::take(&mut self.boxes);
-        let (sorter, rank_of) = (std::mem::take(&mut self.sorter), &self.rank_of);
-        let bodies = sorter.sorted().iter();
-        let bodies = bodies.map(|(_, index)| ahead.bodies[*index as usize]);
-        self.level.run(TakeAll {
-            origin: self.origin,
-            bodies: bodies.filter(|slot| rank_of[slot.index()] != NONE),
-            proxies: tick.proxies,
-            boxes: &mut boxes,
-        });
         self.clear_blocks(tick.members.bounded());
         let mut taken = boxes.iter();
-        for (key, index) in sorter.sorted() {
-            let slot = ahead.bodies[*index as usize];
-            let here = self.rank_of[slot.index()] != NONE;
-            let one = if here { taken.next() } else { None };
-            self.deal_to(*key, FILL, one.map(|one| (slot, one)));
+        for (key, slot) in sorted() {
+            let one = self.rank(slot).and_then(|_| taken.next());
+            self.deal_to(key, FILL, one.map(|one| (slot, one)));
         }
         self.close_blocks(boxes.len());
         (self.sorter, self.boxes) = (sorter, boxes);
@@ -157,5 +158,20 @@ impl Order {
         let all = self.seat_all(&late, tick.proxies);
         self.afresh.ahead.late = late;
         all
+    }
+
+    /// Measures everything from the middle of the boxes: they are taken once more.
+    fn look_from_the_middle<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
+        self.afresh.framed = 0;
+        let bodies = tick.members.bounded().iter();
+        let now = middle(bodies.map(|slot| tick.proxies.aabb(*slot)));
+        self.sorter
+            .shift(std::array::from_fn(|k| now[k] - self.origin[k]));
+        self.origin = now;
+        // Who seems to jump by that does not: nobody asks.
+        self.level.run(TakeLanes {
+            order: self,
+            proxies: tick.proxies,
+        });
     }
 }

@@ -41,7 +41,7 @@ impl Order {
         let mut boxes = std::mem::take(&mut self.boxes);
         self.level.run(TakeAll {
             origin: self.origin,
-            bodies: bodies.iter().copied(),
+            bodies,
             proxies: tick.proxies,
             boxes: &mut boxes,
         });
@@ -184,15 +184,15 @@ fn reach(bound: &[f32; 6], side: f32) -> f32 {
         .product()
 }
 
-/// Takes boxes, in the order of some bodies, as corners.
-pub(super) struct TakeAll<'a, P, B> {
-    pub(super) origin: [f64; 3],
-    pub(super) bodies: B,
-    pub(super) proxies: &'a P,
-    pub(super) boxes: &'a mut Vec<[f32; 6]>,
+/// Takes every box, in the order of the members, as corners.
+struct TakeAll<'a, P> {
+    origin: [f64; 3],
+    bodies: &'a [BodySlot],
+    proxies: &'a P,
+    boxes: &'a mut Vec<[f32; 6]>,
 }
 
-impl<P: Proxies, B: Iterator<Item = BodySlot> + Clone> Work for TakeAll<'_, P, B> {
+impl<P: Proxies> Work for TakeAll<'_, P> {
     type Out = ();
 
     #[inline(always)]
@@ -204,12 +204,11 @@ impl<P: Proxies, B: Iterator<Item = BodySlot> + Clone> Work for TakeAll<'_, P, B
             boxes,
         } = self;
         boxes.clear();
-        let mut ahead = bodies.clone().skip(AHEAD);
-        for slot in bodies {
-            if let Some(ahead) = ahead.next() {
-                prefetch(proxies.aabb(ahead));
+        for (at, slot) in bodies.iter().enumerate() {
+            if let Some(ahead) = bodies.get(at + AHEAD) {
+                prefetch(proxies.aabb(*ahead));
             }
-            let aabb = proxies.aabb(slot);
+            let aabb = proxies.aabb(*slot);
             let (min, max) = (aabb.min.coords.as_ref(), aabb.max.coords.as_ref());
             boxes.push(lanes.outward(min, max, &origin).corners());
         }

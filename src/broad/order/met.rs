@@ -4,7 +4,7 @@
 //! those of two ticks with the same lanes differ by their bits alone.
 
 use super::links::{Matrix, room, small, spare};
-use super::{BodySlot, ones, parts};
+use super::{BodySlot, parts};
 use crate::ids::PairKey;
 use crate::simd::boxes::WIDTH;
 
@@ -177,7 +177,10 @@ impl Met {
         for block in 0..self.blocks() {
             for at in self.of(block) {
                 let other = self.others[at] as usize;
-                let left = without(&self.hits[at], gone[block], gone[other]);
+                let mut left = self.hits[at];
+                if gone[block] | gone[other] != 0 {
+                    left = without(&left, gone[block], gone[other]);
+                }
                 write_down(&left, [block, other], slot_of, carried);
             }
         }
@@ -306,12 +309,16 @@ fn minus(one: &Matrix, other: &Matrix) -> Matrix {
     left
 }
 
-/// Row and lane of each bit.
+/// Row and lane of each bit. Four rows at a time: most have none.
 #[inline(always)]
 fn each(hits: &Matrix, mut with: impl FnMut(usize, usize)) {
-    for (row, line) in hits.iter().enumerate() {
-        for lane in ones(*line) {
-            with(row, lane);
+    for (some, rows) in hits.chunks_exact(4).enumerate() {
+        let words = rows.iter().rev().map(|row| u64::from(*row));
+        let mut bits = words.fold(0, |bits, row| bits << WIDTH | row);
+        while bits != 0 {
+            let at = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            with(some * 4 + at / WIDTH, at % WIDTH);
         }
     }
 }
