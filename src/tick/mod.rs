@@ -208,6 +208,8 @@ impl Engine {
             self.world.end_session(session);
         }
         self.world.age(now_ns);
+        self.world
+            .tell_waited(|frame| self.end.shorten(frame, now_ns));
         if !input.edits.is_empty() {
             self.replan();
         }

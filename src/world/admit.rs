@@ -258,6 +258,16 @@ impl World {
         self.settle(slot, false);
     }
 
+    /// Tells each frame that had to wait and was admitted since the last call.
+    pub fn tell_waited(&mut self, mut tell: impl FnMut(&Frame)) {
+        for source in &mut self.sources {
+            let waiting = &mut source.waiting;
+            if std::mem::take(&mut waiting.admitted) {
+                tell(&waiting.frame);
+            }
+        }
+    }
+
     /// Admits the frame of a source that waited, where the scene has come to its revision or its wait is over.
     pub(super) fn flush_waiting(&mut self, source: SourceSlot) {
         let state = &mut self.sources[source.index()];
@@ -269,7 +279,8 @@ impl World {
             let frame = std::mem::take(&mut state.waiting.frame);
             let times = self.times_of(&frame);
             self.take(source, &frame, times);
-            self.sources[source.index()].waiting.frame = frame;
+            let waiting = &mut self.sources[source.index()].waiting;
+            (waiting.frame, waiting.admitted) = (frame, true);
         } else if until_ns <= self.now_ns {
             state.waiting.until_ns = None;
             state.refused += 1;

@@ -3,6 +3,7 @@
 
 use sweepd::time::{Budget, Clock};
 use sweepd::wire::{RejectReason, TickRow, Verdict, frame_flags};
+use sweepd::world::Edit;
 
 use crate::rig::{ALL, FRAME_NS, Rig, ball_pairs, put_pairs};
 
@@ -92,6 +93,33 @@ fn law_4_5_a_frames_deadline_never_lengthens_the_budget() {
     let mut rig = pairs();
     rig.deadline_ns = after(&rig, LONG_NS);
     assert_eq!(collide(&mut rig, Budget::units(7)).units, 7);
+}
+
+#[test]
+fn law_4_5_a_frame_that_waited_for_a_revision_shortens_the_tick_that_it_is_admitted_in() {
+    for own in [true, false] {
+        let mut rig = pairs();
+        put(&mut rig, TOUCHING);
+        rig.scene_rev = rig.out.tick.header.scene_rev + 1;
+        if own {
+            rig.deadline_ns = after(&rig, FRAME_NS + SHORT_NS);
+        } else {
+            rig.time_left_ns = FRAME_NS + SHORT_NS;
+        }
+        let row = rig.send(ALL).tick;
+        assert_eq!((row.budget_ns, row.units), (u64::MAX, 0), "it waits");
+        rig.clock.step_each_read(LOOK_NS);
+        let margin = Edit::Margin {
+            name: None,
+            report_within_m: Some(0.01),
+        };
+        let row = rig.edit(vec![margin], ALL).tick;
+        rig.clock.step_each_read(0);
+        assert_short(&row);
+        // Once: the next tick is nobody's.
+        let row = rig.idle(FRAME_NS, ALL).tick;
+        assert_eq!((row.budget_ns, row.possible), (u64::MAX, 0));
+    }
 }
 
 #[test]

@@ -93,6 +93,8 @@ pub(crate) struct Rig {
     /// What the next frames say of their ticks' end; 0: nothing.
     pub(crate) deadline_ns: u64,
     pub(crate) time_left_ns: u64,
+    /// Revision of the scene that the next frames need.
+    pub(crate) scene_rev: u64,
     /// Between a frame's receipt and its tick.
     pub(crate) waited_ns: u64,
     /// Ticks that went out alone while the last one was under way.
@@ -129,6 +131,7 @@ impl Rig {
             out: Outbox::default(),
             deadline_ns: 0,
             time_left_ns: 0,
+            scene_rev: 0,
             waited_ns: 0,
             pulses: Vec::new(),
             checked: true,
@@ -228,6 +231,7 @@ impl Rig {
             stamp_ns: self.seq * FRAME_NS,
             deadline_ns: self.deadline_ns,
             time_left_ns: self.time_left_ns,
+            scene_rev: self.scene_rev,
             ..FrameHeader::default()
         };
         frame.received_ns = self.clock.boottime_ns();
