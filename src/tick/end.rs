@@ -2,7 +2,7 @@
 
 use crate::narrow::Order;
 use crate::time::Budget;
-use crate::wire::Frame;
+use crate::wire::FrameHeader;
 
 /// The time of a tick, nanoseconds of `CLOCK_MONOTONIC`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -22,10 +22,10 @@ impl End {
     /// Shortens it by what a frame says, where it says so; never lengthens it. For frames that were admitted only: who
     /// is refused has no say in how long others' answers may take.
     ///
-    /// * `now_ns` - `CLOCK_BOOTTIME`: the time that a frame has left counts from its receipt.
-    pub(super) fn shorten(&mut self, frame: &Frame, now_ns: u64) {
-        let header = &frame.header;
-        let waited_ns = match frame.received_ns {
+    /// * `received_ns` - when it was received, `CLOCK_BOOTTIME`; 0: now. The time that it has left counts from there.
+    /// * `now_ns` - `CLOCK_BOOTTIME`.
+    pub(super) fn shorten(&mut self, header: &FrameHeader, received_ns: u64, now_ns: u64) {
+        let waited_ns = match received_ns {
             0 => 0,
             received_ns => now_ns.saturating_sub(received_ns),
         };

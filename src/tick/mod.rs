@@ -197,7 +197,7 @@ impl Engine {
         }
         for frame in input.inbox.frames() {
             if let Admission::Admitted { .. } = self.world.admit(frame, now_ns) {
-                self.end.shorten(frame, now_ns);
+                self.end.shorten(&frame.header, frame.received_ns, now_ns);
             }
         }
         for vertices in input.inbox.vertices() {
@@ -209,7 +209,7 @@ impl Engine {
         }
         self.world.age(now_ns);
         self.world
-            .tell_waited(|frame| self.end.shorten(frame, now_ns));
+            .tell_waited(|header, received_ns| self.end.shorten(header, received_ns, now_ns));
         if !input.edits.is_empty() {
             self.replan();
         }

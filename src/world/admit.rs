@@ -10,7 +10,9 @@ use super::filters::KEEPS;
 use super::source::{Standing, owns, stand};
 use crate::ids::{BodyId, BodySlot, SourceSlot};
 use crate::limits::FRAME_ROWS_MAX;
-use crate::wire::{Frame, RejectReason, TransformRow, WIRE_VERSION, frame_flags, name_str};
+use crate::wire::{
+    Frame, FrameHeader, RejectReason, TransformRow, WIRE_VERSION, frame_flags, name_str,
+};
 
 /// A row that names no body of its source.
 pub(super) const NO_BODY: BodySlot = BodySlot(u32::MAX);
@@ -258,12 +260,12 @@ impl World {
         self.settle(slot, false);
     }
 
-    /// Tells each frame that had to wait and was admitted since the last call.
-    pub fn tell_waited(&mut self, mut tell: impl FnMut(&Frame)) {
+    /// Tells header and receipt (`CLOCK_BOOTTIME`, nanoseconds) of each frame that had to wait and was admitted since the
+    /// last call.
+    pub fn tell_waited(&mut self, mut tell: impl FnMut(&FrameHeader, u64)) {
         for source in &mut self.sources {
-            let waiting = &mut source.waiting;
-            if std::mem::take(&mut waiting.admitted) {
-                tell(&waiting.frame);
+            if let Some((header, received_ns)) = source.waiting.admitted.take() {
+                tell(&header, received_ns);
             }
         }
     }
@@ -280,7 +282,8 @@ impl World {
             let times = self.times_of(&frame);
             self.take(source, &frame, times);
             let waiting = &mut self.sources[source.index()].waiting;
-            (waiting.frame, waiting.admitted) = (frame, true);
+            waiting.admitted = Some((frame.header, times.received_ns));
+            waiting.frame = frame;
         } else if until_ns <= self.now_ns {
             state.waiting.until_ns = None;
             state.refused += 1;

@@ -47,8 +47,8 @@ pub(super) struct Waiting {
     pub(super) frame: Frame,
     /// When its wait ends, nanoseconds of `CLOCK_BOOTTIME`; `None`: no frame waits.
     pub(super) until_ns: Option<u64>,
-    /// Whether the frame was admitted and nobody was told yet.
-    pub(super) admitted: bool,
+    /// Header and receipt (`CLOCK_BOOTTIME`, nanoseconds) of the last one that was admitted, until somebody was told.
+    pub(super) admitted: Option<(FrameHeader, u64)>,
 }
 
 impl SourceState {

@@ -109,16 +109,47 @@ fn law_4_5_a_frame_that_waited_for_a_revision_shortens_the_tick_that_it_is_admit
         let row = rig.send(ALL).tick;
         assert_eq!((row.budget_ns, row.units), (u64::MAX, 0), "it waits");
         rig.clock.step_each_read(LOOK_NS);
-        let margin = Edit::Margin {
-            name: None,
-            report_within_m: Some(0.01),
-        };
-        let row = rig.edit(vec![margin], ALL).tick;
+        let row = rig.edit(vec![margin(0.01)], ALL).tick;
         rig.clock.step_each_read(0);
         assert_short(&row);
         // Once: the next tick is nobody's.
         let row = rig.idle(FRAME_NS, ALL).tick;
         assert_eq!((row.budget_ns, row.possible), (u64::MAX, 0));
+    }
+}
+
+#[test]
+fn law_4_5_a_frame_that_goes_on_waiting_does_not_shorten_the_tick_of_the_one_before_it() {
+    let mut rig = pairs();
+    put(&mut rig, TOUCHING);
+    let now = rig.out.tick.header.scene_rev;
+    (rig.scene_rev, rig.time_left_ns) = (now + 1, 2 * FRAME_NS + SHORT_NS);
+    rig.send(ALL);
+    // The next one, in the tick of the edit that the first waits for, waits for another.
+    (rig.scene_rev, rig.time_left_ns) = (now + 2, 1);
+    rig.clock.step_each_read(LOOK_NS);
+    let row = rig.send_with(vec![margin(0.01)], ALL).tick;
+    rig.clock.step_each_read(0);
+    assert_eq!(row.header.scene_rev, now + 1);
+    assert!(
+        row.budget_ns > SHORT_NS,
+        "{} ns: the first one's",
+        row.budget_ns
+    );
+    assert!(row.budget_ns < FRAME_NS + SHORT_NS);
+    assert_eq!(row.overrun, 0);
+    let row = rig.edit(vec![margin(0.02)], ALL).tick;
+    assert_eq!(
+        (row.header.scene_rev, row.overrun),
+        (now + 2, 1),
+        "the second one's"
+    );
+}
+
+fn margin(report_within_m: f64) -> Edit {
+    Edit::Margin {
+        name: None,
+        report_within_m: Some(report_within_m),
     }
 }
 
