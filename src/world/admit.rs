@@ -260,8 +260,8 @@ impl World {
         self.settle(slot, false);
     }
 
-    /// Tells header and receipt (`CLOCK_BOOTTIME`, nanoseconds) of each frame that had to wait and was admitted since the
-    /// last call.
+    /// Tells header and receipt (`CLOCK_BOOTTIME`, nanoseconds) of each frame that had to wait and was admitted since
+    /// the last call.
     pub fn tell_waited(&mut self, mut tell: impl FnMut(&FrameHeader, u64)) {
         for source in &mut self.sources {
             if let Some((header, received_ns)) = source.waiting.admitted.take() {

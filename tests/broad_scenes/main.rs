@@ -1,5 +1,6 @@
 //! Goal: every broad phase gives the exact pairs and events in every scene class of the bench, the main one with every
-//! set of vector instructions and with several threads, through churn of everything, and in the two cases that once gave double pairs.
+//! set of vector instructions and with several threads, through churn of everything, and in the two cases that once
+//! gave double pairs.
 //!
 //! Method: the bench's scenes at 2,000 bodies; in each frame the pair set is compared with an exact set found another
 //! way (strips and a sweep), and the events with the difference of two such sets. 2,000 frames a scene in release, 60
@@ -26,6 +27,7 @@ mod exact;
 mod rig;
 #[path = "../../benches/broad/scenes.rs"]
 mod scenes;
+mod soak;
 
 use common::Rng;
 use rig::{Rig, at};
@@ -163,6 +165,54 @@ fn blocks_stay_compact_while_bodies_come_and_go_and_all_are_sorted_over_some_tic
 }
 
 #[test]
+fn bodies_that_come_or_leave_alone_or_lose_their_bounds_while_all_are_sorted_are_exact() {
+    const BODIES: usize = 1500;
+    let mut scene = Scene::new(Kind::Gas, BODIES, 11);
+    let mut rig = Rig::geared("from scratch", &[true], BODIES, false);
+    rig.start(&scene.boxes);
+    let mut rng = Rng::new(5);
+    let mut inside = [true; BODIES];
+    // Longer than the frame of the curve lasts.
+    for frame in 0..400 {
+        scene.step();
+        let mut boxes = scene.boxes.clone();
+        // Everywhere for some frames, and bounded again.
+        let endless = frame % 10 < 3;
+        if endless {
+            boxes[0] = [[f32::NEG_INFINITY; 3], [f32::INFINITY; 3]];
+        }
+        let (mut left, mut came) = (Vec::new(), Vec::new());
+        // Now and then so many that what is sorted is given up.
+        let changes = if frame % 50 == 30 { 300 } else { 4 };
+        for _ in 0..changes {
+            let body = 1 + rng.below(BODIES - 1);
+            let slot = body as u32;
+            if !left.contains(&slot) && !came.contains(&slot) {
+                let list = if inside[body] { &mut left } else { &mut came };
+                list.push(slot);
+                inside[body] = !inside[body];
+            }
+        }
+        let stays = |body: &u32| inside[*body as usize] && !came.contains(body);
+        let moved: Vec<u32> = scene.moved.iter().copied().filter(stays).collect();
+        rig.change(&boxes, &moved, &left, &came);
+        // Bodies that are out stand far away, each by itself; the endless one meets all others.
+        let mut seen = boxes;
+        for body in (0..BODIES).filter(|body| !inside[*body] || (endless && *body == 0)) {
+            seen[body] = at([1e6 + body as f32 * 4.0, 0.0, 0.0], 0.5);
+        }
+        let mut wanted = exact::pairs(&seen);
+        if endless {
+            let others = (1..BODIES as u32).filter(|body| inside[*body as usize]);
+            wanted.extend(others.map(|body| (0, body)));
+            wanted.sort_unstable();
+        }
+        rig.tick(&wanted, &format!("frame {frame}"));
+        rig.validate();
+    }
+}
+
+#[test]
 fn candidates_are_tried_again_when_bodies_have_calmed_and_not_before() {
     let mut scene = Scene::new(Kind::Gas, 1000, 11);
     let mut rig = Rig::new(Level::best(), 1000, false);
@@ -261,95 +311,5 @@ fn bodies_that_jump_together_keep_their_pair_without_an_event() {
         rig.put(&now, &moved, &churned);
         rig.tick(&exact::pairs(&now), &format!("tick {tick}"));
         rig.validate();
-    }
-}
-
-#[test]
-fn motions_mixed_while_bodies_come_and_go_stay_exact() {
-    soak(frames() / 4, 1500, 17);
-}
-
-#[test]
-#[ignore = "takes 20 minutes; SWEEPD_CI_SLOW=1 .ci/run runs it"]
-fn soak_for_twenty_minutes() {
-    let seconds = std::env::var("SWEEPD_SOAK_S").map_or(1200, |s| s.parse().unwrap());
-    let clock = sweepd::time::SystemClock;
-    let now = || sweepd::time::Clock::monotonic_ns(&clock);
-    let (start, mut seed) = (now(), 0);
-    while now() - start < seconds * 1_000_000_000 {
-        soak(600, 100_000, seed);
-        seed += 1;
-    }
-}
-
-/// Bodies come up to `most` and go to none, each round moving in another way; every tick is exact.
-fn soak(ticks: usize, most: usize, seed: u64) {
-    let mut rig = Rig::new(Level::best(), most, false);
-    rig.use_threads(2);
-    let mut rng = Rng::new(seed);
-    let reach = (most as f64 / 0.7).cbrt();
-    let mut boxes = vec![at([0.0; 3], 0.5); most];
-    let mut inside = vec![false; most];
-    let mut ways = vec![[0.0_f32; 3]; most];
-    for tick in 0..ticks {
-        let phase = tick * 8 / ticks;
-        let growing = phase.is_multiple_of(2);
-        let step = most * 10 / ticks.max(1) + 1;
-        let (mut came, mut left, mut moved) = (Vec::new(), Vec::new(), Vec::new());
-        for _ in 0..step {
-            let body = rng.below(most);
-            if growing && !inside[body] {
-                let place = std::array::from_fn(|_| rng.between(0.0, reach) as f32);
-                boxes[body] = at(place, 0.05 * 20.0_f64.powf(rng.unit()) as f32);
-                inside[body] = true;
-                came.push(body as u32);
-            } else if !growing && inside[body] && !came.contains(&(body as u32)) {
-                inside[body] = false;
-                left.push(body as u32);
-            }
-        }
-        // Seven ways to move: none, few, few others, all, all anew, all far, jumps.
-        let way = tick / 9 % 7;
-        for body in (0..most).filter(|body| inside[*body] && way != 0) {
-            let mine = match way {
-                1 => body.is_multiple_of(100),
-                2 => body % 100 == tick % 100,
-                6 => rng.once_in(20),
-                _ => true,
-            };
-            if !mine || came.contains(&(body as u32)) {
-                continue;
-            }
-            let far = [0.0, 0.03, 0.03, 0.03, 0.03, 0.5, reach][way];
-            if way != 3 || rng.once_in(50) {
-                ways[body] = std::array::from_fn(|_| rng.between(-far, far) as f32);
-            }
-            for corner in &mut boxes[body] {
-                for (x, v) in corner.iter_mut().zip(ways[body]) {
-                    *x += v;
-                }
-            }
-            moved.push(body as u32);
-        }
-        if phase == 7 && tick.is_multiple_of(5) {
-            // To none at all, and up again.
-            left.extend(
-                (0..most as u32).filter(|body| inside[*body as usize] && !came.contains(body)),
-            );
-            left.iter().for_each(|body| inside[*body as usize] = false);
-            moved.clear();
-        }
-        rig.change(&boxes, &moved, &left, &came);
-        // Bodies that are out stand far away, each by itself.
-        let mut seen = boxes.clone();
-        for (body, inside) in inside.iter().enumerate() {
-            if !inside {
-                seen[body] = at([1e6 + body as f32 * 4.0, 0.0, 0.0], 0.5);
-            }
-        }
-        rig.tick(&exact::pairs(&seen), &format!("seed {seed}, tick {tick}"));
-        if tick.is_multiple_of(50) {
-            rig.validate();
-        }
     }
 }

@@ -6,16 +6,17 @@
 //! tree for those behind it that it meets (`met`): what overlaps is a matrix of bits for each two such blocks. As long
 //! as the lanes stay, what began and what parted are differences of these bits, so no list of pairs is sorted or kept.
 //! It costs the same whatever the bodies do: dearer than candidates that last, and cheaper than candidates that never
-//! do. Which of the two a tick takes is chosen by counted work (`Gear`).
+//! do. Which of the two a tick takes is chosen by counted work (`gear`, `probe`).
 //!
-//! Bodies are laid anew when the blocks have grown so much that what is asked too much has cost as much as that.
+//! Bodies are laid anew when the blocks have grown so much that what is asked too much has cost as much as that. They
+//! are sorted for it over the ticks before (`presort`), or at once where the order is spoilt at once.
 //!
 //! Exact as the rest: boxes are rounded outward, and where rounding could tell otherwise the f64 boxes are asked.
 
-use super::ahead::{Ahead, SPLIT_TICKS_MAX, split_ticks};
 use super::gear::Gear;
 use super::lay::TakeLanes;
 use super::met::{Met, tell_all, tell_asked, tell_difference};
+use super::presort::{Presort, SPLIT_TICKS_MAX, split_ticks};
 use super::probe::Probe;
 use super::sweep::Finds;
 use super::team::Team;
@@ -43,8 +44,8 @@ const AHEAD: usize = 16;
 enum Lay {
     /// Bodies stay where they are.
     Stays,
-    /// They are laid in the order that was sorted ahead.
-    Ahead,
+    /// They are laid in the order that was sorted over the last ticks.
+    Presorted,
     /// They are sorted and laid at once.
     Anew,
 }
@@ -60,7 +61,7 @@ pub(super) struct Afresh {
     pub(super) framed: u32,
     pub(super) laid: u32,
     /// The order that the bodies are to be laid in next.
-    pub(super) ahead: Ahead,
+    pub(super) presort: Presort,
     /// While they are laid: lanes of the last block that have been passed.
     pub(super) dealt: usize,
     /// Ticks left in which bodies are laid without a look.
@@ -96,7 +97,7 @@ impl Order {
         // Lanes change without them: what was learned would be another body's.
         self.gaits.clear();
         self.afresh.on = true;
-        self.afresh.ahead.stop();
+        self.afresh.presort.stop();
         self.afresh.held.clear();
         self.afresh.framed = FRAME_TICKS;
     }
@@ -116,13 +117,17 @@ impl Order {
         }
         self.afresh.framed = self.afresh.framed.saturating_add(1);
         self.afresh.laid = self.afresh.laid.saturating_add(1);
-        let lanes = if was { self.lanes(tick) } else { Lay::Anew };
+        let lanes = if was {
+            self.keep_lanes(tick)
+        } else {
+            Lay::Anew
+        };
         let stays = lanes == Lay::Stays;
         if !stays {
             if was {
                 self.carry_held();
             }
-            if lanes == Lay::Anew || !self.lay_ahead(tick) {
+            if lanes == Lay::Anew || !self.lay_presorted(tick) {
                 self.lay_anew(tick);
             }
         }
@@ -159,6 +164,7 @@ impl Order {
 
     /// Bodies left: they give up their lanes, and their pairs are no difference.
     pub(super) fn leave_afresh(&mut self, left: &[BodySlot]) {
+        self.afresh.presort.note_left(left.len());
         for slot in left {
             let Some(rank) = self.rank(*slot) else {
                 continue;
@@ -173,8 +179,9 @@ impl Order {
         }
     }
 
-    /// Gives who came a lane, takes every box, and tells whether the order is still good.
-    fn lanes<P: Proxies>(&mut self, tick: &Tick<'_, P>) -> Lay {
+    /// Gives who came a lane, takes every box, sorts some more where a sort is under way or due, and tells what becomes
+    /// of the lanes.
+    fn keep_lanes<P: Proxies>(&mut self, tick: &Tick<'_, P>) -> Lay {
         if self.afresh.spoilt > 0 {
             self.afresh.spoilt -= 1;
             return Lay::Anew;
@@ -186,8 +193,8 @@ impl Order {
         let worn = self.afresh.excess + self.afresh.last > most;
         let changed = came + self.afresh.jumps;
         let steady = changed * MANY_CAME * (SPLIT_TICKS_MAX + 1) <= bodies;
-        let late = worn && !(self.afresh.ahead.is_on() || steady);
-        if late || came * MANY_CAME > bodies {
+        let at_once = worn && !(self.afresh.presort.is_on() || steady);
+        if at_once || came * MANY_CAME > bodies {
             return Lay::Anew;
         }
         let jumped = self.level.run(TakeLanes {
@@ -202,28 +209,29 @@ impl Order {
         self.afresh.last = last;
         self.afresh.excess += last;
         let excess = self.afresh.excess;
-        if self.afresh.ahead.is_on() {
-            self.afresh.ahead.note_late(&self.homeless, bodies);
-            if self.afresh.ahead.is_ready() {
-                return Lay::Ahead;
+        self.afresh.presort.note_late(&self.homeless, bodies);
+        if self.afresh.presort.is_ready() {
+            return Lay::Presorted;
+        }
+        let spoils = self.afresh.laid == 1;
+        let waits = if spoils { most } else { most * OVERDUE };
+        if excess > waits || excess > most && !(steady || self.afresh.presort.is_on()) {
+            if spoils {
+                self.afresh.spoilt = SPOILT_TICKS;
             }
-            let Afresh { ahead, .. } = &mut self.afresh;
-            ahead.go_on(&mut self.sorter, &self.boxes);
+            return Lay::Anew;
+        }
+        let Afresh { presort, .. } = &mut self.afresh;
+        if presort.is_on() {
+            presort.go_on(&mut self.sorter, &self.boxes);
         } else if steady {
-            // As many as they take next to nothing of: in fast motion an old order is worth little.
             let ticks = split_ticks(most, last);
             #[allow(clippy::cast_precision_loss, reason = "a few ticks")]
             if excess + last * (ticks + 1) as f64 > most {
-                self.sort_ahead(ticks);
+                self.begin_presort(ticks);
             }
         }
-        if excess <= most || (self.afresh.ahead.is_on() && excess <= most * OVERDUE) {
-            return Lay::Stays;
-        }
-        if self.afresh.laid == 1 {
-            self.afresh.spoilt = SPOILT_TICKS;
-        }
-        Lay::Anew
+        Lay::Stays
     }
 
     /// Asks the f64 boxes of what rounding leaves open.
@@ -308,6 +316,7 @@ impl Order {
                 return Err(format!("the lane of {slot:?} is not its own"));
             }
         }
+        self.check_presort(members)?;
         self.tree.validate(&self.fat)?;
         if bodies.len() > 300 {
             return Ok(());

@@ -41,25 +41,29 @@ const _: () = assert!(
     "one probe at its begin, one at its end"
 );
 const SPELL_MAX: u32 = 2048;
+/// So many spells end without a trial where probes promise nothing, for they do not see all that candidates cost.
+const VAIN_MAX: u32 = 64;
+/// Fat boxes that candidates renew for each one that a body escapes from, at most: some are renewed along with others.
+const RENEWED_PER_ESCAPE: u64 = 3;
 /// A trial of candidates that lasted so many ticks was no failure.
 const TRIAL_TICKS: u32 = 64;
 /// So many ticks in a row with few moved, and candidates are better without a trial.
 const CALM_TICKS: u32 = 4;
 
-/// What it hangs on whether candidates pay.
+/// What decides whether candidates pay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Footing {
-    /// Bodies that leave their fat boxes in a tick, of 1024.
-    pub(super) left: u64,
+    /// Bodies that escape from their fat boxes in a tick, of 1024.
+    pub(super) escapes: u64,
     /// Boxes compared with a block in a search of all, for 1024 bodies.
     pub(super) meets: u64,
 }
 
 impl Footing {
-    /// Whether candidates may pay now, who did not then: bodies keep longer to their fat boxes, or there is another
+    /// Whether candidates may pay now, which did not then: bodies keep longer to their fat boxes, or there is another
     /// crowd of them.
     fn promises(&self, then: &Self) -> bool {
-        let calmer = self.left * 4 < then.left * 3;
+        let calmer = self.escapes * 4 < then.escapes * 3;
         let (few, many) = (self.meets.min(then.meets), self.meets.max(then.meets));
         calmer || many * 3 > few * 4
     }
@@ -83,9 +87,14 @@ pub(super) struct Gear {
     calm: u32,
     /// Boxes compared with a block without candidates, a body, by the last such tick; 0 before the first.
     meets: u64,
-    /// The footing on which candidates were given up, and the last one seen.
-    given_up: Option<Footing>,
-    seen: Option<Footing>,
+    /// Fat boxes renewed in a tick with candidates, of 1024 bodies, in the mean; of the last such ticks while there are
+    /// none.
+    renewed: u64,
+    /// The footing right after candidates were given up, and the last one since.
+    first: Option<Footing>,
+    last: Option<Footing>,
+    /// Spells since without a trial.
+    vain: u32,
 }
 
 impl Default for Gear {
@@ -100,8 +109,10 @@ impl Default for Gear {
             since: TRIAL_TICKS,
             calm: 0,
             meets: 0,
-            given_up: None,
-            seen: None,
+            renewed: 0,
+            first: None,
+            last: None,
+            vain: 0,
         }
     }
 }
@@ -130,9 +141,10 @@ impl Gear {
                 self.spell = SPELL_MIN;
             }
             let over = self.left == 0;
-            let in_vain = over && self.is_as_it_was();
+            let in_vain = over && self.vain < VAIN_MAX && self.is_as_it_was();
             if in_vain {
                 self.left = SPELL_MIN;
+                self.vain += 1;
             }
             self.cause = match (calm, over && !in_vain) {
                 (true, _) => BroadCause::Calm,
@@ -169,15 +181,18 @@ impl Gear {
                 self.left = self.spell;
             }
             (self.since, self.ticks, self.mean) = (0, 0, 0);
-            (self.given_up, self.seen) = (None, None);
+            (self.first, self.last, self.vain) = (None, None, 0);
         }
         chosen
     }
 
-    /// Whether candidates were given up on the footing that was seen last.
+    /// Whether candidates would fare as they did when they were given up, as far as probes tell. The first came a
+    /// little later: what had calmed by then is seen by what candidates themselves had to renew.
     fn is_as_it_was(&self) -> bool {
-        match (self.given_up, self.seen) {
-            (Some(then), Some(now)) => !now.promises(&then),
+        match (self.first, self.last) {
+            (Some(then), Some(now)) => {
+                !now.promises(&then) && now.escapes * RENEWED_PER_ESCAPE >= self.renewed
+            }
             _ => false,
         }
     }
@@ -199,9 +214,9 @@ impl Gear {
     /// Takes what a probe has come to.
     pub(super) fn note_probe(&mut self, footing: Footing) {
         if self.since < PROBE_TICKS {
-            self.given_up = Some(footing);
+            self.first = Some(footing);
         } else {
-            self.seen = Some(footing);
+            self.last = Some(footing);
         }
     }
 
@@ -235,6 +250,8 @@ impl Gear {
         }
         let share = (self.ticks - self.counted_from()).min(MEAN_TICKS);
         self.mean = (self.mean * (share - 1) + cost) / share;
+        let renewed = work.renewed * 1024 / (moved as u64).max(1);
+        self.renewed = (self.renewed * (share - 1) + renewed) / share;
     }
 }
 
@@ -277,44 +294,61 @@ mod tests {
         assert_eq!(run(&mut gear, &mut on, 1000, &calm), 0);
     }
 
-    #[test]
-    fn candidates_are_not_tried_again_on_the_footing_that_they_were_given_up_on() {
-        let (mut gear, mut on) = (Gear::default(), false);
-        let wild = work(10_000, 900);
-        run(&mut gear, &mut on, 40, &wild);
-        assert!(on);
-        // Two probes of `PROBE_TICKS`, each with a first tick, in each spell; what they come to is told here.
-        let probe = |gear: &mut Gear, spells: u32, footing: Footing| {
-            let (mut begun, mut ticks, mut trials) = (0, 0, 0);
-            for _ in 0..spells * SPELL_MIN {
-                trials += u32::from(!gear.choose(true, 1000, 1000, 300));
-                if let Some(begins) = gear.probes() {
-                    begun += u32::from(begins);
-                    ticks += 1;
-                    if ticks % PROBE_TICKS == 0 {
-                        gear.note_probe(footing);
-                    }
+    /// Gives up candidates that renewed 900 boxes a tick of 1,000 bodies.
+    fn given_up() -> Gear {
+        let (mut gear, wild) = (Gear::default(), work(10_000, 900));
+        while !gear.choose(false, 1000, 1000, 300) {
+            gear.note(1000, 0, &wild);
+        }
+        assert_eq!((gear.left, gear.probes()), (SPELL_LONG, Some(true)));
+        gear
+    }
+
+    /// Ticks without candidates, as many as asked for or until a trial; what probes come to is told. Returns how many
+    /// began, their ticks, and whether a trial came.
+    fn spell(gear: &mut Gear, most: u32, escapes: u64, meets: u64) -> (u32, u32, bool) {
+        let (mut begun, mut ticks) = (0, 0);
+        for _ in 0..most {
+            if let Some(begins) = gear.probes() {
+                begun += u32::from(begins);
+                ticks += 1;
+                if ticks % PROBE_TICKS == 0 {
+                    gear.note_probe(Footing { escapes, meets });
                 }
             }
-            (begun, ticks, trials)
-        };
-        let then = Footing {
-            left: 100,
-            meets: 2000,
-        };
-        (gear.since, gear.left) = (u32::MAX, SPELL_MIN);
-        (gear.given_up, gear.seen) = (Some(then), None);
-        let alike = Footing {
-            left: 80,
-            meets: 2500,
-        };
-        assert_eq!(probe(&mut gear, 20, alike), (20, 20 * PROBE_TICKS, 0));
-        let calmer = Footing { left: 70, ..alike };
-        assert_eq!(probe(&mut gear, 1, calmer).2, 1);
-        assert_eq!(gear.cause, BroadCause::Trial);
-        for (meets, promises) in [(1400, true), (1600, false), (2600, false), (2700, true)] {
-            assert_eq!(Footing { meets, ..alike }.promises(&then), promises);
+            if !gear.choose(true, 1000, 1000, 300) {
+                assert_eq!(gear.cause, BroadCause::Trial);
+                return (begun, ticks, true);
+            }
         }
+        (begun, ticks, false)
+    }
+
+    #[test]
+    fn candidates_are_not_tried_again_on_the_footing_that_they_were_given_up_on() {
+        let mut gear = given_up();
+        let two = (2, 2 * PROBE_TICKS, false);
+        assert_eq!(spell(&mut gear, SPELL_LONG, 400, 2000), two);
+        let ten = (10, 10 * PROBE_TICKS, false);
+        assert_eq!(spell(&mut gear, 10 * SPELL_MIN, 350, 2500), ten);
+        // Calmer, or another crowd.
+        for (escapes, meets) in [(290, 2000), (400, 1400), (400, 2700)] {
+            let mut other = gear;
+            assert!(
+                spell(&mut other, SPELL_MIN, escapes, meets).2,
+                "{escapes} {meets}"
+            );
+        }
+        // Nor are they given up for ever.
+        let rest = (VAIN_MAX - 11) * SPELL_MIN;
+        assert!(!spell(&mut gear, rest, 400, 2000).2);
+        assert!(spell(&mut gear, SPELL_MIN, 400, 2000).2);
+    }
+
+    #[test]
+    fn a_burst_that_has_calmed_before_the_first_probe_is_no_footing() {
+        let mut gear = given_up();
+        assert!(spell(&mut gear, SPELL_LONG, 50, 2000).2);
     }
 
     #[test]

@@ -5,7 +5,7 @@
 use super::afresh::{Afresh, FRAME_TICKS};
 use super::links::{room, spare};
 use super::place::{ATTIC, grow, middle};
-use super::sort::{FILL, Sorter};
+use super::sort::{FILL, Frame, Sorter};
 use super::tree::NO_BOUND;
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, ones, small};
 use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work, prefetch};
@@ -31,7 +31,7 @@ impl Order {
 
     /// Deals the bodies to blocks anew, each block compact.
     pub(super) fn lay_anew<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
-        self.afresh.ahead.stop();
+        self.afresh.presort.stop();
         let bodies = tick.members.bounded();
         let look_again = self.afresh.framed >= FRAME_TICKS;
         if look_again {
@@ -46,7 +46,7 @@ impl Order {
             boxes: &mut boxes,
         });
         if look_again {
-            self.sorter.frame(&boxes);
+            self.sorter.frame = Frame::of(&boxes);
         }
         let mut sorter = std::mem::take(&mut self.sorter);
         self.clear_blocks(bodies);
@@ -96,7 +96,7 @@ impl Order {
         self.tree.reserve();
     }
 
-    /// Bounds every block, and takes that as what is usual from now on.
+    /// Bounds every block, and takes what they fill as what is usual from now on; who is seated later adds to it.
     ///
     /// * `bodies` - how many there are; room is made for as many.
     pub(super) fn bound_all(&mut self, bodies: usize) {
@@ -113,7 +113,7 @@ impl Order {
             gone,
             jumped,
             finds,
-            ahead,
+            presort,
             ..
         } = &mut self.afresh;
         for lanes in [gone, jumped] {
@@ -124,12 +124,14 @@ impl Order {
         let seats = bodies / MANY_CAME + 1;
         room(&mut self.homeless, seats);
         room(&mut self.worklist, 2 * seats);
-        ahead.reserve(bodies, seats);
+        presort.reserve(bodies + seats, seats);
+        room(&mut self.boxes, bodies + seats);
         finds.reserve(blocks, bodies);
         spare(&mut self.carried, self.hits, bodies);
     }
 
-    /// Gives a body the next lane, or nobody: the bodies of a block are those that were sorted to it.
+    /// Gives a body the next lane, or nobody: a lane is passed over for who is gone, so that the blocks stay those of
+    /// the sort.
     ///
     /// * `key` - of the stretch that it was sorted to.
     /// * `fill` - bodies of a block.

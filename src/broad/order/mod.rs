@@ -15,8 +15,8 @@
 //!   seldom sorted anew.
 //! * **Exact.** Boxes are f32, rounded outward, relative to an f64 origin amid the scene; where rounding could tell
 //!   otherwise than the f64 boxes, those are asked. So the pairs are those of the f64 boxes at any offset.
-//! * **Without candidates** (`afresh`, `sweep`, `met`, `ahead`): where no fat box lasts, lanes and overlaps alone are
-//!   kept, until a few bodies show that fat boxes would last (`probe`). Threads (`team`) share a large search.
+//! * **Without candidates** (`afresh`, `sweep`, `met`, `presort`): where no fat box lasts, lanes and overlaps alone are
+//!   kept. Threads (`team`) share a large search: the same bits for any number.
 //! * **Modes** (few or many moved; renewal, sorting anew, without candidates) are chosen by counted work with weights
 //!   that were measured once, so that a replay chooses alike. They decide about cost alone: pairs, slots and events are
 //!   the same.
@@ -37,7 +37,6 @@ use crate::simd::boxes::{Boxes16, Down, Hold, Level, WIDTH};
 use crate::wire::{BroadCause, BroadMode};
 
 mod afresh;
-mod ahead;
 mod fatten;
 mod gear;
 mod jump;
@@ -48,6 +47,7 @@ mod look;
 mod mend;
 mod met;
 mod place;
+mod presort;
 mod probe;
 mod renew;
 mod sort;

@@ -2,7 +2,7 @@
 
 use super::fatten::{Gait, outward};
 use super::links::{room, small, spare};
-use super::sort::{CLASSES_MAX, FILL, Sorter, centre};
+use super::sort::{CLASSES_MAX, FILL, Frame, Sorter, centre};
 use super::tree::NO_BOUND;
 use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, ones, parts};
 use crate::math::Aabb;
@@ -130,7 +130,7 @@ impl Order {
     /// A free lane near a box's place on the curve, in the block whose part of space is nearest; and how far that is,
     /// squared.
     pub(super) fn lane_near(&self, one: &[f32; 6]) -> Option<(f32, u32)> {
-        let key = self.sorter.key(one);
+        let key = self.sorter.frame.key(one);
         let sorted = &self.keys[..self.sorted];
         let home = sorted.partition_point(|first| *first <= key);
         let mut best = (f32::INFINITY, None);
@@ -162,7 +162,7 @@ impl Order {
                 .iter()
                 .map(|slot| outward(Portable, tick.proxies.aabb(*slot), &self.origin).corners()),
         );
-        self.sorter.frame(&boxes);
+        self.sorter.frame = Frame::of(&boxes);
         self.lay_out(bodies, &boxes);
         self.boxes = boxes;
         for rank in 0..self.slot_of.len() {

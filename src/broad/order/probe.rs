@@ -1,11 +1,13 @@
 //! Without candidates: what a few bodies would do with fat boxes.
 //!
-//! In: the boxes of some bodies, in each tick of a while. Out: how often they left fat boxes that nobody else sees, and
-//! what the search met meanwhile. Where both are as they were when candidates were given up, candidates are not tried
-//! again: a trial takes several times what the ticks about it take, a probe next to nothing.
+//! In: the boxes of some bodies, in each tick of a while. Out: how often they escape from fat boxes that nobody else
+//! sees, and what the search meets meanwhile. Where they escape no more seldom than when candidates were given up, and
+//! as much is met, candidates are not tried again: a trial takes several times what the ticks about it take, a probe
+//! next to nothing.
 
 use super::fatten::{Gait, HORIZON};
 use super::gear::Footing;
+use super::links::room;
 use super::{BodySlot, Order, Proxies, Tick, Work as Done};
 use crate::simd::boxes::{Down, Hold, Lanes, Portable};
 
@@ -30,8 +32,8 @@ pub(super) struct Probe {
     /// Where the boxes are measured from, metres.
     origin: [f64; 3],
     bodies: Vec<Watched>,
-    /// Bodies that left their fat boxes, and those that could have.
-    left: u64,
+    /// Bodies that escaped from their fat boxes, and those that could have.
+    escapes: u64,
     watched: u64,
     /// Boxes compared with a block, and bodies.
     tests: u64,
@@ -42,6 +44,7 @@ impl Probe {
     /// Begins anew, with some of these bodies.
     fn begin(&mut self, origin: [f64; 3], bodies: &[BodySlot]) {
         self.bodies.clear();
+        room(&mut self.bodies, 2 * SAMPLE);
         let some = bodies.iter().step_by((bodies.len() / SAMPLE).max(1));
         self.bodies.extend(some.map(|slot| Watched {
             slot: *slot,
@@ -72,7 +75,7 @@ impl Probe {
             if !stays {
                 *hold = gait.renew(&now, self.ticks, HORIZON, hold);
             }
-            self.left += counts * u64::from(!stays);
+            self.escapes += counts * u64::from(!stays);
             self.watched += counts;
         }
     }
@@ -80,7 +83,7 @@ impl Probe {
     /// What it comes to.
     fn footing(&self) -> Footing {
         Footing {
-            left: self.left * 1024 / self.watched.max(1),
+            escapes: self.escapes * 1024 / self.watched.max(1),
             meets: self.tests * 1024 / self.all.max(1),
         }
     }

@@ -23,13 +23,19 @@ pub(super) const CLASSES_MAX: usize = 1 << (64 - CURVE_BITS - INDEX_BITS);
 /// Bits that one pass of the radix sort takes.
 const DIGIT_BITS: u32 = 11;
 
-/// The frame of the curve and the memory of the sort.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Sorter {
+/// The frame of the curve: where a box belongs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
     low: [f32; 3],
     scale: [f32; 3],
     /// By octave: its class.
-    classes: Vec<u8>,
+    classes: [u8; OCTAVES],
+}
+
+/// A frame of the curve and the memory of the sort.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sorter {
+    pub(super) frame: Frame,
     words: Vec<u64>,
     spare: Vec<u64>,
     counts: Vec<u32>,
@@ -37,9 +43,20 @@ pub(super) struct Sorter {
     middles: Vec<([f32; 3], u32)>,
 }
 
-impl Sorter {
-    /// Looks at the boxes and lays classes and the frame of the curve.
-    pub(super) fn frame(&mut self, boxes: &[[f32; 6]]) {
+impl Default for Frame {
+    fn default() -> Self {
+        Self {
+            low: [0.0; 3],
+            scale: [0.0; 3],
+            classes: [0; OCTAVES],
+        }
+    }
+}
+
+impl Frame {
+    /// The one that suits these boxes.
+    pub(super) fn of(boxes: &[[f32; 6]]) -> Self {
+        let mut frame = Self::default();
         let mut seen = [0_u32; OCTAVES];
         let (mut count, mut sum, mut squares) = (0_u32, [0.0_f64; 3], [0.0_f64; 3]);
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
@@ -69,18 +86,17 @@ impl Sorter {
                 reason = "a place on a curve, not a bound"
             )]
             {
-                self.low[k] = from as f32;
+                frame.low[k] = from as f32;
                 let even = cells / (to - from).max(f64::from(f32::MIN_POSITIVE));
-                self.scale[k] = even.min(finest) as f32;
+                frame.scale[k] = even.min(finest) as f32;
             }
         }
-        self.lay_classes(&seen);
+        frame.lay_classes(&seen);
+        frame
     }
 
     /// From the largest size down, each class begins at the next octave that has any body.
     fn lay_classes(&mut self, seen: &[u32; OCTAVES]) {
-        self.classes.clear();
-        self.classes.resize(OCTAVES, 0);
         let (mut class, mut left) = (0_usize, 0);
         let mut begun = false;
         for octave in (0..OCTAVES).rev() {
@@ -98,7 +114,7 @@ impl Sorter {
 
     /// Where a box belongs: its class above its place on the curve.
     pub(super) fn key(&self, one: &[f32; 6]) -> u64 {
-        let class = self.classes.get(octave(one)).copied().unwrap_or(0);
+        let class = self.classes[octave(one)];
         let centre = centre(one);
         let mut key = u64::from(class) << CURVE_BITS;
         for (k, centre) in centre.into_iter().enumerate() {
@@ -114,6 +130,22 @@ impl Sorter {
         key
     }
 
+    /// The same frame, told by another origin.
+    ///
+    /// * `by` - the new origin less the old one.
+    pub(super) fn shift(&mut self, by: [f64; 3]) {
+        for (low, by) in self.low.iter_mut().zip(by) {
+            #[allow(
+                clippy::cast_possible_truncation,
+                reason = "a place on a curve, not a bound"
+            )]
+            let by = by as f32;
+            *low -= by;
+        }
+    }
+}
+
+impl Sorter {
     /// The class in a key.
     pub(super) fn class_of(key: u64) -> u64 {
         key >> CURVE_BITS
@@ -127,7 +159,7 @@ impl Sorter {
         let mut words = std::mem::take(&mut self.words);
         words.clear();
         let all = boxes.iter().enumerate();
-        words.extend(all.map(|(index, one)| self.key(one) << INDEX_BITS | index as u64));
+        words.extend(all.map(|(index, one)| self.frame.key(one) << INDEX_BITS | index as u64));
         self.words = words;
         let used = self.words.iter().fold(0, |all, word| all | word);
         let top = u64::BITS - used.leading_zeros();
@@ -181,21 +213,7 @@ impl Sorter {
         from
     }
 
-    /// The frame of the curve, told by another origin.
-    ///
-    /// * `by` - the new origin less the old one.
-    pub(super) fn shift(&mut self, by: [f64; 3]) {
-        for (low, by) in self.low.iter_mut().zip(by) {
-            #[allow(
-                clippy::cast_possible_truncation,
-                reason = "a place on a curve, not a bound"
-            )]
-            let by = by as f32;
-            *low -= by;
-        }
-    }
-
-    /// What the last sort yielded.
+    /// What the sort has yielded: of [`Sorter::begin`] as far as it is split.
     pub(super) fn sorted(&self) -> &[(u64, u32)] {
         &self.order
     }
@@ -311,8 +329,10 @@ mod tests {
             let side = if i % 2 == 0 { 0.9 } else { 1.1 };
             boxes.push(cube(at.map(|v| v * 100.0 + f32::from(i)), side));
         }
-        let mut sorter = Sorter::default();
-        sorter.frame(&boxes);
+        let mut sorter = Sorter {
+            frame: Frame::of(&boxes),
+            ..Sorter::default()
+        };
         let order = sorter.sort(&boxes).to_vec();
         assert_eq!(order[0].1, 0);
         assert!(order.is_sorted_by_key(|(key, _)| *key));
@@ -333,8 +353,10 @@ mod tests {
             let (x, y) = (f32::from(i % 64), f32::from(i / 64));
             boxes.push(cube([x, y, f32::from(i % 101) * 1e-3], 0.9));
         }
-        let mut sorter = Sorter::default();
-        sorter.frame(&boxes);
+        let mut sorter = Sorter {
+            frame: Frame::of(&boxes),
+            ..Sorter::default()
+        };
         let order: Vec<u32> = sorter.along_curve(&boxes).map(|(_, index)| index).collect();
         // Sixteen in a row stand in a square of four by four, or nearly so.
         let spread = |k: usize| {
