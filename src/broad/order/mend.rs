@@ -22,6 +22,9 @@ const MIXED: f32 = 1.2;
 /// Least bodies of a block that is dealt anew: with fewer the blocks would be many and empty.
 const FILL_LEAST: usize = 8;
 
+/// ... but not where they overlap so many others, a body: each overlap is carried to the new lanes.
+const CROWD: usize = 128;
+
 /// A body on its way to another lane.
 #[derive(Clone, Copy, Debug)]
 struct Seat {
@@ -83,7 +86,7 @@ impl Order {
             let blocks = first..(first + WIDTH).min(self.sorted);
             let same = blocks.take_while(|block| class(*block) == class(first));
             let end = first + same.count();
-            if self.is_mixed(first, end) {
+            if self.is_mixed(first, end) && !self.is_crowd(first, end) {
                 self.deal(first, end);
             }
         }
@@ -173,6 +176,17 @@ impl Order {
             now += extent(&spread);
         }
         now > dealt * MIXED
+    }
+
+    /// Whether the bodies of some blocks overlap so many others that dealing them anew costs more than it saves.
+    fn is_crowd(&self, from: usize, to: usize) -> bool {
+        let bodies: usize = self.live[from..to]
+            .iter()
+            .map(|live| live.count_ones() as usize)
+            .sum();
+        let records = (from..to).flat_map(|block| self.links.of(small(block)));
+        let rows = records.flat_map(|(_, record)| self.links.bits(record).hit);
+        rows.map(|row| row.count_ones() as usize).sum::<usize>() > bodies * CROWD
     }
 
     /// Deals the bodies of some blocks to the same blocks anew, each block compact. Their overlaps are carried.
