@@ -63,8 +63,7 @@ impl Order {
             }
         }
         (self.sorter, self.boxes) = (sorter, boxes);
-        self.close_blocks(bodies.len());
-        self.bound_all(bodies.len());
+        self.close_blocks(bodies.len(), bodies.len());
     }
 
     /// Takes everything out of the blocks.
@@ -73,17 +72,19 @@ impl Order {
         self.keys.clear();
         self.slot_of.clear();
         self.fat.clear();
-        self.len = 0;
         self.reserve_blocks(bodies.len());
         if let Some(last) = bodies.iter().max() {
             grow(&mut self.rank_of, last.index(), NONE);
         }
     }
 
-    /// After the last body was dealt: the attic, and room for the tree.
-    pub(super) fn close_blocks(&mut self, bodies: usize) {
+    /// After the last body was dealt: the attic, the tree, and room for all.
+    ///
+    /// * `dealt` - how many bodies were.
+    /// * `bodies` - how many there are, with those that are still to be seated.
+    pub(super) fn close_blocks(&mut self, dealt: usize, bodies: usize) {
         self.sorted = self.live.len();
-        self.len = bodies;
+        self.len = dealt;
         let blocks = self.sorted + self.sorted / ATTIC + 1;
         for list in [&mut self.live, &mut self.dirty, &mut self.renewing] {
             list.resize(blocks, 0);
@@ -94,12 +95,13 @@ impl Order {
         self.homes.resize(blocks, NO_BOUND);
         self.tree.reset(blocks);
         self.tree.reserve();
+        self.bound_all(bodies);
     }
 
     /// Bounds every block, and takes what they fill as what is usual from now on; who is seated later adds to it.
     ///
     /// * `bodies` - how many there are; room is made for as many.
-    pub(super) fn bound_all(&mut self, bodies: usize) {
+    fn bound_all(&mut self, bodies: usize) {
         let blocks = self.live.len();
         self.level.run(Bound {
             order: self,
@@ -206,6 +208,7 @@ impl<P: Proxies> Work for TakeAll<'_, P> {
             boxes,
         } = self;
         boxes.clear();
+        boxes.reserve(bodies.len());
         for (at, slot) in bodies.iter().enumerate() {
             if let Some(ahead) = bodies.get(at + AHEAD) {
                 prefetch(proxies.aabb(*ahead));

@@ -19,11 +19,10 @@ const NEARER: f32 = 4.0;
 /// Blocks whose bodies have spread so much over what they were dealt are dealt anew: that costs about as much as
 /// renewing all of them once more, and blocks that are so much longer meet twice as many others.
 const MIXED: f32 = 1.2;
-/// Least bodies of a block that is dealt anew: with fewer the blocks would be many and empty.
-const FILL_LEAST: usize = 8;
-
 /// ... but not where they overlap so many others, a body: each overlap is carried to the new lanes.
 const CROWD: usize = 128;
+/// Least bodies of a block that is dealt anew: with fewer the blocks would be many and empty.
+const FILL_LEAST: usize = 8;
 
 /// A body on its way to another lane.
 #[derive(Clone, Copy, Debug)]

@@ -160,11 +160,11 @@ impl Order {
             let one = self.rank(slot).and_then(|_| taken.next());
             self.deal_to(key, FILL, one.map(|one| (slot, one)));
         }
-        self.close_blocks(boxes.len());
+        let dealt = boxes.len();
+        // Their memory is back before room is made in it.
         (self.sorter, self.boxes) = (sorter, boxes);
-        // Its memory is back before room is made in it.
         self.afresh.presort = presort;
-        self.bound_all(tick.members.bounded().len());
+        self.close_blocks(dealt, tick.members.bounded().len());
         let mut late = std::mem::take(&mut self.afresh.presort.late);
         late.retain(|slot| tick.members.is_bounded(*slot));
         let all = self.seat_all(&late, tick.proxies);
