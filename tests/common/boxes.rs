@@ -5,7 +5,7 @@ use sweepd::ids::{BodyId, BodySlot};
 use sweepd::math::Aabb;
 use sweepd::pairs::PairPolicy;
 
-/// Boxes by slot, each of a body.
+/// Boxes by slot, each of a body. One without an end has no bound, for who asks when it comes.
 pub struct Boxes {
     pub all: Vec<Aabb>,
     pub ids: Vec<u64>,
@@ -25,8 +25,8 @@ impl Proxies for Boxes {
     fn aabb(&self, slot: BodySlot) -> &Aabb {
         &self.all[slot.index()]
     }
-    fn unbounded(&self, _: BodySlot) -> bool {
-        false
+    fn unbounded(&self, slot: BodySlot) -> bool {
+        self.all[slot.index()].max.x == f64::INFINITY
     }
     fn id(&self, slot: BodySlot) -> BodyId {
         BodyId(self.ids[slot.index()])

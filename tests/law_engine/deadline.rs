@@ -38,6 +38,14 @@ fn collide(rig: &mut Rig, budget: Budget) -> TickRow {
     rig.out.tick
 }
 
+/// Makes a new revision of the scene, if the margin is a new one.
+fn margin(report_within_m: f64) -> Edit {
+    Edit::Margin {
+        name: None,
+        report_within_m: Some(report_within_m),
+    }
+}
+
 /// So long after the next tick's wake-up, but for some looks at the clock.
 fn after(rig: &Rig, ns: u64) -> u64 {
     rig.clock.monotonic_ns() + FRAME_NS + ns
@@ -144,13 +152,6 @@ fn law_4_5_a_frame_that_goes_on_waiting_does_not_shorten_the_tick_of_the_one_bef
         (now + 2, 1),
         "the second one's"
     );
-}
-
-fn margin(report_within_m: f64) -> Edit {
-    Edit::Margin {
-        name: None,
-        report_within_m: Some(report_within_m),
-    }
 }
 
 #[test]
