@@ -15,13 +15,15 @@
 
 mod leaf;
 
-use leaf::{Leaf, mix};
+use leaf::{Leaf, corner_name, mix};
 
 use super::Closest;
 use super::contacts::LeafContact;
+use super::patches::Patches;
 use super::placed::Placed;
 use super::side::Side;
 use crate::math::{Interval, Point, Vec3};
+use crate::narrow::arena::Arena;
 use crate::narrow::exact::{ManifoldPoint, shared_points};
 use crate::shape::Mesh;
 
@@ -44,15 +46,14 @@ enum Base {
     Own,
 }
 
-/// Hands over the points of two leaves that touch: at least one.
-///
-/// * `take` - is given points in A's frame; `patch` names the surface that the normal is of.
+/// Hands over the points of two leaves that touch: at least one. They are in A's frame, and `patch` names the surface
+/// that the normal is of.
 pub(super) fn points(
     a: (Side<'_>, u32),
     b: (Side<'_>, u32),
     at: &Placed,
     found: &LeafContact,
-    mut take: impl FnMut(LeafContact),
+    (patches, arena): (&mut Patches, &mut Arena<LeafContact>),
 ) {
     let [a, b] = [(a, false), (b, true)].map(|((side, place), is_b)| Leaf {
         side,
@@ -64,17 +65,19 @@ pub(super) fn points(
     // Rounding is a share of all, not of the smaller one.
     let rounding_m = 4.0 * at.slop;
     let better_m = rounding_m.max(BETTER * size);
-    let (normal, base) = choose(&a, &b, &found.closest, better_m);
+    let Chosen { normal, base, top } = choose(&a, &b, &found.closest, better_m);
     let patch = match base {
         Base::B => b.patch(),
         _ if a.mesh().is_some() => a.patch(),
         _ => b.patch(),
     };
+    // To walk to it is far, and often in vain.
+    let top = top.filter(|(_, depth_m)| patches.misses(arena, (patch, &normal), *depth_m));
     let mut any = false;
     let mut put = |point_a: Point, point_b: Point, feature: u64| {
         let gap_m = normal.dot(&(point_b - point_a));
         any = true;
-        take(LeafContact {
+        let point = LeafContact {
             closest: Closest {
                 gap: Interval::new(gap_m, gap_m),
                 best_m: gap_m,
@@ -86,7 +89,8 @@ pub(super) fn points(
             feature: mix(feature, u64::from(patch)),
             patch,
             ..*found
-        });
+        };
+        patches.add(arena, &point);
     };
     let forced = match base {
         Base::A => Some(false),
@@ -103,7 +107,8 @@ pub(super) fn points(
     });
     if let Some(base_is_b) = forced {
         let (on, of) = if base_is_b { (&b, &a) } else { (&a, &b) };
-        corners(on, of, &normal, prediction_m, |on, of, feature| {
+        let top = top.map(|(top, _)| top);
+        corners((on, of), &normal, top, prediction_m, |on, of, feature| {
             let (point_a, point_b) = if base_is_b { (of, on) } else { (on, of) };
             put(point_a, point_b, feature);
         });
@@ -116,7 +121,7 @@ pub(super) fn points(
     } else {
         LeafContact::SPARE
     };
-    take(nearest(&a, &b, normal, patch, found));
+    patches.add(arena, &nearest(&a, &b, normal, patch, found));
 }
 
 /// Where the leaves themselves meet, straight across along a normal.
@@ -150,10 +155,26 @@ fn nearest(
     }
 }
 
+/// What [`choose`] chose.
+struct Chosen {
+    /// Unit, A to B.
+    normal: Vec3,
+    base: Base,
+    /// The vertex of the other one that lies deepest behind the base's face, where that is a mesh, and how deep.
+    top: Option<(u32, f64)>,
+}
+
 /// The normal, A to B, along which the two surfaces overlap least.
-fn choose(a: &Leaf<'_>, b: &Leaf<'_>, found: &Closest, better_m: f64) -> (Vec3, Base) {
+fn choose(a: &Leaf<'_>, b: &Leaf<'_>, found: &Closest, better_m: f64) -> Chosen {
     let (normal_a, normal_b) = (a.normal(), b.normal());
-    let mut best = (f64::INFINITY, found.normal, Base::Own);
+    let (mut best_m, mut best) = (
+        f64::INFINITY,
+        Chosen {
+            normal: found.normal,
+            base: Base::Own,
+            top: None,
+        },
+    );
     for (leaf, other, face, base) in [(a, b, normal_a, Base::A), (b, a, normal_b, Base::B)] {
         let (Some(outward), Some(mesh)) = (face, leaf.mesh()) else {
             continue;
@@ -163,12 +184,14 @@ fn choose(a: &Leaf<'_>, b: &Leaf<'_>, found: &Closest, better_m: f64) -> (Vec3, 
         let ways = if mesh.is_solid() { 1 } else { 2 };
         for outward in [outward, -outward].into_iter().take(ways) {
             let height = outward.dot(&plane.coords);
-            let Some(reach) = other.reach(&-outward, best.0 - height) else {
+            let Some((reach, top)) = other.reach(&-outward, best_m - height) else {
                 continue;
             };
-            if height + reach < best.0 - better_m {
+            if height + reach < best_m - better_m {
                 let normal = if base == Base::A { outward } else { -outward };
-                best = (height + reach, normal, base);
+                best_m = height + reach;
+                let top = top.map(|top| (top, best_m));
+                best = Chosen { normal, base, top };
             }
         }
     }
@@ -179,13 +202,17 @@ fn choose(a: &Leaf<'_>, b: &Leaf<'_>, found: &Closest, better_m: f64) -> (Vec3, 
         along.abs() >= FACE || (solid && along < INWARD)
     };
     if !known(normal_a, own, a) && !known(normal_b, -own, b) {
-        let reach = a.own_reach(&own, best.0 - b.least_reach(&-own));
-        let whole = reach.and_then(|r| Some(r + b.own_reach(&-own, best.0 - r)?));
-        if whole.is_some_and(|depth| depth < best.0 - better_m) {
-            return (own, Base::Own);
+        let reach = a.own_reach(&own, best_m - b.least_reach(&-own));
+        let whole = reach.and_then(|r| Some(r + b.own_reach(&-own, best_m - r)?));
+        if whole.is_some_and(|depth| depth < best_m - better_m) {
+            return Chosen {
+                normal: own,
+                base: Base::Own,
+                top: None,
+            };
         }
     }
-    (best.1, best.2)
+    best
 }
 
 /// The points that two leaves share.
@@ -218,12 +245,12 @@ fn feature_of(a: &Leaf<'_>, b: &Leaf<'_>, feature: u32, base_is_b: bool) -> u64 
     }
 }
 
-/// Corners of `of` behind the surface about `on`, and the one that lies deepest: a triangle that pokes through the
-/// surface has its corners over other triangles than the one that it crosses.
+/// Corners of `of` behind the surface about `on`, and `top`, the one that lies deepest: a triangle that pokes through
+/// the surface has its corners over other triangles than the one that it crosses.
 fn corners(
-    on: &Leaf<'_>,
-    of: &Leaf<'_>,
+    (on, of): (&Leaf<'_>, &Leaf<'_>),
     normal: &Vec3,
+    top: Option<u32>,
     prediction_m: f64,
     mut take: impl FnMut(Point, Point, u64),
 ) {
@@ -233,8 +260,7 @@ fn corners(
     let outward = if on.is_b { -normal } else { *normal };
     let plane = on.corners()[0];
     let own = on.turn(&outward);
-    let deepest = mesh.climb(of.place, &of.turn(&-outward), f64::INFINITY);
-    for vertex in mesh.faces()[of.place as usize].into_iter().chain(deepest) {
+    for vertex in mesh.faces()[of.place as usize].into_iter().chain(top) {
         let point = of.in_a(&mesh.vertices()[vertex as usize]);
         if outward.dot(&(point - plane)) > prediction_m {
             continue;
@@ -245,7 +271,7 @@ fn corners(
         };
         let beneath = on.in_a(&beneath);
         if outward.dot(&(point - beneath)) <= prediction_m {
-            take(beneath, point, u64::from(vertex) << 1 | u64::from(of.is_b));
+            take(beneath, point, corner_name(vertex, of.is_b));
         }
     }
 }

@@ -48,26 +48,31 @@ impl Patches {
         if !all.is_empty() && !spare && point.patch == LeafContact::SPARE {
             return;
         }
-        let turn = |patch: &[LeafContact]| patch[0].closest.normal.dot(&point.closest.normal);
-        let (mut nearest, mut best) = (None, f64::NEG_INFINITY);
-        for (at, patch) in all.chunks_exact(PATCH_POINTS).enumerate() {
-            let turn = turn(patch);
-            let same = spare || (patch[0].patch == point.patch && turn >= SAME_NORMAL);
-            if same || turn > best {
-                (nearest, best) = (Some(at), turn);
-            }
-            if same {
-                best = f64::INFINITY;
-                break;
-            }
-        }
+        let goes = goes(all, spare, point.patch, &point.closest.normal);
         let full = all.len() / PATCH_POINTS >= PATCHES_MAX;
-        if !full && best < f64::INFINITY && self.begin(arena, point) {
+        if !full && !matches!(goes, Goes::Into(_)) && self.begin(arena, point) {
             return;
         }
         let all = arena.all_mut(&self.kept);
-        if let Some(patch) = nearest.and_then(|at| all.chunks_exact_mut(PATCH_POINTS).nth(at)) {
+        if let Goes::Into(at) | Goes::Beside(at) = goes
+            && let Some(patch) = all.chunks_exact_mut(PATCH_POINTS).nth(at)
+        {
             update(patch, point);
+        }
+    }
+
+    /// Whether it is worth a long walk to a point of this surface and normal: its patch has none as deep, and there is
+    /// room for that patch.
+    pub(super) fn misses(
+        &self,
+        arena: &Arena<LeafContact>,
+        (surface, normal): (u32, &Vec3),
+        depth_m: f64,
+    ) -> bool {
+        let all = self.all(arena);
+        match goes(all, false, surface, normal) {
+            Goes::Into(at) => -depth_m < all[at * PATCH_POINTS + 1].closest.best_m,
+            Goes::Beside(_) | Goes::First => all.len() / PATCH_POINTS < PATCHES_MAX,
         }
     }
 
@@ -89,6 +94,32 @@ impl Patches {
     pub(super) fn release(&mut self, arena: &mut Arena<LeafContact>) {
         arena.release(&mut self.kept);
     }
+}
+
+/// Where a point belongs.
+#[derive(Clone, Copy, Debug)]
+enum Goes {
+    /// Into this patch.
+    Into(usize),
+    /// Into one of its own; where there is no room for that, into this one, which has the nearest normal.
+    Beside(usize),
+    /// Into the first.
+    First,
+}
+
+/// Where a point of a surface and with a normal belongs among all.
+fn goes(all: &[LeafContact], spare: bool, surface: u32, normal: &Vec3) -> Goes {
+    let (mut nearest, mut best) = (Goes::First, f64::NEG_INFINITY);
+    for (at, patch) in all.chunks_exact(PATCH_POINTS).enumerate() {
+        let turn = patch[0].closest.normal.dot(normal);
+        if spare || (patch[0].patch == surface && turn >= SAME_NORMAL) {
+            return Goes::Into(at);
+        }
+        if turn > best {
+            (nearest, best) = (Goes::Beside(at), turn);
+        }
+    }
+    nearest
 }
 
 /// Points with the number of their patch.

@@ -103,7 +103,7 @@ pub(super) fn ball(core: &Core) -> (Point, f64) {
             (Point::new(0.0, 0.0, z_m), radius_m * UP)
         }
         Core::Hull(hull) => ball_of(hull.points()),
-        Core::Triangle(corners) => ball_of(corners),
+        Core::Triangle(corners) => ball_of_triangle(corners),
         _ => (Point::origin(), reach(core)),
     }
 }
@@ -135,6 +135,50 @@ fn ball_of(points: &[Vec3]) -> (Point, f64) {
     (Point::from(best.0), best.1 * UP)
 }
 
+/// The least ball around three points: about the longest side, or through all three where they are acute.
+fn ball_of_triangle(corners: &[Vec3; 3]) -> (Point, f64) {
+    let [a, b, c] = corners;
+    let (u, v) = (b - a, c - a);
+    let (ab, ac, bc) = (u.norm_squared(), v.norm_squared(), (c - b).norm_squared());
+    let centre = if ab >= ac + bc {
+        a + u / 2.0
+    } else if ac >= ab + bc {
+        a + v / 2.0
+    } else if bc >= ab + ac {
+        b + (c - b) / 2.0
+    } else {
+        let across = u.cross(&v);
+        a + (across.cross(&u) * ac + v.cross(&across) * ab) / (2.0 * across.norm_squared())
+    };
+    // Whatever rounding did to the middle, it is a ball around them.
+    (Point::from(centre), farthest(corners, &centre) * UP)
+}
+
 fn farthest(points: &[Vec3], from: &Vec3) -> f64 {
     points.iter().map(|p| (p - from).norm()).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The least ball of a triangle, by trial: about each pair, and through all three.
+    #[test]
+    fn the_ball_of_a_triangle_holds_it_and_is_the_least() {
+        let mut random = crate::builtin::Random::new(3);
+        let mut point = || Vec3::from_fn(|_, _| random.unit() * 2.0 - 1.0);
+        for round in 0..500 {
+            let mut corners = [point(), point(), point()];
+            if round % 5 == 0 {
+                // In one line, or two in one place.
+                corners[2] = corners[0] + (corners[1] - corners[0]) * f64::from(round % 3);
+            }
+            let (centre, radius) = ball_of_triangle(&corners);
+            let all = |c: Vec3| farthest(&corners, &c);
+            assert!(all(centre.coords) <= radius, "{corners:?}");
+            for _ in 0..20 {
+                assert!(all(centre.coords + point() * 0.01) >= radius * (1.0 - 1e-9));
+            }
+        }
+    }
 }

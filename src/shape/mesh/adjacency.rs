@@ -23,6 +23,10 @@ const HOPS_MAX: u32 = 48;
 const RING_MAX: u32 = 64;
 /// Faces that a walk over a surface passes.
 const WALK_MAX: u32 = 48;
+/// After so many of them it is told how far the walk has come, ...
+const GLANCE: u32 = 8;
+/// ... and where it would need so many times what is left at that rate, it is given up: two in three end nowhere.
+const TOO_FAR: f64 = 1.5;
 /// A face that leans further from the direction of a walk (cosine) is not walked onto.
 const LEAN: f64 = 0.3;
 /// The ends of an edge that lies across a direction differ in height by less than this share of the face's.
@@ -213,10 +217,12 @@ impl Mesh {
         }
     }
 
-    /// Visits the corners of all faces about the start of a side, as sides that start there.
+    /// Visits the corners of all faces about the start of a side, as sides that start there: each at the first face
+    /// that has it.
     fn ring(&self, side: u32, mut visit: impl FnMut(u32)) {
         let (face, k) = (side / 3, side % 3);
-        let at = self.vertices[self.start_of(side) as usize];
+        let start = self.start_of(side);
+        let at = self.vertices[start as usize];
         visit(3 * face + (k + 1) % 3);
         visit(3 * face + (k + 2) % 3);
         // One way round; from a border once more the other way.
@@ -244,15 +250,28 @@ impl Mesh {
                     whole = true;
                     break;
                 }
-                let corner = (0..3)
-                    .find(|&j| self.vertices[self.faces[next as usize][j as usize] as usize] == at);
-                let Some(j) = corner else { break };
-                visit(3 * next + (j + 1) % 3);
-                visit(3 * next + (j + 2) % 3);
-                // Out by the other side at this corner, whichever way the face is turned.
+                let corners = self.faces[next as usize];
+                // Without a branch on which corner it is: that is as good as random.
+                let same = corners.map(|v| u32::from(v == start));
+                let mut j = same[1] | same[2] << 1;
+                if same == [0; 3] {
+                    // Another vertex at the same place.
+                    let there = |&j: &u32| self.vertices[corners[j as usize] as usize] == at;
+                    let Some(other) = (0..3).find(there) else {
+                        break;
+                    };
+                    j = other;
+                }
+                // Of a face that has it twice the first.
+                j = if same[0] == 1 { 0 } else { j.min(2) };
+                // Out by the other side at this corner, whichever way the face is turned. The side that was come in by
+                // has been seen, and so has its other end.
+                let (beside, opposite) = (3 * next + (j + 1) % 3, 3 * next + (j + 2) % 3);
                 leave = if entry == 3 * next + j {
-                    3 * next + (j + 2) % 3
+                    visit(opposite);
+                    opposite
                 } else {
+                    visit(beside);
                     3 * next + j
                 };
             }
@@ -268,17 +287,30 @@ impl Mesh {
     /// * returns - `None` where the surface ends or turns away on the way there.
     pub(crate) fn beneath(&self, mut face: u32, point: &Point, direction: &Vec3) -> Option<Point> {
         let same = SAME * self.radius;
-        for _ in 0..WALK_MAX {
+        let mut first_m = 0.0;
+        for step in 0..WALK_MAX {
             let corners = self.triangle(face);
-            let normal = self.face_normal(face)?;
-            let rise = normal.dot(direction);
-            if rise.abs() < LEAN || (self.solid && rise < 0.0) {
+            let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+            let (rise, square) = (normal.dot(direction), normal.norm_squared());
+            let leans = rise * rise < LEAN * LEAN * square || square <= f64::MIN_POSITIVE;
+            if leans || (self.solid && rise < 0.0) {
                 return None;
             }
-            let (k, out) = self.farthest_side(face, point, direction, rise.signum());
+            let (k, out) = farthest_side(&corners, point, direction, rise.signum());
             if out <= same {
                 let lift = normal.dot(&(point - corners[0])) / rise;
                 return Some(point - direction * lift);
+            }
+            match step {
+                0 => first_m = out,
+                GLANCE => {
+                    let left = f64::from(WALK_MAX - GLANCE) / f64::from(GLANCE);
+                    let may_come_m = (first_m - out) * TOO_FAR * left;
+                    if may_come_m < out {
+                        return None;
+                    }
+                }
+                _ => {}
             }
             let entry = self.adjacency.twins[(3 * face + k) as usize];
             face = if entry == NONE {
@@ -293,30 +325,32 @@ impl Mesh {
         None
     }
 
-    /// The side of a face that a point lies farthest beyond, looking along `direction`, and how far, metres.
-    ///
-    /// * `sign` - of the face's normal along `direction`.
-    fn farthest_side(&self, face: u32, point: &Point, direction: &Vec3, sign: f64) -> (u32, f64) {
-        let corners = self.triangle(face);
-        let over = |k: usize| {
-            let (from, to) = (corners[k], corners[(k + 1) % 3]);
-            let outward = (to - from).cross(direction) * sign;
-            let length = outward.norm();
-            if length > 0.0 {
-                outward.dot(&(point - from)) / length
-            } else {
-                f64::NEG_INFINITY
-            }
-        };
-        let sides = (0u32..3).zip([over(0), over(1), over(2)]);
-        sides.fold((0, f64::NEG_INFINITY), |x, y| if y.1 > x.1 { y } else { x })
-    }
-
     /// How far a point lies off a face, looking along `direction`, metres.
     fn off(&self, face: u32, point: &Point, direction: &Vec3) -> f64 {
         let sign = self
             .face_normal(face)
             .map_or(1.0, |n| n.dot(direction).signum());
-        self.farthest_side(face, point, direction, sign).1
+        farthest_side(&self.triangle(face), point, direction, sign).1
     }
+}
+
+/// The side of a face that a point lies farthest beyond, looking along `direction`, and how far, metres.
+///
+/// * `sign` - of the face's normal along `direction`.
+fn farthest_side(corners: &[Point; 3], point: &Point, direction: &Vec3, sign: f64) -> (u32, f64) {
+    // As a square with a sign: one root for all three.
+    let over = |k: usize| {
+        let (from, to) = (corners[k], corners[(k + 1) % 3]);
+        let outward = (to - from).cross(direction);
+        let (out, square) = (outward.dot(&(point - from)) * sign, outward.norm_squared());
+        if square > 0.0 {
+            out * out.abs() / square
+        } else {
+            f64::NEG_INFINITY
+        }
+    };
+    let sides = (0u32..3).zip([over(0), over(1), over(2)]);
+    let farther = |x: (u32, f64), y: (u32, f64)| if y.1 > x.1 { y } else { x };
+    let (k, square) = sides.fold((0, f64::NEG_INFINITY), farther);
+    (k, square.abs().sqrt().copysign(square))
 }

@@ -73,9 +73,8 @@ impl CarriedFront {
             }
             self.known.touches = true;
             if self.known.points_wanted {
-                manifold::points(leaf_a, leaf_b, &self.at, &contact, |point| {
-                    self.contacts.add(&mut store.contacts, &point);
-                });
+                let patches = (&mut self.contacts, &mut store.contacts);
+                manifold::points(leaf_a, leaf_b, &self.at, &contact, patches);
             }
         } else {
             self.known.blurred = true;

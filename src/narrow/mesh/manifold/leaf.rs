@@ -67,17 +67,18 @@ impl<'a> Leaf<'a> {
         direction.dot(&self.in_a(&Point::origin()).coords)
     }
 
-    /// How far the surface about this leaf reaches along a direction, from A's origin; `None`: beyond `beyond_m`.
-    pub(super) fn reach(&self, direction: &Vec3, beyond_m: f64) -> Option<f64> {
+    /// How far the surface about this leaf reaches along a direction, from A's origin, and the vertex of a mesh there;
+    /// `None`: beyond `beyond_m`.
+    pub(super) fn reach(&self, direction: &Vec3, beyond_m: f64) -> Option<(f64, Option<u32>)> {
         let (own, offset) = (self.turn(direction), self.offset(direction));
-        let height = match self.side {
-            Side::Convex(convex) => own.dot(&convex.support(&own).coords),
+        let (height, top) = match self.side {
+            Side::Convex(convex) => (own.dot(&convex.support(&own).coords), None),
             Side::Mesh(mesh) => {
                 let top = mesh.climb(self.place, &own, beyond_m - offset)?;
-                own.dot(&mesh.vertices()[top as usize].coords)
+                (own.dot(&mesh.vertices()[top as usize].coords), Some(top))
             }
         };
-        Some(height + offset)
+        Some((height + offset, top))
     }
 
     /// The same for a normal of the leaf's own: an edge that is one of the surface is not left for higher ground beyond
@@ -86,7 +87,7 @@ impl<'a> Leaf<'a> {
         let crest = (self.mesh()).and_then(|mesh| mesh.crest(self.place, &self.turn(direction)));
         match crest {
             Some(height) => Some(height + self.offset(direction)),
-            None => self.reach(direction, beyond_m),
+            None => self.reach(direction, beyond_m).map(|(height, _)| height),
         }
     }
 
@@ -131,6 +132,11 @@ impl<'a> Leaf<'a> {
         let (from, to) = (self.corner_name(edge % 3), self.corner_name((edge + 1) % 3));
         mix(from.min(to), from.max(to))
     }
+}
+
+/// What a vertex of one of the two is called.
+pub(super) fn corner_name(vertex: u32, is_b: bool) -> u64 {
+    u64::from(vertex) << 1 | u64::from(is_b)
 }
 
 /// Two names as one.
