@@ -262,8 +262,9 @@ impl Engine {
             order: self.end.order(budget),
         };
         let end_ns = self.end.at_ns();
+        let began_ns = self.clock.monotonic_ns();
         let deadline_ns = end_ns.map(|end_ns| {
-            let left_ns = end_ns.saturating_sub(self.clock.monotonic_ns());
+            let left_ns = end_ns.saturating_sub(began_ns);
             end_ns - self.floor.reserve_ns(left_ns).min(end_ns)
         });
         let mut row = self.bare_tick(input);
@@ -281,6 +282,7 @@ impl Engine {
         );
         let done = self.narrow.spend(&mut self.world, wanted, &mut meter);
         let units = meter.spent();
+        (self.floor).note_narrowed(began_ns, deadline_ns, self.clock.monotonic_ns());
         let open = end_ns.filter(|_| !done && budget.units.is_none());
         self.rest.open = open.map(|end_ns| (wanted, end_ns));
         units

@@ -1,6 +1,7 @@
 //! Two leaves of a front: triangles, or a convex shape.
 
 use super::cover::Group;
+use super::search::LEAF_COST;
 use super::store::FrontStore;
 use super::{BoxId, CarriedFront, Crossing, LeafContact, Open, Side};
 use crate::math::Interval;
@@ -8,11 +9,16 @@ use crate::narrow::exact::Closest;
 use crate::narrow::mesh::{manifold, side};
 use crate::shape::{Held, Obb};
 
+/// What a proof that two leaves are apart costs, in tests of a box against a pack, and what contact points do.
+const PROOF_COST: u64 = 4;
+const POINTS_COST: u64 = 128;
+
 impl CarriedFront {
     /// Queries two leaves.
     ///
     /// * `known_m` - a bound on their gap that holds at this pose.
     /// * `exact` - their distance is wanted; else any proof that they are apart will do.
+    /// * returns - what it cost, in tests of a box against a pack.
     pub(super) fn leaves(
         &mut self,
         store: &mut FrontStore,
@@ -20,16 +26,16 @@ impl CarriedFront {
         (a, b): (Side<'_>, Side<'_>),
         known_m: f64,
         exact: bool,
-    ) {
+    ) -> u64 {
         let (Held::Triangle(i), Held::Triangle(j)) = (a.held(id_a), b.held(id_b)) else {
-            return;
+            return PROOF_COST;
         };
         let (leaf_a, leaf_b) = ((a, i), (b, j));
         // Once the pair touches, only what touches too is of interest.
         let exact = exact && !self.known.touches;
         if !exact && let Some(gap) = side::parted(leaf_a, leaf_b, &self.at) {
             self.keep_leaf(store, id_a, id_b, gap);
-            return;
+            return PROOF_COST;
         }
         let beyond = if exact && self.known.high > 0.0 {
             self.known.high
@@ -39,7 +45,7 @@ impl CarriedFront {
         let Some(closest) = side::leaf(leaf_a, leaf_b, &self.at, beyond) else {
             // Farther than the nearest known: that is proof enough.
             self.keep_leaf(store, id_a, id_b, beyond.max(known_m));
-            return;
+            return PROOF_COST;
         };
         let low = closest.gap.min.max(known_m);
         self.known.leaf_low = self.known.leaf_low.min(low);
@@ -58,8 +64,9 @@ impl CarriedFront {
                 (self.last, self.witness) = (Some((id_a, id_b)), Some(contact));
             }
             self.keep_leaf(store, id_a, id_b, low);
-            return;
+            return LEAF_COST;
         }
+        let mut cost = LEAF_COST;
         // Certified, or zero within its rounding: touching collides.
         if closest.gap.max <= 8.0 * self.at.slop || closest.finished {
             let deeper = |w: &LeafContact| closest.best_m < w.closest.best_m;
@@ -73,6 +80,7 @@ impl CarriedFront {
             }
             self.known.touches = true;
             if self.known.points_wanted {
+                cost += POINTS_COST;
                 let patches = (&mut self.contacts, &mut store.contacts);
                 manifold::points(leaf_a, leaf_b, &self.at, &contact, patches);
             }
@@ -86,6 +94,7 @@ impl CarriedFront {
         };
         let kept = store.open.push(&mut self.touching, touching);
         self.note_room(kept);
+        cost
     }
 
     fn keep_leaf(&mut self, store: &mut FrontStore, id_a: BoxId, id_b: BoxId, gap: f64) {

@@ -9,8 +9,8 @@ use crate::shape::{Held, Obb};
 use crate::simd::obb::LANES;
 use crate::time::Meter;
 
-/// What two leaves cost, in tests of a box against a pack: when the clock is to be read again.
-const LEAF_COST: u64 = 4;
+/// What the distance of two leaves costs, in tests of a box against a pack: when the clock is to be read again.
+pub(super) const LEAF_COST: u64 = 16;
 
 impl CarriedFront {
     pub(super) fn step(
@@ -85,8 +85,8 @@ impl CarriedFront {
     ) {
         let child = match (a.held(open.a), b.held(open.b)) {
             (Held::Triangle(_), Held::Triangle(_)) => {
-                self.leaves(store, (open.a, open.b), (a, b), f64::NEG_INFINITY, exact);
-                meter.charge_weighted(1, LEAF_COST);
+                let cost = self.leaves(store, (open.a, open.b), (a, b), f64::NEG_INFINITY, exact);
+                meter.charge_weighted(1, cost);
                 return;
             }
             (held_a, held_b) => self.children((open.a, held_a), (open.b, held_b), (a, b)),
@@ -234,8 +234,8 @@ impl CarriedFront {
     ) {
         if group.leaf {
             let pair = group.pair(group.mask.trailing_zeros());
-            self.leaves(store, pair, sides, f64::NEG_INFINITY, exact);
-            meter.charge_weighted(1, LEAF_COST);
+            let cost = self.leaves(store, pair, sides, f64::NEG_INFINITY, exact);
+            meter.charge_weighted(1, cost);
         } else {
             self.test(store, group, sides, f64::NEG_INFINITY);
             meter.charge(1);
@@ -256,8 +256,8 @@ impl CarriedFront {
         let known_m = self.drift.left_m(group.expiry_m);
         if group.leaf {
             let pair = group.pair(group.mask.trailing_zeros());
-            self.leaves(store, pair, sides, known_m, true);
-            meter.charge_weighted(1, LEAF_COST);
+            let cost = self.leaves(store, pair, sides, known_m, true);
+            meter.charge_weighted(1, cost);
             return;
         }
         let mut gaps = self.gaps(&group, sides);
@@ -288,8 +288,8 @@ impl CarriedFront {
         let known_m = gaps[nearest as usize];
         match (sides.0.held(id_a), sides.1.held(id_b)) {
             (Held::Triangle(_), Held::Triangle(_)) => {
-                self.leaves(store, (id_a, id_b), sides, known_m, true);
-                meter.charge_weighted(2, LEAF_COST);
+                let cost = self.leaves(store, (id_a, id_b), sides, known_m, true);
+                meter.charge_weighted(2, cost);
             }
             (held_a, held_b) => {
                 let child = self.children((id_a, held_a), (id_b, held_b), sides);
