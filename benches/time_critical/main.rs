@@ -315,13 +315,26 @@ fn cold(name: &str, shapes: &[Arc<Shape>], rounds: usize, add: &mut impl FnMut(S
     }
 }
 
+/// Which pairs collide in each tick. Found before: the walks look at every tree, and between two ticks they would take
+/// the caches from what is timed.
+fn truths(shapes: &[Arc<Shape>], percent: f64, ticks: u64) -> Vec<Vec<bool>> {
+    let (mut stage, mut walk) = (Stage::new(shapes, percent, SEED), Walk::default());
+    let truth = |_| {
+        let truth = stage.truth(&mut walk);
+        stage.advance();
+        truth
+    };
+    (1..=ticks).map(truth).collect()
+}
+
 /// Coherent motion, the first tick cold.
 fn moving(name: &str, shapes: &[Arc<Shape>], percent: f64, limit: Limit, ticks: u64) -> String {
+    let truths = truths(shapes, percent, ticks);
     let mut stage = Stage::new(shapes, percent, SEED);
     let mut subject = Subject::new(name);
     let mut tally = Tally::new();
-    let (clock, mut walk) = (SystemClock, Walk::default());
-    for tick in 1..=ticks {
+    let clock = SystemClock;
+    for (tick, truth) in (1..=ticks).zip(&truths) {
         let motion_ns = stage.begin();
         let (from_ns, cpu_ns) = (clock.monotonic_ns(), clock.thread_cpu_ns());
         let (limit_ns, units) = match limit {
@@ -347,7 +360,7 @@ fn moving(name: &str, shapes: &[Arc<Shape>], percent: f64, limit: Limit, ticks: 
                 .over_cpu_ns
                 .push(spent_cpu_ns.saturating_sub(limit_ns));
         }
-        tally.compare(tick, &stage.truth(&mut walk), &subject.verdicts(&stage));
+        tally.compare(tick, truth, &subject.verdicts(&stage));
         stage.advance();
     }
     let delay = |tally: &mut Tally, share: f64| {

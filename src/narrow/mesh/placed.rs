@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::retest::reach_of;
-use crate::math::{Point, Pose, ROUND, Vec3, f32_down};
+use crate::math::{Point, Pose, ROUND, Vec3, f32_near};
 use crate::shape::{Obb, ObbPack, Shape};
 use crate::simd::obb::{GAP_ROUND, LANES, One, gaps};
 
@@ -81,10 +81,10 @@ impl Placed {
         let from = centre - pack.origin;
         let axis = |k: usize| {
             let column = axes.column(k);
-            [f32_down(column.x), f32_down(column.y), f32_down(column.z)]
+            [f32_near(column.x), f32_near(column.y), f32_near(column.z)]
         };
         let seen = One {
-            centre: [f32_down(from.x), f32_down(from.y), f32_down(from.z)],
+            centre: [f32_near(from.x), f32_near(from.y), f32_near(from.z)],
             axes: [axis(0), axis(1), axis(2)],
             half: one.half,
         };
