@@ -330,6 +330,7 @@ impl CarriedFront {
         self.solids = side_a.solid().or(side_b.solid()).is_some();
         (self.bent_m, self.trees) = (bent_of(a, b), trees_of(a, b));
         self.measure_depth(a, b);
+        self.shells.forget();
         self.shells.start(self.solids);
         self.shells_expiry_m = f64::NEG_INFINITY;
         let roots = Open {

@@ -6,6 +6,7 @@
 
 use super::placed::Placed;
 use super::side::Side;
+use crate::math::{Point, Vec3};
 use crate::shape::Inside;
 
 /// What is known of it.
@@ -30,9 +31,16 @@ pub(super) struct ShellTests {
     place: usize,
     /// A test is under way.
     testing: bool,
+    /// By way: a point that was found far out, and along which direction, own frame; of what has one connected surface.
+    far: [Option<(Point, Vec3)>; 2],
 }
 
 impl ShellTests {
+    /// Other shapes, or other vertices than were looked at last.
+    pub(super) fn forget(&mut self) {
+        self.far = [None; 2];
+    }
+
     /// Starts; `needed`: false where the outcome is known to be outside.
     pub(super) fn start(&mut self, needed: bool) {
         self.state = if needed {
@@ -47,6 +55,7 @@ impl ShellTests {
     /// hold as they did.
     pub(super) fn drop_test(&mut self) {
         self.testing = false;
+        self.forget();
     }
 
     pub(super) fn state(&self) -> Containment {
@@ -79,7 +88,7 @@ impl ShellTests {
             } else {
                 at.turn_to_b(&-at.pos12.translation.vector)
             };
-            let point = of.shell_point(self.place, &-ahead);
+            let point = self.point_of(of, &-ahead);
             self.inside.start(if a_in_b {
                 at.to_b(&point)
             } else {
@@ -93,6 +102,25 @@ impl ShellTests {
             self.place += 1;
             if self.inside.winding() != 0 {
                 self.state = Containment::Inside;
+            }
+        }
+    }
+
+    /// The next point to be tested, far along a direction where there is a choice. What was far out a moment ago mostly
+    /// still is, and to look for it is a way down the whole tree.
+    fn point_of(&mut self, of: Side<'_>, direction: &Vec3) -> Point {
+        let single = of.shell_count() == 1;
+        let near = |found: &Vec3| {
+            let along = found.dot(direction);
+            // Within 45 degrees.
+            along > 0.0 && 2.0 * along * along > found.norm_squared() * direction.norm_squared()
+        };
+        match self.far[self.way] {
+            Some((point, found)) if single && near(&found) => point,
+            _ => {
+                let point = of.shell_point(self.place, direction);
+                self.far[self.way] = single.then_some((point, *direction));
+                point
             }
         }
     }

@@ -66,6 +66,7 @@ impl Walk {
         self.touches = false;
         self.blurred = false;
         self.witness = None;
+        self.shells.forget();
         self.shells.start(true);
         match (Side::of(a), Side::of(b)) {
             (Some(Side::Convex(_)), Some(Side::Convex(_))) => {}

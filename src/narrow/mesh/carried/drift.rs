@@ -70,9 +70,19 @@ impl Drift {
 
     /// The path at which a gap found at this pose is used up, rounded down; `None` where it does not outlast this pose.
     pub(super) fn expiry(&self, gap: f64) -> Option<f64> {
+        self.outlasts(gap).then(|| self.used_up_at(gap))
+    }
+
+    /// Whether a gap found at this pose outlasts it.
+    #[inline]
+    pub(super) fn outlasts(&self, gap: f64) -> bool {
+        (gap > 0.0) & (self.left_m(self.used_up_at(gap)) > 0.0)
+    }
+
+    #[inline]
+    fn used_up_at(&self, gap: f64) -> f64 {
         let expiry_m = (self.path_m - self.offset_m) + gap;
-        let expiry_m = expiry_m - 4.0 * ROUND * (self.path_m + self.offset_m + gap);
-        (gap > 0.0 && self.left_m(expiry_m) > 0.0).then_some(expiry_m)
+        expiry_m - 4.0 * ROUND * (self.path_m + self.offset_m + gap)
     }
 
     /// The gap that an expiry proves at this pose, rounded down; zero or less: none.

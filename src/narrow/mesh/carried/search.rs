@@ -152,26 +152,28 @@ impl CarriedFront {
         sides: (Side<'_>, Side<'_>),
         known_m: f64,
     ) {
-        let gaps = self.gaps(group, sides);
+        let gaps = self.gaps(group, sides).map(|gap| gap.max(known_m));
         let (mut apart, mut least) = (0_u8, f64::INFINITY);
+        // What would not outlast this pose is looked into: smaller boxes are farther apart. Without a branch: which of
+        // them are apart is as good as random.
+        for (lane, &gap) in gaps.iter().enumerate() {
+            let lasts = (known_m > 0.0) | self.drift.outlasts(gap);
+            let is_apart = lasts & (group.mask >> lane & 1 == 1);
+            apart |= u8::from(is_apart) << lane;
+            least = if is_apart { least.min(gap) } else { least };
+        }
         let mut deep = [(0.0, 0_u32); LANES];
         let mut count = 0;
-        for lane in lanes(group.mask) {
-            let gap = gaps[lane as usize].max(known_m);
-            // What would not outlast this pose is looked into: smaller boxes are farther apart.
-            if known_m > 0.0 || self.drift.expiry(gap).is_some() {
-                apart |= 1 << lane;
-                least = least.min(gap);
-            } else {
-                // Sorted in: the deepest last.
-                let mut at = count;
-                while at > 0 && deep[at - 1].0 < gap {
-                    deep[at] = deep[at - 1];
-                    at -= 1;
-                }
-                deep[at] = (gap, lane);
-                count += 1;
+        for lane in lanes(group.mask & !apart) {
+            let gap = gaps[lane as usize];
+            // Sorted in: the deepest last.
+            let mut at = count;
+            while at > 0 && deep[at - 1].0 < gap {
+                deep[at] = deep[at - 1];
+                at -= 1;
             }
+            deep[at] = (gap, lane);
+            count += 1;
         }
         if apart != 0 {
             let mask = apart;
