@@ -284,7 +284,7 @@ impl Mesh {
     /// The place of the surface that a point lies over, looking along `direction`: from `face` on, over its neighbours.
     ///
     /// * `direction` - unit, outward where the mesh is a solid.
-    /// * returns - `None` where the surface ends or turns away on the way there.
+    /// * returns - `None` where the surface ends or turns away on the way there, or it is more than 48 faces off.
     pub(crate) fn beneath(&self, mut face: u32, point: &Point, direction: &Vec3) -> Option<Point> {
         let same = SAME * self.radius;
         let mut first_m = 0.0;

@@ -1,7 +1,6 @@
 //! Two leaves of a front: triangles, or a convex shape.
 
 use super::cover::Group;
-use super::search::LEAF_COST;
 use super::store::FrontStore;
 use super::{BoxId, CarriedFront, Crossing, LeafContact, Open, Side};
 use crate::math::Interval;
@@ -9,8 +8,12 @@ use crate::narrow::exact::Closest;
 use crate::narrow::mesh::{manifold, side};
 use crate::shape::{Held, Obb};
 
-/// What a proof that two leaves are apart costs, in tests of a box against a pack, and what contact points do.
+/// What two leaves cost, in tests of a box against a pack, which say when the clock is to be read again: a proof that
+/// they are apart, ...
 const PROOF_COST: u64 = 4;
+/// ... their distance, ...
+pub(super) const LEAF_COST: u64 = 16;
+/// ... and contact points.
 const POINTS_COST: u64 = 128;
 
 impl CarriedFront {

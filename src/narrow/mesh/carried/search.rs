@@ -1,16 +1,13 @@
 //! One step of work on a front: a box against a pack, two leaves, or a node of an inside test.
 
 use super::cover::{Group, Open, lanes};
-use super::leaves::contact;
+use super::leaves::{LEAF_COST, contact};
 use super::store::FrontStore;
 use super::{BoxId, CarriedFront, Containment, Goal, Side};
 use crate::narrow::mesh::side;
 use crate::shape::{Held, Obb};
 use crate::simd::obb::LANES;
 use crate::time::Meter;
-
-/// What the distance of two leaves costs, in tests of a box against a pack: when the clock is to be read again.
-pub(super) const LEAF_COST: u64 = 16;
 
 impl CarriedFront {
     pub(super) fn step(
