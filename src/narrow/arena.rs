@@ -200,9 +200,8 @@ impl<T: Linked + Ord> Arena<T> {
             if child >= items.len() {
                 break;
             }
-            if child + 1 < items.len() && items[child] < items[child + 1] {
-                child += 1;
-            }
+            // Without a branch: which of the two is greater is as good as random.
+            child += usize::from(child + 1 < items.len() && items[child] < items[child + 1]);
             if items[child] <= last {
                 break;
             }
