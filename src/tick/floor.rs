@@ -62,6 +62,22 @@ impl Laps {
     }
 }
 
+/// When the narrow phase of a tick began, on the wall and by the thread's CPU clock.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Began {
+    wall_ns: u64,
+    cpu_ns: u64,
+}
+
+impl Began {
+    pub(super) fn now(clock: &dyn Clock) -> Self {
+        Self {
+            wall_ns: clock.monotonic_ns(),
+            cpu_ns: clock.thread_cpu_ns(),
+        }
+    }
+}
+
 /// What publishing and sending will take, learned from the ticks before.
 ///
 /// Publishing is taken by the thread's CPU clock: a slice that the scheduler gave to others says nothing about the next
@@ -142,10 +158,15 @@ impl Floor {
 
     /// The narrow phase was to end at `deadline_ns`, and did now.
     ///
-    /// * `began_ns` - when it began: what was late before is not its doing.
-    pub(super) fn note_narrowed(&mut self, began_ns: u64, deadline_ns: Option<u64>, now_ns: u64) {
-        let due_ns = deadline_ns.map_or(now_ns, |deadline_ns| deadline_ns.max(began_ns));
-        self.late_ns = now_ns.saturating_sub(due_ns);
+    /// * `began` - when it began: what was late before is not its doing, and what others had of its core neither.
+    pub(super) fn note_narrowed(&mut self, began: Began, deadline_ns: u64, clock: &dyn Clock) {
+        let now_ns = clock.monotonic_ns();
+        let late_ns = now_ns.saturating_sub(deadline_ns.max(began.wall_ns));
+        if late_ns > 0 {
+            let cpu_ns = clock.thread_cpu_ns().saturating_sub(began.cpu_ns);
+            let others_ns = (now_ns - began.wall_ns).saturating_sub(cpu_ns);
+            self.late_ns = late_ns.saturating_sub(others_ns);
+        }
     }
 
     fn note_ending(&mut self, ending_ns: u64) {
@@ -192,6 +213,7 @@ fn decayed(ns: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::time::ManualClock;
 
     fn after(publishings_us: impl Iterator<Item = u64>) -> Floor {
         let mut floor = Floor::default();
@@ -223,15 +245,20 @@ mod tests {
 
     #[test]
     fn what_the_narrow_phase_passes_its_deadline_by_is_kept_back_and_what_was_late_before_is_not() {
-        let mut floor = Floor::default();
-        let mut late_ns = |began_ns, deadline_ns, now_ns| {
-            floor.note_narrowed(began_ns, deadline_ns, now_ns);
-            std::mem::take(&mut floor.late_ns)
+        let late_us = |began_us: u64, deadline_us: u64, ran_us: u64, others_us: u64| {
+            let clock = ManualClock::new(1_000 * began_us);
+            let mut began = Began::now(&clock);
+            clock.advance(1_000 * (ran_us + others_us));
+            // The clock by hand knows of no others: the thread had run for so much longer before.
+            began.cpu_ns += 1_000 * others_us;
+            let mut floor = Floor::default();
+            floor.note_narrowed(began, 1_000 * deadline_us, &clock);
+            floor.late_ns / 1_000
         };
-        assert_eq!(late_ns(100, Some(200), 230), 30);
-        assert_eq!(late_ns(100, Some(200), 180), 0);
-        assert_eq!(late_ns(300, Some(200), 310), 10);
-        assert_eq!(late_ns(300, None, 310), 0);
+        assert_eq!(late_us(100, 200, 130, 0), 30);
+        assert_eq!(late_us(100, 200, 80, 0), 0);
+        assert_eq!(late_us(300, 200, 10, 0), 10);
+        assert_eq!(late_us(100, 200, 130, 5_000), 30);
     }
 
     #[test]

@@ -33,7 +33,7 @@ use crate::wire::{
 use crate::world::{Admission, ChangeSet, PlacedShape, World};
 
 use end::End;
-use floor::{Floor, Laps};
+use floor::{Began, Floor, Laps};
 use rest::Rest;
 
 pub use input::{EditBatch, EditOutcome, TickInput};
@@ -262,9 +262,9 @@ impl Engine {
             order: self.end.order(budget),
         };
         let end_ns = self.end.at_ns();
-        let began_ns = self.clock.monotonic_ns();
+        let began = end_ns.map(|_| Began::now(self.clock.as_ref()));
         let deadline_ns = end_ns.map(|end_ns| {
-            let left_ns = end_ns.saturating_sub(began_ns);
+            let left_ns = end_ns.saturating_sub(self.clock.monotonic_ns());
             end_ns - self.floor.reserve_ns(left_ns).min(end_ns)
         });
         let mut row = self.bare_tick(input);
@@ -282,7 +282,9 @@ impl Engine {
         );
         let done = self.narrow.spend(&mut self.world, wanted, &mut meter);
         let units = meter.spent();
-        (self.floor).note_narrowed(began_ns, deadline_ns, self.clock.monotonic_ns());
+        if let Some((began, deadline_ns)) = began.zip(deadline_ns) {
+            (self.floor).note_narrowed(began, deadline_ns, self.clock.as_ref());
+        }
         let open = end_ns.filter(|_| !done && budget.units.is_none());
         self.rest.open = open.map(|end_ns| (wanted, end_ns));
         units
