@@ -10,6 +10,10 @@ daemon's reader), `outbound` from the tick's end to the callback (the daemon's w
 second rclpy process that sends the same bytes back, without decoding them. Nothing else should run: the figures are those
 of an idle machine.
 
+`lean` is the same way with the least that rclpy asks for: subscriptions that are taken from in a loop in place of an executor,
+and bytes in place of message objects, which rclpy publishes and hands over as they are; and so is its echo, `lean_echo`.
+What is left is DDS and the daemon.
+
 `cyclone` is the same way with a peer that costs little: Cyclone DDS (a C library under a thin Python binding) publishes
 bytes that were encoded before, and takes the pairs without decoding them.
 """
@@ -180,7 +184,12 @@ def main():
         try:
             found, lost, pairs = measure(Bench(args.bodies), args.samples)
             rclpy.shutdown()
-            # Its session of the source ends with its time-out; then the other peer's begins.
+            echo.terminate()
+            echo.wait()
+            # A peer's session of the source ends with its time-out; then the next one's begins.
+            time.sleep(6)
+            lean = [sys.executable, str(ROOT / "benches/ros2_latency_bytes.py"), str(args.bodies), str(args.samples)]
+            lean = json.loads(subprocess.run(lean, stdout=subprocess.PIPE, text=True, check=True).stdout)
             time.sleep(6)
             cheap = [sys.executable, str(ROOT / "benches/ros2_latency_cyclone.py"), str(domain), str(args.bodies), str(args.samples)]
             cyclone = json.loads(subprocess.run(cheap, stdout=subprocess.PIPE, text=True, check=True, env=os.environ | {"CYCLONEDDS_URI": ON_LOOPBACK}).stdout)
@@ -189,7 +198,8 @@ def main():
             echo.terminate()
             daemon.wait()
             echo.wait()
-    lost += cyclone.count(None)
+    lost += cyclone.count(None) + lean["lost"]
+    found |= {"lean": lean["through"], "lean_beyond_tick": lean["beyond_tick"], "lean_echo": lean["echo"]}
     found["cyclone"] = [value for value in cyclone if value is not None]
     commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False)
     row = {"machine": machine(), "commit": commit.stdout.strip(), "compiler": f"Python {platform.python_version()}", "seed": SEED,
@@ -198,7 +208,7 @@ def main():
         row[f"{name}_p50_us"] = round(percentile(values, 0.5), 1)
         row[f"{name}_p99_us"] = round(percentile(values, 0.99), 1)
         print(f"{name:12} p50 {row[f'{name}_p50_us']:8.1f} us   p99 {row[f'{name}_p99_us']:8.1f} us")
-    print(f"{args.bodies} bodies, {pairs:.0f} pairs a tick, {lost} of {3 * args.samples} answers lost")
+    print(f"{args.bodies} bodies, {pairs:.0f} pairs a tick, {lost} of {5 * args.samples} answers lost")
     if args.csv:
         new = not args.csv.exists()
         with args.csv.open("a", newline="") as file:
