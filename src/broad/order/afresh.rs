@@ -6,7 +6,8 @@
 //! tree for those behind it that it meets (`met`): what overlaps is a matrix of bits for each two such blocks. As long
 //! as the lanes stay, what began and what parted are differences of these bits, so no list of pairs is sorted or kept.
 //! It costs the same whatever the bodies do: dearer than candidates that last, and cheaper than candidates that never
-//! do. Which of the two a tick takes is chosen by counted work (`gear`, `probe`).
+//! do. Which of the two a tick takes is chosen by counted work (`gear`, `probe`). Where bodies go on as they came, one
+//! search serves several ticks (`verlet`).
 //!
 //! Bodies are laid anew when the blocks have grown so much that what is asked too much has cost as much as that. They
 //! are sorted for it over the ticks before (`presort`), or at once where the order is spoilt at once.
@@ -20,10 +21,12 @@ use super::presort::{Presort, SPLIT_TICKS_MAX, split_ticks};
 use super::probe::Probe;
 use super::sweep::Finds;
 use super::team::Team;
+use super::verlet::Verlet;
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, Work as Done, parts};
 use crate::broad::members::{ASKED, CAME, Members};
 use crate::ids::PairKey;
 use crate::simd::boxes::prefetch;
+use crate::wire::BroadMode;
 
 /// Ticks between two looks at where the bodies are and how large, for the frame of the curve: a frame that is out of
 /// date costs time, nothing else.
@@ -68,6 +71,7 @@ pub(super) struct Afresh {
     pub(super) spoilt: u32,
     /// Overlaps of the last tick, and what was found in this one.
     pub(super) held: Met,
+    pub(super) verlet: Verlet,
     pub(super) finds: Finds,
     /// Threads that search beside this one.
     pub(super) team: Team,
@@ -104,20 +108,44 @@ impl Order {
 
     /// Goes back to candidates: the overlaps wait for a sort of all, which must follow.
     pub(super) fn end_afresh(&mut self) {
+        if self.afresh.verlet.on {
+            self.end_list();
+        }
         self.carry_held();
         self.links.reset(self.live.len());
         self.afresh.on = false;
     }
 
+    /// A tick without candidates.
+    pub(super) fn work_afresh<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Done) {
+        work.way = Some((BroadMode::Scratch, self.afresh.gear.cause));
+        self.update_afresh(tick, work);
+        let Afresh { verlet, gear, .. } = &mut self.afresh;
+        let mean = verlet.pace.mean().filter(|_| verlet.on);
+        gear.note_scratch(tick.members.bounded().len(), mean.unwrap_or(work.tests));
+        self.probe(tick);
+    }
+
     /// Finds every overlap and reports what differs from the last tick.
-    pub(super) fn update_afresh<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Done) {
+    fn update_afresh<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Done) {
         let was = self.afresh.on;
         if !was {
             self.begin_afresh();
         }
         self.afresh.framed = self.afresh.framed.saturating_add(1);
         self.afresh.laid = self.afresh.laid.saturating_add(1);
-        let lanes = if was {
+        let listed = self.afresh.verlet.on;
+        if listed && self.update_list(tick, work) {
+            self.afresh.gone.fill(0);
+            self.tell_asked_afresh(tick.members, tick.began);
+            return;
+        }
+        let Afresh { verlet, finds, .. } = &mut self.afresh;
+        let begins = was && !listed && verlet.pace.begins(self.hits, finds.tests);
+        if begins {
+            self.note_places();
+        }
+        let lanes = if was && !listed {
             self.keep_lanes(tick)
         } else {
             Lay::Anew
@@ -133,7 +161,7 @@ impl Order {
         }
         let Afresh { finds, team, .. } = &mut self.afresh;
         let lanes = (&mut self.live, &mut self.fat, &mut self.tree);
-        team.search(self.level, lanes, finds);
+        team.search(self.level, lanes, finds, false);
         let tests = finds.tests;
         work.tests += tests;
         self.ask_open(tick.proxies);
@@ -160,6 +188,9 @@ impl Order {
         self.afresh.gone.fill(0);
         std::mem::swap(&mut self.afresh.held, &mut self.afresh.finds.met);
         self.tell_asked_afresh(tick.members, tick.began);
+        if begins && stays {
+            self.begin_list(tick, work);
+        }
     }
 
     /// Bodies left: they give up their lanes, and their pairs are no difference.
@@ -285,7 +316,11 @@ impl Order {
             }
         }
         if any {
-            tell_asked(&self.afresh.held, &self.dirty, &self.slot_of, began);
+            if self.afresh.verlet.on {
+                self.tell_listed(&self.dirty, began);
+            } else {
+                tell_asked(&self.afresh.held, &self.dirty, &self.slot_of, began);
+            }
             self.dirty.fill(0);
         }
     }
@@ -298,7 +333,11 @@ impl Order {
         proxies: &P,
     ) -> Result<(), String> {
         let bodies = members.bounded();
-        let held = self.afresh.held.recount();
+        let held = if self.afresh.verlet.on {
+            self.count_listed()
+        } else {
+            self.afresh.held.recount()
+        };
         if bodies.len() != self.len || held != self.hits {
             return Err(format!(
                 "{} bodies have lanes, {} boxes are in; {held} overlaps, {} counted",
@@ -318,6 +357,9 @@ impl Order {
         }
         self.check_presort(members)?;
         self.tree.validate(&self.fat)?;
+        if self.afresh.verlet.on {
+            return self.check_listed(bodies, proxies);
+        }
         if bodies.len() > 300 {
             return Ok(());
         }

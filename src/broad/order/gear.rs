@@ -20,6 +20,10 @@ const MEET: u64 = 12;
 /// blocks that a block's query meets, in sixteenths.
 const MEETS_LEAST: u64 = 2;
 const MEETS_SHARE: u64 = 128;
+/// What a Verlet list (`verlet`) takes in the mean, in boxes compared with a block a body: this share of them, one for
+/// each overlap, and so many for the boxes.
+const LIST_SHARE: u64 = 4;
+const LIST_LEAST: u64 = 3;
 /// Ticks that a mean of the work is taken over ...
 const MEAN_TICKS: u64 = 16;
 /// ... and ticks after a sort of all that do not count: bodies have yet to learn their margins.
@@ -33,8 +37,7 @@ const HOPELESS: u64 = 2;
 const SPELL_LONG: u32 = 512;
 /// Below so many bodies either way takes next to nothing.
 const BODIES_MIN: u64 = 64;
-/// Ticks without candidates before these are tried again, if a probe promises anything: twice as many each time that
-/// they prove no better.
+/// Ticks without candidates before these are tried again, if a probe promises anything; twice as many when in vain.
 const SPELL_MIN: u32 = 128;
 const _: () = assert!(
     SPELL_MIN >= 2 * PROBE_TICKS,
@@ -55,8 +58,8 @@ const CALM_TICKS: u32 = 4;
 pub(super) struct Footing {
     /// Bodies that escape from their fat boxes in a tick, of 1024.
     pub(super) escapes: u64,
-    /// Boxes compared with a block in a search of all, for 1024 bodies.
-    pub(super) meets: u64,
+    /// How crowded it is, by the overlaps of 1024 bodies.
+    pub(super) crowd: u64,
 }
 
 impl Footing {
@@ -64,7 +67,7 @@ impl Footing {
     /// crowd of them.
     fn promises(&self, then: &Self) -> bool {
         let calmer = self.escapes * 4 < then.escapes * 3;
-        let (few, many) = (self.meets.min(then.meets), self.meets.max(then.meets));
+        let (few, many) = (self.crowd.min(then.crowd), self.crowd.max(then.crowd));
         calmer || many * 3 > few * 4
     }
 }
@@ -121,8 +124,14 @@ impl Gear {
     /// Whether this tick is to be worked without candidates.
     ///
     /// * `on` - whether the last one was.
-    /// * `usual` - blocks that a block's query meets, in sixteenths.
-    pub(super) fn choose(&mut self, on: bool, moved: usize, bodies: usize, usual: u64) -> bool {
+    /// * `usual`, `hits` - blocks that a block's query meets, in sixteenths; and overlaps.
+    pub(super) fn choose(
+        &mut self,
+        on: bool,
+        moved: usize,
+        bodies: usize,
+        (usual, hits): (u64, usize),
+    ) -> bool {
         if let Some(forced) = self.forced {
             self.cause = BroadCause::Forced;
             return forced;
@@ -157,7 +166,9 @@ impl Gear {
             let meets = if self.meets > 0 {
                 self.meets
             } else {
-                MEETS_LEAST + usual / MEETS_SHARE
+                let plain = MEETS_LEAST + usual / MEETS_SHARE;
+                let hits = hits as u64 / bodies.max(1);
+                plain.min(plain / LIST_SHARE + hits + LIST_LEAST)
             };
             let scratch = bodies * (BODY + meets * MEET);
             let seen = self.ticks.saturating_sub(self.counted_from());
@@ -229,9 +240,9 @@ impl Gear {
         }
     }
 
-    /// Takes the work of a tick without candidates.
-    pub(super) fn note_scratch(&mut self, bodies: usize, work: &Work) {
-        self.meets = work.tests / (bodies as u64).max(1) + 1;
+    /// Takes the work of a tick without candidates: boxes compared with a block.
+    pub(super) fn note_scratch(&mut self, bodies: usize, tests: u64) {
+        self.meets = tests / (bodies as u64).max(1) + 1;
     }
 
     /// Takes the work of a tick with candidates.
@@ -271,7 +282,7 @@ mod tests {
     fn run(gear: &mut Gear, on: &mut bool, ticks: u32, work: &Work) -> u32 {
         let mut scratch = 0;
         for _ in 0..ticks {
-            *on = gear.choose(*on, 1000, 1000, 300);
+            *on = gear.choose(*on, 1000, 1000, (300, 0));
             if *on {
                 scratch += 1;
             } else {
@@ -297,7 +308,7 @@ mod tests {
     /// Gives up candidates that renewed 900 boxes a tick of 1,000 bodies.
     fn given_up() -> Gear {
         let (mut gear, wild) = (Gear::default(), work(10_000, 900));
-        while !gear.choose(false, 1000, 1000, 300) {
+        while !gear.choose(false, 1000, 1000, (300, 0)) {
             gear.note(1000, 0, &wild);
         }
         assert_eq!((gear.left, gear.probes()), (SPELL_LONG, Some(true)));
@@ -306,17 +317,17 @@ mod tests {
 
     /// Ticks without candidates, as many as asked for or until a trial; what probes come to is told. Returns how many
     /// began, their ticks, and whether a trial came.
-    fn spell(gear: &mut Gear, most: u32, escapes: u64, meets: u64) -> (u32, u32, bool) {
+    fn spell(gear: &mut Gear, most: u32, escapes: u64, crowd: u64) -> (u32, u32, bool) {
         let (mut begun, mut ticks) = (0, 0);
         for _ in 0..most {
             if let Some(begins) = gear.probes() {
                 begun += u32::from(begins);
                 ticks += 1;
                 if ticks % PROBE_TICKS == 0 {
-                    gear.note_probe(Footing { escapes, meets });
+                    gear.note_probe(Footing { escapes, crowd });
                 }
             }
-            if !gear.choose(true, 1000, 1000, 300) {
+            if !gear.choose(true, 1000, 1000, (300, 0)) {
                 assert_eq!(gear.cause, BroadCause::Trial);
                 return (begun, ticks, true);
             }
@@ -332,11 +343,11 @@ mod tests {
         let ten = (10, 10 * PROBE_TICKS, false);
         assert_eq!(spell(&mut gear, 10 * SPELL_MIN, 350, 2500), ten);
         // Calmer, or another crowd.
-        for (escapes, meets) in [(290, 2000), (400, 1400), (400, 2700)] {
+        for (escapes, crowd) in [(290, 2000), (400, 1400), (400, 2700)] {
             let mut other = gear;
             assert!(
-                spell(&mut other, SPELL_MIN, escapes, meets).2,
-                "{escapes} {meets}"
+                spell(&mut other, SPELL_MIN, escapes, crowd).2,
+                "{escapes} {crowd}"
             );
         }
         // Nor are they given up for ever.
@@ -371,11 +382,11 @@ mod tests {
         run(&mut gear, &mut on, 40, &work(10_000, 900));
         assert!(on);
         for _ in 0..CALM_TICKS {
-            on = gear.choose(on, 10, 1000, 300);
+            on = gear.choose(on, 10, 1000, (300, 0));
         }
         assert_eq!((on, gear.cause), (false, BroadCause::Calm));
         gear.forced = Some(true);
-        assert!(gear.choose(on, 10, 1000, 300));
+        assert!(gear.choose(on, 10, 1000, (300, 0)));
         assert_eq!(gear.cause, BroadCause::Forced);
     }
 

@@ -11,12 +11,11 @@
 //! * **The look** (`look`): candidates are compared one after the other, and begin and end are differences of bits.
 //!   Pairs whose cores overlap are sure and not compared. Cost in proportion to what moved: few moved bodies are looked
 //!   at one by one.
-//! * **Mending** (`mend`): while bodies move, a few blocks in each tick are put in order again, so that everything is
-//!   seldom sorted anew.
+//! * **Mending** (`mend`): while bodies move, a few blocks in each tick are put in order: all are seldom sorted anew.
 //! * **Exact.** Boxes are f32, rounded outward, relative to an f64 origin amid the scene; where rounding could tell
 //!   otherwise than the f64 boxes, those are asked. So the pairs are those of the f64 boxes at any offset.
-//! * **Without candidates** (`afresh`, `sweep`, `met`, `presort`): where no fat box lasts, lanes and overlaps alone are
-//!   kept. Threads (`team`) share a large search: the same bits for any number.
+//! * **Without candidates** (`afresh`, `sweep`, `met`, `presort`): where no fat box lasts, overlaps alone are kept; or
+//!   a list for some ticks, made by one search (`verlet`), which threads (`team`) share.
 //! * **Modes** (few or many moved; renewal, sorting anew, without candidates) are chosen by counted work with weights
 //!   that were measured once, so that a replay chooses alike. They decide about cost alone: pairs, slots and events are
 //!   the same.
@@ -46,15 +45,19 @@ mod load;
 mod look;
 mod mend;
 mod met;
+mod near;
+mod pace;
 mod place;
 mod presort;
 mod probe;
 mod renew;
 mod sort;
 mod sweep;
+mod swept;
 mod team;
 mod tree;
 mod validate;
+mod verlet;
 
 use afresh::Afresh;
 use fatten::Gait;
@@ -63,8 +66,7 @@ use tree::Tree;
 
 /// No index.
 const NONE: u32 = u32::MAX;
-/// One moved body in so many, and they are looked at block by block rather than one by one. A single look costs
-/// about 80 ns, a body of a block about 8.
+/// One moved body in so many, and blocks are looked at rather than bodies: about 80 ns each, and 8 for one of a block.
 const MANY_MOVED: usize = 10;
 /// ... and so few, that the list of candidates is let go.
 const STILL_MANY: usize = 14;
@@ -231,11 +233,9 @@ impl Order {
         let came = tick.members.touched().iter().copied();
         let came = came.filter(|s| tick.members.has(*s, CAME) && tick.members.is_bounded(*s));
         self.homeless.extend(came);
-        if (self.afresh.gear).choose(was, moved, bodies, self.usual) {
-            work.way = Some((BroadMode::Scratch, self.afresh.gear.cause));
-            self.update_afresh(&mut tick, work);
-            self.afresh.gear.note_scratch(bodies, work);
-            self.probe(&tick, work);
+        let crowd = (self.usual, self.hits);
+        if (self.afresh.gear).choose(was, moved, bodies, crowd) {
+            self.work_afresh(&mut tick, work);
             return;
         }
         if was {

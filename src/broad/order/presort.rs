@@ -107,7 +107,12 @@ impl Order {
             for lane in ones(*live) {
                 let slot = self.slot_of[block * WIDTH + lane];
                 presort.bodies.push(BodySlot(slot));
-                self.boxes.push(self.fat[block].get(lane));
+                // By size, and a swept box is larger.
+                self.boxes.push(if self.afresh.verlet.on {
+                    self.exact[block * WIDTH + lane].corners()
+                } else {
+                    self.fat[block].get(lane)
+                });
             }
         }
         let frame = self.sorter.frame;

@@ -8,7 +8,7 @@
 use super::fatten::{Gait, HORIZON};
 use super::gear::Footing;
 use super::links::room;
-use super::{BodySlot, Order, Proxies, Tick, Work as Done};
+use super::{BodySlot, Order, Proxies, Tick};
 use crate::simd::boxes::{Down, Hold, Lanes, Portable};
 
 /// Ticks of a probe, and those of them until bodies have learned their margins, which do not count.
@@ -16,6 +16,8 @@ pub(super) const PROBE_TICKS: u32 = 64;
 const LEARN_TICKS: u32 = 16;
 /// Bodies that are watched, at most twice as many.
 const SAMPLE: usize = 64;
+/// What an overlap adds to a body's crowd: as much is near it as overlaps it, and more.
+const CROWD: u64 = 4;
 
 /// A body and the fat box that it would have.
 #[derive(Clone, Copy, Debug)]
@@ -35,8 +37,8 @@ pub(super) struct Probe {
     /// Bodies that escaped from their fat boxes, and those that could have.
     escapes: u64,
     watched: u64,
-    /// Boxes compared with a block, and bodies.
-    tests: u64,
+    /// Overlaps, and bodies.
+    hits: u64,
     all: u64,
 }
 
@@ -59,10 +61,10 @@ impl Probe {
     }
 
     /// Looks at the bodies once.
-    fn look<P: Proxies>(&mut self, tick: &Tick<'_, P>, tests: u64) {
+    fn look<P: Proxies>(&mut self, tick: &Tick<'_, P>, hits: usize) {
         self.ticks += 1;
         let counts = u64::from(self.ticks > LEARN_TICKS);
-        self.tests += counts * tests;
+        self.hits += counts * hits as u64;
         self.all += counts * tick.members.bounded().len() as u64;
         for Watched { slot, gait, hold } in &mut self.bodies {
             if !tick.members.is_bounded(*slot) {
@@ -84,14 +86,14 @@ impl Probe {
     fn footing(&self) -> Footing {
         Footing {
             escapes: self.escapes * 1024 / self.watched.max(1),
-            meets: self.tests * 1024 / self.all.max(1),
+            crowd: 1024 + self.hits * CROWD * 1024 / self.all.max(1),
         }
     }
 }
 
 impl Order {
     /// Goes on with the probe of this tick, if there is one.
-    pub(super) fn probe<P: Proxies>(&mut self, tick: &Tick<'_, P>, work: &Done) {
+    pub(super) fn probe<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
         let Some(begins) = self.afresh.gear.probes() else {
             return;
         };
@@ -99,7 +101,7 @@ impl Order {
         if begins {
             probe.begin(self.origin, tick.members.bounded());
         }
-        probe.look(tick, work.tests);
+        probe.look(tick, self.hits);
         if probe.ticks == PROBE_TICKS {
             let footing = probe.footing();
             self.afresh.gear.note_probe(footing);

@@ -9,10 +9,11 @@
 
 use std::ops::Range;
 
-use super::links::{Matrix, room, small};
+use super::links::{Matrix, room, small, spare};
 use super::met::Met;
+use super::near::Near;
 use super::tree::{Tree, Walk};
-use crate::simd::boxes::{Boxes16, Lanes, WIDTH, Work, prefetch, slack};
+use crate::simd::boxes::{Boxes16, LANES, Lanes, WIDTH, Work, prefetch, slack};
 
 /// Blocks near one that are worked on together: what the passes hand on stays in the first cache.
 const TOGETHER: usize = 64;
@@ -52,6 +53,8 @@ pub(super) struct Finds {
     pub(super) met: Met,
     /// Ranks of boxes for which rounding leaves it open.
     pub(super) open: Vec<[u32; 2]>,
+    /// What is near, where that alone is asked for.
+    pub(super) near: Vec<Near>,
     /// How many boxes were compared with a block.
     pub(super) tests: u64,
     scratch: Scratch,
@@ -68,12 +71,15 @@ impl Finds {
     pub(super) fn spare(&mut self) {
         let (records, blocks) = (self.met.len(), self.met.blocks());
         self.met.spare_for(records, blocks);
+        let near = self.near.len();
+        spare(&mut self.near, near, blocks);
     }
 
     /// Puts what was found among the blocks that follow behind.
     pub(super) fn append(&mut self, next: &Self) {
         self.met.append(&next.met);
         self.open.extend_from_slice(&next.open);
+        self.near.extend_from_slice(&next.near);
         self.tests += next.tests;
     }
 }
@@ -118,6 +124,8 @@ pub(super) struct Sweep<'a> {
     /// From a multiple of `WIDTH` on.
     pub(super) blocks: Range<usize>,
     pub(super) finds: &'a mut Finds,
+    /// Whether pairs are listed as near, and nothing else is found.
+    pub(super) lists: bool,
 }
 
 impl Work for Sweep<'_> {
@@ -130,7 +138,9 @@ impl Work for Sweep<'_> {
         let mut scratch = std::mem::take(&mut finds.scratch);
         let mut open = std::mem::take(&mut finds.open);
         let mut met = std::mem::take(&mut finds.met);
+        let mut listed = std::mem::take(&mut finds.near);
         met.clear();
+        listed.clear();
         open.clear();
         let mut tests = 0;
         for block in self.blocks {
@@ -149,8 +159,12 @@ impl Work for Sweep<'_> {
             for some in near.chunks(TOGETHER) {
                 let (sides, boxes) = scratch.sift(lanes, field, block, some);
                 let hits = scratch.compare(lanes, field, boxes);
-                met.add(scratch.enter(lanes, field, (block, sides), hits, &mut open));
-                scratch.record(block, sides, &mut met);
+                if self.lists {
+                    scratch.list(hits, &mut listed);
+                } else {
+                    met.add(scratch.enter(lanes, field, (block, sides), hits, &mut open));
+                    scratch.record(block, sides, &mut met);
+                }
                 tests += boxes as u64;
             }
             scratch.near = near;
@@ -159,6 +173,7 @@ impl Work for Sweep<'_> {
         *finds = Finds {
             met,
             open,
+            near: listed,
             tests,
             scratch,
         };
@@ -282,6 +297,20 @@ impl Scratch {
             }
         }
         pairs
+    }
+
+    /// Lists what was met.
+    #[inline(always)]
+    fn list(&self, hits: usize, listed: &mut Vec<Near>) {
+        for hit in &self.hits[..hits] {
+            let side = &self.sides[usize::from(hit.side)];
+            let one = side.block * LANES + u32::from(hit.lane);
+            let (first, mut met) = (side.against * LANES, hit.met);
+            while met != 0 {
+                listed.push(Near::new(one, first + met.trailing_zeros()));
+                met &= met - 1;
+            }
+        }
     }
 
     /// Records the matrices that hold any overlap.

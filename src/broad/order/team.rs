@@ -47,6 +47,7 @@ struct Job {
     level: Level,
     blocks: Range<usize>,
     finds: Finds,
+    lists: bool,
 }
 
 /// Another thread.
@@ -71,11 +72,13 @@ impl Mate {
                     level,
                     blocks,
                     mut finds,
+                    lists,
                 } = job;
                 level.run(Sweep {
                     field: lent.field(),
                     blocks,
                     finds: &mut finds,
+                    lists,
                 });
                 // Given back before it is told: the owner takes it as its own again.
                 drop(lent);
@@ -153,7 +156,15 @@ impl Team {
     }
 
     /// Finds the overlaps of all blocks.
-    pub(super) fn search(&mut self, level: Level, (live, fat, tree): Own<'_>, finds: &mut Finds) {
+    ///
+    /// * `lists` - see [`Sweep`].
+    pub(super) fn search(
+        &mut self,
+        level: Level,
+        (live, fat, tree): Own<'_>,
+        finds: &mut Finds,
+        lists: bool,
+    ) {
         let blocks = live.len();
         let threads = if finds.tests >= self.least {
             self.gather()
@@ -166,6 +177,7 @@ impl Team {
                 field,
                 blocks: 0..blocks,
                 finds,
+                lists,
             });
             return;
         }
@@ -178,6 +190,7 @@ impl Team {
                 level,
                 blocks: self.ends[at]..self.ends[at + 1],
                 finds: std::mem::take(&mut mate.finds),
+                lists,
             };
             mate.busy = mate.jobs.send(job).is_ok();
         }
@@ -186,6 +199,7 @@ impl Team {
             field,
             blocks: 0..self.ends[0],
             finds,
+            lists,
         });
         self.took.clear();
         self.took.push(finds.tests);
@@ -203,6 +217,7 @@ impl Team {
                     field: self.lent.field(),
                     blocks: self.ends[at]..self.ends[at + 1],
                     finds: &mut mate.finds,
+                    lists,
                 });
             }
             self.took.push(mate.finds.tests);
@@ -318,7 +333,7 @@ mod tests {
         finds.reserve(BLOCKS, BLOCKS * WIDTH);
         let before = stand.0.clone();
         let own = (&mut stand.0, &mut stand.1, &mut stand.2);
-        team.search(Level::best(), own, &mut finds);
+        team.search(Level::best(), own, &mut finds, false);
         assert_eq!(stand.0, before, "what was lent is back");
         assert!(finds.met.hits() > 1_000 && finds.met.recount() == finds.met.hits());
         format!("{:?} {:?} {}", finds.met, finds.open, finds.tests)
