@@ -34,7 +34,7 @@ use rig::{Rig, at};
 use scenes::{Kind, Scene};
 use sweepd::broad::Method;
 use sweepd::simd::boxes::Level;
-use sweepd::wire::BroadMode;
+use sweepd::wire::{BroadCause, BroadMode};
 
 fn frames() -> usize {
     let told = std::env::var("SWEEPD_FRAMES").ok();
@@ -236,8 +236,11 @@ fn candidates_are_tried_again_when_bodies_have_calmed_and_not_before() {
             }
             rig.take(scene);
             rig.tick(&exact::pairs(&scene.boxes), &format!("frame {frame}"));
+            // A list that is kept for some ticks only is compared as candidates are, for another cause.
             let way = rig.work().way;
-            scratch += usize::from(way.is_some_and(|(mode, _)| mode == BroadMode::Scratch));
+            scratch += usize::from(way.is_some_and(|(mode, cause)| {
+                mode == BroadMode::Scratch || cause == BroadCause::Spell
+            }));
         }
         scratch
     };
