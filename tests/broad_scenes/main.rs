@@ -293,6 +293,31 @@ fn a_slot_that_another_body_takes_in_the_same_tick_keeps_no_pair() {
 }
 
 #[test]
+fn bodies_that_crowd_to_one_place_while_all_are_sorted_lose_no_event() {
+    const BODIES: usize = 2000;
+    let mut scene = Scene::new(Kind::Gas, BODIES, 12);
+    let mut rig = Rig::geared("from scratch", &[true], BODIES, false);
+    rig.start(&scene.boxes);
+    let mut rng = Rng::new(9);
+    let mut place = [0.0; 3];
+    for frame in 0..900 {
+        scene.step();
+        let mut boxes = scene.boxes.clone();
+        // In some spells some more go to one place in each frame, until its lanes are full.
+        let crowd = [0, 0, 0, 0, 0, 45, 45, 45, 45, 45][frame / 3 % 10];
+        if frame % 30 == 15 {
+            place = std::array::from_fn(|_| rng.between(2.0, 8.0) as f32);
+        }
+        for k in 0..crowd * (frame % 15 + 1) / 2 {
+            let body = (k * 7 + frame / 30) % BODIES;
+            boxes[body] = at(place.map(|x| x + (k % 9) as f32 * 0.01), 0.05);
+        }
+        rig.put(&boxes, &scene.moved, &[]);
+        rig.tick(&exact::pairs(&boxes), &format!("frame {frame}"));
+    }
+}
+
+#[test]
 fn bodies_that_jump_together_keep_their_pair_without_an_event() {
     let mut rig = Rig::geared("from scratch", &[true], 900, false);
     let mut rng = Rng::new(8);

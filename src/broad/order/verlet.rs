@@ -77,6 +77,8 @@ impl Order {
             held,
             ..
         } = &mut self.afresh;
+        // They are all new to the list, and none is in its lane.
+        verlet.strays.clear();
         verlet.fresh.fill(0);
         jumped.fill(0);
         held.clear();
@@ -85,14 +87,19 @@ impl Order {
 
     /// Lets go of the list; its overlaps are remembered.
     pub(super) fn end_list(&mut self) {
-        let Verlet { entries, on, .. } = &mut self.afresh.verlet;
+        self.carry_listed();
+        self.afresh.verlet.on = false;
+    }
+
+    /// Takes the entries out; writes those that overlap down as two body slots.
+    fn carry_listed(&mut self) {
+        let entries = &mut self.afresh.verlet.entries;
         for entry in entries.drain(..).filter(|entry| entry.is_hit()) {
             let [one, other] = entry.ranks().map(|rank| self.slot_of[rank]);
             if one != NONE && other != NONE {
                 self.carried.push((one, other));
             }
         }
-        *on = false;
     }
 
     /// A tick by the list; `false` where it was let go, and bodies are to be laid anew.
@@ -132,7 +139,6 @@ impl Order {
             self.list_strays(tick, work);
             self.presort_listed(bodies);
         } else if self.afresh.presort.is_ready() && !self.lay_listed(tick) {
-            self.end_list();
             return false;
         } else {
             self.list_all(tick, work);
@@ -219,12 +225,18 @@ impl Order {
 
     /// Deals the bodies to blocks in the order that was sorted; whether there was a lane for each.
     fn lay_listed<P: Proxies>(&mut self, tick: &Tick<'_, P>) -> bool {
-        // Who is new in his lane, by body: the lanes go.
+        // The old lanes go: where not all find a new one, the overlaps are told of by body.
+        self.carry_listed();
+        // Who is new in his lane, by body too.
         let mut new = std::mem::take(&mut self.afresh.verlet.strays);
         for stray in &mut new {
             *stray = self.slot_of[*stray as usize];
         }
-        let all = self.lay_presorted(tick);
+        if !self.lay_presorted(tick) {
+            self.afresh.verlet.on = false;
+            return false;
+        }
+        self.carried.clear();
         let blocks = self.live.len();
         let verlet = &mut self.afresh.verlet;
         verlet.pace.note_laid();
@@ -247,7 +259,7 @@ impl Order {
             order: self,
             proxies: tick.proxies,
         });
-        all
+        true
     }
 
     /// Brings the bounds of the strays' blocks up to date.
