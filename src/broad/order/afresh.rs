@@ -15,11 +15,11 @@
 //! Exact as the rest: boxes are rounded outward, and where rounding could tell otherwise the f64 boxes are asked.
 
 use super::gear::Gear;
-use super::lay::TakeLanes;
+use super::lay::{LAY_TESTS, TakeLanes};
 use super::met::{Met, tell_all, tell_asked, tell_difference};
 use super::presort::{Presort, SPLIT_TICKS_MAX, split_ticks};
 use super::probe::Probe;
-use super::sweep::Finds;
+use super::sweep::{Finds, Search};
 use super::team::Team;
 use super::verlet::Verlet;
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, Work as Done, parts};
@@ -31,8 +31,6 @@ use crate::wire::BroadMode;
 /// Ticks between two looks at where the bodies are and how large, for the frame of the curve: a frame that is out of
 /// date costs time, nothing else.
 pub(super) const FRAME_TICKS: u32 = 256;
-/// Boxes compared with a block in the time that laying a body anew takes.
-const LAY_TESTS: f64 = 12.0;
 /// Where what was laid is spoilt in a tick, it is not even looked at in so many ticks.
 const SPOILT_TICKS: u32 = 64;
 
@@ -160,8 +158,9 @@ impl Order {
             }
         }
         let Afresh { finds, team, .. } = &mut self.afresh;
+        let blocks = self.live.len();
         let lanes = (&mut self.live, &mut self.fat, &mut self.tree);
-        team.search(self.level, lanes, finds, false);
+        team.search(self.level, lanes, 0..blocks, finds, Search::Overlaps);
         let tests = finds.tests;
         work.tests += tests;
         self.ask_open(tick.proxies);
@@ -173,8 +172,7 @@ impl Order {
             ..
         } = &mut self.afresh;
         self.hits = finds.met.hits();
-        let (records, blocks) = (finds.met.len(), self.live.len());
-        held.spare_for(records, blocks);
+        held.spare_for(finds.met.len(), blocks);
         finds.spare();
         team.reserve(blocks, self.len);
         if stays {
@@ -219,7 +217,10 @@ impl Order {
         }
         let (came, bodies) = (self.homeless.len(), tick.members.bounded().len());
         #[allow(clippy::cast_precision_loss, reason = "a cost")]
-        let (usual, most) = (self.afresh.usual as f64, self.len as f64 * LAY_TESTS);
+        let (usual, most) = (
+            self.afresh.usual as f64,
+            self.len as f64 * f64::from(LAY_TESTS),
+        );
         // Blocks do not shrink: what the last tick asked too much this one will at least, and need not be tried.
         let worn = self.afresh.excess + self.afresh.last > most;
         let changed = came + self.afresh.jumps;

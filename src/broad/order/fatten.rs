@@ -73,9 +73,7 @@ impl Gait {
     /// * `held` - the hold it had; where it still keeps to it, it is renewed along with others.
     #[inline(always)]
     pub(super) fn renew(&mut self, now: &Down, beat: u32, horizon: u32, held: &Hold) -> Hold {
-        let f = &now.faces;
-        // The sum of lower faces and minus upper ones is minus three mean sides.
-        let side = ((f[0] + f[4]) + (f[1] + f[5]) + (f[2] + f[6])) * (-1.0 / 3.0);
+        let side = now.mean_side();
         let age = self.age(beat);
         if age > 0 {
             self.learn(now, held, age, side);
@@ -92,7 +90,10 @@ impl Gait {
         let (mut fat, mut core) = (*now, NO_CORE);
         // An infinite box has no finite side: it is its own fat box.
         if self.wild >= WILD_AFTER || !side.is_finite() {
-            return hold(fat, core);
+            return Hold {
+                fat: fat.open(),
+                core,
+            };
         }
         if self.rest >= REST_AFTER {
             if let Some(hold) = self.stay(&before, held, side) {
@@ -122,7 +123,10 @@ impl Gait {
         }
         core.faces[SLACK] = f32::INFINITY;
         core.faces[SLACK + 4] = f32::INFINITY;
-        hold(fat, core)
+        Hold {
+            fat: fat.open(),
+            core,
+        }
     }
 
     /// The hold of a body at rest: where it has been, and a little more where it came beyond; `None` where that spans
@@ -152,7 +156,10 @@ impl Gait {
             core.faces[k] = if most > high { to + more } else { to };
         }
         self.rest = self.rest.max(REST_AFTER + 1);
-        Some(hold(fat, core))
+        Some(Hold {
+            fat: fat.open(),
+            core,
+        })
     }
 
     /// It moves between two beats: it alone grows older. So a body that moves now and then is swept by its moves, which
@@ -244,14 +251,6 @@ impl Gait {
 const NO_CORE: Down = Down {
     faces: [f32::INFINITY; 8],
 };
-
-/// A fat box holds whatever stands in the spare lanes.
-#[inline(always)]
-fn hold(mut fat: Down, core: Down) -> Hold {
-    fat.faces[SLACK] = f32::NEG_INFINITY;
-    fat.faces[SLACK + 4] = f32::NEG_INFINITY;
-    Hold { fat, core }
-}
 
 /// What the f64 box of a body that keeps to its hold is sure to hold: the core, less what rounding may have added.
 #[inline(always)]

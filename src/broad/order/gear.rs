@@ -15,7 +15,7 @@ const RENEW: u64 = 200;
 const LANE: u64 = 1500;
 /// ... and without candidates a body, a box compared with a block.
 const BODY: u64 = 25;
-const MEET: u64 = 12;
+pub(super) const MEET: u64 = 12;
 /// Boxes compared with a block without candidates, a body, where that is not known yet: so many, and one for so many
 /// blocks that a block's query meets, in sixteenths.
 const MEETS_LEAST: u64 = 2;

@@ -4,15 +4,17 @@
 
 use super::afresh::{Afresh, FRAME_TICKS};
 use super::links::{room, spare};
+use super::load::ask_ahead;
 use super::place::{ATTIC, grow, middle};
 use super::sort::{FILL, Frame, Sorter};
 use super::tree::NO_BOUND;
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, ones, small};
 use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work, prefetch};
 
-/// How many bodies ahead boxes are asked for, and how many blocks.
+/// Boxes compared with a block in the time that laying a body anew takes.
+pub(super) const LAY_TESTS: u32 = 12;
+/// How many bodies ahead boxes are asked for.
 const AHEAD: usize = 16;
-const AHEAD_BLOCKS: usize = 2;
 
 impl Order {
     /// How many times more a block is met than when it was laid, in the mean, by the space it takes.
@@ -236,12 +238,7 @@ impl<P: Proxies> Work for TakeLanes<'_, P> {
         let origin = order.origin;
         let mut jumps = 0;
         for block in 0..order.live.len() {
-            let ahead = order.slot_of[block * WIDTH..].chunks_exact(WIDTH);
-            if let Some(ahead) = ahead.clone().nth(AHEAD_BLOCKS) {
-                for slot in ahead.iter().filter(|slot| **slot != NONE) {
-                    prefetch(proxies.aabb(BodySlot(*slot)));
-                }
-            }
+            ask_ahead(&order.slot_of, block, proxies);
             for lane in ones(order.live[block]) {
                 let rank = block * WIDTH + lane;
                 let aabb = proxies.aabb(BodySlot(order.slot_of[rank]));

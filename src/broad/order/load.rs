@@ -108,6 +108,16 @@ impl Order {
     }
 }
 
+/// Asks for the boxes of a block to come while one is taken: those of the world stand in another order.
+#[inline(always)]
+pub(super) fn ask_ahead<P: Proxies>(slot_of: &[u32], block: usize, proxies: &P) {
+    if let Some(ahead) = slot_of[block * WIDTH..].chunks_exact(WIDTH).nth(AHEAD) {
+        for slot in ahead.iter().filter(|slot| **slot != NONE) {
+            prefetch(proxies.aabb(BodySlot(*slot)));
+        }
+    }
+}
+
 /// Block by block, the dirty lanes of each.
 struct LoadBlocks<'a, 'b, P> {
     order: &'a mut Order,
@@ -125,15 +135,7 @@ impl<P: Proxies> Work for LoadBlocks<'_, '_, P> {
             if moved == 0 {
                 continue;
             }
-            // The boxes of the world stand in another order: the next blocks' are asked for while this one is taken.
-            if let Some(ahead) = order.slot_of[block * WIDTH..]
-                .chunks_exact(WIDTH)
-                .nth(AHEAD)
-            {
-                for slot in ahead.iter().filter(|slot| **slot != NONE) {
-                    prefetch(tick.proxies.aabb(BodySlot(*slot)));
-                }
-            }
+            ask_ahead(&order.slot_of, block, tick.proxies);
             let mut out = 0;
             for lane in ones(moved) {
                 let rank = block * WIDTH + lane;

@@ -17,8 +17,7 @@
 //! * **Without candidates** (`afresh`, `sweep`, `met`, `presort`): where no fat box lasts, overlaps alone are kept; or
 //!   a list for some ticks, made by one search (`verlet`), which threads (`team`) share.
 //! * **Modes** (few or many moved; renewal, sorting anew, without candidates) are chosen by counted work with weights
-//!   that were measured once, so that a replay chooses alike. They decide about cost alone: pairs, slots and events are
-//!   the same.
+//!   measured once, so that a replay chooses alike. They decide about cost alone: pairs, slots, events are the same.
 //!
 //! Refused: three lists of sorted ends (see `sap`: exponent 1.5 to 2 as soon as motion is incoherent); a list of pairs
 //! as the one home of candidates (each renewal would insert, remove and look up single pairs; matrices are overwritten,
@@ -28,9 +27,8 @@
 //! Sources: Terdiman, "Box pruning revisited" (2017), for sorted copies in structure-of-arrays form; Verlet lists
 //! (Verlet 1967) for candidates that outlive a step; Morton 1966 for the order.
 
-use super::Proxies;
-use super::Work;
 use super::members::{ASKED, CAME, Members};
+use super::{Proxies, Work};
 use crate::ids::{BodySlot, PairKey};
 use crate::simd::boxes::{Boxes16, Down, Hold, Level, WIDTH};
 use crate::wire::{BroadCause, BroadMode};
@@ -46,11 +44,13 @@ mod look;
 mod mend;
 mod met;
 mod near;
+mod next;
 mod pace;
 mod place;
 mod presort;
 mod probe;
 mod renew;
+mod shares;
 mod sort;
 mod sweep;
 mod swept;
@@ -66,7 +66,7 @@ use tree::Tree;
 
 /// No index.
 const NONE: u32 = u32::MAX;
-/// One moved body in so many, and blocks are looked at rather than bodies: about 80 ns each, and 8 for one of a block.
+/// One moved body in so many, and they are looked at by blocks: 8 ns a body there, 80 one by one.
 const MANY_MOVED: usize = 10;
 /// ... and so few, that the list of candidates is let go.
 const STILL_MANY: usize = 14;

@@ -37,6 +37,30 @@ impl Near {
     pub(super) fn is_hit(self) -> bool {
         self.one & HIT != 0
     }
+
+    /// By the body slots that stand at the ranks.
+    #[inline(always)]
+    pub(super) fn key(self, slot_of: &[u32]) -> PairKey {
+        let [one, other] = self.ranks().map(|rank| BodySlot(slot_of[rank]));
+        PairKey::new(one, other)
+    }
+
+    /// With each of the two by what a table says of it: body slots for ranks, or ranks for body slots.
+    #[inline(always)]
+    pub(super) fn by(self, table: &[u32]) -> Self {
+        let [one, other] = self.ranks().map(|at| table[at]);
+        Self {
+            one: one | self.one & HIT,
+            other,
+        }
+    }
+
+    /// Whether either lane is among some.
+    #[inline(always)]
+    pub(super) fn any_among(self, lanes: &[u16]) -> bool {
+        let [one, other] = self.ranks();
+        is_among(lanes, one) | is_among(lanes, other)
+    }
 }
 
 /// What a look at an entry found: its place in the list, and whether the boxes overlap; `None` where rounding leaves it
@@ -47,7 +71,7 @@ pub(super) struct Found {
     now: Option<bool>,
 }
 
-/// Whether a rank's lane is among some.
+/// Whether the lane of a rank is among some.
 #[inline(always)]
 pub(super) fn is_among(lanes: &[u16], rank: usize) -> bool {
     lanes[rank / WIDTH] >> (rank % WIDTH) & 1 == 1
@@ -85,8 +109,7 @@ impl Order {
         self.hits -= lost;
         for Found { at, now } in found.iter() {
             let entry = &mut entries[*at as usize];
-            let ranks = entry.ranks();
-            let slots = ranks.map(|rank| BodySlot(slot_of[rank]));
+            let slots = entry.ranks().map(|rank| BodySlot(slot_of[rank]));
             let now = now.unwrap_or_else(|| {
                 let [a, b] = slots.map(|slot| tick.proxies.aabb(slot));
                 a.overlaps(b)
@@ -99,8 +122,31 @@ impl Order {
             let key = PairKey::new(slots[0], slots[1]);
             if !now {
                 tick.parted.push(key);
-            } else if old || ranks.into_iter().any(|rank| is_among(fresh, rank)) {
+            } else if old || entry.any_among(fresh) {
                 tick.began.push(key);
+            }
+        }
+    }
+
+    /// Finds which of the entries from one on overlap, and tells nobody.
+    pub(super) fn settle_listed<P: Proxies>(&mut self, from: usize, proxies: &P) {
+        let verlet = &mut self.afresh.verlet;
+        verlet.found.clear();
+        let (exact, slot_of) = (&self.exact[..], &self.slot_of[..]);
+        self.hits += self.level.run(Settle {
+            exact,
+            entries: &mut verlet.entries,
+            from,
+            found: &mut verlet.found,
+        });
+        for Found { at, .. } in &verlet.found {
+            let entry = &mut verlet.entries[*at as usize];
+            let [a, b] = entry
+                .ranks()
+                .map(|rank| proxies.aabb(BodySlot(slot_of[rank])));
+            if a.overlaps(b) {
+                entry.one |= HIT;
+                self.hits += 1;
             }
         }
     }
@@ -108,12 +154,49 @@ impl Order {
     /// Reports every overlap of marked lanes.
     pub(super) fn tell_listed(&self, marked: &[u16], began: &mut Vec<PairKey>) {
         for entry in &self.afresh.verlet.entries {
-            let any = || entry.ranks().into_iter().any(|rank| is_among(marked, rank));
-            if entry.is_hit() && any() {
-                let [one, other] = entry.ranks().map(|rank| BodySlot(self.slot_of[rank]));
-                began.push(PairKey::new(one, other));
+            if entry.is_hit() && entry.any_among(marked) {
+                began.push(entry.key(&self.slot_of));
             }
         }
+    }
+}
+
+/// See [`Order::settle_listed`]. Returns how many surely overlap.
+struct Settle<'a> {
+    exact: &'a [Down],
+    entries: &'a mut [Near],
+    from: usize,
+    /// What rounding leaves open.
+    found: &'a mut Vec<Found>,
+}
+
+impl Work for Settle<'_> {
+    type Out = usize;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> usize {
+        let mut hits = 0;
+        for at in self.from..self.entries.len() {
+            ask_ahead(self.exact, self.entries, at);
+            let [a, b] = self.entries[at].ranks();
+            let (apart, sure) = lanes.parts(&self.exact[a], &self.exact[b]);
+            self.entries[at].one |= if sure { HIT } else { 0 };
+            hits += usize::from(sure);
+            if !(apart | sure) {
+                let now = None;
+                self.found.push(Found { at: small(at), now });
+            }
+        }
+        hits
+    }
+}
+
+/// Asks for a box of an entry to come.
+#[inline(always)]
+fn ask_ahead(exact: &[Down], entries: &[Near], at: usize) {
+    if let Some(next) = entries.get(at + AHEAD) {
+        let [_, other] = next.ranks();
+        prefetch(&exact[other]);
     }
 }
 
@@ -136,13 +219,10 @@ impl Work for Look<'_> {
     fn run<L: Lanes>(self, lanes: L) -> usize {
         let (mut kept, mut lost) = (self.from, 0);
         for at in self.from..self.entries.len() {
-            if let Some(next) = self.entries.get(at + AHEAD) {
-                let [_, b] = next.ranks();
-                prefetch(&self.exact[b]);
-            }
+            ask_ahead(self.exact, self.entries, at);
             let entry = self.entries[at];
             let [a, b] = entry.ranks();
-            let alive = !(self.old & (is_among(self.out, a) | is_among(self.out, b)));
+            let alive = !(self.old & entry.any_among(self.out));
             self.entries[kept] = entry;
             let (apart, sure) = lanes.parts(&self.exact[a], &self.exact[b]);
             // Without a branch on the state: it is as good as random.

@@ -1,35 +1,53 @@
-//! For how many ticks a Verlet list is made, and whether it pays.
+//! For how many ticks a Verlet list is made, when the next one is begun, and whether lists pay.
 //!
 //! In: counted work, never time, so that a replay chooses alike. Out: when the list is made anew, for how long, and
 //! when it is let go. The weights were measured once; they decide about cost alone.
 
-/// Weights, in nanoseconds of the machine that they were measured on: a box compared with a block in a search, an entry
-/// looked at, a body looked for alone.
-const MEET: u64 = 12;
+use super::gear::MEET;
+use super::lay::LAY_TESTS;
+
+/// Weights, as those of [`gear`](super::gear): an entry looked at, a body looked for alone.
 const LOOK: u64 = 4;
 const STRAY: u64 = 400;
-/// Boxes compared with a block in the time that laying a body anew takes.
-const LAY_TESTS: u64 = 12;
-/// Ticks that a list is made for, at first, at least and at most.
+/// Ticks that a list is in use, at first, at least and at most.
 const TICKS: u32 = 8;
-const TICKS_MIN: u32 = 2;
+const TICKS_MIN: u32 = 4;
 const TICKS_MAX: u32 = 24;
+/// One in so many of them is one in which the next list is made, ... and so many at most.
+const AHEAD_SHARE: u32 = 2;
+const AHEAD_MAX: u32 = 4;
 /// Lists in a row that take more than a search in each tick would, and there are none ...
 const VAIN: u32 = 3;
 /// ... for so many ticks; four times as many each time that they prove no better.
 const REST_MIN: u32 = 64;
 const REST_MAX: u32 = 2048;
-/// One in so many strays in a tick, and the next one makes the list anew.
+/// One in so many strays in a tick, and the next list is begun in the one that follows.
 const MANY_STRAY: usize = 32;
+
+/// What a tick is to the list in use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Phase {
+    /// It lasts; the next one has not been begun.
+    Lasts,
+    /// All boxes are swept anew, and the next one is begun.
+    Opens,
+    /// The next one is being made.
+    Makes,
+    /// The next one takes over.
+    Ends,
+}
 
 /// What the choice is made by.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pace {
-    /// Ticks that boxes are swept for, and how many of them are left.
+    /// Ticks that a list is in use, or the next one where that is being made; and ticks until the next takes over.
     ticks: u32,
     left: u32,
-    /// Work of the list at hand and the ticks it has lasted, ...
+    /// Whether the next one is being made.
+    making: bool,
+    /// Work of the list in use, of its last tick, and the ticks it has lasted; ...
     cost: u64,
+    tick: u64,
     lasted: u64,
     /// ... of the one before in the mean, and whether its ticks were more than those of the one before it.
     before: u64,
@@ -52,7 +70,9 @@ impl Default for Pace {
         Self {
             ticks: TICKS,
             left: 0,
+            making: false,
             cost: 0,
+            tick: 0,
             lasted: 0,
             before: 0,
             longer: true,
@@ -77,29 +97,55 @@ impl Pace {
         self.rest == 0 && hits as u64 * LOOK < plain * MEET
     }
 
-    /// A list begins.
+    /// Lists begin, all at once.
     ///
     /// * `plain` - boxes compared with a block in a search of all boxes as they are.
     pub(super) fn begin(&mut self, plain: u64) {
-        self.plain = plain;
+        (self.plain, self.left, self.making) = (plain, 0, false);
         self.note_laid();
-        (self.cost, self.lasted) = (0, 0);
     }
 
-    /// Whether the list is to be made anew in this tick.
-    pub(super) fn is_due(&self) -> bool {
-        self.left == 0
+    /// What this tick is to the list in use.
+    pub(super) fn phase(&self) -> Phase {
+        match (self.making, self.left) {
+            (true, 0) => Phase::Ends,
+            (true, _) => Phase::Makes,
+            (false, left) if left <= self.ahead() => Phase::Opens,
+            (false, _) => Phase::Lasts,
+        }
     }
 
-    /// Ticks that a box made in this tick is swept for: to the one in which the list is made anew, for what has begun
-    /// and parted until then is told by the old one.
-    pub(super) fn left(&self, due: bool) -> u32 {
-        1 + if due { self.ticks } else { self.left - 1 }
+    /// Ticks before a list takes over in which it is made.
+    fn ahead(&self) -> u32 {
+        (self.ticks / AHEAD_SHARE).clamp(1, AHEAD_MAX)
+    }
+
+    /// Ticks in which nothing of the next list is made yet, this one among them.
+    pub(super) fn spare(&self) -> u32 {
+        self.left.saturating_sub(self.ahead())
+    }
+
+    /// The next list is begun in this tick; in how many it is made, this one among them.
+    pub(super) fn open(&mut self) -> u32 {
+        self.making = true;
+        self.left
+    }
+
+    /// Ticks that a box made in this tick is swept for: to the end of the list that it is made for, the one in which
+    /// another takes over; for what has begun and parted until then is told by the old one.
+    ///
+    /// * `first` - whether it is for the first list, which is in use from this tick on.
+    pub(super) fn span(&self, first: bool) -> u32 {
+        if first || self.making {
+            self.left + self.ticks
+        } else {
+            self.left
+        }
     }
 
     /// Whether the searches have cost more than laying anew would.
     pub(super) fn is_worn(&self, bodies: usize) -> bool {
-        self.excess + self.last > LAY_TESTS * bodies as u64
+        self.excess + self.last > u64::from(LAY_TESTS) * bodies as u64
     }
 
     /// What a tick takes in the mean, in boxes compared with a block; `None` where that is not known yet.
@@ -112,9 +158,10 @@ impl Pace {
         (self.usual, self.excess, self.last) = (0, 0, 0);
     }
 
-    /// Takes what the list has cost, now that it is due; whether there is to be another.
+    /// Takes what the list has cost, and will have when the next one takes over; whether there is to be one.
     pub(super) fn pays(&mut self) -> bool {
-        let mean = self.cost / self.lasted.max(1);
+        let left = u64::from(self.left);
+        let mean = (self.cost + left * self.tick) / (self.lasted + left).max(1);
         let pays = mean * 10 < self.plain * MEET * 9;
         self.vain = if pays { 0 } else { self.vain + 1 };
         if pays {
@@ -143,32 +190,39 @@ impl Pace {
         self.rest = self.spell;
         self.spell = (self.spell * 4).min(REST_MAX);
         self.vain = 0;
-        self.ticks = TICKS;
+        (self.ticks, self.left) = (TICKS, 0);
+        self.making = false;
         self.before = 0;
     }
 
-    /// A search for a list has been.
-    pub(super) fn note_search(&mut self, tests: u64) {
+    /// A list takes over.
+    ///
+    /// * `tests` - boxes compared with a block in the search for it.
+    pub(super) fn note_list(&mut self, tests: u64) {
         if self.usual == 0 {
             self.usual = tests;
         }
         self.last = tests.saturating_sub(self.usual);
         self.excess += self.last;
-        (self.cost, self.lasted) = (tests * MEET, 0);
+        (self.cost, self.tick, self.lasted) = (tests * MEET, 0, 0);
         self.left = self.ticks;
+        self.making = false;
     }
 
-    /// A tick with the list has been.
+    /// A tick with a list is over.
     pub(super) fn note_tick(&mut self, entries: usize, strays: usize, bodies: usize) {
+        self.tick = entries as u64 * LOOK + strays as u64 * STRAY;
         self.lasted += 1;
-        self.cost += entries as u64 * LOOK + strays as u64 * STRAY;
+        self.cost += self.tick;
         self.left -= 1;
         let hopeless = entries as u64 * LOOK > self.plain * MEET;
         if hopeless {
             self.vain = VAIN - 1;
         }
-        if hopeless || strays * MANY_STRAY > bodies {
-            self.left = 0;
+        // In the tick in which a list takes over it is the one before that bodies strayed from.
+        let stray = strays * MANY_STRAY > bodies && self.lasted > 1;
+        if !self.making && (hopeless || stray) {
+            self.left = self.left.min(self.ahead());
         }
     }
 }
@@ -179,32 +233,78 @@ mod tests {
 
     const BODIES: usize = 1000;
 
-    /// One list after another; each costs a search of `tests`, and each tick of it so many entries for each tick that
-    /// it is made for. Returns how long the last ones were made for, and whether lists go on.
+    /// Lists in turn; a search costs `tests`, and a tick so many entries for each tick that boxes are swept for.
+    /// Returns how long the last ones were in use, and whether lists go on.
     fn run(pace: &mut Pace, tests: u64, entries: u64, lists: u32) -> (u32, bool) {
+        pace.note_list(tests);
         for _ in 0..lists {
-            pace.note_search(tests);
-            while !pace.is_due() {
-                let most = entries * u64::from(pace.ticks);
-                pace.note_tick(usize::try_from(most).unwrap(), 0, BODIES);
+            let most = usize::try_from(entries * u64::from(pace.ticks)).unwrap();
+            while pace.phase() == Phase::Lasts {
+                pace.note_tick(most, 0, BODIES);
             }
             if !pace.pays() {
                 return (pace.ticks, false);
             }
+            pace.open();
+            while pace.phase() == Phase::Makes {
+                pace.note_tick(most, 0, BODIES);
+            }
+            assert_eq!(pace.phase(), Phase::Ends);
+            pace.note_list(tests);
+            pace.note_tick(most, 0, BODIES);
         }
         (pace.ticks, true)
     }
 
     #[test]
-    fn a_list_is_made_for_as_many_ticks_as_cost_least() {
+    fn a_list_is_in_use_for_as_many_ticks_as_cost_least() {
         // A search of 12 000 over n ticks, and 480 n in each: least at five.
         let mut pace = Pace::default();
         pace.begin(4000);
         let (ticks, on) = run(&mut pace, 1000, 120, 40);
-        assert!((3..=8).contains(&ticks) && on, "{ticks}");
+        assert!((4..=8).contains(&ticks) && on, "{ticks}");
         // With cheaper entries longer.
         let (ticks, on) = run(&mut pace, 1000, 10, 40);
         assert!((12..=TICKS_MAX).contains(&ticks) && on, "{ticks}");
+    }
+
+    #[test]
+    fn the_next_list_is_made_in_the_last_ticks_of_the_one_in_use() {
+        let mut pace = Pace::default();
+        pace.begin(1000);
+        assert_eq!(pace.span(true), TICKS);
+        pace.note_list(1000);
+        pace.note_tick(10, 0, BODIES);
+        let mut seen = Vec::new();
+        loop {
+            let phase = pace.phase();
+            if phase == Phase::Opens {
+                assert!(pace.pays());
+                assert_eq!(pace.open(), pace.left);
+            }
+            seen.push((phase, pace.span(false)));
+            if phase == Phase::Ends {
+                break;
+            }
+            pace.note_tick(10, 0, BODIES);
+        }
+        let (lasts, makes) = seen.split_at(3);
+        assert_eq!(
+            pace.ticks,
+            TICKS - 2,
+            "one way is as good as the other at first"
+        );
+        let spans: Vec<u32> = lasts.iter().map(|(_, span)| *span).collect();
+        assert!(lasts.iter().all(|(phase, _)| *phase == Phase::Lasts));
+        assert_eq!(spans, [7, 6, 5]);
+        let made = [9, 8, 7].map(|span| (Phase::Makes, span));
+        assert_eq!(makes[0], (Phase::Opens, 10));
+        assert_eq!(makes[1..4], made);
+        assert_eq!(makes[4..], [(Phase::Ends, 6)]);
+        // Its boxes hold to the end of the list that takes over now.
+        pace.note_list(1000);
+        pace.note_tick(10, 0, BODIES);
+        assert_eq!((pace.phase(), pace.span(false)), (Phase::Lasts, 5));
     }
 
     #[test]
@@ -213,7 +313,7 @@ mod tests {
         let mut rests = Vec::new();
         for _ in 0..4 {
             pace.begin(1000);
-            let (_, on) = run(&mut pace, 5000, 300, 40);
+            let (_, on) = run(&mut pace, 8000, 300, 40);
             assert!(!on);
             let mut rest = 1;
             while !pace.begins(0, 1000) {
@@ -233,33 +333,33 @@ mod tests {
     fn a_crowd_of_overlaps_is_not_listed() {
         let mut pace = Pace::default();
         assert!(!pace.begins(10_000, 1000) && pace.begins(2000, 1000));
-        // What turns out to be one is let go when it is due, which is at once.
+        // What turns out to be one is let go in the next tick.
         pace.begin(1000);
-        pace.note_search(1000);
+        pace.note_list(1000);
         pace.note_tick(100_000, 0, BODIES);
-        assert!(pace.is_due() && !pace.pays());
+        assert!(pace.phase() == Phase::Opens && !pace.pays());
     }
 
     #[test]
-    fn many_strays_make_the_list_due() {
+    fn where_many_stray_the_next_list_is_begun() {
         let mut pace = Pace::default();
         pace.begin(1000);
-        pace.note_search(1000);
+        pace.note_list(1000);
         pace.note_tick(100, BODIES / 100, BODIES);
-        assert!(!pace.is_due());
+        assert_eq!(pace.phase(), Phase::Lasts);
         pace.note_tick(100, BODIES / 10, BODIES);
-        assert!(pace.is_due());
+        assert_eq!(pace.phase(), Phase::Opens);
     }
 
     #[test]
     fn searches_that_have_cost_as_much_as_laying_anew_are_wear() {
         let mut pace = Pace::default();
-        pace.note_search(1000);
+        pace.note_list(1000);
         for _ in 0..11 {
             assert!(!pace.is_worn(BODIES));
-            pace.note_search(2000);
+            pace.note_list(2000);
         }
-        pace.note_search(2000);
+        pace.note_list(2000);
         assert!(pace.is_worn(BODIES));
         pace.note_laid();
         assert!(!pace.is_worn(BODIES));

@@ -119,6 +119,12 @@ impl Order {
         presort.frame = None;
         if self.afresh.framed >= FRAME_TICKS {
             self.sorter.frame = Frame::of(&self.boxes);
+            // To measure from elsewhere is not done with a list.
+            if self.afresh.verlet.on && !self.sorter.frame.is_near_origin() {
+                self.afresh.verlet.adrift = true;
+                self.sorter.frame = frame;
+                return;
+            }
             presort.frame = Some(self.sorter.frame);
         }
         self.sorter.begin(&self.boxes);
@@ -140,7 +146,10 @@ impl Order {
         presort.stop();
         if let Some(frame) = presort.frame.take() {
             self.sorter.frame = frame;
-            self.look_from_the_middle(tick);
+            self.afresh.framed = 0;
+            if !self.afresh.verlet.on {
+                self.look_from_the_middle(tick);
+            }
         }
         // Who has no lane is not dealt: who left, and who is late.
         for slot in &presort.late {
@@ -179,7 +188,6 @@ impl Order {
 
     /// Measures everything from the middle of the boxes: they are taken once more.
     fn look_from_the_middle<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
-        self.afresh.framed = 0;
         let bodies = tick.members.bounded().iter();
         let now = middle(bodies.map(|slot| tick.proxies.aabb(*slot)));
         let by = std::array::from_fn(|k| now[k] - self.origin[k]);

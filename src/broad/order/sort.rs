@@ -95,6 +95,13 @@ impl Frame {
         frame
     }
 
+    /// Whether the origin lies no farther from what it spans than that is wide, or deep, or high.
+    pub(super) fn is_near_origin(&self) -> bool {
+        let cells = f32::from(1_u16 << AXIS_BITS);
+        let near = |(low, scale): (&f32, &f32)| low.abs() <= 2.0 * cells / scale;
+        self.low.iter().zip(&self.scale).all(near)
+    }
+
     /// From the largest size down, each class begins at the next octave that has any body.
     fn lay_classes(&mut self, seen: &[u32; OCTAVES]) {
         let (mut class, mut left) = (0_usize, 0);

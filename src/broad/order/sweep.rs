@@ -118,14 +118,22 @@ impl Scratch {
     }
 }
 
-/// Finds the overlaps of some blocks with themselves and with every block behind them.
+/// What is searched for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Search {
+    /// Overlaps, as matrices, and what rounding leaves open.
+    Overlaps,
+    /// What is near, behind what is listed already.
+    Near,
+}
+
+/// Searches some blocks and every block behind them.
 pub(super) struct Sweep<'a> {
     pub(super) field: Field<'a>,
     /// From a multiple of `WIDTH` on.
     pub(super) blocks: Range<usize>,
     pub(super) finds: &'a mut Finds,
-    /// Whether pairs are listed as near, and nothing else is found.
-    pub(super) lists: bool,
+    pub(super) search: Search,
 }
 
 impl Work for Sweep<'_> {
@@ -140,7 +148,6 @@ impl Work for Sweep<'_> {
         let mut met = std::mem::take(&mut finds.met);
         let mut listed = std::mem::take(&mut finds.near);
         met.clear();
-        listed.clear();
         open.clear();
         let mut tests = 0;
         for block in self.blocks {
@@ -159,7 +166,7 @@ impl Work for Sweep<'_> {
             for some in near.chunks(TOGETHER) {
                 let (sides, boxes) = scratch.sift(lanes, field, block, some);
                 let hits = scratch.compare(lanes, field, boxes);
-                if self.lists {
+                if self.search == Search::Near {
                     scratch.list(hits, &mut listed);
                 } else {
                     met.add(scratch.enter(lanes, field, (block, sides), hits, &mut open));

@@ -4,8 +4,10 @@
 
 use super::fatten::outward;
 use super::links::small;
+use super::load::ask_ahead;
+use super::pace::Phase;
 use super::{BodySlot, NONE, Order, Proxies, ones};
-use crate::simd::boxes::{Down, Lanes, SLACK, WIDTH, Work, prefetch};
+use crate::simd::boxes::{Down, Lanes, WIDTH, Work, prefetch};
 
 /// What a swept box is padded by, in mean sides: what stands still but for its sender's rounding stays in, ...
 const PAD: f32 = 0.01;
@@ -13,44 +15,49 @@ const PAD: f32 = 0.01;
 const SWERVE: f32 = 0.25;
 /// Most that a face is swept, in mean sides.
 const SWEEP_MAX: f32 = 2.0;
-/// Bodies ahead whose boxes are asked for, and blocks of them.
+/// Bodies ahead whose boxes are asked for.
 const AHEAD: usize = 16;
-const AHEAD_BLOCKS: usize = 2;
 
 impl Order {
     /// Notes where the bodies are, so that the boxes of this tick tell how they move.
     pub(super) fn note_places(&mut self) {
         for (block, live) in self.live.iter().enumerate() {
             for lane in ones(*live) {
-                let [x, y, z, u, v, w] = self.fat[block].get(lane);
-                let faces = [x, y, z, 0.0, -u, -v, -w, 0.0];
-                self.exact[block * WIDTH + lane] = Down { faces };
+                self.exact[block * WIDTH + lane] = Down::of(self.fat[block].get(lane));
             }
         }
     }
 
-    /// Takes every box; where the list is due, sweeps all anew, else those that stray. Notes who does, and who has
+    /// Takes every box; sweeps all anew where the next list is begun, else those that stray. Notes who does, and who has
     /// jumped clear of where its block was: how many.
-    pub(super) fn take_swept<P: Proxies>(&mut self, proxies: &P, due: bool) -> usize {
-        let left = self.afresh.verlet.pace.left(due);
+    ///
+    /// * `span` - ticks to sweep for.
+    pub(super) fn take_swept<P: Proxies>(&mut self, proxies: &P, phase: Phase, span: u32) -> usize {
         self.afresh.verlet.strays.clear();
         let level = self.level;
         #[allow(clippy::cast_precision_loss, reason = "a few ticks")]
         level.run(TakeSwept {
             order: self,
             proxies,
-            due,
-            ticks: left as f32,
+            phase,
+            ticks: span as f32,
         })
+    }
+
+    /// Takes every box where it was laid; its swept box stands there.
+    pub(super) fn take_laid<P: Proxies>(&mut self, proxies: &P) {
+        let level = self.level;
+        level.run(TakeLaid {
+            order: self,
+            proxies,
+        });
     }
 }
 
 /// The box of a body for some ticks, if it goes on as it came.
 #[inline(always)]
 pub(super) fn sweep(before: &Down, now: &Down, ticks: f32) -> Down {
-    let f = &now.faces;
-    // The sum of lower faces and minus upper ones is minus three mean sides.
-    let side = ((f[0] + f[4]) + (f[1] + f[5]) + (f[2] + f[6])) * (-1.0 / 3.0);
+    let side = now.mean_side();
     let side = if side.is_finite() { side } else { 0.0 };
     let (least, most) = (side * PAD, side * SWEEP_MAX);
     let mut swept = *now;
@@ -67,7 +74,7 @@ pub(super) fn sweep(before: &Down, now: &Down, ticks: f32) -> Down {
 struct TakeSwept<'a, P> {
     order: &'a mut Order,
     proxies: &'a P,
-    due: bool,
+    phase: Phase,
     ticks: f32,
 }
 
@@ -79,18 +86,15 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
         let Self {
             order,
             proxies,
-            due,
+            phase,
             ticks,
         } = self;
         let (origin, mut jumps) = (order.origin, 0);
+        let opens = phase == Phase::Opens;
+        let makes = matches!(phase, Phase::Makes | Phase::Ends);
         for block in 0..order.live.len() {
-            let ahead = order.slot_of[block * WIDTH..].chunks_exact(WIDTH);
-            if let Some(ahead) = ahead.clone().nth(AHEAD_BLOCKS) {
-                for slot in ahead.iter().filter(|slot| **slot != NONE) {
-                    prefetch(proxies.aabb(BodySlot(*slot)));
-                }
-            }
-            let (mut out, mut jumped) = (0, 0);
+            ask_ahead(&order.slot_of, block, proxies);
+            let (mut out, mut late, mut jumped) = (0, 0, 0);
             for lane in ones(order.live[block]) {
                 let rank = block * WIDTH + lane;
                 let aabb = proxies.aabb(BodySlot(order.slot_of[rank]));
@@ -100,27 +104,46 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
                 order.exact[rank] = now;
                 let swept = &mut order.afresh.verlet.swept[rank];
                 let stays = lanes.holds(swept, &now);
-                if due || !stays {
-                    let clear = !meets(&now, order.tree.bound(block));
-                    jumped |= u16::from(clear & !stays) << lane;
-                    let wide = sweep(&before, &now, ticks);
-                    if due {
-                        order.fat[block].set(lane, &wide.corners());
+                if stays && !opens {
+                    if phase == Phase::Ends {
+                        *swept = Down::of(order.fat[block].get(lane)).open();
                     }
-                    *swept = open(wide);
-                    // Who jumped gets another lane, and is new there.
-                    if !stays && !clear {
-                        order.afresh.verlet.strays.push(small(rank));
-                    }
+                    continue;
                 }
-                out |= u16::from(!stays) << lane;
+                let mut wide = sweep(&before, &now, ticks).open();
+                if opens {
+                    order.fat[block].set(lane, &wide.corners());
+                }
+                if stays {
+                    // Whoever leaves either has left.
+                    *swept = within(swept, &wide);
+                    continue;
+                }
+                let mut keeps = false;
+                if makes {
+                    // The boxes of the next list stand in the blocks: who has left that of the old one alone keeps his.
+                    let next = Down::of(order.fat[block].get(lane)).open();
+                    keeps = lanes.holds(&next, &now);
+                    wide = if keeps { next } else { wide };
+                }
+                *swept = wide;
+                out |= 1 << lane;
+                late |= u16::from(!keeps) << lane;
+                if meets(&now, order.tree.bound(block)) {
+                    order.afresh.verlet.strays.push(small(rank));
+                } else {
+                    // He gets another lane, and is new there.
+                    jumped |= 1 << lane;
+                }
             }
+            let gone = order.afresh.gone[block];
             let verlet = &mut order.afresh.verlet;
             verlet.fresh[block] = out;
-            verlet.out[block] = out | order.afresh.gone[block];
+            verlet.out[block] = out | gone;
+            verlet.late[block] |= late | jumped | gone;
             order.afresh.jumped[block] = jumped;
             jumps += jumped.count_ones() as usize;
-            if due {
+            if opens {
                 let bound = lanes.bound(&order.fat[block], u16::MAX);
                 order.tree.set(block, bound);
             }
@@ -130,10 +153,20 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
     }
 }
 
-/// Takes every box where it was laid; its swept box stands there.
-pub(super) struct TakeLaid<'a, P> {
-    pub(super) order: &'a mut Order,
-    pub(super) proxies: &'a P,
+/// What lies within both boxes.
+#[inline(always)]
+fn within(one: &Down, other: &Down) -> Down {
+    let mut both = *one;
+    for (face, least) in both.faces.iter_mut().zip(&other.faces) {
+        *face = if *least > *face { *least } else { *face };
+    }
+    both
+}
+
+/// See [`Order::take_laid`].
+struct TakeLaid<'a, P> {
+    order: &'a mut Order,
+    proxies: &'a P,
 }
 
 impl<P: Proxies> Work for TakeLaid<'_, P> {
@@ -154,20 +187,11 @@ impl<P: Proxies> Work for TakeLaid<'_, P> {
             if slot != NONE {
                 let aabb = proxies.aabb(BodySlot(slot));
                 order.exact[rank] = outward(lanes, aabb, &order.origin);
-                let [x, y, z, u, v, w] = order.fat[rank / WIDTH].get(rank % WIDTH);
-                let faces = [x, y, z, 0.0, -u, -v, -w, 0.0];
-                order.afresh.verlet.swept[rank] = open(Down { faces });
+                let swept = Down::of(order.fat[rank / WIDTH].get(rank % WIDTH));
+                order.afresh.verlet.swept[rank] = swept.open();
             }
         }
     }
-}
-
-/// A swept box whose spare lanes hold whatever stands in another's.
-#[inline(always)]
-fn open(mut swept: Down) -> Down {
-    swept.faces[SLACK] = f32::NEG_INFINITY;
-    swept.faces[SLACK + 4] = f32::NEG_INFINITY;
-    swept
 }
 
 /// Whether a box meets a bound.

@@ -14,10 +14,11 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
-use super::sweep::{Field, Finds, Sweep};
+use super::shares::Shares;
+use super::sweep::{Field, Finds, Search, Sweep};
 use super::tree::Tree;
 use crate::limits::THREADS_MAX;
-use crate::simd::boxes::{Boxes16, Level, WIDTH};
+use crate::simd::boxes::{Boxes16, Level};
 
 /// What is searched, while it is lent.
 #[derive(Clone, Debug, Default)]
@@ -47,7 +48,7 @@ struct Job {
     level: Level,
     blocks: Range<usize>,
     finds: Finds,
-    lists: bool,
+    search: Search,
 }
 
 /// Another thread.
@@ -72,13 +73,13 @@ impl Mate {
                     level,
                     blocks,
                     mut finds,
-                    lists,
+                    search,
                 } = job;
                 level.run(Sweep {
                     field: lent.field(),
                     blocks,
                     finds: &mut finds,
-                    lists,
+                    search,
                 });
                 // Given back before it is told: the owner takes it as its own again.
                 drop(lent);
@@ -110,9 +111,7 @@ pub(super) struct Team {
     least: u64,
     mates: Vec<Mate>,
     lent: Arc<Lent>,
-    /// Where the runs of the last tick ended, and what they took.
-    ends: Vec<usize>,
-    took: Vec<u64>,
+    shares: Shares,
 }
 
 impl Default for Team {
@@ -123,8 +122,7 @@ impl Default for Team {
             least: 0,
             mates: Vec::new(),
             lent: Arc::default(),
-            ends: Vec::new(),
-            took: Vec::new(),
+            shares: Shares::default(),
         }
     }
 }
@@ -155,17 +153,17 @@ impl Team {
         }
     }
 
-    /// Finds the overlaps of all blocks.
+    /// Searches some blocks. What is near is listed behind what is listed already.
     ///
-    /// * `lists` - see [`Sweep`].
+    /// * `blocks` - from a multiple of `WIDTH` on.
     pub(super) fn search(
         &mut self,
         level: Level,
         (live, fat, tree): Own<'_>,
+        blocks: Range<usize>,
         finds: &mut Finds,
-        lists: bool,
+        search: Search,
     ) {
-        let blocks = live.len();
         let threads = if finds.tests >= self.least {
             self.gather()
         } else {
@@ -175,34 +173,35 @@ impl Team {
             let field = Field { live, fat, tree };
             level.run(Sweep {
                 field,
-                blocks: 0..blocks,
+                blocks,
                 finds,
-                lists,
+                search,
             });
             return;
         }
-        self.deal(blocks, threads);
+        self.shares.deal(blocks, threads);
+        let (shares, room) = (self.shares, live.len());
         self.exchange((live, fat, tree));
         for (at, mate) in self.mates.iter_mut().enumerate() {
-            mate.finds.reserve(blocks, 0);
+            mate.finds.reserve(room, 0);
+            mate.finds.near.clear();
             let job = Job {
                 lent: Arc::clone(&self.lent),
                 level,
-                blocks: self.ends[at]..self.ends[at + 1],
+                blocks: shares.run(at + 1),
                 finds: std::mem::take(&mut mate.finds),
-                lists,
+                search,
             };
             mate.busy = mate.jobs.send(job).is_ok();
         }
         let field = self.lent.field();
         level.run(Sweep {
             field,
-            blocks: 0..self.ends[0],
+            blocks: shares.run(0),
             finds,
-            lists,
+            search,
         });
-        self.took.clear();
-        self.took.push(finds.tests);
+        self.shares.note(finds.tests);
         for (at, mate) in self.mates.iter_mut().enumerate() {
             let told = if mate.busy {
                 mate.done.recv().ok()
@@ -212,15 +211,15 @@ impl Team {
             mate.busy = told.is_some();
             mate.finds = told.unwrap_or_default();
             if !mate.busy {
-                mate.finds.reserve(blocks, 0);
+                mate.finds.reserve(room, 0);
                 level.run(Sweep {
                     field: self.lent.field(),
-                    blocks: self.ends[at]..self.ends[at + 1],
+                    blocks: shares.run(at + 1),
                     finds: &mut mate.finds,
-                    lists,
+                    search,
                 });
             }
-            self.took.push(mate.finds.tests);
+            self.shares.note(mate.finds.tests);
             finds.append(&mate.finds);
         }
         self.mates.retain(|mate| mate.busy);
@@ -239,40 +238,6 @@ impl Team {
         self.mates.len() + 1
     }
 
-    /// Deals runs of blocks, of equal work where it is known how much the last ones took.
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_precision_loss,
-        clippy::cast_sign_loss,
-        reason = "a share of the blocks of a run; where runs end changes no result"
-    )]
-    fn deal(&mut self, blocks: usize, threads: usize) {
-        let known = self.took.len() == threads && self.ends.last() == Some(&blocks);
-        if !known {
-            self.ends.clear();
-            self.ends
-                .extend((1..=threads).map(|run| blocks * run / threads));
-            self.took.clear();
-            self.took.resize(threads, 1);
-        }
-        let all: u64 = self.took.iter().sum();
-        let mut ends = [blocks; THREADS_MAX];
-        for (end, run) in ends[..threads - 1].iter_mut().zip(1..) {
-            // The block before which the share of the work lies; it is even within a run.
-            let (mut left, mut from) = (all * run / threads as u64, 0);
-            for (to, took) in self.ends.iter().zip(&self.took) {
-                if left <= *took {
-                    let share = left as f64 / (*took).max(1) as f64;
-                    from += ((to - from) as f64 * share) as usize;
-                    break;
-                }
-                (left, from) = (left - took, *to);
-            }
-            *end = from / WIDTH * WIDTH;
-        }
-        self.ends.copy_from_slice(&ends[..threads]);
-    }
-
     /// Exchanges what is lent with what is the owner's: lends it, and takes it back. Nobody else holds it then; but for
     /// a thread that died and has not let go yet, which keeps its own.
     fn exchange(&mut self, (live, fat, tree): Own<'_>) {
@@ -286,6 +251,7 @@ impl Team {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::boxes::WIDTH;
 
     const BLOCKS: usize = 100;
 
@@ -333,7 +299,7 @@ mod tests {
         finds.reserve(BLOCKS, BLOCKS * WIDTH);
         let before = stand.0.clone();
         let own = (&mut stand.0, &mut stand.1, &mut stand.2);
-        team.search(Level::best(), own, &mut finds, false);
+        team.search(Level::best(), own, 0..BLOCKS, &mut finds, Search::Overlaps);
         assert_eq!(stand.0, before, "what was lent is back");
         assert!(finds.met.hits() > 1_000 && finds.met.recount() == finds.met.hits());
         format!("{:?} {:?} {}", finds.met, finds.open, finds.tests)
@@ -350,7 +316,9 @@ mod tests {
             let ends: Vec<_> = (0..2)
                 .map(|_| {
                     assert_eq!(search(&mut team, &mut stand), alone, "{threads} threads");
-                    team.ends.clone()
+                    (0..threads)
+                        .map(|run| team.shares.run(run))
+                        .collect::<Vec<_>>()
                 })
                 .collect();
             assert_eq!(team.mates.len(), threads - 1);

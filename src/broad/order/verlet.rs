@@ -8,22 +8,23 @@
 //! strays: its entries die, it gets another swept box and is looked for alone. Unlike candidates that last (`links`)
 //! the list is made for all bodies by one pass of the search, which takes a fraction of what one by one would.
 //!
-//! Bodies are laid anew in a tick that makes the list anew, in an order that was sorted over the ticks before: entries
-//! are found again then, so no overlap is carried from the old lanes to the new.
+//! The next list is made in the last ticks of the one in use (`next`), so that no tick has a whole search. Between two
+//! lists bodies are laid anew, in an order that was sorted over the ticks before, and the entries with them.
 //!
-//! For how many ticks boxes are swept is found by going uphill on counted work, and so is whether a list pays at all
+//! For how many ticks a list is in use is found by going uphill on counted work, and so is whether lists pay at all
 //! (`pace`).
 //!
 //! Source: Verlet 1967; swept boxes in place of his spheres, so that a list lasts as long for what flies fast.
 
-use super::afresh::{Afresh, FRAME_TICKS};
+use super::afresh::Afresh;
 use super::fatten::outward;
 use super::lay::Bound;
-use super::links::{room, small, spare};
+use super::links::small;
 use super::near::{Found, Near, is_among};
-use super::pace::Pace;
+use super::next::Next;
+use super::pace::{Pace, Phase};
 use super::presort::SPLIT_TICKS_MAX;
-use super::swept::{TakeLaid, sweep};
+use super::swept::sweep;
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, Work as Done, parts};
 use crate::ids::PairKey;
 use crate::simd::boxes::{Down, LANES, Lanes, Portable, WIDTH, Work};
@@ -41,10 +42,15 @@ pub(super) struct Verlet {
     pub(super) fresh: Vec<u16>,
     /// Ranks of the latter.
     pub(super) strays: Vec<u32>,
-    /// By rank: the swept box.
+    /// By rank: the box to stay in, open (`Down::open`).
     pub(super) swept: Vec<Down>,
+    pub(super) next: Next,
+    /// By block: lanes of which nothing is taken from the search for the next list.
+    pub(super) late: Vec<u16>,
+    /// Whether all bodies have drifted so far from the origin that they are to be measured from another.
+    pub(super) adrift: bool,
     /// Memory kept over calls.
-    blocks: Vec<u32>,
+    pub(super) blocks: Vec<u32>,
     pub(super) pace: Pace,
 }
 
@@ -54,47 +60,36 @@ const FEW: usize = 300;
 impl Order {
     /// Lists what is near, from a tick on of which everything is told.
     pub(super) fn begin_list<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Done) {
-        let blocks = self.live.len();
         let Afresh {
             verlet,
             finds,
             presort,
+            held,
             ..
         } = &mut self.afresh;
         verlet.on = true;
         presort.stop();
-        verlet.pace.begin(finds.tests);
-        verlet.swept.clear();
-        verlet.swept.resize(blocks * WIDTH, Down::EMPTY);
-        for lanes in [&mut verlet.out, &mut verlet.fresh] {
-            lanes.clear();
-            lanes.resize(blocks, 0);
-        }
-        self.take_swept(tick.proxies, true);
-        let Afresh {
-            verlet,
-            jumped,
-            held,
-            ..
-        } = &mut self.afresh;
-        // They are all new to the list, and none is in its lane.
-        verlet.strays.clear();
-        verlet.fresh.fill(0);
-        jumped.fill(0);
         held.clear();
-        self.list_all(tick, work);
+        verlet.pace.begin(finds.tests);
+        let span = verlet.pace.span(true);
+        self.clear_lanes();
+        self.take_swept(tick.proxies, Phase::Opens, span);
+        // They are all new to the list, and none has left his lane.
+        let Afresh { verlet, jumped, .. } = &mut self.afresh;
+        verlet.strays.clear();
+        verlet.entries.clear();
+        jumped.fill(0);
+        self.open_next(1, work);
+        self.take_over(tick.proxies);
+        self.note_listed(0, tick);
     }
 
     /// Lets go of the list; its overlaps are remembered.
     pub(super) fn end_list(&mut self) {
-        self.carry_listed();
-        self.afresh.verlet.on = false;
-    }
-
-    /// Takes the entries out; writes those that overlap down as two body slots.
-    fn carry_listed(&mut self) {
-        let entries = &mut self.afresh.verlet.entries;
-        for entry in entries.drain(..).filter(|entry| entry.is_hit()) {
+        let verlet = &mut self.afresh.verlet;
+        verlet.on = false;
+        let overlaps = verlet.entries.drain(..).filter(|entry| entry.is_hit());
+        for entry in overlaps {
             let [one, other] = entry.ranks().map(|rank| self.slot_of[rank]);
             if one != NONE && other != NONE {
                 self.carried.push((one, other));
@@ -110,24 +105,19 @@ impl Order {
     ) -> bool {
         let (came, bodies) = (self.homeless.len(), tick.members.bounded().len());
         let pace = &mut self.afresh.verlet.pace;
-        let due = pace.is_due();
-        // To lay bodies by another frame is not done with a list.
-        let reframed = due && pace.is_worn(bodies) && self.afresh.framed >= FRAME_TICKS;
-        let ends = came * MANY_CAME > bodies || due && !pace.pays() || reframed;
-        if ends {
+        let phase = pace.phase();
+        let opens = phase == Phase::Opens;
+        let adrift = std::mem::take(&mut self.afresh.verlet.adrift);
+        if came * MANY_CAME > bodies || adrift || opens && !pace.pays() {
             self.end_list();
             return false;
         }
-        let jumped = self.take_swept(tick.proxies, due);
-        // Where all are swept anew, none is looked for alone.
-        let strays = if due {
-            0
-        } else {
-            self.afresh.verlet.strays.len() + came
-        };
+        let ahead = if opens { pace.open() } else { 0 };
+        let span = pace.span(false);
+        let jumped = self.take_swept(tick.proxies, phase, span);
+        let strays = self.afresh.verlet.strays.len() + came;
         self.look_listed(0, true, tick);
-        let too_many = strays * MANY_CAME > bodies;
-        if too_many || !self.seat_anew(jumped, tick) {
+        if strays * MANY_CAME > bodies || !self.seat_anew(jumped, tick) {
             self.afresh.verlet.pace.fail();
             self.end_list();
             return false;
@@ -135,14 +125,30 @@ impl Order {
         work.renewed += strays as u64;
         self.afresh.presort.note_late(&self.homeless, bodies);
         self.sweep_seated();
-        if !due {
-            self.list_strays(tick, work);
-            self.presort_listed(bodies);
-        } else if self.afresh.presort.is_ready() && !self.lay_listed(tick) {
-            return false;
-        } else {
-            self.list_all(tick, work);
+        self.list_strays(tick, work);
+        match phase {
+            Phase::Opens => self.open_next(ahead, work),
+            Phase::Makes => self.search_next(work),
+            Phase::Ends => self.take_over(tick.proxies),
+            Phase::Lasts if self.afresh.presort.is_ready() => {
+                if !self.lay_listed(tick) {
+                    self.afresh.verlet.pace.fail();
+                    self.afresh.verlet.on = false;
+                    return false;
+                }
+            }
+            Phase::Lasts => {}
         }
+        self.presort_listed(phase, bodies);
+        self.note_listed(strays, tick);
+        work.tests += self.afresh.verlet.entries.len() as u64;
+        work.way = Some((BroadMode::List, self.afresh.gear.cause));
+        true
+    }
+
+    /// A tick with the list is over.
+    fn note_listed<P>(&mut self, strays: usize, tick: &Tick<'_, P>) {
+        let bodies = tick.members.bounded().len();
         let Verlet {
             pace,
             entries,
@@ -151,11 +157,26 @@ impl Order {
         } = &mut self.afresh.verlet;
         pace.note_tick(entries.len(), strays, bodies);
         fresh.fill(0);
-        work.tests += entries.len() as u64;
-        if !due {
-            work.way = Some((BroadMode::List, self.afresh.gear.cause));
+    }
+
+    /// Nothing is known of any lane.
+    pub(super) fn clear_lanes(&mut self) {
+        let blocks = self.live.len();
+        let Verlet {
+            swept,
+            out,
+            fresh,
+            late,
+            strays,
+            ..
+        } = &mut self.afresh.verlet;
+        swept.clear();
+        swept.resize(blocks * WIDTH, Down::EMPTY);
+        for lanes in [out, fresh, late] {
+            lanes.clear();
+            lanes.resize(blocks, 0);
         }
-        true
+        strays.clear();
     }
 
     /// Who was given a lane in this tick is new there, and nobody knows how it moves.
@@ -166,100 +187,31 @@ impl Order {
             };
             let (block, lane) = parts(rank);
             let now = self.exact[rank as usize];
-            let swept = sweep(&now, &now, 0.0);
+            let swept = sweep(&now, &now, 0.0).open();
             self.fat[block].set(lane, &swept.corners());
             let verlet = &mut self.afresh.verlet;
             verlet.swept[rank as usize] = swept;
             verlet.fresh[block] |= 1 << lane;
+            verlet.late[block] |= 1 << lane;
             verlet.strays.push(rank);
         }
     }
 
-    /// Lists everything that is near by the swept boxes.
-    fn list_all<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Done) {
-        self.bound_strays();
+    /// Sorts the bodies some more, where they are to be laid anew before the next list is begun.
+    fn presort_listed(&mut self, phase: Phase, bodies: usize) {
         let Afresh {
-            verlet,
-            finds,
-            team,
-            ..
+            presort, verlet, ..
         } = &mut self.afresh;
-        finds.near.clear();
-        let lanes = (&mut self.live, &mut self.fat, &mut self.tree);
-        team.search(self.level, lanes, finds, true);
-        work.tests += finds.tests;
-        verlet.pace.note_search(finds.tests);
-        std::mem::swap(&mut verlet.entries, &mut finds.near);
-        let (entries, blocks) = (verlet.entries.len(), self.live.len());
-        spare(&mut verlet.entries, entries, self.len);
-        spare(&mut finds.near, entries, self.len);
-        room(&mut verlet.found, self.len);
-        room(&mut verlet.strays, self.len);
-        room(&mut verlet.blocks, blocks);
-        finds.spare();
-        team.reserve(blocks, self.len);
-        self.hits = 0;
-        self.look_listed(0, false, tick);
-    }
-
-    /// Sorts the bodies some more, where they are to be laid anew when the list is due.
-    fn presort_listed(&mut self, bodies: usize) {
-        let left = self.afresh.verlet.pace.left(false) as usize - 1;
-        let Afresh {
-            presort,
-            verlet,
-            framed,
-            ..
-        } = &mut self.afresh;
+        let spare = verlet.pace.spare() as usize;
         if presort.is_on() {
             if !presort.is_ready() {
                 presort.go_on(&mut self.sorter, &self.boxes);
             }
-        } else if *framed < FRAME_TICKS
-            && verlet.pace.is_worn(bodies)
-            && (1..=SPLIT_TICKS_MAX + 1).contains(&left)
-        {
-            self.begin_presort(left.saturating_sub(1));
+        } else if phase == Phase::Lasts && verlet.pace.is_worn(bodies) {
+            // One for the boxes and the curve, and one to lay; where there are too few, after the next list.
+            let ticks = spare.checked_sub(2).unwrap_or(SPLIT_TICKS_MAX);
+            self.begin_presort(ticks.min(SPLIT_TICKS_MAX));
         }
-    }
-
-    /// Deals the bodies to blocks in the order that was sorted; whether there was a lane for each.
-    fn lay_listed<P: Proxies>(&mut self, tick: &Tick<'_, P>) -> bool {
-        // The old lanes go: where not all find a new one, the overlaps are told of by body.
-        self.carry_listed();
-        // Who is new in his lane, by body too.
-        let mut new = std::mem::take(&mut self.afresh.verlet.strays);
-        for stray in &mut new {
-            *stray = self.slot_of[*stray as usize];
-        }
-        if !self.lay_presorted(tick) {
-            self.afresh.verlet.on = false;
-            return false;
-        }
-        self.carried.clear();
-        let blocks = self.live.len();
-        let verlet = &mut self.afresh.verlet;
-        verlet.pace.note_laid();
-        verlet.swept.clear();
-        verlet.swept.resize(blocks * WIDTH, Down::EMPTY);
-        for lanes in [&mut verlet.out, &mut verlet.fresh] {
-            lanes.clear();
-            lanes.resize(blocks, 0);
-        }
-        for slot in new.drain(..) {
-            let rank = self.rank_of.get(slot as usize).copied().unwrap_or(NONE);
-            if rank != NONE {
-                let (block, lane) = parts(rank);
-                verlet.fresh[block] |= 1 << lane;
-            }
-        }
-        verlet.strays = new;
-        let level = self.level;
-        level.run(TakeLaid {
-            order: self,
-            proxies: tick.proxies,
-        });
-        true
     }
 
     /// Brings the bounds of the strays' blocks up to date.
@@ -318,18 +270,17 @@ impl Order {
             if now.faces.map(f32::to_bits) != stored.faces.map(f32::to_bits) {
                 return Err(format!("the stored box of {slot:?} is not its box"));
             }
-            let stands = self.fat[block].get(lane).map(f32::to_bits);
-            if !Portable.holds(wide, now) || stands != wide.corners().map(f32::to_bits) {
+            let stands = Down::of(self.fat[block].get(lane)).open();
+            if ![&stands, wide]
+                .iter()
+                .all(|outer| Portable.holds(outer, now))
+            {
                 return Err(format!("{slot:?} has left its swept box"));
             }
         }
         let listed = |hit: bool| {
             let some = entries.iter().filter(move |entry| entry.is_hit() | !hit);
-            let pairs = some.map(|entry| {
-                let [one, other] = entry.ranks().map(|rank| BodySlot(self.slot_of[rank]));
-                PairKey::new(one, other)
-            });
-            let mut pairs: Vec<PairKey> = pairs.collect();
+            let mut pairs: Vec<PairKey> = some.map(|entry| entry.key(&self.slot_of)).collect();
             pairs.sort_unstable();
             pairs
         };

@@ -79,6 +79,30 @@ impl Down {
         let f = &self.faces;
         [f[0], f[1], f[2], -f[4], -f[5], -f[6]]
     }
+
+    /// Of lower and upper corner; the spare lanes are zero.
+    #[inline(always)]
+    pub(crate) fn of([x, y, z, u, v, w]: [f32; 6]) -> Self {
+        Self {
+            faces: [x, y, z, 0.0, -u, -v, -w, 0.0],
+        }
+    }
+
+    /// As an outer box: its spare lanes hold whatever stands in another's.
+    #[inline(always)]
+    pub(crate) fn open(mut self) -> Self {
+        self.faces[SLACK] = f32::NEG_INFINITY;
+        self.faces[SLACK + 4] = f32::NEG_INFINITY;
+        self
+    }
+
+    /// The mean of its three sides; not finite where the box is not.
+    #[inline(always)]
+    pub(crate) fn mean_side(&self) -> f32 {
+        let f = &self.faces;
+        // The sum of lower faces and minus upper ones is minus three mean sides.
+        ((f[0] + f[4]) + (f[1] + f[5]) + (f[2] + f[6])) * (-1.0 / 3.0)
+    }
 }
 
 /// How much more than the rounding of a face tells two boxes surely overlap: rounding takes 2^-22 of a face's distance

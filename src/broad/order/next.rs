@@ -1,0 +1,112 @@
+//! The next Verlet list, made over some ticks while the one in use goes on.
+//!
+//! In: swept boxes that hold to the end of the next list, in their blocks. Out: that list.
+//!
+//! From the tick on in which all boxes are swept anew, a run of blocks is searched in each, so that no tick has a whole
+//! search. Who leaves his new box before the list is made is late: what the search lists of him is not taken. He has
+//! left the list in use too, and was looked for among the new boxes: what is listed there of him goes over.
+
+use super::afresh::Afresh;
+use super::links::{room, small, spare};
+use super::shares::Shares;
+use super::sweep::Search;
+use super::{Order, Proxies, Tick, Work as Done};
+
+/// How far the list has been made.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Next {
+    shares: Shares,
+}
+
+impl Order {
+    /// Begins the list, which is to be made in so many ticks. The first of several, in which all boxes are swept, has no
+    /// search.
+    pub(super) fn open_next(&mut self, ticks: u32, work: &mut Done) {
+        let blocks = self.live.len();
+        let Afresh { verlet, finds, .. } = &mut self.afresh;
+        let runs = (ticks as usize).saturating_sub(1).max(1);
+        verlet.next.shares.deal(0..blocks, runs);
+        verlet.late.fill(0);
+        finds.near.clear();
+        if ticks == 1 {
+            self.search_next(work);
+        }
+    }
+
+    /// Searches the next run of blocks, if there is one left.
+    pub(super) fn search_next(&mut self, work: &mut Done) {
+        let Afresh {
+            verlet,
+            finds,
+            team,
+            ..
+        } = &mut self.afresh;
+        let shares = &mut verlet.next.shares;
+        let blocks = shares.run(shares.over());
+        let lanes = (&mut self.live, &mut self.fat, &mut self.tree);
+        team.search(self.level, lanes, blocks, finds, Search::Near);
+        shares.note(finds.tests);
+        work.tests += finds.tests;
+    }
+
+    /// Takes the list into use.
+    pub(super) fn take_over<P: Proxies>(&mut self, proxies: &P) {
+        let Afresh { verlet, finds, .. } = &mut self.afresh;
+        let (entries, late) = (&mut verlet.entries, &verlet.late[..]);
+        entries.retain(|entry| entry.any_among(late));
+        self.hits = entries.iter().filter(|entry| entry.is_hit()).count();
+        let kept = entries.len();
+        let found = finds.near.drain(..);
+        entries.extend(found.filter(|entry| !entry.any_among(late)));
+        verlet.pace.note_list(verlet.next.shares.sum());
+        self.spare_listed();
+        // What overlaps has been told of by the list before.
+        self.settle_listed(kept, proxies);
+    }
+
+    /// Room for what comes up until the next list.
+    pub(super) fn spare_listed(&mut self) {
+        let blocks = self.live.len();
+        let Afresh {
+            verlet,
+            finds,
+            team,
+            ..
+        } = &mut self.afresh;
+        let entries = verlet.entries.len();
+        spare(&mut verlet.entries, entries, self.len);
+        spare(&mut finds.near, entries, self.len);
+        room(&mut verlet.found, self.len);
+        room(&mut verlet.strays, self.len);
+        room(&mut verlet.blocks, blocks);
+        finds.spare();
+        team.reserve(blocks, self.len);
+    }
+
+    /// Deals the bodies to blocks in the order that was sorted, and the list with them; whether there was a lane for
+    /// each. Where not, the list is let go, and its overlaps are remembered.
+    pub(super) fn lay_listed<P: Proxies>(&mut self, tick: &Tick<'_, P>) -> bool {
+        let mut entries = std::mem::take(&mut self.afresh.verlet.entries);
+        for entry in &mut entries {
+            *entry = entry.by(&self.slot_of);
+        }
+        let laid = self.lay_presorted(tick);
+        if laid {
+            for entry in &mut entries {
+                *entry = entry.by(&self.rank_of);
+            }
+        } else {
+            for entry in entries.drain(..).filter(|entry| entry.is_hit()) {
+                let [one, other] = entry.ranks().map(small);
+                self.carried.push((one, other));
+            }
+        }
+        self.afresh.verlet.entries = entries;
+        if laid {
+            self.afresh.verlet.pace.note_laid();
+            self.clear_lanes();
+            self.take_laid(tick.proxies);
+        }
+        laid
+    }
+}
