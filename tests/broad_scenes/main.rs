@@ -31,7 +31,7 @@ mod soak;
 
 use common::Rng;
 use rig::{Rig, at};
-use scenes::{Kind, Scene};
+use scenes::{Box3, Kind, Scene};
 use sweepd::broad::Method;
 use sweepd::simd::boxes::Level;
 use sweepd::wire::{BroadCause, BroadMode};
@@ -315,6 +315,63 @@ fn bodies_that_crowd_to_one_place_while_all_are_sorted_lose_no_event() {
         rig.put(&boxes, &scene.moved, &[]);
         rig.tick(&exact::pairs(&boxes), &format!("frame {frame}"));
     }
+}
+
+#[test]
+fn a_crowd_that_drifts_away_is_listed_and_measured_from_elsewhere_in_time() {
+    const BODIES: usize = 800;
+    let mut scene = Scene::new(Kind::Gas, BODIES, 13);
+    let mut rig = Rig::geared("from scratch", &[true], BODIES, false);
+    rig.start(&scene.boxes);
+    let mut listed = 0;
+    for frame in 0..2400 {
+        scene.step();
+        // Many times as far as it is wide.
+        let by = 0.04 * frame as f32;
+        let gone = |one: &Box3| one.map(|[x, y, z]| [x + by, y, z - 2.0 * by]);
+        let boxes: Vec<Box3> = scene.boxes.iter().map(gone).collect();
+        rig.put(&boxes, &scene.moved, &[]);
+        rig.tick(&exact::pairs(&boxes), &format!("frame {frame}"));
+        if frame % 10 == 0 {
+            rig.validate();
+        }
+        listed += usize::from(rig.work().way.is_some_and(|way| way.0 == BroadMode::List));
+    }
+    assert!(listed > 1200, "{listed}");
+}
+
+#[test]
+fn bodies_that_swerve_jump_come_and_leave_while_the_next_list_is_made_are_exact() {
+    const BODIES: usize = 700;
+    let mut scene = Scene::new(Kind::Gas, BODIES, 14);
+    let mut rig = Rig::geared("from scratch", &[true], BODIES, false);
+    rig.start(&scene.boxes);
+    let mut rng = Rng::new(15);
+    let mut off = vec![[0.0_f32; 3]; BODIES];
+    let mut listed = 0;
+    for frame in 0..1200 {
+        scene.step();
+        // Spells of a few that go elsewhere, the same ones again and again, by little or by far.
+        for k in 0..[0, 6, 1, 20][frame / 40 % 4] {
+            let body = (frame / 3 * 5 + k * 37) % BODIES;
+            let far = if rng.below(3) == 0 { 3.0 } else { 0.3 };
+            off[body] = std::array::from_fn(|_| rng.between(-far, far) as f32);
+        }
+        let churned: Vec<u32> = (0..rng.below(4))
+            .map(|k| ((frame * 11 + k * 101) % BODIES) as u32)
+            .collect();
+        let gone = |(one, off): (&Box3, &[f32; 3])| {
+            one.map(|corner| std::array::from_fn(|k| corner[k] + off[k]))
+        };
+        let boxes: Vec<Box3> = scene.boxes.iter().zip(&off).map(gone).collect();
+        let churned_not = |body: &u32| !churned.contains(body);
+        let moved: Vec<u32> = (0..BODIES as u32).filter(churned_not).collect();
+        rig.put(&boxes, &moved, &churned);
+        rig.tick(&exact::pairs(&boxes), &format!("frame {frame}"));
+        rig.validate();
+        listed += usize::from(rig.work().way.is_some_and(|way| way.0 == BroadMode::List));
+    }
+    assert!(listed > 600, "{listed}");
 }
 
 #[test]

@@ -95,7 +95,7 @@ impl Frame {
         frame
     }
 
-    /// Whether the origin lies no farther from what it spans than that is wide, or deep, or high.
+    /// Whether the origin is so near that rounding moves no face by more than a thousandth of a cell.
     pub(super) fn is_near_origin(&self) -> bool {
         let cells = f32::from(1_u16 << AXIS_BITS);
         let near = |(low, scale): (&f32, &f32)| low.abs() <= 2.0 * cells / scale;
