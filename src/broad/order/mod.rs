@@ -393,7 +393,7 @@ impl Iterator for Ones {
         if self.0 == 0 {
             return None;
         }
-        let at = self.0.trailing_zeros() as usize;
+        let at = self.0.trailing_zeros() as usize % WIDTH;
         self.0 &= self.0 - 1;
         Some(at)
     }

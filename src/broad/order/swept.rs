@@ -94,43 +94,46 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
         let makes = matches!(phase, Phase::Makes | Phase::Ends);
         for block in 0..order.live.len() {
             ask_ahead(&order.slot_of, block, proxies);
-            let (mut out, mut late, mut jumped) = (0, 0, 0);
-            for lane in ones(order.live[block]) {
-                let rank = block * WIDTH + lane;
-                let aabb = proxies.aabb(BodySlot(order.slot_of[rank]));
-                let (min, max) = (aabb.min.coords.as_ref(), aabb.max.coords.as_ref());
-                let before = order.exact[rank];
-                let now = lanes.outward(min, max, &origin);
-                order.exact[rank] = now;
-                let swept = &mut order.afresh.verlet.swept[rank];
-                let stays = lanes.holds(swept, &now);
-                if stays && !opens {
-                    if phase == Phase::Ends {
-                        *swept = Down::of(order.fat[block].get(lane)).open();
-                    }
-                    continue;
+            let live = order.live[block];
+            let slots = &order.slot_of.as_chunks().0[block];
+            let exact = &mut order.exact.as_chunks_mut().0[block];
+            let swept = &mut order.afresh.verlet.swept.as_chunks_mut().0[block];
+            let fat = &mut order.fat[block];
+            let before = *exact;
+            let out = live & !take(lanes, (proxies, origin), (slots, live), exact, swept);
+            if phase == Phase::Ends {
+                for lane in ones(live) {
+                    swept[lane] = Down::of(fat.get(lane)).open();
                 }
-                let mut wide = sweep(&before, &now, ticks).open();
-                if opens {
-                    order.fat[block].set(lane, &wide.corners());
-                }
-                if stays {
+            }
+            if opens {
+                for lane in ones(live) {
+                    let wide = sweep(&before[lane], &exact[lane], ticks).open();
+                    fat.set(lane, &wide.corners());
                     // Whoever leaves either has left.
-                    *swept = within(swept, &wide);
-                    continue;
+                    swept[lane] = if out >> lane & 1 == 1 {
+                        wide
+                    } else {
+                        within(&swept[lane], &wide)
+                    };
                 }
-                let mut keeps = false;
-                if makes {
+            }
+            let (mut late, mut jumped) = (0, 0);
+            for lane in ones(out) {
+                if !opens {
                     // The boxes of the next list stand in the blocks: who has left that of the old one alone keeps his.
-                    let next = Down::of(order.fat[block].get(lane)).open();
-                    keeps = lanes.holds(&next, &now);
-                    wide = if keeps { next } else { wide };
+                    let next = Down::of(fat.get(lane)).open();
+                    let keeps = makes && lanes.holds(&next, &exact[lane]);
+                    swept[lane] = if keeps {
+                        next
+                    } else {
+                        sweep(&before[lane], &exact[lane], ticks).open()
+                    };
+                    late |= u16::from(!keeps) << lane;
                 }
-                *swept = wide;
-                out |= 1 << lane;
-                late |= u16::from(!keeps) << lane;
-                if meets(&now, order.tree.bound(block)) {
-                    order.afresh.verlet.strays.push(small(rank));
+                if meets(&exact[lane], order.tree.bound(block)) {
+                    let rank = small(block * WIDTH + lane);
+                    order.afresh.verlet.strays.push(rank);
                 } else {
                     // He gets another lane, and is new there.
                     jumped |= 1 << lane;
@@ -151,6 +154,25 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
         order.tree.refit(lanes);
         jumps
     }
+}
+
+/// Takes the boxes of a block; returns the lanes whose box stays in its swept one.
+#[inline(always)]
+fn take<L: Lanes, P: Proxies>(
+    lanes: L,
+    (proxies, origin): (&P, [f64; 3]),
+    (slots, live): (&[u32; WIDTH], u16),
+    exact: &mut [Down; WIDTH],
+    swept: &[Down; WIDTH],
+) -> u16 {
+    let mut stays = 0;
+    for lane in ones(live) {
+        let aabb = proxies.aabb(BodySlot(slots[lane]));
+        let now = outward(lanes, aabb, &origin);
+        exact[lane] = now;
+        stays |= u16::from(lanes.holds(&swept[lane], &now)) << lane;
+    }
+    stays
 }
 
 /// What lies within both boxes.
