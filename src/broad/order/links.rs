@@ -5,7 +5,7 @@
 //! their lanes, whatever is renewed around it, so no map from pairs to places is needed.
 
 use super::NONE;
-use crate::simd::boxes::{LANES, WIDTH};
+use crate::simd::boxes::{LANES, WIDTH, prefetch};
 
 /// Bits of lanes by lane.
 pub(super) type Matrix = [u16; WIDTH];
@@ -124,6 +124,14 @@ impl Links {
             pieces: &self.pieces,
             piece: self.pieces.get(head as usize),
             at: 0,
+        }
+    }
+
+    /// Asks for a block's list to come.
+    #[inline(always)]
+    pub(super) fn ask(&self, block: u32) {
+        if let Some(piece) = self.pieces.get(self.heads[block as usize] as usize) {
+            prefetch(piece);
         }
     }
 

@@ -16,6 +16,8 @@ const NEARLY_ALL: usize = 16;
 
 /// How many blocks ahead boxes are asked for: a block takes some 100 ns, memory about as long.
 const AHEAD: usize = 2;
+/// How many bodies ahead, where few moved, what is known of them is.
+const AHEAD_BODIES: usize = 8;
 
 impl Order {
     /// Takes boxes; notes who must be renewed in `renewing` and `worklist`.
@@ -163,7 +165,16 @@ impl<P: Proxies> Work for LoadBodies<'_, '_, P> {
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) {
         let (order, tick) = (self.order, self.tick);
-        for slot in tick.moved {
+        for (at, slot) in tick.moved.iter().enumerate() {
+            if let Some(ahead) = tick.moved.get(at + AHEAD_BODIES) {
+                prefetch(tick.proxies.aabb(*ahead));
+                if let Some(rank) = order.rank(*ahead) {
+                    let rank = rank as usize;
+                    prefetch(&order.held[rank]);
+                    prefetch(&order.exact[rank]);
+                    prefetch(&order.gaits[rank]);
+                }
+            }
             let rank = order.rank_of.get(slot.index()).copied().unwrap_or(NONE);
             if rank == NONE {
                 continue;

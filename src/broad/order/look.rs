@@ -22,6 +22,15 @@ pub(super) struct Entry {
     state: u32,
 }
 
+impl Row {
+    /// The rank of its body, and of the first lane of the other block.
+    #[inline(always)]
+    fn ranks(self) -> [usize; 2] {
+        let [a, b] = self.blocks.map(|block| block as usize * WIDTH);
+        [a + usize::from(self.row), b]
+    }
+}
+
 /// The bit of [`Entry::state`] that says whether the boxes overlapped.
 const HIT: u32 = 1 << 16;
 
@@ -41,6 +50,19 @@ pub(super) struct Found {
 
 /// Entries ahead whose boxes are asked for.
 const AHEAD: usize = 24;
+/// Moved bodies ahead whose blocks' lists are asked for, and whose matrices.
+const AHEAD_LISTS: usize = 8;
+const AHEAD_BITS: usize = 4;
+
+/// Lanes of a row of a matrix, to be looked at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    record: u32,
+    /// The lower first.
+    blocks: [u32; 2],
+    row: u16,
+    lanes: u16,
+}
 
 impl Order {
     /// Looks at every candidate, by the flat list.
@@ -135,6 +157,7 @@ impl Order {
         self.listed = false;
         self.entries.clear();
         for at in 0..tick.moved.len() {
+            self.ask_ahead(&tick.moved[at..]);
             let slot = tick.moved[at];
             if let Some(rank) = self.rank(slot) {
                 self.look_at(rank, tick, done);
@@ -147,45 +170,72 @@ impl Order {
         }
     }
 
+    /// Asks for what the bodies to come are looked at by: they stand far from one another.
+    #[inline(always)]
+    fn ask_ahead(&self, moved: &[BodySlot]) {
+        let rank = |ahead: usize| moved.get(ahead).and_then(|slot| self.rank(*slot));
+        if let Some(rank) = rank(AHEAD_LISTS) {
+            self.links.ask(small(parts(rank).0));
+        }
+        if let Some(rank) = rank(AHEAD_BITS) {
+            for (_, record) in self.links.of(small(parts(rank).0)) {
+                prefetch(self.links.bits(record));
+            }
+        }
+    }
+
     /// Looks at the candidates of one body by its f64 box: for so few pairs the list would not pay.
     fn look_at<P: Proxies>(&mut self, rank: u32, tick: &mut Tick<'_, P>, done: &mut Done) {
         let (block, lane) = parts(rank);
         let mut rows = std::mem::take(&mut self.rows);
         rows.clear();
-        for (other, record) in self.links.of(small(block)) {
+        let mine = small(block);
+        for (other, record) in self.links.of(mine) {
             let bits = self.links.bits(record);
-            let first = self.links.blocks(record)[0] as usize == block;
-            if first && bits.cand[lane] != 0 {
-                rows.push((record, lane, bits.cand[lane]));
+            let blocks = [mine.min(other), mine.max(other)];
+            let mut push = |row: usize, lanes: u16| {
+                prefetch(&self.slot_of[blocks[1] as usize * WIDTH]);
+                #[allow(clippy::cast_possible_truncation, reason = "below 16")]
+                rows.push(Row {
+                    record,
+                    blocks,
+                    row: row as u16,
+                    lanes,
+                });
+            };
+            if mine <= other && bits.cand[lane] != 0 {
+                push(lane, bits.cand[lane]);
             }
-            if !first || other as usize == block {
+            if other <= mine {
                 for row in ones(column(&bits.cand, lane)) {
-                    rows.push((record, row, 1 << lane));
+                    push(row, 1 << lane);
                 }
             }
         }
-        for (record, row, lanes) in &rows {
-            done.tests += u64::from(lanes.count_ones());
-            self.look_at_row(*record, *row, *lanes, tick);
+        for row in &rows {
+            let [a, b] = row.ranks();
+            prefetch(tick.proxies.aabb(BodySlot(self.slot_of[a])));
+            for lane in ones(row.lanes) {
+                prefetch(tick.proxies.aabb(BodySlot(self.slot_of[b + lane])));
+            }
+        }
+        for row in &rows {
+            done.tests += u64::from(row.lanes.count_ones());
+            self.look_at_row(*row, tick);
         }
         self.rows = rows;
     }
 
     /// Compares the f64 boxes of a row with some lanes; flips the bits that changed and reports their pairs.
-    fn look_at_row<P: Proxies>(
-        &mut self,
-        record: u32,
-        row: usize,
-        lanes: u16,
-        tick: &mut Tick<'_, P>,
-    ) {
-        let [a, b] = self.links.blocks(record);
-        let one = BodySlot(self.slot_of[a as usize * WIDTH + row]);
+    fn look_at_row<P: Proxies>(&mut self, row: Row, tick: &mut Tick<'_, P>) {
+        let [a, b] = row.ranks();
+        let one = BodySlot(self.slot_of[a]);
         let mine = tick.proxies.aabb(one);
-        let hit = self.links.bits(record).hit[row];
+        let line = usize::from(row.row);
+        let hit = self.links.bits(row.record).hit[line];
         let mut flips = 0;
-        for lane in ones(lanes) {
-            let other = BodySlot(self.slot_of[b as usize * WIDTH + lane]);
+        for lane in ones(row.lanes) {
+            let other = BodySlot(self.slot_of[b + lane]);
             let now = mine.overlaps(tick.proxies.aabb(other));
             if now == (hit >> lane & 1 == 1) {
                 continue;
@@ -200,7 +250,7 @@ impl Order {
             }
         }
         if flips != 0 {
-            self.links.bits_mut(record).hit[row] ^= flips;
+            self.links.bits_mut(row.record).hit[line] ^= flips;
         }
     }
 

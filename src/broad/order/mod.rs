@@ -147,7 +147,7 @@ pub(super) struct Order {
     entries: Vec<look::Entry>,
     listed: bool,
     found: Vec<look::Found>,
-    rows: Vec<(u32, usize, u16)>,
+    rows: Vec<look::Row>,
     /// Blocks met by queries since the last sort beyond what they met right after it.
     excess: u64,
     /// Blocks met by a query right after the last sort, in sixteenths.
@@ -342,7 +342,7 @@ impl Order {
         let (block, lane) = parts(rank);
         for (other, record) in self.links.of(small(block)) {
             let matrix = matrix(self.links.bits(record));
-            let row = self.links.blocks(record)[0] as usize == block;
+            let row = block <= other as usize;
             let mut bits = if row { matrix[lane] } else { 0 };
             if !row || other as usize == block {
                 bits |= column(&matrix, lane);

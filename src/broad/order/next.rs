@@ -33,7 +33,7 @@ impl Order {
         }
     }
 
-    /// Searches the next run of blocks, if there is one left.
+    /// Searches the next run of blocks.
     pub(super) fn search_next(&mut self, work: &mut Done) {
         let Afresh {
             verlet,
@@ -65,7 +65,7 @@ impl Order {
     }
 
     /// Room for what comes up until the next list.
-    pub(super) fn spare_listed(&mut self) {
+    fn spare_listed(&mut self) {
         let blocks = self.live.len();
         let Afresh {
             verlet,

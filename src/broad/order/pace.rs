@@ -5,6 +5,7 @@
 
 use super::gear::MEET;
 use super::lay::LAY_TESTS;
+use super::shares::RUNS_MAX;
 
 /// Weights, as those of [`gear`](super::gear): an entry looked at, a body looked for alone.
 const LOOK: u64 = 4;
@@ -16,6 +17,7 @@ const TICKS_MAX: u32 = 24;
 /// One in so many of them is one in which the next list is made, ... and so many at most.
 const AHEAD_SHARE: u32 = 2;
 const AHEAD_MAX: u32 = 4;
+const _: () = assert!(AHEAD_MAX as usize <= RUNS_MAX, "a run of blocks in each");
 /// Lists in a row that take more than a search in each tick would, and there are none ...
 const VAIN: u32 = 3;
 /// ... for so many ticks; four times as many each time that they prove no better.
