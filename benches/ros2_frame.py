@@ -47,13 +47,9 @@ class EncodedFrame:
         return bytes(self.bytes), self.second * 10**9 + number
 
 
-def tick_header_at(raw):
-    """Where the `TickHeader` behind the header of an encoded message begins: pairs, state or tick."""
+def stamp_of(raw):
+    """`newest_stamp_ns` of an encoded message with a `TickHeader` behind its header: pairs, state or tick."""
     at = 12
     at += 4 + struct.unpack_from("<I", raw, at)[0]
-    return 4 + (at - 4 + 7) // 8 * 8
-
-
-def stamp_of(raw):
-    """`newest_stamp_ns` of an encoded message."""
-    return struct.unpack_from("<Q", raw, tick_header_at(raw) + 32)[0]
+    tick_header_at = 4 + (at - 4 + 7) // 8 * 8
+    return struct.unpack_from("<Q", raw, tick_header_at + 32)[0]

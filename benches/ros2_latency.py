@@ -167,6 +167,26 @@ def measure(bench, samples):
     return found, lost, sum(rows) / len(rows)
 
 
+def stop(process):
+    """Ends it; by force where it does not hear."""
+    process.terminate()
+    try:
+        process.wait(timeout=5)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def append(path, row):
+    """Adds a row to a table; rows from before it had some column keep that empty."""
+    rows = list(csv.DictReader(path.open(newline=""))) if path.exists() else []
+    names = list(dict.fromkeys(name for some in [*rows, row] for name in some))
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, names, restval="", lineterminator="\n")
+        writer.writeheader()
+        writer.writerows([*rows, row])
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--bodies", type=int, default=100)
@@ -184,8 +204,7 @@ def main():
         try:
             found, lost, pairs = measure(Bench(args.bodies), args.samples)
             rclpy.shutdown()
-            echo.terminate()
-            echo.wait()
+            stop(echo)
             # A peer's session of the source ends with its time-out; then the next one's begins.
             time.sleep(6)
             lean = [sys.executable, str(ROOT / "benches/ros2_latency_bytes.py"), str(args.bodies), str(args.samples)]
@@ -194,10 +213,8 @@ def main():
             cheap = [sys.executable, str(ROOT / "benches/ros2_latency_cyclone.py"), str(domain), str(args.bodies), str(args.samples)]
             cyclone = json.loads(subprocess.run(cheap, stdout=subprocess.PIPE, text=True, check=True, env=os.environ | {"CYCLONEDDS_URI": ON_LOOPBACK}).stdout)
         finally:
-            daemon.terminate()
-            echo.terminate()
-            daemon.wait()
-            echo.wait()
+            stop(daemon)
+            stop(echo)
     lost += cyclone.count(None) + lean["lost"]
     found |= {"lean": lean["through"], "lean_beyond_tick": lean["beyond_tick"], "lean_echo": lean["echo"]}
     found["cyclone"] = [value for value in cyclone if value is not None]
@@ -210,12 +227,7 @@ def main():
         print(f"{name:12} p50 {row[f'{name}_p50_us']:8.1f} us   p99 {row[f'{name}_p99_us']:8.1f} us")
     print(f"{args.bodies} bodies, {pairs:.0f} pairs a tick, {lost} of {5 * args.samples} answers lost")
     if args.csv:
-        new = not args.csv.exists()
-        with args.csv.open("a", newline="") as file:
-            writer = csv.DictWriter(file, row)
-            if new:
-                writer.writeheader()
-            writer.writerow(row)
+        append(args.csv, row)
 
 
 if __name__ == "__main__":
