@@ -7,10 +7,12 @@ use super::probe::PROBE_TICKS;
 use super::{MANY_MOVED, Work};
 use crate::wire::BroadCause;
 
-/// Weights, in nanoseconds of the machine that they were measured on: a box taken, a candidate compared, a fat box
-/// renewed, a lane given up or taken ...
+/// Weights, in nanoseconds of the machine that they were measured on: a box taken, a candidate compared (or where more
+/// bodies move than the caches hold), a fat box renewed, a lane given up or taken ...
 const TAKE: u64 = 10;
 const TEST: u64 = 15;
+const TEST_FAR: u64 = 25;
+const FAR: usize = 1 << 15;
 const RENEW: u64 = 200;
 const LANE: u64 = 1500;
 /// ... and without candidates a body, a box compared with a block.
@@ -20,8 +22,7 @@ pub(super) const MEET: u64 = 12;
 /// blocks that a block's query meets, in sixteenths.
 const MEETS_LEAST: u64 = 2;
 const MEETS_SHARE: u64 = 128;
-/// What a Verlet list (`verlet`) takes in the mean, in boxes compared with a block a body: this share of them, one for
-/// each overlap, and so many for the boxes.
+/// A Verlet list (`verlet`) takes this share of them in the mean, one for each overlap, and so many for the boxes.
 const LIST_SHARE: u64 = 4;
 const LIST_LEAST: u64 = 3;
 /// Ticks that a mean of the work is taken over ...
@@ -254,7 +255,8 @@ impl Gear {
             (self.ticks, self.mean) = (0, 0);
             return;
         }
-        let cost = moved as u64 * TAKE + work.tests * TEST + work.renewed * RENEW + lanes * LANE;
+        let test = if moved > FAR { TEST_FAR } else { TEST };
+        let cost = moved as u64 * TAKE + work.tests * test + work.renewed * RENEW + lanes * LANE;
         self.ticks += 1;
         if self.ticks <= EARLY_TICKS {
             return;
