@@ -19,8 +19,8 @@ pub(super) struct Next {
 }
 
 impl Order {
-    /// Begins the list, which is to be made in so many ticks. The first of several, in which all boxes are swept, has no
-    /// search.
+    /// Begins the list, which is to be made in so many ticks. The first of several, in which all boxes are swept, has
+    /// no search.
     pub(super) fn open_next(&mut self, ticks: u32, work: &mut Done) {
         let blocks = self.live.len();
         let Afresh { verlet, finds, .. } = &mut self.afresh;

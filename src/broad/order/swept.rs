@@ -28,8 +28,8 @@ impl Order {
         }
     }
 
-    /// Takes every box; sweeps all anew where the next list is begun, else those that stray. Notes who does, and who has
-    /// jumped clear of where its block was: how many.
+    /// Takes every box; sweeps all anew where the next list is begun, else those that stray. Notes who does, and who
+    /// has jumped clear of where its block was: how many.
     ///
     /// * `span` - ticks to sweep for.
     pub(super) fn take_swept<P: Proxies>(&mut self, proxies: &P, phase: Phase, span: u32) -> usize {
