@@ -166,19 +166,18 @@ impl<P: Proxies> Work for LoadBodies<'_, '_, P> {
     fn run<L: Lanes>(self, lanes: L) {
         let (order, tick) = (self.order, self.tick);
         for (at, slot) in tick.moved.iter().enumerate() {
-            if let Some(ahead) = tick.moved.get(at + AHEAD_BODIES) {
+            if let Some(ahead) = tick.moved.get(at + AHEAD_BODIES)
+                && let Some(rank) = order.rank(*ahead)
+            {
+                let rank = rank as usize;
                 prefetch(tick.proxies.aabb(*ahead));
-                if let Some(rank) = order.rank(*ahead) {
-                    let rank = rank as usize;
-                    prefetch(&order.held[rank]);
-                    prefetch(&order.exact[rank]);
-                    prefetch(&order.gaits[rank]);
-                }
+                prefetch(&order.held[rank]);
+                prefetch(&order.exact[rank]);
+                prefetch(&order.gaits[rank]);
             }
-            let rank = order.rank_of.get(slot.index()).copied().unwrap_or(NONE);
-            if rank == NONE {
+            let Some(rank) = order.rank(*slot) else {
                 continue;
-            }
+            };
             let (block, lane) = parts(rank);
             order.gaits[rank as usize].note_move();
             if !order.take(lanes, tick.proxies, *slot, rank as usize) {

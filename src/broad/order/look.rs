@@ -22,15 +22,6 @@ pub(super) struct Entry {
     state: u32,
 }
 
-impl Row {
-    /// The rank of its body, and of the first lane of the other block.
-    #[inline(always)]
-    fn ranks(self) -> [usize; 2] {
-        let [a, b] = self.blocks.map(|block| block as usize * WIDTH);
-        [a + usize::from(self.row), b]
-    }
-}
-
 /// The bit of [`Entry::state`] that says whether the boxes overlapped.
 const HIT: u32 = 1 << 16;
 
@@ -62,6 +53,15 @@ pub(super) struct Row {
     blocks: [u32; 2],
     row: u16,
     lanes: u16,
+}
+
+impl Row {
+    /// The rank of its body, and of the first lane of the other block.
+    #[inline(always)]
+    fn ranks(self) -> [usize; 2] {
+        let [a, b] = self.blocks.map(|block| block as usize * WIDTH);
+        [a + usize::from(self.row), b]
+    }
 }
 
 impl Order {

@@ -8,15 +8,8 @@
 
 use super::afresh::Afresh;
 use super::links::{room, small, spare};
-use super::shares::Shares;
 use super::sweep::Search;
 use super::{Order, Proxies, Tick, Work as Done};
-
-/// How far the list has been made.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Next {
-    shares: Shares,
-}
 
 impl Order {
     /// Begins the list, which is to be made in so many ticks. The first of several, in which all boxes are swept, has
@@ -25,7 +18,7 @@ impl Order {
         let blocks = self.live.len();
         let Afresh { verlet, finds, .. } = &mut self.afresh;
         let runs = (ticks as usize).saturating_sub(1).max(1);
-        verlet.next.shares.deal(0..blocks, runs);
+        verlet.next.deal(0..blocks, runs);
         verlet.late.fill(0);
         finds.near.clear();
         if ticks == 1 {
@@ -41,11 +34,11 @@ impl Order {
             team,
             ..
         } = &mut self.afresh;
-        let shares = &mut verlet.next.shares;
-        let blocks = shares.run(shares.over());
+        let runs = &mut verlet.next;
+        let blocks = runs.run(runs.over());
         let lanes = (&mut self.live, &mut self.fat, &mut self.tree);
         team.search(self.level, lanes, blocks, finds, Search::Near);
-        shares.note(finds.tests);
+        runs.note(finds.tests);
         work.tests += finds.tests;
     }
 
@@ -58,7 +51,7 @@ impl Order {
         let kept = entries.len();
         let found = finds.near.drain(..);
         entries.extend(found.filter(|entry| !entry.any_among(late)));
-        verlet.pace.note_list(verlet.next.shares.sum());
+        verlet.pace.note_list(verlet.next.sum());
         self.spare_listed();
         // What overlaps has been told of by the list before.
         self.settle_listed(kept, proxies);

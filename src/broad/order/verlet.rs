@@ -21,9 +21,9 @@ use super::fatten::outward;
 use super::lay::Bound;
 use super::links::small;
 use super::near::{Found, Near, is_among};
-use super::next::Next;
 use super::pace::{Pace, Phase};
 use super::presort::SPLIT_TICKS_MAX;
+use super::shares::Shares;
 use super::swept::sweep;
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, Work as Done, parts};
 use crate::ids::PairKey;
@@ -44,7 +44,8 @@ pub(super) struct Verlet {
     pub(super) strays: Vec<u32>,
     /// By rank: the box to stay in, open (`Down::open`).
     pub(super) swept: Vec<Down>,
-    pub(super) next: Next,
+    /// The runs of blocks that the next list is searched in.
+    pub(super) next: Shares,
     /// By block: lanes of which nothing is taken from the search for the next list.
     pub(super) late: Vec<u16>,
     /// Whether all bodies have drifted so far from the origin that they are to be measured from another.
