@@ -48,5 +48,5 @@ pub fn retest_witness(
         return None;
     }
     let (leaf_a, leaf_b) = ((side_a, triangle_a), (side_b, triangle_b));
-    leaf(leaf_a, leaf_b, &at, f64::INFINITY)
+    leaf(leaf_a, leaf_b, &at, f64::INFINITY).ok()
 }

@@ -111,22 +111,26 @@ pub(super) fn low(a: (Side<'_>, &Point), b: (Side<'_>, &Point), frame: &Frame) -
     best - frame.placed.slop
 }
 
-/// The gap of one triangle (or convex shape) of A and one of B, in A's frame; `None` when it is proved to exceed
-/// `beyond`.
+/// The gap of one triangle (or convex shape) of A and one of B, in A's frame.
+///
+/// * `beyond_m` - a gap that exceeds this is of no interest; 0: only what touches is.
+///
+/// # Errors
+/// A gap proved to be so many metres at least, and more than `beyond_m`.
 pub(super) fn leaf(
     a: (Side<'_>, u32),
     b: (Side<'_>, u32),
     at: &Placed,
-    beyond: f64,
-) -> Option<Closest> {
+    beyond_m: f64,
+) -> Result<Closest, f64> {
     match (a.0, b.0) {
         (Side::Mesh(mesh_a), Side::Mesh(mesh_b)) => {
             let in_a = mesh_b.triangle(b.1).map(|p| at.to_a(&p));
-            triangle::gap(&mesh_a.triangle(a.1), &in_a, at.slop, beyond)
+            triangle::gap(&mesh_a.triangle(a.1), &in_a, at.slop, beyond_m)
         }
         (Side::Mesh(mesh), Side::Convex(convex)) => {
             let triangle = Convex::triangle(mesh.triangle(a.1));
-            Some(convex_gap(
+            Ok(convex_gap(
                 &triangle,
                 convex,
                 &at.pos12,
@@ -135,24 +139,16 @@ pub(super) fn leaf(
         }
         (Side::Convex(convex), Side::Mesh(mesh)) => {
             let triangle = Convex::triangle(mesh.triangle(b.1));
-            Some(convex_gap(
+            Ok(convex_gap(
                 convex,
                 &triangle,
                 &at.pos12,
                 &mut Warm::default(),
             ))
         }
-        (Side::Convex(_), Side::Convex(_)) => None,
+        // Not reached: such a pair is none of ours, and nothing is known of it.
+        (Side::Convex(_), Side::Convex(_)) => Err(f64::NEG_INFINITY),
     }
-}
-
-/// A proof that two leaves are apart, by so many metres at least; `None` where the cheap axes do not tell.
-pub(super) fn parted(a: (Side<'_>, u32), b: (Side<'_>, u32), at: &Placed) -> Option<f64> {
-    let (Side::Mesh(mesh_a), Side::Mesh(mesh_b)) = (a.0, b.0) else {
-        return None;
-    };
-    let in_a = mesh_b.triangle(b.1).map(|p| at.to_a(&p));
-    triangle::parted(&mesh_a.triangle(a.1), &in_a, at.slop)
 }
 
 /// The corners of two leaves that are triangles, each in its own frame.

@@ -14,6 +14,9 @@ use super::Closest;
 use crate::math::{Interval, Point, Vec3};
 use crate::shape::side;
 
+/// What is rounded where the squares of two separations are compared, as a share of them: far more than it is.
+const NEAR: f64 = 1e-12;
+
 /// Three corners.
 pub(super) type Triangle = [Point; 3];
 
@@ -42,34 +45,45 @@ impl Candidate {
 /// The gap of two triangles.
 ///
 /// * `slop` - bound on the rounding of corners and of distances between them, metres.
-/// * `beyond` - a gap proved to exceed this is of no interest: `None`.
-pub(super) fn gap(a: &Triangle, b: &Triangle, slop: f64, beyond: f64) -> Option<Closest> {
+/// * `beyond_m` - a gap that exceeds this is of no interest; 0: only what touches is.
+///
+/// # Errors
+/// A gap proved to be so many metres at least, and more than `beyond_m`.
+pub(super) fn gap(a: &Triangle, b: &Triangle, slop: f64, beyond_m: f64) -> Result<Closest, f64> {
     let (edges_a, edges_b) = (edges(a), edges(b));
     let (normal_a, normal_b) = (edges_a[0].cross(&edges_a[1]), edges_b[0].cross(&edges_b[1]));
     // Three cheap axes turn most pairs away.
     let middle = (b[0] - a[0]) + (b[1] - a[1]) + (b[2] - a[2]);
-    let mut best = Best::none();
+    let mut best = Best::of(a, b);
     for axis in [middle, normal_a, normal_b] {
-        best.try_axis(a, b, &axis);
+        best.try_axis(&axis);
     }
-    if best.apart - slop > beyond {
-        return None;
+    let proved = |best: &Best| best.apart - slop > beyond_m;
+    if proved(&best) {
+        return Err(best.apart - slop);
     }
 
     if best.apart <= slop && crossing(a, b) {
         try_all_axes(&mut best, a, b);
-        return Some(overlap(&best, a, b, slop));
+        return Ok(overlap(&best, a, b, slop));
+    }
+    if beyond_m <= 0.0 {
+        // Where a proof will do, axes are cheaper than points.
+        try_all_axes(&mut best, a, b);
+        if proved(&best) {
+            return Err(best.apart - slop);
+        }
     }
     let found = closest_points(a, b, &edges_a, &edges_b, &normal_a, &normal_b);
     let distance = found.square.sqrt();
-    try_feature_axes(&mut best, a, b, &found);
+    try_feature_axes(&mut best, &found);
     let size = edges_a[0].norm() + edges_b[0].norm() + edges_a[1].norm() + edges_b[1].norm();
     if best.apart < distance - 1e-13 * size - slop {
         try_all_axes(&mut best, a, b);
     }
     let low = (best.apart - slop).max(-slop).min(distance);
     let normal = (found.b - found.a).try_normalize(slop).unwrap_or(best.axis);
-    Some(Closest {
+    Ok(Closest {
         gap: Interval::new(low, distance + slop),
         best_m: distance,
         normal,
@@ -77,17 +91,6 @@ pub(super) fn gap(a: &Triangle, b: &Triangle, slop: f64, beyond: f64) -> Option<
         point_b: found.b,
         finished: best.apart >= distance - 1e-9 * size - slop,
     })
-}
-
-/// A proof that two triangles are apart, by so many metres at least, along three axes that part most; else `None`.
-pub(super) fn parted(a: &Triangle, b: &Triangle, slop: f64) -> Option<f64> {
-    let mut best = Best::none();
-    let middle = (b[0] - a[0]) + (b[1] - a[1]) + (b[2] - a[2]);
-    let normal = |t: &Triangle| (t[1] - t[0]).cross(&(t[2] - t[1]));
-    for axis in [middle, normal(a), normal(b)] {
-        best.try_axis(a, b, &axis);
-    }
-    (best.apart > slop).then_some(best.apart - slop)
 }
 
 /// Whether an edge of the one passes through the other well within both, whatever rounding did to the corners.
@@ -134,41 +137,67 @@ fn edges(t: &Triangle) -> [Vec3; 3] {
 struct Best {
     apart: f64,
     axis: Vec3,
+    /// Corners from the first one of A, whose place is zero: the digits of a common offset are not lost.
+    a: [Vec3; 2],
+    b: [Vec3; 3],
 }
 
 impl Best {
-    fn none() -> Self {
+    fn of(a: &Triangle, b: &Triangle) -> Self {
         Self {
             apart: f64::NEG_INFINITY,
             axis: Vec3::z(),
+            a: [a[1] - a[0], a[2] - a[0]],
+            b: b.map(|p| p - a[0]),
         }
     }
 
-    fn try_axis(&mut self, a: &Triangle, b: &Triangle, axis: &Vec3) {
+    /// How far B lies beyond A along an axis of any length, and A beyond B: by so many of its lengths.
+    #[inline(always)]
+    fn parts(&self, axis: &Vec3) -> [f64; 2] {
+        let ([a1, a2], [b0, b1, b2]) = (self.a.map(|p| axis.dot(&p)), self.b.map(|p| axis.dot(&p)));
+        let (low_a, high_a) = (least(least(a1, a2), 0.0), most(most(a1, a2), 0.0));
+        let (low_b, high_b) = (least(least(b0, b1), b2), most(most(b0, b1), b2));
+        [low_b - high_a, low_a - high_b]
+    }
+
+    #[inline(always)]
+    fn try_axis(&mut self, axis: &Vec3) {
         let square = axis.norm_squared();
         if square <= f64::MIN_POSITIVE {
             return;
         }
-        let unit = axis / square.sqrt();
-        // Relative to one corner: the digits of a common offset are not lost.
-        let on = |p: &Point| unit.dot(&(p - a[0]));
-        let (a1, a2) = (on(&a[1]), on(&a[2]));
-        let (b0, b1, b2) = (on(&b[0]), on(&b[1]), on(&b[2]));
-        let (low_a, high_a) = (a1.min(a2).min(0.0), a1.max(a2).max(0.0));
-        let (low_b, high_b) = (b0.min(b1).min(b2), b0.max(b1).max(b2));
-        if low_b - high_a > self.apart {
-            self.apart = low_b - high_a;
-            self.axis = unit;
+        // Most are no better, which squares tell as well as lengths, but for what is rounded.
+        let [one, other] = self.parts(axis);
+        let farthest = most(one, other);
+        let [now, there] = [self.apart, farthest].map(|x| x * x.abs());
+        if there <= now * square - NEAR * there.abs() {
+            return;
         }
-        if low_a - high_b > self.apart {
-            self.apart = low_a - high_b;
-            self.axis = -unit;
+        let unit = axis / square.sqrt();
+        let [one, other] = self.parts(&unit);
+        if one > self.apart {
+            (self.apart, self.axis) = (one, unit);
+        }
+        if other > self.apart {
+            (self.apart, self.axis) = (other, -unit);
         }
     }
 }
 
+/// The smaller of two numbers: one instruction where neither needs to be looked at for NaN.
+#[inline(always)]
+fn least(x: f64, y: f64) -> f64 {
+    if x < y { x } else { y }
+}
+
+#[inline(always)]
+fn most(x: f64, y: f64) -> f64 {
+    if x > y { x } else { y }
+}
+
 /// The axis between the points found, at right angles to the edges that hold them.
-fn try_feature_axes(best: &mut Best, a: &Triangle, b: &Triangle, found: &Candidate) {
+fn try_feature_axes(best: &mut Best, found: &Candidate) {
     let square_away = |mut axis: Vec3| {
         // Twice: what the first round leaves of a nearly parallel pair of edges, the second takes away.
         for edge in found.edges.iter().chain(&found.edges) {
@@ -180,10 +209,10 @@ fn try_feature_axes(best: &mut Best, a: &Triangle, b: &Triangle, found: &Candida
         axis
     };
     let between = found.b - found.a;
-    best.try_axis(a, b, &square_away(between));
+    best.try_axis(&square_away(between));
     let cross = found.edges[0].cross(&found.edges[1]);
     if let Some(cross) = cross.try_normalize(f64::MIN_POSITIVE) {
-        best.try_axis(a, b, &square_away(cross));
+        best.try_axis(&square_away(cross));
     }
 }
 
@@ -192,18 +221,18 @@ fn try_all_axes(best: &mut Best, a: &Triangle, b: &Triangle) {
     let (edges_a, edges_b) = (edges(a), edges(b));
     for (edges, other) in [(&edges_a, &edges_b), (&edges_b, &edges_a)] {
         let normal = edges[0].cross(&edges[1]);
-        best.try_axis(a, b, &normal);
+        best.try_axis(&normal);
         for edge in edges {
-            best.try_axis(a, b, &edge.cross(&normal));
+            best.try_axis(&edge.cross(&normal));
             // A needle has no normal to speak of; the other's will do.
-            best.try_axis(a, b, &edge.cross(&other[0].cross(&other[1])));
+            best.try_axis(&edge.cross(&other[0].cross(&other[1])));
         }
     }
     for u in &edges_a {
         for v in &edges_b {
             let cross = u.cross(v);
             if cross.norm_squared() > 1e-24 * u.norm_squared() * v.norm_squared() {
-                best.try_axis(a, b, &cross);
+                best.try_axis(&cross);
             }
         }
     }

@@ -288,7 +288,7 @@ impl Walk {
     }
 
     fn query(&mut self, low: f64, a: (Side<'_>, u32), b: (Side<'_>, u32)) {
-        let Some(closest) = side::leaf(a, b, &self.frame.placed, self.high) else {
+        let Ok(closest) = side::leaf(a, b, &self.frame.placed, self.high) else {
             return;
         };
         self.leaf_low = self.leaf_low.min(closest.gap.min.max(low));

@@ -36,19 +36,14 @@ impl CarriedFront {
         let (leaf_a, leaf_b) = ((a, i), (b, j));
         // Once the pair touches, only what touches too is of interest.
         let exact = exact && !self.known.touches;
-        if !exact && let Some(gap) = side::parted(leaf_a, leaf_b, &self.at) {
-            self.keep_leaf(store, id_a, id_b, gap);
-            return PROOF_COST;
-        }
-        let beyond = if exact && self.known.high > 0.0 {
-            self.known.high
-        } else {
-            f64::INFINITY
-        };
-        let Some(closest) = side::leaf(leaf_a, leaf_b, &self.at, beyond) else {
-            // Farther than the nearest known: that is proof enough.
-            self.keep_leaf(store, id_a, id_b, beyond.max(known_m));
-            return PROOF_COST;
+        let beyond_m = if exact { self.known.high.max(0.0) } else { 0.0 };
+        let closest = match side::leaf(leaf_a, leaf_b, &self.at, beyond_m) {
+            Ok(closest) => closest,
+            Err(gap) => {
+                // Farther than the nearest known: that is proof enough.
+                self.keep_leaf(store, id_a, id_b, gap.max(known_m));
+                return PROOF_COST;
+            }
         };
         let low = closest.gap.min.max(known_m);
         self.known.leaf_low = self.known.leaf_low.min(low);

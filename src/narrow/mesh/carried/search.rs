@@ -63,7 +63,7 @@ impl CarriedFront {
             return;
         };
         if let (Held::Triangle(i), Held::Triangle(j)) = (a.held(leaf_a), b.held(leaf_b))
-            && let Some(closest) = side::leaf((a, i), (b, j), &self.at, f64::INFINITY)
+            && let Ok(closest) = side::leaf((a, i), (b, j), &self.at, f64::INFINITY)
         {
             // No more than the distance of two points: what else it says is said when its entry's turn comes.
             self.known.high = self.known.high.min(closest.gap.max.max(0.0));

@@ -39,8 +39,8 @@ fn bug_triangles_a_plane_parts_by_millimetres_never_touch() {
         );
         assert!(found.gap.width() < 1e-12, "seed {seed}: {found:?}");
         assert!(!surely_crosses(&a, &b, slop), "seed {seed}");
-        let proof = parted(&a, &b, slop);
-        assert!(proof.is_none_or(|g| g <= found.gap.max), "seed {seed}");
+        let proof = gap(&a, &b, slop, 0.0).unwrap_err();
+        assert!(proof > 0.0 && proof <= found.gap.max, "seed {seed}");
     }
 }
 
@@ -57,8 +57,9 @@ fn what_surely_crosses_is_found_crossing() {
             crossed += 1;
             assert!(found.gap.max <= 0.0, "seed {seed}: {found:?}");
         }
-        if let Some(apart) = parted(&a, &b, 1e-15) {
-            assert!(found.gap.max >= apart, "seed {seed}: {found:?} {apart}");
+        match gap(&a, &b, 1e-15, 0.0) {
+            Ok(touching) => assert_eq!(touching.gap, found.gap, "seed {seed}"),
+            Err(apart) => assert!(found.gap.max >= apart, "seed {seed}: {found:?} {apart}"),
         }
     }
     assert!(crossed > 1_000, "{crossed}");
