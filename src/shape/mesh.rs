@@ -11,10 +11,13 @@ mod obb;
 mod outline;
 mod places;
 mod predicates;
+mod rings;
 mod seams;
 mod topology;
+mod trails;
 mod tree;
 mod turn;
+mod walks;
 
 use deform::Deform;
 pub(crate) use deform::{NewTree, NoVertex, TreeJob, can_be_vertices};
@@ -29,7 +32,10 @@ pub(crate) use tree::{Below, NODES_WAITING_MAX, Node};
 use adjacency::Adjacency;
 use normals::Normals;
 use outline::Outline;
+use rings::Rings;
 use topology::Topology;
+pub(crate) use trails::Trails;
+pub(crate) use walks::Climb;
 
 use crate::limits::{EXTENT_MAX_M, EXTENT_MIN_M, TRIANGLES_MAX};
 use crate::math::{Aabb, Point, Pose, ROUND, Vec3};
@@ -117,6 +123,8 @@ impl Mesh {
         }
         // Turned faces have their sides in another order.
         mesh.adjacency = Box::new(Adjacency::new(&topology, &mesh));
+        let rings = Rings::new(&mesh);
+        mesh.adjacency.take_rings(rings);
         mesh.normals = Box::new(Normals::new(&mesh));
         mesh.warnings.extend(mesh.adjacency.warning());
         Ok(mesh)

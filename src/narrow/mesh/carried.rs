@@ -286,6 +286,9 @@ impl CarriedFront {
             // A verdict ends at the first that touches: there are few.
             self.ask_touching_again(store);
         }
+        if goal == Goal::Contacts {
+            store.walks.clear();
+        }
         let end = meter.spent().saturating_add(slice_units);
         loop {
             if self.reached(goal) {

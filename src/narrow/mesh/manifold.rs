@@ -25,7 +25,7 @@ use super::side::Side;
 use crate::math::{Interval, Point, Vec3};
 use crate::narrow::arena::Arena;
 use crate::narrow::exact::{ManifoldPoint, shared_points};
-use crate::shape::Mesh;
+use crate::shape::{Climb, Mesh, Trails};
 
 /// Points so far apart still count as contacts, as a share of the smaller one's radius: of a body at rest all corners
 /// do, though rounding lifts some.
@@ -36,6 +36,31 @@ const FACE: f64 = 0.999_998;
 const INWARD: f64 = -0.1;
 /// A later normal has to be better by this share of the smaller one's radius.
 const BETTER: f64 = 1e-9;
+
+/// What the walks of one search for contact points have come to.
+#[derive(Debug, Default)]
+pub(super) struct Walks {
+    /// Over A and over B to where they reach farthest.
+    tops: [Trails<Climb>; 2],
+    /// From vertices of A and of B to the face of the other beneath them.
+    feet: [Trails<u32>; 2],
+}
+
+impl Walks {
+    /// Begins a search: it is not to rest on what others have found.
+    pub(super) fn clear(&mut self) {
+        self.tops.iter_mut().for_each(Trails::clear);
+        self.feet.iter_mut().for_each(Trails::clear);
+    }
+
+    fn tops(&mut self, is_b: bool) -> &mut Trails<Climb> {
+        &mut self.tops[usize::from(is_b)]
+    }
+
+    fn feet(&mut self, is_b: bool) -> &mut Trails<u32> {
+        &mut self.feet[usize::from(is_b)]
+    }
+}
 
 /// Whose face the normal is of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,18 +79,14 @@ pub(super) fn points(
     at: &Placed,
     found: &LeafContact,
     (patches, arena): (&mut Patches, &mut Arena<LeafContact>),
+    walks: &mut Walks,
 ) {
-    let [a, b] = [(a, false), (b, true)].map(|((side, place), is_b)| Leaf {
-        side,
-        place,
-        is_b,
-        at,
-    });
+    let [a, b] = [(a, false), (b, true)].map(|(leaf, is_b)| Leaf::new(leaf, is_b, at));
     let size = a.side.radius().min(b.side.radius());
     // Rounding is a share of all, not of the smaller one.
     let rounding_m = 4.0 * at.slop;
     let better_m = rounding_m.max(BETTER * size);
-    let Chosen { normal, base, top } = choose(&a, &b, &found.closest, better_m);
+    let Chosen { normal, base, top } = choose((&a, &b), &found.closest, better_m, walks);
     let patch = match base {
         Base::B => b.patch(),
         _ if a.mesh().is_some() => a.patch(),
@@ -107,11 +128,13 @@ pub(super) fn points(
     });
     if let Some(base_is_b) = forced {
         let (on, of) = if base_is_b { (&b, &a) } else { (&a, &b) };
-        let top = top.map(|(top, _)| top);
-        corners((on, of), &normal, top, prediction_m, |on, of, feature| {
+        let mut take = |on, of, feature| {
             let (point_a, point_b) = if base_is_b { (of, on) } else { (on, of) };
             put(point_a, point_b, feature);
-        });
+        };
+        let top = top.map(|(top, _)| top);
+        let walk = (&normal, prediction_m);
+        corners((on, of), walk, top, walks, &mut take);
     }
     if any {
         return;
@@ -165,8 +188,13 @@ struct Chosen {
 }
 
 /// The normal, A to B, along which the two surfaces overlap least.
-fn choose(a: &Leaf<'_>, b: &Leaf<'_>, found: &Closest, better_m: f64) -> Chosen {
-    let (normal_a, normal_b) = (a.normal(), b.normal());
+fn choose(
+    (a, b): (&Leaf<'_>, &Leaf<'_>),
+    found: &Closest,
+    better_m: f64,
+    walks: &mut Walks,
+) -> Chosen {
+    let (normal_a, normal_b) = (a.normal, b.normal);
     let (mut best_m, mut best) = (
         f64::INFINITY,
         Chosen {
@@ -179,12 +207,12 @@ fn choose(a: &Leaf<'_>, b: &Leaf<'_>, found: &Closest, better_m: f64) -> Chosen 
         let (Some(outward), Some(mesh)) = (face, leaf.mesh()) else {
             continue;
         };
-        let plane = leaf.corners()[0];
+        let plane = leaf.corners[0];
         // A surface can be touched from both sides.
         let ways = if mesh.is_solid() { 1 } else { 2 };
         for outward in [outward, -outward].into_iter().take(ways) {
             let height = outward.dot(&plane.coords);
-            let Some((reach, top)) = other.reach(&-outward, best_m - height) else {
+            let Some((reach, top)) = other.reach(&-outward, best_m - height, walks) else {
                 continue;
             };
             if height + reach < best_m - better_m {
@@ -202,8 +230,8 @@ fn choose(a: &Leaf<'_>, b: &Leaf<'_>, found: &Closest, better_m: f64) -> Chosen 
         along.abs() >= FACE || (solid && along < INWARD)
     };
     if !known(normal_a, own, a) && !known(normal_b, -own, b) {
-        let reach = a.own_reach(&own, best_m - b.least_reach(&-own));
-        let whole = reach.and_then(|r| Some(r + b.own_reach(&-own, best_m - r)?));
+        let reach = a.own_reach(&own, best_m - b.least_reach(&-own), walks);
+        let whole = reach.and_then(|r| Some(r + b.own_reach(&-own, best_m - r, walks)?));
         if whole.is_some_and(|depth| depth < best_m - better_m) {
             return Chosen {
                 normal: own,
@@ -249,16 +277,16 @@ fn feature_of(a: &Leaf<'_>, b: &Leaf<'_>, feature: u32, base_is_b: bool) -> u64 
 /// the surface has its corners over other triangles than the one that it crosses.
 fn corners(
     (on, of): (&Leaf<'_>, &Leaf<'_>),
-    normal: &Vec3,
+    (normal, prediction_m): (&Vec3, f64),
     top: Option<u32>,
-    prediction_m: f64,
-    mut take: impl FnMut(Point, Point, u64),
+    walks: &mut Walks,
+    take: &mut impl FnMut(Point, Point, u64),
 ) {
     let (Some(surface), Some(mesh)) = (on.mesh(), of.mesh()) else {
         return;
     };
     let outward = if on.is_b { -normal } else { *normal };
-    let plane = on.corners()[0];
+    let plane = on.corners[0];
     let own = on.turn(&outward);
     for vertex in mesh.faces()[of.place as usize].into_iter().chain(top) {
         let point = of.in_a(&mesh.vertices()[vertex as usize]);
@@ -266,9 +294,12 @@ fn corners(
             continue;
         }
         let there = if on.is_b { on.at.to_b(&point) } else { point };
-        let Some(beneath) = surface.beneath(on.place, &there, &own) else {
+        let feet = walks.feet(of.is_b);
+        let from = feet.find(vertex, &own).unwrap_or(on.place);
+        let Some((beneath, face)) = surface.beneath(from, &there, &own) else {
             continue;
         };
+        feet.note(vertex, &own, face);
         let beneath = on.in_a(&beneath);
         if outward.dot(&(point - beneath)) <= prediction_m {
             take(beneath, point, corner_name(vertex, of.is_b));
@@ -278,8 +309,8 @@ fn corners(
 
 /// The middle of what two triangles share where they cross.
 fn crossing(a: &Leaf<'_>, b: &Leaf<'_>) -> Option<Point> {
-    let (normal_a, normal_b) = (a.normal()?, b.normal()?);
-    let (of_a, of_b) = (a.corners(), b.corners());
+    let (normal_a, normal_b) = (a.normal?, b.normal?);
+    let (of_a, of_b) = (a.corners, b.corners);
     let (mut sum, mut count) = (Vec3::zeros(), 0.0);
     for (plane, normal, other) in [(&of_a, &normal_a, &of_b), (&of_b, &normal_b, &of_a)] {
         for k in 0..3 {

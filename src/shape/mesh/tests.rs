@@ -271,14 +271,17 @@ fn a_climb_over_a_convex_surface_ends_at_its_outermost_vertex() {
     let vertices = vertices.iter().map(|v| Point::new(v.x, v.y, v.z)).collect();
     let mesh = Mesh::new(vertices, faces, None).unwrap();
     let count = u32::try_from(mesh.faces().len()).unwrap();
+    // What earlier climbs have come to, other directions' too, shortens the way and leads nowhere else.
+    let mut trails = Trails::default();
     for _ in 0..200 {
         let direction = Vec3::new(unit(), unit(), unit()).normalize();
         let height = |v: u32| direction.dot(&mesh.vertices()[v as usize].coords);
         let highest = (0..200).map(height).fold(f64::NEG_INFINITY, f64::max);
         for face in 0..count {
-            let top = mesh.climb(face, &direction, f64::INFINITY).unwrap();
+            let mut climb = |beyond_m| mesh.climb(face, &direction, beyond_m, &mut trails);
+            let top = climb(f64::INFINITY).unwrap();
             assert!(height(top) >= highest - 1e-9, "from {face}");
-            assert_eq!(mesh.climb(face, &direction, highest - 0.01), None);
+            assert_eq!(climb(highest - 0.01), None);
         }
     }
 }
@@ -288,7 +291,11 @@ fn a_walk_comes_to_the_place_beneath_a_point_unless_it_is_far() {
     let mesh = sheet(40);
     let beneath = |x: f64, y: f64| mesh.beneath(0, &Point::new(x, y, 3.0), &Vec3::z());
     for (x, y) in [(0.5, 0.2), (3.25, 7.5), (14.5, 0.25), (8.5, 8.25)] {
-        let there = beneath(x, y).unwrap();
+        let (there, face) = beneath(x, y).unwrap();
+        assert_eq!(
+            mesh.beneath(face, &Point::new(x, y, 3.0), &Vec3::z()),
+            Some((there, face))
+        );
         assert!((there - Point::new(x, y, 0.0)).norm() < 1e-12, "{there}");
     }
     // Beyond the faces that a walk passes, and beyond the border.
@@ -297,4 +304,47 @@ fn a_walk_comes_to_the_place_beneath_a_point_unless_it_is_far() {
     // Nor along a direction that the sheet leans from by more than a walk goes on.
     let flat = Vec3::new(1.0, 0.0, 0.1).normalize();
     assert_eq!(mesh.beneath(0, &Point::new(5.0, 5.0, 0.5), &flat), None);
+}
+
+/// Where a vertex has its neighbours listed they are those that one comes by face by face; on a border, and where two
+/// rings touch, it has none.
+#[test]
+fn the_ring_of_a_vertex_holds_each_neighbour_once() {
+    let ball = ball(12, 0.1);
+    let sides = u32::try_from(3 * ball.faces().len()).unwrap();
+    for side in 0..sides {
+        let mut round = Vec::new();
+        let faces = ball
+            .go_round(side, |side| round.push(ball.start_of(side)))
+            .unwrap();
+        let ring = ball.adjacency.ring_of(ball.start_of(side)).iter();
+        let mut ring: Vec<u32> = ring.map(|side| ball.start_of(*side)).collect();
+        assert_eq!(ring.len(), faces as usize);
+        for all in [&mut round, &mut ring] {
+            all.sort_unstable();
+            all.dedup();
+        }
+        assert_eq!(ring, round);
+        assert_eq!(ring.len(), faces as usize);
+    }
+    let sheet = sheet(4);
+    let listed = |v: u32| !sheet.adjacency.ring_of(v).is_empty();
+    assert_eq!((0..25).filter(|v| listed(*v)).count(), 9, "the inner ones");
+    // Two boxes that share one corner by its number.
+    let (mut vertices, mut faces) = cuboid([0.0; 3], 1.0, false);
+    let (more, other) = cuboid([2.0; 3], 1.0, false);
+    let shared = |v: u32| (more[v as usize] - Point::new(1.0, 1.0, 1.0)).norm() < 1e-12;
+    let corner = vertices
+        .iter()
+        .position(|v| (v - Point::new(1.0, 1.0, 1.0)).norm() < 1e-12);
+    let corner = u32::try_from(corner.unwrap()).unwrap();
+    let first = u32::try_from(vertices.len()).unwrap();
+    let name = |v: u32| if shared(v) { corner } else { first + v };
+    faces.extend(other.into_iter().map(|face| face.map(name)));
+    vertices.extend(&more);
+    let mesh = Mesh::new(vertices, faces, Some(false)).unwrap();
+    for (v, ring) in (0..16).map(|v| (v, mesh.adjacency.ring_of(v))) {
+        let none = v == corner || (v >= first && shared(v - first));
+        assert_eq!(ring.is_empty(), none, "vertex {v}");
+    }
 }

@@ -80,7 +80,8 @@ impl CarriedFront {
             if self.known.points_wanted {
                 cost += POINTS_COST;
                 let patches = (&mut self.contacts, &mut store.contacts);
-                manifold::points(leaf_a, leaf_b, &self.at, &contact, patches);
+                let walks = &mut store.walks;
+                manifold::points(leaf_a, leaf_b, &self.at, &contact, patches, walks);
             }
         } else {
             self.known.blurred = true;

@@ -4,6 +4,7 @@
 use super::cover::{Group, Open};
 use crate::narrow::arena::{Arena, Linked, Run};
 use crate::narrow::mesh::LeafContact;
+use crate::narrow::mesh::manifold::Walks;
 use crate::shape::BoxId;
 
 /// Groups of all fronts together, 24 bytes each: some 10,000 pairs of 20,000-triangle meshes. Beyond it what is proved
@@ -20,6 +21,8 @@ pub struct FrontStore {
     pub(super) groups: Arena<Group>,
     pub(super) open: Arena<Open>,
     pub(in crate::narrow::mesh) contacts: Arena<LeafContact>,
+    /// Of the search that is going on.
+    pub(super) walks: Walks,
 }
 
 impl Default for FrontStore {
@@ -36,6 +39,7 @@ impl FrontStore {
             groups: Arena::new(groups),
             open: Arena::new(open),
             contacts: Arena::new(CONTACTS_MAX),
+            walks: Walks::default(),
         }
     }
 

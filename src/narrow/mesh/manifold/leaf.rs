@@ -1,6 +1,6 @@
 //! A leaf of a pair: a triangle with the surface about it, or a convex shape; seen from A.
 
-use super::{Placed, Side};
+use super::{Placed, Side, Walks};
 use crate::math::{Point, Vec3};
 use crate::shape::{Convex, Mesh};
 
@@ -11,9 +11,30 @@ pub(super) struct Leaf<'a> {
     pub(super) place: u32,
     pub(super) is_b: bool,
     pub(super) at: &'a Placed,
+    /// Of a triangle, A's frame.
+    pub(super) corners: [Point; 3],
+    /// Of a triangle with an area: unit, outward of a solid, A's frame.
+    pub(super) normal: Option<Vec3>,
 }
 
 impl<'a> Leaf<'a> {
+    pub(super) fn new((side, place): (Side<'a>, u32), is_b: bool, at: &'a Placed) -> Self {
+        let mut leaf = Self {
+            side,
+            place,
+            is_b,
+            at,
+            corners: [Point::origin(); 3],
+            normal: None,
+        };
+        if let Side::Mesh(mesh) = side {
+            leaf.corners = mesh.triangle(place).map(|p| leaf.in_a(&p));
+            let turn = |n: Vec3| if is_b { at.rotation * n } else { n };
+            leaf.normal = mesh.face_normal(place).map(turn);
+        }
+        leaf
+    }
+
     pub(super) fn mesh(&self) -> Option<&'a Mesh> {
         match self.side {
             Side::Mesh(mesh) => Some(mesh),
@@ -44,24 +65,6 @@ impl<'a> Leaf<'a> {
         }
     }
 
-    /// Of a triangle, A's frame.
-    pub(super) fn corners(&self) -> [Point; 3] {
-        match self.side {
-            Side::Mesh(mesh) => mesh.triangle(self.place).map(|p| self.in_a(&p)),
-            Side::Convex(_) => [Point::origin(); 3],
-        }
-    }
-
-    /// Of a triangle: unit, outward of a solid, A's frame.
-    pub(super) fn normal(&self) -> Option<Vec3> {
-        let normal = self.mesh()?.face_normal(self.place)?;
-        Some(if self.is_b {
-            self.at.rotation * normal
-        } else {
-            normal
-        })
-    }
-
     /// Where A's origin lies along a direction of A's frame, seen from its own.
     pub(super) fn offset(&self, direction: &Vec3) -> f64 {
         direction.dot(&self.in_a(&Point::origin()).coords)
@@ -69,12 +72,18 @@ impl<'a> Leaf<'a> {
 
     /// How far the surface about this leaf reaches along a direction, from A's origin, and the vertex of a mesh there;
     /// `None`: beyond `beyond_m`.
-    pub(super) fn reach(&self, direction: &Vec3, beyond_m: f64) -> Option<(f64, Option<u32>)> {
+    pub(super) fn reach(
+        &self,
+        direction: &Vec3,
+        beyond_m: f64,
+        walks: &mut Walks,
+    ) -> Option<(f64, Option<u32>)> {
         let (own, offset) = (self.turn(direction), self.offset(direction));
         let (height, top) = match self.side {
             Side::Convex(convex) => (own.dot(&convex.support(&own).coords), None),
             Side::Mesh(mesh) => {
-                let top = mesh.climb(self.place, &own, beyond_m - offset)?;
+                let trails = walks.tops(self.is_b);
+                let top = mesh.climb(self.place, &own, beyond_m - offset, trails)?;
                 (own.dot(&mesh.vertices()[top as usize].coords), Some(top))
             }
         };
@@ -83,11 +92,16 @@ impl<'a> Leaf<'a> {
 
     /// The same for a normal of the leaf's own: an edge that is one of the surface is not left for higher ground beyond
     /// it.
-    pub(super) fn own_reach(&self, direction: &Vec3, beyond_m: f64) -> Option<f64> {
+    pub(super) fn own_reach(
+        &self,
+        direction: &Vec3,
+        beyond_m: f64,
+        walks: &mut Walks,
+    ) -> Option<f64> {
         let crest = (self.mesh()).and_then(|mesh| mesh.crest(self.place, &self.turn(direction)));
         match crest {
             Some(height) => Some(height + self.offset(direction)),
-            None => self.reach(direction, beyond_m).map(|(height, _)| height),
+            None => (self.reach(direction, beyond_m, walks)).map(|(height, _)| height),
         }
     }
 
@@ -99,7 +113,7 @@ impl<'a> Leaf<'a> {
                 own.dot(&convex.support(&own).coords) + self.offset(direction)
             }
             Side::Mesh(_) => {
-                let on = self.corners().map(|p| direction.dot(&p.coords));
+                let on = self.corners.map(|p| direction.dot(&p.coords));
                 on[0].max(on[1]).max(on[2])
             }
         }

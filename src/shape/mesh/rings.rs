@@ -1,0 +1,59 @@
+//! The neighbours of each vertex, side by side, for walks that go from vertex to vertex.
+//!
+//! In: a mesh with its twins. Out: for every vertex whose faces close to one ring the sides that start at its
+//! neighbours; of others nothing is kept, and `Mesh::ring` goes round them face by face.
+//!
+//! Going round by twins is a chain of loads, each waiting for the one before; of a list all are under way at once.
+
+use super::Mesh;
+use super::adjacency::NONE;
+
+/// Lists by vertex.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Rings {
+    /// For each vertex where its list begins, and the end of all.
+    from: Vec<u32>,
+    sides: Vec<u32>,
+}
+
+impl Rings {
+    /// * `mesh` - its faces as they finally are, and their neighbours.
+    ///
+    /// Cost: O(n).
+    pub(super) fn new(mesh: &Mesh) -> Self {
+        let mut first = vec![(NONE, 0_u32); mesh.vertices.len()];
+        for (side, &vertex) in (0u32..).zip(mesh.faces.as_flattened()) {
+            let (first, count) = &mut first[vertex as usize];
+            *first = side.min(*first);
+            *count += 1;
+        }
+        let mut rings = Self {
+            from: Vec::with_capacity(first.len() + 1),
+            sides: Vec::with_capacity(mesh.faces.len() * 3),
+        };
+        let mut end = 0;
+        rings.from.push(end);
+        for (side, faces) in first {
+            let begin = rings.sides.len();
+            if side != NONE {
+                let closed = mesh.go_round(side, |side| rings.sides.push(side));
+                // Where more faces have this vertex than were met, another ring touches it. The last to be met was the
+                // first.
+                let all = closed.filter(|met| *met == faces).unwrap_or_default();
+                rings.sides.truncate(begin + all as usize);
+            }
+            end += u32::try_from(rings.sides.len() - begin).unwrap_or_default();
+            rings.from.push(end);
+        }
+        rings.sides.shrink_to_fit();
+        rings
+    }
+
+    /// The sides that start at the neighbours of a vertex; none: they are not kept.
+    #[inline]
+    pub(super) fn of(&self, vertex: u32) -> &[u32] {
+        let range = self.from.get(vertex as usize..vertex as usize + 2);
+        let range = range.map_or(0..0, |at| at[0] as usize..at[1] as usize);
+        self.sides.get(range).unwrap_or_default()
+    }
+}
