@@ -49,6 +49,12 @@ impl Feature {
         feature
     }
 
+    /// A triangle as it is; `None` for one without an area.
+    pub(super) fn of_triangle(corners: &[Vec3; 3]) -> Option<Self> {
+        let mut feature = Self::empty();
+        feature.fill_triangle(corners).then_some(feature)
+    }
+
     pub(super) fn used(&self) -> &[Vec3] {
         &self.corners[..self.count]
     }
@@ -76,6 +82,20 @@ impl Feature {
             self.ids[self.count] = id;
             self.count += 1;
         }
+    }
+
+    /// False, and nothing is taken, for a triangle without an area.
+    fn fill_triangle(&mut self, corners: &[Vec3; 3]) -> bool {
+        let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+        let length = normal.norm();
+        if length <= 0.0 {
+            return false;
+        }
+        for (place, corner) in (0_u32..).zip(corners) {
+            self.push(*corner, place);
+        }
+        self.normal = normal / length;
+        true
     }
 
     fn fill(&mut self, core: &Core, dir: &Vec3) {
@@ -132,15 +152,7 @@ impl Feature {
                 }
             }
             Core::Triangle(corners) => {
-                for (place, corner) in (0_u32..).zip(corners) {
-                    self.push(*corner, place);
-                }
-                let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-                let length = normal.norm();
-                if length > 0.0 {
-                    self.normal = normal / length;
-                } else {
-                    self.count = 0;
+                if !self.fill_triangle(corners) {
                     self.push_support(core, dir);
                 }
             }

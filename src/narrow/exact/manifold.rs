@@ -8,7 +8,7 @@
 
 mod shared;
 
-pub(in crate::narrow) use shared::shared_points;
+pub(in crate::narrow) use shared::{shared_by_triangles, shared_points};
 
 use super::feature::{CORNERS_MAX, Feature};
 use super::pair::Pair;
@@ -166,6 +166,17 @@ struct Found {
 
 impl Found {
     fn new(pair: &Pair<'_>, closest: &Closest, prediction_m: f64) -> Self {
+        let margins = [pair.a.margin(), pair.b.margin()];
+        Self::with(margins, pair.scale, closest, prediction_m)
+    }
+
+    /// * `scale` - spread of both and their distance, metres.
+    fn with(
+        [margin_a, margin_b]: [f64; 2],
+        scale: f64,
+        closest: &Closest,
+        prediction_m: f64,
+    ) -> Self {
         let witness = ManifoldPoint {
             point_a: closest.point_a,
             point_b: closest.point_b,
@@ -176,11 +187,11 @@ impl Found {
             points: [witness; 2 * CORNERS_MAX],
             count: 0,
             normal: closest.normal,
-            margin_a: pair.a.margin(),
-            margin_b: pair.b.margin(),
+            margin_a,
+            margin_b,
             prediction_m,
             witness,
-            same: 1e-6 * (pair.scale + pair.a.margin() + pair.b.margin()),
+            same: 1e-6 * (scale + margin_a + margin_b),
         }
     }
 

@@ -36,8 +36,8 @@ mod simplex;
 use crate::math::{Interval, Point, Pose, Vec3};
 use crate::shape::Convex;
 
-pub(in crate::narrow) use manifold::shared_points;
 pub use manifold::{Manifold, ManifoldPoint, manifold};
+pub(in crate::narrow) use manifold::{shared_by_triangles, shared_points};
 
 use pair::{CoreGap, Held, Pair};
 

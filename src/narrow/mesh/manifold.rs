@@ -24,7 +24,7 @@ use super::placed::Placed;
 use super::side::Side;
 use crate::math::{Interval, Point, Vec3};
 use crate::narrow::arena::Arena;
-use crate::narrow::exact::{ManifoldPoint, shared_points};
+use crate::narrow::exact::{ManifoldPoint, shared_by_triangles, shared_points};
 use crate::shape::{Climb, Mesh, Trails};
 
 /// Points so far apart still count as contacts, as a share of the smaller one's radius: of a body at rest all corners
@@ -34,6 +34,8 @@ pub(super) const PREDICTION: f64 = 1e-6;
 const FACE: f64 = 0.999_998;
 /// A solid's surface does not push inwards (cosine; a little more than a right angle is rounding).
 const INWARD: f64 = -0.1;
+/// Where nothing of a surface is found beneath a vertex, none is along a normal as close as this (cosine of 4 degrees).
+const SAME_FOOT: f64 = 0.9976;
 /// A later normal has to be better by this share of the smaller one's radius.
 const BETTER: f64 = 1e-9;
 
@@ -42,8 +44,8 @@ const BETTER: f64 = 1e-9;
 pub(super) struct Walks {
     /// Over A and over B to where they reach farthest.
     tops: [Trails<Climb>; 2],
-    /// From vertices of A and of B to the face of the other beneath them.
-    feet: [Trails<u32>; 2],
+    /// From vertices of A and of B to the face of the other beneath them, if there is one.
+    feet: [Trails<Option<u32>>; 2],
 }
 
 impl Walks {
@@ -57,7 +59,7 @@ impl Walks {
         &mut self.tops[usize::from(is_b)]
     }
 
-    fn feet(&mut self, is_b: bool) -> &mut Trails<u32> {
+    fn feet(&mut self, is_b: bool) -> &mut Trails<Option<u32>> {
         &mut self.feet[usize::from(is_b)]
     }
 }
@@ -252,6 +254,11 @@ fn shared(
     prediction_m: f64,
     take: impl FnMut(&ManifoldPoint, bool),
 ) {
+    if a.normal.is_some() && b.normal.is_some() {
+        let triangles = [&a.corners, &b.corners];
+        shared_by_triangles(triangles, normal, forced, prediction_m, take);
+        return;
+    }
     let (one, other) = (a.convex(), b.convex());
     shared_points(
         (&one, &other),
@@ -295,11 +302,14 @@ fn corners(
         }
         let there = if on.is_b { on.at.to_b(&point) } else { point };
         let feet = walks.feet(of.is_b);
-        let from = feet.find(vertex, &own).unwrap_or(on.place);
-        let Some((beneath, face)) = surface.beneath(from, &there, &own) else {
-            continue;
+        let from = match feet.find(vertex, &own) {
+            Some((None, cos)) if cos >= SAME_FOOT => continue,
+            Some((Some(face), _)) => face,
+            _ => on.place,
         };
-        feet.note(vertex, &own, face);
+        let found = surface.beneath(from, &there, &own);
+        feet.note(vertex, &own, found.map(|(_, face)| face));
+        let Some((beneath, _)) = found else { continue };
         let beneath = on.in_a(&beneath);
         if outward.dot(&(point - beneath)) <= prediction_m {
             take(beneath, point, corner_name(vertex, of.is_b));

@@ -64,7 +64,8 @@ pub(super) fn gap(a: &Triangle, b: &Triangle, slop: f64, beyond_m: f64) -> Resul
     }
 
     if best.apart <= slop && crossing(a, b) {
-        try_all_axes(&mut best, a, b);
+        // What crosses is not in one plane: beside the normals its depth is along the cross of two edges.
+        try_crosses(&mut best, &edges_a, &edges_b);
         return Ok(overlap(&best, a, b, slop));
     }
     if beyond_m <= 0.0 {
@@ -228,8 +229,13 @@ fn try_all_axes(best: &mut Best, a: &Triangle, b: &Triangle) {
             best.try_axis(&edge.cross(&other[0].cross(&other[1])));
         }
     }
-    for u in &edges_a {
-        for v in &edges_b {
+    try_crosses(best, &edges_a, &edges_b);
+}
+
+/// Crosses of edges.
+fn try_crosses(best: &mut Best, edges_a: &[Vec3; 3], edges_b: &[Vec3; 3]) {
+    for u in edges_a {
+        for v in edges_b {
             let cross = u.cross(v);
             if cross.norm_squared() > 1e-24 * u.norm_squared() * v.norm_squared() {
                 best.try_axis(&cross);

@@ -8,7 +8,7 @@
 use super::Mesh;
 use super::adjacency::NONE;
 
-/// Lists by vertex.
+/// Lists by vertex: 14 bytes a triangle.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rings {
     /// For each vertex where its list begins, and the end of all.

@@ -46,15 +46,17 @@ impl<End: Copy + Default> Trails<End> {
         });
     }
 
-    /// Where the last walk that came by a vertex has led, if its direction was much the same.
+    /// Where the last walk that came by a vertex has led, if its direction was much the same, and the cosine between
+    /// the two.
     #[inline]
-    pub(crate) fn find(&self, vertex: u32, direction: &Vec3) -> Option<End> {
+    pub(crate) fn find(&self, vertex: u32, direction: &Vec3) -> Option<(End, f64)> {
         let entry = &self.entries[place(vertex)];
         if entry.vertex != vertex || entry.search != self.search {
             return None;
         }
         let [x, y, z] = entry.direction.map(f64::from);
-        (direction.dot(&Vec3::new(x, y, z)) >= SAME_WAY).then_some(entry.end)
+        let cos = direction.dot(&Vec3::new(x, y, z));
+        (cos >= SAME_WAY).then_some((entry.end, cos))
     }
 
     #[inline]

@@ -64,7 +64,7 @@ impl Mesh {
             }
             let vertex = self.start_of(best.1);
             (path[len], len) = ((vertex, hops), len + 1);
-            if let Some(ahead) = trails.find(vertex, direction)
+            if let Some((ahead, _)) = trails.find(vertex, direction)
                 && height(ahead.side) > best.0
             {
                 best = (height(ahead.side), ahead.side);
