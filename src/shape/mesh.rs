@@ -58,6 +58,8 @@ pub struct Mesh {
     obb: ObbTree,
     /// Apart, so that a shape that is no mesh is not large for it.
     adjacency: Box<Adjacency>,
+    /// The neighbours of each vertex; apart as well.
+    rings: Box<Rings>,
     /// Which way the faces under each oriented box look; apart as well.
     normals: Box<Normals>,
     /// None for a small mesh, whose vertices are walked.
@@ -107,6 +109,7 @@ impl Mesh {
             radius: radius(&vertices, &faces, &centre),
             obb: ObbTree::new(&vertices, &faces),
             adjacency: Box::default(),
+            rings: Box::default(),
             normals: Box::default(),
             shells: topology.shells.iter().map(|s| s.vertex).collect(),
             vertices,
@@ -123,8 +126,7 @@ impl Mesh {
         }
         // Turned faces have their sides in another order.
         mesh.adjacency = Box::new(Adjacency::new(&topology, &mesh));
-        let rings = Rings::new(&mesh);
-        mesh.adjacency.take_rings(rings);
+        mesh.rings = Box::new(Rings::new(&mesh));
         mesh.normals = Box::new(Normals::new(&mesh));
         mesh.warnings.extend(mesh.adjacency.warning());
         Ok(mesh)

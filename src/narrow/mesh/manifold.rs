@@ -88,7 +88,7 @@ pub(super) fn points(
     // Rounding is a share of all, not of the smaller one.
     let rounding_m = 4.0 * at.slop;
     let better_m = rounding_m.max(BETTER * size);
-    let Chosen { normal, base, top } = choose((&a, &b), &found.closest, better_m, walks);
+    let Chosen { normal, base, top } = choose(&a, &b, &found.closest, better_m, walks);
     let patch = match base {
         Base::B => b.patch(),
         _ if a.mesh().is_some() => a.patch(),
@@ -130,13 +130,12 @@ pub(super) fn points(
     });
     if let Some(base_is_b) = forced {
         let (on, of) = if base_is_b { (&b, &a) } else { (&a, &b) };
-        let mut take = |on, of, feature| {
+        let top = top.map(|(top, _)| top);
+        let take = |on, of, feature| {
             let (point_a, point_b) = if base_is_b { (of, on) } else { (on, of) };
             put(point_a, point_b, feature);
         };
-        let top = top.map(|(top, _)| top);
-        let walk = (&normal, prediction_m);
-        corners((on, of), walk, top, walks, &mut take);
+        corners((on, of), &normal, top, prediction_m, walks, take);
     }
     if any {
         return;
@@ -190,12 +189,7 @@ struct Chosen {
 }
 
 /// The normal, A to B, along which the two surfaces overlap least.
-fn choose(
-    (a, b): (&Leaf<'_>, &Leaf<'_>),
-    found: &Closest,
-    better_m: f64,
-    walks: &mut Walks,
-) -> Chosen {
+fn choose(a: &Leaf<'_>, b: &Leaf<'_>, found: &Closest, better_m: f64, walks: &mut Walks) -> Chosen {
     let (normal_a, normal_b) = (a.normal, b.normal);
     let (mut best_m, mut best) = (
         f64::INFINITY,
@@ -284,10 +278,11 @@ fn feature_of(a: &Leaf<'_>, b: &Leaf<'_>, feature: u32, base_is_b: bool) -> u64 
 /// the surface has its corners over other triangles than the one that it crosses.
 fn corners(
     (on, of): (&Leaf<'_>, &Leaf<'_>),
-    (normal, prediction_m): (&Vec3, f64),
+    normal: &Vec3,
     top: Option<u32>,
+    prediction_m: f64,
     walks: &mut Walks,
-    take: &mut impl FnMut(Point, Point, u64),
+    mut take: impl FnMut(Point, Point, u64),
 ) {
     let (Some(surface), Some(mesh)) = (on.mesh(), of.mesh()) else {
         return;

@@ -11,7 +11,7 @@
 use std::cmp::Ordering;
 
 use super::Closest;
-use crate::math::{Interval, Point, Vec3};
+use crate::math::{Interval, Point, Vec3, greater, lesser};
 use crate::shape::side;
 
 /// What is rounded where the squares of two separations are compared, as a share of them: far more than it is.
@@ -157,8 +157,8 @@ impl Best {
     #[inline(always)]
     fn parts(&self, axis: &Vec3) -> [f64; 2] {
         let ([a1, a2], [b0, b1, b2]) = (self.a.map(|p| axis.dot(&p)), self.b.map(|p| axis.dot(&p)));
-        let (low_a, high_a) = (least(least(a1, a2), 0.0), most(most(a1, a2), 0.0));
-        let (low_b, high_b) = (least(least(b0, b1), b2), most(most(b0, b1), b2));
+        let (low_a, high_a) = (lesser(lesser(a1, a2), 0.0), greater(greater(a1, a2), 0.0));
+        let (low_b, high_b) = (lesser(lesser(b0, b1), b2), greater(greater(b0, b1), b2));
         [low_b - high_a, low_a - high_b]
     }
 
@@ -170,7 +170,7 @@ impl Best {
         }
         // Most are no better, which squares tell as well as lengths, but for what is rounded.
         let [one, other] = self.parts(axis);
-        let farthest = most(one, other);
+        let farthest = greater(one, other);
         let [now, there] = [self.apart, farthest].map(|x| x * x.abs());
         if there <= now * square - NEAR * there.abs() {
             return;
@@ -184,17 +184,6 @@ impl Best {
             (self.apart, self.axis) = (other, -unit);
         }
     }
-}
-
-/// The smaller of two numbers: one instruction where neither needs to be looked at for NaN.
-#[inline(always)]
-fn least(x: f64, y: f64) -> f64 {
-    if x < y { x } else { y }
-}
-
-#[inline(always)]
-fn most(x: f64, y: f64) -> f64 {
-    if x > y { x } else { y }
 }
 
 /// The axis between the points found, at right angles to the edges that hold them.

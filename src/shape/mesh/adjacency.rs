@@ -8,7 +8,6 @@
 //! them nevertheless, they have a seam (`seams`).
 
 use super::Mesh;
-use super::rings::Rings;
 use super::seams::{self, SIDES_MAX, Seam};
 use super::topology::{Sets, Topology};
 use crate::math::{Point, Vec3};
@@ -26,8 +25,6 @@ pub(super) struct Adjacency {
     twins: Vec<u32>,
     /// What lies beyond sides without a neighbour, by side.
     seams: Vec<Seam>,
-    /// The neighbours of each vertex.
-    rings: Rings,
     /// For each face the least face of its region.
     regions: Vec<u32>,
     /// Sides without a neighbour.
@@ -88,24 +85,12 @@ impl Adjacency {
             seams,
             regions,
             open,
-            ..Self::default()
         }
-    }
-
-    /// Takes the neighbours of each vertex.
-    pub(super) fn take_rings(&mut self, rings: Rings) {
-        self.rings = rings;
     }
 
     /// For each side that of the neighbour.
     pub(super) fn twins(&self) -> &[u32] {
         &self.twins
-    }
-
-    /// Sides that start at the neighbours of a vertex, if they are kept: see [`Rings`].
-    #[inline]
-    pub(super) fn ring_of(&self, vertex: u32) -> &[u32] {
-        self.rings.of(vertex)
     }
 
     /// Takes other regions, and no seams.

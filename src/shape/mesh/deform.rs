@@ -17,7 +17,7 @@ use super::obb::ObbPack;
 use super::topology::Sets;
 use super::{Mesh, ObbTree, Tree};
 use crate::limits::{DEFORMING_TRIANGLES_MAX, DEFORMING_VERTICES_MAX, EXTENT_MAX_M};
-use crate::math::{Aabb, Point, ROUND, Vec3};
+use crate::math::{Aabb, Point, ROUND, Vec3, greater, lesser};
 use crate::shape::ShapeError;
 use crate::simd::obb::LANES;
 
@@ -47,17 +47,6 @@ impl Corners {
             self.high[k] = greater(self.high[k], other.high[k]);
         }
     }
-}
-
-// One instruction each, unlike `f32::min` and `max`, which ask for NaN.
-#[inline(always)]
-fn lesser(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-#[inline(always)]
-fn greater(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }
 
 /// What a mesh has that deforms.

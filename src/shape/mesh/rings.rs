@@ -1,7 +1,7 @@
 //! The neighbours of each vertex, side by side, for walks that go from vertex to vertex.
 //!
 //! In: a mesh with its twins. Out: for every vertex whose faces close to one ring the sides that start at its
-//! neighbours; of others nothing is kept, and `Mesh::ring` goes round them face by face.
+//! neighbours; of others nothing is kept, and `Mesh::go_round` passes them face by face.
 //!
 //! Going round by twins is a chain of loads, each waiting for the one before; of a list all are under way at once.
 
@@ -31,8 +31,7 @@ impl Rings {
             from: Vec::with_capacity(first.len() + 1),
             sides: Vec::with_capacity(mesh.faces.len() * 3),
         };
-        let mut end = 0;
-        rings.from.push(end);
+        rings.from.push(0);
         for (side, faces) in first {
             let begin = rings.sides.len();
             if side != NONE {
@@ -42,8 +41,9 @@ impl Rings {
                 let all = closed.filter(|met| *met == faces).unwrap_or_default();
                 rings.sides.truncate(begin + all as usize);
             }
-            end += u32::try_from(rings.sides.len() - begin).unwrap_or_default();
-            rings.from.push(end);
+            rings
+                .from
+                .push(u32::try_from(rings.sides.len()).unwrap_or(NONE));
         }
         rings.sides.shrink_to_fit();
         rings

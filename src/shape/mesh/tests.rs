@@ -317,7 +317,7 @@ fn the_ring_of_a_vertex_holds_each_neighbour_once() {
         let faces = ball
             .go_round(side, |side| round.push(ball.start_of(side)))
             .unwrap();
-        let ring = ball.adjacency.ring_of(ball.start_of(side)).iter();
+        let ring = ball.rings.of(ball.start_of(side)).iter();
         let mut ring: Vec<u32> = ring.map(|side| ball.start_of(*side)).collect();
         assert_eq!(ring.len(), faces as usize);
         for all in [&mut round, &mut ring] {
@@ -328,7 +328,7 @@ fn the_ring_of_a_vertex_holds_each_neighbour_once() {
         assert_eq!(ring.len(), faces as usize);
     }
     let sheet = sheet(4);
-    let listed = |v: u32| !sheet.adjacency.ring_of(v).is_empty();
+    let listed = |v: u32| !sheet.rings.of(v).is_empty();
     assert_eq!((0..25).filter(|v| listed(*v)).count(), 9, "the inner ones");
     // Two boxes that share one corner by its number.
     let (mut vertices, mut faces) = cuboid([0.0; 3], 1.0, false);
@@ -343,7 +343,7 @@ fn the_ring_of_a_vertex_holds_each_neighbour_once() {
     faces.extend(other.into_iter().map(|face| face.map(name)));
     vertices.extend(&more);
     let mesh = Mesh::new(vertices, faces, Some(false)).unwrap();
-    for (v, ring) in (0..16).map(|v| (v, mesh.adjacency.ring_of(v))) {
+    for (v, ring) in (0..16).map(|v| (v, mesh.rings.of(v))) {
         let none = v == corner || (v >= first && shared(v - first));
         assert_eq!(ring.is_empty(), none, "vertex {v}");
     }

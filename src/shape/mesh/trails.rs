@@ -13,28 +13,22 @@ const TRAILS_LOG: u32 = 9;
 const SAME_WAY: f64 = 0.8;
 
 /// What walks have come to, by the vertex that they passed or began from: the last one of those that share a place.
-#[derive(Debug)]
+///
+/// Takes no memory before the first walk: most pairs are of no meshes.
+#[derive(Debug, Default)]
 pub(crate) struct Trails<End> {
-    entries: Box<[Entry<End>]>,
+    entries: Vec<Entry<End>>,
     search: u32,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Entry<End> {
     vertex: u32,
-    /// Of which search; 0: of none.
+    /// Of which search.
     search: u32,
+    /// No direction is near that of an entry not in use, which is zero.
     direction: [f32; 3],
     end: End,
-}
-
-impl<End: Copy + Default> Default for Trails<End> {
-    fn default() -> Self {
-        Self {
-            entries: vec![Entry::default(); 1 << TRAILS_LOG].into(),
-            search: 1,
-        }
-    }
 }
 
 impl<End: Copy + Default> Trails<End> {
@@ -42,7 +36,7 @@ impl<End: Copy + Default> Trails<End> {
     pub(crate) fn clear(&mut self) {
         self.search = self.search.checked_add(1).unwrap_or_else(|| {
             self.entries.fill(Entry::default());
-            1
+            0
         });
     }
 
@@ -50,7 +44,7 @@ impl<End: Copy + Default> Trails<End> {
     /// the two.
     #[inline]
     pub(crate) fn find(&self, vertex: u32, direction: &Vec3) -> Option<(End, f64)> {
-        let entry = &self.entries[place(vertex)];
+        let entry = self.entries.get(place(vertex))?;
         if entry.vertex != vertex || entry.search != self.search {
             return None;
         }
@@ -61,6 +55,9 @@ impl<End: Copy + Default> Trails<End> {
 
     #[inline]
     pub(crate) fn note(&mut self, vertex: u32, direction: &Vec3, end: End) {
+        if self.entries.is_empty() {
+            self.entries.resize(1 << TRAILS_LOG, Entry::default());
+        }
         self.entries[place(vertex)] = Entry {
             vertex,
             search: self.search,

@@ -73,8 +73,10 @@ impl Mesh {
             }
             let mut next = (best.0 + SAME * self.radius, best.1);
             let mut look = |side| next = higher(next, (height(side), side));
-            match self.adjacency.ring_of(vertex) {
-                [] => self.ring(best.1, look),
+            match self.rings.of(vertex) {
+                [] => {
+                    self.go_round(best.1, look);
+                }
                 ring => ring.iter().for_each(|side| look(*side)),
             }
             if next.1 == best.1 {
@@ -122,17 +124,14 @@ impl Mesh {
     /// Visits the faces about the corners of a face, some more than once.
     pub(super) fn about(&self, face: u32, mut visit: impl FnMut(u32)) {
         for side in 3 * face..3 * face + 3 {
-            self.ring(side, |other| visit(other / 3));
+            self.go_round(side, |other| visit(other / 3));
         }
     }
 
     /// Visits the corners of all faces about the start of a side, as sides that start there: each at the first face
     /// that has it.
-    fn ring(&self, side: u32, visit: impl FnMut(u32)) {
-        self.go_round(side, visit);
-    }
-
-    /// The same; yields how many faces there are, where they close to a ring.
+    ///
+    /// * returns - how many faces there are, where they close to a ring.
     pub(super) fn go_round(&self, side: u32, mut visit: impl FnMut(u32)) -> Option<u32> {
         let (face, k) = (side / 3, side % 3);
         let start = self.start_of(side);
