@@ -22,6 +22,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod crowd;
 #[path = "../../benches/broad/exact.rs"]
 mod exact;
 mod rig;

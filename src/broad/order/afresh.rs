@@ -92,6 +92,7 @@ impl Order {
     /// Lets go of candidates; their overlaps stay.
     fn begin_afresh(&mut self) {
         self.carry_all();
+        self.give_back_candidates();
         self.links.reset(self.live.len());
         self.entries.clear();
         self.listed = false;
@@ -110,6 +111,7 @@ impl Order {
             self.end_list();
         }
         self.carry_held();
+        self.give_back_afresh();
         self.links.reset(self.live.len());
         self.afresh.on = false;
     }

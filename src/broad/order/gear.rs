@@ -12,7 +12,7 @@ use crate::wire::BroadCause;
 const TAKE: u64 = 10;
 const TEST: u64 = 15;
 const TEST_FAR: u64 = 25;
-const FAR: usize = 1 << 15;
+pub(super) const FAR: usize = 1 << 15;
 const RENEW: u64 = 200;
 const LANE: u64 = 1500;
 /// ... and without candidates a body, a box compared with a block.
@@ -38,6 +38,11 @@ const HOPELESS: u64 = 2;
 const SPELL_LONG: u32 = 512;
 /// Below so many bodies either way takes next to nothing.
 const BODIES_MIN: u64 = 64;
+/// Of more than `FAR` bodies the first ticks are worked without candidates: until their margins are learned these take
+/// several times as much, and memory that is not needed if they do not pay. A short probe tells whether they may: ...
+const FIRST_TICKS: u32 = 24;
+/// ... where no more of 1024 bodies escape in a tick.
+const FIRST_ESCAPES: u64 = 64;
 /// Ticks without candidates before these are tried again, if a probe promises anything; twice as many when in vain.
 const SPELL_MIN: u32 = 128;
 const _: () = assert!(
@@ -99,6 +104,8 @@ pub(super) struct Gear {
     last: Option<Footing>,
     /// Spells since without a trial.
     vain: u32,
+    /// Candidates have not lasted long enough yet to be told by.
+    untried: bool,
 }
 
 impl Default for Gear {
@@ -117,6 +124,7 @@ impl Default for Gear {
             first: None,
             last: None,
             vain: 0,
+            untried: true,
         }
     }
 }
@@ -146,12 +154,13 @@ impl Gear {
         let mut hopeless = false;
         let chosen = if on {
             self.left = self.left.saturating_sub(1);
-            let calm = self.calm >= CALM_TICKS;
+            let calm = self.calm >= if self.untried { 1 } else { CALM_TICKS };
             if calm {
                 self.spell = SPELL_MIN;
             }
             let over = self.left == 0;
             let in_vain = over && self.vain < VAIN_MAX && self.is_as_it_was();
+            self.untried &= !(calm || over);
             if in_vain {
                 self.left = SPELL_MIN;
                 self.vain += 1;
@@ -162,6 +171,11 @@ impl Gear {
                 (false, false) => BroadCause::Spell,
             };
             self.cause == BroadCause::Spell
+        } else if self.untried && bodies > FAR {
+            // Who came is not told as moved.
+            self.calm = 0;
+            self.cause = BroadCause::Spell;
+            true
         } else {
             let bodies = bodies as u64;
             let meets = if self.meets > 0 {
@@ -190,7 +204,11 @@ impl Gear {
                 if hopeless {
                     self.spell = self.spell.max(SPELL_LONG);
                 }
-                self.left = self.spell;
+                self.left = if self.untried {
+                    FIRST_TICKS
+                } else {
+                    self.spell
+                };
             }
             (self.since, self.ticks, self.mean) = (0, 0, 0);
             (self.first, self.last, self.vain) = (None, None, 0);
@@ -202,6 +220,7 @@ impl Gear {
     /// little later: what had calmed by then is seen by what candidates themselves had to renew.
     fn is_as_it_was(&self) -> bool {
         match (self.first, self.last) {
+            (Some(now), _) if self.untried => now.escapes > FIRST_ESCAPES,
             (Some(then), Some(now)) => {
                 !now.promises(&then) && now.escapes * RENEWED_PER_ESCAPE >= self.renewed
             }
@@ -221,6 +240,11 @@ impl Gear {
         } else {
             self.left == PROBE_TICKS
         })
+    }
+
+    /// Whether a probe of so many ticks is told what it has come to.
+    pub(super) fn asks_probe(&self, ticks: u32) -> bool {
+        ticks == PROBE_TICKS || (self.untried && ticks == FIRST_TICKS)
     }
 
     /// Takes what a probe has come to.
@@ -261,6 +285,7 @@ impl Gear {
         if self.ticks <= EARLY_TICKS {
             return;
         }
+        self.untried = false;
         let share = (self.ticks - self.counted_from()).min(MEAN_TICKS);
         self.mean = (self.mean * (share - 1) + cost) / share;
         let renewed = work.renewed * 1024 / (moved as u64).max(1);
@@ -269,132 +294,4 @@ impl Gear {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn work(tests: u64, renewed: u64) -> Work {
-        Work {
-            tests,
-            renewed,
-            ..Work::default()
-        }
-    }
-
-    /// Runs ticks in which all of 1,000 bodies move; returns how many were worked without candidates.
-    fn run(gear: &mut Gear, on: &mut bool, ticks: u32, work: &Work) -> u32 {
-        let mut scratch = 0;
-        for _ in 0..ticks {
-            *on = gear.choose(*on, 1000, 1000, (300, 0));
-            if *on {
-                scratch += 1;
-            } else {
-                gear.note(1000, 0, work);
-            }
-        }
-        scratch
-    }
-
-    #[test]
-    fn motion_that_no_box_holds_is_worked_from_scratch_but_for_ever_rarer_trials() {
-        let (mut gear, mut on) = (Gear::default(), false);
-        let wild = work(10_000, 900);
-        assert!(run(&mut gear, &mut on, 40, &wild) >= 1);
-        assert_eq!(gear.cause, BroadCause::Spell);
-        assert!(run(&mut gear, &mut on, 10_000, &wild) > 9_700);
-        // It has calmed: a trial finds that out and stays.
-        let calm = work(2_000, 60);
-        run(&mut gear, &mut on, SPELL_MAX + 1, &calm);
-        assert_eq!(run(&mut gear, &mut on, 1000, &calm), 0);
-    }
-
-    /// Gives up candidates that renewed 900 boxes a tick of 1,000 bodies.
-    fn given_up() -> Gear {
-        let (mut gear, wild) = (Gear::default(), work(10_000, 900));
-        while !gear.choose(false, 1000, 1000, (300, 0)) {
-            gear.note(1000, 0, &wild);
-        }
-        assert_eq!((gear.left, gear.probes()), (SPELL_LONG, Some(true)));
-        gear
-    }
-
-    /// Ticks without candidates, as many as asked for or until a trial; what probes come to is told. Returns how many
-    /// began, their ticks, and whether a trial came.
-    fn spell(gear: &mut Gear, most: u32, escapes: u64, crowd: u64) -> (u32, u32, bool) {
-        let (mut begun, mut ticks) = (0, 0);
-        for _ in 0..most {
-            if let Some(begins) = gear.probes() {
-                begun += u32::from(begins);
-                ticks += 1;
-                if ticks % PROBE_TICKS == 0 {
-                    gear.note_probe(Footing { escapes, crowd });
-                }
-            }
-            if !gear.choose(true, 1000, 1000, (300, 0)) {
-                assert_eq!(gear.cause, BroadCause::Trial);
-                return (begun, ticks, true);
-            }
-        }
-        (begun, ticks, false)
-    }
-
-    #[test]
-    fn candidates_are_not_tried_again_on_the_footing_that_they_were_given_up_on() {
-        let mut gear = given_up();
-        let two = (2, 2 * PROBE_TICKS, false);
-        assert_eq!(spell(&mut gear, SPELL_LONG, 400, 2000), two);
-        let ten = (10, 10 * PROBE_TICKS, false);
-        assert_eq!(spell(&mut gear, 10 * SPELL_MIN, 350, 2500), ten);
-        // Calmer, or another crowd.
-        for (escapes, crowd) in [(290, 2000), (400, 1400), (400, 2700)] {
-            let mut other = gear;
-            assert!(
-                spell(&mut other, SPELL_MIN, escapes, crowd).2,
-                "{escapes} {crowd}"
-            );
-        }
-        // Nor are they given up for ever.
-        let rest = (VAIN_MAX - 11) * SPELL_MIN;
-        assert!(!spell(&mut gear, rest, 400, 2000).2);
-        assert!(spell(&mut gear, SPELL_MIN, 400, 2000).2);
-    }
-
-    #[test]
-    fn a_burst_that_has_calmed_before_the_first_probe_is_no_footing() {
-        let mut gear = given_up();
-        assert!(spell(&mut gear, SPELL_LONG, 50, 2000).2);
-    }
-
-    #[test]
-    fn candidates_that_take_twice_as_much_are_given_up_early() {
-        let (mut gear, mut on) = (Gear::default(), false);
-        let wild = work(10_000, 900);
-        assert_eq!(run(&mut gear, &mut on, 12, &wild), 0);
-        assert_eq!(run(&mut gear, &mut on, 1, &wild), 1);
-        assert_eq!(gear.cause, BroadCause::Cost);
-        let left = SPELL_LONG - 1;
-        assert_eq!(run(&mut gear, &mut on, left, &wild), left);
-        assert_eq!(gear.cause, BroadCause::Spell);
-        assert_eq!(run(&mut gear, &mut on, 1, &wild), 0);
-        assert_eq!(gear.cause, BroadCause::Trial);
-    }
-
-    #[test]
-    fn a_world_that_comes_to_rest_is_left_to_candidates_at_once() {
-        let (mut gear, mut on) = (Gear::default(), false);
-        run(&mut gear, &mut on, 40, &work(10_000, 900));
-        assert!(on);
-        for _ in 0..CALM_TICKS {
-            on = gear.choose(on, 10, 1000, (300, 0));
-        }
-        assert_eq!((on, gear.cause), (false, BroadCause::Calm));
-        gear.forced = Some(true);
-        assert!(gear.choose(on, 10, 1000, (300, 0)));
-        assert_eq!(gear.cause, BroadCause::Forced);
-    }
-
-    #[test]
-    fn motion_that_boxes_hold_is_never_worked_from_scratch() {
-        let (mut gear, mut on) = (Gear::default(), false);
-        assert_eq!(run(&mut gear, &mut on, 5_000, &work(2_500, 80)), 0);
-    }
-}
+mod tests;

@@ -36,6 +36,7 @@ use crate::wire::{BroadCause, BroadMode};
 mod afresh;
 mod fatten;
 mod gear;
+mod idle;
 mod jump;
 mod lay;
 mod links;
@@ -128,10 +129,9 @@ pub(super) struct Order {
     len: usize,
     /// By block: lanes that moved, while boxes are taken.
     dirty: Vec<u16>,
-    /// By block: lanes to renew in this tick, and the blocks that have any.
+    /// By block: lanes to renew in this tick; the blocks that have any; bodies without a lane that are to get one.
     renewing: Vec<u16>,
     worklist: Vec<u32>,
-    /// Bodies without a lane that are to get one.
     homeless: Vec<BodySlot>,
     /// Overlaps in all matrices.
     hits: usize,

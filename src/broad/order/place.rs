@@ -1,6 +1,7 @@
 //! Who stands where: lanes are given up and taken, and from time to time everything is sorted anew.
 
 use super::fatten::{Gait, outward};
+use super::gear::FAR;
 use super::links::{room, small, spare};
 use super::sort::{CLASSES_MAX, FILL, Frame, Sorter, centre};
 use super::tree::NO_BOUND;
@@ -165,6 +166,7 @@ impl Order {
         self.sorter.frame = Frame::of(&boxes);
         self.lay_out(bodies, &boxes);
         self.boxes = boxes;
+        self.give_back_sort();
         for rank in 0..self.slot_of.len() {
             if self.slot_of[rank] != NONE {
                 _ = self.take(Portable, tick.proxies, BodySlot(self.slot_of[rank]), rank);
@@ -227,18 +229,21 @@ impl Order {
             room(list, most);
         }
         room(&mut self.exact, most * WIDTH);
-        room(&mut self.held, most * WIDTH);
         room(&mut self.keys, most);
         room(&mut self.homes, most);
         room(&mut self.quarters, most / WIDTH + 1);
         room(&mut self.middles, most / WIDTH + 1);
         room(&mut self.fat, most);
-        room(&mut self.sure, most);
         room(&mut self.slot_of, most * WIDTH);
+        self.tree.reserve_blocks(most);
+        if self.afresh.on && bodies > FAR {
+            return;
+        }
+        room(&mut self.held, most * WIDTH);
+        room(&mut self.sure, most);
         room(&mut self.gaits, most * WIDTH);
         room(&mut self.ages, most * WIDTH);
         self.links.reserve_blocks(most);
-        self.tree.reserve_blocks(most);
         self.scratch.reserve(most);
     }
 
@@ -255,8 +260,11 @@ impl Order {
         for slot in bodies {
             grow(&mut self.rank_of, slot.index(), NONE);
             let rank = self.rank_of[slot.index()] as usize;
-            self.former
-                .push(self.gaits.get(rank).copied().unwrap_or(Gait::NEW));
+            // Of nobody anything is known where there were no candidates.
+            if !self.gaits.is_empty() {
+                let gait = self.gaits.get(rank).copied();
+                self.former.push(gait.unwrap_or(Gait::NEW));
+            }
         }
         self.gaits.clear();
         let order = self.sorter.sort(boxes);
@@ -286,7 +294,8 @@ impl Order {
             let middle = centre(&boxes[*index as usize]);
             widen(&mut self.homes[block], &middle);
             widen(&mut self.quarters[block / WIDTH], &middle);
-            self.gaits[rank] = self.former[*index as usize];
+            let gait = self.former.get(*index as usize).copied();
+            self.gaits[rank] = gait.unwrap_or(Gait::NEW);
         }
         self.sorted = self.live.len();
         let blocks = self.sorted + self.sorted / ATTIC + 1;

@@ -102,7 +102,7 @@ impl Order {
             probe.begin(self.origin, tick.members.bounded());
         }
         probe.look(tick, self.hits);
-        if probe.ticks == PROBE_TICKS {
+        if self.afresh.gear.asks_probe(probe.ticks) {
             let footing = probe.footing();
             self.afresh.gear.note_probe(footing);
         }

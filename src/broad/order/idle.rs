@@ -1,0 +1,69 @@
+//! Memory of the way that is not taken: of many bodies it is given back.
+//!
+//! In: a change of the way. Out: less memory; nothing else is told by it. Candidates and the search without them take
+//! half of it each, and a world of many bodies seldom changes from the one to the other, in a tick that lays all of
+//! them anyway. Of fewer bodies it is kept, so that no tick makes any.
+
+use super::afresh::Afresh;
+use super::gear::FAR;
+use super::links::Links;
+use super::mend::Mender;
+use super::sort::Sorter;
+use super::verlet::Verlet;
+use super::{Order, renew};
+
+impl Order {
+    /// Whether there are so many bodies that what lies idle is given back.
+    fn is_thrifty(&self) -> bool {
+        self.len > FAR
+    }
+
+    /// Candidates were let go.
+    pub(super) fn give_back_candidates(&mut self) {
+        if !self.is_thrifty() {
+            return;
+        }
+        self.links = Links::default();
+        self.mender = Mender::default();
+        self.scratch = renew::Scratch::default();
+        (self.held, self.sure) = (Vec::new(), Vec::new());
+        (self.ages, self.gaits, self.former) = (Vec::new(), Vec::new(), Vec::new());
+        (self.entries, self.found, self.rows) = (Vec::new(), Vec::new(), Vec::new());
+        (self.touched_records, self.emptied) = (Vec::new(), Vec::new());
+    }
+
+    /// Candidates are taken up again: what is learned of the ways stays.
+    pub(super) fn give_back_afresh(&mut self) {
+        if !self.is_thrifty() {
+            return;
+        }
+        let Afresh {
+            gear,
+            probe,
+            team,
+            verlet,
+            ..
+        } = std::mem::take(&mut self.afresh);
+        self.afresh = Afresh {
+            gear,
+            probe,
+            team,
+            verlet: Verlet {
+                pace: verlet.pace,
+                ..Verlet::default()
+            },
+            ..Afresh::default()
+        };
+    }
+
+    /// Bodies with candidates were sorted: that is seldom done.
+    pub(super) fn give_back_sort(&mut self) {
+        if !self.is_thrifty() {
+            return;
+        }
+        (self.boxes, self.former) = (Vec::new(), Vec::new());
+        let frame = self.sorter.frame;
+        self.sorter = Sorter::default();
+        self.sorter.frame = frame;
+    }
+}

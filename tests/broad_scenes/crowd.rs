@@ -1,0 +1,69 @@
+//! Goal: a world of very many bodies, whose way of working gives back the memory of the other way, stays exact when it
+//! changes from one to the other and back; and begins with the way that suits it.
+//!
+//! Method: 40,000 bodies that move, stand still, move again; or hardly move at all. What each tick did is read off its
+//! work.
+
+use sweepd::simd::boxes::Level;
+use sweepd::wire::{BroadCause, BroadMode};
+
+use crate::exact;
+use crate::rig::Rig;
+use crate::scenes::{Kind, Scene};
+
+const BODIES: usize = 40_000;
+
+/// Ticks with a scene that goes on or stands still; returns the ways they took.
+fn frames(rig: &mut Rig, scene: &mut Scene, count: usize, moving: bool) -> Vec<BroadMode> {
+    let way = |frame: usize| {
+        if moving {
+            scene.step();
+            rig.take(scene);
+        } else {
+            rig.put(&scene.boxes, &[], &[]);
+        }
+        rig.tick(&exact::pairs(&scene.boxes), &format!("frame {frame}"));
+        let (mode, _) = rig.work().way.unwrap();
+        mode
+    };
+    (0..count).map(way).collect()
+}
+
+#[test]
+fn many_bodies_that_move_stop_and_move_again_are_exact_and_begin_without_candidates() {
+    let mut scene = Scene::new(Kind::Gas, BODIES, 13);
+    let mut rig = Rig::new(Level::best(), BODIES, false);
+    rig.start(&scene.boxes);
+    let first = frames(&mut rig, &mut scene, 30, true);
+    assert!(!first.contains(&BroadMode::Sparse) && !first.contains(&BroadMode::Sort));
+    assert_eq!(rig.work().way.unwrap().1, BroadCause::Spell);
+    rig.validate();
+    let still = frames(&mut rig, &mut scene, 8, false);
+    assert!(still.ends_with(&[BroadMode::Sparse]), "{still:?}");
+    rig.validate();
+    let again = frames(&mut rig, &mut scene, 40, true);
+    assert!(again.contains(&BroadMode::Scratch), "{again:?}");
+    rig.validate();
+}
+
+#[test]
+fn many_bodies_of_which_few_move_have_candidates_from_the_second_tick_on() {
+    let mut scene = Scene::new(Kind::OnePercent, BODIES, 13);
+    let mut rig = Rig::new(Level::best(), BODIES, false);
+    rig.start(&scene.boxes);
+    assert_eq!(rig.work().way.unwrap().0, BroadMode::Scratch);
+    let ways = frames(&mut rig, &mut scene, 6, true);
+    assert_eq!(ways[0], BroadMode::Sort);
+    assert_eq!(ways[1..], [BroadMode::Sparse; 5]);
+    rig.validate();
+}
+
+#[test]
+fn many_bodies_in_each_gear_by_turns_are_exact() {
+    let gears = &[true, true, false, true, false, false, false, true, true];
+    let mut scene = Scene::new(Kind::Churn, BODIES, 13);
+    let mut rig = Rig::geared("shifting", gears, BODIES, false);
+    rig.start(&scene.boxes);
+    frames(&mut rig, &mut scene, 26, true);
+    rig.validate();
+}
