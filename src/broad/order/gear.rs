@@ -217,7 +217,8 @@ impl Gear {
     }
 
     /// Whether candidates would fare as they did when they were given up, as far as probes tell. The first came a
-    /// little later: what had calmed by then is seen by what candidates themselves had to renew.
+    /// little later: what had calmed by then is seen by what candidates themselves had to renew. Before any trial:
+    /// whether more bodies would escape than candidates are worth.
     fn is_as_it_was(&self) -> bool {
         match (self.first, self.last) {
             (Some(now), _) if self.untried => now.escapes > FIRST_ESCAPES,
