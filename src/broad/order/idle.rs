@@ -12,15 +12,15 @@ use super::sort::Sorter;
 use super::verlet::Verlet;
 use super::{Order, renew};
 
-impl Order {
-    /// Whether there are so many bodies that what lies idle is given back.
-    fn is_thrifty(&self) -> bool {
-        self.len > FAR
-    }
+/// Whether there are so many bodies that what lies idle is given back.
+pub(super) fn is_thrifty(bodies: usize) -> bool {
+    bodies > FAR
+}
 
+impl Order {
     /// Candidates were let go.
     pub(super) fn give_back_candidates(&mut self) {
-        if !self.is_thrifty() {
+        if !is_thrifty(self.len) {
             return;
         }
         self.links = Links::default();
@@ -34,7 +34,7 @@ impl Order {
 
     /// Candidates are taken up again: what is learned of the ways stays.
     pub(super) fn give_back_afresh(&mut self) {
-        if !self.is_thrifty() {
+        if !is_thrifty(self.len) {
             return;
         }
         let Afresh {
@@ -58,7 +58,7 @@ impl Order {
 
     /// Bodies with candidates were sorted: that is seldom done.
     pub(super) fn give_back_sort(&mut self) {
-        if !self.is_thrifty() {
+        if !is_thrifty(self.len) {
             return;
         }
         (self.boxes, self.former) = (Vec::new(), Vec::new());

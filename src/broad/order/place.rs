@@ -1,7 +1,7 @@
 //! Who stands where: lanes are given up and taken, and from time to time everything is sorted anew.
 
 use super::fatten::{Gait, outward};
-use super::gear::FAR;
+use super::idle;
 use super::links::{room, small, spare};
 use super::sort::{CLASSES_MAX, FILL, Frame, Sorter, centre};
 use super::tree::NO_BOUND;
@@ -236,7 +236,7 @@ impl Order {
         room(&mut self.fat, most);
         room(&mut self.slot_of, most * WIDTH);
         self.tree.reserve_blocks(most);
-        if self.afresh.on && bodies > FAR {
+        if self.afresh.on && idle::is_thrifty(bodies) {
             return;
         }
         room(&mut self.held, most * WIDTH);
