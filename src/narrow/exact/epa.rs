@@ -67,6 +67,23 @@ pub(super) fn depth(pair: &Pair<'_>, simplex: &Simplex, warm: Option<Refined>) -
     })
 }
 
+/// The gap of two cores by a polytope that begins around the closest point of an earlier answer; `None` where it does
+/// not hold the origin, or leaves the ends apart.
+pub(super) fn depth_around(pair: &Pair<'_>, found: &Refined) -> Option<CoreGap> {
+    if found.value >= -pair.tiny() {
+        return None;
+    }
+    SCRATCH.with(|scratch| {
+        let mut polytope = scratch.try_borrow_mut().ok()?;
+        if !polytope.start_below(pair, found.corner(), &-found.normal) {
+            return None;
+        }
+        let gap = polytope.settle(pair, Some(found));
+        let gap = polytope.straight(pair, gap);
+        (gap.upper - gap.lower <= LOOSE * pair.scale).then_some(gap)
+    })
+}
+
 /// Best end found so far.
 struct Best {
     /// `f(normal)`.
@@ -126,6 +143,11 @@ impl Polytope {
         if let Err(flat) = self.start(pair, simplex, axes) {
             return flat;
         }
+        self.settle(pair, warm.as_ref())
+    }
+
+    /// Grows as far as it helps, around what Newton found first; the gap that is known then.
+    fn settle(&mut self, pair: &Pair<'_>, warm: Option<&Refined>) -> CoreGap {
         let mut state = State {
             best: Best {
                 lower: f64::NEG_INFINITY,
@@ -138,7 +160,7 @@ impl Polytope {
             last: f64::NEG_INFINITY,
         };
         let sound = match warm {
-            Some(found) => self.plant(pair, &found, &mut state),
+            Some(found) => self.plant(pair, found, &mut state),
             None => true,
         };
         if sound {

@@ -10,7 +10,8 @@
 //! * Else GJK (`gjk`) finds the features that are closest, or that the cores overlap; then an expanding polytope
 //!   (`epa`) gives the least translation, and a form of its own where two axes coincide (`coaxial`).
 //! * Where a circle takes part both stop early and a Newton method on the features (`newton`) finishes: it finds the
-//!   normal that makes `f` greatest, outside and inside alike.
+//!   normal that makes `f` greatest, outside and inside alike. It starts from the features of the last answer, and
+//!   where it says that they overlap the polytope begins around its closest point, without GJK.
 //!
 //! The certificate: for every unit `n`, `f(n) = -(s_A(n) + s_B(-n))` is a lower bound on the gap, so the lower end is
 //! `f` at the best normal found, whoever found it. The upper end is the distance of two points that are convex
@@ -148,6 +149,9 @@ fn iterate(pair: &Pair<'_>, warm: &Warm) -> CoreGap {
     } else {
         newton::resume(pair, &warm.held, &start)
     };
+    if let Some(gap) = (refined.as_ref()).and_then(|found| epa::depth_around(pair, found)) {
+        return gap;
+    }
     match gjk::distance(pair, &start, &warm.held, refined.as_ref()) {
         gjk::Outcome::Apart(gap) => gap,
         gjk::Outcome::Overlap(simplex) => {

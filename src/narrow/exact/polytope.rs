@@ -6,6 +6,9 @@ use super::pair::{CoreGap, Held, Pair, Vertex, across, unit};
 use super::simplex::{Simplex, normal_of};
 use crate::math::Vec3;
 
+/// Sine of 60 degrees.
+const SIXTY: f64 = 0.866_025_403_784_438_6;
+
 /// A triangle of the polytope; corners counter-clockwise seen from outside.
 #[derive(Clone, Copy)]
 pub(super) struct Face {
@@ -50,6 +53,31 @@ impl Polytope {
         best.0
     }
 
+    fn clear(&mut self) {
+        self.vertices.clear();
+        self.faces.clear();
+        self.distances.clear();
+    }
+
+    /// A tetrahedron of `top` and three vertices that lie on the other side of the origin, as seen from it; false where
+    /// that does not hold the origin. Whoever knows the closest point begins with it, and need not ask whether the
+    /// cores overlap.
+    ///
+    /// * `out` - unit, from the origin to `top`.
+    pub(super) fn start_below(&mut self, pair: &Pair<'_>, top: Vertex, out: &Vec3) -> bool {
+        self.clear();
+        let one = across(out);
+        let other = out.cross(&one);
+        self.vertices.push(top);
+        for (x, y) in [(1.0, 0.0), (-0.5, SIXTY), (-0.5, -SIXTY)] {
+            // The support is asked for the way it is least along.
+            self.vertices.push(pair.support(&-(one * x + other * y)));
+        }
+        self.tetrahedron();
+        let tiny = pair.tiny();
+        (self.faces.iter()).all(|face| face.normal != Vec3::zeros() && face.distance > tiny)
+    }
+
     /// A tetrahedron with a volume, or the gap when the difference is flat.
     ///
     /// * `axes` - orthogonal; where the simplex does not do, the tetrahedron begins along one of them.
@@ -60,9 +88,7 @@ impl Polytope {
         simplex: &Simplex,
         axes: &[Vec3; 3],
     ) -> Result<(), CoreGap> {
-        self.vertices.clear();
-        self.faces.clear();
-        self.distances.clear();
+        self.clear();
         let flat_below = 2.0 * pair.tiny();
         if simplex.count == 4 {
             let w = simplex.vertices.map(|v| v.w);
@@ -219,7 +245,8 @@ impl Polytope {
         let base = self.faces.len();
         for k in 0..count {
             let edge = self.hole[k];
-            let (before, after) = (base + (k + count - 1) % count, base + (k + 1) % count);
+            let before = base + if k == 0 { count - 1 } else { k - 1 };
+            let after = base + if k + 1 == count { 0 } else { k + 1 };
             let face = self.face([edge.from, edge.to, apex], [edge.outside, after, before]);
             self.push(face);
             self.faces[edge.outside].beside[edge.slot] = base + k;
