@@ -248,10 +248,34 @@ fn place(r: &mut Random, a: &Solid, b: &Solid, rotation: Quat, target: f64) -> P
     Pose::from_parts(at.into(), rotation)
 }
 
-const CATEGORIES: [&str; 11] = [
+const CATEGORIES: [&str; 12] = [
     "generic", "near", "shallow", "deep", "parallel", "aspect", "ratio", "tiny", "huge", "same",
-    "flat",
+    "flat", "coaxial",
 ];
+
+/// Solids of revolution, the axis of one within the other: offset and lean from nothing to a third of the size.
+fn coaxial(r: &mut Random) -> (Solid, Solid, Pose) {
+    let shape = |r: &mut Random| {
+        let (x, y) = (r.range(0.05, 1.0), r.range(0.05, 1.0));
+        match r.below(3) {
+            0 => Solid::Capsule(x, y),
+            1 => Solid::Cylinder(x, y),
+            _ => Solid::Cone(x, y),
+        }
+    };
+    let (a, b) = (shape(r), shape(r));
+    let part = |r: &mut Random| match r.below(4) {
+        0 => 0.0,
+        _ => 10.0_f64.powf(r.range(-14.0, -0.5)),
+    };
+    let (lean, off, way) = (part(r), part(r), r.range(0.0, 6.3));
+    let over = std::f64::consts::PI * r.below(2) as f64;
+    let rotation = Quat::from_axis_angle(&Vec3::z_axis(), r.range(0.0, 6.3))
+        * Quat::from_axis_angle(&Vec3::x_axis(), over + lean);
+    let lift = (a.size() + b.size()) * r.range(-0.4, 0.4);
+    let at = Vec3::new(off * way.cos(), off * way.sin(), lift);
+    (a, b, Pose::from_parts(at.into(), rotation))
+}
 
 fn case(r: &mut Random, category: &str) -> (Solid, Solid, Pose) {
     let (mut a, mut b) = (Solid::random(r), Solid::random(r));
@@ -295,6 +319,7 @@ fn case(r: &mut Random, category: &str) -> (Solid, Solid, Pose) {
             (a, b) = (a.scaled(s), b.scaled(s));
             sign * s * 10.0_f64.powf(r.range(-4.0, 0.0))
         }
+        "coaxial" => return coaxial(r),
         "same" => {
             if r.below(2) == 0 {
                 b = a.clone();

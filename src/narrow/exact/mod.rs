@@ -8,7 +8,7 @@
 //! * Point and segment pairs, and a point against anything, have closed forms (`closed`).
 //! * Two boxes try their separating axes (`sat`) first.
 //! * Else GJK (`gjk`) finds the features that are closest, or that the cores overlap; then an expanding polytope
-//!   (`epa`) gives the least translation, and a form of its own where two axes coincide (`coaxial`).
+//!   (`epa`) gives the least translation, or planes through an axis do, where two axes nearly agree (`revolved`).
 //! * Where a circle takes part both stop early and a Newton method on the features (`newton`) finishes: it finds the
 //!   normal that makes `f` greatest, outside and inside alike. It starts from the features of the last answer, and
 //!   where it says that they overlap the polytope begins around its closest point, without GJK.
@@ -23,7 +23,6 @@
 //! multiple of the pair's size, so nothing is scaled or cached and no copy of a hull is kept.
 
 mod closed;
-mod coaxial;
 mod epa;
 mod feature;
 mod gjk;
@@ -31,6 +30,7 @@ mod manifold;
 mod newton;
 mod pair;
 mod polytope;
+mod revolved;
 mod sat;
 mod simplex;
 
@@ -112,7 +112,8 @@ const FINISHED: f64 = 1e-6;
 /// * `warm` - kept by the caller for this pair; changes only the time taken (and the last bits).
 /// * returns - see [`Closest`]; `unknown` when `pos12` is not finite.
 ///
-/// Cost: 20 ns (spheres) to some 10 us (overlapping cylinders); no allocation after a thread's first calls.
+/// Cost: 20 ns (spheres) to some 10 us (overlapping cylinders), bounded by the faces that a polytope may grow; no
+/// allocation after a thread's first calls.
 #[must_use]
 pub fn convex_gap(a: &Convex, b: &Convex, pos12: &Pose, warm: &mut Warm) -> Closest {
     let pair = Pair::new(a, b, pos12);
@@ -149,14 +150,21 @@ fn iterate(pair: &Pair<'_>, warm: &Warm) -> CoreGap {
     } else {
         newton::resume(pair, &warm.held, &start)
     };
-    if let Some(gap) = (refined.as_ref()).and_then(|found| epa::depth_around(pair, found)) {
-        return gap;
+    let mut known = None;
+    if let Some(found) = refined.as_ref().filter(|r| r.value < -pair.tiny()) {
+        known = revolved::gap(pair, Some(found));
+        let told = known.filter(|gap| gap.is_tight(pair));
+        if let Some(gap) = told.or_else(|| epa::depth_around(pair, found)) {
+            return gap;
+        }
     }
     match gjk::distance(pair, &start, &warm.held, refined.as_ref()) {
         gjk::Outcome::Apart(gap) => gap,
-        gjk::Outcome::Overlap(simplex) => {
-            coaxial::gap(pair).unwrap_or_else(|| epa::depth(pair, &simplex, refined))
-        }
+        gjk::Outcome::Overlap(simplex) => match known.or_else(|| revolved::gap(pair, None)) {
+            Some(gap) if gap.is_tight(pair) => gap,
+            Some(gap) => gjk::better(&gap, &epa::depth(pair, &simplex, refined)),
+            None => epa::depth(pair, &simplex, refined),
+        },
     }
 }
 

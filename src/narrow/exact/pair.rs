@@ -68,6 +68,29 @@ pub(super) struct CoreGap {
     pub(super) held: Held,
 }
 
+/// Width at which curved cores end, in parts of the size; polytopes end at roundoff.
+const CURVED: f64 = 5e-8;
+/// Width from which more work is worth its time, in parts of the size.
+const LOOSE: f64 = 5e-7;
+/// Closest points that are further than this from straight across are looked for anew, in parts of the size.
+const STRAIGHT: f64 = 1e-7;
+
+impl CoreGap {
+    /// Whether both ends are as close as curved cores are asked for.
+    pub(super) fn is_tight(&self, pair: &Pair<'_>) -> bool {
+        self.upper - self.lower <= LOOSE * pair.scale
+    }
+
+    /// How far the closest points are from straight across from each other, metres.
+    pub(super) fn off(&self) -> f64 {
+        (self.point_b - self.point_a - self.normal * self.lower).norm()
+    }
+
+    pub(super) fn is_straight(&self, pair: &Pair<'_>) -> bool {
+        self.off() <= STRAIGHT * pair.scale
+    }
+}
+
 /// Two cores in A's frame.
 #[derive(Debug)]
 pub(super) struct Pair<'a> {
@@ -112,6 +135,15 @@ impl<'a> Pair<'a> {
     #[inline]
     pub(super) fn tiny(&self) -> f64 {
         4.0 * f64::EPSILON * self.scale
+    }
+
+    /// How close both ends of a depth should come, metres.
+    pub(super) fn tolerance(&self) -> f64 {
+        if self.polytopes {
+            self.tiny()
+        } else {
+            CURVED * self.scale
+        }
     }
 
     #[inline]
