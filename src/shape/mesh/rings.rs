@@ -1,18 +1,20 @@
 //! The neighbours of each vertex, side by side, for walks that go from vertex to vertex.
 //!
-//! In: a mesh with its twins. Out: for every vertex whose faces close to one ring the sides that start at its
-//! neighbours; of others nothing is kept, and `Mesh::go_round` passes them face by face.
+//! In: a mesh with its twins. Out: for every vertex whose faces close to one ring its neighbours; of others a side that
+//! starts there, from which `Mesh::go_round` passes face by face.
 //!
 //! Going round by twins is a chain of loads, each waiting for the one before; of a list all are under way at once.
 
 use super::Mesh;
 use super::adjacency::NONE;
 
-/// Lists by vertex: 14 bytes a triangle.
+/// Lists by vertex: 16 bytes a triangle.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rings {
     /// For each vertex where its list begins, and the end of all.
     from: Vec<u32>,
+    vertices: Vec<u32>,
+    /// A side that starts at each vertex.
     sides: Vec<u32>,
 }
 
@@ -29,31 +31,37 @@ impl Rings {
         }
         let mut rings = Self {
             from: Vec::with_capacity(first.len() + 1),
-            sides: Vec::with_capacity(mesh.faces.len() * 3),
+            vertices: Vec::with_capacity(mesh.faces.len() * 3),
+            sides: first.iter().map(|(side, _)| *side).collect(),
         };
         rings.from.push(0);
+        let Self { from, vertices, .. } = &mut rings;
         for (side, faces) in first {
-            let begin = rings.sides.len();
+            let begin = vertices.len();
             if side != NONE {
-                let closed = mesh.go_round(side, |side| rings.sides.push(side));
+                let closed = mesh.go_round(side, |side| vertices.push(mesh.start_of(side)));
                 // Where more faces have this vertex than were met, another ring touches it. The last to be met was the
                 // first.
                 let all = closed.filter(|met| *met == faces).unwrap_or_default();
-                rings.sides.truncate(begin + all as usize);
+                vertices.truncate(begin + all as usize);
             }
-            rings
-                .from
-                .push(u32::try_from(rings.sides.len()).unwrap_or(NONE));
+            from.push(u32::try_from(vertices.len()).unwrap_or(NONE));
         }
-        rings.sides.shrink_to_fit();
+        rings.vertices.shrink_to_fit();
         rings
     }
 
-    /// The sides that start at the neighbours of a vertex; none: they are not kept.
+    /// The neighbours of a vertex; none: they are not kept.
     #[inline]
     pub(super) fn of(&self, vertex: u32) -> &[u32] {
         let range = self.from.get(vertex as usize..vertex as usize + 2);
         let range = range.map_or(0..0, |at| at[0] as usize..at[1] as usize);
-        self.sides.get(range).unwrap_or_default()
+        self.vertices.get(range).unwrap_or_default()
+    }
+
+    /// A side that starts at a vertex, of the first face that has it; `None`: no face has it.
+    pub(super) fn side_at(&self, vertex: u32) -> Option<u32> {
+        let side = self.sides.get(vertex as usize).copied();
+        side.filter(|side| *side != NONE)
     }
 }

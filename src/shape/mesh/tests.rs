@@ -317,8 +317,7 @@ fn the_ring_of_a_vertex_holds_each_neighbour_once() {
         let faces = ball
             .go_round(side, |side| round.push(ball.start_of(side)))
             .unwrap();
-        let ring = ball.rings.of(ball.start_of(side)).iter();
-        let mut ring: Vec<u32> = ring.map(|side| ball.start_of(*side)).collect();
+        let mut ring = ball.rings.of(ball.start_of(side)).to_vec();
         assert_eq!(ring.len(), faces as usize);
         for all in [&mut round, &mut ring] {
             all.sort_unstable();

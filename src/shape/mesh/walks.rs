@@ -28,8 +28,8 @@ const SAME: f64 = 1e-10;
 /// Where a climb over a mesh has led from one of the vertices on its way.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Climb {
-    /// Starts at the vertex that it has come to.
-    side: u32,
+    /// The vertex that it has come to.
+    vertex: u32,
     /// Corners on the way there, at least one.
     hops: u32,
 }
@@ -48,11 +48,8 @@ impl Mesh {
         beyond_m: f64,
         trails: &mut Trails<Climb>,
     ) -> Option<u32> {
-        let height = |side: u32| {
-            let at = self.vertices[self.start_of(side) as usize];
-            direction.dot(&at.coords)
-        };
-        let corners = [3 * face, 3 * face + 1, 3 * face + 2].map(|side| (height(side), side));
+        let height = |vertex: u32| direction.dot(&self.vertices[vertex as usize].coords);
+        let corners = self.faces[face as usize].map(|vertex| (height(vertex), vertex));
         let higher = |x: (f64, u32), y: (f64, u32)| if y.0 > x.0 { y } else { x };
         let mut best = corners.into_iter().fold(corners[0], higher);
         // Vertices passed, each with the corners up to it.
@@ -62,32 +59,33 @@ impl Mesh {
             if best.0 > beyond_m || hops >= HOPS_MAX {
                 break None;
             }
-            let vertex = self.start_of(best.1);
+            let vertex = best.1;
             (path[len], len) = ((vertex, hops), len + 1);
             if let Some((ahead, _)) = trails.find(vertex, direction)
-                && height(ahead.side) > best.0
+                && height(ahead.vertex) > best.0
             {
-                best = (height(ahead.side), ahead.side);
+                best = (height(ahead.vertex), ahead.vertex);
                 hops += ahead.hops;
                 continue;
             }
-            let mut next = (best.0 + SAME * self.radius, best.1);
-            let mut look = |side| next = higher(next, (height(side), side));
-            match self.rings.of(vertex) {
-                [] => {
-                    self.go_round(best.1, look);
-                }
-                ring => ring.iter().for_each(|side| look(*side)),
+            let mut next = (best.0 + SAME * self.radius, vertex);
+            let mut look = |other| next = higher(next, (height(other), other));
+            let ring = self.rings.of(vertex);
+            ring.iter().for_each(|other| look(*other));
+            if ring.is_empty()
+                && let Some(side) = self.rings.side_at(vertex)
+            {
+                self.go_round(side, |side| look(self.start_of(side)));
             }
-            if next.1 == best.1 {
+            if next.1 == vertex {
                 break Some(vertex);
             }
             best = next;
             hops += 1;
         };
-        for (vertex, before) in &path[..len] {
-            let (side, hops) = (best.1, (hops - before).max(1));
-            trails.note(*vertex, direction, Climb { side, hops });
+        for (passed, before) in &path[..len] {
+            let (vertex, hops) = (best.1, (hops - before).max(1));
+            trails.note(*passed, direction, Climb { vertex, hops });
         }
         top
     }
