@@ -10,9 +10,9 @@ daemon's reader), `outbound` from the tick's end to the callback (the daemon's w
 second rclpy process that sends the same bytes back, without decoding them. Nothing else should run: the figures are those
 of an idle machine.
 
-`lean` is the same way with the least that rclpy asks for: subscriptions that are taken from in a loop in place of an executor,
-and bytes in place of message objects, which rclpy publishes and hands over as they are; and so is its echo, `lean_echo`.
-What is left is DDS and the daemon.
+`lean` is the same way with the least that rclpy asks for: a wait set for each subscription in place of an executor, and bytes
+in place of message objects, which rclpy publishes and hands over as they are; and so is its echo, `lean_echo`. What is left is
+DDS and the daemon.
 
 `cyclone` is the same way with a peer that costs little: Cyclone DDS (a C library under a thin Python binding) publishes
 bytes that were encoded before, and takes the pairs without decoding them.

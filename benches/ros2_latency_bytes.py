@@ -1,4 +1,5 @@
-"""The lean rclpy peer of ros2_latency.py: subscriptions taken from without an executor, and bytes in place of messages.
+"""The lean rclpy peer of ros2_latency.py: a wait set for each subscription in place of an executor, and bytes in place of
+messages.
 
     ros2_latency_bytes.py BODIES SAMPLES    # the peer
     ros2_latency_bytes.py echo              # its echo: sends back what comes
@@ -13,13 +14,14 @@ import sys
 import time
 
 import rclpy
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.serialization import deserialize_message, serialize_message
 from ros2_frame import EncodedFrame, fill, stamp_of
 from sweepd_msgs.msg import BodyTransform, BodyTransforms, Pairs, Tick
 
 PAUSE_S = 0.005
-# Between two looks: a loop without it takes a core from DDS and the daemon.
-NAP_S = 2e-5
+# Longest sleep: how soon the end is seen.
+WAIT_NS = 50_000_000
 SEED = 31
 
 
@@ -30,9 +32,9 @@ class Peer:
         self.node = rclpy.create_node("latency_bytes")
         self.to_daemon = self.node.create_publisher(BodyTransforms, "/sweepd/transforms", 10)
         self.to_echo = self.node.create_publisher(BodyTransforms, "/echo/bytes/in", 10)
-        self.pairs = self.node.create_subscription(Pairs, "/sweepd/pairs", print, 10, raw=True)
-        self.ticks = self.node.create_subscription(Tick, "/sweepd/tick", print, 10, raw=True)
-        self.echoes = self.node.create_subscription(BodyTransforms, "/echo/bytes/out", print, 10, raw=True)
+        self.pairs = Inlet(self.node, Pairs, "/sweepd/pairs")
+        self.ticks = Inlet(self.node, Tick, "/sweepd/tick")
+        self.echoes = Inlet(self.node, BodyTransforms, "/echo/bytes/out")
         frame = BodyTransforms()
         fill(frame, BodyTransform, bodies, SEED, second=3)
         self.frame = EncodedFrame(frame, serialize_message(frame), SEED)
@@ -42,8 +44,8 @@ class Peer:
         encoded, stamp = self.frame.next(number)
         start = time.perf_counter_ns()
         self.to_daemon.publish(encoded)
-        arrived = wait(self.pairs, lambda raw: stamp_of(raw) == stamp)
-        tick = wait(self.ticks, lambda raw: stamp_of(raw) == stamp)
+        arrived = self.pairs.next(lambda raw: stamp_of(raw) == stamp)
+        tick = self.ticks.next(lambda raw: stamp_of(raw) == stamp)
         if not arrived or not tick:
             return None
         return (arrived[1] - start) / 1e3, deserialize_message(tick[0], Tick).elapsed_ns / 1e3
@@ -53,39 +55,47 @@ class Peer:
         encoded, _ = self.frame.next(1000000 + number)
         start = time.perf_counter_ns()
         self.to_echo.publish(encoded)
-        came = wait(self.echoes, lambda raw: raw == encoded)
+        came = self.echoes.next(lambda raw: raw == encoded)
         return (came[1] - start) / 1e3 if came else None
 
 
-def take(subscription):
-    """The next message's bytes; None: there is none."""
-    with subscription.handle:
-        taken = subscription.handle.take_message(subscription.msg_type, True)
-    return taken[0] if taken else None
+class Inlet:
+    """A subscription that is waited on and taken from directly."""
 
+    def __init__(self, node, kind, topic):
+        self.subscription = node.create_subscription(kind, topic, print, 10, raw=True)
+        self.context = node.context
+        with self.context.handle:
+            self.waiting = _rclpy.WaitSet(1, 0, 0, 0, 0, 0, self.context.handle)
 
-def wait(subscription, wanted, seconds=2.0):
-    """The first message that is wanted, and when it was taken, nanoseconds; None: none came."""
-    until = time.perf_counter_ns() + seconds * 1e9
-    while (now := time.perf_counter_ns()) < until:
-        raw = take(subscription)
-        if raw is not None and wanted(raw):
-            return raw, now
-        if raw is None:
-            time.sleep(NAP_S)
-    return None
+    def next(self, wanted, seconds=2.0):
+        """The first message that is wanted, as bytes, and when it was taken, nanoseconds; None: none came."""
+        until = time.perf_counter_ns() + seconds * 1e9
+        while time.perf_counter_ns() < until:
+            with self.subscription.handle:
+                taken = self.subscription.handle.take_message(self.subscription.msg_type, True)
+            now = time.perf_counter_ns()
+            if taken and wanted(taken[0]):
+                return taken[0], now
+            if not taken:
+                self.sleep()
+        return None
+
+    def sleep(self):
+        with self.context.handle, self.subscription.handle:
+            self.waiting.clear_entities()
+            self.waiting.add_subscription(self.subscription.handle)
+            self.waiting.wait(WAIT_NS)
 
 
 def send_back():
     rclpy.init()
     node = rclpy.create_node("echo_bytes")
     out = node.create_publisher(BodyTransforms, "/echo/bytes/out", 10)
-    come = node.create_subscription(BodyTransforms, "/echo/bytes/in", print, 10, raw=True)
+    come = Inlet(node, BodyTransforms, "/echo/bytes/in")
     while rclpy.ok():
-        if (raw := take(come)) is not None:
-            out.publish(raw)
-        else:
-            time.sleep(NAP_S)
+        if got := come.next(lambda _: True):
+            out.publish(got[0])
 
 
 def sample(way, samples):
