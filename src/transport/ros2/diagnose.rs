@@ -109,11 +109,19 @@ impl Diagnoser {
             .sends_dropped
             .saturating_sub(self.counts.sends_dropped);
         let undecodable = counts.undecodable.saturating_sub(self.counts.undecodable);
+        let dropped = counts
+            .datagrams_dropped
+            .saturating_sub(self.counts.datagrams_dropped);
         self.counts = counts;
         let mut said: Vec<String> = faults.to_vec();
         if undecodable > 0 {
             said.push(format!(
                 "{undecodable} samples could not be decoded: a wrong type on a topic?"
+            ));
+        }
+        if dropped > 0 {
+            said.push(format!(
+                "{dropped} datagrams were no RTPS, or did not fit into the receive buffers: who else sends to the ports of this domain? is net.core.rmem_max large enough?"
             ));
         }
         if unsent > 0 {
@@ -130,6 +138,7 @@ impl Diagnoser {
             value("sends_dropped", counts.sends_dropped),
             value("receipts_undecodable", counts.undecodable),
             value("receipts_refused", counts.refused),
+            value("datagrams_dropped", counts.datagrams_dropped),
         ];
         let skew = counts.skew_ns.map(super::poses::seconds);
         values.extend(skew.map(|skew_s| value("tf_skew_s", format_args!("{skew_s:.4}"))));

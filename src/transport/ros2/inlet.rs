@@ -2,6 +2,7 @@
 //!
 //! In: samples of anybody in the DDS domain. Out: frames for the tick thread, which is woken; faults in words.
 
+mod frames;
 mod roster;
 
 use std::sync::Arc;
@@ -16,13 +17,11 @@ use super::poses::{Receipt, Source};
 use super::services::Services;
 use super::shared::Shared;
 use super::shelf::{Shelf, Update};
-use super::speak::Book;
 use crate::error::{Error, Result};
-use crate::limits::FRAME_ROWS_MAX;
 use crate::time::{Clock as _, SystemClock};
 use crate::transport::Setting;
-use crate::wire::ros::{BodyTransforms, Twist};
-use crate::wire::{Frame, FrameHeader, RejectReason, TransformRow, WIRE_VERSION, name_bytes};
+use crate::wire::RejectReason;
+use frames::{fill, foreign, odd};
 
 /// Longest sleep: how soon the end, and chains that never change, are seen.
 const SLEEP: Duration = Duration::from_nanos(SLEEP_NS);
@@ -194,10 +193,14 @@ impl Inlet {
                 drain(from, shared, |message, _| {
                     let mut frame = shelf.spare();
                     fill(&mut frame, &message, &book, receipt);
-                    if let Some(fault) = foreign(&message, frame_id) {
+                    let foreign = foreign(&message, frame_id);
+                    if foreign.is_some() {
                         shared.note_refused(1);
-                        *frame_fault = Some((fault, receipt.now_ns));
                         frame.refused = Some(RejectReason::BadChain);
+                    }
+                    let fault = foreign.or_else(|| odd(&message, receipt));
+                    if let Some(fault) = fault {
+                        *frame_fault = Some((fault, receipt.now_ns));
                     }
                     shelf.put(frame);
                 })
@@ -270,17 +273,6 @@ impl Inlet {
     }
 }
 
-/// What is wrong with a frame that is not in the scene's frame.
-fn foreign(message: &BodyTransforms, frame_id: &str) -> Option<String> {
-    let given = message.header.frame_id.trim_start_matches('/');
-    (!given.is_empty() && given != frame_id).then(|| {
-        format!(
-            "frames of source {} are in \"{given}\", not in the scene's frame \"{frame_id}\": they are refused",
-            message.source
-        )
-    })
-}
-
 /// Takes a message of one body.
 fn take_one(
     sources: &mut [Source],
@@ -332,52 +324,4 @@ fn drain<M: DeserializeOwned + 'static>(
         }
     }
     (came, true)
-}
-
-/// A frame of the daemon from one of `~/transforms`.
-fn fill(frame: &mut Frame, message: &BodyTransforms, book: &Book, receipt: Receipt) {
-    frame.header = FrameHeader {
-        session: message.session,
-        epoch: message.epoch,
-        seq: message.seq,
-        sent_ns: message.sent_ns,
-        stamp_ns: message.header.stamp.to_ns(),
-        scene_rev: message.scene_rev,
-        deadline_ns: message.deadline_ns,
-        time_left_ns: message.time_left_ns,
-        source: name_bytes(&message.source),
-        flags: message.flags,
-        clock_id: message.clock_id,
-        schema: WIRE_VERSION,
-        reserved: 0,
-    };
-    frame.received_ns = receipt.now_ns;
-    frame.waited = receipt.waited;
-    frame.refused = None;
-    frame.transforms.clear();
-    frame.velocities.clear();
-    frame.stamps_ns.clear();
-    frame.refused_bodies.clear();
-    if message.transforms.len() > FRAME_ROWS_MAX {
-        frame.refused = Some(RejectReason::OverLimit);
-        return;
-    }
-    let rows = message.transforms.iter().map(|body| TransformRow {
-        // No body has id 0: a name that nobody has is counted where unknown ids are.
-        body: match body.name.as_str() {
-            "" => body.body,
-            name => book.id(name).unwrap_or(0),
-        },
-        position: body.pose.position.into(),
-        orientation: body.pose.orientation.into(),
-        ..TransformRow::default()
-    });
-    frame.transforms.extend(rows);
-    let velocity = |twist: &Twist| {
-        let (l, a) = (twist.linear, twist.angular);
-        [l.x, l.y, l.z, a.x, a.y, a.z]
-    };
-    frame
-        .velocities
-        .extend(message.velocities.iter().map(velocity));
 }

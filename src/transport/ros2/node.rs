@@ -104,7 +104,7 @@ impl RosNode {
         let timeouts_ns: Vec<u64> = scene.sources.iter().map(|s| s.timeout_ns).collect();
         let shared = Arc::new(Shared::new(names.node(), book.clone(), &timeouts_ns, least));
 
-        let context = join(options.network)?;
+        let (context, drops) = join(options.network)?;
         let mut node = make(options, &context, &names, &table, &shared)?;
         let sources = Source::of(scene);
         let shelf = Arc::new(Shelf::default());
@@ -151,6 +151,7 @@ impl RosNode {
             shown_ns: 0,
             boxes: boxes(scene),
             left_out: 0,
+            drops,
             strangers: Strangers::of(&context, &names, scene),
             read: Read::default(),
             namesakes,
@@ -306,7 +307,8 @@ impl Door for RosNode {
     }
 
     fn publish_tick(&mut self, tick: &TickRow) -> Result<()> {
-        self.parcels.put_tick(tick);
+        let gone = self.parcels.put_tick(tick);
+        self.shared.note_unsent(gone);
         Ok(())
     }
 

@@ -23,7 +23,8 @@ use super::params_file::Value;
 use super::parcel::{Next, Parcel, Parcels};
 use super::services::open;
 use super::shared::{Say, Shared};
-use super::speak::Speaker;
+use super::sockets::Drops;
+use super::speak::{Counts, Speaker};
 use super::strangers::Strangers;
 use super::wheel::{Sent, Wheel};
 use crate::config::RosKind;
@@ -55,6 +56,7 @@ pub(super) struct Outlet {
     pub(super) boxes: Boxes,
     /// Contacts that the newest `~/collisions` does not hold.
     pub(super) left_out: u64,
+    pub(super) drops: Drops,
     pub(super) strangers: Strangers,
     pub(super) read: Read,
     pub(super) namesakes: Namesakes,
@@ -201,7 +203,11 @@ impl Outlet {
         }
         *told_ns = now_ns;
         let now = self.shared.now();
-        let (counts, mut faults) = (self.shared.counts(), self.shared.faults());
+        let counts = Counts {
+            datagrams_dropped: self.drops.count(),
+            ..self.shared.counts()
+        };
+        let mut faults = self.shared.faults();
         faults.extend_from_slice(self.strangers.found());
         if self.left_out > 0 {
             let text = "contacts are left out of ~/collisions, which holds the deepest";
@@ -274,8 +280,9 @@ impl<'a> Pen<'a> {
     fn write<M: Serialize>(&mut self, to: &mut Wheel<M>, message: M) {
         match to.publish(self.node, self.context, message, self.now_ns) {
             Sent::Yes => {}
-            Sent::Turned => {
-                tracing::debug!("ROS 2: a reader does not acknowledge; a new writer goes on")
+            Sent::Turned(given_up) => {
+                tracing::debug!("ROS 2: a reader does not acknowledge; a new writer goes on");
+                self.shared.note_unsent(given_up);
             }
             Sent::No => self.shared.note_unsent(1),
         }

@@ -166,11 +166,13 @@ impl Parcels {
     }
 
     /// Puts a tick alone.
-    pub(super) fn put_tick(&self, tick: &TickRow) {
+    ///
+    /// * returns - ticks that gave way.
+    pub(super) fn put_tick(&self, tick: &TickRow) -> u64 {
         let mut parcel = self.take_spare();
         parcel.tick = *tick;
         parcel.holds = Demand::default();
-        self.push(parcel, None);
+        self.push(parcel, None)
     }
 
     fn take_spare(&self) -> Parcel {

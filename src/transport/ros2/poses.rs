@@ -7,14 +7,15 @@ mod roster;
 mod stamps;
 
 use judge::judge;
-use stamps::{off, older, rivalry};
+pub(super) use stamps::off;
+use stamps::{older, rivalry};
 
 use ros2_client::Gid;
 
 use super::RosScene;
 use super::lines::Heard;
 use super::shelf::Update;
-use super::tf::{Missing, Taken, Tree};
+use super::tf::{Missing, Taken, Tree, sound};
 use crate::config::RosKind;
 use crate::math::{Quat, Vec3, pose_from};
 use crate::wire::ros::{Odometry, PoseStamped, TfMessage};
@@ -325,8 +326,10 @@ impl Source {
         }
         let odd = off(("body", &member.name), stamp_ns, receipt, self.timeout_ns);
         let plain = frame.strip_prefix('/').unwrap_or(frame);
-        let mut result = Ok(row);
-        member.fault = None;
+        let mut result = sound(row.position, row.orientation).map(|_| row);
+        member.fault = result
+            .err()
+            .map(|reason| format!("its pose is no pose: {reason}"));
         if plain != self.root.0 {
             result = Err(RejectReason::BadChain);
             member.fault = Some(format!(

@@ -1,12 +1,15 @@
-//! Keeps the node on this host: every socket of DDS is bound to the loopback interface.
+//! The sockets of DDS: keeps them on this host, and keeps away from them what is no RTPS.
 //!
 //! DDS told to use 127.0.0.1 only still listens on the wildcard address and answers whoever asks: a forged datagram
 //! from another host was taken for data (measured). Bound to `lo`, nothing comes in from elsewhere and nothing leaves.
+//!
+//! A datagram that does not begin as RTPS does is dropped by the kernel, which counts it: DDS has one thread for all
+//! that comes, and tells nobody what it passes over.
 
 use std::os::fd::OwnedFd;
 
 use rustix::process::{PidfdFlags, PidfdGetfdFlags, pidfd_getfd, pidfd_open};
-use socket2::{Domain, SockRef, Type};
+use socket2::{Domain, SockFilter, SockRef, Type};
 
 const LOOPBACK: &[u8] = b"lo";
 /// Bit of an interface's flags in sysfs: it carries multicast.
@@ -28,6 +31,96 @@ pub(super) fn bind_to_loopback() -> Result<usize, String> {
         bound += 1;
     }
     Ok(bound)
+}
+
+/// A socket's program in the kernel: a datagram is a header of RTPS 2 and a first submessage that ends within it, or
+/// it is dropped, as one that is too short for a look is. Offsets count from the UDP header, of 8 bytes; jumps, if true
+/// and if not, from the next instruction.
+///
+/// Source: Linux, Documentation/networking/filter.rst; OMG, DDSI-RTPS 2.5, sections 9.4.4 and 9.4.5.
+const RTPS_ONLY: [SockFilter; 22] = [
+    SockFilter::new(LOAD_WORD, 0, 0, 8),
+    SockFilter::new(IF_EQUAL, 0, 19, u32::from_be_bytes(*b"RTPS")),
+    SockFilter::new(LOAD_BYTE, 0, 0, 12),
+    SockFilter::new(IF_EQUAL, 0, 17, 2),
+    // A header of 20 bytes; whether a submessage of at least 4 follows.
+    SockFilter::new(LOAD_LENGTH, 0, 0, 0),
+    SockFilter::new(IF_LEAST, 0, 15, 28),
+    SockFilter::new(IF_LEAST, 0, 13, 32),
+    // Its length, little-endian where the first of its flags is set.
+    SockFilter::new(LOAD_BYTE, 0, 0, 29),
+    SockFilter::new(IF_SET, 0, 6, 1),
+    SockFilter::new(LOAD_BYTE, 0, 0, 31),
+    SockFilter::new(SHIFT_LEFT, 0, 0, 8),
+    SockFilter::new(TO_OTHER, 0, 0, 0),
+    SockFilter::new(LOAD_BYTE, 0, 0, 30),
+    SockFilter::new(OR_OTHER, 0, 0, 0),
+    SockFilter::new(GO_ON_BEHIND, 0, 0, 1),
+    SockFilter::new(LOAD_HALF, 0, 0, 30),
+    SockFilter::new(ADD, 0, 0, 32),
+    SockFilter::new(TO_OTHER, 0, 0, 0),
+    SockFilter::new(LOAD_LENGTH, 0, 0, 0),
+    SockFilter::new(IF_LEAST_OTHER, 0, 1, 0),
+    SockFilter::new(RETURN, 0, 0, u32::MAX),
+    SockFilter::new(RETURN, 0, 0, 0),
+];
+
+// Instructions of such programs; there is one register for values, and another one.
+const LOAD_WORD: u16 = 0x20;
+const LOAD_HALF: u16 = 0x28;
+const LOAD_BYTE: u16 = 0x30;
+const LOAD_LENGTH: u16 = 0x80;
+const TO_OTHER: u16 = 0x07;
+const ADD: u16 = 0x04;
+const SHIFT_LEFT: u16 = 0x64;
+const OR_OTHER: u16 = 0x4c;
+const GO_ON_BEHIND: u16 = 0x05;
+const IF_EQUAL: u16 = 0x15;
+const IF_LEAST: u16 = 0x35;
+const IF_LEAST_OTHER: u16 = 0x3d;
+const IF_SET: u16 = 0x45;
+const RETURN: u16 = 0x06;
+
+/// What the kernel drops of datagrams to this process's sockets.
+#[derive(Debug, Default)]
+pub(super) struct Drops {
+    /// Inode numbers of the sockets.
+    sockets: Vec<u64>,
+}
+
+impl Drops {
+    /// Lets only RTPS through to every internet datagram socket of this process.
+    ///
+    /// # Errors
+    /// One text, when the kernel does not let it.
+    pub(super) fn of_rtps_only() -> Result<Self, String> {
+        let mut sockets = Vec::new();
+        for socket in datagram_sockets()? {
+            SockRef::from(&socket)
+                .attach_filter(&RTPS_ONLY)
+                .map_err(|e| format!("a socket takes no filter ({e})"))?;
+            let found = rustix::fs::fstat(&socket);
+            sockets.push(
+                found
+                    .map_err(|e| format!("a socket has no number ({e})"))?
+                    .st_ino,
+            );
+        }
+        Ok(Self { sockets })
+    }
+
+    /// Datagrams dropped since the start: what was no RTPS, and what did not fit into the receive buffers.
+    pub(super) fn count(&self) -> u64 {
+        let table = std::fs::read_to_string("/proc/self/net/udp").unwrap_or_default();
+        let counted = table.lines().skip(1).filter_map(|line| {
+            // .. uid, timeout, inode, references, pointer, drops
+            let mut fields = line.split_whitespace().skip(9);
+            let inode: u64 = fields.next()?.parse().ok()?;
+            let drops: u64 = fields.nth(2)?.parse().ok()?;
+            self.sockets.contains(&inode).then_some(drops)
+        });
+        counted.sum()
+    }
 }
 
 /// Duplicates of this process's internet datagram sockets.
@@ -90,5 +183,63 @@ mod tests {
             SockRef::from(&socket).device().unwrap().as_deref(),
             Some(LOOPBACK)
         );
+    }
+
+    #[test]
+    fn what_is_no_rtps_is_dropped_and_counted() {
+        let socket = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket
+            .set_read_timeout(Some(std::time::Duration::from_secs(5)))
+            .unwrap();
+        let drops = match Drops::of_rtps_only() {
+            Ok(drops) => drops,
+            Err(why) => {
+                eprintln!("SKIPPED: {why}");
+                return;
+            }
+        };
+        let own = rustix::fs::fstat(&socket).unwrap().st_ino;
+        assert!(drops.sockets.contains(&own));
+        let drops = Drops { sockets: vec![own] };
+        let (to, from) = (
+            socket.local_addr().unwrap(),
+            std::net::UdpSocket::bind("127.0.0.1:0").unwrap(),
+        );
+        let with = |version: u8, submessage: &[u8]| {
+            let mut bytes = b"RTPS".to_vec();
+            bytes.extend([version, 3, 1, 15]);
+            bytes.extend([7; 12]);
+            bytes.extend(submessage);
+            bytes
+        };
+        let noise = [
+            Vec::new(),
+            b"RTP".to_vec(),
+            b"SPTR and more that is long enough".to_vec(),
+            b"rtps of another kind, and long".to_vec(),
+            with(1, &[9, 1, 2, 0, 5, 5]),
+            with(2, &[])[..19].to_vec(),
+            // Longer than what is there, in both orders of bytes.
+            with(2, &[9, 1, 3, 0, 5, 5]),
+            with(2, &[9, 0, 0, 3, 5, 5]),
+            with(2, &[9, 1, 0, 1, 5, 5]),
+        ];
+        let sound = [
+            with(2, &[]),
+            with(2, &[9, 1, 2, 0, 5, 5]),
+            with(2, &[9, 0, 0, 2, 5, 5]),
+            // To the end, whatever follows.
+            with(2, &[21, 1, 0, 0, 5, 5, 5]),
+            with(2, &[&[6, 1, 0, 2][..], &[0; 512], &[9, 1, 0, 0]].concat()),
+        ];
+        for datagram in noise.iter().chain(&sound) {
+            from.send_to(datagram, to).unwrap();
+        }
+        let mut got = [0; 1024];
+        for datagram in &sound {
+            let length = socket.recv(&mut got).unwrap();
+            assert_eq!(&got[..length], datagram);
+        }
+        assert_eq!(drops.count(), noise.len() as u64);
     }
 }

@@ -91,6 +91,8 @@ pub(super) struct Counts {
     pub(super) sends_dropped: u64,
     /// Samples that could not be decoded.
     pub(super) undecodable: u64,
+    /// Datagrams that the kernel dropped before DDS.
+    pub(super) datagrams_dropped: u64,
     /// Samples that were refused.
     pub(super) refused: u64,
     /// Widest skew of a chain, nanoseconds; `None`: no chain.

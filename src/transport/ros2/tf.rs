@@ -208,7 +208,7 @@ impl Tree {
 }
 
 /// The pose of numbers as they come, or what is wrong with them.
-fn sound(position: [f64; 3], orientation: [f64; 4]) -> Result<Pose, RejectReason> {
+pub(super) fn sound(position: [f64; 3], orientation: [f64; 4]) -> Result<Pose, RejectReason> {
     if !position.iter().chain(&orientation).all(|v| v.is_finite()) {
         return Err(RejectReason::NotFinite);
     }

@@ -39,8 +39,9 @@ pub(super) struct Wheel<M: Serialize> {
 pub(super) enum Sent {
     /// It is on its way.
     Yes,
-    /// It is on its way by a new writer, because a reader does not acknowledge.
-    Turned,
+    /// It is on its way by a new writer, because a reader does not acknowledge. With the last writer but one that
+    /// reader has lost up to so many messages.
+    Turned(u64),
     /// It is lost.
     No,
 }
@@ -128,10 +129,11 @@ impl<M: Serialize> Wheel<M> {
         let Some(next) = next.or_else(|| self.make(node, context)) else {
             return Sent::No;
         };
-        self.before = Some(std::mem::replace(&mut self.current, next));
+        let full = std::mem::replace(&mut self.current, next);
+        let given_up = self.before.replace(full).map_or(0, |_| window as u64);
         self.sent = 1;
         match self.current.publish(message) {
-            Ok(()) => Sent::Turned,
+            Ok(()) => Sent::Turned(given_up),
             Err(_) => Sent::No,
         }
     }
@@ -173,7 +175,7 @@ mod tests {
             range: Range::Localhost,
             pinned: false,
         };
-        let context = join(network).unwrap();
+        let (context, _) = join(network).unwrap();
         let name = NodeName::new("/", name).unwrap();
         let mut node = context.new_node(name, NodeOptions::new()).unwrap();
         // Who listens is known to a node that is spun only.
@@ -265,16 +267,25 @@ mod tests {
             );
         }
         kill_process(Pid::from_child(&child.0), Signal::STOP).unwrap();
-        let (mut turned, mut lost) = (0, 0);
+        let (mut turned, mut lost, mut given_up) = (0, 0, 0);
         for _ in 0..150 {
             match step(&mut wheel, &mut node).1 {
                 Sent::Yes => {}
-                Sent::Turned => turned += 1,
+                Sent::Turned(count) => {
+                    turned += 1;
+                    given_up += count;
+                }
                 Sent::No => lost += 1,
             }
         }
         assert!(turned >= 3, "{turned} turns");
         assert_eq!(lost, 0, "a writer with room was there for every message");
+        let window = out.window() as u64;
+        assert_eq!(
+            given_up,
+            (turned - 1) * window,
+            "all that the stopped one lost"
+        );
         // The healthy one goes on, also by the writer that is new by now.
         let end = Instant::now() + Duration::from_secs(10);
         let (number, ..) = step(&mut wheel, &mut node);

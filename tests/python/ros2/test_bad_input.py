@@ -49,7 +49,7 @@ class Desk:
         return self.room.until(lambda: self.states[-1].word == word and self.states[-1], word, then=feed or self.feeder)
 
 
-@pytest.mark.parametrize(("who", "name"), [("person", "body person"), ("cart", "body cart"), ("elbow", "frame elbow")])
+@pytest.mark.parametrize(("who", "name"), [("person", "body person"), ("cart", "body cart"), ("elbow", "frame elbow"), ("box", "source sim")])
 @pytest.mark.parametrize(("shift_s", "side"), [(30, "in the future"), (-30, "in the past")])
 def test_stamps_far_from_the_nodes_clock_are_told_and_the_poses_are_used(room, who, name, shift_s, side):
     desk = Desk(room)
@@ -134,8 +134,8 @@ def test_a_quaternion_of_zeros_is_told_and_makes_that_body_unknown(room, who):
     room.until(lambda: desk.ticks[-1].rejects[Tick.REJECT_BAD_QUATERNION] > 0, "counted by its reason", then=bent)
     room.until(lambda: any("bad_quaternion" in status.message for message in desk.said[-2:] for status in message.status),
                "its reason in the diagnostics", then=bent)  # fmt: skip
-    if who == "elbow":
-        desk.told("body hand", 'frame "elbow" is no pose', feed=bent)
+    body, words = ("hand", 'frame "elbow" is no pose') if who == "elbow" else (who, "is no pose: bad_quaternion")
+    desk.told(f"body {body}", words, feed=bent)
     desk.feeder.skip = set()
     desk.word("clear")
 

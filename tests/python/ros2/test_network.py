@@ -109,8 +109,14 @@ class Packets:
 
 def udp_ports(pid):
     """The ports the process has bound."""
-    inodes = {os.readlink(f"/proc/{pid}/fd/{fd}")[8:-1] for fd in os.listdir(f"/proc/{pid}/fd")
-              if os.readlink(f"/proc/{pid}/fd/{fd}").startswith("socket:")}  # fmt: skip
+    inodes = set()
+    for fd in os.listdir(f"/proc/{pid}/fd"):
+        try:
+            link = os.readlink(f"/proc/{pid}/fd/{fd}")
+        except FileNotFoundError:  # closed meanwhile, as at the start
+            continue
+        if link.startswith("socket:"):
+            inodes.add(link[8:-1])
     rows = [line.split() for line in open(f"/proc/{pid}/net/udp").readlines()[1:]]
     return {int(row[1].split(":")[1], 16) for row in rows if row[9] in inodes}
 
@@ -123,9 +129,16 @@ def lan(room):
 
 
 def test_in_loopback_mode_nothing_leaves_the_host_while_ros_runs_on_another(room, lan):
-    daemon = room.daemon(HANDS)
-    node = room.node()
     packets = Packets("cable")
+    daemon = room.daemon(HANDS)
+    # nobody else of this host speaks yet: all that is heard now is the daemon's, whatever its port
+    ours, until = set(), time.monotonic() + 2
+    while time.monotonic() < until:
+        ours |= udp_ports(daemon.pid)
+        time.sleep(0.01)
+    assert "on this host only" in daemon.log and ours, daemon.log
+    assert packets.sent == [], "the start"
+    node = room.node()
     env = room.env | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", "ROS_STATIC_PEERS": "10.77.0.1"}
     beside = os.path.join(os.path.dirname(__file__), "peer_echo.py")
     other = lan.start([sys.executable, beside, "--seconds", "9"], env)
@@ -136,8 +149,11 @@ def test_in_loopback_mode_nothing_leaves_the_host_while_ros_runs_on_another(room
     while time.monotonic() < until:
         sender.send(FAR)
         room.spin(0.1)
+        ours |= udp_ports(daemon.pid)
     other.wait(timeout=15)
-    ours = udp_ports(daemon.pid)
+    # its farewell is in it, too
+    assert daemon.stop()[0] == 0
+    room.spin(0.5)
     sent = packets.stop()
     from_daemon = [ports for ports, _ in sent if ports[0] in ours]
     print(f"packets on the cable: {len(sent)} of this host, {len(from_daemon)} of the daemon's ports {sorted(ours)}")

@@ -1,5 +1,6 @@
 """The node as ROS 2 users know nodes: its name, its graph, its QoS, remaps, exit."""
 
+import contextlib
 import os
 import signal
 import threading
@@ -143,12 +144,35 @@ def test_the_log_level_holds_for_rosout_and_for_stderr(room, level, heard):
     assert {name for name in wanted if name in daemon.log} == heard, daemon.log
 
 
+def paths_below(*roots):
+    """What is in these folders at any depth; others may come and go meanwhile."""
+    return {Path(folder, name) for root in roots for folder, dirs, files in os.walk(root) for name in dirs + files}
+
+
+def iceoryx_paths(pid):
+    """The files in shared memory and in iceoryx2's folder that are the process's: mapped, open, or of its nodes."""
+    shared, nodes = Path("/dev/shm"), Path("/tmp/iceoryx2/nodes")
+    mapped = {Path(line.split(maxsplit=5)[5]) for line in Path(f"/proc/{pid}/maps").read_text().splitlines() if "/dev/shm/" in line}
+    opened = set()
+    for fd in os.listdir(f"/proc/{pid}/fd"):
+        with contextlib.suppress(FileNotFoundError):  # closed meanwhile
+            opened.add(Path(os.readlink(f"/proc/{pid}/fd/{fd}")))
+    # it may look into another's node, but it holds the lock of its own ones only
+    own = {path.stem.removeprefix("iox2_") for path in opened if path.suffix == ".node_monitor_owner_lock"}
+    of_nodes = {path for path in paths_below(nodes) if any(name in str(path) for name in own)}
+    return mapped | of_nodes | {path for path in opened if {shared, nodes.parent / "services"} & set(path.parents)}
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_at_exit_the_name_leaves_the_graph_at_once_and_nothing_is_left(room, number):
+    before = paths_below("/dev/shm", "/tmp/iceoryx2")
     daemon = room.daemon(HANDS)
     node = room.node()
     ticks = room.hear(Tick, "/sweepd/tick")
     room.until(lambda: ticks and "/sweepd" in node_names(node), "the node at work")
+    paths = iceoryx_paths(daemon.pid) - before
+    # iceoryx2 names its files itself, so those of this daemon are known by what it has mapped and opened
+    assert len([path for path in paths if path.name.startswith("iox2_")]) > 10 and any(path.is_dir() for path in paths), paths
     done = {}
     waiter = threading.Thread(target=lambda: done.update(zip(("code", "seconds"), daemon.stop(number))))
     start = time.monotonic()
@@ -159,6 +183,7 @@ def test_at_exit_the_name_leaves_the_graph_at_once_and_nothing_is_left(room, num
     print(f"exit: code {done['code']} after {done['seconds']:.2f} s, the name gone after {gone:.2f} s")
     assert done["code"] == 0 and done["seconds"] < 2 and gone < 3
     assert [path for path in Path("/dev/shm").glob(f"*{room.instance}*")] == []
+    assert [path for path in paths if path.exists()] == []
 
 
 def test_without_the_flag_there_is_no_socket_and_no_thread_of_dds(room):
@@ -177,7 +202,12 @@ def test_without_the_flag_there_is_no_socket_and_no_thread_of_dds(room):
     plain_threads, plain_sockets = counts(plain.pid)
     threads, sockets = counts(with_node.pid)
     assert sockets >= 5 and threads >= plain_threads + 3
+    threads_of = lambda pid: [comm.read_text().strip() for comm in Path(f"/proc/{pid}/task").glob("*/comm")]  # noqa: E731
+    of_dds = lambda pid: {name for name in threads_of(pid) if name.startswith(("ros-", "RustDDS"))}  # noqa: E731
+    assert {name.split("-")[0].split()[0] for name in of_dds(with_node.pid)} == {"ros", "RustDDS"}, threads_of(with_node.pid)
+    assert of_dds(plain.pid) == set()
     # iceoryx2's events are Unix sockets or files; none is of the internet
-    inet = {line.split()[9] for kind in ("udp", "tcp") for line in Path(f"/proc/{plain.pid}/net/{kind}").read_text().splitlines()[1:]}
+    tables = [Path(f"/proc/{plain.pid}/net/{kind}") for kind in ("udp", "tcp", "udp6", "tcp6")]
+    inet = {line.split()[9] for table in tables if table.exists() for line in table.read_text().splitlines()[1:]}
     links = [os.readlink(f"/proc/{plain.pid}/fd/{fd}") for fd in os.listdir(f"/proc/{plain.pid}/fd")]
     assert not [link for link in links if link.startswith("socket:") and link[8:-1] in inet]

@@ -1,5 +1,7 @@
 """Parameters: given at the start, read and set by others while the node runs, refused with a reason; simulated time."""
 
+import time
+
 import pytest
 from conftest import BEST_EFFORT, LATCHED, RELIABLE
 from frames import Sender
@@ -139,6 +141,48 @@ def test_limits_of_rows_are_parameters(room):
     put(room, ros_max_contacts=5)
     cut = room.until(lambda: not contacts[-1].complete and contacts[-1], "cut", then=lambda: sender.send(together))
     assert len(cut.contacts) == 5 and cut.tick_header.truncated == 30 * 29 // 2 - 5
+
+
+def test_a_sources_timeout_that_is_set_while_running_is_when_its_bodies_are_stale(room):
+    room.daemon(HANDS, ros_args=EDITS)
+    node = room.node()
+    ticks = room.hear(Tick, "/sweepd/tick")
+    sender = Sender(node)
+
+    def silence():
+        """How long after the last frame its bodies are stale, seconds."""
+        room.until(lambda: ticks and ticks[-1].reasons == 0, "known bodies", then=lambda: sender.send(FAR))
+        last, start = time.clock_gettime_ns(time.CLOCK_BOOTTIME), len(ticks)
+        seq = sender.send(FAR)
+        room.until(lambda: any(t.sources[0].seq == seq for t in ticks[start:]), "the last frame")
+        stale = room.until(lambda: [t for t in ticks[start:] if t.sources[0].seq == seq and t.reasons & State.STALE], "stale bodies")
+        return (stale[0].sent_ns - last) / 1e9
+
+    assert 0.5 <= silence() < 0.9, "as the scene says"
+    # shorter and longer than that; 0.4 s is for the way and for the machine
+    for timeout in (0.1, 1.5):
+        assert put(room, timeout_ms__sim=1e3 * timeout) == [(True, "")]
+        assert timeout <= silence() < timeout + 0.4, timeout
+
+
+def test_the_limit_of_pairs_that_is_set_while_running_bounds_the_rows_and_the_rest_is_told(room):
+    room.daemon(cloud(30))
+    node = room.node()
+    pairs = room.hear(Pairs, "/sweepd/pairs")
+    sender = Sender(node)
+    together = {f"b{n:04}": (0.001 * n, 0, 0) for n in range(30)}
+    whole = room.until(lambda: pairs and pairs[-1].complete and pairs[-1].pairs and pairs[-1], "all", then=lambda: sender.send(together))
+    assert len(whole.pairs) == 30 * 29 // 2 and whole.tick_header.truncated == 0
+    assert put(room, ros_max_pairs=7) == [(True, "")]
+    cut = room.until(lambda: not pairs[-1].complete and pairs[-1], "cut", then=lambda: sender.send(together))
+    assert len(cut.pairs) == 7 and cut.tick_header.truncated == 30 * 29 // 2 - 7
+
+
+def test_the_reason_of_a_refusal_has_the_range_in_words(room):
+    room.daemon(HANDS, ros_args=EDITS)
+    room.node()
+    ((done, reason),) = put(room, markers_rate_hz=1000.0)
+    assert not done and "markers_rate_hz is 1000: write a number from 0.1 to 100" in reason, reason
 
 
 def test_the_margin_of_near_pairs_is_a_parameter_given_at_the_start_and_set_while_running(room):

@@ -33,6 +33,7 @@ def bodies(room, reader, names):
 def test_all_kinds_of_topics_move_their_bodies_and_chains_are_composed(fed):
     room, feeder, states = fed
     reader = room.client(None, listen=("bodies",))
+    ticks = room.hear(Tick, "/sweepd/tick")
     # base at 0; mount 0.5 above; elbow 0.5 above that, turned a quarter about z; tip 0.5 along the turned x
     wanted = {"base": (0, 0, 0), "hand": (0, 0.5, 1.0), "person": (2, 0, 0), "cart": (3, 0, 0), "box": (4, 0, 0)}
 
@@ -47,6 +48,8 @@ def test_all_kinds_of_topics_move_their_bodies_and_chains_are_composed(fed):
     feeder.x |= {"base": 1.95}
     state = room.until(lambda: states[-1].word == "colliding" and states[-1], "base meets person", then=feeder)
     assert {state.worst_name_a, state.worst_name_b} == {"base", "person"}
+    room.until(lambda: ticks, "a tick", then=feeder)
+    assert ticks[-1].receipts_undecodable == 0
 
 
 @pytest.mark.parametrize("who", ["person", "cart", "box", "base", "elbow"])

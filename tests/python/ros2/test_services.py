@@ -9,8 +9,8 @@ from rcl_interfaces.msg import Log
 from scenes import HANDS
 from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
 from geometry_msgs.msg import Point
-from sweepd_msgs.msg import Names, Pairs, State
-from sweepd_msgs.srv import AttachBody, EnableBody, PutBody, RemoveBody, Reset, SetFilter, TickNow
+from sweepd_msgs.msg import Names, Pairs, State, Tick
+from sweepd_msgs.srv import AttachBody, EnableBody, Gap, PutBody, RemoveBody, Reset, SetFilter, TickNow
 
 CLOSE = {"left": (0, 0, 0), "right": (0.5, 0, 0)}
 FAR = {"left": (0, 0, 0), "right": (5, 0, 0)}
@@ -47,6 +47,7 @@ def test_edits_are_refused_unless_the_scene_allows_them(room):
 def test_bodies_are_put_disabled_attached_and_removed(scene):
     room, sender, states = scene
     names = room.hear(Names, "/sweepd/names", LATCHED)
+    ticks = room.hear(Tick, "/sweepd/tick")
     # 0.6 away from the left hand's surface
     answer = room.call(PutBody, "/sweepd/put_body", still(-1.3, name="crate", options_json=json.dumps({"report_within_m": 0.7})))
     assert answer.success, answer.message
@@ -64,6 +65,61 @@ def test_bodies_are_put_disabled_attached_and_removed(scene):
     room.until(lambda: "crate" not in {n.name for n in names[-1].names}, "the name gone", then=lambda: sender.send(FAR))
     answer = room.call(RemoveBody, "/sweepd/remove_body", RemoveBody.Request(name="crate"))
     assert not answer.success and "crate" in answer.message
+    room.until(lambda: ticks, "a tick")
+    assert ticks[-1].receipts_undecodable == 0
+
+
+def test_each_field_of_an_edit_does_what_it_says(scene):
+    room, sender, states = scene
+    ticks = room.hear(Tick, "/sweepd/tick")
+    place = {**FAR}
+    feed = lambda: sender.send(place)  # noqa: E731
+    room.until(lambda: states[-1].word == "clear" and ticks, "clear", then=feed)
+
+    def edit(kind, name, request, warned=()):
+        """Until a tick has it; the answer."""
+        answer = room.call(kind, f"/sweepd/{name}", request)
+        assert answer.success and answer.message == "", answer.message
+        assert len(answer.warnings) == len(warned) and all(word in text for word, text in zip(warned, answer.warnings)), answer.warnings
+        room.until(lambda: ticks[-1].tick_header.scene_rev >= answer.scene_rev, "its revision", then=feed)
+        return answer.scene_rev
+
+    def gap(a, b, wanted):
+        """Until the two are so far apart: the shape, and where it stands."""
+        ask = lambda: room.call(Gap, "/sweepd/gap", Gap.Request(name_a=a, name_b=b)).gap_best_m  # noqa: E731
+        room.until(lambda: abs(ask() - wanted) < 1e-9, f"{wanted} m between {a} and {b}", then=feed)
+
+    def primitive(name, kind, dimensions, at, warned=()):
+        shape = SolidPrimitive(type=kind, dimensions=dimensions)
+        request = PutBody.Request(name=name, moves=False, pose=pose(at), primitives=[shape], primitive_poses=[pose((0, 0, 0))])
+        return edit(PutBody, "put_body", request, warned)
+
+    # the hands are balls of 0.5 m; heights and radii are not mixed up, and the cone's tip is up
+    revisions = [primitive("ball", SolidPrimitive.SPHERE, [0.25], (0, 0, 3))]
+    gap("left", "ball", 2.25)
+    revisions.append(primitive("drum", SolidPrimitive.CYLINDER, [1.0, 0.3], (0, 3, 0)))
+    gap("left", "drum", 2.2)
+    revisions.append(primitive("hat", SolidPrimitive.CONE, [0.8, 0.4], (0, 0, -3)))
+    gap("left", "hat", 2.1)
+    assert revisions == sorted(set(revisions))
+    assert primitive("hat", SolidPrimitive.CONE, [0.8, 0.4], (0, 0, -3)) == revisions[-1], "the same content again changes nothing"
+    primitive("grain", SolidPrimitive.SPHERE, [2e-4], (0, 9, 0), warned=["grain"])
+    # hung where it is, it goes along; hung at a pose, it stands there; let go, it stays
+    edit(AttachBody, "attach_body", AttachBody.Request(name="drum", to="right", keep_pose=True, pose=pose((7, 7, 7))))
+    gap("left", "drum", 2.2)
+    place["right"] = (5, 1, 0)
+    gap("left", "drum", 3.2)
+    edit(AttachBody, "attach_body", AttachBody.Request(name="hat", to="right", pose=pose((0, 0, 2))))
+    gap("right", "hat", 1.1)
+    edit(AttachBody, "attach_body", AttachBody.Request(name="hat", to="", pose=pose((0, 0, -3))))
+    # a rule behind all others wins
+    place["right"] = (0.5, 0, 0)
+    room.until(lambda: states[-1].word == "colliding", "a collision", then=feed)
+    edit(SetFilter, "set_filter", SetFilter.Request(action=SetFilter.Request.IGNORE, a="left", b="r*", reason="test"))
+    room.until(lambda: states[-1].word == "clear", "ignored", then=feed)
+    edit(SetFilter, "set_filter", SetFilter.Request(action=SetFilter.Request.CHECK, a="left", b="right", reason="test"))
+    room.until(lambda: states[-1].word == "colliding", "checked again", then=feed)
+    assert ticks[-1].receipts_undecodable == 0
 
 
 def test_each_edit_is_logged_done_or_refused(scene):

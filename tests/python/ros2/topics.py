@@ -103,4 +103,4 @@ class Feeder:
             self.stamp(message.header, "cart")
             self.cart.publish(message)
         if "box" not in self.skip:
-            self.sim.send({"box": (self.x["box"], 0.0, 0.0)})
+            self.sim.send({"box": (self.x["box"], 0.0, 0.0)}, stamp_ns=time.time_ns() + self.shift_ns.get("box", 0))

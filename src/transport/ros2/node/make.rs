@@ -12,7 +12,7 @@ use super::super::names::Names;
 use super::super::params::{self, Table};
 use super::super::params_file::{self, Setting};
 use super::super::shared::{Say, Shared};
-use super::super::sockets;
+use super::super::sockets::{self, Drops};
 use super::RosOptions;
 use crate::error::{Error, Result};
 
@@ -67,7 +67,9 @@ pub(super) fn make(
 }
 
 /// Joins the DDS domain, on this host or on all its networks.
-pub(in super::super) fn join(network: Network) -> Result<Context> {
+///
+/// * returns - beside the context, what the kernel drops of what is sent to it.
+pub(in super::super) fn join(network: Network) -> Result<(Context, Drops)> {
     let failed = |e: &dyn std::fmt::Display| {
         Error::Refused(format!(
             "ROS 2: domain {} cannot be joined: {e}",
@@ -87,5 +89,11 @@ pub(in super::super) fn join(network: Network) -> Result<Context> {
             ))
         })?;
     }
-    Context::from_domain_participant(participant).map_err(|e| failed(&e))
+    // Without it DDS passes over what it cannot read, as it always did, and nobody counts it.
+    let drops = Drops::of_rtps_only().unwrap_or_else(|why| {
+        tracing::warn!("ROS 2: datagrams that are no RTPS are not counted: {why}");
+        Drops::default()
+    });
+    let context = Context::from_domain_participant(participant).map_err(|e| failed(&e))?;
+    Ok((context, drops))
 }

@@ -54,7 +54,7 @@ pub(super) fn older((kind, name): (&str, &str), by_ns: u64) -> String {
 }
 
 /// What is wrong with a stamp that is not near the node's time; a stamp of 0 says nothing.
-pub(super) fn off(
+pub(in super::super) fn off(
     (kind, name): (&str, &str),
     stamp_ns: u64,
     receipt: Receipt,
