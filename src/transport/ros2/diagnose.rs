@@ -112,6 +112,9 @@ impl Diagnoser {
         let dropped = counts
             .datagrams_dropped
             .saturating_sub(self.counts.datagrams_dropped);
+        let unread = counts
+            .datagrams_unread
+            .saturating_sub(self.counts.datagrams_unread);
         self.counts = counts;
         let mut said: Vec<String> = faults.to_vec();
         if undecodable > 0 {
@@ -122,6 +125,11 @@ impl Diagnoser {
         if dropped > 0 {
             said.push(format!(
                 "{dropped} datagrams were no RTPS, or did not fit into the receive buffers: who else sends to the ports of this domain? is net.core.rmem_max large enough?"
+            ));
+        }
+        if unread > 0 {
+            said.push(format!(
+                "{unread} datagrams began as RTPS and could not be read: who else sends to the ports of this domain?"
             ));
         }
         if unsent > 0 {
@@ -139,6 +147,7 @@ impl Diagnoser {
             value("receipts_undecodable", counts.undecodable),
             value("receipts_refused", counts.refused),
             value("datagrams_dropped", counts.datagrams_dropped),
+            value("datagrams_unread", counts.datagrams_unread),
         ];
         let skew = counts.skew_ns.map(super::poses::seconds);
         values.extend(skew.map(|skew_s| value("tf_skew_s", format_args!("{skew_s:.4}"))));

@@ -19,6 +19,7 @@ mod mend;
 pub mod names;
 mod namesakes;
 mod node;
+mod noise;
 mod outlet;
 mod params;
 pub mod params_file;

@@ -104,7 +104,7 @@ impl RosNode {
         let timeouts_ns: Vec<u64> = scene.sources.iter().map(|s| s.timeout_ns).collect();
         let shared = Arc::new(Shared::new(names.node(), book.clone(), &timeouts_ns, least));
 
-        let (context, drops) = join(options.network)?;
+        let (context, noise) = join(options.network)?;
         let mut node = make(options, &context, &names, &table, &shared)?;
         let sources = Source::of(scene);
         let shelf = Arc::new(Shelf::default());
@@ -151,7 +151,7 @@ impl RosNode {
             shown_ns: 0,
             boxes: boxes(scene),
             left_out: 0,
-            drops,
+            noise,
             strangers: Strangers::of(&context, &names, scene),
             read: Read::default(),
             namesakes,

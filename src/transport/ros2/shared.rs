@@ -250,6 +250,7 @@ impl Shared {
             sends_dropped: self.unsent.load(Ordering::Relaxed),
             undecodable: self.undecodable.load(Ordering::Relaxed),
             datagrams_dropped: 0,
+            datagrams_unread: 0,
             refused: self.refused.load(Ordering::Relaxed),
             skew_ns: (skew_ns != NONE).then_some(skew_ns),
         }

@@ -93,6 +93,8 @@ pub(super) struct Counts {
     pub(super) undecodable: u64,
     /// Datagrams that the kernel dropped before DDS.
     pub(super) datagrams_dropped: u64,
+    /// Datagrams that DDS could not read.
+    pub(super) datagrams_unread: u64,
     /// Samples that were refused.
     pub(super) refused: u64,
     /// Widest skew of a chain, nanoseconds; `None`: no chain.

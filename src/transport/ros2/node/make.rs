@@ -9,10 +9,11 @@ use rustdds::DomainParticipantBuilder;
 use super::super::args::{Params, RosArgs};
 use super::super::env::{Network, Range};
 use super::super::names::Names;
+use super::super::noise::Noise;
 use super::super::params::{self, Table};
 use super::super::params_file::{self, Setting};
 use super::super::shared::{Say, Shared};
-use super::super::sockets::{self, Drops};
+use super::super::sockets;
 use super::RosOptions;
 use crate::error::{Error, Result};
 
@@ -68,8 +69,8 @@ pub(super) fn make(
 
 /// Joins the DDS domain, on this host or on all its networks.
 ///
-/// * returns - beside the context, what the kernel drops of what is sent to it.
-pub(in super::super) fn join(network: Network) -> Result<(Context, Drops)> {
+/// * returns - beside the context, what comes to its ports and is no message.
+pub(in super::super) fn join(network: Network) -> Result<(Context, Noise)> {
     let failed = |e: &dyn std::fmt::Display| {
         Error::Refused(format!(
             "ROS 2: domain {} cannot be joined: {e}",
@@ -89,11 +90,7 @@ pub(in super::super) fn join(network: Network) -> Result<(Context, Drops)> {
             ))
         })?;
     }
-    // Without it DDS passes over what it cannot read, as it always did, and nobody counts it.
-    let drops = Drops::of_rtps_only().unwrap_or_else(|why| {
-        tracing::warn!("ROS 2: datagrams that are no RTPS are not counted: {why}");
-        Drops::default()
-    });
+    let noise = Noise::listen();
     let context = Context::from_domain_participant(participant).map_err(|e| failed(&e))?;
-    Ok((context, drops))
+    Ok((context, noise))
 }
