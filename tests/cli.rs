@@ -167,6 +167,18 @@ fn a_scene_that_is_missing_or_wrong_is_code_2_with_its_place() {
     let ended = output(&["run", scene.to_str().unwrap(), "--mode", "on_frame=ghost"]);
     assert_eq!(code(&ended), Some(2));
     assert!(err(&ended).contains("ghost"), "{}", err(&ended));
+    // No message of such a source is a whole frame.
+    let of_topics = TWO_SPHERES
+        .replace("on_frame = \"sim\"", "rate = 100")
+        .replace("timeout_ms = 3000", "ros2 = { type = \"tf\" }");
+    let topics = desk.write("topics.toml", &of_topics);
+    let ended = output(&["run", topics.to_str().unwrap(), "--mode", "on_frame=sim"]);
+    assert_eq!(code(&ended), Some(2));
+    let text = err(&ended);
+    assert!(
+        text.contains("--mode on_frame=sim: ") && text.contains("body by body"),
+        "{text}"
+    );
     let ended = output(&["feed", scene.to_str().unwrap(), "--source", "ghost"]);
     assert_eq!(code(&ended), Some(2));
     assert!(err(&ended).contains("it has: sim"), "{}", err(&ended));

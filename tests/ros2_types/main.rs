@@ -1,7 +1,7 @@
 //! Goal: the Rust structs and codes are those of the ROS 2 interfaces: field names, types, order, constants.
 //! Method: `data/ros2_types.txt` has every type as rosidl's JSON type descriptions say (a ROS 2 test holds it against
 //! the generator); each struct is traced through serde, as CDR reads it, and compared with it. Constants are read from
-//! the `.msg` files and compared with the codes of the wire.
+//! the interface files and compared with the codes of the wire.
 #![cfg(feature = "ros2")]
 #![allow(
     clippy::unwrap_used,
@@ -13,7 +13,7 @@
 mod trace;
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use sweepd::wire::ros;
 use sweepd::wire::{
@@ -22,10 +22,14 @@ use sweepd::wire::{
 };
 use trace::{Kind, trace};
 
-/// The constants of a `.msg` file, by name.
-fn constants(message: &str) -> BTreeMap<String, u64> {
-    let path = format!("msgs/sweepd_msgs/msg/{message}.msg");
-    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap();
+/// Where the interfaces are.
+fn package() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("msgs/sweepd_msgs")
+}
+
+/// The constants of an interface file, by name.
+fn constants(file: &str) -> BTreeMap<String, u64> {
+    let text = std::fs::read_to_string(package().join(file)).unwrap();
     let mut all = BTreeMap::new();
     for line in text.lines() {
         let code = line.split('#').next().unwrap();
@@ -71,9 +75,9 @@ fn flags_of_pairs() -> [(&'static str, u64); 8] {
 fn the_constants_of_the_messages_are_the_codes_of_the_wire() {
     let bits = |words: &'static [(&'static str, u64)]| words.iter().copied();
     let wanted: Vec<(&str, BTreeMap<String, u64>)> = vec![
-        ("TickHeader", named("", codes!(State)).collect()),
+        ("msg/TickHeader.msg", named("", codes!(State)).collect()),
         (
-            "State",
+            "msg/State.msg",
             named(
                 "",
                 Reason::ALL.iter().map(|r| (r.word(), u64::from(r.bit()))),
@@ -81,7 +85,7 @@ fn the_constants_of_the_messages_are_the_codes_of_the_wire() {
             .collect(),
         ),
         (
-            "Pair",
+            "msg/Pair.msg",
             named("", codes!(Verdict))
                 .chain(named(
                     "",
@@ -93,7 +97,7 @@ fn the_constants_of_the_messages_are_the_codes_of_the_wire() {
                 .collect(),
         ),
         (
-            "Contact",
+            "msg/Contact.msg",
             named("", codes!(ContactKind))
                 .chain(named(
                     "",
@@ -105,7 +109,7 @@ fn the_constants_of_the_messages_are_the_codes_of_the_wire() {
                 .collect(),
         ),
         (
-            "Tick",
+            "msg/Tick.msg",
             named("", codes!(TickCause))
                 .chain(named("BROAD_MODE_", codes!(BroadMode)))
                 .chain(named("BROAD_CAUSE_", codes!(BroadCause)))
@@ -118,7 +122,7 @@ fn the_constants_of_the_messages_are_the_codes_of_the_wire() {
                 .collect(),
         ),
         (
-            "BodyTransforms",
+            "msg/BodyTransforms.msg",
             named(
                 "",
                 [
@@ -131,13 +135,41 @@ fn the_constants_of_the_messages_are_the_codes_of_the_wire() {
             .collect(),
         ),
         (
-            "Name",
+            "msg/Name.msg",
             named("", bits(&[("no_source", u32::MAX as u64)])).collect(),
         ),
-        ("Source", named("", bits(&[("never", u64::MAX)])).collect()),
+        (
+            "msg/Source.msg",
+            named("", bits(&[("never", u64::MAX)])).collect(),
+        ),
+        ("srv/Gap.srv", named("", codes!(Verdict)).collect()),
+        (
+            "srv/SetFilter.srv",
+            named(
+                "",
+                bits(&[
+                    ("masks", ros::SetFilter::MASKS as u64),
+                    ("ignore", ros::SetFilter::IGNORE as u64),
+                    ("check", ros::SetFilter::CHECK as u64),
+                    ("drop", ros::SetFilter::DROP as u64),
+                ]),
+            )
+            .collect(),
+        ),
     ];
-    for (message, wanted) in wanted {
-        assert_eq!(constants(message), wanted, "{message}.msg");
+    let compared: Vec<&str> = wanted.iter().map(|(file, _)| *file).collect();
+    for (file, wanted) in &wanted {
+        assert_eq!(constants(file), *wanted, "{file}");
+    }
+    for folder in ["msg", "srv"] {
+        for entry in std::fs::read_dir(package().join(folder)).unwrap() {
+            let name = entry.unwrap().file_name().into_string().unwrap();
+            let file = format!("{folder}/{name}");
+            assert!(
+                compared.contains(&file.as_str()) || constants(&file).is_empty(),
+                "{file} has constants that are compared with nothing"
+            );
+        }
     }
 }
 

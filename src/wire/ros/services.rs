@@ -113,6 +113,17 @@ pub struct SetFilter {
     pub mask: u32,
 }
 
+impl SetFilter {
+    /// Sets the group and mask of body `a`.
+    pub const MASKS: u8 = 0;
+    /// Adds a rule that ignores pairs.
+    pub const IGNORE: u8 = 1;
+    /// Adds a rule that checks pairs.
+    pub const CHECK: u8 = 2;
+    /// Takes out the rules of a pair.
+    pub const DROP: u8 = 3;
+}
+
 /// `sweepd_msgs/srv/Reset`, request.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Reset {

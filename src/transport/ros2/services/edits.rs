@@ -114,10 +114,12 @@ pub(super) fn filter(request: &SetFilter) -> Result<Value, String> {
     let (a, b) = (&request.a, &request.b);
     let rule = |action: &str| json!({ "rule": { "action": action, "a": a, "b": b, "reason": request.reason } });
     match request.action {
-        0 => Ok(json!({ "filter": { "body": a, "group": request.group, "mask": request.mask } })),
-        1 => Ok(rule("ignore")),
-        2 => Ok(rule("check")),
-        3 => Ok(json!({ "drop_rules": { "a": a, "b": b } })),
+        SetFilter::MASKS => {
+            Ok(json!({ "filter": { "body": a, "group": request.group, "mask": request.mask } }))
+        }
+        SetFilter::IGNORE => Ok(rule("ignore")),
+        SetFilter::CHECK => Ok(rule("check")),
+        SetFilter::DROP => Ok(json!({ "drop_rules": { "a": a, "b": b } })),
         other => Err(format!(
             "action {other} is none: write MASKS, IGNORE, CHECK or DROP"
         )),
