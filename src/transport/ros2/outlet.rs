@@ -18,12 +18,12 @@ use super::lines::{Arrival, Line, of_body};
 use super::markers::{Boxes, CONTACTS_MAX, collisions, markers};
 use super::names::Names;
 use super::namesakes::Namesakes;
+use super::noise::Noise;
 use super::params::Kept;
 use super::params_file::Value;
 use super::parcel::{Next, Parcel, Parcels};
 use super::services::open;
 use super::shared::{Say, Shared};
-use super::sockets::Drops;
 use super::speak::{Counts, Speaker};
 use super::strangers::Strangers;
 use super::wheel::{Sent, Wheel};
@@ -56,7 +56,7 @@ pub(super) struct Outlet {
     pub(super) boxes: Boxes,
     /// Contacts that the newest `~/collisions` does not hold.
     pub(super) left_out: u64,
-    pub(super) drops: Drops,
+    pub(super) noise: Noise,
     pub(super) strangers: Strangers,
     pub(super) read: Read,
     pub(super) namesakes: Namesakes,
@@ -77,6 +77,9 @@ pub(super) struct Read {
     collisions: bool,
     pairs: bool,
     contacts: bool,
+    /// Any topic that a tick has a message on: `~/state` and `~/tick` go out with each of them, so that whoever has
+    /// rows has the tick that they are of.
+    ticks: bool,
 }
 
 impl Outlet {
@@ -156,11 +159,14 @@ impl Outlet {
         let (out, node) = (&self.publishers, &self.node);
         let markers = self.shared.markers_period_ns().is_some() && out.markers.is_read(node);
         let collisions = self.shared.collisions() && out.collisions.is_read(node);
+        let (pairs, contacts) = (out.pairs.is_read(node), out.contacts.is_read(node));
+        let rows = markers || collisions || pairs || contacts;
         self.read = Read {
             markers,
             collisions,
-            pairs: out.pairs.is_read(node),
-            contacts: out.contacts.is_read(node),
+            pairs,
+            contacts,
+            ticks: rows || out.state.is_read(node) || out.tick.is_read(node),
         };
         self.shared.set_demand(Demand {
             pairs: markers || self.read.pairs,
@@ -204,7 +210,8 @@ impl Outlet {
         *told_ns = now_ns;
         let now = self.shared.now();
         let counts = Counts {
-            datagrams_dropped: self.drops.count(),
+            datagrams_dropped: self.noise.dropped(),
+            datagrams_unread: self.noise.unread(),
             ..self.shared.counts()
         };
         let mut faults = self.shared.faults();
@@ -246,6 +253,9 @@ impl Outlet {
             for message in self.speaker.pairs(parcel) {
                 pen.write(&mut out.pairs, message);
             }
+        }
+        if !self.read.ticks {
+            return;
         }
         pen.write(&mut out.state, self.speaker.state(&parcel.tick));
         let tick = self.speaker.tick(&parcel.tick, self.shared.counts());
