@@ -10,7 +10,7 @@ use crate::shape::Core;
 pub(super) const CORNERS_MAX: usize = 8;
 
 /// See [`Feature::spread`].
-const RIM: f64 = 1e-9;
+pub(super) const RIM: f64 = 1e-9;
 
 /// A polygon (three corners and more), a segment or a point.
 pub(super) struct Feature {
@@ -47,12 +47,6 @@ impl Feature {
         }
         feature.normal = pair.rotation * feature.normal;
         feature
-    }
-
-    /// A triangle as it is; `None` for one without an area.
-    pub(super) fn of_triangle(corners: &[Vec3; 3]) -> Option<Self> {
-        let mut feature = Self::empty();
-        feature.fill_triangle(corners).then_some(feature)
     }
 
     pub(super) fn used(&self) -> &[Vec3] {

@@ -7,8 +7,10 @@
 //! gaps are measured along the normal. The deepest point is always among those that come out.
 
 mod shared;
+mod triangles;
 
-pub(in crate::narrow) use shared::{shared_by_triangles, shared_points};
+pub(in crate::narrow) use shared::shared_points;
+pub(in crate::narrow) use triangles::shared_by_triangles;
 
 use super::feature::{CORNERS_MAX, Feature};
 use super::pair::Pair;
@@ -19,6 +21,8 @@ use crate::shape::Core;
 
 /// Faces that lean further from the normal than this (cosine) share no patch worth clipping.
 const FACING: f64 = 0.7;
+/// Points nearer than this share of the pair's scale are one.
+const SAME: f64 = 1e-6;
 /// Id of the closest points themselves, where no clipped point stands for them.
 const WITNESS: u32 = 0x7fff_ffff;
 
@@ -166,17 +170,7 @@ struct Found {
 
 impl Found {
     fn new(pair: &Pair<'_>, closest: &Closest, prediction_m: f64) -> Self {
-        let margins = [pair.a.margin(), pair.b.margin()];
-        Self::with(margins, pair.scale, closest, prediction_m)
-    }
-
-    /// * `scale` - spread of both and their distance, metres.
-    fn with(
-        [margin_a, margin_b]: [f64; 2],
-        scale: f64,
-        closest: &Closest,
-        prediction_m: f64,
-    ) -> Self {
+        let (margin_a, margin_b) = (pair.a.margin(), pair.b.margin());
         let witness = ManifoldPoint {
             point_a: closest.point_a,
             point_b: closest.point_b,
@@ -191,7 +185,7 @@ impl Found {
             margin_b,
             prediction_m,
             witness,
-            same: 1e-6 * (scale + margin_a + margin_b),
+            same: SAME * (pair.scale + margin_a + margin_b),
         }
     }
 
