@@ -1,5 +1,6 @@
 """What leaves the host and what comes in from outside: nothing, in loopback mode. Needs root (name spaces)."""
 
+import json
 import os
 import socket
 import struct
@@ -7,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import conftest
 import pytest
@@ -276,3 +278,18 @@ def test_twenty_participants_all_match_and_all_hear(room, lan):
             executor.shutdown()
             node.destroy_node()
             rclpy.shutdown(context=context)
+
+
+def test_the_profile_for_fast_dds_gives_a_subscribers_sockets_room(room):
+    most = int(Path("/proc/sys/net/core/rmem_max").read_text()) if Path("/proc/sys/net/core/rmem_max").exists() else 0
+    if most < 4 << 20:
+        pytest.skip(f"net.core.rmem_max is {most}, or not shown in this name space: the profile asks for 4 MB")
+    room.daemon(HANDS)
+    profile = Path(__file__).resolve().parents[3] / "launch-free-scripts/ros2/fastdds_profile.xml"
+    largest = {}
+    for name, env in (("without", {}), ("with", {"FASTDDS_DEFAULT_PROFILES_FILE": str(profile)})):
+        said = json.loads(room.python("peer_sockets.py", 15, env=env).communicate(timeout=60)[0])
+        assert said["heard"], name
+        largest[name] = max(said["buffers"].values())
+    # Linux doubles what is asked for
+    assert largest["with"] == 8 << 20 > largest["without"], largest
