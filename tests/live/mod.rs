@@ -59,9 +59,13 @@ impl Desk {
         Self { instance, dir }
     }
 
+    /// Writes a file, whole at any moment: a daemon that was just started may be reading the one before.
     pub fn write(&self, name: &str, text: &str) -> PathBuf {
         let path = self.dir.join(name);
-        std::fs::write(&path, text).unwrap();
+        let number = NUMBERS.fetch_add(1, Ordering::Relaxed);
+        let part = self.dir.join(format!("{name}.{number}.part"));
+        std::fs::write(&part, text).unwrap();
+        std::fs::rename(&part, &path).unwrap();
         path
     }
 
