@@ -19,6 +19,16 @@ pub(super) struct Diagnoser {
 }
 
 impl Diagnoser {
+    /// Tells what is new from now on.
+    pub(super) fn since(row: &TickRow, counts: Counts) -> Self {
+        Self {
+            missed: row.missed,
+            overrun_s: 0,
+            rejects: row.rejects.to_vec(),
+            counts,
+        }
+    }
+
     /// The statuses of the last second.
     pub(super) fn diagnose(
         &mut self,
@@ -222,6 +232,29 @@ mod tests {
             all.iter().map(|(level, _)| *level).collect::<Vec<_>>(),
             [OK; 4]
         );
+    }
+
+    #[test]
+    fn bug_a_reader_that_comes_late_is_not_told_of_hours_ago_as_of_the_last_second() {
+        let mut row = TickRow {
+            missed: 7,
+            ..TickRow::default()
+        };
+        row.rejects[0] = 9;
+        let counts = Counts {
+            sends_dropped: 3,
+            undecodable: 2,
+            ..Counts::default()
+        };
+        let levels = |diagnoser: &mut Diagnoser, row: &TickRow| -> Vec<u8> {
+            let all = diagnoser.diagnose(Time::default(), "sweepd", row, counts, &[]);
+            all.status.iter().map(|status| status.level).collect()
+        };
+        let mut diagnoser = Diagnoser::since(&row, counts);
+        assert_eq!(levels(&mut diagnoser, &row), [OK; 4]);
+        row.missed += 1;
+        row.rejects[0] += 1;
+        assert_eq!(levels(&mut diagnoser, &row), [OK, WARN, WARN, OK]);
     }
 
     #[test]

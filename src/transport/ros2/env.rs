@@ -44,7 +44,7 @@ impl Network {
         };
         if domain > DOMAIN_MAX {
             return Err(format!(
-                "ROS domain {domain}: DDS has ports for 0 to {DOMAIN_MAX}, of which 0 to 101 are safe on Linux"
+                "ROS_DOMAIN_ID={domain}: DDS has ports for 0 to {DOMAIN_MAX}, of which 0 to 101 are safe on Linux"
             ));
         }
         rmw(given("RMW_IMPLEMENTATION").as_deref())?;
@@ -166,7 +166,10 @@ mod tests {
             ("RMW_IMPLEMENTATION", "rmw_email_cpp"),
         ] {
             let error = read(None, &[(name, text)]).unwrap_err();
-            assert!(error.contains(text), "{name}={text}: {error}");
+            assert!(
+                error.contains(text) && error.contains(name),
+                "{name}={text}: {error}"
+            );
         }
     }
 }

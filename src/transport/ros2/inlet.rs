@@ -13,6 +13,7 @@ use rustdds::mio1::{Events, Poll, Token, Waker};
 use serde::de::DeserializeOwned;
 
 use super::lines::{Feeder, Line};
+use super::params::Answers;
 use super::poses::{Receipt, Source};
 use super::services::Services;
 use super::shared::Shared;
@@ -21,7 +22,8 @@ use crate::error::{Error, Result};
 use crate::time::{Clock as _, SystemClock};
 use crate::transport::Setting;
 use crate::wire::RejectReason;
-use frames::{fill, foreign, odd};
+pub(super) use frames::Local;
+use frames::{fill, foreign};
 
 /// Longest sleep: how soon the end, and chains that never change, are seen.
 const SLEEP: Duration = Duration::from_nanos(SLEEP_NS);
@@ -44,13 +46,13 @@ const WAKE: Token = Token(usize::MAX);
 pub(super) struct Inlet {
     lines: Vec<Line>,
     services: Services,
+    answers: Answers,
     sources: Vec<Source>,
     shelf: Arc<Shelf>,
     shared: Arc<Shared>,
     /// Wakes the tick thread.
     wake: Box<dyn Fn() + Send>,
-    /// The scene's frame.
-    frame_id: String,
+    local: Local,
     /// The daemon's heartbeat: a longer silence of this loop means that the process stood still, nanoseconds.
     heartbeat_ns: u64,
     poll: Poll,
@@ -67,12 +69,12 @@ impl Inlet {
     /// # Errors
     /// `Error::Io` when there is no descriptor left.
     pub(super) fn new(
-        (mut lines, mut services): (Vec<Line>, Services),
+        (mut lines, mut services, mut answers): (Vec<Line>, Services, Answers),
         sources: Vec<Source>,
         shelf: Arc<Shelf>,
         shared: Arc<Shared>,
         wake: Box<dyn Fn() + Send>,
-        (frame_id, heartbeat_ns): (String, u64),
+        (local, heartbeat_ns): (Local, u64),
     ) -> Result<(Self, Waker)> {
         let failed = |e| Error::io("ROS 2: cannot wait on subscriptions", e);
         let poll = Poll::new().map_err(failed)?;
@@ -80,17 +82,18 @@ impl Inlet {
         for (at, line) in lines.iter_mut().enumerate() {
             line.register(poll.registry(), Token(at)).map_err(failed)?;
         }
-        services
-            .register(poll.registry(), Token(lines.len()))
-            .map_err(failed)?;
+        let behind = Token(lines.len());
+        services.register(poll.registry(), behind).map_err(failed)?;
+        answers.register(poll.registry(), behind).map_err(failed)?;
         let inlet = Self {
             lines,
             services,
+            answers,
             sources,
             shelf,
             shared,
             wake,
-            frame_id,
+            local,
             heartbeat_ns,
             poll,
             updates: Vec::new(),
@@ -149,7 +152,8 @@ impl Inlet {
         if came {
             (self.wake)();
         }
-        if self.services.round(&self.shared.desk, &self.shared) {
+        let asked = self.services.round(&self.shared.desk, &self.shared);
+        if self.answers.round(&self.shared) || asked {
             (self.wake)();
         }
         if receipt.now_ns.saturating_sub(self.looked_ns) >= FAULTS_NS {
@@ -166,7 +170,7 @@ impl Inlet {
             sources,
             shelf,
             shared,
-            frame_id,
+            local,
             frame_fault,
             ..
         } = self;
@@ -193,12 +197,12 @@ impl Inlet {
                 drain(from, shared, |message, _| {
                     let mut frame = shelf.spare();
                     fill(&mut frame, &message, &book, receipt);
-                    let foreign = foreign(&message, frame_id);
+                    let foreign = foreign(&message, &local.frame_id);
                     if foreign.is_some() {
                         shared.note_refused(1);
                         frame.refused = Some(RejectReason::BadChain);
                     }
-                    let fault = foreign.or_else(|| odd(&message, receipt));
+                    let fault = foreign.or_else(|| local.odd(&message, receipt, &book));
                     if let Some(fault) = fault {
                         *frame_fault = Some((fault, receipt.now_ns));
                     }

@@ -1,13 +1,12 @@
 //! The ROS 2 node: the one door to ros2-client and rustdds. In: topics of anybody in the DDS domain. Out: frames for
 //! the tick thread, and its ticks as topics.
 //!
-//! Four threads, none of which the tick thread waits for: `ros-spin` (parameters and the graph), `ros-rx`
-//! (`inlet`: subscriptions, decoding, chains of frames), `ros-tx` (`outlet`: messages, publishing), and those of
-//! DDS itself. Between them and the tick stand a shelf of frames (`shelf`) and a queue of two parcels (`parcel`):
+//! Threads, none of which the tick thread waits for: `ros-rx` (`inlet`: subscriptions, decoding, chains of frames,
+//! services, parameters), `ros-tx` (`outlet`: messages, publishing), and those of DDS itself. Between them and the tick stand a shelf of frames (`shelf`) and a queue of two parcels (`parcel`):
 //! the newest wins, and what gave way is counted. The tick thread never calls into DDS, which may block.
 //!
-//! Order at the end is a promise: the sending and receiving threads first, then the node, which takes its name out of
-//! the graph, then the spinner's thread, then the context; in any other order the name stays in the graph for 50 s.
+//! Order at the end is a promise: the sending and receiving threads first, with them the node, which takes its name out
+//! of the graph, then the context; in any other order the name stays in the graph for 50 s.
 
 pub mod args;
 mod diagnose;
@@ -25,6 +24,7 @@ mod params;
 pub mod params_file;
 mod parcel;
 mod poses;
+mod readers;
 mod services;
 mod shared;
 mod shelf;

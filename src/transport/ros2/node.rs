@@ -10,22 +10,23 @@ use std::time::Duration;
 
 pub(super) use make::join;
 use make::{make, said};
-use ros2_client::{Context, RosoutRaw as _, Spinner};
+use ros2_client::{Context, RosoutRaw as _};
 use rustdds::mio1::Waker;
 
 use super::RosScene;
 use super::args::RosArgs;
 use super::diagnose::Diagnoser;
 use super::env::{Network, Range};
-use super::inlet::Inlet;
+use super::inlet::{Inlet, Local};
 use super::lines::subscribe;
 use super::markers::Boxes;
 use super::names::Names;
 use super::namesakes::Namesakes;
 use super::outlet::{Outlet, Publishers, Read};
-use super::params::Table;
+use super::params::{Answers, Table};
 use super::parcel::Parcels;
 use super::poses::Source;
+use super::readers::Readers;
 use super::services::{Services, open};
 use super::shared::{Say, Shared};
 use super::shelf::Shelf;
@@ -66,7 +67,6 @@ pub struct RosNode {
     context: Option<Context>,
     receiving: Option<JoinHandle<()>>,
     sending: Option<JoinHandle<()>>,
-    spinning: Option<JoinHandle<()>>,
     demand: Demand,
     /// Who waits for the next tick.
     ticks_asked: Vec<u64>,
@@ -94,9 +94,7 @@ impl RosNode {
         wake: Box<dyn Fn() + Send>,
     ) -> Result<Self> {
         let mut names = Names::new(&options.args, NODE_NAME).map_err(Error::Usage)?;
-        let mut table = Table::of(scene);
-        let mut odd = table
-            .start(&said(&options.args)?, &names.full_node())
+        let (table, mut odd) = Table::started(scene, &said(&options.args)?, &names.full_node())
             .map_err(Error::Usage)?;
         let table = Arc::new(table);
         let least = Say::least(options.args.log_level.as_deref());
@@ -105,7 +103,10 @@ impl RosNode {
         let shared = Arc::new(Shared::new(names.node(), book.clone(), &timeouts_ns, least));
 
         let (context, noise) = join(options.network)?;
-        let mut node = make(options, &context, &names, &table, &shared)?;
+        let mut node = make(options, &context, &names)?;
+        shared.take(table.effects());
+        // Before any writer, so that no reader of one is missed.
+        let readers = Readers::of(&context);
         let sources = Source::of(scene);
         let shelf = Arc::new(Shelf::default());
         for source in &sources {
@@ -113,26 +114,28 @@ impl RosNode {
         }
         let heartbeat_ns = scene.config.heartbeat_ns;
         let reliable = shared.reliable();
-        let publishers =
-            Publishers::create(&mut node, &context, &mut names, heartbeat_ns, reliable)?;
+        let sources_len = scene.sources.len();
+        let publishers = Publishers::create(
+            (&mut node, &context, &mut names),
+            (heartbeat_ns, sources_len),
+            reliable,
+        )?;
         let (lines, unheard) = subscribe(&mut node, &context, &mut names, &sources, scene.again)?;
         odd.extend(unheard);
         let services = Services::create(&mut node, &mut names, table.flag("ros.allow_edits"))?;
+        let answers = Answers::create(&mut node, &context, &mut names, &table)?;
         shared.set_rosout(Some(node.rosout_writer()));
-        let spinner = node
-            .spinner()
-            .map_err(|e| Error::io("ROS 2: the node cannot spin", e))?;
         let namesakes = Namesakes::of(&context, node.fully_qualified_name())?;
         table.run();
 
         let parcels = Arc::new(Parcels::default());
         let (inlet, waker) = Inlet::new(
-            (lines, services),
+            (lines, services, answers),
             sources,
             Arc::clone(&shelf),
             Arc::clone(&shared),
             wake,
-            (scene.frame_id.clone(), heartbeat_ns),
+            (Local::of(scene), heartbeat_ns),
         )?;
         let outlet = Outlet {
             node,
@@ -153,11 +156,11 @@ impl RosNode {
             left_out: 0,
             noise,
             strangers: Strangers::of(&context, &names, scene),
+            readers,
             read: Read::default(),
             namesakes,
             names: names.clone(),
             sources: scene.sources.clone(),
-            kept: scene.kept.clone(),
         };
         let mut open = Self {
             shelf,
@@ -167,21 +170,15 @@ impl RosNode {
             context: Some(context),
             receiving: None,
             sending: None,
-            spinning: None,
             demand: Demand::default(),
             ticks_asked: Vec::new(),
         };
-        open.start(spinner, inlet, outlet)?;
+        open.start(inlet, outlet)?;
         open.greet(options.network, &names, &odd);
         Ok(open)
     }
 
-    fn start(&mut self, spinner: Spinner, inlet: Inlet, outlet: Outlet) -> Result<()> {
-        self.spinning = Some(thread("ros-spin", move || {
-            if let Err(e) = futures_executor::block_on(spinner.spin()) {
-                tracing::error!("ROS 2: parameters are not answered any more: {e}");
-            }
-        })?);
+    fn start(&mut self, inlet: Inlet, outlet: Outlet) -> Result<()> {
         self.sending = Some(thread("ros-tx", move || outlet.run())?);
         self.receiving = Some(thread("ros-rx", move || inlet.run())?);
         Ok(())
@@ -231,7 +228,6 @@ impl RosNode {
         for thread in [self.receiving.take(), self.sending.take()] {
             let _told_by_its_panic = thread.map(JoinHandle::join);
         }
-        let _told_by_its_panic = self.spinning.take().map(JoinHandle::join);
         // The node has said that it goes. Who missed that can ask again only while the participant lives; who cannot
         // ask shows the name until its lease ends.
         #[allow(
@@ -262,8 +258,10 @@ fn first_names(scene: &RosScene) -> Vec<NameRow> {
         for (to, from) in name.iter_mut().zip(body.name.bytes()) {
             *to = from;
         }
+        let source = body.source.and_then(|place| u32::try_from(place).ok());
         NameRow {
             body: body.id,
+            source: source.unwrap_or(u32::MAX),
             len: u32::try_from(body.name.len().min(BODY_NAME_LEN)).unwrap_or(0),
             name,
             ..NameRow::default()

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 pub(super) use publishers::Publishers;
-use ros2_client::{Context, Node, ParameterValue, Publisher};
+use ros2_client::{Context, Node, Publisher};
 use serde::Serialize;
 
 use super::RosSourceSpec;
@@ -19,9 +19,8 @@ use super::markers::{Boxes, CONTACTS_MAX, collisions, markers};
 use super::names::Names;
 use super::namesakes::Namesakes;
 use super::noise::Noise;
-use super::params::Kept;
-use super::params_file::Value;
 use super::parcel::{Next, Parcel, Parcels};
+use super::readers::Readers;
 use super::services::open;
 use super::shared::{Say, Shared};
 use super::speak::{Counts, Speaker};
@@ -58,12 +57,12 @@ pub(super) struct Outlet {
     pub(super) left_out: u64,
     pub(super) noise: Noise,
     pub(super) strangers: Strangers,
+    pub(super) readers: Readers,
     pub(super) read: Read,
     pub(super) namesakes: Namesakes,
     /// Makes full names of the topics of bodies that come.
     pub(super) names: Names,
     pub(super) sources: Vec<RosSourceSpec>,
-    pub(super) kept: Kept,
 }
 
 /// What somebody listens to, as of the last look.
@@ -88,7 +87,6 @@ impl Outlet {
         loop {
             self.follow_edits();
             self.look_who_listens();
-            self.follow_sim_time();
             self.diagnose();
             let strange = self.strangers.watch(SystemClock.boottime_ns());
             for text in self.namesakes.look().into_iter().chain(strange) {
@@ -107,17 +105,6 @@ impl Outlet {
                     self.parcels.give_back(*parcel);
                 }
             }
-        }
-        self.node.stop_spinner();
-    }
-
-    /// The crate keeps this parameter to itself: its set action is never called.
-    fn follow_sim_time(&self) {
-        let value = self.node.get_parameter("use_sim_time");
-        let on = matches!(value, Some(ParameterValue::Boolean(true)));
-        if on != self.shared.sim_time() {
-            self.shared.set_sim_time(on);
-            self.kept.keep("use_sim_time", Value::Flag(on));
         }
     }
 
@@ -144,6 +131,9 @@ impl Outlet {
             return None;
         }
         let topic = self.names.claim(&body.topic).map_err(Error::Usage);
+        if let Ok(topic) = &topic {
+            self.strangers.meet(topic, kind);
+        }
         let line = topic.and_then(|topic| of_body(&mut self.node, &self.context, kind, &topic));
         line.map_err(|e| {
             let text = format!("body {}: no poses of it can come: {e}", body.name);
@@ -156,17 +146,18 @@ impl Outlet {
         let reliable = self.shared.reliable();
         self.publishers
             .set_reliable(&mut self.node, &self.context, reliable);
-        let (out, node) = (&self.publishers, &self.node);
-        let markers = self.shared.markers_period_ns().is_some() && out.markers.is_read(node);
-        let collisions = self.shared.collisions() && out.collisions.is_read(node);
-        let (pairs, contacts) = (out.pairs.is_read(node), out.contacts.is_read(node));
+        self.readers.hear();
+        let (out, readers) = (&self.publishers, &self.readers);
+        let markers = self.shared.markers_period_ns().is_some() && out.markers.is_read(readers);
+        let collisions = self.shared.collisions() && out.collisions.is_read(readers);
+        let (pairs, contacts) = (out.pairs.is_read(readers), out.contacts.is_read(readers));
         let rows = markers || collisions || pairs || contacts;
         self.read = Read {
             markers,
             collisions,
             pairs,
             contacts,
-            ticks: rows || out.state.is_read(node) || out.tick.is_read(node),
+            ticks: rows || out.state.is_read(readers) || out.tick.is_read(readers),
         };
         self.shared.set_demand(Demand {
             pairs: markers || self.read.pairs,
@@ -179,7 +170,8 @@ impl Outlet {
 
     /// Markers at their own rate, collisions each tick; where somebody listens.
     fn show(&mut self, parcel: &Parcel) {
-        let mut pen = Pen::of(&mut self.node, &self.context, &self.shared);
+        let readers = &mut self.readers;
+        let mut pen = Pen::of(&mut self.node, &self.context, &self.shared, readers);
         self.left_out = 0;
         if self.read.collisions && parcel.holds.contacts {
             let header = self.speaker.header(parcel.tick.header.oldest_stamp_ns);
@@ -204,9 +196,11 @@ impl Outlet {
         let (row, told_ns) = &mut self.told;
         let to = &self.publishers.diagnostics;
         let due = now_ns.saturating_sub(*told_ns) >= DIAGNOSTICS_NS && row.header.tick > 0;
-        if !due || to.get_subscription_count(&self.node) == 0 {
+        if !due || self.readers.count(to) == 0 {
             return;
         }
+        // While nobody read, what is counted was told to nobody; it is no news of the last second.
+        let is_first = now_ns.saturating_sub(*told_ns) > 2 * DIAGNOSTICS_NS;
         *told_ns = now_ns;
         let now = self.shared.now();
         let counts = Counts {
@@ -222,6 +216,9 @@ impl Outlet {
                 "{} {text} {CONTACTS_MAX}: ~/contacts tells how many there are, and ros_max_contacts sets how many it holds",
                 self.left_out
             ));
+        }
+        if is_first {
+            self.diagnoser = Diagnoser::since(row, counts);
         }
         let message = self
             .diagnoser
@@ -243,7 +240,8 @@ impl Outlet {
     /// Contacts and pairs first, the tick last: whoever has the tick has all that belongs to it.
     fn send(&mut self, parcel: &Parcel) {
         let out = &mut self.publishers;
-        let mut pen = Pen::of(&mut self.node, &self.context, &self.shared);
+        let readers = &mut self.readers;
+        let mut pen = Pen::of(&mut self.node, &self.context, &self.shared, readers);
         if parcel.holds.contacts && self.read.contacts {
             for message in self.speaker.contacts(parcel) {
                 pen.write(&mut out.contacts, message);
@@ -274,15 +272,22 @@ struct Pen<'a> {
     node: &'a mut Node,
     context: &'a Context,
     shared: &'a Shared,
+    readers: &'a mut Readers,
     now_ns: u64,
 }
 
 impl<'a> Pen<'a> {
-    fn of(node: &'a mut Node, context: &'a Context, shared: &'a Shared) -> Self {
+    fn of(
+        node: &'a mut Node,
+        context: &'a Context,
+        shared: &'a Shared,
+        readers: &'a mut Readers,
+    ) -> Self {
         Self {
             node,
             context,
             shared,
+            readers,
             now_ns: SystemClock.boottime_ns(),
         }
     }
@@ -290,9 +295,11 @@ impl<'a> Pen<'a> {
     fn write<M: Serialize>(&mut self, to: &mut Wheel<M>, message: M) {
         match to.publish(self.node, self.context, message, self.now_ns) {
             Sent::Yes => {}
-            Sent::Turned(given_up) => {
+            Sent::Turned { given_up, gone } => {
                 tracing::debug!("ROS 2: a reader does not acknowledge; a new writer goes on");
                 self.shared.note_unsent(given_up);
+                gone.into_iter()
+                    .for_each(|writer| self.readers.forget(writer));
             }
             Sent::No => self.shared.note_unsent(1),
         }

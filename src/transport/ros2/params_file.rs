@@ -18,6 +18,18 @@ pub enum Value {
     List(Vec<Value>),
 }
 
+impl std::fmt::Display for Value {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Flag(flag) => write!(f, "{flag}"),
+            Self::Whole(whole) => write!(f, "{whole}"),
+            Self::Real(real) => write!(f, "{real}"),
+            Self::Text(text) => write!(f, "`{text}`"),
+            Self::List(values) => f.debug_list().entries(values).finish(),
+        }
+    }
+}
+
 /// A parameter that somebody set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {

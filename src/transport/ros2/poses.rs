@@ -8,7 +8,7 @@ mod stamps;
 
 use judge::judge;
 pub(super) use stamps::off;
-use stamps::{older, rivalry};
+use stamps::{both, older, rivalry};
 
 use ros2_client::Gid;
 
@@ -161,6 +161,7 @@ impl Source {
         for link in &message.transforms {
             let what = ("frame", link.child_frame_id.as_str());
             let stamp_ns = link.header.stamp.to_ns();
+            let mixed = self.tree.is_otherwise(what.1, fixed).then(|| both(what));
             let taken = self.tree.take(link, fixed, receipt.now_ns, self.timeout_ns);
             let odd = match taken {
                 Taken::Newer if !fixed => off(what, stamp_ns, receipt, self.timeout_ns),
@@ -169,6 +170,7 @@ impl Source {
             };
             // Those that never change are said again by whoever starts anew.
             let rivals = !fixed && taken != Taken::Refused && self.has_rivals(what.1, receipt);
+            let odd = mixed.filter(|_| taken != Taken::Refused).or(odd);
             let odd = if rivals { Some(rivalry(what)) } else { odd };
             back |= taken == Taken::WentBack;
             self.refused += u64::from(matches!(taken, Taken::Older(_) | Taken::Refused));

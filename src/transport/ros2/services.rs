@@ -21,7 +21,7 @@ use gap::told;
 
 use super::names::Names;
 use super::shared::{Say, Shared};
-use super::topics::failed;
+use super::topics::{TypeName, failed};
 use crate::error::{Error, Result};
 use crate::wire::ros::{
     AttachBody, Edited, EnableBody, Gap, GapTold, PutBody, RemoveBody, Reset, SetFilter, TickNow,
@@ -99,15 +99,16 @@ impl Services {
     /// # Errors
     /// `Error::Usage` when remaps collide; `Error::Io` when DDS refuses.
     pub(super) fn create(node: &mut Node, names: &mut Names, allowed: bool) -> Result<Self> {
+        let kind = |kind| ("sweepd_msgs", kind);
         Ok(Self {
-            put: server(node, names, "~/put_body", "PutBody")?,
-            remove: server(node, names, "~/remove_body", "RemoveBody")?,
-            enable: server(node, names, "~/enable_body", "EnableBody")?,
-            attach: server(node, names, "~/attach_body", "AttachBody")?,
-            filter: server(node, names, "~/set_filter", "SetFilter")?,
-            reset: server(node, names, "~/reset", "Reset")?,
-            gap: server(node, names, "~/gap", "Gap")?,
-            tick: server(node, names, "~/tick_now", "TickNow")?,
+            put: server(node, names, "~/put_body", kind("PutBody"))?,
+            remove: server(node, names, "~/remove_body", kind("RemoveBody"))?,
+            enable: server(node, names, "~/enable_body", kind("EnableBody"))?,
+            attach: server(node, names, "~/attach_body", kind("AttachBody"))?,
+            filter: server(node, names, "~/set_filter", kind("SetFilter"))?,
+            reset: server(node, names, "~/reset", kind("Reset"))?,
+            gap: server(node, names, "~/gap", kind("Gap"))?,
+            tick: server(node, names, "~/tick_now", kind("TickNow"))?,
             pending: BTreeMap::new(),
             ticks: BTreeMap::new(),
             next: 1,
@@ -117,15 +118,14 @@ impl Services {
 
     /// Registers them behind the subscriptions.
     pub(super) fn register(&mut self, registry: &Registry, token: Token) -> std::io::Result<()> {
-        let wanted = Interest::READABLE;
-        self.put.register(registry, token, wanted)?;
-        self.remove.register(registry, token, wanted)?;
-        self.enable.register(registry, token, wanted)?;
-        self.attach.register(registry, token, wanted)?;
-        self.filter.register(registry, token, wanted)?;
-        self.reset.register(registry, token, wanted)?;
-        self.gap.register(registry, token, wanted)?;
-        self.tick.register(registry, token, wanted)
+        register(&mut self.put, registry, token)?;
+        register(&mut self.remove, registry, token)?;
+        register(&mut self.enable, registry, token)?;
+        register(&mut self.attach, registry, token)?;
+        register(&mut self.filter, registry, token)?;
+        register(&mut self.reset, registry, token)?;
+        register(&mut self.gap, registry, token)?;
+        register(&mut self.tick, registry, token)
     }
 
     /// Takes requests and sends responses; whether the tick thread has something to do.
@@ -278,23 +278,40 @@ fn in_words(edit: &Value) -> String {
     format!("edit over ROS 2: {verb} {body}")
 }
 
-fn server<Q: Message + Clone + 'static, R: Message + 'static>(
+/// Creates a server.
+///
+/// # Errors
+/// `Error::Usage` when remaps collide; `Error::Io` when DDS refuses.
+pub(super) fn server<Q: Message + Clone + 'static, R: Message + 'static>(
     node: &mut Node,
     names: &mut Names,
     name: &str,
-    kind: &str,
+    (package, kind): TypeName,
 ) -> Result<Server<Q, R>> {
     let full = names.claim(name).map_err(Error::Usage)?;
     let parsed = Name::parse(&full).map_err(|e| Error::Usage(format!("{full}: {e}")))?;
     let qos = QosProfile::publisher_default()
         .history(History::KeepLast { depth: 10 })
         .reliability_reliable(WhenFull::Fail);
-    let kind = ServiceTypeName::new("sweepd_msgs", kind);
+    let kind = ServiceTypeName::new(package, kind);
     node.create_server(ServiceMapping::Enhanced, &parsed, &kind, qos.clone(), qos)
         .map_err(|e| failed(&full, e))
 }
 
-fn receive<Q: Message + 'static, R: Message + 'static>(
+/// Has the thread that waits on the registry woken by requests.
+///
+/// # Errors
+/// Those of the system.
+pub(super) fn register<Q: Message + 'static, R: Message + 'static>(
+    server: &mut Server<Q, R>,
+    registry: &Registry,
+    token: Token,
+) -> std::io::Result<()> {
+    server.register(registry, token, Interest::READABLE)
+}
+
+/// Takes the requests that wait.
+pub(super) fn receive<Q: Message + 'static, R: Message + 'static>(
     server: &Server<Q, R>,
     shared: &Shared,
     mut each: impl FnMut(RmwRequestId, Q),

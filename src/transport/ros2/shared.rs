@@ -123,15 +123,20 @@ impl Shared {
         }
     }
 
-    /// Does what a parameter says.
-    pub(super) fn take(&self, effect: Effect) {
+    /// Does what parameters say; no tick takes a part of it.
+    pub(super) fn take(&self, effects: impl Iterator<Item = Effect>) {
+        let mut settings = open(&self.settings);
+        effects.for_each(|effect| self.take_one(effect, &mut settings));
+    }
+
+    fn take_one(&self, effect: Effect, settings: &mut Vec<Setting>) {
         match effect {
-            Effect::Tick(setting) => open(&self.settings).push(setting),
+            Effect::Tick(setting) => settings.push(setting),
             Effect::Timeout(source, timeout_ns) => {
                 if let Some(slot) = self.timeouts_ns.get(source) {
                     slot.store(timeout_ns, Ordering::Relaxed);
                 }
-                open(&self.settings).push(Setting::Timeout { source, timeout_ns });
+                settings.push(Setting::Timeout { source, timeout_ns });
             }
             Effect::Own(own) => match own {
                 Own::MaxPairs(rows) => self.max_pairs.store(rows, Ordering::Relaxed),
@@ -143,6 +148,7 @@ impl Shared {
                 Own::MarkersPeriod(ns) => self.markers_period_ns.store(ns, Ordering::Relaxed),
                 Own::Collisions(on) => self.collisions.store(on, Ordering::Relaxed),
                 Own::Reliable(on) => self.reliable.store(on, Ordering::Relaxed),
+                Own::SimTime(on) => self.sim_time.store(on, Ordering::Relaxed),
             },
             Effect::None => {}
         }
@@ -184,11 +190,6 @@ impl Shared {
     /// Whether lost messages of large topics are sent again.
     pub(super) fn reliable(&self) -> bool {
         self.reliable.load(Ordering::Relaxed)
-    }
-
-    /// Takes whether time is that of `/clock`.
-    pub(super) fn set_sim_time(&self, on: bool) {
-        self.sim_time.store(on, Ordering::Relaxed);
     }
 
     /// Whether time is that of `/clock`.

@@ -65,6 +65,12 @@ impl Book {
         self.by_id.get(&body).or_else(gone).map_or("", name_of)
     }
 
+    /// The place of the source that moves a body of the scene; `None`: no such body, or none moves it.
+    pub(super) fn source(&self, body: u64) -> Option<usize> {
+        let place = self.by_id.get(&body)?.source;
+        usize::try_from(place).ok().filter(|_| place != u32::MAX)
+    }
+
     /// The id of a name in the scene.
     pub(super) fn id(&self, name: &str) -> Option<u64> {
         self.by_name.get(name).copied()

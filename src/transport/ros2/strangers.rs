@@ -60,23 +60,31 @@ impl Strangers {
                 put(&ros.static_topic, ("tf2_msgs", "TFMessage"));
             }
         }
-        for body in &scene.bodies {
-            let source = body.source.and_then(|place| scene.sources.get(place));
-            match source
-                .and_then(|source| source.ros2.as_ref())
-                .map(|ros| ros.kind)
-            {
-                Some(RosKind::Pose) => put(&body.topic, ("geometry_msgs", "PoseStamped")),
-                Some(RosKind::Odometry) => put(&body.topic, ("nav_msgs", "Odometry")),
-                Some(RosKind::Tf) | None => {}
-            }
-        }
-        Self {
+        let mut watch = Self {
             context: context.clone(),
             own,
             found: Vec::new(),
             looked_ns: 0,
+        };
+        for body in &scene.bodies {
+            let source = body.source.and_then(|place| scene.sources.get(place));
+            let ros = source.and_then(|source| source.ros2.as_ref());
+            if let (Some(ros), Ok(topic)) = (ros, names.resolve(&body.topic)) {
+                watch.meet(&topic, ros.kind);
+            }
         }
+        watch
+    }
+
+    /// Takes the topic of a body, by its full name.
+    pub(super) fn meet(&mut self, topic: &str, kind: RosKind) {
+        let (package, kind) = match kind {
+            RosKind::Pose => ("geometry_msgs", "PoseStamped"),
+            RosKind::Odometry => ("nav_msgs", "Odometry"),
+            RosKind::Tf => return,
+        };
+        let kind = MessageTypeName::new(package, kind).dds_msg_type();
+        self.own.insert(format!("rt{topic}"), kind);
     }
 
     /// What is so now.

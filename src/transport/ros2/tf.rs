@@ -99,6 +99,13 @@ impl Tree {
         Some(id)
     }
 
+    /// Whether the link of a frame that is there is one that never changes, and this is none, or the other way round.
+    pub(super) fn is_otherwise(&self, child: &str, fixed: bool) -> bool {
+        let id = self.ids.get(plain(child));
+        let link = id.and_then(|id| self.links.get(*id)?.as_ref());
+        link.is_some_and(|link| link.fixed != fixed)
+    }
+
     /// Forgets every link that has an age.
     pub(super) fn forget(&mut self) {
         for link in &mut self.links {

@@ -10,8 +10,10 @@
 //! (measured: 5 ticks at 30 Hz were lost a turn); so while a reader is stuck, the next one is made in advance.
 
 use ros2_client::{Context, Node, Publisher, WriteError};
+use rustdds::GUID;
 use serde::Serialize;
 
+use super::readers::Readers;
 use super::topics::{Out, TypeName, publisher};
 use crate::error::Result;
 
@@ -41,7 +43,11 @@ pub(super) enum Sent {
     Yes,
     /// It is on its way by a new writer, because a reader does not acknowledge. With the last writer but one that
     /// reader has lost up to so many messages.
-    Turned(u64),
+    Turned {
+        given_up: u64,
+        /// The last writer but one, which is gone.
+        gone: Option<GUID>,
+    },
     /// It is lost.
     No,
 }
@@ -71,8 +77,8 @@ impl<M: Serialize> Wheel<M> {
     }
 
     /// Whether somebody listens. A new writer is known to its readers a little later than the old one was.
-    pub(super) fn is_read(&self, node: &Node) -> bool {
-        let read = |writer: &Publisher<M>| writer.get_subscription_count(node) > 0;
+    pub(super) fn is_read(&self, readers: &Readers) -> bool {
+        let read = |writer: &Publisher<M>| readers.count(writer) > 0;
         read(&self.current)
             || self.before.as_ref().is_some_and(read)
             || self.next.as_ref().is_some_and(read)
@@ -130,10 +136,11 @@ impl<M: Serialize> Wheel<M> {
             return Sent::No;
         };
         let full = std::mem::replace(&mut self.current, next);
-        let given_up = self.before.replace(full).map_or(0, |_| window as u64);
+        let gone = self.before.replace(full).map(|writer| writer.guid());
+        let given_up = gone.map_or(0, |_| window as u64);
         self.sent = 1;
         match self.current.publish(message) {
-            Ok(()) => Sent::Turned(given_up),
+            Ok(()) => Sent::Turned { given_up, gone },
             Err(_) => Sent::No,
         }
     }
@@ -177,10 +184,7 @@ mod tests {
         };
         let (context, _) = join(network).unwrap();
         let name = NodeName::new("/", name).unwrap();
-        let mut node = context.new_node(name, NodeOptions::new()).unwrap();
-        // Who listens is known to a node that is spun only.
-        let spinner = node.spinner().unwrap();
-        std::thread::spawn(move || futures_executor::block_on(spinner.spin()));
+        let node = context.new_node(name, NodeOptions::new()).unwrap();
         (context, node)
     }
 
@@ -255,9 +259,11 @@ mod tests {
             (next, sent, heard.last().copied())
         };
         let end = Instant::now() + Duration::from_secs(30);
-        while wheel.current.get_subscription_count(&node) < 2 {
+        let mut readers = Readers::of(&context);
+        while readers.count(&wheel.current) < 2 {
             assert!(Instant::now() < end, "both readers are found");
             std::thread::sleep(STEP);
+            readers.hear();
         }
         for _ in 0..50 {
             assert_eq!(
@@ -271,7 +277,9 @@ mod tests {
         for _ in 0..150 {
             match step(&mut wheel, &mut node).1 {
                 Sent::Yes => {}
-                Sent::Turned(count) => {
+                Sent::Turned {
+                    given_up: count, ..
+                } => {
                     turned += 1;
                     given_up += count;
                 }

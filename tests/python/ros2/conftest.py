@@ -57,6 +57,8 @@ class Daemon:
 
     def __init__(self, args, env, log):
         self.log_path = log
+        # Whether a test has seen it refuse to start.
+        self.refused = False
         with log.open("w") as file:
             self.process = subprocess.Popen(args, env=env, stdout=file, stderr=subprocess.STDOUT)
 
@@ -71,6 +73,12 @@ class Daemon:
 
     def send(self, number):
         self.process.send_signal(number)
+
+    def refusal(self):
+        """Waits for a daemon that must not start; its exit code."""
+        code = self.process.wait(timeout=PATIENCE_S)
+        self.refused = code in (2, 4)
+        return code
 
     def stop(self, number=signal.SIGINT):
         """Its exit code and how long it took, seconds."""
@@ -227,5 +235,5 @@ def room(tmp_path):
     made = Room(tmp_path)
     yield made
     ends = made.close()
-    bad = [(end, daemon.log[-2000:]) for end, daemon in zip(ends, made.daemons) if end not in (0, -signal.SIGKILL, 2, 4)]
+    bad = [(end, daemon.log[-2000:]) for end, daemon in zip(ends, made.daemons) if end not in (0, -signal.SIGKILL) and not daemon.refused]
     assert not bad, bad

@@ -175,7 +175,51 @@ def test_a_body_fed_by_another_source_is_told_and_its_own_wins(room):
     room.until(lambda: desk.ticks[-1].rejects[Tick.REJECT_WRONG_SOURCE] > 3, "refused: wrong source", then=both)
     room.until(lambda: any("wrong_source" in status.message for message in desk.said[-2:] for status in message.status),
                "its reason in the diagnostics", then=both)  # fmt: skip
+    desk.told("body person", "source sim", "source poses", feed=both)
     assert desk.states[-1].word == "clear"
+
+
+def test_a_frame_that_is_linked_on_tf_and_on_tf_static_is_told(room):
+    desk = Desk(room)
+
+    def both():
+        desk.feeder()
+        desk.feeder.fixed.publish(TFMessage(transforms=[desk.feeder.link("elbow", "mount", (0.0, 0.0, 0.5), stamp_ns=0)]))
+
+    desk.told("frame elbow", "fixed links", feed=both)
+
+
+def test_a_frame_of_transforms_in_another_frame_than_the_scenes_is_refused_counted_and_told(room):
+    desk = Desk(room, skip=["box"])
+
+    def lost():
+        desk.feeder()
+        message = desk.feeder.sim.frame({"box": (4.0, 0.0, 0.0)})
+        message.header.frame_id = "somewhere"
+        desk.feeder.sim.publisher.publish(message)
+
+    desk.told("source sim", "somewhere", feed=lost)
+    room.until(lambda: desk.ticks[-1].rejects[Tick.REJECT_BAD_CHAIN] > 3 and desk.ticks[-1].receipts_refused > 3, "counted", then=lost)
+    assert desk.word("unknown", feed=lost)
+    desk.feeder.skip = set()
+    desk.word("clear")
+
+
+def test_stamps_of_another_clock_are_carried_and_not_told_as_odd(room):
+    desk = Desk(room, skip=["box"])
+    room.until(lambda: desk.ticks and desk.said, "the node", then=desk.feeder)
+
+    def elsewhen():
+        desk.feeder()
+        desk.feeder.sim.send({"box": (4.0, 0.0, 0.0)}, stamp_ns=77, clock_id=9)
+
+    desk.word("clear", feed=elsewhen)
+    for _ in range(150):
+        elsewhen()
+        room.spin(0.02)
+    (source,) = [source for source in desk.ticks[-1].sources if source.name == "sim"]
+    assert (source.clock_id, source.stamp_ns) == (9, 77)
+    assert not [log.msg for log in desk.logs if "source sim" in log.msg and "clock" in log.msg]
 
 
 def test_two_nodes_of_one_name_are_told(room):

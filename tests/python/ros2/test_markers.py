@@ -243,6 +243,11 @@ def test_what_nobody_listens_to_is_not_computed(room):
     again = spent()
     print(f"units a tick: {quiet} unwatched, {watched} with a reader of markers, {again} after it has left")
     assert watched > 3 * quiet and again < 2 * quiet + 5
+    # one that is killed says nothing: it is gone when its lease of 20 s has ended
+    killed = room.python("peer_echo.py", "--seconds", 3600)
+    room.until(lambda: spent() > 3 * quiet, "contacts for the reader in a process of its own", seconds=30)
+    killed.kill()
+    room.until(lambda: spent() < 2 * quiet + 5, "no contacts any more", seconds=60)
 
 
 def test_collisions_are_off_unless_asked_and_then_those_of_the_contacts(room):

@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from frames import Sender
 from parameters import put, value
 from rcl_interfaces.msg import Log, Parameter, ParameterEvent, ParameterType
-from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParametersAtomically
+from rcl_interfaces.srv import DescribeParameters, GetParameters, GetParameterTypes, ListParameters, SetParametersAtomically
 from rosgraph_msgs.msg import Clock
 from scenes import HANDS, cloud
 from sweepd_msgs.msg import Contacts, Pairs, State, Tick
@@ -32,14 +32,35 @@ def test_parameters_are_listed_described_and_read(room):
               "publish_markers", "publish_collisions", "ros.allow_edits", "use_sim_time", "timeout_ms.sim"}  # fmt: skip
     assert wanted <= names, wanted - names
     assert get(room, "budget_ms", "mode", "ros_max_contacts", "timeout_ms.sim", "nothing") == [3.0, "on_frame=sim", 500, 500.0, None]
-    described = room.call(DescribeParameters, "/sweepd/describe_parameters", DescribeParameters.Request(names=["budget_ms"]))
-    assert described.descriptors[0].type == ParameterType.PARAMETER_DOUBLE
+    kinds = room.call(GetParameterTypes, "/sweepd/get_parameter_types", GetParameterTypes.Request(names=["mode", "nothing"])).types
+    assert list(kinds) == [ParameterType.PARAMETER_STRING, ParameterType.PARAMETER_NOT_SET]
+    listed = room.call(ListParameters, "/sweepd/list_parameters", ListParameters.Request(prefixes=["timeout_ms", "ros"])).result
+    assert (list(listed.names), list(listed.prefixes)) == (["ros.allow_edits", "timeout_ms.sim"], ["ros", "timeout_ms"])
+
+
+def test_descriptors_tell_what_a_parameter_is_for_its_range_and_when_it_is_set(room):
+    room.daemon(HANDS)
+    room.node()
+    names = ["budget_ms", "markers_rate_hz", "ros_max_contacts", "out_reliability", "ros.allow_edits", "nothing"]
+    answer = room.call(DescribeParameters, "/sweepd/describe_parameters", DescribeParameters.Request(names=names))
+    told = dict(zip(names, answer.descriptors))
+    assert [d.name for d in answer.descriptors] == names
+    assert all(d.description and not d.dynamic_typing for name, d in told.items() if name != "nothing")
+    budget, rate, rows = told["budget_ms"], told["markers_rate_hz"], told["ros_max_contacts"]
+    assert budget.type == ParameterType.PARAMETER_DOUBLE and "-1 for no limit" in budget.additional_constraints
+    assert "allow_edits" in budget.additional_constraints and "allow_edits" not in rate.additional_constraints
+    assert (rate.floating_point_range[0].from_value, rate.floating_point_range[0].to_value) == (0.1, 100.0)
+    assert (rows.integer_range[0].from_value, rows.integer_range[0].to_value) == (0, 100_000)
+    assert told["out_reliability"].additional_constraints == "reliable or best_effort"
+    assert [name for name in names if told[name].read_only] == ["ros.allow_edits"]
+    assert told["nothing"].type == ParameterType.PARAMETER_NOT_SET
 
 
 def test_safety_parameters_are_refused_unless_edits_are_allowed(room):
     room.daemon(HANDS)
     room.node()
-    for name, one in [("budget_ms", 1.0), ("mode", "rate=10"), ("timeout_ms.sim", 100.0), ("report_within_m", 0.1)]:
+    for name, one in [("budget_ms", 1.0), ("mode", "rate=10"), ("timeout_ms.sim", 100.0), ("report_within_m", 0.1),
+                      ("use_sim_time", True)]:  # fmt: skip
         ((done, reason),) = put(room, **{name.replace(".", "__"): one})
         assert not done and "allow_edits" in reason, (name, reason)
     assert put(room, ros__allow_edits=True)[0][0] is False
@@ -89,12 +110,14 @@ def test_what_is_set_takes_effect_and_is_told(room):
     logs = room.hear(Log, "/rosout")
     sender = Sender(node)
     room.until(lambda: ticks and ticks[-1].budget_ns == Tick.UNLIMITED, "no budget", then=lambda: sender.send(FAR))
-    assert put(room, budget_ms=4.0) == [(True, "")]
+    assert put(room, budget_ms=4) == [(True, "")], "a whole number stands for a number"
     room.until(lambda: ticks[-1].budget_ns == 4_000_000, "the budget in the tick", then=lambda: sender.send(FAR))
+    assert get(room, "budget_ms") == [4.0]
     assert put(room, mode="rate=20") == [(True, "")]
     start = len(ticks)
     room.until(lambda: len(ticks) > start + 20, "ticks without frames", seconds=5)
-    room.until(lambda: any("budget_ms" in str(event) for event in events), "a parameter event")
+    changed = lambda: [(p.name, p.value.double_value) for e in events if e.node == "/sweepd" for p in e.changed_parameters]  # noqa: E731
+    room.until(lambda: ("budget_ms", 4.0) in changed(), "a parameter event")
     room.until(lambda: any("budget_ms" in log.msg for log in logs), "a line on /rosout")
 
 
@@ -120,7 +143,7 @@ def test_parameter_files_and_arguments_are_taken_in_order(room):
 )
 def test_a_value_that_cannot_be_meant_is_refused_at_the_start(room, arguments, word):
     daemon = room.daemon(HANDS, ros_args=arguments)
-    assert daemon.process.wait(timeout=15) in (2, 4)
+    assert daemon.refusal() in (2, 4)
     assert word in daemon.log, daemon.log
 
 
@@ -206,6 +229,30 @@ def test_the_margin_of_near_pairs_is_a_parameter_given_at_the_start_and_set_whil
     word("clear", "as the scene says")
     ((done, reason),) = put(room, report_within_m=-0.5)
     assert not done and "what each body was put with" in reason
+
+
+def test_simulated_time_is_switched_on_and_off_while_running(room):
+    room.daemon(HANDS, ros_args=EDITS)
+    node = room.node()
+    clock = node.create_publisher(Clock, "/clock", RELIABLE)
+    said = room.hear(DiagnosticArray, "/diagnostics")
+    sender = Sender(node)
+
+    def step():
+        message = Clock()
+        message.clock.sec = 1_500
+        clock.publish(message)
+        sender.send(FAR)
+
+    def is_simulated(wanted, what):
+        start = len(said)
+        room.until(lambda: len(said) > start and (said[-1].header.stamp.sec == 1_500) == wanted, what, then=step)
+
+    is_simulated(False, "the time of the host")
+    assert put(room, use_sim_time=True) == [(True, "")]
+    is_simulated(True, "the time of /clock")
+    assert put(room, use_sim_time=False) == [(True, "")]
+    is_simulated(False, "the time of the host again")
 
 
 def test_simulated_time_is_that_of_the_clock_topic_and_a_jump_back_ends_every_pair(room):

@@ -1,10 +1,11 @@
 //! Frames of `~/transforms` as the daemon's, and what is odd about them, in words.
 
+use super::super::RosScene;
 use super::super::poses::{Receipt, off};
 use super::super::speak::Book;
 use super::super::tf::sound;
 use crate::limits::FRAME_ROWS_MAX;
-use crate::wire::ros::{BodyTransforms, Twist};
+use crate::wire::ros::{BodyTransform, BodyTransforms, Twist};
 use crate::wire::{Frame, FrameHeader, RejectReason, TransformRow, WIRE_VERSION, name_bytes};
 
 /// What is wrong with a frame that is not in the scene's frame.
@@ -18,31 +19,74 @@ pub(super) fn foreign(message: &BodyTransforms, frame_id: &str) -> Option<String
     })
 }
 
-/// What is odd about a frame whose other bodies are taken as they come: a pose that is none, or a stamp far from the
-/// node's clock where it is said to be of that.
-pub(super) fn odd(message: &BodyTransforms, receipt: Receipt) -> Option<String> {
-    let source = message.source.as_str();
-    let no_pose = message.transforms.iter().find_map(|body| {
-        let (position, orientation) = (body.pose.position.into(), body.pose.orientation.into());
-        let reason = sound(position, orientation).err()?;
-        let body = match body.name.as_str() {
-            "" => body.body.to_string(),
-            name => name.to_owned(),
-        };
-        Some(format!(
-            "body {body}: its pose from source {source} is no pose: {reason}"
-        ))
-    });
-    no_pose.or_else(|| {
-        if message.clock_id != 0 {
-            return None;
+/// What frames are held against.
+#[derive(Clone, Debug, Default)]
+pub(in super::super) struct Local {
+    /// The scene's frame.
+    pub(super) frame_id: String,
+    /// The scene's sources by name, in its order.
+    sources: Vec<String>,
+}
+
+impl Local {
+    /// Of a scene.
+    pub(in super::super) fn of(scene: &RosScene) -> Self {
+        let sources = scene.sources.iter();
+        Self {
+            frame_id: scene.frame_id.clone(),
+            sources: sources.map(|source| source.name.clone()).collect(),
         }
-        let stamp_ns = message.header.stamp.to_ns();
-        let text = off(("source", source), stamp_ns, receipt, 0)?;
-        Some(format!(
-            "{text}; frames of another clock have a clock_id other than 0"
-        ))
-    })
+    }
+
+    /// What is odd about a frame whose other bodies are taken as they come: a pose that is none, a body that another
+    /// source moves, or a stamp far from the node's clock where it is said to be of that.
+    pub(super) fn odd(
+        &self,
+        message: &BodyTransforms,
+        receipt: Receipt,
+        book: &Book,
+    ) -> Option<String> {
+        let source = message.source.as_str();
+        let place = self.sources.iter().position(|own| own == source);
+        let odd_body = message.transforms.iter().find_map(|body| {
+            let id = id(body, book);
+            let name = match body.name.as_str() {
+                "" => body.body.to_string(),
+                name => name.to_owned(),
+            };
+            let (position, orientation) = (body.pose.position.into(), body.pose.orientation.into());
+            if let Err(reason) = sound(position, orientation) {
+                return Some(format!(
+                    "body {name}: its pose from source {source} is no pose: {reason}"
+                ));
+            }
+            // A source that the scene does not have is counted as that.
+            let owner = place.and(book.source(id));
+            let other = owner.filter(|owner| Some(*owner) != place)?;
+            let other = self.sources.get(other).map_or("?", String::as_str);
+            Some(format!(
+                "body {name}: source {source} sends it on ~/transforms, but the scene has source {other} move it: what {source} says of it is refused"
+            ))
+        });
+        odd_body.or_else(|| {
+            if message.clock_id != 0 {
+                return None;
+            }
+            let stamp_ns = message.header.stamp.to_ns();
+            let text = off(("source", source), stamp_ns, receipt, 0)?;
+            Some(format!(
+                "{text}; frames of another clock have a clock_id other than 0"
+            ))
+        })
+    }
+}
+
+/// The id of a body; no body has id 0, so a name that nobody has is counted where unknown ids are.
+fn id(body: &BodyTransform, book: &Book) -> u64 {
+    match body.name.as_str() {
+        "" => body.body,
+        name => book.id(name).unwrap_or(0),
+    }
 }
 
 /// A frame of the daemon from one of `~/transforms`.
@@ -74,11 +118,7 @@ pub(super) fn fill(frame: &mut Frame, message: &BodyTransforms, book: &Book, rec
         return;
     }
     let rows = message.transforms.iter().map(|body| TransformRow {
-        // No body has id 0: a name that nobody has is counted where unknown ids are.
-        body: match body.name.as_str() {
-            "" => body.body,
-            name => book.id(name).unwrap_or(0),
-        },
+        body: id(body, book),
         position: body.pose.position.into(),
         orientation: body.pose.orientation.into(),
         ..TransformRow::default()
@@ -96,12 +136,61 @@ pub(super) fn fill(frame: &mut Frame, message: &BodyTransforms, book: &Book, rec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::ros::BodyTransform;
-
+    use crate::wire::NameRow;
     const S: u64 = 1_000_000_000;
+
+    /// A scene of two sources; the second one moves the lid.
+    fn local() -> (Local, Book) {
+        let name = *b"lid";
+        let mut row = NameRow {
+            body: 4,
+            source: 1,
+            len: 3,
+            ..NameRow::default()
+        };
+        row.name[..3].copy_from_slice(&name);
+        let local = Local {
+            frame_id: "world".to_owned(),
+            sources: vec!["sim".to_owned(), "arm".to_owned()],
+        };
+        (local, Book::of(&[row]))
+    }
+
+    #[test]
+    fn a_body_that_two_sources_send_is_told_by_name() {
+        let (local, book) = local();
+        let receipt = Receipt {
+            now_ns: 5,
+            waited: false,
+            ros_now_ns: 0,
+            from: ros2_client::Gid::ZERO,
+        };
+        let by = |source: &str, name: &str, body: u64| {
+            let mut body = BodyTransform {
+                name: name.to_owned(),
+                body,
+                ..BodyTransform::default()
+            };
+            body.pose.orientation.w = 1.0;
+            let message = BodyTransforms {
+                source: source.to_owned(),
+                transforms: vec![body],
+                ..BodyTransforms::default()
+            };
+            local.odd(&message, receipt, &book)
+        };
+        for (name, body) in [("lid", 0), ("", 4)] {
+            let told = by("sim", name, body).unwrap();
+            assert!(told.contains("source sim sends it") && told.contains("source arm"));
+            assert_eq!(by("arm", name, body), None, "its own");
+            assert_eq!(by("nobody", name, body), None, "counted as no source");
+        }
+        assert_eq!(by("sim", "nothing", 0), None, "counted as no body");
+    }
 
     #[test]
     fn a_pose_that_is_none_and_a_stamp_of_another_time_are_told_by_name() {
+        let (local, book) = local();
         let receipt = Receipt {
             now_ns: 5,
             waited: false,
@@ -114,25 +203,31 @@ mod tests {
         };
         body.pose.orientation.w = 1.0;
         let mut message = BodyTransforms {
-            source: "sim".to_owned(),
+            source: "arm".to_owned(),
             transforms: vec![body],
             ..BodyTransforms::default()
         };
         message.header.stamp.sec = 100;
-        assert_eq!(odd(&message, receipt), None);
+        assert_eq!(local.odd(&message, receipt, &book), None);
         message.header.stamp.sec = 7;
         assert!(
-            odd(&message, receipt)
+            local
+                .odd(&message, receipt, &book)
                 .unwrap()
-                .contains("source sim: its stamp lies 93.000 s in the past")
+                .contains("source arm: its stamp lies 93.000 s in the past")
         );
         message.clock_id = 3;
-        assert_eq!(odd(&message, receipt), None, "the time of another clock");
+        assert_eq!(
+            local.odd(&message, receipt, &book),
+            None,
+            "the time of another clock"
+        );
         message.transforms[0].pose.orientation.w = 0.0;
         assert!(
-            odd(&message, receipt)
+            local
+                .odd(&message, receipt, &book)
                 .unwrap()
-                .contains("body lid: its pose from source sim is no pose")
+                .contains("body lid: its pose from source arm is no pose")
         );
     }
 }

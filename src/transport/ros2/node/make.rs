@@ -1,7 +1,6 @@
-//! What comes before topics: the DDS domain, and the node with its parameters.
+//! What comes before topics: the DDS domain, and the node.
 
 use std::net::Ipv4Addr;
-use std::sync::Arc;
 
 use ros2_client::{Context, Node, NodeName, NodeOptions};
 use rustdds::DomainParticipantBuilder;
@@ -10,9 +9,7 @@ use super::super::args::{Params, RosArgs};
 use super::super::env::{Network, Range};
 use super::super::names::Names;
 use super::super::noise::Noise;
-use super::super::params::{self, Table};
 use super::super::params_file::{self, Setting};
-use super::super::shared::{Say, Shared};
 use super::super::sockets;
 use super::RosOptions;
 use crate::error::{Error, Result};
@@ -35,33 +32,14 @@ pub(super) fn said(args: &RosArgs) -> Result<Vec<Setting>> {
     Ok(all)
 }
 
-/// Makes the node with its parameters, whose values take effect as they are declared.
-pub(super) fn make(
-    options: &RosOptions,
-    context: &Context,
-    names: &Names,
-    table: &Arc<Table>,
-    shared: &Arc<Shared>,
-) -> Result<Node> {
+/// Makes the node, without the parameters of ros2-client: this node has its own (`params`).
+pub(super) fn make(options: &RosOptions, context: &Context, names: &Names) -> Result<Node> {
     let name = NodeName::new(names.namespace(), names.node())
         .map_err(|e| Error::Usage(format!("--ros-args: {}: {e}", names.full_node())))?;
-    let mut declared = NodeOptions::new().enable_rosout(options.args.rosout != Some(false));
-    for spec in table.specs() {
-        declared = declared.declare_parameter(&spec.name, params::declared(&spec.value));
-    }
-    let (checked, taken, shared) = (Arc::clone(table), Arc::clone(table), Arc::clone(shared));
-    declared = declared
-        .parameter_validator(Box::new(move |name, value| checked.check(name, value)))
-        .parameter_set_action(Box::new(move |name, value| {
-            let effect = taken.effect(name, value);
-            if taken.is_running() {
-                taken.keep(name, value);
-                shared.say(Say::Info, &format!("parameter {name} is now {value:?}"));
-            }
-            shared.take(effect);
-            Ok(())
-        }));
-    context.new_node(name, declared).map_err(|e| {
+    let with = NodeOptions::new()
+        .enable_rosout(options.args.rosout != Some(false))
+        .start_parameter_services(false);
+    context.new_node(name, with).map_err(|e| {
         let text = format!("ROS 2: node {} cannot be made", names.full_node());
         Error::io(text, e)
     })

@@ -12,12 +12,14 @@ use crate::wire::ros;
 
 /// Messages of names kept for late joiners: a scene of 100,000 bodies.
 const NAMES_DEPTH: usize = 64;
-/// Bytes of a state, and of a tick of a few sources: a reader that has stopped may hold 16 and 8 thousand of them,
-/// which is 20 s at 400 Hz, and its lease has ended. So these topics keep one writer, as watchers of a node expect;
-/// only above 400 Hz, and only beside a stopped reader, does a new one go on.
+/// Bytes of a state, of a tick, and of each of its sources: a reader that has stopped may hold 16 thousand states and,
+/// of a scene with one source, 8 thousand ticks, which is 20 s at 400 Hz, and its lease has ended. So these topics keep
+/// one writer, as watchers of a node expect; only above 400 Hz, and only beside a stopped reader, does a new one go on.
 const STATE_BYTES: usize = 512;
 /// As [`STATE_BYTES`].
-const TICK_BYTES: usize = 1024;
+const TICK_BYTES: usize = 832;
+/// As [`STATE_BYTES`].
+const SOURCE_BYTES: usize = 192;
 /// Bytes of the largest messages.
 const CHUNK_BYTES: usize = 128 << 10;
 
@@ -36,15 +38,14 @@ pub(in super::super) struct Publishers {
 impl Publishers {
     /// Creates them.
     ///
+    /// * `heartbeat_ns`, `sources_len` - of the scene.
     /// * `reliable` - whether pairs and contacts that were lost are sent again.
     ///
     /// # Errors
     /// `Error::Usage` when remaps collide; `Error::Io` when DDS refuses.
     pub(in super::super) fn create(
-        node: &mut Node,
-        context: &Context,
-        names: &mut Names,
-        heartbeat_ns: u64,
+        (node, context, names): (&mut Node, &Context, &mut Names),
+        (heartbeat_ns, sources_len): (u64, usize),
         reliable: bool,
     ) -> Result<Self> {
         let mut claim = |name: &str| names.claim(name).map_err(Error::Usage);
@@ -124,7 +125,7 @@ impl Publishers {
                 node,
                 context,
                 (&claim("~/tick")?, ("sweepd_msgs", "Tick")),
-                watched(TICK_BYTES),
+                watched(TICK_BYTES + sources_len * SOURCE_BYTES),
             )?,
         })
     }

@@ -1,7 +1,5 @@
 //! Which values parameters take, and what to write instead. Pure.
 
-use ros2_client::ParameterValue;
-
 use super::super::params_file::Value;
 use crate::config::Mode;
 
@@ -28,6 +26,18 @@ pub(super) enum Rule {
 }
 
 impl Rule {
+    /// The value as it is meant: a whole number stands for a number.
+    #[allow(
+        clippy::cast_precision_loss,
+        reason = "a whole number for the nearest number"
+    )]
+    pub(super) fn read(&self, value: &Value) -> Value {
+        match (self, value) {
+            (Self::Real { .. }, Value::Whole(whole)) => Value::Real(*whole as f64),
+            (_, value) => value.clone(),
+        }
+    }
+
     /// Whether the parameter of this name takes the value.
     ///
     /// * `sources` - by name, and whether one can lead in lockstep.
@@ -106,15 +116,4 @@ pub(super) fn some_ns(ms: f64) -> Option<u64> {
 /// Rows of a number that was checked.
 pub(super) fn count(rows: i64) -> usize {
     usize::try_from(rows).unwrap_or(0)
-}
-
-/// A value as it is checked; `None`: of a kind that no parameter has.
-pub(super) fn plain(value: &ParameterValue) -> Option<Value> {
-    match value {
-        ParameterValue::Boolean(flag) => Some(Value::Flag(*flag)),
-        ParameterValue::Integer(whole) => Some(Value::Whole(*whole)),
-        ParameterValue::Double(real) => Some(Value::Real(*real)),
-        ParameterValue::String(text) => Some(Value::Text(text.clone())),
-        _ => None,
-    }
 }

@@ -3,7 +3,7 @@
 use super::*;
 use crate::transport::ros2::RosSourceSpec;
 
-fn table() -> Table {
+pub(super) fn table() -> Table {
     let source = |name: &str| RosSourceSpec {
         name: name.to_owned(),
         timeout_ns: 500_000_000,
@@ -37,7 +37,7 @@ fn what_is_said_at_the_start_is_taken_in_order_and_whole_numbers_stand_for_numbe
     ];
     let unknown = table.start(&all, "/sweepd").unwrap();
     assert!(unknown.len() == 1 && unknown[0].contains("no parameter `colour`"));
-    assert_eq!(table.specs()[0].value, Value::Real(1.0));
+    assert_eq!(table.specs[0].value, Value::Real(1.0));
     assert!(table.flag("ros.allow_edits"));
     let wrong = table.start(&[said("budget_ms", Value::Real(-2.0))], "/sweepd");
     assert!(wrong.unwrap_err().contains("or -1 for no limit"));
@@ -47,45 +47,21 @@ fn what_is_said_at_the_start_is_taken_in_order_and_whole_numbers_stand_for_numbe
 fn each_value_out_of_range_has_its_reason() {
     let table = table();
     for (name, value, word) in [
-        ("budget_ms", ParameterValue::Double(-2.0), "from 0 to"),
-        ("budget_ms", ParameterValue::Double(f64::NAN), "from 0 to"),
-        (
-            "budget_ms",
-            ParameterValue::String("x".to_owned()),
-            "a number",
-        ),
-        (
-            "ros_max_contacts",
-            ParameterValue::Integer(-1),
-            "from 0 to 100000",
-        ),
-        (
-            "ros_max_contacts",
-            ParameterValue::Double(1.0),
-            "a whole number",
-        ),
-        (
-            "markers_rate_hz",
-            ParameterValue::Double(0.0),
-            "from 0.1 to 100",
-        ),
-        ("timeout_ms.arm", ParameterValue::Double(0.0), "from 1 to"),
+        ("budget_ms", Value::Real(-2.0), "from 0 to"),
+        ("budget_ms", Value::Real(f64::NAN), "from 0 to"),
+        ("budget_ms", Value::Text("x".to_owned()), "a number"),
+        ("ros_max_contacts", Value::Whole(-1), "from 0 to 100000"),
+        ("ros_max_contacts", Value::Real(1.0), "a whole number"),
+        ("markers_rate_hz", Value::Real(0.0), "from 0.1 to 100"),
+        ("timeout_ms.arm", Value::Real(0.0), "from 1 to"),
         (
             "mode",
-            ParameterValue::String("on_frame=leg".to_owned()),
+            Value::Text("on_frame=leg".to_owned()),
             "no source `leg`",
         ),
-        ("mode", ParameterValue::String("fast".to_owned()), "rate=HZ"),
-        (
-            "publish_markers",
-            ParameterValue::Integer(1),
-            "true or false",
-        ),
-        (
-            "budget_ms",
-            ParameterValue::DoubleArray(vec![1.0]),
-            "no such value",
-        ),
+        ("mode", Value::Text("fast".to_owned()), "rate=HZ"),
+        ("publish_markers", Value::Whole(1), "true or false"),
+        ("budget_ms", Value::List(vec![Value::Real(1.0)]), "a number"),
     ] {
         let why = table.check(name, &value).unwrap_err();
         assert!(why.contains(word), "{name}: {why}");
@@ -95,7 +71,7 @@ fn each_value_out_of_range_has_its_reason() {
 #[test]
 fn what_touches_safety_needs_leave_while_running() {
     let mut locked = table();
-    let value = ParameterValue::Double(2.0);
+    let value = Value::Real(2.0);
     assert!(locked.check("budget_ms", &value).is_ok());
     locked.run();
     assert!(
@@ -104,14 +80,10 @@ fn what_touches_safety_needs_leave_while_running() {
             .unwrap_err()
             .contains("ros.allow_edits")
     );
+    assert!(locked.check("ros_max_pairs", &Value::Whole(7)).is_ok());
     assert!(
         locked
-            .check("ros_max_pairs", &ParameterValue::Integer(7))
-            .is_ok()
-    );
-    assert!(
-        locked
-            .check("ros.allow_edits", &ParameterValue::Boolean(true))
+            .check("ros.allow_edits", &Value::Flag(true))
             .unwrap_err()
             .contains("at the start only")
     );
@@ -124,7 +96,7 @@ fn what_touches_safety_needs_leave_while_running() {
 #[test]
 fn a_value_does_what_its_name_says() {
     let table = table();
-    let real = ParameterValue::Double;
+    let real = Value::Real;
     assert_eq!(
         table.effect("budget_ms", &real(2.5)),
         Effect::Tick(Setting::BudgetTime(Some(2_500_000)))
@@ -146,12 +118,12 @@ fn a_value_does_what_its_name_says() {
         table.effect("markers_rate_hz", &real(10.0)),
         Effect::Own(Own::MarkersPeriod(100_000_000))
     );
-    let best = ParameterValue::String("best_effort".to_owned());
+    let best = Value::Text("best_effort".to_owned());
     assert_eq!(
         table.effect("out_reliability", &best),
         Effect::Own(Own::Reliable(false))
     );
-    let mode = ParameterValue::String("rate=50".to_owned());
+    let mode = Value::Text("rate=50".to_owned());
     assert_eq!(
         table.effect("mode", &mode),
         Effect::Tick(Setting::Mode(Mode::Rate(50.0)))
@@ -162,10 +134,10 @@ fn a_value_does_what_its_name_says() {
 fn bug_a_node_opened_anew_does_not_undo_margins_that_were_edited_since() {
     let scene = RosScene::default();
     let margin = |table: &Table, metres| {
-        let value = ParameterValue::Double(metres);
+        let value = Value::Real(metres);
         let effect = table.effect("report_within_m", &value);
         if table.is_running() {
-            table.keep("report_within_m", &value);
+            table.keep("report_within_m", value);
         }
         effect
     };
@@ -191,11 +163,11 @@ fn what_was_set_while_it_ran_is_what_the_next_node_begins_with() {
     ];
     first.start(&start, "/sweepd").unwrap();
     first.run();
-    first.keep("budget_ms", &ParameterValue::Double(4.0));
+    first.keep("budget_ms", Value::Real(4.0));
     let mut second = Table::of(&scene);
     second.start(&start, "/sweepd").unwrap();
     let value = |name: &str| {
-        let mut specs = second.specs().iter();
+        let mut specs = second.specs.iter();
         specs.find(|spec| spec.name == name).unwrap().value.clone()
     };
     assert_eq!(value("budget_ms"), Value::Real(4.0));

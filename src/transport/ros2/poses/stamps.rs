@@ -40,6 +40,13 @@ impl Source {
     }
 }
 
+/// The link of a frame comes as one that never changes and as one that does.
+pub(super) fn both((kind, name): (&str, &str)) -> String {
+    format!(
+        "{kind} {name}: its link comes on the topic of fixed links and on that of others, and the last one counts: leave one out"
+    )
+}
+
 /// Two publishers send links of one frame.
 pub(super) fn rivalry((kind, name): (&str, &str)) -> String {
     format!("{kind} {name}: two publishers send links of it: stop one of them")

@@ -89,6 +89,21 @@ fn a_body_is_said_when_a_link_of_its_chain_comes_and_not_again() {
 }
 
 #[test]
+fn a_link_that_is_fixed_on_one_topic_and_moves_on_another_is_told() {
+    let mut one = tf("tool");
+    one.take_links(&link("world", "tool", 0), true, at(MS));
+    assert_eq!(one.faults(9, MS), [""; 0]);
+    one.take_links(&link("world", "tool", 0), true, at(2 * MS));
+    assert_eq!(one.faults(9, 2 * MS), [""; 0], "said again");
+    one.take_links(&link("world", "tool", 3 * MS), false, at(3 * MS));
+    let told = one.faults(9, 3 * MS);
+    assert!(
+        told[0].contains("frame tool") && told[0].contains("leave one out"),
+        "{told:?}"
+    );
+}
+
+#[test]
 fn stamps_too_far_apart_make_the_body_unknown_and_say_so() {
     let mut one = source(RosKind::Tf, 50 * MS, "tool");
     one.take_links(&link("world", "base", 10 * MS), false, at(MS));

@@ -1,6 +1,8 @@
 //! What messages say, and how large they become.
 
+use super::super::markers::{CONTACTS_MAX, collisions};
 use super::*;
+use crate::wire::BODY_NAME_LEN;
 
 fn named(body: u64, text: &str) -> NameRow {
     let mut row = NameRow {
@@ -24,38 +26,49 @@ fn rows_are_cut_into_messages_that_fit_and_none_is_lost() {
 
 #[test]
 fn the_largest_message_stays_below_128_kilobytes_on_the_wire() {
-    let long = "x".repeat(104);
-    let speaker = Speaker {
+    let long = "x".repeat(BODY_NAME_LEN);
+    let rows: Vec<NameRow> = (1..=3000).map(|id| named(id, &long)).collect();
+    let all = Speaker {
         frame_id: "world".to_owned(),
-        book: Book::of(&[named(1, &long), named(2, &long)]),
+        book: Book::of(&rows),
     };
-    let contact = ContactRow {
+    let contact = |body_b| ContactRow {
         body_a: 1,
-        body_b: 2,
+        body_b,
         ..ContactRow::default()
     };
-    let pair = PairRow {
+    let pair = |body_b| PairRow {
         body_a: 1,
-        body_b: 2,
+        body_b,
         ..PairRow::default()
     };
     let parcel = Parcel {
-        contacts: vec![contact; 2000],
-        pairs: vec![pair; 2000],
+        contacts: (2..2002).map(contact).collect(),
+        pairs: (2..2002).map(pair).collect(),
         ..Parcel::default()
     };
-    let size = |bytes: Result<Vec<u8>, _>| -> usize {
-        let bytes: Vec<u8> = bytes.unwrap_or_else(|e: String| panic!("{e}"));
-        bytes.len()
-    };
-    let cdr = |message: &Contacts| {
-        cdr_encoding::to_vec::<_, byteorder::LittleEndian>(message).map_err(|e| e.to_string())
-    };
-    let largest = speaker.contacts(&parcel).iter().map(|m| size(cdr(m))).max();
-    assert!(
-        largest.is_some_and(|bytes| bytes <= 128 * 1024),
-        "{largest:?}"
-    );
+    let header = Header::default();
+    let (collisions, left_out) = collisions(header, &all.book, &parcel);
+    assert_eq!(left_out, 2000 - CONTACTS_MAX as u64);
+    let names = all.names(Time::default(), 1, 1);
+    for (topic, bytes) in [
+        ("contacts", largest(&all.contacts(&parcel))),
+        ("pairs", largest(&all.pairs(&parcel))),
+        ("names", largest(&names)),
+        ("collisions", largest(&[collisions])),
+    ] {
+        assert!((60_000..=128 * 1024).contains(&bytes), "{topic}: {bytes}");
+    }
+}
+
+/// Bytes on the wire of the largest one.
+fn largest<M: serde::Serialize>(messages: &[M]) -> usize {
+    let sizes = messages.iter().map(|message| {
+        cdr_encoding::to_vec::<_, byteorder::LittleEndian>(message)
+            .unwrap()
+            .len()
+    });
+    sizes.max().unwrap()
 }
 
 #[test]
