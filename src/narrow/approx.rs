@@ -254,10 +254,11 @@ impl Narrow {
         }
     }
 
-    /// The front of a pair of single shapes.
+    /// The front of a pair of single shapes; one that was never started knows nothing.
     fn front_of(&self, slot: PairSlot) -> Option<&CarriedFront> {
         let memo = self.memos.get(slot.index())?;
-        (memo.front != NONE).then(|| self.fronts.get(memo.front))?
+        let front = (memo.front != NONE).then(|| self.fronts.get(memo.front))?;
+        front.filter(|front| !front.is_empty())
     }
 }
 

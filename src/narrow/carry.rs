@@ -4,17 +4,19 @@
 //! with its own certificate, so a pair that has not moved enough is not looked at, and its front is not touched.
 
 use crate::ids::PairSlot;
-use crate::math::{Interval, relative};
+use crate::math::{Interval, Pose, relative};
+use crate::shape::Shape;
 use crate::time::Meter;
-use crate::world::Body;
+use crate::world::{Body, PlacedShape};
 
 use super::cursor::SLICE_UNITS;
-use super::memo::{Witness, bent};
-use super::mesh::{CarriedFront, Goal, numbered};
+use super::memo::{Memo, Witness, bent};
+use super::mesh::{CarriedFront, Goal, LeafContact, Search, numbered};
 use super::query::{leaf_contact, shape_pose, sound, witness_of};
 use super::{NONE, Narrow};
 
-/// What asking the last contact again costs, in tests of a box against a pack: when the clock is to be read.
+/// What asking two triangles whether they surely cross costs, in tests of a box against a pack, with what it takes to
+/// come to them: when the clock is to be read.
 const RETEST_COST: u64 = 2;
 
 /// A pair's turn doubles with each tick it waits for its verdict, up to so many times: what motion undoes in a tick may
@@ -48,13 +50,7 @@ impl Narrow {
         let pos12 = shape_pose(one, other, &rel);
         let due = goal == Goal::Verdict && self.witness_due(slot);
         let memo = &mut self.memos[slot.index()];
-        // Ticks without a verdict; none of a pair that is decided and asked for more.
-        let waited = match memo.undecided_since {
-            0 => 0,
-            since => self.tick.saturating_sub(since),
-        };
-        let fresh = memo.front == NONE;
-        if fresh {
+        if memo.front == NONE {
             memo.front = self.fronts.take(CarriedFront::default);
         }
         let Some(front) = self.fronts.get_mut(memo.front) else {
@@ -64,23 +60,39 @@ impl Narrow {
         let credit_m = a.motion.credit_m() + b.motion.credit_m();
         let bent_m = bent(a, b);
         let (one_shape, other_shape) = (&one.shape, &other.shape);
-        if fresh {
-            front.start(store, one_shape, other_shape, &pos12, self.search);
-        } else if due {
-            memo.retested = self.tick;
-            self.counters.queries += 1;
-            meter.charge_weighted(1, RETEST_COST);
-            if front.still_touches(one_shape, other_shape, &pos12) {
+        if goal == Goal::Verdict && self.search == Search::Carried || due {
+            self.counters.queries += u64::from(due);
+            memo.retested = if due { self.tick } else { memo.retested };
+            let told = glance(front, (one_shape, other_shape), &pos12, due, meter);
+            let gap = match &told {
                 // A certified touch at these very poses; the lower end is what motion left of the old one.
-                memo.gap = Interval::new(memo.now.min.min(0.0), 0.0);
+                Glance::Touch(_) => Interval::new(memo.now.min.min(0.0), 0.0),
+                Glance::Apart(low_m) => {
+                    let apart = Interval::new(*low_m, f64::INFINITY);
+                    sound(apart, one, other, &rel).meet(memo.now)
+                }
+                Glance::Nothing => Interval::UNKNOWN,
+            };
+            if gap.max <= 0.0 || gap.min > memo.report_m.max(0.0) {
+                memo.gap = gap;
                 (memo.rel, memo.credit_m, memo.tested) = (rel, credit_m, self.tick);
                 (memo.bent_m, memo.finished, memo.tight) = (bent_m, false, false);
+                match told {
+                    Glance::Touch(Some(leaf)) => {
+                        memo.witness = Some(seen_at(one, other, &pos12, &leaf));
+                    }
+                    Glance::Touch(None) => {}
+                    Glance::Apart(_) | Glance::Nothing => forget_touch(memo),
+                }
                 return false;
             }
         }
+        if front.is_empty() {
+            front.start(store, one_shape, other_shape, &pos12, self.search);
+        }
         front.move_to(store, one_shape, other_shape, &pos12);
         self.counters.slices += 1;
-        let slice_units = SLICE_UNITS << waited.min(SLICE_DOUBLINGS_MAX);
+        let slice_units = slice_units(memo.undecided_since, self.tick);
         let done = front.advance(store, one_shape, other_shape, goal, slice_units, meter);
         let found = sound(front.interval(), one, other, &rel);
         let now = memo.now;
@@ -95,14 +107,9 @@ impl Narrow {
         memo.finished = whole && front.is_certain();
         memo.tight = whole && goal != Goal::Verdict;
         if let Some(leaf) = front.witness() {
-            memo.witness = Some(Witness {
-                triangle_a: leaf.triangle_a,
-                triangle_b: leaf.triangle_b,
-                ..witness_of(one, other, &pos12, &leaf.closest, (0, 0))
-            });
-        } else if memo.gap.min > 0.0 && memo.witness.is_some_and(|w| w.best_m <= 0.0) {
-            // Where it touched says nothing of a pair that is apart.
-            memo.witness = None;
+            memo.witness = Some(seen_at(one, other, &pos12, &leaf));
+        } else if memo.gap.min > 0.0 {
+            forget_touch(memo);
         }
         if done && goal == Goal::Contacts {
             let gap = memo.gap;
@@ -117,5 +124,62 @@ impl Narrow {
             self.keep_contacts(slot, a.radius.min(b.radius));
         }
         !done
+    }
+}
+
+/// Units of a turn of a pair without a verdict since a tick, 0 of one that is decided and asked for more.
+fn slice_units(undecided_since: u64, tick: u64) -> u64 {
+    let waited = match undecided_since {
+        0 => 0,
+        since => tick.saturating_sub(since),
+    };
+    SLICE_UNITS << waited.min(SLICE_DOUBLINGS_MAX)
+}
+
+/// What a glance at a pair says, without a search of its front.
+enum Glance {
+    /// It touches still: where it did, or at these leaves.
+    Touch(Option<LeafContact>),
+    /// A plane parts it by so much, metres.
+    Apart(f64),
+    /// Nothing.
+    Nothing,
+}
+
+/// Looks at a pair where it touched last, or else at what a plane would say.
+///
+/// * `touched` - whether it touched when it was last looked at.
+fn glance(
+    front: &mut CarriedFront,
+    (a, b): (&Shape, &Shape),
+    pos12: &Pose,
+    touched: bool,
+    meter: &mut Meter<'_>,
+) -> Glance {
+    if !touched {
+        let low_m = front.parted(a, b, pos12, meter);
+        return low_m.map_or(Glance::Nothing, Glance::Apart);
+    }
+    meter.charge_weighted(1, RETEST_COST);
+    if front.still_touches(a, b, pos12) {
+        return Glance::Touch(None);
+    }
+    let beside = front.touches_beside(a, b, pos12, meter);
+    beside.map_or(Glance::Nothing, |leaf| Glance::Touch(Some(leaf)))
+}
+
+/// Two leaves as the witness of a pair of single shapes.
+fn seen_at(one: &PlacedShape, other: &PlacedShape, pos12: &Pose, leaf: &LeafContact) -> Witness {
+    Witness {
+        triangle_a: leaf.triangle_a,
+        triangle_b: leaf.triangle_b,
+        ..witness_of(one, other, pos12, &leaf.closest, (0, 0))
+    }
+}
+
+/// Where it touched says nothing of a pair that is apart.
+fn forget_touch(memo: &mut Memo) {
+    if memo.witness.is_some_and(|w| w.best_m <= 0.0) {
+        memo.witness = None;
     }
 }

@@ -34,6 +34,7 @@ mod containment;
 mod front;
 mod half_space;
 mod manifold;
+mod parting;
 mod patches;
 mod placed;
 mod query;
@@ -46,6 +47,7 @@ mod walk;
 
 pub use carried::{CarriedFront, FrontStore, Search, has_front};
 pub use contacts::{LEAF_CONTACTS_MAX, LeafContact};
+pub use parting::parted;
 pub use patches::{PATCH_POINTS, PATCHES_MAX, numbered};
 pub use query::{Goal, MeshQuery};
 pub use retest::retest_witness;

@@ -208,20 +208,28 @@ impl Mesh {
         bounds.widened(slop)
     }
 
+    /// An upper bound, but for rounding, on how far it reaches from its centre along a unit direction.
+    pub(crate) fn reach(&self, direction: &Vec3) -> f64 {
+        match &self.outline {
+            // No direction reaches beyond the ball.
+            Some(outline) if !self.is_deforming() => outline.reach(direction).min(self.radius),
+            _ => self.extent(direction)[0],
+        }
+    }
+
     /// Upper bounds, but for rounding, on how far it reaches from its centre along a unit direction and against it.
     pub(crate) fn extent(&self, direction: &Vec3) -> [f64; 2] {
         if self.is_deforming() {
             return self.extent_of_bounds(direction);
         }
-        let Some(outline) = &self.outline else {
+        if self.outline.is_none() {
             let named = self.faces.iter().flatten();
             return named.fold([f64::NEG_INFINITY; 2], |[up, down], &v| {
                 let on = direction.dot(&(self.vertices[v as usize] - self.centre));
                 [up.max(on), down.max(-on)]
             });
-        };
-        // No direction reaches beyond the ball.
-        [*direction, -direction].map(|along| outline.reach(&along).min(self.radius))
+        }
+        [*direction, -direction].map(|along| self.reach(&along))
     }
 
     /// A vertex far along `direction`: a guess, but a vertex of a face in any case.

@@ -71,6 +71,7 @@ fn drive(rng: &mut Rng, couple: &mut Couple<'_>, search: Search, whole: bool, wh
             if front.still_touches(a, b, &pos12) {
                 assert!(matches!(truth, Truth::Overlap(_)), "{at}: {truth:?}");
             }
+            glance(&mut front, (a, b), &pos12, truth, &at);
             front.move_to(&mut store, a, b, &pos12);
         }
         let goal = [Goal::Verdict, Goal::Verdict, Goal::Gap, Goal::Contacts][rng.below(4)];
@@ -117,6 +118,102 @@ fn drive(rng: &mut Rng, couple: &mut Couple<'_>, search: Search, whole: bool, wh
         }
         couple.pose_b = step(rng, &couple.pose_b, &home, a.radius.min(b.radius));
     }
+}
+
+/// What is told of a pair without a search: each answer against the truth.
+fn glance(
+    front: &mut CarriedFront,
+    (a, b): (&Shape, &Shape),
+    pos12: &Pose,
+    truth: Truth,
+    at: &str,
+) {
+    let tolerance = 1e-11 * (a.radius + b.radius);
+    let clock = ManualClock::new(0);
+    let mut meter = Meter::unlimited(&clock);
+    // A new pair is asked along one line only.
+    let _line = front.parted(a, b, pos12, &mut meter);
+    let low = front.parted(a, b, pos12, &mut meter);
+    let units = meter.spent();
+    assert!(units <= 2, "{at}: {units} units");
+    match (low, truth) {
+        (Some(low), Truth::Apart(d)) => {
+            assert!(0.0 < low && low <= d + tolerance, "{at}: {low} of {d}");
+        }
+        (Some(low), Truth::Overlap(gap)) => panic!("{at}: parted by {low}, but {gap}"),
+        (None, _) => {}
+    }
+    let again = front.parted(a, b, pos12, &mut meter);
+    match low {
+        Some(low) => assert!(again.is_some_and(|again| again >= low), "{at}: {again:?}"),
+        // Nothing has moved since none was found.
+        None => assert_eq!((again, meter.spent()), (None, units), "{at}"),
+    }
+    if let Some(leaf) = front.touches_beside(a, b, pos12, &mut meter) {
+        assert!(
+            matches!(truth, Truth::Overlap(_)),
+            "{at}: {leaf:?}, but {truth:?}"
+        );
+        assert!(leaf.closest.gap.max <= 0.0, "{at}: {leaf:?}");
+        assert!(
+            front.still_touches(a, b, pos12),
+            "{at}: it is asked from now on"
+        );
+    }
+}
+
+/// Balls with bumps that roll about one another: a plane parts them where they are a little apart, and where they go on
+/// touching, the leaves beside those that touched last touch.
+#[test]
+fn planes_and_leaves_beside_the_last_ones_tell_most_of_what_moves() {
+    let ball = shape(&meshes::bumpy_sphere(20, 40, 0.05), None);
+    let radius = ball.radius;
+    let clock = ManualClock::new(0);
+    let (mut parted, mut apart, mut beside, mut lost, mut wrong) = (0, 0, 0, 0, 0);
+    for case in 0..8 {
+        let mut rng = Rng::new(27_000_000 + case);
+        let (mut store, mut front) = (FrontStore::default(), CarriedFront::default());
+        let distance = if case % 2 == 0 { 2.15 } else { 1.75 } * radius;
+        let (axis, spin) = (rng.direction(), rng.vector(0.02));
+        let mut turn = rng.rotation();
+        for tick in 0..100 {
+            turn = Quat::new_normalize((Quat::from_scaled_axis(spin) * turn).into_inner());
+            let sway = 1.0 + 0.01 * (0.2 * f64::from(tick)).sin();
+            let pos12 = Pose::from_parts((axis * distance * sway).into(), turn);
+            if tick == 0 {
+                front.start(&mut store, &ball, &ball, &pos12, Search::Carried);
+            } else if front.still_touches(&ball, &ball, &pos12) {
+                continue;
+            }
+            let mut meter = Meter::unlimited(&clock);
+            if tick > 1 && case % 2 == 0 {
+                apart += 1;
+                parted += u32::from(front.parted(&ball, &ball, &pos12, &mut meter).is_some());
+            } else if tick > 1 {
+                lost += 1;
+                let found = front.touches_beside(&ball, &ball, &pos12, &mut meter);
+                beside += u32::from(found.is_some());
+            }
+            front.move_to(&mut store, &ball, &ball, &pos12);
+            let mut meter = Meter::unlimited(&clock);
+            assert!(front.advance(
+                &mut store,
+                &ball,
+                &ball,
+                Goal::Verdict,
+                u64::MAX,
+                &mut meter
+            ));
+            wrong += u32::from((front.interval().min > 0.0) != (case % 2 == 0));
+        }
+    }
+    println!("{parted} of {apart} parted by a plane, {beside} of {lost} found beside");
+    assert_eq!(wrong, 0, "as they were placed");
+    assert!(
+        apart > 300 && parted * 10 > apart * 9,
+        "{parted} of {apart}"
+    );
+    assert!(lost > 30 && beside * 10 > lost * 6, "{beside} of {lost}");
 }
 
 fn check_end(

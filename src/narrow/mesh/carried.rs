@@ -31,12 +31,12 @@
 use super::bound::Frame;
 use super::contacts::LeafContact;
 use super::containment::{Containment, ShellTests};
+use super::parting::Parting;
 use super::patches::Patches;
 use super::placed::{Placed, lag_of};
 use super::query::Goal;
 use super::retest::{reach_of, tree_of};
 use super::side::{self, Side};
-use super::triangle::{Triangle, surely_crosses};
 use crate::math::{Pose, ROUND};
 use crate::narrow::arena::Run;
 use crate::shape::{BoxId, Obb, Shape};
@@ -44,11 +44,12 @@ use crate::time::Meter;
 
 mod count;
 mod cover;
-mod drift;
+pub(super) mod drift;
 mod known;
 mod leaves;
 mod search;
 mod store;
+mod touch;
 mod unproved;
 
 pub use cover::Search;
@@ -58,14 +59,15 @@ use drift::Drift;
 use known::Known;
 pub use store::FrontStore;
 use store::Proved;
+use touch::Crossing;
 
 /// A front that has split into so many times its fresh size, and [`STALE_MORE`], starts anew: entries only ever split.
 const STALE_TIMES: usize = 3;
 const STALE_MORE: usize = 128;
-/// A front starts anew when so many times its used-up groups exceed the steps that a fresh start took: at 2 % of the
-/// diameter a tick 6,400 units in place of 14,800, at 0.1 % no difference (`benches/time_critical`; 1 and 4 were
-/// tried).
-const WORN_TIMES: usize = 2;
+/// A front starts anew when so many times its used-up groups exceed the steps that a fresh start took: at 0.5 % of the
+/// diameter a tick 2,000 units in place of 2,130 (2), 2,270 (1) and 2,230 (8), at 2 % 4,070 in place of 4,110, at 0.1 %
+/// no difference (`benches/time_critical`).
+const WORN_TIMES: usize = 3;
 /// Steps beyond this share of the smaller body's radius start anew where the touch is lost: 5,300 units in place of
 /// 7,300 at 2 % of the diameter a tick, 3,400 in place of 3,700 at 0.5 %; at 0.02 more pairs stay open within a limit.
 const ADRIFT: f64 = 0.04;
@@ -111,19 +113,12 @@ pub struct CarriedFront {
     last: Option<(BoxId, BoxId)>,
     witness: Option<LeafContact>,
     crossing: Option<Crossing>,
+    parting: Parting,
     contacts: Patches,
     /// Sum of what the two have deformed, when they were last looked at, metres.
     bent_m: f64,
     /// Which trees the boxes are of.
     trees: [u32; 2],
-}
-
-/// The triangles that touched last.
-#[derive(Clone, Copy, Debug)]
-struct Crossing {
-    places: [u32; 2],
-    /// Each in its own frame: to ask them again costs no look into a mesh that does not deform.
-    corners: [Triangle; 2],
 }
 
 /// Whether a pair of shapes can have a front.
@@ -160,6 +155,9 @@ impl CarriedFront {
         self.open.release(&mut store.open);
         store.open.release(&mut self.touching);
         self.contacts.release(&mut store.contacts);
+        // Another pair may have it next.
+        (self.last, self.crossing) = (None, None);
+        self.parting = Parting::default();
     }
 
     /// Takes the pair to another pose, and to the vertices of now; what was proved is carried over as far as it holds.
@@ -236,18 +234,17 @@ impl CarriedFront {
         }
     }
 
-    /// Whether the leaves that touched last are certain to touch at a pose; nothing else is looked at or changed.
-    #[must_use]
-    pub fn still_touches(&self, a: &Shape, b: &Shape, pos12: &Pose) -> bool {
-        let Some(crossing) = &self.crossing else {
-            return false;
-        };
-        let now = |shape: &Shape, k: usize| match shape.mesh() {
-            Some(mesh) if mesh.is_deforming() => mesh.triangle(crossing.places[k]),
-            _ => crossing.corners[k],
-        };
-        let at = Placed::new(pos12, reach_of(a), reach_of(b));
-        surely_crosses(&now(a, 0), &now(b, 1).map(|p| at.to_a(&p)), at.slop)
+    /// A lower bound on the gap at a pose, of a plane that parts the two as wholes; `None`: none was found. What is
+    /// proved of the pair stays as it is, at the pose it is at. One unit at most.
+    pub fn parted(
+        &mut self,
+        a: &Shape,
+        b: &Shape,
+        pos12: &Pose,
+        meter: &mut Meter<'_>,
+    ) -> Option<f64> {
+        let is_carried = self.search == Search::Carried;
+        is_carried.then(|| self.parting.low(a, b, pos12, meter))?
     }
 
     /// A mesh has other vertices than when this was last asked, and the front is to stay at its pose: what is found

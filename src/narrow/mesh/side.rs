@@ -52,13 +52,19 @@ impl<'a> Side<'a> {
         }
     }
 
+    /// An upper bound on how far it reaches from the origin of its tree along a direction of its frame.
+    pub(super) fn reach(self, direction: &Vec3, origin: &Point) -> f64 {
+        match self {
+            Self::Mesh(mesh) => mesh.reach(direction),
+            Self::Convex(convex) => direction.dot(&(convex.support(direction) - origin)),
+        }
+    }
+
     /// Upper bounds on how far it reaches from the origin of its tree along a direction of its frame, and against it.
     pub(super) fn extent(self, direction: &Vec3, origin: &Point) -> [f64; 2] {
         match self {
             Self::Mesh(mesh) => mesh.extent(direction),
-            Self::Convex(convex) => {
-                [*direction, -direction].map(|along| along.dot(&(convex.support(&along) - origin)))
-            }
+            Self::Convex(_) => [*direction, -direction].map(|along| self.reach(&along, origin)),
         }
     }
 

@@ -117,6 +117,14 @@ impl Adjacency {
     }
 }
 
+impl Mesh {
+    /// The face beyond the `k`th side of a face.
+    pub(crate) fn beside(&self, face: u32, k: u32) -> Option<u32> {
+        let twin = self.adjacency.twins.get((3 * face + k) as usize)?;
+        (*twin != NONE).then(|| twin / 3)
+    }
+}
+
 fn normal(vertices: &[Point], face: &[u32; 3]) -> Option<Vec3> {
     let [a, b, c] = face.map(|v| vertices[v as usize]);
     (b - a).cross(&(c - a)).try_normalize(f64::MIN_POSITIVE)

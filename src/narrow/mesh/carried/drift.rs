@@ -73,9 +73,14 @@ impl Drift {
         self.outlasts(gap).then(|| self.used_up_at(gap))
     }
 
+    /// A gap found at this pose that is greater than this outlasts it, metres; one not as great may.
+    pub(super) fn lasting_m(&self) -> f64 {
+        // What is used up at once, and what is rounded on the way there and back.
+        2.0 * self.offset_m + 16.0 * ROUND * (self.path_m + self.offset_m)
+    }
+
     /// Whether a gap found at this pose outlasts it.
-    #[inline]
-    pub(super) fn outlasts(&self, gap: f64) -> bool {
+    fn outlasts(&self, gap: f64) -> bool {
         (gap > 0.0) & (self.left_m(self.used_up_at(gap)) > 0.0)
     }
 
@@ -93,7 +98,7 @@ impl Drift {
 }
 
 /// How far any point of the smaller one's surface moves, seen from the other, metres, rounded up.
-pub(super) fn moved(a: &Shape, b: &Shape, from: &Pose, to: &Pose) -> f64 {
+pub(in crate::narrow::mesh) fn moved(a: &Shape, b: &Shape, from: &Pose, to: &Pose) -> f64 {
     if a.radius < b.radius {
         displacement(&from.inverse(), &to.inverse(), &a.centre, a.radius)
     } else {

@@ -159,6 +159,15 @@ impl<'a> Side<'a> {
         }
     }
 
+    /// How large a box is, see `ObbTree::size`.
+    pub(in crate::narrow::mesh) fn size(self, id: BoxId, whole: &Option<Obb>) -> f32 {
+        match (self, whole) {
+            (Self::Mesh(mesh), _) => mesh.obb().size(id),
+            (Self::Convex(_), Some(whole)) => whole.half.iter().map(|h| h * h).sum(),
+            (Self::Convex(_), None) => f32::INFINITY,
+        }
+    }
+
     /// How contacts name a leaf: a convex shape has no triangles.
     fn triangle_name(self, i: u32) -> u32 {
         match self {

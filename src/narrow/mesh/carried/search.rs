@@ -5,7 +5,7 @@ use super::leaves::{LEAF_COST, contact};
 use super::store::FrontStore;
 use super::{BoxId, CarriedFront, Containment, Goal, Side};
 use crate::narrow::mesh::side;
-use crate::shape::{Held, Obb};
+use crate::shape::Held;
 use crate::simd::obb::LANES;
 use crate::time::Meter;
 
@@ -101,8 +101,7 @@ impl CarriedFront {
     ) -> Group {
         let part_b = match (held_a, held_b) {
             (Held::Pack(_), Held::Pack(_)) => {
-                let size = |obb: Obb| obb.half.iter().map(|h| h * h).sum::<f32>();
-                size(b.obb(id_b, &self.whole[1])) > size(a.obb(id_a, &self.whole[0]))
+                b.size(id_b, &self.whole[1]) > a.size(id_a, &self.whole[0])
             }
             (held_a, _) => matches!(held_a, Held::Triangle(_)),
         };
@@ -153,9 +152,13 @@ impl CarriedFront {
         let (mut apart, mut least) = (0_u8, f64::INFINITY);
         // What would not outlast this pose is looked into: smaller boxes are farther apart. Without a branch: which of
         // them are apart is as good as random.
+        let lasting_m = if known_m > 0.0 {
+            f64::NEG_INFINITY
+        } else {
+            self.drift.lasting_m()
+        };
         for (lane, &gap) in gaps.iter().enumerate() {
-            let lasts = (known_m > 0.0) | self.drift.outlasts(gap);
-            let is_apart = lasts & (group.mask >> lane & 1 == 1);
+            let is_apart = (gap > lasting_m) & (group.mask >> lane & 1 == 1);
             apart |= u8::from(is_apart) << lane;
             least = if is_apart { least.min(gap) } else { least };
         }
