@@ -19,6 +19,8 @@ pub struct LeafContact {
     pub feature: u64,
     /// The surface that the normal is of; see [`LeafContact::SPARE`].
     pub patch: u32,
+    /// How far out it lies in its patch, where it is kept for that (`patches`), metres.
+    pub(super) out_m: f64,
 }
 
 impl LeafContact {

@@ -264,6 +264,7 @@ impl HalfSpaceWalk {
             triangle_b,
             feature: u64::from(vertex) << 1 | 1,
             patch: 0,
+            out_m: 0.0,
         }
     }
 }

@@ -42,7 +42,11 @@ impl Patches {
         let all = arena.all_mut(&self.kept);
         let spare = all.first().is_some_and(|p| p.patch == LeafContact::SPARE);
         if spare && point.patch != LeafContact::SPARE {
-            all.fill(*point);
+            // The first of its patch, from which the others lie so far out.
+            all.fill(LeafContact {
+                out_m: 0.0,
+                ..*point
+            });
             return;
         }
         if !all.is_empty() && !spare && point.patch == LeafContact::SPARE {
@@ -80,7 +84,13 @@ impl Patches {
     fn begin(&mut self, arena: &mut Arena<LeafContact>, point: &LeafContact) -> bool {
         let before = self.kept.len();
         for _ in 0..PATCH_POINTS {
-            if !arena.push(&mut self.kept, *point) {
+            if !arena.push(
+                &mut self.kept,
+                LeafContact {
+                    out_m: 0.0,
+                    ..*point
+                },
+            ) {
                 while self.kept.len() > before {
                     arena.pop(&mut self.kept);
                 }
@@ -137,30 +147,32 @@ fn update(patch: &mut [LeafContact], point: &LeafContact) {
     if point.closest.best_m < deepest.closest.best_m {
         *deepest = *point;
     }
-    let from = first.closest.point_a;
-    for (kept, direction) in outermost.iter_mut().zip(directions(&first.closest.normal)) {
-        let out = |p: &LeafContact| direction.dot(&(p.closest.point_a - from));
-        if out(point) > out(kept) {
-            *kept = *point;
+    let away = point.closest.point_a - first.closest.point_a;
+    let [x, y] = across(&first.closest.normal).map(|along| along.dot(&away));
+    let (ahead, behind) = outermost.split_at_mut(DIRECTIONS / 2);
+    for (k, (cos, sin)) in TURNS.into_iter().enumerate() {
+        let out_m = x * cos + y * sin;
+        for (kept, out_m) in [(&mut ahead[k], out_m), (&mut behind[k], -out_m)] {
+            if out_m > kept.out_m {
+                *kept = LeafContact { out_m, ..*point };
+            }
         }
     }
 }
 
-/// Eight directions at right angles to a unit normal, evenly spread and along no axis of the frame: two corners of what
-/// is drawn along the axes are never equally far out.
-fn directions(normal: &Vec3) -> [Vec3; DIRECTIONS] {
+/// Cosine and sine of half of the directions, evenly spread and along no axis of the frame: two corners of what is drawn
+/// along the axes are never equally far out. The other half is opposite.
+const TURNS: [(f64, f64); DIRECTIONS / 2] = [
+    (0.972, 0.233),
+    (0.522, 0.853),
+    (-0.233, 0.972),
+    (-0.853, 0.522),
+];
+
+/// Two directions at right angles to a unit normal and to one another.
+fn across(normal: &Vec3) -> [Vec3; 2] {
     let mut least = Vec3::zeros();
     least[normal.iamin()] = 1.0;
     let x = normal.cross(&least).normalize();
-    let y = normal.cross(&x);
-    let turns: [(f64, f64); 4] = [
-        (0.972, 0.233),
-        (0.522, 0.853),
-        (-0.233, 0.972),
-        (-0.853, 0.522),
-    ];
-    let half = turns.map(|(cos, sin)| x * cos + y * sin);
-    [
-        half[0], half[1], half[2], half[3], -half[0], -half[1], -half[2], -half[3],
-    ]
+    [x, normal.cross(&x)]
 }

@@ -310,6 +310,7 @@ impl Walk {
             triangle_b: triangle(b),
             feature: 0,
             patch: 0,
+            out_m: 0.0,
         };
         let better = |w: &Witness| closest.best_m < w.closest.best_m;
         if self.witness.as_ref().is_none_or(better) {

@@ -116,6 +116,7 @@ pub(super) fn contact(a: (Side<'_>, u32), b: (Side<'_>, u32), closest: Closest) 
         triangle_b: b.0.triangle_name(b.1),
         feature: 0,
         patch: LeafContact::SPARE,
+        out_m: 0.0,
     }
 }
 
