@@ -92,7 +92,8 @@ impl Parting {
     }
 }
 
-/// A lower bound on the gap of two shapes of which one is a mesh, at a pose by itself: see [`Parting::low`].
+/// A lower bound on the gap of two shapes of which one is a mesh, positive and rounded down, at a pose by itself;
+/// `None`: no plane that parts them was found. Two units at most.
 #[must_use]
 pub fn parted((a, b): (&Shape, &Shape), pos12: &Pose, meter: &mut Meter<'_>) -> Option<f64> {
     a.mesh().or(b.mesh())?;
