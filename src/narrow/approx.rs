@@ -258,7 +258,7 @@ impl Narrow {
     fn front_of(&self, slot: PairSlot) -> Option<&CarriedFront> {
         let memo = self.memos.get(slot.index())?;
         let front = (memo.front != NONE).then(|| self.fronts.get(memo.front))?;
-        front.filter(|front| !front.is_empty())
+        front.filter(|front| front.is_started())
     }
 }
 

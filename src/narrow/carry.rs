@@ -1,7 +1,9 @@
 //! Pairs of single shapes of which one is a mesh: work on their fronts, and what it says of the bodies.
 //!
-//! A front works at this tick's poses; what it had proved before is carried there. The pair's memory is an interval
-//! with its own certificate, so a pair that has not moved enough is not looked at, and its front is not touched.
+//! A front works at this tick's poses; what it had proved before is carried there. It stays behind, or is not begun,
+//! while a glance tells enough: a plane that parts the two, or a touch where they touched last. The pair's memory is
+//! an interval with its own certificate, so a pair that has not moved enough is not looked at, and its front is not
+//! touched.
 
 use crate::ids::PairSlot;
 use crate::math::{Interval, Pose, relative};
@@ -10,7 +12,7 @@ use crate::time::Meter;
 use crate::world::{Body, PlacedShape};
 
 use super::cursor::SLICE_UNITS;
-use super::memo::{Memo, Witness, bent};
+use super::memo::{Witness, bent};
 use super::mesh::{CarriedFront, Goal, LeafContact, Search, numbered};
 use super::query::{leaf_contact, shape_pose, sound, witness_of};
 use super::{NONE, Narrow};
@@ -82,12 +84,13 @@ impl Narrow {
                         memo.witness = Some(seen_at(one, other, &pos12, &leaf));
                     }
                     Glance::Touch(None) => {}
-                    Glance::Apart(_) | Glance::Nothing => forget_touch(memo),
+                    // Where it was nearest once is not where it is now.
+                    Glance::Apart(_) | Glance::Nothing => memo.witness = None,
                 }
                 return false;
             }
         }
-        if front.is_empty() {
+        if !front.is_started() {
             front.start(store, one_shape, other_shape, &pos12, self.search);
         }
         front.move_to(store, one_shape, other_shape, &pos12);
@@ -108,8 +111,9 @@ impl Narrow {
         memo.tight = whole && goal != Goal::Verdict;
         if let Some(leaf) = front.witness() {
             memo.witness = Some(seen_at(one, other, &pos12, &leaf));
-        } else if memo.gap.min > 0.0 {
-            forget_touch(memo);
+        } else if memo.gap.min > 0.0 && memo.witness.is_some_and(|w| w.best_m <= 0.0) {
+            // Where it touched says nothing of a pair that is apart.
+            memo.witness = None;
         }
         if done && goal == Goal::Contacts {
             let gap = memo.gap;
@@ -160,6 +164,9 @@ fn glance(
         let low_m = front.parted(a, b, pos12, meter);
         return low_m.map_or(Glance::Nothing, Glance::Apart);
     }
+    if !front.knows_touch() {
+        return Glance::Nothing;
+    }
     meter.charge_weighted(1, RETEST_COST);
     if front.still_touches(a, b, pos12) {
         return Glance::Touch(None);
@@ -174,12 +181,5 @@ fn seen_at(one: &PlacedShape, other: &PlacedShape, pos12: &Pose, leaf: &LeafCont
         triangle_a: leaf.triangle_a,
         triangle_b: leaf.triangle_b,
         ..witness_of(one, other, pos12, &leaf.closest, (0, 0))
-    }
-}
-
-/// Where it touched says nothing of a pair that is apart.
-fn forget_touch(memo: &mut Memo) {
-    if memo.witness.is_some_and(|w| w.best_m <= 0.0) {
-        memo.witness = None;
     }
 }

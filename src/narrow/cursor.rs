@@ -189,7 +189,7 @@ impl Cursor {
             let mut bound = sphere_bound(one, other, &self.rel);
             if bound > enough {
                 meter.charge(1);
-            } else if room.search == Search::Carried {
+            } else if room.search == Search::Carried && enough < f64::INFINITY {
                 let low = parted((&one.shape, &other.shape), &pos12, meter);
                 let apart = low.map(|low| sound(Interval::new(low, low), one, other, &self.rel));
                 bound = apart.map_or(bound, |apart| apart.min.max(bound));

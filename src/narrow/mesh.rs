@@ -9,6 +9,9 @@
 //!   surfaces it is a front that is not carried on;
 //! - [`Walk`], the same over the trees of axis-aligned boxes: the twin and the baseline of the two.
 //!
+//! Before any of the first two searches, a plane that parts the two as wholes is looked for (`parting`), and of a pair
+//! that touched last the triangles that did, and those beside them (`carried/touch`).
+//!
 //! Of a walk every pair of triangles is covered by exactly one entry at any time: on the stack (boxes that may touch),
 //! in the heap (boxes proved apart by so much), or settled (queried, or proved farther than the best distance known).
 //! So the least of all entries is a sound lower bound at any interruption. Three stages:

@@ -482,7 +482,7 @@ fn a_coherent_front_costs_a_fraction_of_starting_again() {
 #[test]
 fn a_front_without_room_is_sound_and_says_that_it_is_not_certain() {
     let clock = ManualClock::new(0);
-    let (mut decided, mut undecided) = (0, 0);
+    let (mut decided, mut undecided, mut lumped) = (0, 0, 0);
     for case in 0..CASES {
         let mut rng = Rng::new(26_000_000 + case);
         let (kind_a, kind_b) = (rng.below(KINDS), rng.below(KINDS));
@@ -503,6 +503,9 @@ fn a_front_without_room_is_sound_and_says_that_it_is_not_certain() {
             let mut meter = Meter::new(&clock, None, Some(2000));
             let done = front.advance(&mut store, &a, &b, goal, u64::MAX, &mut meter);
             let (gap, tolerance) = (front.interval(), 1e-11 * (a.radius + b.radius));
+            // With all of it lumped together it holds no entry, and is no front that has yet to be started.
+            lumped += u32::from(front.is_empty());
+            assert!(front.is_started(), "case {case}");
             match truth_of(&a, &b, &pose_a, &pose_b) {
                 Truth::Apart(d) => {
                     assert!(gap.min <= d + tolerance && d - tolerance <= gap.max);
@@ -518,6 +521,11 @@ fn a_front_without_room_is_sound_and_says_that_it_is_not_certain() {
             }
             pose_b = step(&mut rng, &pose_b, &home, a.radius.min(b.radius));
         }
+        front.release(&mut store);
+        assert!(!front.is_started(), "case {case}");
     }
-    assert!(decided > 0 && undecided > 0, "{decided} {undecided}");
+    assert!(
+        decided > 0 && undecided > 0 && lumped > 0,
+        "{decided} {undecided} {lumped}"
+    );
 }

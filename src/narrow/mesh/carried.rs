@@ -81,6 +81,8 @@ const LEAP: f64 = 0.1;
 #[derive(Debug, Default)]
 pub struct CarriedFront {
     search: Search,
+    /// Started, and not released since.
+    started: bool,
     at: Placed,
     drift: Drift,
     proved: Proved,
@@ -143,6 +145,7 @@ impl CarriedFront {
         search: Search,
     ) {
         self.search = search;
+        self.started = true;
         self.at = Placed::of(a, b, pos12);
         (self.last, self.crossing) = (None, None);
         self.start_over(store, a, b);
@@ -156,6 +159,7 @@ impl CarriedFront {
         store.open.release(&mut self.touching);
         self.contacts.release(&mut store.contacts);
         // Another pair may have it next.
+        self.started = false;
         (self.last, self.crossing) = (None, None);
         self.parting = Parting::default();
     }
@@ -304,7 +308,13 @@ impl CarriedFront {
         self.proved.len() + self.open.len() + self.passing.len() + self.touching.len()
     }
 
-    /// Whether it was never started.
+    /// Whether it was started, and not released since: what it covers may still be lumped together, entry by entry.
+    #[must_use]
+    pub fn is_started(&self) -> bool {
+        self.started
+    }
+
+    /// Whether it holds no entry.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0

@@ -1,14 +1,15 @@
 //! A plane between two shapes, found again at each pose from where it was at the last.
 //!
-//! In: two shapes of which at least one is a mesh, and one pose after the other. Out: a lower bound on their gap where a
-//! plane parts them as wholes. What is left to the fronts are pairs that reach into one another's hollows, or are as
+//! In: two shapes of which at least one is a mesh, and one pose after the other. Out: a lower bound on their gap where
+//! a plane parts them as wholes. What is left to the fronts are pairs that reach into one another's hollows, or are as
 //! near as the tables are coarse.
 //!
 //! How far a whole reaches along a direction is known from a table or from a support point (`Side::reach`), so that a
-//! direction costs a third of what a box against a pack does. `n . between` less what the two reach is a concave function of
-//! `n`: where a plane parts them, any way uphill leads to one. So the climb is a compass in the plane across `n`, which
-//! stops at the first direction that parts. A pair that is new is asked along the line between its middles only: most
-//! that touch are found out by less than a climb costs.
+//! direction costs half of what a box against a pack does. `n . between` less what the two reach is a concave function
+//! of `n` but for the table's cells: where a plane parts them, ways uphill lead to one. So the climb is a compass in
+//! the plane across `n`, which stops at the first direction that parts, or at a ridge that it cannot follow. A pair
+//! that is new is asked along the line between its middles only: most that touch are found out by less than a climb
+//! costs.
 //!
 //! Refused: the closest points of the two hulls (a query of its own, where a sign is all that is asked).
 
@@ -20,21 +21,25 @@ use crate::math::{Pose, Vec3};
 use crate::shape::Shape;
 use crate::time::Meter;
 
-/// Directions tried in one climb: a warm one mostly needs one. With 12 a hundredth more pairs are parted than with 8.
+/// Directions tried in one climb: a warm one mostly needs one.
 const TRIES_MAX: u64 = 12;
 /// First step of the compass, radians: what two bodies turn by in some ticks.
 const STEP: f64 = 0.12;
 /// Least step: a table is no better.
 const STEP_MIN: f64 = 0.01;
-/// What one direction costs, in quarters of a test of a box against a pack: when the clock is to be read.
+/// What one direction costs, in quarters of a test of a box against a pack: when the clock is to be read. So many
+/// points of a convex shape, each of which is asked, cost another quarter.
 const TRY_COST_QUARTERS: u64 = 2;
+/// As [`TRY_COST_QUARTERS`].
+const POINTS_A_QUARTER: usize = 16;
 
 /// The plane of one pair.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Parting {
     /// Unit, A's frame, from A to B; `None`: never looked for.
     normal: Option<Vec3>,
-    /// Where none was found last, and how far it was from one, metres: no motion shorter than that brings one about.
+    /// Where none was found last, and how far the climb's end was from one, metres: a shorter motion brings none about
+    /// there, and is not worth another climb.
     none_at: Option<(Pose, f64)>,
 }
 
@@ -87,7 +92,9 @@ impl Parting {
         }
         self.normal = Some(normal);
         self.none_at = (best <= 0.0 && !new).then(|| (*pos12, -best));
-        meter.charge_weighted(1, tries * TRY_COST_QUARTERS / 4 + 1);
+        let points = (side_a.points() + side_b.points()) / POINTS_A_QUARTER;
+        let cost = tries * (TRY_COST_QUARTERS + points as u64) / 4 + 1;
+        meter.charge_weighted(1, cost);
         (best > 0.0).then_some(best)
     }
 }

@@ -160,8 +160,8 @@ fn update(patch: &mut [LeafContact], point: &LeafContact) {
     }
 }
 
-/// Cosine and sine of half of the directions, evenly spread and along no axis of the frame: two corners of what is drawn
-/// along the axes are never equally far out. The other half is opposite.
+/// Cosine and sine of half of the directions, evenly spread and along no axis of the frame: two corners of what is
+/// drawn along the axes are never equally far out. The other half is opposite.
 const TURNS: [(f64, f64); DIRECTIONS / 2] = [
     (0.972, 0.233),
     (0.522, 0.853),

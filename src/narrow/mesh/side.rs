@@ -60,6 +60,14 @@ impl<'a> Side<'a> {
         }
     }
 
+    /// How many points are asked for how far it reaches; a mesh has a table.
+    pub(super) fn points(self) -> usize {
+        match self {
+            Self::Mesh(_) => 0,
+            Self::Convex(convex) => convex.vertices().len(),
+        }
+    }
+
     /// Upper bounds on how far it reaches from the origin of its tree along a direction of its frame, and against it.
     pub(super) fn extent(self, direction: &Vec3, origin: &Point) -> [f64; 2] {
         match self {

@@ -173,13 +173,6 @@ impl ObbTree {
         self.packs[id.pack() as usize].below(id.lane())
     }
 
-    /// How large a box is, to be compared with another: the sum of its half sides' squares, square metres.
-    #[inline]
-    pub(crate) fn size(&self, id: BoxId) -> f32 {
-        let half = &self.packs[id.pack() as usize].boxes.half;
-        half.iter().map(|row| row[id.lane()] * row[id.lane()]).sum()
-    }
-
     /// A box by itself.
     pub(crate) fn get(&self, id: BoxId) -> Obb {
         let pack = &self.packs[id.pack() as usize];

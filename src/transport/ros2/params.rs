@@ -1,5 +1,5 @@
 //! The node's parameters: what they are, which values they take, what they do. In: a scene, settings of the command
-//! line and of files, sets of anybody (`answer`). Out: values, or why not; changes for the tick thread and the node's own.
+//! line and of files, sets of anybody (`answer`). Out: values, or why not; changes for the tick thread and the node.
 //!
 //! What touches safety (budget, mode, time-outs, skew, margins) is changed while running only with `ros.allow_edits`,
 //! which is said at the start.

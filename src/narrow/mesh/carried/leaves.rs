@@ -74,6 +74,7 @@ impl CarriedFront {
                 self.crossing = corners.map(|corners| Crossing {
                     places: [i, j],
                     corners,
+                    asked: 0,
                 });
             }
             self.known.touches = true;
@@ -160,10 +161,14 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// How large a box is, see `ObbTree::size`.
+    /// How large a box is, to be compared with another: the sum of its half sides' squares, square metres.
     pub(in crate::narrow::mesh) fn size(self, id: BoxId, whole: &Option<Obb>) -> f32 {
         match (self, whole) {
-            (Self::Mesh(mesh), _) => mesh.obb().size(id),
+            (Self::Mesh(mesh), _) => {
+                let half = &mesh.obb().packs()[id.pack() as usize].boxes.half;
+                let lane = id.lane();
+                half.iter().map(|row| row[lane] * row[lane]).sum()
+            }
             (Self::Convex(_), Some(whole)) => whole.half.iter().map(|h| h * h).sum(),
             (Self::Convex(_), None) => f32::INFINITY,
         }

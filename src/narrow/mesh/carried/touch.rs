@@ -38,9 +38,16 @@ pub(super) struct Crossing {
     pub(super) places: [u32; 2],
     /// Each in its own frame: to ask them again costs no look into a mesh that does not deform.
     pub(super) corners: [Triangle; 2],
+    /// How many of those beside them have been asked: a round that was cut off goes on.
+    pub(super) asked: usize,
 }
 
 impl CarriedFront {
+    /// Whether it is known where they touched last; after a round in vain it is not.
+    pub(in crate::narrow) fn knows_touch(&self) -> bool {
+        self.crossing.is_some()
+    }
+
     /// Whether the leaves that touched last are certain to touch at a pose; nothing else is looked at or changed.
     #[must_use]
     pub fn still_touches(&self, a: &Shape, b: &Shape, pos12: &Pose) -> bool {
@@ -56,7 +63,8 @@ impl CarriedFront {
     }
 
     /// Leaves that are certain to touch at a pose, beside those that touched last and do not any more: they are the
-    /// ones to be asked next time, and nothing else is changed. Units: a pair of leaves each.
+    /// ones to be asked next time. After a round in vain it is forgotten where the two touched, so that no pair spends
+    /// a small budget on it for ever; nothing else is changed. Units: a pair of leaves each.
     pub fn touches_beside(
         &mut self,
         a: &Shape,
@@ -64,7 +72,7 @@ impl CarriedFront {
         pos12: &Pose,
         meter: &mut Meter<'_>,
     ) -> Option<LeafContact> {
-        let crossing = self.crossing.as_ref()?;
+        let crossing = self.crossing.as_mut()?;
         let (mesh_a, mesh_b) = (a.mesh()?, b.mesh()?);
         if self.search != Search::Carried {
             return None;
@@ -78,13 +86,14 @@ impl CarriedFront {
         let of_b =
             near_b.map(|place| place.map(|place| mesh_b.triangle(place).map(|p| at.to_a(&p))));
         // One that touched and one beside the other first; the two themselves have been asked.
-        for (i, j) in BESIDE {
-            let (Some(one), Some(other)) = (&of_a[i], &of_b[j]) else {
-                continue;
-            };
+        for (i, j) in BESIDE.into_iter().skip(crossing.asked) {
             if !meter.open() {
                 return None;
             }
+            crossing.asked += 1;
+            let (Some(one), Some(other)) = (&of_a[i], &of_b[j]) else {
+                continue;
+            };
             meter.charge(1);
             let places = (near_a[i]?, near_b[j]?);
             if surely_crosses(one, other, at.slop) {
@@ -96,10 +105,12 @@ impl CarriedFront {
                 self.crossing = Some(Crossing {
                     places: [places.0, places.1],
                     corners: [*one, mesh_b.triangle(places.1)],
+                    asked: 0,
                 });
                 return Some(contact(leaves.0, leaves.1, closest));
             }
         }
+        self.crossing = None;
         None
     }
 }
