@@ -1,5 +1,6 @@
 //! 4.7: who has a turn first when the budget does not reach for all, and that nobody waits for ever.
 
+use sweepd::math::Vec3;
 use sweepd::time::Budget;
 use sweepd::wire::Verdict;
 
@@ -134,32 +135,52 @@ fn bug_contacts_that_were_confirmed_each_tick_kept_all_others_waiting() {
 
 #[test]
 fn bug_pairs_that_no_turn_decided_kept_all_others_waiting() {
+    // Side by side and asked from the roots at each pose, for a plane would part them at once; and a ball in the hollow
+    // of a solid, which no plane parts from it.
+    let ball = bumpy_sphere(24, 48, 0.01);
+    let large = |by: f64| ball.clone().scaled(Vec3::new(by, by, by));
+    let hollow = large(2.0).and(large(1.06).inverted());
+    no_turn_decides(
+        "restart",
+        [&trimesh(&ball, None), &trimesh(&ball, None)],
+        2.04,
+    );
+    no_turn_decides(
+        "carried",
+        [&trimesh(&hollow, None), &trimesh(&ball, None)],
+        0.0,
+    );
+}
+
+/// Pairs of meshes that are never decided, so far apart in every tick and turned anew, beside pairs of balls.
+fn no_turn_decides(search: &str, meshes: [&str; 2], apart_m: f64) {
     const MESHES: usize = 4;
     const BALLS: usize = 6;
     const UNITS: u64 = 40;
-    let mesh = trimesh(&bumpy_sphere(24, 48, 0.01), None);
     let mut bodies = Vec::new();
     for pair in 0..MESHES + BALLS {
         let (id, x) = (2 * pair as u64 + 1, 20.0 * pair as f64);
-        let [dx, dy, dz] = offset(2.1, 0.0);
-        for (id, at) in [(id, [x, 0.0, 0.0]), (id + 1, [x + dx, dy, dz])] {
+        let [dx, dy, dz] = offset(if pair < MESHES { apart_m } else { 2.1 }, 0.0);
+        let places = [(id, [x, 0.0, 0.0]), (id + 1, [x + dx, dy, dz])];
+        for ((id, at), mesh) in places.into_iter().zip(meshes) {
             bodies.push(if pair < MESHES {
-                body(id, at, &mesh, "")
+                body(id, at, mesh, "")
             } else {
                 ball(id, at, 1.0)
             });
         }
     }
-    // From the roots at each pose: a plane would part them at once.
-    let run = "[run]\nmesh_search = \"restart\"";
-    let mut rig = Rig::new(&scene(run, &bodies));
+    let mut rig = Rig::new(&scene(
+        &format!("[run]\nmesh_search = \"{search}\""),
+        &bodies,
+    ));
     rig.send(ALL);
     let most = longest_wait((MESHES + BALLS) as u64, 1, CLOSING);
     let mut rng = Rng::new(42);
     let (mut waits, mut open) = ([0_u64; MESHES + BALLS], 0);
     for tick in 0..400 {
         for pair in 0..MESHES + BALLS {
-            let distance_m = if pair < MESHES { 2.04 } else { 2.1 };
+            let distance_m = if pair < MESHES { apart_m } else { 2.1 };
             put(&mut rig, pair, offset(distance_m, 0.15 * f64::from(tick)));
             // What turns so far has nothing left of what was proved.
             let [x, y, z, w] = *rng.rotation().as_vector().as_ref();
@@ -173,12 +194,15 @@ fn bug_pairs_that_no_turn_decided_kept_all_others_waiting() {
             .count();
         for (wait, decided) in waits.iter_mut().zip(decided).skip(MESHES) {
             *wait = if decided { 0 } else { *wait + 1 };
-            assert!(*wait <= most, "{wait} of {most} ticks in tick {tick}");
+            assert!(
+                *wait <= most,
+                "{search}: {wait} of {most} ticks in tick {tick}"
+            );
         }
     }
     assert!(
         open > 300 * MESHES,
-        "the meshes are to be too much for the budget: {open}"
+        "{search}: the meshes are to be too much for the budget: {open}"
     );
 }
 
