@@ -524,8 +524,7 @@ fn a_front_without_room_is_sound_and_says_that_it_is_not_certain() {
         front.release(&mut store);
         assert!(!front.is_started(), "case {case}");
     }
-    assert!(
-        decided > 0 && undecided > 0 && lumped > 0,
-        "{decided} {undecided} {lumped}"
-    );
+    assert!(decided > 0 && undecided > 0, "{decided} {undecided}");
+    // A few cases in a thousand, more than dev can bear.
+    assert!(lumped > 0 || CASES < 300, "none was lumped together");
 }
