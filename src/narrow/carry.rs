@@ -63,8 +63,10 @@ impl Narrow {
         let bent_m = bent(a, b);
         let (one_shape, other_shape) = (&one.shape, &other.shape);
         if goal == Goal::Verdict && self.search == Search::Carried || due {
-            self.counters.queries += u64::from(due);
-            memo.retested = if due { self.tick } else { memo.retested };
+            if due {
+                self.counters.queries += 1;
+                memo.retested = self.tick;
+            }
             let told = glance(front, (one_shape, other_shape), &pos12, due, meter);
             let gap = match &told {
                 // A certified touch at these very poses; the lower end is what motion left of the old one.

@@ -179,23 +179,25 @@ impl Cursor {
             reason = "limits::SHAPES_PER_BODY_MAX fits"
         )]
         let places = (place_a as u32, place_b as u32);
-        let pos12 = shape_pose(one, other, &self.rel);
+        // A shape pair that cannot be the least (nor, where contacts are wanted, touch) needs no query.
+        let enough = match self.goal {
+            Goal::Verdict => report_m.max(0.0),
+            Goal::Gap | Goal::Contacts => self.gap.max.max(0.0),
+        };
         if !self.under_way {
-            // A shape pair that cannot be the least (nor, where contacts are wanted, touch) needs no query.
-            let enough = match self.goal {
-                Goal::Verdict => report_m.max(0.0),
-                Goal::Gap | Goal::Contacts => self.gap.max.max(0.0),
-            };
-            let mut bound = sphere_bound(one, other, &self.rel);
+            let bound = sphere_bound(one, other, &self.rel);
             if bound > enough {
                 meter.charge(1);
-            } else if room.search == Search::Carried && enough < f64::INFINITY {
-                let low = parted((&one.shape, &other.shape), &pos12, meter);
-                let apart = low.map(|low| sound(Interval::new(low, low), one, other, &self.rel));
-                bound = apart.map_or(bound, |apart| apart.min.max(bound));
-            }
-            if bound > enough {
                 self.gap.min = self.gap.min.min(bound);
+                return true;
+            }
+        }
+        let pos12 = shape_pose(one, other, &self.rel);
+        if !self.under_way && room.search == Search::Carried && enough < f64::INFINITY {
+            let low = parted((&one.shape, &other.shape), &pos12, meter);
+            let apart = low.map(|low| sound(Interval::new(low, low), one, other, &self.rel));
+            if let Some(apart) = apart.filter(|apart| apart.min > enough) {
+                self.gap.min = self.gap.min.min(apart.min);
                 return true;
             }
         }

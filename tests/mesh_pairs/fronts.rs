@@ -216,6 +216,47 @@ fn planes_and_leaves_beside_the_last_ones_tell_most_of_what_moves() {
     assert!(lost > 30 && beside * 10 > lost * 6, "{beside} of {lost}");
 }
 
+#[test]
+fn bug_a_round_beside_a_touch_that_was_cut_off_is_whole_again_once_the_touch_is_back() {
+    let ball = shape(&meshes::bumpy_sphere(20, 40, 0.05), None);
+    let clock = ManualClock::new(0);
+    let (mut store, mut front) = (FrontStore::default(), CarriedFront::default());
+    // Turned, so that no edge lies in a face.
+    let turn = Quat::from_scaled_axis(Vec3::new(0.3, 0.5, 0.2));
+    let at = |x: f64| Pose::from_parts(Vec3::new(x, 0.13, 0.07).into(), turn);
+    let (here, away) = (at(1.75), at(5.0));
+    front.start(&mut store, &ball, &ball, &here, Search::Carried);
+    let mut meter = Meter::unlimited(&clock);
+    assert!(front.advance(
+        &mut store,
+        &ball,
+        &ball,
+        Goal::Verdict,
+        u64::MAX,
+        &mut meter
+    ));
+    assert!(front.still_touches(&ball, &ball, &here));
+    let asked = |front: &mut CarriedFront, units| {
+        let mut meter = Meter::new(&clock, None, units);
+        assert!(
+            front
+                .touches_beside(&ball, &ball, &away, &mut meter)
+                .is_none()
+        );
+        meter.spent()
+    };
+    assert_eq!(asked(&mut front, Some(5)), 5);
+    assert!(front.still_touches(&ball, &ball, &here));
+    assert_eq!(asked(&mut front, Some(5)), 5, "from the first on");
+    assert_eq!(asked(&mut front, None), 10, "where it was cut off");
+    assert_eq!(
+        asked(&mut front, None),
+        0,
+        "forgotten after a round in vain"
+    );
+    assert!(!front.still_touches(&ball, &ball, &here));
+}
+
 fn check_end(
     front: &CarriedFront,
     store: &FrontStore,

@@ -125,8 +125,12 @@ impl Shared {
 
     /// Does what parameters say; no tick takes a part of it.
     pub(super) fn take(&self, effects: impl Iterator<Item = Effect>) {
+        // Made before the lock is taken, which the tick thread takes, too.
+        let effects: Vec<Effect> = effects.collect();
         let mut settings = open(&self.settings);
-        effects.for_each(|effect| self.take_one(effect, &mut settings));
+        effects
+            .into_iter()
+            .for_each(|effect| self.take_one(effect, &mut settings));
     }
 
     fn take_one(&self, effect: Effect, settings: &mut Vec<Setting>) {

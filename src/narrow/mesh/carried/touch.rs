@@ -48,10 +48,11 @@ impl CarriedFront {
         self.crossing.is_some()
     }
 
-    /// Whether the leaves that touched last are certain to touch at a pose; nothing else is looked at or changed.
+    /// Whether the leaves that touched last are certain to touch at a pose; nothing else is looked at. Where they are,
+    /// a round beside them that was cut off is no more to be gone on with.
     #[must_use]
-    pub fn still_touches(&self, a: &Shape, b: &Shape, pos12: &Pose) -> bool {
-        let Some(crossing) = &self.crossing else {
+    pub fn still_touches(&mut self, a: &Shape, b: &Shape, pos12: &Pose) -> bool {
+        let Some(crossing) = &mut self.crossing else {
             return false;
         };
         let now = |shape: &Shape, k: usize| match shape.mesh() {
@@ -59,7 +60,11 @@ impl CarriedFront {
             _ => crossing.corners[k],
         };
         let at = Placed::new(pos12, reach_of(a), reach_of(b));
-        surely_crosses(&now(a, 0), &now(b, 1).map(|p| at.to_a(&p)), at.slop)
+        let touches = surely_crosses(&now(a, 0), &now(b, 1).map(|p| at.to_a(&p)), at.slop);
+        if touches {
+            crossing.asked = 0;
+        }
+        touches
     }
 
     /// Leaves that are certain to touch at a pose, beside those that touched last and do not any more: they are the
