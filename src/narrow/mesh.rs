@@ -47,6 +47,7 @@ mod shared;
 mod side;
 mod triangle;
 mod walk;
+mod way;
 
 pub use carried::{CarriedFront, FrontStore, Search, has_front};
 pub use contacts::{LEAF_CONTACTS_MAX, LeafContact};

@@ -163,9 +163,9 @@ fn glance(
 }
 
 /// Balls with bumps that roll about one another: a plane parts them where they are a little apart, and where they go on
-/// touching, the leaves beside those that touched last touch.
+/// touching, a walk comes to where they do now.
 #[test]
-fn planes_and_leaves_beside_the_last_ones_tell_most_of_what_moves() {
+fn planes_and_walks_from_the_last_touch_tell_most_of_what_moves() {
     let ball = shape(&meshes::bumpy_sphere(20, 40, 0.05), None);
     let radius = ball.radius;
     let clock = ManualClock::new(0);
@@ -207,7 +207,7 @@ fn planes_and_leaves_beside_the_last_ones_tell_most_of_what_moves() {
             wrong += u32::from((front.interval().min > 0.0) != (case % 2 == 0));
         }
     }
-    println!("{parted} of {apart} parted by a plane, {beside} of {lost} found beside");
+    println!("{parted} of {apart} parted by a plane, {beside} of {lost} found by a walk");
     assert_eq!(wrong, 0, "as they were placed");
     assert!(
         apart > 300 && parted * 10 > apart * 9,
@@ -217,7 +217,7 @@ fn planes_and_leaves_beside_the_last_ones_tell_most_of_what_moves() {
 }
 
 #[test]
-fn bug_a_round_beside_a_touch_that_was_cut_off_is_whole_again_once_the_touch_is_back() {
+fn bug_a_walk_from_a_touch_that_was_cut_off_begins_anew_once_the_touch_is_back() {
     let ball = shape(&meshes::bumpy_sphere(20, 40, 0.05), None);
     let clock = ManualClock::new(0);
     let (mut store, mut front) = (FrontStore::default(), CarriedFront::default());
@@ -236,23 +236,21 @@ fn bug_a_round_beside_a_touch_that_was_cut_off_is_whole_again_once_the_touch_is_
         &mut meter
     ));
     assert!(front.still_touches(&ball, &ball, &here));
-    let asked = |front: &mut CarriedFront, units| {
+    let walked = |front: &mut CarriedFront, units| {
         let mut meter = Meter::new(&clock, None, units);
-        assert!(
-            front
-                .touches_beside(&ball, &ball, &away, &mut meter)
-                .is_none()
-        );
+        let found = front.touches_beside(&ball, &ball, &away, &mut meter);
+        assert!(found.is_none());
         meter.spent()
     };
-    assert_eq!(asked(&mut front, Some(5)), 5);
-    assert!(front.still_touches(&ball, &ball, &here));
-    assert_eq!(asked(&mut front, Some(5)), 5, "from the first on");
-    assert_eq!(asked(&mut front, None), 10, "where it was cut off");
+    assert_eq!(walked(&mut front, Some(3)), 3);
+    assert!(front.still_touches(&ball, &ball, &here), "the same leaves");
+    assert_eq!(walked(&mut front, Some(3)), 3, "from the first step on");
+    let rest = walked(&mut front, None);
+    assert!(rest > 0 && rest + 3 <= 12, "where it was cut off: {rest}");
     assert_eq!(
-        asked(&mut front, None),
+        walked(&mut front, None),
         0,
-        "forgotten after a round in vain"
+        "forgotten after it was in vain"
     );
     assert!(!front.still_touches(&ball, &ball, &here));
 }

@@ -130,7 +130,7 @@ fn surely_pierces(a: &Triangle, b: &Triangle, slop: f64) -> bool {
     })
 }
 
-fn edges(t: &Triangle) -> [Vec3; 3] {
+pub(super) fn edges(t: &Triangle) -> [Vec3; 3] {
     [t[1] - t[0], t[2] - t[1], t[0] - t[2]]
 }
 

@@ -17,6 +17,8 @@ pub(super) struct Known {
     pub(super) points_wanted: bool,
     /// The last leaves have been asked at this pose.
     pub(super) asked_last: bool,
+    /// A walk has set out from leaves that do not touch.
+    pub(super) sought: bool,
     /// Bounds of the wholes at this pose, when they were asked for.
     pub(super) floor_m: f64,
 }
@@ -30,6 +32,7 @@ impl Default for Known {
             blurred: false,
             points_wanted: false,
             asked_last: false,
+            sought: false,
             floor_m: f64::NEG_INFINITY,
         }
     }

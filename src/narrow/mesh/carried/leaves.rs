@@ -47,13 +47,7 @@ impl CarriedFront {
         };
         let low = closest.gap.min.max(known_m);
         self.known.leaf_low = self.known.leaf_low.min(low);
-        // A solid's depth is that of a point, and the translation that parts two leaves can be more: of an overlap
-        // their query proves no more than that it is one.
-        let high = if self.solids {
-            closest.gap.max.max(0.0)
-        } else {
-            closest.gap.max
-        };
+        let high = self.high_of(&closest);
         let better = self.known.high > high || self.last.is_none();
         self.known.high = self.known.high.min(high);
         let contact = contact(leaf_a, leaf_b, closest);
@@ -71,11 +65,7 @@ impl CarriedFront {
             if !self.known.touches || self.witness.as_ref().is_none_or(deeper) {
                 (self.last, self.witness) = (Some((id_a, id_b)), Some(contact));
                 let corners = side::triangles(leaf_a, leaf_b);
-                self.crossing = corners.map(|corners| Crossing {
-                    places: [i, j],
-                    corners,
-                    asked: 0,
-                });
+                self.crossing = corners.map(|corners| Crossing::at([i, j], corners));
             }
             self.known.touches = true;
             if self.known.points_wanted {
@@ -95,6 +85,14 @@ impl CarriedFront {
         let kept = store.open.push(&mut self.touching, touching);
         self.note_room(kept);
         cost
+    }
+
+    /// The upper bound on the gap that a query of two leaves proves, metres.
+    pub(super) fn high_of(&self, closest: &Closest) -> f64 {
+        // A solid's depth is that of a point, and the translation that parts two leaves can be more: of an overlap
+        // their query proves no more than that it is one.
+        let least = if self.solids { 0.0 } else { f64::NEG_INFINITY };
+        closest.gap.max.max(least)
     }
 
     fn keep_leaf(&mut self, store: &mut FrontStore, id_a: BoxId, id_b: BoxId, gap: f64) {

@@ -81,9 +81,12 @@ impl CarriedFront {
         meter: &mut Meter<'_>,
     ) {
         let child = match (a.held(open.a), b.held(open.b)) {
-            (Held::Triangle(_), Held::Triangle(_)) => {
+            (Held::Triangle(held_a), Held::Triangle(held_b)) => {
                 let cost = self.leaves(store, (open.a, open.b), (a, b), f64::NEG_INFINITY, exact);
                 meter.charge_weighted(1, cost);
+                if !exact && !self.known.touches {
+                    self.seek([held_a, held_b], (a, b), meter);
+                }
                 return;
             }
             (held_a, held_b) => self.children((open.a, held_a), (open.b, held_b), (a, b)),
