@@ -7,7 +7,8 @@
 //! the end over the other trees.
 //!
 //! `cargo bench --bench time_critical [-- --quick] [--cold] [METHOD..]`, and `-- regions` for approximate contacts
-//! alone (see `regions`); `-- peers FOLDER` is a part of `benches/mesh_peers.py`.
+//! alone (see `regions`), `-- distance` for the distance of one pair; `-- peers FOLDER` is a part of
+//! `benches/mesh_peers.py`.
 
 #![allow(
     clippy::cast_precision_loss,
@@ -20,6 +21,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod distance;
 #[path = "../../tests/oracle/mod.rs"]
 mod oracle;
 mod peers;
@@ -196,6 +198,10 @@ fn main() {
     let shapes = shapes();
     if let Some(at) = only.iter().position(|name| name == "peers") {
         peers::run(&shapes, std::path::Path::new(&only[at + 1]));
+        return;
+    }
+    if only.iter().any(|name| name == "distance") {
+        distance::run(&shapes);
         return;
     }
     if only.iter().any(|name| name == "regions") {

@@ -13,7 +13,7 @@ use parry3d_f64::query::{
     self, ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher,
 };
 use parry3d_f64::shape::TriMesh;
-use sweepd::math::{Pose, relative};
+use sweepd::math::{Pose, Vec3, relative};
 use sweepd::narrow::mesh::{CarriedFront, FrontStore, Goal, Search};
 use sweepd::shape::{Geometry, Mesh, Shape};
 use sweepd::time::{Clock, Meter, SystemClock};
@@ -53,22 +53,24 @@ fn write_inputs(folder: &Path, shapes: &[Arc<Shape>], courses: &Courses) {
 }
 
 /// What one job yields.
-struct Found {
-    touches: bool,
+pub struct Found {
+    pub touches: bool,
     /// An interval that holds the distance, metres.
-    gap_m: [f64; 2],
+    pub gap_m: [f64; 2],
     contacts: usize,
+    /// Work units, of ours.
+    pub units: u64,
 }
 
 /// Ours, cold: nothing of one pair serves another but memory that was touched before.
 #[derive(Default)]
-struct Ours {
+pub struct Ours {
     store: FrontStore,
     front: CarriedFront,
 }
 
 impl Ours {
-    fn ask(&mut self, a: &Shape, b: &Shape, rel: &Pose, goal: Goal) -> Found {
+    pub fn ask(&mut self, a: &Shape, b: &Shape, rel: &Pose, goal: Goal) -> Found {
         let mut meter = Meter::unlimited(&SystemClock);
         self.front
             .start(&mut self.store, a, b, rel, Search::Carried);
@@ -81,16 +83,23 @@ impl Ours {
             touches: gap.max <= 0.0,
             gap_m: [gap.min, gap.max],
             contacts: self.front.contacts(&self.store).len(),
+            units: meter.spent(),
         }
+    }
+
+    /// From the first to the second at the nearest points of the last question, unit, the first's frame.
+    pub fn normal(&self) -> Option<Vec3> {
+        self.front.witness().map(|leaf| leaf.closest.normal)
     }
 }
 
-fn theirs(mesh: &Mesh) -> TriMesh {
+pub fn theirs(shape: &Shape) -> TriMesh {
+    let mesh = mesh(shape);
     let vertices = mesh.vertices().iter().map(|v| Vector::new(v.x, v.y, v.z));
     TriMesh::new(vertices.collect(), mesh.faces().to_vec()).unwrap()
 }
 
-fn ask_parry(a: &TriMesh, b: &TriMesh, rel: &Pose, goal: Goal) -> Found {
+pub fn ask_parry(a: &TriMesh, b: &TriMesh, rel: &Pose, goal: Goal) -> Found {
     let (t, q) = (rel.translation.vector, rel.rotation.coords);
     let there = TheirPose {
         rotation: Rotation::from_xyzw(q.x, q.y, q.z, q.w),
@@ -131,13 +140,14 @@ fn ask_parry(a: &TriMesh, b: &TriMesh, rel: &Pose, goal: Goal) -> Found {
         touches,
         gap_m,
         contacts,
+        units: 0,
     }
 }
 
 pub fn run(shapes: &[Arc<Shape>], folder: &Path) {
     let courses = Courses::new(0.0, SEED);
     write_inputs(folder, shapes, &courses);
-    let meshes: Vec<TriMesh> = shapes.iter().map(|shape| theirs(mesh(shape))).collect();
+    let meshes: Vec<TriMesh> = shapes.iter().map(|shape| theirs(shape)).collect();
     let mut ours = Ours::default();
     let mut csv = String::from("pair,library,job,ns,touches,gap_min_m,gap_max_m,contacts\n");
     // Once round without a row: memory and caches are then as the others have them.
