@@ -11,9 +11,9 @@ use crate::builtin::Pattern;
 pub(super) enum Report {
     /// Error against run time of a scene, over a sweep of budgets.
     ///
-    /// Drives the engine of the daemon offline, with the built-in motion of `feed`, once for each budget; each answer is
-    /// held against a twin without a budget at the same poses. Ends with code 1 when a verdict is wrong or an interval
-    /// excludes the truth.
+    /// Drives the engine of the daemon offline, with the built-in motion of `feed`, once for each budget; each answer
+    /// is held against a twin without a budget at the same poses. Ends with code 1 when a verdict is wrong or an
+    /// interval excludes the truth.
     Error(ErrorArgs),
     /// Stiff and extreme cases, each against a truth that is known.
     ///
@@ -26,12 +26,12 @@ pub(super) struct ErrorArgs {
     /// The scene file (TOML).
     #[arg(value_name = "SCENE")]
     pub(super) scene: PathBuf,
-    /// Budgets of time a tick, such as `50us,200us,1ms,none`; by default nine, from the scene's floor to what its slowest
-    /// ticks take without a budget.
+    /// Budgets of time a tick, such as `50us,200us,1ms,none`; by default nine, from the scene's floor to what its
+    /// slowest ticks take without a budget.
     #[arg(long, value_name = "TIME,..", value_delimiter = ',', value_parser = duration)]
     pub(super) budgets: Vec<Limit>,
-    /// Budgets of work units in place of time: no clock takes part, and a report is the same to the last bit whenever it
-    /// is made. With numbers, such as `--units 0,1000,none`, those; by default nine.
+    /// Budgets of work units in place of time: no clock takes part, and a report is the same to the last bit whenever
+    /// it is made. With numbers, such as `--units 0,1000,none`, those; by default nine.
     #[arg(long, value_name = "UNITS,..", value_delimiter = ',', num_args = 0..=1, value_parser = units, conflicts_with = "budgets")]
     pub(super) units: Option<Vec<Limit>>,
     /// Ticks at each budget, after a sixth as many to warm up.

@@ -1,5 +1,5 @@
-//! A page of HTML that needs nothing but itself: style sheet, head, tables. Light or dark as the reader's system is, and
-//! readable on a narrow screen.
+//! A page of HTML that needs nothing but itself: style sheet, head, tables. Light or dark as the reader's system is,
+//! and readable on a narrow screen.
 
 use std::fmt::Write as _;
 

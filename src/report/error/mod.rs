@@ -208,7 +208,8 @@ fn budgets(setup: &Setup<'_>, course: &Course) -> Result<Vec<Budget>> {
     Ok(limits.into_iter().map(budget).collect())
 }
 
-/// A few ticks without a budget, and what they took: from the floor to twice what slow ticks take, evenly on a log scale.
+/// A few ticks without a budget, and what they took: from the floor to twice what slow ticks take, evenly on a log
+/// scale.
 fn pilot(setup: &Setup<'_>, course: &Course, timed: bool) -> Result<Vec<Option<u64>>> {
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
     let mut rig = Rig::new(setup.scene, setup.shapes, clock)?;

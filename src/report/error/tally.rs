@@ -125,8 +125,8 @@ impl Tally {
         self.found.excluded += found.excluded;
     }
 
-    /// Follows collisions from their first tick to the one in which they are told. Those that were there before the ticks
-    /// that count have no onset.
+    /// Follows collisions from their first tick to the one in which they are told. Those that were there before the
+    /// ticks that count have no onset.
     pub(super) fn onsets(
         &mut self,
         told: &[Told],

@@ -1,6 +1,7 @@
 //! What is wrong with an answer, if anything: an interval and a verdict against the truth.
 //!
-//! In: a [`Truth`], what was published. Out: a [`Judgement`]. Pure, so that a wrong answer can be made up and is caught.
+//! In: a [`Truth`], what was published. Out: a [`Judgement`]. Pure, so that a wrong answer can be made up and is
+//! caught.
 
 use super::dd::Dd;
 use super::truth::Truth;

@@ -165,7 +165,8 @@ pub(super) fn nested() -> Vec<Case> {
                 at,
             ),
         ]);
-        // The deepest point of what is within lies on the far side from the nearest face of the cube, 1 m from its middle.
+        // The deepest point of what is within lies on the far side from the nearest face of the cube, 1 m from its
+        // middle.
         let deepest = Dd::from(0.3) - Dd::from(1.0) - Dd::from(r);
         for (kind, shape) in [("sphere in mesh", ball(r)), ("mesh in mesh", mesh_cube(r))] {
             cases.push(Case {
