@@ -84,6 +84,13 @@ fn row(found: &Found) -> Vec<String> {
     ]
 }
 
+/// Errors below this are drawn as 0, in parts of the size: a hundredth of what f64 rounds off.
+const NOTHING: f64 = 1e-18;
+
+fn drawn(error: f64) -> f64 {
+    if error < NOTHING { 0.0 } else { error }
+}
+
 /// Errors of each parameter: the greatest and the middle one of all kinds, the widest interval, parry's greatest.
 fn plot(found: &Found) -> String {
     let mut values: Vec<f64> = found.points.iter().map(|point| point.value).collect();
@@ -99,7 +106,7 @@ fn plot(found: &Found) -> String {
         dashed,
         points: values
             .iter()
-            .filter_map(|&value| Some((value, of(value)?)))
+            .filter_map(|&value| Some((value, drawn(of(value)?))))
             .collect(),
     };
     let greatest = |value| at(value).filter_map(|point| point.error).reduce(f64::max);

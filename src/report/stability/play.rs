@@ -19,8 +19,8 @@ use crate::report::rig::Rig;
 use crate::time::{Budget, Clock, SystemClock};
 use crate::wire::{PairRow, Stage, Verdict, pair_flags};
 
-/// Error that a pair without a round part across an axis is meant to stay below, in parts of its size: the rounding that
-/// its interval allows for (some 64 units of roundoff) and what its best estimate may differ within it.
+/// Error that a pair without a round part across an axis is meant to stay below, in parts of its size: the rounding
+/// that its interval allows for (some 64 units of roundoff) and what its best estimate may differ within it.
 pub const TOLERANCE: f64 = 1e-13;
 /// The same of cylinders and cones: their depths end where the next bit would cost as much as all before it, at some
 /// 1e-7; wider than this is not called finished.

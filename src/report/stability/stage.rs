@@ -87,8 +87,8 @@ impl Case {
         }
     }
 
-    /// How large a pair is: how far both reach from their origins, and how far these are apart; errors are told in parts
-    /// of it. Metres.
+    /// How large a pair is: how far both reach from their origins, and how far these are apart; errors are told in
+    /// parts of it. Metres.
     #[must_use]
     pub fn size_m(&self, tick: usize, (i, j): (usize, usize)) -> f64 {
         let poses = &self.ticks[tick];
