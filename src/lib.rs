@@ -31,3 +31,4 @@ pub mod builtin;
 pub mod cli;
 pub mod daemon;
 pub mod query;
+pub mod report;

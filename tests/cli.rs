@@ -14,6 +14,8 @@ mod live;
 mod feed;
 #[path = "cli/monitor.rs"]
 mod monitor;
+#[path = "cli/report.rs"]
+mod report;
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::process::{Output, Stdio};
@@ -78,7 +80,7 @@ fn usage_is_refused_with_code_2_on_stderr_and_help_is_given_with_code_0_on_stdou
             "{args:?}"
         );
     }
-    for command in ["run", "check", "feed", "monitor", "query", "list"] {
+    for command in ["run", "check", "feed", "monitor", "query", "list", "report"] {
         let ended = output(&[command, "--help"]);
         assert_eq!(code(&ended), Some(0), "{command}");
         assert!(ended.stderr.is_empty(), "{command}");

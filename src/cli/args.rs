@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+use super::args_report::Report;
 use crate::builtin::Pattern;
 
 /// A collision server: body poses in over shared memory, colliding pairs and contacts out, within a time budget a tick.
@@ -27,6 +28,10 @@ Try it, in three terminals:
   sweepd feed pool.toml                              a source that moves them
   sweepd monitor                                     what touches what
 
+Measure, without a daemon:
+  sweepd report error pool.toml --html error.html    error against run time, over a sweep of budgets
+  sweepd report stability --html stability.html      stiff and extreme cases against known truths
+
 Exit codes: 0 done, 1 a check failed, 2 usage or a bad scene, 3 timed out, 4 refused or could not run,
 5 watchdog, 101 internal error.
 Environment: NO_COLOR switches colours off. With --ros2: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY.";
@@ -45,6 +50,15 @@ pub(super) enum Command {
     Query(QueryArgs),
     /// List running instances.
     List(ListArgs),
+    /// Measure: error against run time, and numerical stability.
+    Report(ReportArgs),
+}
+
+/// Which report.
+#[derive(Debug, Args)]
+pub(super) struct ReportArgs {
+    #[command(subcommand)]
+    pub(super) report: Report,
 }
 
 /// Which daemon.
@@ -198,7 +212,7 @@ pub(super) enum Limit {
     Of(u64),
 }
 
-fn duration(text: &str) -> Result<Limit, String> {
+pub(super) fn duration(text: &str) -> Result<Limit, String> {
     if text == "none" {
         Ok(Limit::None)
     } else {
@@ -206,7 +220,7 @@ fn duration(text: &str) -> Result<Limit, String> {
     }
 }
 
-fn units(text: &str) -> Result<Limit, String> {
+pub(super) fn units(text: &str) -> Result<Limit, String> {
     if text == "none" {
         return Ok(Limit::None);
     }

@@ -4,6 +4,7 @@
 //! closed pipe is a normal end. Results go to stdout, logs to stderr.
 
 mod args;
+mod args_report;
 mod check;
 mod feed;
 mod figures;
@@ -11,6 +12,7 @@ mod list;
 mod monitor;
 mod out;
 mod query;
+mod report;
 mod ros;
 mod run;
 mod screen;
@@ -70,6 +72,7 @@ fn dispatch(command: Command, ros_words: Option<&[String]>) -> Result<ExitCode> 
         Command::Monitor(args) => monitor::monitor(&args, &mut out, stop()?.as_ref()),
         Command::Query(args) => query::query(&args, &mut out),
         Command::List(args) => list::list(&args, &mut out),
+        Command::Report(args) => report::report(&args, &mut out, stop()?.as_ref()),
     };
     match done {
         Ok(true) => Ok(ExitCode::SUCCESS),

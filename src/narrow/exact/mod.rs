@@ -30,6 +30,7 @@ mod manifold;
 mod newton;
 mod pair;
 mod polytope;
+pub mod raw;
 mod revolved;
 mod sat;
 mod simplex;

@@ -1,0 +1,51 @@
+//! A line on stderr that says how far long work is, where stderr is a terminal; nothing otherwise.
+
+use std::io::{IsTerminal as _, Write as _};
+
+use crate::time::{Clock as _, SystemClock};
+
+/// Time between two lines, nanoseconds.
+const LINE_NS: u64 = 100_000_000;
+/// Columns of the line.
+const COLUMNS: usize = 76;
+
+/// How far it is. The line is wiped when this is dropped.
+pub(super) struct Progress {
+    shown: bool,
+    next_ns: u64,
+    drawn: bool,
+}
+
+impl Progress {
+    pub(super) fn new() -> Self {
+        Self {
+            shown: std::io::stderr().is_terminal(),
+            next_ns: 0,
+            drawn: false,
+        }
+    }
+
+    /// Says it, now and then.
+    pub(super) fn tell(&mut self, done: u64, all: u64, what: &str) {
+        let now_ns = SystemClock.monotonic_ns();
+        if !self.shown || now_ns < self.next_ns {
+            return;
+        }
+        self.next_ns = now_ns.saturating_add(LINE_NS);
+        self.drawn = true;
+        let percent = (100 * done).checked_div(all).unwrap_or(0);
+        let line: String = format!("{percent:3} %  {done} of {all}  {what}")
+            .chars()
+            .take(COLUMNS)
+            .collect();
+        let _ = write!(std::io::stderr(), "\r{line:<COLUMNS$}");
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if self.drawn {
+            let _ = write!(std::io::stderr(), "\r{:<COLUMNS$}\r", "");
+        }
+    }
+}

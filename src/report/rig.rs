@@ -1,0 +1,177 @@
+//! An engine that is fed by hand, without transport: what both reports drive.
+//!
+//! In: a checked scene with its shapes, poses a tick. Out: the engine's outbox, and how long it took.
+
+use std::sync::Arc;
+
+use crate::error::Result;
+use crate::math::{Pose, f32_near};
+use crate::scene::Scene;
+use crate::shape::Geometry;
+use crate::tick::{Engine, TickInput};
+use crate::time::{Budget, Clock};
+use crate::wire::{
+    Demand, FrameHeader, Inbox, Outbox, TickCause, TransformRow, VertexHeader, WIRE_VERSION,
+    frame_flags, name_bytes, vertex_flags,
+};
+use crate::world::PlacedShape;
+
+/// The session that all frames of a report are of.
+const SESSION: u64 = 1;
+/// What is asked for: pairs with their bounds; contacts would be work that no figure tells of.
+const DEMAND: Demand = Demand {
+    pairs: true,
+    contacts: false,
+    regions: false,
+    bodies: false,
+    body_verdicts: false,
+};
+
+/// What a tick took, nanoseconds of the engine's clock.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Took {
+    /// From wake-up until the outbox was filled.
+    pub told_ns: u64,
+    /// The same with the work that went on after it.
+    pub whole_ns: u64,
+}
+
+/// An engine, and what it is fed with.
+pub struct Rig {
+    engine: Engine,
+    clock: Arc<dyn Clock>,
+    inbox: Inbox,
+    names: Vec<String>,
+    /// Source, body, and the vertices of each body that deforms: sent once, as they are at rest.
+    vertices: Vec<(usize, u64, Vec<[f32; 3]>)>,
+    seq: u64,
+}
+
+impl std::fmt::Debug for Rig {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Rig")
+            .field("ticks", &self.seq)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Rig {
+    /// An engine for a scene and its built shapes, in the scene's order.
+    ///
+    /// # Errors
+    /// `Error::Scene` when the scene holds more than its limits allow.
+    pub fn new(
+        scene: &Scene,
+        shapes: &[Arc<[PlacedShape]>],
+        clock: Arc<dyn Clock>,
+    ) -> Result<Self> {
+        let engine = Engine::new(scene, shapes.to_vec(), 1, Arc::clone(&clock))?;
+        let deforming = scene.bodies.iter().zip(shapes).filter(|(b, _)| b.deforms);
+        let vertices = deforming.filter_map(|(body, placed)| {
+            let Geometry::Mesh(mesh) = &placed.first()?.shape.geometry else {
+                return None;
+            };
+            let rows = mesh.vertices().iter();
+            let rows = rows.map(|v| [f32_near(v.x), f32_near(v.y), f32_near(v.z)]);
+            Some((body.source?, body.id.0, rows.collect()))
+        });
+        Ok(Self {
+            vertices: vertices.collect(),
+            names: scene.sources.iter().map(|s| s.name.clone()).collect(),
+            engine,
+            clock,
+            inbox: Inbox::default(),
+            seq: 0,
+        })
+    }
+
+    /// One tick with a frame of each source, and all that its budget leaves.
+    ///
+    /// * `frames` - rows by the source's place.
+    pub fn tick(&mut self, frames: &[Vec<TransformRow>], budget: Budget) -> Took {
+        self.seq += 1;
+        self.inbox.clear();
+        let now_ns = self.clock.boottime_ns();
+        for (name, rows) in self.names.iter().zip(frames) {
+            let frame = self.inbox.push();
+            frame.header = FrameHeader {
+                session: SESSION,
+                epoch: 1,
+                seq: self.seq,
+                source: name_bytes(name),
+                flags: frame_flags::FULL,
+                schema: WIRE_VERSION,
+                ..FrameHeader::default()
+            };
+            frame.received_ns = now_ns;
+            frame.set_transforms(rows);
+        }
+        if self.seq == 1 {
+            self.send_vertices(now_ns);
+        }
+        let woke_ns = self.clock.monotonic_ns();
+        self.engine.tick(TickInput {
+            inbox: &self.inbox,
+            edits: &[],
+            demand: DEMAND,
+            budget,
+            cause: TickCause::Frame,
+            cause_source: (!self.names.is_empty()).then_some(0),
+            woke_ns,
+            pulse: None,
+        });
+        let told_ns = self.clock.monotonic_ns() - woke_ns;
+        while self.engine.work_on(u64::MAX) {}
+        Took {
+            told_ns,
+            whole_ns: self.clock.monotonic_ns() - woke_ns,
+        }
+    }
+
+    /// What the last tick filled.
+    #[must_use]
+    pub fn out(&self) -> &Outbox {
+        self.engine.outbox()
+    }
+
+    /// The engine.
+    #[must_use]
+    pub fn engine(&self) -> &Engine {
+        &self.engine
+    }
+
+    /// Bodies that deform are unknown until their vertices have come.
+    fn send_vertices(&mut self, now_ns: u64) {
+        for (source, body, rows) in &self.vertices {
+            let count = u32::try_from(rows.len()).unwrap_or(u32::MAX);
+            let frame = self.inbox.push_vertices();
+            frame.header = VertexHeader {
+                session: SESSION,
+                epoch: 1,
+                seq: self.seq,
+                body: *body,
+                version: 1,
+                source: name_bytes(&self.names[*source]),
+                count,
+                total: count,
+                flags: vertex_flags::FULL,
+                schema: WIRE_VERSION,
+                ..VertexHeader::default()
+            };
+            frame.received_ns = now_ns;
+            frame.rows.extend_from_slice(rows);
+        }
+    }
+}
+
+/// A row of a frame.
+#[must_use]
+pub fn row(body: u64, pose: &Pose) -> TransformRow {
+    let q = pose.rotation.as_vector();
+    TransformRow {
+        body,
+        position: pose.translation.vector.into(),
+        orientation: [q.x, q.y, q.z, q.w],
+        ..TransformRow::default()
+    }
+}

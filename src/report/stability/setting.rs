@@ -1,0 +1,100 @@
+//! The scene that a case is played in. In: a [`Case`]. Out: what an engine is made of.
+
+use std::sync::Arc;
+
+use super::stage::{Actor, Asked, Case, Pos};
+use super::truth::Truth;
+use crate::config::OnStale;
+use crate::error::Result;
+use crate::ids::BodyId;
+use crate::math::Pose;
+use crate::scene::{BodySpec, PlacedSpec, Scene, SourceSpec};
+use crate::shape::{Library, ShapeSpec};
+use crate::wire::TransformRow;
+use crate::world::PlacedShape;
+
+/// How far bodies are told apart: well beyond every gap that is asked, so that each of them has a row.
+pub(super) fn reach_of(scene: &Scene, (i, j): (usize, usize)) -> f64 {
+    let of = |at: usize| scene.bodies[at].report_within_m;
+    of(i).max(of(j))
+}
+
+/// The scene of a case: one source, and bodies that are reported well beyond every gap that is asked.
+pub(super) fn scene(case: &Case, truths: &[Vec<Truth>]) -> Scene {
+    let farthest = truths.iter().flatten().map(|truth| truth.high.near());
+    let most = farthest.fold(0.0_f64, f64::max);
+    let within_m = match case.asked {
+        Asked::Impact(_) => 0.0,
+        _ => 2.0 * most + case.size_m(0, case.pairs[0]),
+    };
+    let mut scene = Scene {
+        frame_id: "world".to_owned(),
+        sources: vec![SourceSpec {
+            name: "report".to_owned(),
+            timeout_ns: 3_600_000_000_000,
+            ros2: None,
+        }],
+        ..Scene::default()
+    };
+    scene.config.threads = Some(1);
+    scene.bodies = (1..)
+        .zip(&case.actors)
+        .map(|(id, actor)| body(id, actor, within_m))
+        .collect();
+    scene
+}
+
+fn body(id: u64, actor: &Actor, report_within_m: f64) -> BodySpec {
+    let part = |(shape, at): &(_, [f64; 3])| PlacedSpec {
+        shape: ShapeSpec::clone(shape),
+        pose: Pose::translation(at[0], at[1], at[2]),
+    };
+    BodySpec {
+        name: format!("body_{id}"),
+        id: BodyId(id),
+        shapes: actor.parts.iter().map(part).collect(),
+        pose: Pose::identity(),
+        moves: true,
+        deforms: false,
+        continuous: actor.continuous,
+        teleport_m: None,
+        source: Some(0),
+        ros_frame: None,
+        ros_topic: None,
+        group: 1,
+        mask: u32::MAX,
+        parent: None,
+        attached_to: None,
+        rigid_group: None,
+        report_within_m,
+        max_speed_mps: None,
+        priority: 1.0,
+        on_stale: OnStale::default(),
+        enabled: true,
+    }
+}
+
+/// The shapes of its bodies.
+pub(super) fn shapes(scene: &Scene) -> Result<Vec<Arc<[PlacedShape]>>> {
+    let built = scene.build_shapes(&mut Library::new(), |_, _| {})?;
+    let placed = scene.bodies.iter().zip(built.shapes).map(|(body, shapes)| {
+        let parts = body.shapes.iter().zip(shapes);
+        parts
+            .map(|(spec, shape)| PlacedShape {
+                shape,
+                pose: spec.pose,
+            })
+            .collect()
+    });
+    Ok(placed.collect())
+}
+
+/// A row of a frame, as a sender writes it.
+pub(super) fn row(body: u64, pos: &Pos) -> TransformRow {
+    TransformRow {
+        body,
+        position: pos.t,
+        orientation: pos.q,
+        ..TransformRow::default()
+    }
+}
