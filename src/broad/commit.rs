@@ -7,6 +7,7 @@
 use super::Proxies;
 use super::forced::Forced;
 use super::members::{IN, Members, UNBOUNDED};
+use super::order::give_back;
 use crate::ids::{BodyId, BodySlot, PairKey, PairSlot};
 use crate::pairs::{Ended, PairDelta, PairPolicy, PairSet};
 use crate::simd::boxes::prefetch;
@@ -102,10 +103,13 @@ impl<X: Proxies, P: PairPolicy> Judge<'_, X, P> {
 }
 
 impl Found {
-    /// Begins an update.
-    pub(super) fn open_tick(&mut self) {
-        self.began.clear();
-        self.ended.clear();
+    /// Ends an update: what it needed more of than most do is given back.
+    pub(super) fn close_tick(&mut self, bodies: usize) {
+        give_back(&mut self.began, bodies);
+        give_back(&mut self.ended, bodies);
+        give_back(&mut self.ranked, bodies);
+        give_back(&mut self.slots, bodies);
+        give_back(&mut self.doomed, bodies);
     }
 
     /// Takes a stored pair out.

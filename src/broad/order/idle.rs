@@ -1,8 +1,9 @@
-//! Memory of the way that is not taken: of many bodies it is given back.
+//! Memory that lies idle: of many bodies it is given back.
 //!
-//! In: a change of the way. Out: less memory; nothing else is told by it. Candidates and the search without them take
-//! half of it each, and a world of many bodies seldom changes from the one to the other, in a tick that lays all of
-//! them anyway. Of fewer bodies it is kept, so that no tick makes any.
+//! In: a change of the way, a tick that is over. Out: less memory; nothing else is told by it. Candidates and the search
+//! without them take half of it each, and a world of many bodies seldom changes from the one to the other, in a tick
+//! that lays all of them anyway. Lists that a tick fills once, as the first one does with every pair, are not kept at
+//! that length. Of fewer bodies all of it is kept, so that no tick makes any.
 
 use super::afresh::Afresh;
 use super::gear::FAR;
@@ -12,9 +13,20 @@ use super::sort::Sorter;
 use super::verlet::Verlet;
 use super::{Order, renew};
 
+/// Entries a body from which on a list of what changes in a tick is of a tick unlike the others.
+const BURST: usize = 2;
+
 /// Whether there are so many bodies that what lies idle is given back.
-pub(super) fn is_thrifty(bodies: usize) -> bool {
+pub(in crate::broad) fn is_thrifty(bodies: usize) -> bool {
     bodies > FAR
+}
+
+/// Empties a list of a tick, and gives back what is more than most ticks need: as much as one entry a body.
+pub(in crate::broad) fn give_back<T>(list: &mut Vec<T>, bodies: usize) {
+    list.clear();
+    if is_thrifty(bodies) && list.capacity() > BURST * bodies {
+        list.shrink_to(bodies);
+    }
 }
 
 impl Order {
@@ -30,6 +42,14 @@ impl Order {
         (self.ages, self.gaits, self.former) = (Vec::new(), Vec::new(), Vec::new());
         (self.entries, self.found, self.rows) = (Vec::new(), Vec::new(), Vec::new());
         (self.touched_records, self.emptied) = (Vec::new(), Vec::new());
+    }
+
+    /// Few moved: the list of candidates is let go.
+    pub(super) fn give_back_list(&mut self) {
+        self.listed = false;
+        if is_thrifty(self.len) {
+            (self.entries, self.found, self.sure) = (Vec::new(), Vec::new(), Vec::new());
+        }
     }
 
     /// Candidates are taken up again: what is learned of the ways stays.

@@ -8,7 +8,7 @@ use super::load::ask_ahead;
 use super::place::{ATTIC, grow, middle};
 use super::sort::{FILL, Frame, Sorter};
 use super::tree::NO_BOUND;
-use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, ones, small};
+use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, is_thrifty, ones, small};
 use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work, prefetch};
 
 /// Boxes compared with a block in the time that laying a body anew takes.
@@ -55,8 +55,8 @@ impl Order {
         // What is spoilt in a tick is not worth being dealt to compact blocks.
         if self.afresh.spoilt == 0 {
             for (key, at) in sorter.sort(&boxes) {
-                let at = *at as usize;
-                self.deal_to(*key, FILL, Some((bodies[at], &boxes[at])));
+                let at = at as usize;
+                self.deal_to(key, FILL, Some((bodies[at], &boxes[at])));
             }
         } else {
             for (key, at) in sorter.along_curve(&boxes) {
@@ -131,7 +131,9 @@ impl Order {
         presort.reserve(bodies + seats, seats);
         room(&mut self.boxes, bodies + seats);
         finds.reserve(blocks, bodies);
-        spare(&mut self.carried, self.hits, bodies);
+        if !is_thrifty(bodies) {
+            spare(&mut self.carried, self.hits, bodies);
+        }
     }
 
     /// Gives a body the next lane, or nobody: a lane is passed over for who is gone, so that the blocks stay those of

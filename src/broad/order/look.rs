@@ -5,10 +5,11 @@
 //! ones dead. Pairs that are sure for as long as both bodies keep to their holds are not listed. When few move, their
 //! bits in the matrices are looked up, and the list is let go.
 
+use super::fatten::sure;
 use super::links::Matrix;
 use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, column, ones, parts, small};
 use crate::ids::PairKey;
-use crate::simd::boxes::{Down, LANES, Lanes, Portable, WIDTH, Work, prefetch};
+use crate::simd::boxes::{Boxes16, Down, LANES, Lanes, Portable, WIDTH, Work, prefetch};
 
 /// A candidate, as four words that are read and written whole.
 #[derive(Clone, Copy, Debug)]
@@ -154,8 +155,8 @@ impl Order {
 
     /// Looks at the candidates of moved bodies, one by one.
     pub(super) fn look_at_moved<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
-        self.listed = false;
         self.entries.clear();
+        self.give_back_list();
         for at in 0..tick.moved.len() {
             self.ask_ahead(&tick.moved[at..]);
             let slot = tick.moved[at];
@@ -321,6 +322,13 @@ impl Work for ListAll<'_> {
         let order = self.order;
         order.listed = true;
         order.entries.clear();
+        order.sure.clear();
+        order.sure.resize(order.live.len(), Boxes16::EMPTY);
+        for (block, live) in order.live.iter().enumerate() {
+            for lane in ones(*live) {
+                order.sure[block].set(lane, &sure(&order.held[block * WIDTH + lane]));
+            }
+        }
         for record in 0..order.links.len() {
             if order.links.blocks(record)[0] != NONE {
                 let chosen = order.links.bits(record).cand;

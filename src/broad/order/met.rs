@@ -174,6 +174,7 @@ impl Met {
         slot_of: &[u32],
         carried: &mut Vec<(u32, u32)>,
     ) {
+        carried.reserve(self.count);
         for block in 0..self.blocks() {
             for at in self.of(block) {
                 let other = self.others[at] as usize;

@@ -62,6 +62,7 @@ mod verlet;
 
 use afresh::Afresh;
 use fatten::Gait;
+pub(super) use idle::{give_back, is_thrifty};
 use links::{Links, small, spare};
 use tree::Tree;
 
@@ -102,8 +103,8 @@ pub(super) struct Order {
     live: Vec<u16>,
     /// By rank: the box, rounded outward.
     exact: Vec<Down>,
-    /// By rank: the fat box and the core; and by block, to be asked sixteen at a time, the fat boxes and what is sure
-    /// of the cores.
+    /// By rank: the fat box and the core; and by block, to be asked sixteen at a time, the fat boxes, and while
+    /// candidates are listed what is sure of the cores.
     held: Vec<Hold>,
     fat: Vec<Boxes16>,
     sure: Vec<Boxes16>,
@@ -289,11 +290,6 @@ impl Order {
         self.afresh.gear.forced = afresh;
     }
 
-    /// Sets how many threads search without candidates at most, and from how many comparisons in a tick on.
-    pub(super) fn use_threads(&mut self, most: usize, least: u64) {
-        self.afresh.team.set(most, least);
-    }
-
     /// Reports every overlap of bodies whose pairs must be looked for, whatever moved.
     fn tell_asked<P: Proxies>(&mut self, tick: &mut Tick<'_, P>) {
         let members = tick.members;
@@ -321,9 +317,11 @@ impl Order {
         for block in self.worklist.drain(..) {
             self.renewing[block as usize] = 0;
         }
-        self.carried.clear();
+        give_back(&mut self.carried, self.len);
         // A sort may come in any tick and carries every overlap: room for that grows when their number does.
-        spare(&mut self.carried, self.hits, self.len);
+        if !is_thrifty(self.len) {
+            spare(&mut self.carried, self.hits, self.len);
+        }
     }
 
     /// Block and lane of a body.

@@ -159,8 +159,8 @@ impl Order {
             std::mem::take(&mut self.sorter),
             std::mem::take(&mut self.boxes),
         );
-        let sorted = sorter.sorted().iter();
-        let sorted = sorted.map(|(key, at)| (*key, presort.bodies[*at as usize]));
+        let sorted = sorter.sorted();
+        let sorted = sorted.map(|(key, at)| (key, presort.bodies[at as usize]));
         boxes.clear();
         for (_, slot) in sorted.clone() {
             if let Some(rank) = self.rank(slot) {
@@ -206,7 +206,7 @@ impl Order {
         if !presort.on {
             return Ok(());
         }
-        let sorted = self.sorter.sorted().iter().map(|(_, at)| *at as usize);
+        let sorted = self.sorter.sorted().map(|(_, at)| at as usize);
         let mut indices: Vec<usize> = sorted.collect();
         indices.sort_unstable();
         let all = presort.bodies.len();

@@ -163,7 +163,9 @@ impl Renew<'_> {
             let hold = order.gaits[rank].renew(&now, order.beat, horizon, &order.held[rank]);
             order.held[rank] = hold;
             order.fat[block].set(lane, &hold.fat.corners());
-            order.sure[block].set(lane, &sure(&hold));
+            if order.listed {
+                order.sure[block].set(lane, &sure(&hold));
+            }
             order.ages[rank] = order.ages[rank].wrapping_add(1);
         }
         self.done.renewed += u64::from(renewing.count_ones());

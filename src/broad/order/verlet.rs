@@ -89,6 +89,7 @@ impl Order {
     pub(super) fn end_list(&mut self) {
         let verlet = &mut self.afresh.verlet;
         verlet.on = false;
+        self.carried.reserve(self.hits);
         let overlaps = verlet.entries.drain(..).filter(|entry| entry.is_hit());
         for entry in overlaps {
             let [one, other] = entry.ranks().map(|rank| self.slot_of[rank]);
