@@ -7,10 +7,7 @@
 
 use super::afresh::Afresh;
 use super::gear::FAR;
-use super::links::Links;
 use super::mend::Mender;
-use super::sort::Sorter;
-use super::verlet::Verlet;
 use super::{Order, renew};
 
 /// Entries a body from which on a list of what changes in a tick is of a tick unlike the others.
@@ -29,26 +26,40 @@ pub(in crate::broad) fn give_back<T>(list: &mut Vec<T>, bodies: usize) {
     }
 }
 
+/// Empties a list and gives its memory back, but for one entry. Freed whole it would be a sign to glibc that lists of
+/// this size come and go: the next ones then share one heap, and what is freed amid it stays with the process. A list
+/// that shrinks and grows has pages of its own.
+pub(super) fn shed<T>(list: &mut Vec<T>) {
+    list.clear();
+    list.shrink_to(1);
+}
+
 impl Order {
     /// Candidates were let go.
     pub(super) fn give_back_candidates(&mut self) {
         if !is_thrifty(self.len) {
             return;
         }
-        self.links = Links::default();
+        self.links.give_back();
         self.mender = Mender::default();
         self.scratch = renew::Scratch::default();
-        (self.held, self.sure) = (Vec::new(), Vec::new());
-        (self.ages, self.gaits, self.former) = (Vec::new(), Vec::new(), Vec::new());
-        (self.entries, self.found, self.rows) = (Vec::new(), Vec::new(), Vec::new());
-        (self.touched_records, self.emptied) = (Vec::new(), Vec::new());
+        shed(&mut self.held);
+        shed(&mut self.ages);
+        shed(&mut self.gaits);
+        shed(&mut self.former);
+        shed(&mut self.rows);
+        shed(&mut self.touched_records);
+        shed(&mut self.emptied);
+        self.give_back_list();
     }
 
     /// Few moved: the list of candidates is let go.
     pub(super) fn give_back_list(&mut self) {
         self.listed = false;
         if is_thrifty(self.len) {
-            (self.entries, self.found, self.sure) = (Vec::new(), Vec::new(), Vec::new());
+            shed(&mut self.entries);
+            shed(&mut self.found);
+            shed(&mut self.sure);
         }
     }
 
@@ -58,32 +69,27 @@ impl Order {
             return;
         }
         let Afresh {
-            gear,
-            probe,
-            team,
+            presort,
+            held,
             verlet,
+            finds,
+            reach,
             ..
-        } = std::mem::take(&mut self.afresh);
-        self.afresh = Afresh {
-            gear,
-            probe,
-            team,
-            verlet: Verlet {
-                pace: verlet.pace,
-                ..Verlet::default()
-            },
-            ..Afresh::default()
-        };
+        } = &mut self.afresh;
+        presort.give_back();
+        held.give_back();
+        finds.give_back();
+        verlet.give_back();
+        shed(reach);
     }
 
-    /// Bodies with candidates were sorted: that is seldom done.
+    /// Bodies were sorted: that is seldom done, and not while lists are longest.
     pub(super) fn give_back_sort(&mut self) {
         if !is_thrifty(self.len) {
             return;
         }
-        (self.boxes, self.former) = (Vec::new(), Vec::new());
-        let frame = self.sorter.frame;
-        self.sorter = Sorter::default();
-        self.sorter.frame = frame;
+        shed(&mut self.boxes);
+        shed(&mut self.former);
+        self.sorter.give_back();
     }
 }

@@ -118,6 +118,7 @@ impl Order {
             jumped,
             finds,
             presort,
+            spoilt,
             ..
         } = &mut self.afresh;
         for lanes in [gone, jumped] {
@@ -128,11 +129,14 @@ impl Order {
         let seats = bodies / MANY_CAME + 1;
         room(&mut self.homeless, seats);
         room(&mut self.worklist, 2 * seats);
-        presort.reserve(bodies + seats, seats);
-        room(&mut self.boxes, bodies + seats);
         finds.reserve(blocks, bodies);
         if !is_thrifty(bodies) {
+            presort.reserve(bodies + seats, seats);
+            room(&mut self.boxes, bodies + seats);
             spare(&mut self.carried, self.hits, bodies);
+        } else if *spoilt == 0 {
+            presort.give_back();
+            self.give_back_sort();
         }
     }
 

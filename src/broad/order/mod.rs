@@ -34,6 +34,7 @@ use crate::simd::boxes::{Boxes16, Down, Hold, Level, WIDTH};
 use crate::wire::{BroadCause, BroadMode};
 
 mod afresh;
+mod entry;
 mod fatten;
 mod gear;
 mod idle;
@@ -145,7 +146,7 @@ pub(super) struct Order {
     touched_records: Vec<u32>,
     emptied: Vec<u32>,
     /// The candidates as a flat list, while it is kept (`look`).
-    entries: Vec<look::Entry>,
+    entries: Vec<entry::Entry>,
     listed: bool,
     found: Vec<look::Found>,
     rows: Vec<look::Row>,

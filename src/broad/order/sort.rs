@@ -1,5 +1,6 @@
 //! The order: classes of size, largest first, and within a class the Morton curve.
 
+use super::idle::shed;
 use crate::math::morton_bits;
 use crate::simd::boxes::WIDTH;
 
@@ -153,6 +154,12 @@ impl Frame {
 }
 
 impl Sorter {
+    /// Gives all memory back; the frame stays.
+    pub(super) fn give_back(&mut self) {
+        shed(&mut self.words);
+        shed(&mut self.spare);
+    }
+
     /// The class in a key.
     pub(super) fn class_of(key: u64) -> u64 {
         key >> CURVE_BITS

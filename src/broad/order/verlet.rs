@@ -18,6 +18,7 @@
 
 use super::afresh::Afresh;
 use super::fatten::outward;
+use super::idle::shed;
 use super::lay::Bound;
 use super::links::small;
 use super::near::{Found, Near, is_among};
@@ -53,6 +54,17 @@ pub(super) struct Verlet {
     /// Memory kept over calls.
     pub(super) blocks: Vec<u32>,
     pub(super) pace: Pace,
+}
+
+impl Verlet {
+    /// Gives the memory of the list back.
+    pub(super) fn give_back(&mut self) {
+        self.on = false;
+        shed(&mut self.entries);
+        shed(&mut self.found);
+        shed(&mut self.strays);
+        shed(&mut self.swept);
+    }
 }
 
 /// Bodies whose every pair a check looks for.
