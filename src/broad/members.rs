@@ -4,6 +4,7 @@
 //! slot (a body is some hundred bytes, a box 48); the others read them where they are.
 
 use super::Proxies;
+use super::order::give_back;
 use crate::ids::{BodyId, BodySlot, PairKey};
 use crate::math::Aabb;
 
@@ -96,6 +97,7 @@ impl Members {
         for slot in self.touched.drain(..) {
             self.flags[slot.index()] &= IN | UNBOUNDED;
         }
+        give_back(&mut self.touched, self.bounded.len());
     }
 
     /// Takes a body out; `false` when it is not in.

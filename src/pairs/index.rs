@@ -21,8 +21,8 @@ const EMPTY: Entry = Entry {
 };
 /// Least size of the table.
 const LEAST: usize = 16;
-/// Of so many places of the table so many are taken at most: runs then are of some places, which lie in a line of memory
-/// or two.
+/// Of so many places of the table so many are taken at most: runs then are of some places, which lie in a line of
+/// memory or two.
 const OF: usize = 3;
 const TAKEN: usize = 2;
 

@@ -194,8 +194,8 @@ impl PairSet {
         self.free.append(&mut self.resting);
     }
 
-    /// Makes room for so many pairs more, as far as they may be stored. Pairs that begin together are told together, so that
-    /// memory grows once by what they need and not by doubling.
+    /// Makes room for so many pairs more, as far as they may be stored. Pairs that begin together are told together, so
+    /// that memory grows once by what they need and not by doubling.
     pub(crate) fn reserve(&mut self, more: usize) {
         let more = more.min(self.limit - self.len);
         let len = self.nodes.len() + more.saturating_sub(self.free.len());

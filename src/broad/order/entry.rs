@@ -3,8 +3,8 @@
 use crate::limits::BODIES_MAX;
 
 /// A candidate, as one word: whether the boxes overlapped at the last look, the ranks, the lower first, and the ages of
-/// the two lanes when it was listed, one byte each: with another age it is dead. Its record is looked for where anything
-/// changes: of a long list every byte counts.
+/// the two lanes when it was listed, one byte each: with another age it is dead. Its record is looked for where
+/// anything changes: of a long list every byte counts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry(u64);
 

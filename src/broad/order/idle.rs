@@ -1,28 +1,31 @@
 //! Memory that lies idle: of many bodies it is given back.
 //!
-//! In: a change of the way, a tick that is over. Out: less memory; nothing else is told by it. Candidates and the search
-//! without them take half of it each, and a world of many bodies seldom changes from the one to the other, in a tick
-//! that lays all of them anyway. Lists that a tick fills once, as the first one does with every pair, are not kept at
-//! that length. Of fewer bodies all of it is kept, so that no tick makes any.
+//! In: a change of the way, a tick that is over. Out: less memory; nothing else is told by it. Candidates and the
+//! search without them take half of it each, and a world of many bodies seldom changes from the one to the other, in a
+//! tick that lays all of them anyway. Lists that a tick fills once, as the first one does with every pair, are not kept
+//! at that length. Of fewer bodies all of it is kept, so that no tick makes any.
 
 use super::afresh::Afresh;
 use super::gear::FAR;
 use super::mend::Mender;
 use super::{Order, renew};
 
-/// Entries a body from which on a list of what changes in a tick is of a tick unlike the others.
-const BURST: usize = 2;
+/// A list of what changes in a tick keeps room for one entry for so many bodies, and up to twice as many: enough for
+/// all scenes of the bench but the fastest and those of tens of pairs a body, where a tick has other things to do for
+/// long.
+const KEPT: usize = 4;
 
 /// Whether there are so many bodies that what lies idle is given back.
 pub(in crate::broad) fn is_thrifty(bodies: usize) -> bool {
     bodies > FAR
 }
 
-/// Empties a list of a tick, and gives back what is more than most ticks need: as much as one entry a body.
+/// Empties a list of a tick, and gives back what is more than most ticks need.
 pub(in crate::broad) fn give_back<T>(list: &mut Vec<T>, bodies: usize) {
     list.clear();
-    if is_thrifty(bodies) && list.capacity() > BURST * bodies {
-        list.shrink_to(bodies);
+    let kept = bodies / KEPT;
+    if is_thrifty(bodies) && list.capacity() > 2 * kept {
+        list.shrink_to(kept);
     }
 }
 

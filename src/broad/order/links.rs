@@ -29,8 +29,8 @@ struct Ends {
     places: [u32; 2],
 }
 
-/// Records a block that room is made for at first: where few boxes overlap there are about five, and to grow by doubling
-/// would hold twice as many meanwhile.
+/// Records a block that room is made for at first: where few boxes overlap there are about five, and to grow by
+/// doubling would hold twice as many meanwhile.
 const RECORDS: usize = 6;
 
 /// Entries of a piece of a block's list.

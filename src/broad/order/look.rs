@@ -6,11 +6,14 @@
 //! bits in the matrices are looked up, and the list is let go.
 
 use super::entry::{Entry, ages};
-use super::fatten::sure;
 use super::links::Matrix;
-use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, column, ones, parts, small};
+use super::{
+    BodySlot, NONE, Order, Proxies, Tick, Work as Done, column, is_thrifty, ones, parts, small,
+};
 use crate::ids::PairKey;
-use crate::simd::boxes::{Boxes16, Down, LANES, Lanes, Portable, WIDTH, Work, prefetch};
+use crate::simd::boxes::{
+    Boxes16, Down, Hold, LANES, Lanes, Portable, WIDTH, Work, prefetch, slack,
+};
 
 /// What a look at an entry found; the place of the entry, and:
 #[derive(Clone, Copy, Debug)]
@@ -71,7 +74,11 @@ impl Order {
                 let [a, b] = slots.map(|slot| tick.proxies.aabb(slot));
                 a.overlaps(b)
             });
-            self.entries[one.at as usize].set_hit(now);
+            let entry = &mut self.entries[one.at as usize];
+            if now == entry.is_hit() {
+                continue;
+            }
+            entry.set_hit(now);
             let ((a, row), (b, lane)) = (parts(ranks[0]), parts(ranks[1]));
             let record = self.links.find(small(a), small(b));
             debug_assert!(record.is_some(), "what is listed has a record");
@@ -91,6 +98,11 @@ impl Order {
             }
         }
         self.found = found;
+        // The first looks after a sort are at many more than are listed once bodies have learned their cores.
+        let len = self.entries.len() + self.len / 4;
+        if is_thrifty(self.len) && self.entries.capacity() > 2 * len {
+            self.entries.shrink_to(len);
+        }
     }
 
     /// Lists some candidates of a record; those that are sure now overlap, and are told if they did not.
@@ -286,6 +298,26 @@ impl Order {
         }
         Ok(())
     }
+}
+
+/// What the f64 box of a body that keeps to its hold is sure to hold: the core, less what rounding may have added.
+#[inline(always)]
+pub(super) fn sure(hold: &Hold) -> [f32; 6] {
+    let (fat, core) = (hold.fat.corners(), hold.core.corners());
+    let largest = fat.iter().fold(
+        0.0,
+        |most: f32, face| {
+            if face.abs() > most { face.abs() } else { most }
+        },
+    );
+    let slack = slack(largest);
+    std::array::from_fn(|k| {
+        if k < 3 {
+            core[k] + slack
+        } else {
+            core[k] - slack
+        }
+    })
 }
 
 /// Lists every candidate.

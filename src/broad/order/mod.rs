@@ -231,7 +231,7 @@ impl Order {
         self.tick = self.tick.wrapping_add(1);
         let (moved, bodies) = (tick.moved.len(), tick.members.bounded().len());
         let was = self.afresh.on;
-        self.homeless.clear();
+        give_back(&mut self.homeless, self.len);
         let came = tick.members.touched().iter().copied();
         let came = came.filter(|s| tick.members.has(*s, CAME) && tick.members.is_bounded(*s));
         self.homeless.extend(came);
@@ -318,7 +318,7 @@ impl Order {
         for block in self.worklist.drain(..) {
             self.renewing[block as usize] = 0;
         }
-        give_back(&mut self.carried, self.len);
+        self.carried.clear();
         // A sort may come in any tick and carries every overlap: room for that grows when their number does.
         if !is_thrifty(self.len) {
             spare(&mut self.carried, self.hits, self.len);

@@ -179,6 +179,7 @@ impl Order {
         self.hits = 0;
         self.renew_all(tick, done);
         self.restore(tick);
+        idle::give_back(&mut self.carried, self.len);
         self.reserve(tick);
     }
 
@@ -197,11 +198,13 @@ impl Order {
         ] {
             room(list, most);
         }
-        room(&mut self.homeless, bodies);
-        room(&mut self.found, bodies);
         room(&mut self.rows, most);
-        room(tick.began, bodies);
-        room(tick.parted, bodies);
+        if !idle::is_thrifty(bodies) {
+            room(&mut self.homeless, bodies);
+            room(&mut self.found, bodies);
+            room(tick.began, bodies);
+            room(tick.parted, bodies);
+        }
         self.tree.reserve();
         self.mender.reserve(blocks);
     }

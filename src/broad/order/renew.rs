@@ -4,8 +4,8 @@
 //! its renewed lanes, and overwrites their rows and columns. So of two bodies that leave their boxes in one tick each
 //! sees the other's new box, and since a row is written, not added to, no pair is there twice.
 
-use super::fatten::sure;
 use super::links::{Bits, Matrix, room};
+use super::look::sure;
 use super::{BodySlot, NONE, Order, PairKey, Proxies, Tick, Work as Done, ones, parts, small};
 use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch};
 
