@@ -7,6 +7,7 @@
 use super::Proxies;
 use super::forced::Forced;
 use super::members::{IN, Members, UNBOUNDED};
+use super::order::give_back;
 use crate::ids::{BodyId, BodySlot, PairKey, PairSlot};
 use crate::pairs::{Ended, PairDelta, PairPolicy, PairSet};
 use crate::simd::boxes::prefetch;
@@ -18,12 +19,12 @@ const AHEAD: usize = 8;
 /// What an update has found so far; memory is kept over updates.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Found {
-    /// Pairs that may have begun.
+    /// Pairs that may have begun, and then those that did.
     pub(super) began: Vec<PairKey>,
     /// Pairs taken out of the set, with the order of the delta.
     ended: Vec<((BodyId, BodyId), Ended)>,
-    /// Pairs to be stored, in the order of the delta.
-    fresh: Vec<((BodyId, BodyId), PairKey)>,
+    /// Pairs to be stored, with the order of the delta, while they are put in it.
+    ranked: Vec<((BodyId, BodyId), PairKey)>,
     /// Stored pairs to look at, while some are taken out.
     pub(super) slots: Vec<PairSlot>,
     /// Stored pairs that end, and why.
@@ -102,10 +103,13 @@ impl<X: Proxies, P: PairPolicy> Judge<'_, X, P> {
 }
 
 impl Found {
-    /// Begins an update.
-    pub(super) fn open_tick(&mut self) {
-        self.began.clear();
-        self.ended.clear();
+    /// Ends an update: what it needed more of than most do is given back.
+    pub(super) fn close_tick(&mut self, bodies: usize) {
+        give_back(&mut self.began, bodies);
+        give_back(&mut self.ended, bodies);
+        give_back(&mut self.ranked, bodies);
+        give_back(&mut self.slots, bodies);
+        give_back(&mut self.doomed, bodies);
     }
 
     /// Takes a stored pair out.
@@ -165,8 +169,9 @@ impl Found {
         self.truncated.clear();
         self.truncated.extend_from_slice(pairs.truncated());
         pairs.forget_missing();
-        for (at, (_, key)) in self.fresh.iter().enumerate() {
-            if let Some((_, ahead)) = self.fresh.get(at + AHEAD) {
+        pairs.reserve(self.began.len());
+        for (at, key) in self.began.iter().enumerate() {
+            if let Some(ahead) = self.began.get(at + AHEAD) {
                 pairs.prefetch_insert(*ahead);
             }
             match pairs.insert(*key) {
@@ -184,18 +189,29 @@ impl Found {
 
     /// Of the suggestions those that must be stored and are not, in the order of ids.
     fn select(&mut self, judge: &Judge<'_, impl Proxies, impl PairPolicy>, pairs: &PairSet) {
-        self.fresh.clear();
         self.began.sort_unstable();
         self.began.dedup();
-        for (at, key) in self.began.iter().enumerate() {
+        let mut kept = 0;
+        for at in 0..self.began.len() {
             pairs.prefetch_find(&self.began, at);
             if let Some(ahead) = self.began.get(at + AHEAD) {
                 judge.prefetch(*ahead);
             }
-            if pairs.find(*key).is_none() && judge.begins(*key) {
-                self.fresh.push((judge.members.rank(*key), *key));
+            let key = self.began[at];
+            if pairs.find(key).is_none() && judge.begins(key) {
+                self.began[kept] = key;
+                kept += 1;
             }
         }
-        self.fresh.sort_unstable_by_key(|(rank, _)| *rank);
+        self.began.truncate(kept);
+        // As a rule ids ascend with slots, and so do these.
+        if !judge.members.ids_ascend() {
+            let keys = self.began.iter();
+            self.ranked.clear();
+            (self.ranked).extend(keys.map(|key| (judge.members.rank(*key), *key)));
+            self.ranked.sort_unstable_by_key(|(rank, _)| *rank);
+            self.began.clear();
+            self.began.extend(self.ranked.iter().map(|(_, key)| *key));
+        }
     }
 }

@@ -4,6 +4,7 @@
 //! slot (a body is some hundred bytes, a box 48); the others read them where they are.
 
 use super::Proxies;
+use super::order::give_back;
 use crate::ids::{BodyId, BodySlot, PairKey};
 use crate::math::Aabb;
 
@@ -78,6 +79,8 @@ pub(super) struct Members {
     unbounded: Vec<BodySlot>,
     /// Bodies with a flag of this tick, each once.
     touched: Vec<BodySlot>,
+    /// Slots whose id is not above that of the slot before, also of bodies that left.
+    descents: usize,
 }
 
 impl Members {
@@ -94,6 +97,7 @@ impl Members {
         for slot in self.touched.drain(..) {
             self.flags[slot.index()] &= IN | UNBOUNDED;
         }
+        give_back(&mut self.touched, self.bounded.len());
     }
 
     /// Takes a body out; `false` when it is not in.
@@ -126,11 +130,13 @@ impl Members {
             if self.with_bounds {
                 self.bounds.resize(at + 1, Bounds::EMPTY);
             }
+            let last = self.ids.len().saturating_sub(1);
             self.ids.resize(at + 1, BodyId(0));
+            self.descents += descents(&self.ids[last..]);
             self.flags.resize(at + 1, 0);
             self.place.resize(at + 1, 0);
         }
-        self.ids[at] = proxies.id(slot);
+        self.name(at, proxies.id(slot));
         let list = if proxies.unbounded(slot) {
             self.flags[at] |= IN | UNBOUNDED;
             &mut self.unbounded
@@ -149,6 +155,19 @@ impl Members {
         }
         self.touch(slot, ASKED | CAME);
         true
+    }
+
+    /// Sets the id of a slot.
+    fn name(&mut self, at: usize, id: BodyId) {
+        let around = at.saturating_sub(1)..self.ids.len().min(at + 2);
+        self.descents -= descents(&self.ids[around.clone()]);
+        self.ids[at] = id;
+        self.descents += descents(&self.ids[around]);
+    }
+
+    /// Whether ids ascend with slots: keys then are in the order of ids as they are.
+    pub(super) fn ids_ascend(&self) -> bool {
+        self.descents == 0
     }
 
     /// Takes the new box of a body that is in and has one.
@@ -230,6 +249,9 @@ impl Members {
         if inside != self.bounded.len() + self.unbounded.len() {
             return Err(format!("{inside} bodies are in, the lists hold others"));
         }
+        if self.descents != descents(&self.ids) {
+            return Err(format!("{} descents of ids are counted", self.descents));
+        }
         for (list, flags) in [(&self.bounded, IN), (&self.unbounded, IN | UNBOUNDED)] {
             for (place, slot) in list.iter().enumerate() {
                 let at = slot.index();
@@ -247,6 +269,11 @@ impl Members {
         }
         Ok(())
     }
+}
+
+/// How many ids are not above the one before.
+fn descents(ids: &[BodyId]) -> usize {
+    ids.windows(2).filter(|two| two[0] >= two[1]).count()
 }
 
 /// An index as the 32 bits it is stored in; there are never more bodies than `limits::BODIES_MAX`.

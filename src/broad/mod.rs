@@ -35,7 +35,7 @@ use commit::{Found, Judge};
 use forced::Forced;
 use grid::{Grid, Kind};
 use members::{ASKED, IN, Members, REFILTERED};
-use order::{Order, Tick};
+use order::{Order, Tick, give_back};
 use sap::Sap;
 
 /// The boxes, as the world has them.
@@ -185,9 +185,9 @@ impl BroadPhase {
         delta: &mut PairDelta,
     ) {
         pairs.open_tick();
-        delta.clear();
+        give_back(&mut delta.began, self.len());
+        give_back(&mut delta.ended, self.len());
         self.members.open_tick();
-        self.found.open_tick();
         self.work = Work::default();
         self.leave(changes, pairs);
         self.enter(changes, proxies);
@@ -212,7 +212,6 @@ impl BroadPhase {
             }
             Engine::Order(order) => {
                 touched::end(&judge, pairs, &mut self.found);
-                self.parted.clear();
                 let tick = Tick {
                     members: &self.members,
                     proxies,
@@ -227,6 +226,9 @@ impl BroadPhase {
         }
         self.found.commit(&judge, pairs, delta);
         self.forced.settle();
+        let bodies = self.len();
+        self.found.close_tick(bodies);
+        give_back(&mut self.parted, bodies);
     }
 
     /// Takes out the bodies that left; their pairs end. Of two bodies that left, the cause with the lower code wins,

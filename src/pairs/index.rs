@@ -5,6 +5,9 @@
 //! nothing but the table. For pairs: a body of a dense scene has tens of them, and there walks through lists took 71 %
 //! of a tick of the broad phase. Fixed hash, never iterated: nothing depends on its order.
 //!
+//! The table is of any size, not only of powers of two, which would be up to twice what is needed: every place of it is
+//! touched, whatever it holds.
+//!
 //! Linear probing with deletion by shifting back (Knuth, TAOCP 3, section 6.4, algorithm R).
 
 use crate::simd::boxes::prefetch;
@@ -18,6 +21,10 @@ const EMPTY: Entry = Entry {
 };
 /// Least size of the table.
 const LEAST: usize = 16;
+/// Of so many places of the table so many are taken at most: runs then are of some places, which lie in a line of
+/// memory or two.
+const OF: usize = 3;
+const TAKEN: usize = 2;
 
 /// A place, and the upper half of the mixed hash of its key.
 #[derive(Clone, Copy, Debug)]
@@ -59,7 +66,7 @@ impl Index {
             if entry.mixed == mixed && is_it(entry.place) {
                 return Some(entry.place);
             }
-            at = (at + 1) & (self.table.len() - 1);
+            at = self.after(at);
         }
     }
 
@@ -82,11 +89,8 @@ impl Index {
     ///
     /// * `places` - so many there is room for in what holds the keys: the table grows when that does, at no other time.
     pub(crate) fn insert(&mut self, hash: u64, place: u32, places: usize) {
-        // At most half full: runs stay short.
-        if 2 * (self.len + 1) > self.table.len() {
-            let size = (2 * places.max(self.len + 1))
-                .next_power_of_two()
-                .max(LEAST);
+        if OF * (self.len + 1) > TAKEN * self.table.len() {
+            let size = (OF * places.max(self.len + 1)).div_ceil(TAKEN).max(LEAST);
             let old = std::mem::replace(&mut self.table, vec![EMPTY; size]);
             for entry in old.into_iter().filter(|entry| entry.place != NONE) {
                 self.put(entry);
@@ -106,26 +110,24 @@ impl Index {
         if self.table.is_empty() {
             return;
         }
-        let last = self.table.len() - 1;
         let mut hole = self.home(mix(hash));
         while self.table[hole].place != place {
             if self.table[hole].place == NONE {
                 debug_assert!(false, "only what is in the table is taken out");
                 return;
             }
-            hole = (hole + 1) & last;
+            hole = self.after(hole);
         }
         // What stands behind the hole and may not be cut off from its home moves into it.
         let mut at = hole;
         loop {
-            at = (at + 1) & last;
+            at = self.after(at);
             let entry = self.table[at];
             if entry.place == NONE {
                 break;
             }
             let home = self.home(entry.mixed);
-            let reaches = at.wrapping_sub(home) & last;
-            if reaches >= (at.wrapping_sub(hole) & last) {
+            if self.way(home, at) >= self.way(hole, at) {
                 self.table[hole] = entry;
                 hole = at;
             }
@@ -138,17 +140,30 @@ impl Index {
     fn put(&mut self, entry: Entry) {
         let mut at = self.home(entry.mixed);
         while self.table[at].place != NONE {
-            at = (at + 1) & (self.table.len() - 1);
+            at = self.after(at);
         }
         self.table[at] = entry;
     }
 
-    /// Where a key is looked for first: the upper bits of its mixed hash. There are never 2^32 entries.
+    /// The place behind one, round the end.
     #[inline]
+    fn after(&self, at: usize) -> usize {
+        if at + 1 < self.table.len() { at + 1 } else { 0 }
+    }
+
+    /// How many places on from one another is, round the end.
+    #[inline]
+    fn way(&self, from: usize, to: usize) -> usize {
+        let round = if to < from { self.table.len() } else { 0 };
+        to + round - from
+    }
+
+    /// Where a key is looked for first: as far along the table as its mixed hash is among all. There are never 2^32
+    /// entries.
+    #[inline]
+    #[allow(clippy::cast_possible_truncation, reason = "below the table's length")]
     fn home(&self, mixed: u32) -> usize {
-        // An empty table has no entry there.
-        let bits = self.table.len().max(1).trailing_zeros();
-        mixed.checked_shr(u32::BITS - bits).unwrap_or(0) as usize
+        ((u64::from(mixed) * self.table.len() as u64) >> u32::BITS) as usize
     }
 
     /// Checks that the table knows so many keys.

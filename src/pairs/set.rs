@@ -4,9 +4,16 @@ use super::index::Index;
 use crate::ids::{BodySlot, PairKey, PairSlot};
 
 mod ahead;
+mod validate;
 
 /// No pair.
 const NONE: u32 = u32::MAX;
+/// In place of the pair before, in the first of the two lists: no pair stands here. No slot is that high.
+const DEAD: u32 = NONE - 1;
+/// Least places that the set grows by, ...
+const LEAST: usize = 16;
+/// ... and one for so many: what the pairs of a scene come and go by. Their memory is most of that of a dense scene.
+const GROWTH: usize = 8;
 
 /// One place of the set: a pair, its neighbours in the lists of its two bodies (0: lower slot, 1: higher slot).
 #[derive(Clone, Copy, Debug)]
@@ -14,10 +21,23 @@ struct Node {
     key: PairKey,
     next: [u32; 2],
     prev: [u32; 2],
-    live: bool,
 }
 
 impl Node {
+    /// A pair in no list yet.
+    fn new(key: PairKey) -> Self {
+        Self {
+            key,
+            next: [NONE; 2],
+            prev: [NONE; 2],
+        }
+    }
+
+    /// Whether a pair stands here.
+    fn is_live(&self) -> bool {
+        self.prev[0] != DEAD
+    }
+
     /// The key's two bodies.
     fn bodies(&self) -> [BodySlot; 2] {
         let (low, high) = self.key.slots();
@@ -126,7 +146,7 @@ impl PairSet {
     #[must_use]
     pub fn get(&self, slot: PairSlot) -> Option<PairKey> {
         let node = self.nodes.get(slot.index())?;
-        node.live.then_some(node.key)
+        node.is_live().then_some(node.key)
     }
 
     /// Where the pair of two bodies is. Cost: one probe or two.
@@ -165,7 +185,7 @@ impl PairSet {
     pub fn iter(&self) -> impl Iterator<Item = (PairSlot, PairKey)> + '_ {
         (0_u32..)
             .zip(&self.nodes)
-            .filter_map(|(at, node)| node.live.then_some((PairSlot(at), node.key)))
+            .filter_map(|(at, node)| node.is_live().then_some((PairSlot(at), node.key)))
     }
 
     /// Begins a tick: slots freed in the one before may be used again, the lowest first.
@@ -174,25 +194,29 @@ impl PairSet {
         self.free.append(&mut self.resting);
     }
 
+    /// Makes room for so many pairs more, as far as they may be stored. Pairs that begin together are told together, so
+    /// that memory grows once by what they need and not by doubling.
+    pub(crate) fn reserve(&mut self, more: usize) {
+        let more = more.min(self.limit - self.len);
+        let len = self.nodes.len() + more.saturating_sub(self.free.len());
+        if len > self.nodes.capacity() {
+            let len = len + (len / GROWTH).max(LEAST);
+            self.nodes.reserve_exact(len - self.nodes.len());
+        }
+    }
+
     /// Adds a pair that is not in the set; `None` when the set is full.
     pub(crate) fn insert(&mut self, key: PairKey) -> Option<PairSlot> {
         if self.len >= self.limit {
             return None;
         }
-        let at = self.free.pop().unwrap_or_else(|| {
-            self.nodes.push(Node {
-                key,
-                next: [NONE; 2],
-                prev: [NONE; 2],
-                live: false,
-            });
+        let mut node = Node::new(key);
+        let at = if let Some(at) = self.free.pop() {
+            at
+        } else {
+            self.reserve(1);
+            self.nodes.push(node);
             small(self.nodes.len() - 1)
-        });
-        let mut node = Node {
-            key,
-            next: [NONE; 2],
-            prev: [NONE; 2],
-            live: true,
         };
         for (side, body) in node.bodies().into_iter().enumerate() {
             let empty = Head {
@@ -222,7 +246,7 @@ impl PairSet {
 
     /// Takes a pair out; its slot rests until the next tick. `None` where no pair is.
     pub(crate) fn remove(&mut self, slot: PairSlot) -> Option<PairKey> {
-        let node = *self.nodes.get(slot.index()).filter(|n| n.live)?;
+        let node = *self.nodes.get(slot.index()).filter(|n| n.is_live())?;
         for (side, body) in node.bodies().into_iter().enumerate() {
             let (prev, next) = (node.prev[side], node.next[side]);
             let head = &mut self.heads[body.index()];
@@ -240,7 +264,7 @@ impl PairSet {
             }
         }
         self.index.remove(node.key.bits(), slot.0);
-        self.nodes[slot.index()].live = false;
+        self.nodes[slot.index()].prev[0] = DEAD;
         self.resting.push(slot.0);
         self.len -= 1;
         Some(node.key)
@@ -288,54 +312,6 @@ impl PairSet {
             self.is_truncated[body.index()] = true;
             self.truncated.push(body);
         }
-    }
-
-    /// Checks the whole structure: links both ways, counts, free slots, marks.
-    ///
-    /// # Errors
-    /// One sentence on the first thing that does not hold.
-    pub fn validate(&self) -> Result<(), String> {
-        let live = self.iter().count();
-        if live != self.len || self.len > self.limit {
-            return Err(format!("{live} pairs live, {} counted", self.len));
-        }
-        if live + self.free.len() + self.resting.len() != self.nodes.len() {
-            return Err("a pair slot is neither live nor free nor resting".into());
-        }
-        let mut seen = 0;
-        for (at, head) in (0_u32..).zip(&self.heads) {
-            let body = BodySlot(at);
-            let mut before = NONE;
-            let mut count = 0;
-            for slot in self.pairs_of(body).take(self.len + 1) {
-                let node = &self.nodes[slot.index()];
-                let side = node.side(body);
-                if !node.live || node.bodies()[side] != body || node.prev[side] != before {
-                    return Err(format!("the list of body slot {at} is broken at {slot:?}"));
-                }
-                before = slot.0;
-                count += 1;
-            }
-            if count != head.len {
-                return Err(format!(
-                    "body slot {at} has {count} pairs, not {}",
-                    head.len
-                ));
-            }
-            seen += count as usize;
-        }
-        if seen != 2 * self.len {
-            return Err(format!("{seen} list entries for {} pairs", self.len));
-        }
-        self.index.validate(self.len)?;
-        if self.iter().any(|(slot, key)| self.find(key) != Some(slot)) {
-            return Err("a pair is not found by its key".into());
-        }
-        let marked = self.is_truncated.iter().filter(|m| **m).count();
-        if marked != self.truncated.len() || self.truncated.iter().any(|b| !self.is_truncated(*b)) {
-            return Err("the truncated bodies and their marks differ".into());
-        }
-        Ok(())
     }
 }
 

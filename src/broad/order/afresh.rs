@@ -22,7 +22,7 @@ use super::probe::Probe;
 use super::sweep::{Finds, Search};
 use super::team::Team;
 use super::verlet::Verlet;
-use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, Work as Done, parts};
+use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, Work as Done, give_back, parts};
 use crate::broad::members::{ASKED, CAME, Members};
 use crate::ids::PairKey;
 use crate::simd::boxes::prefetch;
@@ -301,7 +301,7 @@ impl Order {
                     .push(PairKey::new(BodySlot(one), BodySlot(other)));
             }
         }
-        self.carried.clear();
+        give_back(&mut self.carried, self.len);
         tell_all(held, &self.slot_of, tick.began);
     }
 

@@ -13,7 +13,7 @@
 //! is nearly every pair.
 
 use crate::math::Aabb;
-use crate::simd::boxes::{Down, Hold, Lanes, SLACK, slack};
+use crate::simd::boxes::{Down, Hold, Lanes, SLACK};
 
 /// Ticks that a fat box is swept for. Renewing a body costs about 100 ns, each tick of sweep adds candidates that cost
 /// some 3 ns a tick: in the gas of the bench 8 to 16 come out alike.
@@ -252,26 +252,6 @@ impl Gait {
 const NO_CORE: Down = Down {
     faces: [f32::INFINITY; 8],
 };
-
-/// What the f64 box of a body that keeps to its hold is sure to hold: the core, less what rounding may have added.
-#[inline(always)]
-pub(super) fn sure(hold: &Hold) -> [f32; 6] {
-    let (fat, core) = (hold.fat.corners(), hold.core.corners());
-    let largest = fat.iter().fold(
-        0.0,
-        |most: f32, face| {
-            if face.abs() > most { face.abs() } else { most }
-        },
-    );
-    let slack = slack(largest);
-    std::array::from_fn(|k| {
-        if k < 3 {
-            core[k] + slack
-        } else {
-            core[k] - slack
-        }
-    })
-}
 
 /// A box of the world as it is stored.
 #[inline(always)]

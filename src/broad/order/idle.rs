@@ -1,20 +1,40 @@
-//! Memory of the way that is not taken: of many bodies it is given back.
+//! Memory that lies idle: of many bodies it is given back.
 //!
-//! In: a change of the way. Out: less memory; nothing else is told by it. Candidates and the search without them take
-//! half of it each, and a world of many bodies seldom changes from the one to the other, in a tick that lays all of
-//! them anyway. Of fewer bodies it is kept, so that no tick makes any.
+//! In: a change of the way, a tick that is over. Out: less memory; nothing else is told by it. Candidates and the
+//! search without them take half of it each, and a world of many bodies seldom changes from the one to the other, in a
+//! tick that lays all of them anyway. Lists that a tick fills once, as the first one does with every pair, are not kept
+//! at that length. Of fewer bodies all of it is kept, so that no tick makes any.
 
 use super::afresh::Afresh;
 use super::gear::FAR;
-use super::links::Links;
 use super::mend::Mender;
-use super::sort::Sorter;
-use super::verlet::Verlet;
 use super::{Order, renew};
 
+/// A list of what changes in a tick keeps room for one entry for so many bodies, and up to twice as many: enough for
+/// all scenes of the bench but the fastest and those of tens of pairs a body, where a tick has other things to do for
+/// long.
+const KEPT: usize = 4;
+
 /// Whether there are so many bodies that what lies idle is given back.
-pub(super) fn is_thrifty(bodies: usize) -> bool {
+pub(in crate::broad) fn is_thrifty(bodies: usize) -> bool {
     bodies > FAR
+}
+
+/// Empties a list of a tick, and gives back what is more than most ticks need.
+pub(in crate::broad) fn give_back<T>(list: &mut Vec<T>, bodies: usize) {
+    list.clear();
+    let kept = bodies / KEPT;
+    if is_thrifty(bodies) && list.capacity() > 2 * kept {
+        list.shrink_to(kept);
+    }
+}
+
+/// Empties a list and gives its memory back, but for one entry. Freed whole it would be a sign to glibc that lists of
+/// this size come and go: the next ones then share one heap, and what is freed amid it stays with the process. A list
+/// that shrinks and grows has pages of its own.
+pub(super) fn shed<T>(list: &mut Vec<T>) {
+    list.clear();
+    list.shrink_to(1);
 }
 
 impl Order {
@@ -23,13 +43,27 @@ impl Order {
         if !is_thrifty(self.len) {
             return;
         }
-        self.links = Links::default();
+        self.links.give_back();
         self.mender = Mender::default();
         self.scratch = renew::Scratch::default();
-        (self.held, self.sure) = (Vec::new(), Vec::new());
-        (self.ages, self.gaits, self.former) = (Vec::new(), Vec::new(), Vec::new());
-        (self.entries, self.found, self.rows) = (Vec::new(), Vec::new(), Vec::new());
-        (self.touched_records, self.emptied) = (Vec::new(), Vec::new());
+        shed(&mut self.held);
+        shed(&mut self.ages);
+        shed(&mut self.gaits);
+        shed(&mut self.former);
+        shed(&mut self.rows);
+        shed(&mut self.touched_records);
+        shed(&mut self.emptied);
+        self.give_back_list();
+    }
+
+    /// Few moved: the list of candidates is let go.
+    pub(super) fn give_back_list(&mut self) {
+        self.listed = false;
+        if is_thrifty(self.len) {
+            shed(&mut self.entries);
+            shed(&mut self.found);
+            shed(&mut self.sure);
+        }
     }
 
     /// Candidates are taken up again: what is learned of the ways stays.
@@ -38,32 +72,27 @@ impl Order {
             return;
         }
         let Afresh {
-            gear,
-            probe,
-            team,
+            presort,
+            held,
             verlet,
+            finds,
+            reach,
             ..
-        } = std::mem::take(&mut self.afresh);
-        self.afresh = Afresh {
-            gear,
-            probe,
-            team,
-            verlet: Verlet {
-                pace: verlet.pace,
-                ..Verlet::default()
-            },
-            ..Afresh::default()
-        };
+        } = &mut self.afresh;
+        presort.give_back();
+        held.give_back();
+        finds.give_back();
+        verlet.give_back();
+        shed(reach);
     }
 
-    /// Bodies with candidates were sorted: that is seldom done.
+    /// Bodies were sorted: that is seldom done, and not while lists are longest.
     pub(super) fn give_back_sort(&mut self) {
         if !is_thrifty(self.len) {
             return;
         }
-        (self.boxes, self.former) = (Vec::new(), Vec::new());
-        let frame = self.sorter.frame;
-        self.sorter = Sorter::default();
-        self.sorter.frame = frame;
+        shed(&mut self.boxes);
+        shed(&mut self.former);
+        self.sorter.give_back();
     }
 }

@@ -8,7 +8,7 @@ use super::load::ask_ahead;
 use super::place::{ATTIC, grow, middle};
 use super::sort::{FILL, Frame, Sorter};
 use super::tree::NO_BOUND;
-use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, ones, small};
+use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, is_thrifty, ones, small};
 use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work, prefetch};
 
 /// Boxes compared with a block in the time that laying a body anew takes.
@@ -55,8 +55,8 @@ impl Order {
         // What is spoilt in a tick is not worth being dealt to compact blocks.
         if self.afresh.spoilt == 0 {
             for (key, at) in sorter.sort(&boxes) {
-                let at = *at as usize;
-                self.deal_to(*key, FILL, Some((bodies[at], &boxes[at])));
+                let at = at as usize;
+                self.deal_to(key, FILL, Some((bodies[at], &boxes[at])));
             }
         } else {
             for (key, at) in sorter.along_curve(&boxes) {
@@ -118,6 +118,7 @@ impl Order {
             jumped,
             finds,
             presort,
+            spoilt,
             ..
         } = &mut self.afresh;
         for lanes in [gone, jumped] {
@@ -128,10 +129,15 @@ impl Order {
         let seats = bodies / MANY_CAME + 1;
         room(&mut self.homeless, seats);
         room(&mut self.worklist, 2 * seats);
-        presort.reserve(bodies + seats, seats);
-        room(&mut self.boxes, bodies + seats);
         finds.reserve(blocks, bodies);
-        spare(&mut self.carried, self.hits, bodies);
+        if !is_thrifty(bodies) {
+            presort.reserve(bodies + seats, seats);
+            room(&mut self.boxes, bodies + seats);
+            spare(&mut self.carried, self.hits, bodies);
+        } else if *spoilt == 0 {
+            presort.give_back();
+            self.give_back_sort();
+        }
     }
 
     /// Gives a body the next lane, or nobody: a lane is passed over for who is gone, so that the blocks stay those of

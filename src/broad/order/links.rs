@@ -5,6 +5,7 @@
 //! their lanes, whatever is renewed around it, so no map from pairs to places is needed.
 
 use super::NONE;
+use super::idle::shed;
 use crate::simd::boxes::{LANES, WIDTH, prefetch};
 
 /// Bits of lanes by lane.
@@ -27,6 +28,10 @@ struct Ends {
     blocks: [u32; 2],
     places: [u32; 2],
 }
+
+/// Records a block that room is made for at first: where few boxes overlap there are about five, and to grow by
+/// doubling would hold twice as many meanwhile.
+const RECORDS: usize = 6;
 
 /// Entries of a piece of a block's list.
 const PIECE: usize = 15;
@@ -80,9 +85,21 @@ impl Links {
         spare(&mut self.free_pieces, pieces, blocks);
     }
 
+    /// Gives all memory back.
+    pub(super) fn give_back(&mut self) {
+        shed(&mut self.ends);
+        shed(&mut self.bits);
+        shed(&mut self.free);
+        shed(&mut self.heads);
+        shed(&mut self.pieces);
+        shed(&mut self.free_pieces);
+    }
+
     /// Room for the lists of so many blocks.
     pub(super) fn reserve_blocks(&mut self, blocks: usize) {
         room(&mut self.heads, blocks);
+        room(&mut self.ends, RECORDS * blocks);
+        room(&mut self.bits, RECORDS * blocks);
     }
 
     /// The matrices of a record.
@@ -135,10 +152,17 @@ impl Links {
         }
     }
 
-    /// The record of two blocks.
+    /// The record of two blocks; in the shorter of their lists, for a huge body's block is near all others.
     pub(super) fn find(&self, a: u32, b: u32) -> Option<u32> {
-        self.of(a)
-            .find_map(|(other, record)| (other == b).then_some(record))
+        for (one, other) in self.of(a).zip(self.of(b)) {
+            if one.0 == b {
+                return Some(one.1);
+            }
+            if other.0 == a {
+                return Some(other.1);
+            }
+        }
+        None
     }
 
     /// A new record of two blocks that have none, `a <= b`.

@@ -5,31 +5,15 @@
 //! ones dead. Pairs that are sure for as long as both bodies keep to their holds are not listed. When few move, their
 //! bits in the matrices are looked up, and the list is let go.
 
+use super::entry::{Entry, ages};
 use super::links::Matrix;
-use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, column, ones, parts, small};
+use super::{
+    BodySlot, NONE, Order, Proxies, Tick, Work as Done, column, is_thrifty, ones, parts, small,
+};
 use crate::ids::PairKey;
-use crate::simd::boxes::{Down, LANES, Lanes, Portable, WIDTH, Work, prefetch};
-
-/// A candidate, as four words that are read and written whole.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(16))]
-pub(super) struct Entry {
-    /// Ranks, the lower first.
-    ranks: [u32; 2],
-    record: u32,
-    /// Ages of the two lanes when it was listed, one byte each: with another age it is dead. Then whether the boxes
-    /// overlapped at the last look.
-    state: u32,
-}
-
-/// The bit of [`Entry::state`] that says whether the boxes overlapped.
-const HIT: u32 = 1 << 16;
-
-/// Ages as they stand in [`Entry::state`].
-#[inline(always)]
-fn state(first: u8, second: u8) -> u32 {
-    u32::from(first) | u32::from(second) << 8
-}
+use crate::simd::boxes::{
+    Boxes16, Down, Hold, LANES, Lanes, Portable, WIDTH, Work, prefetch, slack,
+};
 
 /// What a look at an entry found; the place of the entry, and:
 #[derive(Clone, Copy, Debug)]
@@ -84,18 +68,22 @@ impl Order {
             found: &mut found,
         });
         for one in &found {
-            let entry = self.entries[one.at as usize];
-            let slots = entry
-                .ranks
-                .map(|rank| BodySlot(self.slot_of[rank as usize]));
+            let ranks = self.entries[one.at as usize].ranks();
+            let slots = ranks.map(|rank| BodySlot(self.slot_of[rank as usize]));
             let now = one.now.unwrap_or_else(|| {
                 let [a, b] = slots.map(|slot| tick.proxies.aabb(slot));
                 a.overlaps(b)
             });
-            let state = &mut self.entries[one.at as usize].state;
-            *state = (*state & !HIT) | if now { HIT } else { 0 };
-            let (row, lane) = (parts(entry.ranks[0]).1, parts(entry.ranks[1]).1);
-            let hit = &mut self.links.bits_mut(entry.record).hit[row];
+            let entry = &mut self.entries[one.at as usize];
+            if now == entry.is_hit() {
+                continue;
+            }
+            entry.set_hit(now);
+            let ((a, row), (b, lane)) = (parts(ranks[0]), parts(ranks[1]));
+            let record = self.links.find(small(a), small(b));
+            debug_assert!(record.is_some(), "what is listed has a record");
+            let Some(record) = record else { continue };
+            let hit = &mut self.links.bits_mut(record).hit[row];
             // The matrix holds the truth: a pair that changed its lanes was restored there.
             if now == (*hit >> lane & 1 == 1) {
                 continue;
@@ -110,6 +98,11 @@ impl Order {
             }
         }
         self.found = found;
+        // The first looks after a sort are at many more than are listed once bodies have learned their cores.
+        let len = self.entries.len() + self.len / 4;
+        if is_thrifty(self.len) && self.entries.capacity() > 2 * len {
+            self.entries.shrink_to(len);
+        }
     }
 
     /// Lists some candidates of a record; those that are sure now overlap, and are told if they did not.
@@ -142,20 +135,17 @@ impl Order {
             *hits |= sure;
             for lane in ones(chosen[row] & !sure) {
                 let ranks = [first, b + small(lane)];
-                let ages = state(self.ages[ranks[0] as usize], self.ages[ranks[1] as usize]);
-                self.entries.push(Entry {
-                    ranks,
-                    record,
-                    state: ages | u32::from(*hits >> lane & 1) << 16,
-                });
+                let ages = ages(self.ages[ranks[0] as usize], self.ages[ranks[1] as usize]);
+                let hit = *hits >> lane & 1 == 1;
+                self.entries.push(Entry::new(ranks, ages, hit));
             }
         }
     }
 
     /// Looks at the candidates of moved bodies, one by one.
     pub(super) fn look_at_moved<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
-        self.listed = false;
         self.entries.clear();
+        self.give_back_list();
         for at in 0..tick.moved.len() {
             self.ask_ahead(&tick.moved[at..]);
             let slot = tick.moved[at];
@@ -262,21 +252,24 @@ impl Order {
         }
         let mut seen: Vec<[u32; 2]> = Vec::new();
         for entry in &self.entries {
-            let [first, second] = entry.ranks.map(|rank| self.ages[rank as usize]);
-            if state(first, second) != entry.state & !HIT {
+            let ranks = entry.ranks();
+            let [first, second] = ranks.map(|rank| self.ages[rank as usize]);
+            if ages(first, second) != entry.ages() {
                 continue;
             }
-            let ((a, row), (b, lane)) = (parts(entry.ranks[0]), parts(entry.ranks[1]));
-            let bits = self.links.bits(entry.record);
-            let blocks = self.links.blocks(entry.record).map(|block| block as usize);
+            let ((a, row), (b, lane)) = (parts(ranks[0]), parts(ranks[1]));
+            let Some(record) = self.links.find(small(a), small(b)) else {
+                return Err(format!("{ranks:?} are listed, their blocks have no record"));
+            };
+            let bits = self.links.bits(record);
             let bit = (
                 bits.cand[row] >> lane & 1 == 1,
                 bits.hit[row] >> lane & 1 == 1,
             );
-            if blocks != [a, b] || bit != (true, entry.state & HIT != 0) {
-                return Err(format!("{entry:?} is listed, the matrix has {bit:?}"));
+            if bit != (true, entry.is_hit()) {
+                return Err(format!("{ranks:?} are listed, the matrix has {bit:?}"));
             }
-            seen.push(entry.ranks);
+            seen.push(ranks);
         }
         let listed = seen.len();
         seen.sort_unstable();
@@ -307,6 +300,26 @@ impl Order {
     }
 }
 
+/// What the f64 box of a body that keeps to its hold is sure to hold: the core, less what rounding may have added.
+#[inline(always)]
+pub(super) fn sure(hold: &Hold) -> [f32; 6] {
+    let (fat, core) = (hold.fat.corners(), hold.core.corners());
+    let largest = fat.iter().fold(
+        0.0,
+        |most: f32, face| {
+            if face.abs() > most { face.abs() } else { most }
+        },
+    );
+    let slack = slack(largest);
+    std::array::from_fn(|k| {
+        if k < 3 {
+            core[k] + slack
+        } else {
+            core[k] - slack
+        }
+    })
+}
+
 /// Lists every candidate.
 struct ListAll<'a> {
     order: &'a mut Order,
@@ -321,6 +334,13 @@ impl Work for ListAll<'_> {
         let order = self.order;
         order.listed = true;
         order.entries.clear();
+        order.sure.clear();
+        order.sure.resize(order.live.len(), Boxes16::EMPTY);
+        for (block, live) in order.live.iter().enumerate() {
+            for lane in ones(*live) {
+                order.sure[block].set(lane, &sure(&order.held[block * WIDTH + lane]));
+            }
+        }
         for record in 0..order.links.len() {
             if order.links.blocks(record)[0] != NONE {
                 let chosen = order.links.bits(record).cand;
@@ -346,16 +366,17 @@ impl Work for Look<'_> {
         let mut kept = 0;
         for at in 0..self.entries.len() {
             if let Some(next) = self.entries.get(at + AHEAD) {
-                prefetch(&self.exact[next.ranks[0] as usize]);
-                prefetch(&self.exact[next.ranks[1] as usize]);
+                let [one, other] = next.ranks();
+                prefetch(&self.exact[one as usize]);
+                prefetch(&self.exact[other as usize]);
             }
             let entry = self.entries[at];
-            let (a, b) = (entry.ranks[0] as usize, entry.ranks[1] as usize);
-            let alive = state(self.ages[a], self.ages[b]) == entry.state & !HIT;
+            let [a, b] = entry.ranks().map(|rank| rank as usize);
+            let alive = ages(self.ages[a], self.ages[b]) == entry.ages();
             self.entries[kept] = entry;
             let (apart, sure) = lanes.parts(&self.exact[a], &self.exact[b]);
             // Without a branch on the state: it is as good as random.
-            let hit = entry.state & HIT != 0;
+            let hit = entry.is_hit();
             let as_before = (hit & sure) | (!hit & apart);
             if alive & !as_before {
                 let now = if apart | sure { Some(sure) } else { None };

@@ -260,7 +260,9 @@ impl Order {
         self.live[block] = 0;
         self.renewing[block] = 0;
         self.fat[block] = Boxes16::EMPTY;
-        self.sure[block] = Boxes16::EMPTY;
+        if self.listed {
+            self.sure[block] = Boxes16::EMPTY;
+        }
         self.homes[block] = NO_BOUND;
         self.worklist.push(small(block));
     }

@@ -3,6 +3,7 @@
 //! In: boxes in their lanes, the tree over the blocks. Out: the overlaps of a tick in the order of blocks, so that
 //! those of two ticks with the same lanes differ by their bits alone.
 
+use super::idle::shed;
 use super::links::{Matrix, room, small, spare};
 use super::{BodySlot, parts};
 use crate::ids::PairKey;
@@ -44,6 +45,14 @@ impl Met {
         self.others.clear();
         self.hits.clear();
         self.count = 0;
+    }
+
+    /// Gives all memory back.
+    pub(super) fn give_back(&mut self) {
+        self.clear();
+        shed(&mut self.firsts);
+        shed(&mut self.others);
+        shed(&mut self.hits);
     }
 
     /// Room for more than it, or another of its size, holds: how many records there are differs from tick to tick, and
@@ -174,6 +183,7 @@ impl Met {
         slot_of: &[u32],
         carried: &mut Vec<(u32, u32)>,
     ) {
+        carried.reserve(self.count);
         for block in 0..self.blocks() {
             for at in self.of(block) {
                 let other = self.others[at] as usize;

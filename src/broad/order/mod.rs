@@ -34,6 +34,7 @@ use crate::simd::boxes::{Boxes16, Down, Hold, Level, WIDTH};
 use crate::wire::{BroadCause, BroadMode};
 
 mod afresh;
+mod entry;
 mod fatten;
 mod gear;
 mod idle;
@@ -62,6 +63,7 @@ mod verlet;
 
 use afresh::Afresh;
 use fatten::Gait;
+pub(super) use idle::{give_back, is_thrifty};
 use links::{Links, small, spare};
 use tree::Tree;
 
@@ -102,8 +104,8 @@ pub(super) struct Order {
     live: Vec<u16>,
     /// By rank: the box, rounded outward.
     exact: Vec<Down>,
-    /// By rank: the fat box and the core; and by block, to be asked sixteen at a time, the fat boxes and what is sure
-    /// of the cores.
+    /// By rank: the fat box and the core; and by block, to be asked sixteen at a time, the fat boxes, and while
+    /// candidates are listed what is sure of the cores.
     held: Vec<Hold>,
     fat: Vec<Boxes16>,
     sure: Vec<Boxes16>,
@@ -144,7 +146,7 @@ pub(super) struct Order {
     touched_records: Vec<u32>,
     emptied: Vec<u32>,
     /// The candidates as a flat list, while it is kept (`look`).
-    entries: Vec<look::Entry>,
+    entries: Vec<entry::Entry>,
     listed: bool,
     found: Vec<look::Found>,
     rows: Vec<look::Row>,
@@ -229,7 +231,7 @@ impl Order {
         self.tick = self.tick.wrapping_add(1);
         let (moved, bodies) = (tick.moved.len(), tick.members.bounded().len());
         let was = self.afresh.on;
-        self.homeless.clear();
+        give_back(&mut self.homeless, self.len);
         let came = tick.members.touched().iter().copied();
         let came = came.filter(|s| tick.members.has(*s, CAME) && tick.members.is_bounded(*s));
         self.homeless.extend(came);
@@ -289,11 +291,6 @@ impl Order {
         self.afresh.gear.forced = afresh;
     }
 
-    /// Sets how many threads search without candidates at most, and from how many comparisons in a tick on.
-    pub(super) fn use_threads(&mut self, most: usize, least: u64) {
-        self.afresh.team.set(most, least);
-    }
-
     /// Reports every overlap of bodies whose pairs must be looked for, whatever moved.
     fn tell_asked<P: Proxies>(&mut self, tick: &mut Tick<'_, P>) {
         let members = tick.members;
@@ -323,7 +320,9 @@ impl Order {
         }
         self.carried.clear();
         // A sort may come in any tick and carries every overlap: room for that grows when their number does.
-        spare(&mut self.carried, self.hits, self.len);
+        if !is_thrifty(self.len) {
+            spare(&mut self.carried, self.hits, self.len);
+        }
     }
 
     /// Block and lane of a body.

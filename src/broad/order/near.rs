@@ -128,15 +128,14 @@ impl Order {
         }
     }
 
-    /// Finds which of the entries from one on overlap, and tells nobody.
-    pub(super) fn settle_listed<P: Proxies>(&mut self, from: usize, proxies: &P) {
+    /// Finds which of so many first entries overlap, and tells nobody.
+    pub(super) fn settle_listed<P: Proxies>(&mut self, some: usize, proxies: &P) {
         let verlet = &mut self.afresh.verlet;
         verlet.found.clear();
         let (exact, slot_of) = (&self.exact[..], &self.slot_of[..]);
         self.hits += self.level.run(Settle {
             exact,
-            entries: &mut verlet.entries,
-            from,
+            entries: &mut verlet.entries[..some],
             found: &mut verlet.found,
         });
         for Found { at, .. } in &verlet.found {
@@ -165,7 +164,6 @@ impl Order {
 struct Settle<'a> {
     exact: &'a [Down],
     entries: &'a mut [Near],
-    from: usize,
     /// What rounding leaves open.
     found: &'a mut Vec<Found>,
 }
@@ -176,7 +174,7 @@ impl Work for Settle<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) -> usize {
         let mut hits = 0;
-        for at in self.from..self.entries.len() {
+        for at in 0..self.entries.len() {
             ask_ahead(self.exact, self.entries, at);
             let [a, b] = self.entries[at].ranks();
             let (apart, sure) = lanes.parts(&self.exact[a], &self.exact[b]);

@@ -7,9 +7,10 @@
 //! left the list in use too, and was looked for among the new boxes: what is listed there of him goes over.
 
 use super::afresh::Afresh;
+use super::idle::shed;
 use super::links::{room, small, spare};
 use super::sweep::Search;
-use super::{Order, Proxies, Tick, Work as Done};
+use super::{Order, Proxies, Tick, Work as Done, is_thrifty};
 
 impl Order {
     /// Begins the list, which is to be made in so many ticks. The first of several, in which all boxes are swept, has
@@ -21,6 +22,8 @@ impl Order {
         verlet.next.deal(0..blocks, runs);
         verlet.late.fill(0);
         finds.near.clear();
+        let entries = verlet.entries.len();
+        room(&mut finds.near, entries + entries / 4);
         if ticks == 1 {
             self.search_next(work);
         }
@@ -45,16 +48,19 @@ impl Order {
     /// Takes the list into use.
     pub(super) fn take_over<P: Proxies>(&mut self, proxies: &P) {
         let Afresh { verlet, finds, .. } = &mut self.afresh;
-        let (entries, late) = (&mut verlet.entries, &verlet.late[..]);
-        entries.retain(|entry| entry.any_among(late));
-        self.hits = entries.iter().filter(|entry| entry.is_hit()).count();
-        let kept = entries.len();
-        let found = finds.near.drain(..);
-        entries.extend(found.filter(|entry| !entry.any_among(late)));
+        let (list, late) = (&mut finds.near, &verlet.late[..]);
+        list.retain(|entry| !entry.any_among(late));
+        let found = list.len();
+        let kept = verlet.entries.iter().filter(|entry| entry.any_among(late));
+        list.extend(kept);
+        std::mem::swap(&mut verlet.entries, list);
+        list.clear();
+        let kept = verlet.entries[found..].iter();
+        self.hits = kept.filter(|entry| entry.is_hit()).count();
         verlet.pace.note_list(verlet.next.sum());
         self.spare_listed();
         // What overlaps has been told of by the list before.
-        self.settle_listed(kept, proxies);
+        self.settle_listed(found, proxies);
     }
 
     /// Room for what comes up until the next list.
@@ -67,8 +73,13 @@ impl Order {
             ..
         } = &mut self.afresh;
         let entries = verlet.entries.len();
-        spare(&mut verlet.entries, entries, self.len);
-        spare(&mut finds.near, entries, self.len);
+        if is_thrifty(self.len) {
+            // Until the next list is made a sort may need as much.
+            shed(&mut finds.near);
+        } else {
+            spare(&mut verlet.entries, entries, self.len);
+            spare(&mut finds.near, entries, self.len);
+        }
         room(&mut verlet.found, self.len);
         room(&mut verlet.strays, self.len);
         room(&mut verlet.blocks, blocks);

@@ -63,7 +63,9 @@ impl Order {
         self.live[block] &= !(1 << lane);
         self.renewing[block] &= !(1 << lane);
         self.fat[block].set(lane, &[f32::NAN; 6]);
-        self.sure[block].set(lane, &[f32::NAN; 6]);
+        if self.listed {
+            self.sure[block].set(lane, &[f32::NAN; 6]);
+        }
         let rank = rank as usize;
         self.exact[rank] = Down::EMPTY;
         self.held[rank] = Hold::EMPTY;
@@ -177,12 +179,15 @@ impl Order {
         self.hits = 0;
         self.renew_all(tick, done);
         self.restore(tick);
+        idle::give_back(&mut self.carried, self.len);
         self.reserve(tick);
     }
 
     /// Room for what the ticks until the next sort may need: growth belongs to a sort, not to any tick.
     fn reserve<P>(&mut self, tick: &mut Tick<'_, P>) {
         let (bodies, blocks) = (self.len, self.live.len());
+        // As many as there can be; of many bodies as many as there are but where one is near half of the others.
+        let most = 2 * blocks + if idle::is_thrifty(bodies) { 0 } else { bodies };
         self.links.reserve();
         let entries = self.entries.len();
         spare(&mut self.entries, entries, 2 * bodies);
@@ -191,19 +196,22 @@ impl Order {
             &mut self.touched_records,
             &mut self.emptied,
         ] {
-            room(list, 2 * blocks + bodies);
+            room(list, most);
         }
-        room(&mut self.homeless, bodies);
-        room(&mut self.found, bodies);
-        room(&mut self.rows, 2 * blocks + bodies);
-        room(tick.began, bodies);
-        room(tick.parted, bodies);
+        room(&mut self.rows, most);
+        if !idle::is_thrifty(bodies) {
+            room(&mut self.homeless, bodies);
+            room(&mut self.found, bodies);
+            room(tick.began, bodies);
+            room(tick.parted, bodies);
+        }
         self.tree.reserve();
         self.mender.reserve(blocks);
     }
 
     /// Remembers every overlap.
     pub(super) fn carry_all(&mut self) {
+        self.carried.reserve(self.hits);
         for block in 0..small(self.live.len()) {
             let (links, slot_of, carried) = (&self.links, &self.slot_of, &mut self.carried);
             for (other, record) in links.of(block) {
@@ -240,7 +248,9 @@ impl Order {
             return;
         }
         room(&mut self.held, most * WIDTH);
-        room(&mut self.sure, most);
+        if !idle::is_thrifty(bodies) {
+            room(&mut self.sure, most);
+        }
         room(&mut self.gaits, most * WIDTH);
         room(&mut self.ages, most * WIDTH);
         self.links.reserve_blocks(most);
@@ -274,10 +284,10 @@ impl Order {
                     .live
                     .last()
                     .is_none_or(|live| live.count_ones() as usize == FILL);
-                full || Sorter::class_of(*first) != Sorter::class_of(*key)
+                full || Sorter::class_of(*first) != Sorter::class_of(key)
             });
             if starts {
-                self.keys.push(*key);
+                self.keys.push(key);
                 self.live.push(0);
                 self.homes.push(NO_BOUND);
                 self.quarters
@@ -288,13 +298,13 @@ impl Order {
             let block = self.live.len() - 1;
             let lane = self.live[block].trailing_ones() as usize;
             self.live[block] |= 1 << lane;
-            let (rank, body) = (block * WIDTH + lane, bodies[*index as usize]);
+            let (rank, body) = (block * WIDTH + lane, bodies[index as usize]);
             self.slot_of[rank] = body.0;
             self.rank_of[body.index()] = small(rank);
-            let middle = centre(&boxes[*index as usize]);
+            let middle = centre(&boxes[index as usize]);
             widen(&mut self.homes[block], &middle);
             widen(&mut self.quarters[block / WIDTH], &middle);
-            let gait = self.former.get(*index as usize).copied();
+            let gait = self.former.get(index as usize).copied();
             self.gaits[rank] = gait.unwrap_or(Gait::NEW);
         }
         self.sorted = self.live.len();
@@ -310,10 +320,8 @@ impl Order {
             list.clear();
             list.resize(blocks, 0);
         }
-        for list in [&mut self.fat, &mut self.sure] {
-            list.clear();
-            list.resize(blocks, Boxes16::EMPTY);
-        }
+        self.fat.clear();
+        self.fat.resize(blocks, Boxes16::EMPTY);
         self.exact.clear();
         self.exact.resize(blocks * WIDTH, Down::EMPTY);
         self.held.clear();

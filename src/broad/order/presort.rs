@@ -6,6 +6,7 @@
 //! Who comes or jumps away in between belongs elsewhere than it was sorted to, and is seated behind the others.
 
 use super::afresh::FRAME_TICKS;
+use super::idle::shed;
 use super::lay::TakeLanes;
 use super::links::room;
 use super::place::middle;
@@ -43,6 +44,12 @@ impl Presort {
     pub(super) fn reserve(&mut self, bodies: usize, late: usize) {
         room(&mut self.bodies, bodies);
         room(&mut self.late, late);
+    }
+
+    /// Gives back what it is sorted in.
+    pub(super) fn give_back(&mut self) {
+        self.on = false;
+        shed(&mut self.bodies);
     }
 
     /// Lets go of it.
@@ -103,6 +110,8 @@ impl Order {
         let presort = &mut self.afresh.presort;
         presort.bodies.clear();
         self.boxes.clear();
+        room(&mut presort.bodies, self.len);
+        room(&mut self.boxes, self.len);
         for (block, live) in self.live.iter().enumerate() {
             for lane in ones(*live) {
                 let slot = self.slot_of[block * WIDTH + lane];
@@ -159,8 +168,8 @@ impl Order {
             std::mem::take(&mut self.sorter),
             std::mem::take(&mut self.boxes),
         );
-        let sorted = sorter.sorted().iter();
-        let sorted = sorted.map(|(key, at)| (*key, presort.bodies[*at as usize]));
+        let sorted = sorter.sorted();
+        let sorted = sorted.map(|(key, at)| (key, presort.bodies[at as usize]));
         boxes.clear();
         for (_, slot) in sorted.clone() {
             if let Some(rank) = self.rank(slot) {
@@ -206,7 +215,7 @@ impl Order {
         if !presort.on {
             return Ok(());
         }
-        let sorted = self.sorter.sorted().iter().map(|(_, at)| *at as usize);
+        let sorted = self.sorter.sorted().map(|(_, at)| at as usize);
         let mut indices: Vec<usize> = sorted.collect();
         indices.sort_unstable();
         let all = presort.bodies.len();

@@ -4,8 +4,8 @@
 //! its renewed lanes, and overwrites their rows and columns. So of two bodies that leave their boxes in one tick each
 //! sees the other's new box, and since a row is written, not added to, no pair is there twice.
 
-use super::fatten::sure;
 use super::links::{Bits, Matrix, room};
+use super::look::sure;
 use super::{BodySlot, NONE, Order, PairKey, Proxies, Tick, Work as Done, ones, parts, small};
 use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch};
 
@@ -163,7 +163,9 @@ impl Renew<'_> {
             let hold = order.gaits[rank].renew(&now, order.beat, horizon, &order.held[rank]);
             order.held[rank] = hold;
             order.fat[block].set(lane, &hold.fat.corners());
-            order.sure[block].set(lane, &sure(&hold));
+            if order.listed {
+                order.sure[block].set(lane, &sure(&hold));
+            }
             order.ages[rank] = order.ages[rank].wrapping_add(1);
         }
         self.done.renewed += u64::from(renewing.count_ones());

@@ -1,5 +1,6 @@
 //! The order: classes of size, largest first, and within a class the Morton curve.
 
+use super::idle::shed;
 use crate::math::morton_bits;
 use crate::simd::boxes::WIDTH;
 
@@ -36,10 +37,10 @@ pub(super) struct Frame {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sorter {
     pub(super) frame: Frame,
+    /// A key above an index each.
     words: Vec<u64>,
     spare: Vec<u64>,
     counts: Vec<u32>,
-    order: Vec<(u64, u32)>,
     middles: Vec<([f32; 3], u32)>,
 }
 
@@ -153,6 +154,12 @@ impl Frame {
 }
 
 impl Sorter {
+    /// Gives all memory back; the frame stays.
+    pub(super) fn give_back(&mut self) {
+        shed(&mut self.words);
+        shed(&mut self.spare);
+    }
+
     /// The class in a key.
     pub(super) fn class_of(key: u64) -> u64 {
         key >> CURVE_BITS
@@ -163,11 +170,22 @@ impl Sorter {
         &mut self,
         boxes: &[[f32; 6]],
     ) -> impl Iterator<Item = (u64, u32)> + '_ {
-        let mut words = std::mem::take(&mut self.words);
-        words.clear();
+        self.begin(boxes);
+        self.sorted()
+    }
+
+    /// Sorts; yields for each box, block by block, a key and its index. Keys ascend; all blocks of a stretch share one.
+    pub(super) fn sort(&mut self, boxes: &[[f32; 6]]) -> impl Iterator<Item = (u64, u32)> + '_ {
+        self.begin(boxes);
+        self.split_some(boxes, 0, boxes.len());
+        self.sorted()
+    }
+
+    /// The first part of [`Sorter::sort`]: along the curve.
+    pub(super) fn begin(&mut self, boxes: &[[f32; 6]]) {
+        self.words.clear();
         let all = boxes.iter().enumerate();
-        words.extend(all.map(|(index, one)| self.frame.key(one) << INDEX_BITS | index as u64));
-        self.words = words;
+        (self.words).extend(all.map(|(index, one)| word(self.frame.key(one), index as u64)));
         let used = self.words.iter().fold(0, |all, word| all | word);
         let top = u64::BITS - used.leading_zeros();
         let mut shift = INDEX_BITS;
@@ -175,45 +193,26 @@ impl Sorter {
             self.pass(shift);
             shift += DIGIT_BITS;
         }
-        let index = |word: u64| u32::try_from(word & ((1 << INDEX_BITS) - 1)).unwrap_or(0);
-        let words = self.words.iter();
-        words.map(move |word| (word >> INDEX_BITS, index(*word)))
-    }
-
-    /// Sorts; yields for each box, block by block, a key and its index. Keys ascend; all blocks of a stretch share one.
-    pub(super) fn sort(&mut self, boxes: &[[f32; 6]]) -> &[(u64, u32)] {
-        self.begin(boxes);
-        self.split_some(boxes, 0, boxes.len());
-        &self.order
-    }
-
-    /// The first part of [`Sorter::sort`]: along the curve.
-    pub(super) fn begin(&mut self, boxes: &[[f32; 6]]) {
-        let mut order = std::mem::take(&mut self.order);
-        order.clear();
-        order.extend(self.along_curve(boxes));
-        self.order = order;
     }
 
     /// The rest, some of it: splits the bodies from one on, as many as asked for and what completes a stretch, into
     /// blocks. Returns where it ended.
     pub(super) fn split_some(&mut self, boxes: &[[f32; 6]], mut from: usize, some: usize) -> usize {
-        let to = (from + some).min(self.order.len());
+        let to = (from + some).min(self.words.len());
         while from < to {
-            let class = Self::class_of(self.order[from].0);
-            let most = &self.order[from..(from + STRETCH).min(self.order.len())];
-            let len = most.partition_point(|(key, _)| Self::class_of(*key) == class);
-            let stretch = &mut self.order[from..from + len];
-            let first = stretch[0].0;
+            let (first, _) = unpacked(self.words[from]);
+            let most = &self.words[from..(from + STRETCH).min(self.words.len())];
+            let class = Self::class_of(first);
+            let len = most.partition_point(|word| Self::class_of(unpacked(*word).0) == class);
+            let stretch = &mut self.words[from..from + len];
             self.middles.clear();
-            for (key, index) in stretch.iter_mut() {
-                *key = first;
-                let middle = centre(&boxes[*index as usize]);
-                self.middles.push((middle, *index));
+            for word in &*stretch {
+                let (_, index) = unpacked(*word);
+                self.middles.push((centre(&boxes[index as usize]), index));
             }
             split(&mut self.middles, FILL);
-            for ((_, index), (_, sorted)) in stretch.iter_mut().zip(&self.middles) {
-                *index = *sorted;
+            for (place, (_, index)) in stretch.iter_mut().zip(&self.middles) {
+                *place = word(first, u64::from(*index));
             }
             from += len;
         }
@@ -221,8 +220,8 @@ impl Sorter {
     }
 
     /// What the sort has yielded: of [`Sorter::begin`] as far as it is split.
-    pub(super) fn sorted(&self) -> &[(u64, u32)] {
-        &self.order
+    pub(super) fn sorted(&self) -> impl Iterator<Item = (u64, u32)> + Clone + '_ {
+        self.words.iter().map(|word| unpacked(*word))
     }
 
     /// One pass, stable.
@@ -247,6 +246,17 @@ impl Sorter {
         }
         std::mem::swap(&mut self.words, &mut self.spare);
     }
+}
+
+/// A key above an index.
+fn word(key: u64, index: u64) -> u64 {
+    key << INDEX_BITS | index
+}
+
+/// A key and an index.
+fn unpacked(word: u64) -> (u64, u32) {
+    let index = word & ((1 << INDEX_BITS) - 1);
+    (word >> INDEX_BITS, u32::try_from(index).unwrap_or(0))
 }
 
 /// Bodies put in a block by a sort: one lane stays free for who comes later.
@@ -340,7 +350,7 @@ mod tests {
             frame: Frame::of(&boxes),
             ..Sorter::default()
         };
-        let order = sorter.sort(&boxes).to_vec();
+        let order: Vec<(u64, u32)> = sorter.sort(&boxes).collect();
         assert_eq!(order[0].1, 0);
         assert!(order.is_sorted_by_key(|(key, _)| *key));
         let classes: Vec<u64> = order

@@ -9,6 +9,7 @@
 
 use std::ops::Range;
 
+use super::idle::shed;
 use super::links::{Matrix, room, small, spare};
 use super::met::Met;
 use super::near::Near;
@@ -65,6 +66,13 @@ impl Finds {
     pub(super) fn reserve(&mut self, blocks: usize, bodies: usize) {
         self.scratch.reserve(blocks);
         room(&mut self.open, bodies);
+    }
+
+    /// Gives the memory of what was found back.
+    pub(super) fn give_back(&mut self) {
+        self.met.give_back();
+        shed(&mut self.open);
+        shed(&mut self.near);
     }
 
     /// Room for more than it holds.

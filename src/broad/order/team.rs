@@ -14,6 +14,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
+use super::Order;
 use super::shares::Shares;
 use super::sweep::{Field, Finds, Search, Sweep};
 use super::tree::Tree;
@@ -135,6 +136,13 @@ impl Clone for Team {
             least: self.least,
             ..Self::default()
         }
+    }
+}
+
+impl Order {
+    /// Sets how many threads search without candidates at most, and from how many comparisons in a tick on.
+    pub(in crate::broad) fn use_threads(&mut self, most: usize, least: u64) {
+        self.afresh.team.set(most, least);
     }
 }
 

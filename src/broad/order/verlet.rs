@@ -18,6 +18,7 @@
 
 use super::afresh::Afresh;
 use super::fatten::outward;
+use super::idle::shed;
 use super::lay::Bound;
 use super::links::small;
 use super::near::{Found, Near, is_among};
@@ -55,6 +56,17 @@ pub(super) struct Verlet {
     pub(super) pace: Pace,
 }
 
+impl Verlet {
+    /// Gives the memory of the list back.
+    pub(super) fn give_back(&mut self) {
+        self.on = false;
+        shed(&mut self.entries);
+        shed(&mut self.found);
+        shed(&mut self.strays);
+        shed(&mut self.swept);
+    }
+}
+
 /// Bodies whose every pair a check looks for.
 const FEW: usize = 300;
 
@@ -89,6 +101,7 @@ impl Order {
     pub(super) fn end_list(&mut self) {
         let verlet = &mut self.afresh.verlet;
         verlet.on = false;
+        self.carried.reserve(self.hits);
         let overlaps = verlet.entries.drain(..).filter(|entry| entry.is_hit());
         for entry in overlaps {
             let [one, other] = entry.ranks().map(|rank| self.slot_of[rank]);
