@@ -300,8 +300,10 @@ impl Sweep {
             let ahead = work.look(bodies, &moment, f64::INFINITY, &mut self.warm);
             let step = match ahead {
                 Ahead::Cut => return,
-                Ahead::Touch => {
-                    (self.hit, self.done) = (self.free, true);
+                Ahead::Touch { within_rounding } => {
+                    let ahead = if within_rounding { CLOSE_ENOUGH } else { 0.0 };
+                    self.hit = self.hit.min((self.free + ahead).min(1.0));
+                    self.done = true;
                     return;
                 }
                 Ahead::Unsure => 0.0,
@@ -357,7 +359,7 @@ impl Sweep {
             return;
         }
         let mut warm = self.warm;
-        if let Ahead::Touch = work.look(bodies, &moment, 0.0, &mut warm) {
+        if let Ahead::Touch { .. } = work.look(bodies, &moment, 0.0, &mut warm) {
             (self.hit, self.probes) = (at, 0);
         }
     }

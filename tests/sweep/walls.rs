@@ -222,3 +222,34 @@ fn a_bullet_at_rest_is_not_swept() {
     assert!(rig.pair(1, 2).is_none(), "{:?}", rig.pair(1, 2));
     assert_eq!(rig.out.tick.candidates, 0, "its box is tight again");
 }
+
+#[test]
+fn bug_a_touch_within_rounding_was_told_before_it_was() {
+    // A ball of 1 mm flies 10 mm at a wall of 1 mm: its surface meets the wall's after 3 mm.
+    let mut rig = Rig::new(&scene(
+        "",
+        &[
+            body(
+                1,
+                [0.0; 3],
+                "{ type = \"box\", half_extents = [3.0, 3.0, 0.0005] }",
+                "",
+            ),
+            body(
+                2,
+                [0.0; 3],
+                "{ type = \"sphere\", radius = 0.001 }",
+                "continuous = true",
+            ),
+        ],
+    ));
+    rig.place(1, &Pose::identity());
+    for z in [-0.0045, 0.0055] {
+        rig.place(2, &Pose::translation(0.0, 0.0, z));
+        rig.send(ALL);
+    }
+    let row = rig.pair(1, 2).unwrap();
+    assert_ne!(row.flags & pair_flags::SWEPT_HIT, 0, "{row:?}");
+    assert!(row.toi_min <= 0.3 && 0.3 <= row.toi_max, "{row:?}");
+    assert!(row.toi_max - row.toi_min <= 1e-8, "{row:?}");
+}

@@ -35,8 +35,8 @@ const MESH_UNITS: u64 = 16;
 pub(super) enum Ahead {
     /// They do not touch for so long (in shares of the motion); where they are nearest they are apart by `gap_m`.
     Free { time: f64, gap_m: f64 },
-    /// They touch here.
-    Touch,
+    /// They touch here; `within_rounding`: nothing tells their gap from 0, but it may still be ahead of them.
+    Touch { within_rounding: bool },
     /// Rounding leaves open whether they touch here.
     Unsure,
     /// The meter closed.
@@ -160,7 +160,9 @@ impl Work<'_, '_> {
             let time = (gap.min / speed).max(0.0);
             let good = gap.min > 0.0 && (time >= enough || gap.min >= BOUND_ENOUGH * gap.max);
             if gap.max <= 0.0 {
-                return Ahead::Touch;
+                return Ahead::Touch {
+                    within_rounding: false,
+                };
             }
             if done && gap.min <= 0.0 {
                 return touch(gap, meshes.is_certain() && moment.certain);
@@ -186,8 +188,9 @@ impl Work<'_, '_> {
 
 /// What an interval that holds 0 says.
 fn touch(gap: Interval, finished: bool) -> Ahead {
-    if gap.max <= 0.0 || finished {
-        Ahead::Touch
+    let within_rounding = gap.max > 0.0;
+    if finished || !within_rounding {
+        Ahead::Touch { within_rounding }
     } else {
         Ahead::Unsure
     }

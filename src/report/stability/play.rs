@@ -28,10 +28,6 @@ pub const TOLERANCE_ROUND: f64 = 1e-6;
 
 /// Of times of impact, in parts of the way: a touch is bracketed as closely.
 pub const TOLERANCE_IMPACT: f64 = 1e-9;
-/// Rounding within which two bodies touch, in parts of their size: what an interval allows for at both ends, and what
-/// their poses between two ticks are off by.
-const ROUNDING: f64 = 512.0 * f64::EPSILON;
-
 /// One point of a family: its worst tick and pair.
 #[derive(Clone, Debug, Serialize)]
 pub struct Point {
@@ -194,7 +190,7 @@ pub fn play(case: &Case) -> Result<Point> {
         point.units = point.units.max(out.units);
         if let Asked::Impact(toi) = &case.asked {
             if tick > 0 {
-                impact(&mut point, rig.out().pairs.first(), *toi, rounding(case));
+                impact(&mut point, rig.out().pairs.first(), *toi);
             }
             continue;
         }
@@ -252,19 +248,8 @@ fn answer(rows: &[PairRow], (i, j): (usize, usize), beyond_m: f64) -> Answer {
     )
 }
 
-/// Share of the way on which two bodies cannot be told from touching, before they do.
-fn rounding(case: &Case) -> f64 {
-    let way = |at: usize| {
-        let (from, to) = (case.ticks[0][at].t, case.ticks[1][at].t);
-        let square: f64 = from.iter().zip(to).map(|(a, b)| (a - b).powi(2)).sum();
-        square.sqrt()
-    };
-    ROUNDING * case.size_m(0, (0, 1)) / (way(0) + way(1))
-}
-
-/// A time of impact: its interval is to hold the share of the way at which the two touch first. Touching within
-/// rounding counts as touching (law 3.4): a touch that is told so much too early is counted apart from what is wrong.
-fn impact(point: &mut Point, row: Option<&PairRow>, toi: Dd, rounding: f64) {
+/// A time of impact: its interval is to hold the share of the way at which the two touch first.
+fn impact(point: &mut Point, row: Option<&PairRow>, toi: Dd) {
     let has = |flag: u8| row.is_some_and(|row| row.flags & flag != 0);
     let (hit, open) = (has(pair_flags::SWEPT_HIT), has(pair_flags::SWEPT_OPEN));
     let (min_m, max_m) = row.map_or((f64::NAN, f64::NAN), |row| (row.toi_min, row.toi_max));
@@ -276,11 +261,9 @@ fn impact(point: &mut Point, row: Option<&PairRow>, toi: Dd, rounding: f64) {
     };
     let truth = Truth::is(toi);
     let judged = judge(&truth, &answer);
-    let early = Dd::from(max_m) < toi && toi < Dd::from(max_m) + Dd::from(rounding);
     let found = Judgement {
-        excluded: judged.excluded && !(hit && early),
         wrong: !hit && !open,
-        touching: hit && early,
+        touching: false,
         open,
         ..judged
     };
