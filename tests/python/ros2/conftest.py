@@ -192,11 +192,15 @@ class Room:
             self._executor.spin_once(timeout_sec=0.005)
         return value
 
-    def call(self, kind, name, request=None, seconds=PATIENCE_S, node=None, each_s=math.inf):
-        """Calls a service and returns its answer; asks anew each `each_s`, for a question that may be asked twice."""
+    def call(self, kind, name, request=None, seconds=PATIENCE_S, node=None, each_s=math.inf, then=None):
+        """Calls a service and returns its answer; asks anew each `each_s`, for a question that may be asked twice.
+
+        `then`: what must go on meanwhile, as in `until`. On a busy machine it takes a second until a new client and
+        the service have found each other, longer than a source may be silent.
+        """
         node = node or (self.nodes[0] if self.nodes else self.node())
         client = node.create_client(kind, name)
-        self.until(client.service_is_ready, f"service {name}", seconds)
+        self.until(client.service_is_ready, f"service {name}", seconds, then)
         futures, asked = [], -math.inf
 
         def ask():
@@ -204,6 +208,8 @@ class Room:
             if time.monotonic() - asked >= each_s or not futures:
                 asked = time.monotonic()
                 futures.append(client.call_async(request or kind.Request()))
+            if then is not None:
+                then()
 
         answered = self.until(lambda: [f for f in futures if f.done()], f"an answer of {name}", seconds, then=ask)
         node.destroy_client(client)

@@ -85,8 +85,8 @@ def test_each_field_of_an_edit_does_what_it_says(scene):
         return answer.scene_rev
 
     def gap(a, b, wanted):
-        """Until the two are so far apart: the shape, and where it stands."""
-        ask = lambda: room.call(Gap, "/sweepd/gap", Gap.Request(name_a=a, name_b=b)).gap_best_m  # noqa: E731
+        """Until the two are so far apart: the shape, and where it stands. A source that is silent has no gaps."""
+        ask = lambda: room.call(Gap, "/sweepd/gap", Gap.Request(name_a=a, name_b=b), then=feed).gap_best_m  # noqa: E731
         room.until(lambda: abs(ask() - wanted) < 1e-9, f"{wanted} m between {a} and {b}", then=feed)
 
     def primitive(name, kind, dimensions, at, warned=()):
