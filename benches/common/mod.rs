@@ -116,15 +116,7 @@ impl Bench {
     }
 }
 
-pub fn row(body: u64, pose: &Pose) -> TransformRow {
-    let q = pose.rotation.as_vector();
-    TransformRow {
-        body,
-        position: pose.translation.vector.into(),
-        orientation: [q.x, q.y, q.z, q.w],
-        ..TransformRow::default()
-    }
-}
+pub use sweepd::report::rig::row;
 
 /// Bodies that fly straight and turn evenly, bouncing off the walls of their cube.
 pub struct Flight {

@@ -308,31 +308,14 @@ fn course(k: usize, percent: f64, random: &mut Random) -> Course {
 }
 
 pub fn body(id: u64) -> BodySpec {
-    BodySpec {
-        name: format!("b{id}"),
-        id: BodyId(id),
-        // What is built is handed over beside the scene.
-        shapes: vec![PlacedSpec {
-            shape: ShapeSpec::Sphere { radius: 1.0 },
-            pose: Pose::identity(),
-        }],
+    // What is built is handed over beside the scene.
+    let shape = PlacedSpec {
+        shape: ShapeSpec::Sphere { radius: 1.0 },
         pose: Pose::identity(),
-        moves: true,
-        deforms: false,
-        continuous: false,
-        teleport_m: None,
+    };
+    BodySpec {
         source: Some(0),
-        ros_frame: None,
-        ros_topic: None,
         group: u32::MAX,
-        mask: u32::MAX,
-        parent: None,
-        attached_to: None,
-        rigid_group: None,
-        report_within_m: 0.0,
-        max_speed_mps: None,
-        priority: 1.0,
-        on_stale: OnStale::Unknown,
-        enabled: true,
+        ..BodySpec::new(format!("b{id}"), BodyId(id), vec![shape])
     }
 }

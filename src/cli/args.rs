@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand};
 
 use super::args_report::Report;
 use crate::builtin::Pattern;
+use crate::error::Error;
 
 /// A collision server: body poses in over shared memory, colliding pairs and contacts out, within a time budget a tick.
 #[derive(Debug, Parser)]
@@ -123,6 +124,34 @@ pub(super) struct CheckArgs {
     pub(super) ignored: bool,
 }
 
+/// The built-in motion of a scene's bodies.
+#[derive(Debug, Args)]
+pub(super) struct CourseArgs {
+    /// Frames a second.
+    #[arg(long, default_value_t = 100.0, value_name = "HZ")]
+    pub(super) rate: f64,
+    /// Seed of the motion, and of a scene that is made.
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub(super) seed: u64,
+    /// How bodies move: half a metre about their start, 1 mm about it, turning in place, or not at all.
+    #[arg(long, value_enum, default_value_t = Pattern::Wander)]
+    pub(super) motion: Pattern,
+}
+
+impl CourseArgs {
+    /// # Errors
+    /// `Error::Usage` for a rate that is none.
+    pub(super) fn check(&self) -> crate::error::Result<()> {
+        if self.rate > 0.0 && self.rate <= 1e6 {
+            return Ok(());
+        }
+        Err(Error::Usage(format!(
+            "--rate {}: give frames a second, above 0 and at most 1e6",
+            self.rate
+        )))
+    }
+}
+
 #[derive(Debug, Args)]
 pub(super) struct FeedArgs {
     /// The scene whose bodies to move; the daemon must run the same.
@@ -133,18 +162,11 @@ pub(super) struct FeedArgs {
     /// The source to be; the scene's first otherwise.
     #[arg(long, value_name = "NAME")]
     pub(super) source: Option<String>,
-    /// Frames a second.
-    #[arg(long, default_value_t = 100.0, value_name = "HZ")]
-    pub(super) rate: f64,
+    #[command(flatten)]
+    pub(super) course: CourseArgs,
     /// Bodies to move, the others are sent at rest (default: all); with --write-scene: bodies to make (default: 200).
     #[arg(long, value_name = "N")]
     pub(super) count: Option<usize>,
-    /// Seed of the motion (and of the scene made).
-    #[arg(long, default_value_t = 1, value_name = "N")]
-    pub(super) seed: u64,
-    /// How bodies move: half a metre about their start, 1 mm about it, turning in place, or not at all.
-    #[arg(long, value_enum, default_value_t = Pattern::Wander)]
-    pub(super) motion: Pattern,
     /// End after so many frames; until a signal otherwise.
     #[arg(long, value_name = "N")]
     pub(super) frames: Option<u64>,

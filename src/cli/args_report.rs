@@ -4,8 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::args::{Limit, duration, units};
-use crate::builtin::Pattern;
+use super::args::{CourseArgs, Limit, duration, units};
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Report {
@@ -37,18 +36,11 @@ pub(super) struct ErrorArgs {
     /// Ticks at each budget, after a sixth as many to warm up.
     #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub(super) ticks: u64,
-    /// Frames a second of the motion: how far bodies move from tick to tick.
-    #[arg(long, default_value_t = 100.0, value_name = "HZ")]
-    pub(super) rate: f64,
+    #[command(flatten)]
+    pub(super) course: CourseArgs,
     /// Bodies of each source that move, the others rest at their start (default: all).
     #[arg(long, value_name = "N")]
     pub(super) count: Option<usize>,
-    /// Seed of the motion.
-    #[arg(long, default_value_t = 1, value_name = "N")]
-    pub(super) seed: u64,
-    /// How bodies move: half a metre about their start, 1 mm about it, turning in place, or not at all.
-    #[arg(long, value_enum, default_value_t = Pattern::Wander)]
-    pub(super) motion: Pattern,
     /// One JSON document instead of the table: metres, seconds, shares of 1.
     #[arg(long)]
     pub(super) json: bool,

@@ -27,9 +27,9 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
     if let Some(path) = &args.write_scene {
         let count = args.count.unwrap_or(COUNT_DEFAULT);
         let text = if args.kind == "pile" {
-            pile(count, args.seed)
+            pile(count, args.course.seed)
         } else {
-            pool(count, args.seed)
+            pool(count, args.course.seed)
         };
         std::fs::write(path, text)
             .map_err(|e| Error::io(format!("cannot write {}", path.display()), e))?;
@@ -42,12 +42,7 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
             "give a scene file, or --write-scene FILE to make one".to_owned(),
         ));
     };
-    if !(args.rate > 0.0 && args.rate <= 1e6) {
-        return Err(Error::Usage(format!(
-            "--rate {}: give frames a second, above 0 and at most 1e6",
-            args.rate
-        )));
-    }
+    args.course.check()?;
     let scene = Scene::load(path)?;
     let source = source_of(&scene, args.source.as_deref())?;
     let name = scene.sources[source].name.clone();
@@ -59,7 +54,7 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
         "feeding {} bodies ({} of them moving) as `{name}` at {} Hz",
         bodies.rows.len(),
         bodies.moving,
-        args.rate
+        args.course.rate
     );
     match args.work {
         Some(work_ns) => cadence::keep(args, work_ns, &mut bodies, &mut client, (out, stop))?,
@@ -82,7 +77,7 @@ fn stream(
     let mut heeded = Heeded::default();
     let mut frame = 0_u64;
     while !stop.load(Ordering::Relaxed) && args.frames.is_none_or(|most| frame < most) {
-        let (time_s, stamp_ns) = moment(frame, args.rate);
+        let (time_s, stamp_ns) = moment(frame, args.course.rate);
         bodies.move_to(time_s);
         let info = FrameInfo {
             stamp_ns,
@@ -90,7 +85,7 @@ fn stream(
         };
         client.send(&info, Rows::Poses(&bodies.rows))?;
         frame += 1;
-        let next_ns = start_ns.saturating_add(moment(frame, args.rate).1);
+        let next_ns = start_ns.saturating_add(moment(frame, args.course.rate).1);
         let now_ns = clock.monotonic_ns();
         if now_ns >= look_ns {
             look_ns = now_ns.saturating_add(HEED_NS);
@@ -226,7 +221,7 @@ struct Bodies {
 
 impl Bodies {
     fn of(scene: &Scene, source: usize, args: &FeedArgs) -> Self {
-        let mut random = Random::new(args.seed);
+        let mut random = Random::new(args.course.seed);
         let own = scene
             .bodies
             .iter()
@@ -237,7 +232,7 @@ impl Bodies {
                     body: body.id.0,
                     ..TransformRow::default()
                 };
-                (row, Motion::new(body.pose, args.motion, &mut random))
+                (row, Motion::new(body.pose, args.course.motion, &mut random))
             })
             .unzip();
         let moving = args.count.unwrap_or(rows.len()).min(rows.len());

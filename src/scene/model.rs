@@ -94,6 +94,36 @@ pub struct BodySpec {
     pub enabled: bool,
 }
 
+impl BodySpec {
+    /// A body as a scene file gives it that names no more of it, before it has a source.
+    #[must_use]
+    pub fn new(name: String, id: BodyId, shapes: Vec<PlacedSpec>) -> Self {
+        Self {
+            name,
+            id,
+            shapes,
+            pose: Pose::identity(),
+            moves: true,
+            deforms: false,
+            continuous: false,
+            teleport_m: None,
+            source: None,
+            ros_frame: None,
+            ros_topic: None,
+            group: 1,
+            mask: u32::MAX,
+            parent: None,
+            attached_to: None,
+            rigid_group: None,
+            report_within_m: 0.0,
+            max_speed_mps: None,
+            priority: 1.0,
+            on_stale: OnStale::default(),
+            enabled: true,
+        }
+    }
+}
+
 /// A shape at its place in a body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlacedSpec {

@@ -108,32 +108,31 @@ pub(crate) fn read_body(node: Node, blobs: Option<&[u8]>) -> Result<BodyDraft, F
             "a body with moves = false takes no source: remove `source`, or write moves = true";
         return Err(Fault::new(places.source, text));
     }
+    let shapes = read_shapes(&mut table, at, blobs, &mut places)?;
+    let plain = BodySpec::new(name, BodyId(id), shapes);
     let spec = BodySpec {
-        name,
-        id: BodyId(id),
         pose,
         moves,
-        deforms: table.flag("deforms")?.unwrap_or(false),
-        continuous: table.flag("continuous")?.unwrap_or(false),
+        deforms: table.flag("deforms")?.unwrap_or(plain.deforms),
+        continuous: table.flag("continuous")?.unwrap_or(plain.continuous),
         teleport_m: table.number_within("teleport_m", EXTENT_MIN_M, EXTENT_MAX_M)?,
-        source: None,
         ros_frame: table.name("ros_frame", ROS_NAME_BYTES_MAX)?,
         ros_topic: table.name("ros_topic", ROS_NAME_BYTES_MAX)?,
-        group: table.bits("group")?.unwrap_or(1),
-        mask: table.bits("mask")?.unwrap_or(u32::MAX),
+        group: table.bits("group")?.unwrap_or(plain.group),
+        mask: table.bits("mask")?.unwrap_or(plain.mask),
         parent,
         attached_to,
         rigid_group: table.name("rigid_group", BODY_NAME_BYTES_MAX)?,
         report_within_m: table
             .number_within("report_within_m", 0.0, EXTENT_MAX_M)?
-            .unwrap_or(0.0),
+            .unwrap_or(plain.report_within_m),
         max_speed_mps: table.number_within("max_speed_mps", 0.0, EXTENT_MAX_M)?,
         priority: table
             .number_within("priority", PRIORITY_MIN, PRIORITY_MAX)?
-            .unwrap_or(1.0),
-        on_stale: read_on_stale(&mut table)?.unwrap_or_default(),
-        enabled: table.flag("enabled")?.unwrap_or(true),
-        shapes: read_shapes(&mut table, at, blobs, &mut places)?,
+            .unwrap_or(plain.priority),
+        on_stale: read_on_stale(&mut table)?.unwrap_or(plain.on_stale),
+        enabled: table.flag("enabled")?.unwrap_or(plain.enabled),
+        ..plain
     };
     check_deforms(&spec).map_err(|text| Fault::new(deforms_at, text))?;
     Ok(BodyDraft {

@@ -79,31 +79,13 @@ pub(crate) fn moving(name: &str, id: u64) -> BodySpec {
     let shape = ShapeSpec::Box {
         half_extents: [0.5; 3],
     };
-    BodySpec {
-        name: name.to_owned(),
-        id: BodyId(id),
-        shapes: vec![PlacedSpec {
-            shape,
-            pose: Pose::identity(),
-        }],
+    let placed = PlacedSpec {
+        shape,
         pose: Pose::identity(),
-        moves: true,
-        deforms: false,
-        continuous: false,
-        teleport_m: None,
+    };
+    BodySpec {
         source: Some(0),
-        ros_frame: None,
-        ros_topic: None,
-        group: 1,
-        mask: u32::MAX,
-        parent: None,
-        attached_to: None,
-        rigid_group: None,
-        report_within_m: 0.0,
-        max_speed_mps: None,
-        priority: 1.0,
-        on_stale: OnStale::Unknown,
-        enabled: true,
+        ..BodySpec::new(name.to_owned(), BodyId(id), vec![placed])
     }
 }
 

@@ -73,27 +73,12 @@ fn any_body(rng: &mut Rng, kind: usize, s: f64, id: u64, group: u32) -> (Body, B
         shapes.push(PlacedSpec { shape, pose: local });
     }
     let spec = BodySpec {
-        name: format!("b{id}"),
-        id: BodyId(id),
-        shapes,
-        pose: Pose::identity(),
-        moves: true,
         deforms: kind >= BENDING,
-        continuous: false,
-        teleport_m: None,
         source: Some(0),
-        ros_frame: None,
-        ros_topic: None,
         group,
         mask: group,
-        parent: None,
-        attached_to: None,
-        rigid_group: None,
         report_within_m: if rng.below(3) == 0 { 0.05 * s } else { 0.0 },
-        max_speed_mps: None,
-        priority: 1.0,
-        on_stale: OnStale::Unknown,
-        enabled: true,
+        ..BodySpec::new(format!("b{id}"), BodyId(id), shapes)
     };
     (
         Body {

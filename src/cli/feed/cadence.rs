@@ -44,14 +44,14 @@ pub(super) fn keep(
     (out, stop): (&mut Out, &AtomicBool),
 ) -> Result<()> {
     let clock = SystemClock;
-    let frame_ns = moment(1, args.rate).1;
-    let (mut times, mut random) = (Times::default(), Random::new(args.seed));
+    let frame_ns = moment(1, args.course.rate).1;
+    let (mut times, mut random) = (Times::default(), Random::new(args.course.seed));
     let mut begin_ns = clock.monotonic_ns();
     let mut frame = 0_u64;
     while !stop.load(Ordering::Relaxed) && args.frames.is_none_or(|most| frame < most) {
         let end_ns = begin_ns.saturating_add(frame_ns);
         let own_ns = work_ns.0 + random.bits() % (work_ns.1 - work_ns.0 + 1);
-        let (time_s, stamp_ns) = moment(frame, args.rate);
+        let (time_s, stamp_ns) = moment(frame, args.course.rate);
         bodies.move_to(time_s);
         // Work, not sleep: the daemon is to find a machine on which somebody works.
         while clock.monotonic_ns() < begin_ns + own_ns {

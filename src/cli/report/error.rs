@@ -20,12 +20,7 @@ const BUDGETS_MAX: usize = 64;
 
 /// Runs the sweep; `false` when a verdict is wrong or an interval excludes the truth.
 pub(super) fn error(args: &ErrorArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
-    if !(args.rate > 0.0 && args.rate <= 1e6) {
-        return Err(Error::Usage(format!(
-            "--rate {}: give frames a second, above 0 and at most 1e6",
-            args.rate
-        )));
-    }
+    args.course.check()?;
     let sweep = sweep(args)?;
     let scene = Scene::load(&args.scene)?;
     let shapes = build_shapes(&scene)?;
@@ -33,9 +28,9 @@ pub(super) fn error(args: &ErrorArgs, out: &mut Out, stop: &AtomicBool) -> Resul
     let setup = Setup {
         scene: &scene,
         shapes: &shapes.bodies,
-        motion: args.motion,
-        rate_hz: args.rate,
-        seed: args.seed,
+        motion: args.course.motion,
+        rate_hz: args.course.rate,
+        seed: args.course.seed,
         count: args.count,
         ticks: args.ticks,
         sweep,
@@ -52,7 +47,7 @@ pub(super) fn error(args: &ErrorArgs, out: &mut Out, stop: &AtomicBool) -> Resul
         let mut value = serde_json::to_value(&report)
             .map_err(|e| Error::io("cannot write the report as JSON", e))?;
         value["scene"] = scene.as_str().into();
-        value["motion"] = format!("{:?}", args.motion).to_lowercase().into();
+        value["motion"] = format!("{:?}", args.course.motion).to_lowercase().into();
         value["summary"] = summary(&report).into();
         out.line(&value.to_string())?;
     } else {

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::stage::{Actor, Asked, Case, Pos};
 use super::truth::Truth;
-use crate::config::OnStale;
 use crate::error::Result;
 use crate::ids::BodyId;
 use crate::math::Pose;
@@ -49,28 +48,12 @@ fn body(id: u64, actor: &Actor, report_within_m: f64) -> BodySpec {
         shape: ShapeSpec::clone(shape),
         pose: Pose::translation(at[0], at[1], at[2]),
     };
+    let parts = actor.parts.iter().map(part).collect();
     BodySpec {
-        name: format!("body_{id}"),
-        id: BodyId(id),
-        shapes: actor.parts.iter().map(part).collect(),
-        pose: Pose::identity(),
-        moves: true,
-        deforms: false,
         continuous: actor.continuous,
-        teleport_m: None,
         source: Some(0),
-        ros_frame: None,
-        ros_topic: None,
-        group: 1,
-        mask: u32::MAX,
-        parent: None,
-        attached_to: None,
-        rigid_group: None,
         report_within_m,
-        max_speed_mps: None,
-        priority: 1.0,
-        on_stale: OnStale::default(),
-        enabled: true,
+        ..BodySpec::new(format!("body_{id}"), BodyId(id), parts)
     }
 }
 
