@@ -21,8 +21,7 @@ impl Publisher {
             out.contacts.clear();
             return 0;
         }
-        let rows = &self.listing.rows;
-        let all: usize = rows.iter().map(|row| row.contacts as usize).sum();
+        let all = self.survey.contacts();
         let cut = all > self.limits.contact_rows;
         if cut {
             self.choose_pairs();
@@ -41,11 +40,10 @@ impl Publisher {
             let span = match row.slot {
                 Some(slot) if sent && row.contacts > 0 => {
                     if !row.fresh && row.in_contacts.len == row.contacts {
-                        kept.keep(&mut out.contacts, row.in_contacts)
+                        kept.keep(row.in_contacts)
                     } else {
-                        let was = row.in_contacts;
                         view.narrow.name_contacts(slot, &mut self.next_contact);
-                        kept.make(&mut out.contacts, was, |out| push_rows(view, slot, out))
+                        kept.make(|out| push_rows(view, slot, out))
                     }
                 }
                 _ => Span::default(),

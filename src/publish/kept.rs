@@ -1,23 +1,38 @@
 //! A message that stays from tick to tick: rows that have nothing new to say are left where they are, or moved.
 //!
 //! In: for each pair in order, where its rows stood in the message of the last tick and whether they still hold. Out:
-//! the message of this tick. While nothing came or went, rows stay or are rewritten in place; from the first that did,
-//! the message is put together from the old one, in runs as long as they go.
+//! the message of this tick, in the same memory: what is in front of the first pair that came or went is not touched,
+//! and behind it no run of rows that as many came as went before.
+//!
+//! Refused: to put the message together anew from the old one. Each tick in which a pair came or went then took a copy
+//! of all, which in a scene mostly at rest was most of what publishing took.
 
 use std::ops::Range;
 
-/// How far a message has been gone through.
+/// What a message is made of, while it is gone through.
 #[derive(Debug)]
 pub(super) struct Kept<T> {
     /// Rows that are settled.
     at: usize,
-    /// The message of the last tick, once a row had to move.
-    old: Vec<T>,
-    moved: bool,
-    /// Of the old message: what comes next in the new one, and is not there yet.
-    run: Range<usize>,
-    /// Rows of one pair, while they are made.
+    /// Of the old message, in order: what stays in the new one.
+    runs: Vec<Run>,
+    /// Rows that are made now, and where each pair's stand in the new message.
     made: Vec<T>,
+    places: Vec<Span>,
+}
+
+/// Rows that stay side by side.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    from: usize,
+    to: usize,
+    len: usize,
+}
+
+impl Run {
+    fn old(&self) -> Range<usize> {
+        self.from..self.from + self.len
+    }
 }
 
 /// Rows of one pair in a message: the first, and how many.
@@ -31,10 +46,9 @@ impl<T> Default for Kept<T> {
     fn default() -> Self {
         Self {
             at: 0,
-            old: Vec::new(),
-            moved: false,
-            run: 0..0,
+            runs: Vec::new(),
             made: Vec::new(),
+            places: Vec::new(),
         }
     }
 }
@@ -42,74 +56,84 @@ impl<T> Default for Kept<T> {
 impl<T: Copy> Kept<T> {
     /// Starts at the top of the message.
     pub(super) fn begin(&mut self) {
-        (self.at, self.moved, self.run) = (0, false, 0..0);
+        self.at = 0;
+        self.runs.clear();
+        self.made.clear();
+        self.places.clear();
     }
 
     /// The next rows are those that stood at `was` in the last tick; spans come in the order in which they stood.
     ///
     /// * returns - where they stand now.
-    pub(super) fn keep(&mut self, out: &mut Vec<T>, was: Span) -> Span {
-        let (first, len) = (was.first as usize, was.len as usize);
-        if !self.moved && len > 0 && first != self.at {
-            self.part(out);
-        }
-        if self.moved {
-            if self.run.end != first {
-                self.copy_run(out);
-                self.run = first..first;
-            }
-            self.run.end += len;
+    pub(super) fn keep(&mut self, was: Span) -> Span {
+        let (from, to, len) = (was.first as usize, self.at, was.len as usize);
+        match self.runs.last_mut() {
+            Some(run) if run.old().end == from && run.to + run.len == to => run.len += len,
+            _ if len == 0 => {}
+            _ => self.runs.push(Run { from, to, len }),
         }
         self.span(len)
     }
 
-    /// The next rows are made now, by `make`, which appends them; they take the place of those at `was`.
+    /// The next rows are made now, by `make`, which appends them.
     ///
     /// * returns - where they stand.
-    pub(super) fn make(
-        &mut self,
-        out: &mut Vec<T>,
-        was: Span,
-        make: impl FnOnce(&mut Vec<T>),
-    ) -> Span {
-        if !self.moved {
-            self.made.clear();
-            make(&mut self.made);
-            let there = was.first as usize == self.at && was.len as usize == self.made.len();
-            if there && let Some(rows) = out.get_mut(self.at..self.at + self.made.len()) {
-                rows.copy_from_slice(&self.made);
-            } else if was.len > 0 || !self.made.is_empty() {
-                self.part(out);
-                out.extend_from_slice(&self.made);
-            }
-            return self.span(self.made.len());
-        }
-        self.copy_run(out);
-        let before = out.len();
-        make(out);
-        self.span(out.len() - before)
+    pub(super) fn make(&mut self, make: impl FnOnce(&mut Vec<T>)) -> Span {
+        let before = self.made.len();
+        make(&mut self.made);
+        let span = self.span(self.made.len() - before);
+        self.places.push(span);
+        span
     }
 
-    /// Ends the message: what stood behind its last row is gone.
+    /// Ends the message.
+    ///
+    /// * `out` - that of the last tick, and then of this one.
     pub(super) fn finish(&mut self, out: &mut Vec<T>) {
-        self.copy_run(out);
+        if self.runs.is_empty() {
+            std::mem::swap(out, &mut self.made);
+            return;
+        }
+        // Where there are more rows than before, some are made.
+        if let Some(row) = self.made.first()
+            && out.len() < self.at
+        {
+            out.resize(self.at, *row);
+        }
+        self.move_runs(out);
+        let mut rows = self.made.as_slice();
+        for place in &self.places {
+            let (these, rest) = rows.split_at((place.len as usize).min(rows.len()));
+            let first = place.first as usize;
+            if let Some(there) = out.get_mut(first..first + these.len()) {
+                there.copy_from_slice(these);
+            }
+            rows = rest;
+        }
         out.truncate(self.at);
-        // In which tick rows have to move is not known: room for all is made when they are more than ever.
-        self.old.clear();
-        self.old.reserve(out.len());
+        // In which tick how many rows are made is not known: room for all is made when they are more than ever.
+        self.made.clear();
+        self.made.reserve(out.len());
     }
 
-    /// Rows have to move: starts the message again, with those that are settled.
-    fn part(&mut self, out: &mut Vec<T>) {
-        std::mem::swap(out, &mut self.old);
-        out.clear();
-        out.extend_from_slice(self.old.get(..self.at).unwrap_or_default());
-        (self.moved, self.run) = (true, 0..0);
-    }
-
-    fn copy_run(&mut self, out: &mut Vec<T>) {
-        let run = std::mem::replace(&mut self.run, 0..0);
-        out.extend_from_slice(self.old.get(run).unwrap_or_default());
+    /// Moves what stays to its place. Runs keep their order, so one that moves up can only be in the way of one that
+    /// moves up behind it, which goes first, and one that moves down only of one that moves down before it.
+    fn move_runs(&self, out: &mut [T]) {
+        let mut put = |run: &Run| {
+            if run.from != run.to && run.old().end.max(run.to + run.len) <= out.len() {
+                out.copy_within(run.old(), run.to);
+            }
+        };
+        for same in self
+            .runs
+            .chunk_by(|one, next| (one.from < one.to) == (next.from < next.to))
+        {
+            if same.first().is_some_and(|run| run.from < run.to) {
+                same.iter().rev().for_each(&mut put);
+            } else {
+                same.iter().for_each(&mut put);
+            }
+        }
     }
 
     fn span(&mut self, len: usize) -> Span {
@@ -160,9 +184,9 @@ mod tests {
                     *made = tick + 1;
                     let row = (*number, *made);
                     let copies = *rows;
-                    *span = kept.make(&mut out, *span, |out| out.extend((0..copies).map(|_| row)));
+                    *span = kept.make(|out| out.extend((0..copies).map(|_| row)));
                 } else {
-                    *span = kept.keep(&mut out, *span);
+                    *span = kept.keep(*span);
                     assert_eq!(span.len as usize, *rows);
                 }
             }

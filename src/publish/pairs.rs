@@ -49,20 +49,18 @@ impl Publisher {
             let row = &rows[at];
             let span = if row.fresh {
                 let make = |out: &mut Vec<PairRow>| out.push(self.pair_row(view, row));
-                kept.make(&mut out.pairs, row.in_pairs, make)
+                kept.make(make)
             } else {
-                kept.keep(&mut out.pairs, row.in_pairs)
+                if let Some(sent) = out.pairs.get_mut(row.in_pairs.first as usize) {
+                    grow_older(sent, view.tick);
+                }
+                kept.keep(row.in_pairs)
             };
             self.listing.rows[at].in_pairs = span;
         }
         kept.finish(&mut out.pairs);
         self.kept_pairs = kept;
         let rows = &self.listing.rows;
-        for (row, sent) in rows.iter().zip(&mut out.pairs) {
-            if !row.fresh {
-                grow_older(sent, view.tick);
-            }
-        }
         if left_out == 0 {
             self.events.sent(|_| false);
         } else {

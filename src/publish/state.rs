@@ -120,6 +120,8 @@ pub(super) struct Survey {
     /// Pairs that touched on their way, and those that may have.
     touched: u64,
     open: u64,
+    /// Contacts of all of them.
+    contacts: usize,
 }
 
 impl Survey {
@@ -132,6 +134,7 @@ impl Survey {
             Some(Passage::Open(_)) => self.open += 1,
             Some(Passage::Free) | None => {}
         }
+        self.contacts += row.contacts as usize;
         self.widest_m = self.widest_m.max(row.gap.width());
         let (ids, worst) = (row.ids, self.worst);
         let rank = (row.verdict.code(), -row.best_m);
@@ -142,6 +145,11 @@ impl Survey {
         if order.is_gt() || (order.is_eq() && (ids < worst.ids || worst.ids.0 == BodyId(0))) {
             self.worst = Worst { ids, rank };
         }
+    }
+
+    /// How many contacts the pairs have.
+    pub(super) fn contacts(&self) -> usize {
+        self.contacts
     }
 
     /// Takes since when a pair has had no verdict; 0: it has one.
