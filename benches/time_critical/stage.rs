@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use sweepd::broad::{BroadPhase, Method};
 use sweepd::builtin::Random;
-use sweepd::config::{Config, OnStale};
+use sweepd::config::Config;
 use sweepd::ids::{BodyId, PairSlot};
 use sweepd::math::{Point, Pose, Quat, Vec3, relative};
 use sweepd::narrow::Narrow;

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use sweepd::config::{Config, OnStale};
+use sweepd::config::Config;
 use sweepd::ids::{BodyId, BodySlot, SourceSlot};
 use sweepd::math::{Point, Pose};
 use sweepd::scene::{BodySpec, PairAction, PairRule, PlacedSpec, Scene, SourceSpec};

@@ -1,6 +1,6 @@
 //! Couples of bodies of all kinds, and how they move.
 
-use sweepd::config::{Config, OnStale};
+use sweepd::config::Config;
 use sweepd::ids::BodyId;
 use sweepd::math::{Pose, Quat, Vec3};
 use sweepd::scene::{BodySpec, PlacedSpec, Scene, SourceSpec};
