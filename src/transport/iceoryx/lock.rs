@@ -5,6 +5,7 @@ use std::fs::{DirBuilder, File, OpenOptions};
 use std::io::{Read, Seek, Write};
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use rustix::fs::{FlockOperation, flock};
 use serde::{Deserialize, Serialize};
@@ -15,8 +16,10 @@ use crate::error::{Error, Result};
 /// Shared memory lives here; a lock beside it survives the removal of iceoryx2's root, which would let a second
 /// daemon make a second, silent set of services.
 const LOCK_DIR: &str = "/dev/shm";
-/// Times to try again when the file was removed between opening and locking.
+/// Times to try again when the file was removed between opening and locking, or somebody looks whether it is held.
 const TRIES_MAX: usize = 16;
+/// How long to wait for who looks: that takes some microseconds.
+const LOOK: Duration = Duration::from_millis(10);
 
 /// What the holder of an instance writes into its lock, for people and for clients of another iceoryx2 version.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -84,7 +87,15 @@ impl InstanceLock {
                 .open(&path)
                 .map_err(|e| refuse(format!("{}: {e}", path.display())))?;
             if flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
-                let other = holder(place).unwrap_or_default();
+                // to look for a holder locks it too, for a moment
+                let Some(other) = holder(place) else {
+                    #[allow(
+                        clippy::disallowed_methods,
+                        reason = "before there is a port to wait on"
+                    )]
+                    std::thread::sleep(LOOK);
+                    continue;
+                };
                 return Err(refuse(format!(
                     "taken by process {} (sweepd {}); end it, or choose another name with --instance",
                     other.pid, other.sweepd_version
@@ -176,6 +187,22 @@ mod tests {
         assert!(!lock_path(&place).exists());
         assert_eq!(holder(&place), None);
         InstanceLock::take(&place, &us).unwrap();
+    }
+
+    #[test]
+    fn who_looks_for_a_holder_does_not_keep_one_from_starting() {
+        let place = Place::new(&format!("looked_at_{}", std::process::id())).unwrap();
+        std::fs::write(lock_path(&place), "").unwrap();
+        let looker = File::open(lock_path(&place)).unwrap();
+        flock(&looker, FlockOperation::NonBlockingLockShared).unwrap();
+        let looker = std::thread::spawn(move || {
+            #[allow(clippy::disallowed_methods, reason = "as one who looks would")]
+            std::thread::sleep(LOOK / 5);
+            drop(looker);
+        });
+        let taken = InstanceLock::take(&place, &Holder::default());
+        looker.join().unwrap();
+        taken.unwrap();
     }
 
     #[test]
