@@ -22,6 +22,11 @@ impl Publisher {
             return 0;
         }
         let all = self.survey.contacts();
+        debug_assert_eq!(
+            all,
+            (self.listing.rows.iter().map(|row| row.contacts as usize)).sum::<usize>(),
+            "every row was surveyed once"
+        );
         let cut = all > self.limits.contact_rows;
         if cut {
             self.choose_pairs();

@@ -1,8 +1,8 @@
 //! A message that stays from tick to tick: rows that have nothing new to say are left where they are, or moved.
 //!
 //! In: for each pair in order, where its rows stood in the message of the last tick and whether they still hold. Out:
-//! the message of this tick, in the same memory: what is in front of the first pair that came or went is not touched,
-//! and behind it no run of rows that as many came as went before.
+//! the message of this tick, in the same memory: rows that stand where they stood are not touched, which are those in
+//! front of the first pair that came or went, and those behind it as long as as many rows went as came.
 //!
 //! Refused: to put the message together anew from the old one. Each tick in which a pair came or went then took a copy
 //! of all, which in a scene mostly at rest was most of what publishing took.
@@ -16,9 +16,8 @@ pub(super) struct Kept<T> {
     at: usize,
     /// Of the old message, in order: what stays in the new one.
     runs: Vec<Run>,
-    /// Rows that are made now, and where each pair's stand in the new message.
+    /// Rows that are made now, in order: they fill what the runs leave free.
     made: Vec<T>,
-    places: Vec<Span>,
 }
 
 /// Rows that stay side by side.
@@ -48,7 +47,6 @@ impl<T> Default for Kept<T> {
             at: 0,
             runs: Vec::new(),
             made: Vec::new(),
-            places: Vec::new(),
         }
     }
 }
@@ -59,7 +57,6 @@ impl<T: Copy> Kept<T> {
         self.at = 0;
         self.runs.clear();
         self.made.clear();
-        self.places.clear();
     }
 
     /// The next rows are those that stood at `was` in the last tick; spans come in the order in which they stood.
@@ -81,9 +78,7 @@ impl<T: Copy> Kept<T> {
     pub(super) fn make(&mut self, make: impl FnOnce(&mut Vec<T>)) -> Span {
         let before = self.made.len();
         make(&mut self.made);
-        let span = self.span(self.made.len() - before);
-        self.places.push(span);
-        span
+        self.span(self.made.len() - before)
     }
 
     /// Ends the message.
@@ -101,19 +96,26 @@ impl<T: Copy> Kept<T> {
             out.resize(self.at, *row);
         }
         self.move_runs(out);
-        let mut rows = self.made.as_slice();
-        for place in &self.places {
-            let (these, rest) = rows.split_at((place.len as usize).min(rows.len()));
-            let first = place.first as usize;
-            if let Some(there) = out.get_mut(first..first + these.len()) {
-                there.copy_from_slice(these);
-            }
-            rows = rest;
-        }
+        self.put_made(out);
         out.truncate(self.at);
         // In which tick how many rows are made is not known: room for all is made when they are more than ever.
+        self.runs.clear();
+        self.runs.reserve(out.len() / 2);
         self.made.clear();
         self.made.reserve(out.len());
+    }
+
+    /// Writes what is made between the runs, and behind the last.
+    fn put_made(&self, out: &mut [T]) {
+        let (mut free, mut rows) = (0, self.made.as_slice());
+        let ends = self.runs.iter().map(|run| (run.to, run.to + run.len));
+        for (end, next) in ends.chain([(self.at, self.at)]) {
+            let (these, rest) = rows.split_at((end - free).min(rows.len()));
+            if let Some(there) = out.get_mut(free..free + these.len()) {
+                there.copy_from_slice(these);
+            }
+            (free, rows) = (next, rest);
+        }
     }
 
     /// Moves what stays to its place. Runs keep their order, so one that moves up can only be in the way of one that
