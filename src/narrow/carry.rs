@@ -1,9 +1,9 @@
 //! Pairs of single shapes of which one is a mesh: work on their fronts, and what it says of the bodies.
 //!
 //! A front works at this tick's poses; what it had proved before is carried there. It stays behind, or is not begun,
-//! while a glance tells enough: a plane that parts the two, or a touch where they touched last. The pair's memory is
-//! an interval with its own certificate, so a pair that has not moved enough is not looked at, and its front is not
-//! touched.
+//! while a glance tells enough: a plane that parts the two, balls within them that overlap, or a touch where they
+//! touched last. The pair's memory is an interval with its own certificate, so a pair that has not moved enough is not
+//! looked at, and its front is not touched.
 
 use crate::ids::PairSlot;
 use crate::math::{Interval, Pose, relative};
@@ -68,15 +68,7 @@ impl Narrow {
                 memo.retested = self.tick;
             }
             let told = glance(front, (one_shape, other_shape), &pos12, due, meter);
-            let gap = match &told {
-                // A certified touch at these very poses; the lower end is what motion left of the old one.
-                Glance::Touch(_) => Interval::new(memo.now.min.min(0.0), 0.0),
-                Glance::Apart(low_m) => {
-                    let apart = Interval::new(*low_m, f64::INFINITY);
-                    sound(apart, one, other, &rel).meet(memo.now)
-                }
-                Glance::Nothing => Interval::UNKNOWN,
-            };
+            let gap = told.gap(memo.now, |gap| sound(gap, one, other, &rel));
             if gap.max <= 0.0 || gap.min > memo.report_m.max(0.0) {
                 memo.gap = gap;
                 (memo.rel, memo.credit_m, memo.tested) = (rel, credit_m, self.tick);
@@ -85,7 +77,7 @@ impl Narrow {
                     Glance::Touch(Some(leaf)) => {
                         memo.witness = Some(seen_at(one, other, &pos12, &leaf));
                     }
-                    Glance::Touch(None) => {}
+                    Glance::Touch(None) | Glance::Deep(_) => {}
                     // Where it was nearest once is not where it is now.
                     Glance::Apart(_) | Glance::Nothing => memo.witness = None,
                 }
@@ -146,13 +138,31 @@ fn slice_units(undecided_since: u64, tick: u64) -> u64 {
 enum Glance {
     /// It touches still: where it did, or at these leaves.
     Touch(Option<LeafContact>),
+    /// Balls within the two overlap so deep, metres.
+    Deep(f64),
     /// A plane parts it by so much, metres.
     Apart(f64),
     /// Nothing.
     Nothing,
 }
 
-/// Looks at a pair where it touched last, or else at what a plane would say.
+impl Glance {
+    /// The pair's interval at these very poses.
+    ///
+    /// * `now` - what motion left of the one before: the lower end of a pair that touches.
+    /// * `sound` - makes a bound on the two shapes one on the two bodies.
+    fn gap(&self, now: Interval, sound: impl Fn(Interval) -> Interval) -> Interval {
+        match *self {
+            // A certified touch; how deep it is at most has not been asked again.
+            Self::Touch(_) => Interval::new(now.min.min(0.0), 0.0),
+            Self::Deep(depth_m) => sound(Interval::new(f64::NEG_INFINITY, -depth_m)).meet(now),
+            Self::Apart(low_m) => sound(Interval::new(low_m, f64::INFINITY)).meet(now),
+            Self::Nothing => Interval::UNKNOWN,
+        }
+    }
+}
+
+/// Looks at a pair where it touched last, or else at what balls within the two, and then a plane, would say.
 ///
 /// * `touched` - whether it touched when it was last looked at.
 fn glance(
@@ -162,16 +172,18 @@ fn glance(
     touched: bool,
     meter: &mut Meter<'_>,
 ) -> Glance {
+    if touched && front.knows_touch() {
+        meter.charge_weighted(1, RETEST_COST);
+        if front.still_touches(a, b, pos12) {
+            return Glance::Touch(None);
+        }
+    }
+    if let Some(depth_m) = front.overlap(a, b, pos12, meter) {
+        return Glance::Deep(depth_m);
+    }
     if !touched {
         let low_m = front.parted(a, b, pos12, meter);
         return low_m.map_or(Glance::Nothing, Glance::Apart);
-    }
-    if !front.knows_touch() {
-        return Glance::Nothing;
-    }
-    meter.charge_weighted(1, RETEST_COST);
-    if front.still_touches(a, b, pos12) {
-        return Glance::Touch(None);
     }
     let beside = front.touches_beside(a, b, pos12, meter);
     beside.map_or(Glance::Nothing, |leaf| Glance::Touch(Some(leaf)))

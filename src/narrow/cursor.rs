@@ -12,7 +12,7 @@ use super::arena::{Arena, Run};
 use super::contacts::Contact;
 use super::exact::Warm;
 use super::memo::Witness;
-use super::mesh::{CarriedFront, FrontStore, Goal, MeshQuery, Search, parted};
+use super::mesh::{CarriedFront, FrontStore, Goal, MeshQuery, Search, overlap, parted};
 use super::query::{
     add_manifold, is_simple, leaf_contact, shape_gap, shape_pose, sound, sphere_bound, witness_of,
 };
@@ -198,6 +198,13 @@ impl Cursor {
             let apart = low.map(|low| sound(Interval::new(low, low), one, other, &self.rel));
             if let Some(apart) = apart.filter(|apart| apart.min > enough) {
                 self.gap.min = self.gap.min.min(apart.min);
+                return true;
+            }
+            if self.goal == Goal::Verdict
+                && let Some(depth_m) = overlap((&one.shape, &other.shape), &pos12, meter)
+            {
+                let deep = Interval::new(f64::NEG_INFINITY, -depth_m);
+                self.gap = self.gap.least(sound(deep, one, other, &self.rel));
                 return true;
             }
         }

@@ -9,8 +9,9 @@
 //!   surfaces it is a front that is not carried on;
 //! - [`Walk`], the same over the trees of axis-aligned boxes: the twin and the baseline of the two.
 //!
-//! Before any of the first two searches, a plane that parts the two as wholes is looked for (`parting`), and of a pair
-//! that touched last the triangles that did, and those beside them (`carried/touch`).
+//! Before any of the first two searches, a plane that parts the two as wholes is looked for (`parting`), balls within
+//! the two that overlap (`deep`), and of a pair that touched last the triangles that did, and those beside them
+//! (`carried/touch`).
 //!
 //! Of a walk every pair of triangles is covered by exactly one entry at any time: on the stack (boxes that may touch),
 //! in the heap (boxes proved apart by so much), or settled (queried, or proved farther than the best distance known).
@@ -34,8 +35,10 @@ mod bound;
 mod carried;
 mod contacts;
 mod containment;
+mod deep;
 mod front;
 mod half_space;
+mod lack;
 mod manifold;
 mod parting;
 mod patches;
@@ -51,6 +54,7 @@ mod way;
 
 pub use carried::{CarriedFront, FrontStore, Search, has_front};
 pub use contacts::{LEAF_CONTACTS_MAX, LeafContact};
+pub use deep::overlap;
 pub use parting::parted;
 pub use patches::{PATCH_POINTS, PATCHES_MAX, numbered};
 pub use query::{Goal, MeshQuery};

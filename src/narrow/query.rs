@@ -170,7 +170,7 @@ pub(super) fn sound(gap: Interval, a: &PlacedShape, b: &PlacedShape, bodies12: &
     Interval {
         min: wide.min,
         max: if ordered.max <= 0.0 {
-            ordered.max
+            wide.max.min(0.0)
         } else {
             wide.max
         },

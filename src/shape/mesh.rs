@@ -4,6 +4,7 @@
 //! warnings that `check` shows.
 
 mod adjacency;
+mod balls;
 mod deform;
 mod inside;
 mod normals;
@@ -30,6 +31,7 @@ use tree::Tree;
 pub(crate) use tree::{Below, NODES_WAITING_MAX, Node};
 
 use adjacency::Adjacency;
+pub(crate) use balls::{Ball, Balls};
 use normals::Normals;
 use outline::Outline;
 use rings::Rings;
@@ -62,6 +64,8 @@ pub struct Mesh {
     rings: Box<Rings>,
     /// Which way the faces under each oriented box look; apart as well.
     normals: Box<Normals>,
+    /// Balls within it; none of a surface, or of a mesh that deforms.
+    balls: Option<Box<Balls>>,
     /// None for a small mesh, whose vertices are walked.
     outline: Option<Outline>,
     /// Its box; of one that deforms it holds the vertices that no face names, too.
@@ -111,6 +115,7 @@ impl Mesh {
             adjacency: Box::default(),
             rings: Box::default(),
             normals: Box::default(),
+            balls: None,
             shells: topology.shells.iter().map(|s| s.vertex).collect(),
             vertices,
             faces,
@@ -128,6 +133,7 @@ impl Mesh {
         mesh.adjacency = Box::new(Adjacency::new(&topology, &mesh));
         mesh.rings = Box::new(Rings::new(&mesh));
         mesh.normals = Box::new(Normals::new(&mesh));
+        mesh.balls = mesh.find_balls();
         mesh.warnings.extend(mesh.adjacency.warning());
         Ok(mesh)
     }

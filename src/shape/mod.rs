@@ -21,7 +21,7 @@ pub use library::Library;
 pub(crate) use load::find_mesh;
 pub use mesh::Mesh;
 pub(crate) use mesh::{
-    Below, BoxId, Climb, Cone, Held, Inside, NODES_WAITING_MAX, NewTree, NoVertex, Node, Obb,
+    Ball, Below, BoxId, Climb, Cone, Held, Inside, NODES_WAITING_MAX, NewTree, NoVertex, Node, Obb,
     ObbPack, Trails, TreeJob, can_be_vertices, side,
 };
 pub use spec::ShapeSpec;

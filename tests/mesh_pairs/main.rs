@@ -15,6 +15,7 @@
 #[path = "../oracle/mod.rs"]
 mod oracle;
 
+mod deep;
 mod extremes;
 mod fronts;
 mod half_space;

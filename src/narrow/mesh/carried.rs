@@ -31,6 +31,7 @@
 use super::bound::Frame;
 use super::contacts::LeafContact;
 use super::containment::{Containment, ShellTests};
+use super::deep::Deep;
 use super::parting::Parting;
 use super::patches::Patches;
 use super::placed::{Placed, lag_of};
@@ -45,6 +46,7 @@ use crate::time::Meter;
 mod count;
 mod cover;
 pub(super) mod drift;
+mod glance;
 mod known;
 mod leaves;
 mod search;
@@ -116,6 +118,7 @@ pub struct CarriedFront {
     witness: Option<LeafContact>,
     crossing: Option<Crossing>,
     parting: Parting,
+    deep: Deep,
     contacts: Patches,
     /// Sum of what the two have deformed, when they were last looked at, metres.
     bent_m: f64,
@@ -161,7 +164,7 @@ impl CarriedFront {
         // Another pair may have it next.
         self.started = false;
         (self.last, self.crossing) = (None, None);
-        self.parting = Parting::default();
+        (self.parting, self.deep) = (Parting::default(), Deep::default());
     }
 
     /// Takes the pair to another pose, and to the vertices of now; what was proved is carried over as far as it holds.
@@ -236,19 +239,6 @@ impl CarriedFront {
                 self.keep(store, group, group.expiry_m);
             }
         }
-    }
-
-    /// A lower bound on the gap at a pose, of a plane that parts the two as wholes; `None`: none was found. What is
-    /// proved of the pair stays as it is, at the pose it is at. One unit at most.
-    pub fn parted(
-        &mut self,
-        a: &Shape,
-        b: &Shape,
-        pos12: &Pose,
-        meter: &mut Meter<'_>,
-    ) -> Option<f64> {
-        let is_carried = self.search == Search::Carried;
-        is_carried.then(|| self.parting.low(a, b, pos12, meter))?
     }
 
     /// A mesh has other vertices than when this was last asked, and the front is to stay at its pose: what is found

@@ -13,7 +13,7 @@
 //!
 //! Refused: the closest points of the two hulls (a query of its own, where a sign is all that is asked).
 
-use super::carried::drift::moved;
+use super::lack::Lack;
 use super::placed::Placed;
 use super::retest::tree_of;
 use super::side::Side;
@@ -38,9 +38,9 @@ const POINTS_A_QUARTER: usize = 16;
 pub(super) struct Parting {
     /// Unit, A's frame, from A to B; `None`: never looked for.
     normal: Option<Vec3>,
-    /// Where none was found last, and how far the climb's end was from one, metres: a shorter motion brings none about
-    /// there, and is not worth another climb.
-    none_at: Option<(Pose, f64)>,
+    /// Where none was found last, and how far the climb's end was from one: a shorter motion brings none about there,
+    /// and is not worth another climb.
+    lack: Lack,
 }
 
 impl Parting {
@@ -53,9 +53,7 @@ impl Parting {
         meter: &mut Meter<'_>,
     ) -> Option<f64> {
         let (side_a, side_b) = (Side::of(a)?, Side::of(b)?);
-        if let Some((then, lack_m)) = &self.none_at
-            && moved(a, b, then, pos12) < *lack_m
-        {
+        if self.lack.holds(a, b, pos12) {
             return None;
         }
         let at = Placed::of(a, b, pos12);
@@ -91,7 +89,11 @@ impl Parting {
             }
         }
         self.normal = Some(normal);
-        self.none_at = (best <= 0.0 && !new).then(|| (*pos12, -best));
+        self.lack = if new {
+            Lack::default()
+        } else {
+            Lack::of(pos12, -best)
+        };
         let points = (side_a.points() + side_b.points()) / POINTS_A_QUARTER;
         let cost = tries * (TRY_COST_QUARTERS + points as u64) / 4 + 1;
         meter.charge_weighted(1, cost);

@@ -253,6 +253,11 @@ impl Convex {
         }
     }
 
+    /// Whether it is more than a triangle.
+    pub(crate) fn is_solid(&self) -> bool {
+        !matches!(self.core, Core::Triangle(_))
+    }
+
     /// Radius of the ball rolled around the core, metres.
     #[must_use]
     pub fn margin(&self) -> f64 {

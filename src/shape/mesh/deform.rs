@@ -94,6 +94,7 @@ impl Mesh {
         self.obb = ObbTree::aligned(&self.vertices, &self.faces);
         self.tree = Tree::none(self.centre);
         self.outline = None;
+        self.balls = None;
         self.normals = Box::default();
         self.adjacency.forget_places(self.faces.len());
         let packs = self.obb.packs().len();

@@ -347,3 +347,48 @@ fn the_ring_of_a_vertex_holds_each_neighbour_once() {
         assert_eq!(ring.is_empty(), none, "vertex {v}");
     }
 }
+
+#[test]
+fn balls_are_within_the_solid_whatever_its_faces_and_none_is_of_a_surface() {
+    let (mut vertices, mut faces) = joined(&[
+        cuboid([0.0; 3], 1.0, false),
+        cuboid([5.0, 0.0, 0.0], 0.3, false),
+        cuboid([0.0; 3], 0.4, true),
+    ]);
+    // A face split into slivers by a corner next to its edge.
+    let [a, b, c] = faces[0];
+    let [p, q] = [a, b].map(|v| vertices[v as usize].coords);
+    vertices.push(Point::from((p + q) * 0.5));
+    let middle = u32::try_from(vertices.len() - 1).unwrap();
+    faces[0] = [a, middle, c];
+    faces.push([middle, b, c]);
+    faces.push([a, b, middle]);
+    let solid = Mesh::new(vertices.clone(), faces.clone(), Some(true)).unwrap();
+    let balls = solid.balls().unwrap().all();
+    assert!(
+        balls.iter().any(|ball| ball.centre.x > 4.0),
+        "one in each part"
+    );
+    assert!(
+        balls
+            .windows(2)
+            .all(|pair| pair[0].radius_m <= balls[0].radius_m),
+        "the largest first"
+    );
+    for ball in balls {
+        for k in 0..400_u32 {
+            // Evenly over the ball (a Fibonacci lattice).
+            let z = 1.0 - (2.0 * f64::from(k) + 1.0) / 400.0;
+            let (s, c) = (2.399_963 * f64::from(k)).sin_cos();
+            let across = (1.0 - z * z).sqrt();
+            let on = ball.centre + Vec3::new(across * c, across * s, z) * ball.radius_m;
+            assert_ne!(winding(&solid, on.x, on.y, on.z), 0, "{ball:?} at {on}");
+        }
+    }
+    let surface = Mesh::new(vertices, faces, Some(false)).unwrap();
+    assert!(surface.balls().is_none());
+    let (vertices, faces) = cuboid([0.0; 3], 1.0, false);
+    let bending = Mesh::new(vertices, faces, Some(true)).unwrap();
+    assert!(bending.balls().is_some());
+    assert!(bending.into_deforming().unwrap().balls().is_none());
+}

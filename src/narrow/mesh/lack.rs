@@ -1,0 +1,22 @@
+//! A glance that told nothing, and how far the pair has to move before it can.
+
+use super::carried::drift::moved;
+use crate::math::Pose;
+use crate::shape::Shape;
+
+/// The pose of the glance, and what it lacked, metres; or nothing is known.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Lack(Option<(Pose, f64)>);
+
+impl Lack {
+    /// * `lack_m` - how much nearer or farther the two had to be; zero or less: nothing was lacking.
+    pub(super) fn of(pos12: &Pose, lack_m: f64) -> Self {
+        Self((lack_m > 0.0).then_some((*pos12, lack_m)))
+    }
+
+    /// Whether it would tell nothing at this pose either.
+    pub(super) fn holds(&self, a: &Shape, b: &Shape, pos12: &Pose) -> bool {
+        let still = |(then, lack_m): &(Pose, f64)| moved(a, b, then, pos12) < *lack_m;
+        self.0.as_ref().is_some_and(still)
+    }
+}
