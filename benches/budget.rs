@@ -2,7 +2,8 @@
 //! is left above the floor is used while work remains: before and after publishing on the wall clock, before alone, and
 //! on the CPU clock at least (a thread that waits for its core uses up the wall's time, and none of the core's).
 //!
-//! Scenes: `pool`, `pool(4000, 11)`, each body 1 % of its size a tick, pairs and contacts asked for; `meshes`, 200 pairs
+//! Scenes: `clock`, a control: a thread that does nothing but look at the clock until the time is up, so what it
+//! overshoots by is the machine's; `pool`, `pool(4000, 11)`, each body 1 % of its size a tick, pairs and contacts asked for; `meshes`, 200 pairs
 //! of meshes of 19,880 triangles (`benches/time_critical`), 0.5 % of their diameter a tick, the same asked for; and
 //! `meshes_regions`, the same with a reader of `regions`.
 //!
@@ -27,11 +28,11 @@ use common::{Bench, Flight, kept_rows, provenance, quantile, row, save};
 use stage::{Courses, bodies, shapes};
 use sweepd::builtin::pool;
 use sweepd::shape::Shape;
-use sweepd::time::Budget;
+use sweepd::time::{Budget, Clock, SystemClock};
 use sweepd::wire::{Demand, Stage, TransformRow};
 
 const SEED: u64 = 11;
-const SCENES: [&str; 3] = ["pool", "meshes", "meshes_regions"];
+const SCENES: [&str; 4] = ["clock", "pool", "meshes", "meshes_regions"];
 /// Ticks before those that count.
 const WARM_UP: usize = 40;
 
@@ -77,11 +78,11 @@ fn main() {
     let quick = std::env::args().any(|arg| arg == "--quick");
     let named = |scene: &str| std::env::args().any(|arg| arg == scene);
     let all = !SCENES.iter().any(|scene| named(scene));
-    let ticks = if quick { 60 } else { 400 };
+    let ticks = if quick { 60 } else { 2_000 };
     let meshes = shapes();
     let columns = "machine,commit,compiler,seed,scene,bodies,above_floor_us,ticks,floor_us,publish_p50_us,\
-         overshoot_wall_p50_us,overshoot_wall_p99_us,overshoot_cpu_p50_us,overshoot_cpu_p99_us,used_percent,\
-         used_before_publishing_percent,undecided_percent,used_cpu_percent\n";
+         overshoot_wall_p50_us,overshoot_wall_p99_us,overshoot_wall_p999_us,overshoot_cpu_p50_us,overshoot_cpu_p99_us,\
+         overshoot_cpu_p999_us,used_percent,used_before_publishing_percent,undecided_percent,used_cpu_percent\n";
     let mut csv = String::from(columns);
     let from = provenance();
     for scene in SCENES {
@@ -90,12 +91,39 @@ fn main() {
             continue;
         }
         for above_us in [100, 250, 500, 1_000, 2_000, 5_000_u64] {
-            let line = run(scene, &meshes, above_us, ticks);
+            let line = if scene == "clock" {
+                look(above_us, ticks)
+            } else {
+                run(scene, &meshes, above_us, ticks)
+            };
             eprintln!("{line}");
             csv += &format!("{from},{SEED},{line}\n");
         }
     }
     save("budget.csv", &csv);
+}
+
+/// The control within one budget; its columns from `scene` on.
+fn look(above_us: u64, ticks: usize) -> String {
+    let (mut wall, mut cpu) = (Vec::new(), Vec::new());
+    for _ in 0..ticks {
+        let from = [SystemClock.monotonic_ns(), SystemClock.thread_cpu_ns()];
+        while SystemClock.monotonic_ns() < from[0] + above_us * 1_000 {}
+        let spent_cpu_ns = SystemClock.thread_cpu_ns() - from[1];
+        wall.push(SystemClock.monotonic_ns() - from[0] - above_us * 1_000);
+        cpu.push(spent_cpu_ns.saturating_sub(above_us * 1_000));
+    }
+    let over = overshoots(&mut wall, &mut cpu);
+    format!("clock,0,{above_us},{ticks},0.0,0.0,{over},,,,")
+}
+
+/// Quantiles of what the ticks overshot by, microseconds: 50, 99 and 99.9 % on the wall, then on the CPU clock.
+fn overshoots(wall: &mut [u64], cpu: &mut [u64]) -> String {
+    let of = |times: &mut [u64]| {
+        let at = [0.5, 0.99, 0.999].map(|share| quantile(times, share) as f64 / 1e3);
+        at.map(|us| format!("{us:.1}")).join(",")
+    };
+    format!("{},{}", of(wall), of(cpu))
 }
 
 /// One scene within one budget; its columns from `scene` on.
@@ -153,14 +181,11 @@ fn run(scene: &str, meshes: &[Arc<Shape>], above_us: u64, ticks: usize) -> Strin
         }
     };
     format!(
-        "{scene},{},{above_us},{ticks},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.1},{:.2},{:.1}",
+        "{scene},{},{above_us},{ticks},{:.1},{:.1},{},{:.1},{:.1},{:.2},{:.1}",
         bench.scene.bodies.len(),
         us(quantile(&mut floors, 0.5)),
         us(quantile(&mut publish, 0.5)),
-        us(quantile(&mut wall, 0.5)),
-        us(quantile(&mut wall, 0.99)),
-        us(quantile(&mut cpu, 0.5)),
-        us(quantile(&mut cpu, 0.99)),
+        overshoots(&mut wall, &mut cpu),
         share(used, offered),
         share(told, offered),
         share(open, all),

@@ -45,6 +45,7 @@ pub use sweep::{Passage, Swept};
 
 use crate::ids::{BodySlot, PairSlot};
 use crate::pairs::{PairDelta, PairSet};
+use crate::simd;
 use crate::time::Meter;
 use crate::wire::{BodyStatus, Verdict};
 use crate::world::World;
@@ -142,6 +143,7 @@ impl Narrow {
     /// An empty memory that keeps at most `contacts_per_pair` contacts of a pair.
     #[must_use]
     pub fn new(contacts_per_pair: usize) -> Self {
+        simd::prepare();
         Self {
             contacts_per_pair,
             ..Self::default()
