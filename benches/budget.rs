@@ -3,9 +3,9 @@
 //! on the CPU clock at least (a thread that waits for its core uses up the wall's time, and none of the core's).
 //!
 //! Scenes: `clock`, a control: a thread that does nothing but look at the clock until the time is up, so what it
-//! overshoots by is the machine's; `pool`, `pool(4000, 11)`, each body 1 % of its size a tick, pairs and contacts asked for; `meshes`, 200 pairs
-//! of meshes of 19,880 triangles (`benches/time_critical`), 0.5 % of their diameter a tick, the same asked for; and
-//! `meshes_regions`, the same with a reader of `regions`.
+//! overshoots by is the machine's; `pool`, `pool(4000, 11)`, each body 1 % of its size a tick, pairs and contacts asked
+//! for; `meshes`, 200 pairs of meshes of 19,880 triangles (`benches/time_critical`), 0.5 % of their diameter a tick, the
+//! same asked for; and `meshes_regions`, the same with a reader of `regions`.
 //!
 //! `cargo bench --bench budget [-- --quick] [SCENE..]`; rows of scenes that are not named stay as they are
 

@@ -77,9 +77,9 @@ impl Narrow {
                     Glance::Touch(Some(leaf)) => {
                         memo.witness = Some(seen_at(one, other, &pos12, &leaf));
                     }
-                    Glance::Touch(None) | Glance::Deep(_) => {}
-                    // Where it was nearest once is not where it is now.
-                    Glance::Apart(_) | Glance::Nothing => memo.witness = None,
+                    Glance::Touch(None) => {}
+                    // Where it touched or was nearest once is not where it does or is now.
+                    Glance::Deep(_) | Glance::Apart(_) | Glance::Nothing => memo.witness = None,
                 }
                 return false;
             }

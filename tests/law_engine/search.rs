@@ -153,6 +153,33 @@ fn every_search_of_mesh_pairs_gives_the_same_verdicts_without_a_limit_and_sound_
     assert!(open[0] < open[2] && open[0] < open[3], "{open:?}");
 }
 
+/// Where two touched is no estimate any more once balls within them tell that they overlap: it was kept, and rows told
+/// the gap there, and how fast it closed.
+#[test]
+fn bug_an_overlap_told_by_balls_is_not_shown_where_the_two_touched_before() {
+    let round = trimesh(&bumpy_sphere(16, 24, 0.02), None);
+    let bodies = [[0.0; 3], [1.9, 0.0, 0.0]];
+    let bodies: Vec<String> = (1..)
+        .zip(bodies)
+        .map(|(id, at)| body(id, at, &round, ""))
+        .collect();
+    let mut rig = Rig::new(&scene("", &bodies));
+    rig.send(Budget::UNLIMITED);
+    let touching = *row_of(&rig, 0).unwrap();
+    assert_eq!(touching.verdict, Verdict::Colliding.code());
+    assert!(
+        touching.gap_best_m.is_finite() && touching.gap_max_m > -1e-3,
+        "{touching:?}"
+    );
+    // Deep, and on another side; two units are a look at the old touch and one at the balls.
+    rig.place(2, &Pose::translation(0.0, 0.8, 0.0));
+    rig.send(Budget::units(2));
+    let deep = *row_of(&rig, 0).unwrap();
+    assert_eq!(deep.verdict, Verdict::Colliding.code());
+    assert!(deep.gap_max_m < -0.7, "{deep:?}");
+    assert!(deep.gap_best_m.is_nan(), "{deep:?}");
+}
+
 #[test]
 fn the_scene_chooses_a_search_by_name_and_the_plan_says_so() {
     for (search, name) in MeshSearch::NAMED {

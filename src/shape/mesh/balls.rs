@@ -219,20 +219,20 @@ impl Mesh {
         let [a, b, c] = self.triangle(face);
         let middle = Point::from((a.coords + b.coords + c.coords) / 3.0);
         let mut radius_m = self.radius;
-        for _ in 0..STEPS_MAX {
+        for step in 1.. {
             let centre = middle - normal * radius_m;
-            let (_, nearest) = self.near(&centre);
+            let (clear_m, nearest) = self.near(&centre);
             let way = nearest - middle;
             let under = -2.0 * normal.dot(&way);
             let fits_m = way.norm_squared() / under;
-            if !(fits_m > 0.0 && fits_m < radius_m * (1.0 - 1e-3)) {
-                break;
+            let shrinks = fits_m > 0.0 && fits_m < radius_m * (1.0 - 1e-3);
+            if !shrinks || step == STEPS_MAX {
+                let radius_m = clear_m;
+                return Some(Ball { centre, radius_m });
             }
             radius_m = fits_m;
         }
-        let centre = middle - normal * radius_m;
-        let (radius_m, _) = self.near(&centre);
-        Some(Ball { centre, radius_m })
+        None
     }
 
     /// A point of the surface that is nearly the nearest to a point, and its distance, metres.
