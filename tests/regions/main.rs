@@ -390,9 +390,10 @@ fn widest(out: &Outbox, things: &[Thing; 2]) -> f64 {
 
 #[test]
 fn regions_get_smaller_with_work() {
+    // A mean over a handful of pairs says nothing: as many in every build.
     let mut sums = [0.0; 6];
     let mut count = 0;
-    for case in 0..CASES / 4 {
+    for case in 0..300 {
         let mut rng = Rng::new(30_000 + case);
         let things = things(&mut rng, 0);
         let poses = place(&mut rng, &things);
@@ -411,6 +412,7 @@ fn regions_get_smaller_with_work() {
         "{count} pairs, mean of the largest radius {:?}",
         sums.map(|s| s / f64::from(count))
     );
+    assert!(count > 150, "{count} pairs");
     // What the roots share, cut evenly, is about as small as the first few boxes of a front.
     assert!(sums[1] <= 1.02 * sums[0], "{sums:?}");
     for pair in sums[1..5].windows(2) {
