@@ -248,6 +248,7 @@ impl CarriedFront {
         if bent_m > self.bent_m {
             self.bent_m = bent_m;
             self.shells.drop_test();
+            self.known.walks = None;
         }
     }
 
@@ -278,7 +279,7 @@ impl CarriedFront {
             self.ask_touching_again(store);
         }
         if goal == Goal::Contacts {
-            store.walks.clear();
+            self.known.walks = Some(store.walks.go_on(self.known.walks));
         }
         let end = meter.spent().saturating_add(slice_units);
         loop {

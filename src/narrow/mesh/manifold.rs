@@ -46,13 +46,21 @@ pub(super) struct Walks {
     tops: [Trails<Climb>; 2],
     /// From vertices of A and of B to the face of the other beneath them, if there is one.
     feet: [Trails<Option<u32>>; 2],
+    /// Number of the search that they are of.
+    search: u64,
 }
 
 impl Walks {
-    /// Begins a search: it is not to rest on what others have found.
-    pub(super) fn clear(&mut self) {
-        self.tops.iter_mut().for_each(Trails::clear);
-        self.feet.iter_mut().for_each(Trails::clear);
+    /// Goes on with a search, or begins one: it is not to rest on what others have found. Returns its number.
+    ///
+    /// * `search` - what was returned last for the two at this pose, if anything was.
+    pub(super) fn go_on(&mut self, search: Option<u64>) -> u64 {
+        if search != Some(self.search) {
+            self.tops.iter_mut().for_each(Trails::clear);
+            self.feet.iter_mut().for_each(Trails::clear);
+            self.search += 1;
+        }
+        self.search
     }
 
     fn tops(&mut self, is_b: bool) -> &mut Trails<Climb> {
@@ -75,6 +83,12 @@ enum Base {
 
 /// Hands over the points of two leaves that touch: at least one. They are in A's frame, and `patch` names the surface
 /// that the normal is of.
+///
+/// It takes up to ten walks, each of some microseconds.
+///
+/// * `go_on` - asked between and within walks; where not, it is left off, to be begun again over the trails of what was
+///   walked.
+/// * returns - whether it came to its end.
 pub(super) fn points(
     a: (Side<'_>, u32),
     b: (Side<'_>, u32),
@@ -82,13 +96,17 @@ pub(super) fn points(
     found: &LeafContact,
     (patches, arena): (&mut Patches, &mut Arena<LeafContact>),
     walks: &mut Walks,
-) {
+    go_on: &mut impl FnMut() -> bool,
+) -> bool {
     let [a, b] = [(a, false), (b, true)].map(|(leaf, is_b)| Leaf::new(leaf, is_b, at));
     let size = a.side.radius().min(b.side.radius());
     // Rounding is a share of all, not of the smaller one.
     let rounding_m = 4.0 * at.slop;
     let better_m = rounding_m.max(BETTER * size);
-    let Chosen { normal, base, top } = choose(&a, &b, &found.closest, better_m, walks);
+    let Some(chosen) = choose(&a, &b, &found.closest, better_m, (walks, go_on)) else {
+        return false;
+    };
+    let Chosen { normal, base, top } = chosen;
     let patch = match base {
         Base::B => b.patch(),
         _ if a.mesh().is_some() => a.patch(),
@@ -135,10 +153,12 @@ pub(super) fn points(
             let (point_a, point_b) = if base_is_b { (of, on) } else { (on, of) };
             put(point_a, point_b, feature);
         };
-        corners((on, of), &normal, top, prediction_m, walks, take);
+        if !corners((on, of), &normal, top, prediction_m, (walks, go_on), take) {
+            return false;
+        }
     }
     if any {
-        return;
+        return true;
     }
     let patch = if base == Base::Own {
         patch
@@ -146,6 +166,7 @@ pub(super) fn points(
         LeafContact::SPARE
     };
     patches.add(arena, &nearest(&a, &b, normal, patch, found));
+    true
 }
 
 /// Where the leaves themselves meet, straight across along a normal.
@@ -188,8 +209,14 @@ struct Chosen {
     top: Option<(u32, f64)>,
 }
 
-/// The normal, A to B, along which the two surfaces overlap least.
-fn choose(a: &Leaf<'_>, b: &Leaf<'_>, found: &Closest, better_m: f64, walks: &mut Walks) -> Chosen {
+/// The normal, A to B, along which the two surfaces overlap least; `None`: the meter has closed.
+fn choose(
+    a: &Leaf<'_>,
+    b: &Leaf<'_>,
+    found: &Closest,
+    better_m: f64,
+    (walks, go_on): (&mut Walks, &mut impl FnMut() -> bool),
+) -> Option<Chosen> {
     let (normal_a, normal_b) = (a.normal, b.normal);
     let (mut best_m, mut best) = (
         f64::INFINITY,
@@ -208,9 +235,11 @@ fn choose(a: &Leaf<'_>, b: &Leaf<'_>, found: &Closest, better_m: f64, walks: &mu
         let ways = if mesh.is_solid() { 1 } else { 2 };
         for outward in [outward, -outward].into_iter().take(ways) {
             let height = outward.dot(&plane.coords);
-            let Some((reach, top)) = other.reach(&-outward, best_m - height, walks) else {
-                continue;
-            };
+            let reach = other.reach(&-outward, best_m - height, (walks, go_on));
+            if !go_on() {
+                return None;
+            }
+            let Some((reach, top)) = reach else { continue };
             if height + reach < best_m - better_m {
                 let normal = if base == Base::A { outward } else { -outward };
                 best_m = height + reach;
@@ -226,17 +255,20 @@ fn choose(a: &Leaf<'_>, b: &Leaf<'_>, found: &Closest, better_m: f64, walks: &mu
         along.abs() >= FACE || (solid && along < INWARD)
     };
     if !known(normal_a, own, a) && !known(normal_b, -own, b) {
-        let reach = a.own_reach(&own, best_m - b.least_reach(&-own), walks);
-        let whole = reach.and_then(|r| Some(r + b.own_reach(&-own, best_m - r, walks)?));
+        let reach = a.own_reach(&own, best_m - b.least_reach(&-own), (walks, go_on));
+        let whole = reach.and_then(|r| Some(r + b.own_reach(&-own, best_m - r, (walks, go_on))?));
+        if !go_on() {
+            return None;
+        }
         if whole.is_some_and(|depth| depth < best_m - better_m) {
-            return Chosen {
+            return Some(Chosen {
                 normal: own,
                 base: Base::Own,
                 top: None,
-            };
+            });
         }
     }
-    best
+    Some(best)
 }
 
 /// The points that two leaves share.
@@ -275,17 +307,18 @@ fn feature_of(a: &Leaf<'_>, b: &Leaf<'_>, feature: u32, base_is_b: bool) -> u64 
 }
 
 /// Corners of `of` behind the surface about `on`, and `top`, the one that lies deepest: a triangle that pokes through
-/// the surface has its corners over other triangles than the one that it crosses.
+/// the surface has its corners over other triangles than the one that it crosses. Whether all were asked before the
+/// meter closed.
 fn corners(
     (on, of): (&Leaf<'_>, &Leaf<'_>),
     normal: &Vec3,
     top: Option<u32>,
     prediction_m: f64,
-    walks: &mut Walks,
+    (walks, go_on): (&mut Walks, &mut impl FnMut() -> bool),
     mut take: impl FnMut(Point, Point, u64),
-) {
+) -> bool {
     let (Some(surface), Some(mesh)) = (on.mesh(), of.mesh()) else {
-        return;
+        return true;
     };
     let outward = if on.is_b { -normal } else { *normal };
     let plane = on.corners[0];
@@ -302,7 +335,10 @@ fn corners(
             Some((Some(face), _)) => face,
             _ => on.place,
         };
-        let found = surface.beneath(from, &there, &own);
+        let found = surface.beneath(from, &there, &own, &mut *go_on);
+        if !go_on() {
+            return false;
+        }
         feet.note(vertex, &own, found.map(|(_, face)| face));
         let Some((beneath, _)) = found else { continue };
         let beneath = on.in_a(&beneath);
@@ -310,6 +346,7 @@ fn corners(
             take(beneath, point, corner_name(vertex, of.is_b));
         }
     }
+    true
 }
 
 /// The middle of what two triangles share where they cross.

@@ -244,7 +244,7 @@ pub(super) fn ball(n: u32, bump: f64) -> Mesh {
 }
 
 /// A sheet of `n` by `n` squares of side 1 in z = 0, each of two triangles.
-fn sheet(n: u32) -> Mesh {
+pub(super) fn sheet(n: u32) -> Mesh {
     let at = |i: u32, j: u32| Point::new(f64::from(i), f64::from(j), 0.0);
     let vertices = (0..=n).flat_map(|i| (0..=n).map(move |j| at(i, j)));
     let square = |i: u32, j: u32| {
@@ -253,57 +253,6 @@ fn sheet(n: u32) -> Mesh {
     };
     let faces = (0..n).flat_map(|i| (0..n).flat_map(move |j| square(i, j)));
     Mesh::new(vertices.collect(), faces.collect(), Some(false)).unwrap()
-}
-
-#[test]
-fn a_climb_over_a_convex_surface_ends_at_its_outermost_vertex() {
-    let mut random = crate::builtin::Random::new(5);
-    let mut unit = || random.unit() * 2.0 - 1.0;
-    let points: Vec<Point> = (0..200)
-        .map(|_| Point::from(Vec3::new(unit(), unit(), unit()).normalize()))
-        .collect();
-    let (vertices, faces) = parry3d_f64::transformation::convex_hull(
-        &points
-            .iter()
-            .map(|p| parry3d_f64::math::Vector::new(p.x, p.y, p.z))
-            .collect::<Vec<_>>(),
-    );
-    let vertices = vertices.iter().map(|v| Point::new(v.x, v.y, v.z)).collect();
-    let mesh = Mesh::new(vertices, faces, None).unwrap();
-    let count = u32::try_from(mesh.faces().len()).unwrap();
-    // What earlier climbs have come to, other directions' too, shortens the way and leads nowhere else.
-    let mut trails = Trails::default();
-    for _ in 0..200 {
-        let direction = Vec3::new(unit(), unit(), unit()).normalize();
-        let height = |v: u32| direction.dot(&mesh.vertices()[v as usize].coords);
-        let highest = (0..200).map(height).fold(f64::NEG_INFINITY, f64::max);
-        for face in 0..count {
-            let mut climb = |beyond_m| mesh.climb(face, &direction, beyond_m, &mut trails);
-            let top = climb(f64::INFINITY).unwrap();
-            assert!(height(top) >= highest - 1e-9, "from {face}");
-            assert_eq!(climb(highest - 0.01), None);
-        }
-    }
-}
-
-#[test]
-fn a_walk_comes_to_the_place_beneath_a_point_unless_it_is_far() {
-    let mesh = sheet(40);
-    let beneath = |x: f64, y: f64| mesh.beneath(0, &Point::new(x, y, 3.0), &Vec3::z());
-    for (x, y) in [(0.5, 0.2), (3.25, 7.5), (14.5, 0.25), (8.5, 8.25)] {
-        let (there, face) = beneath(x, y).unwrap();
-        assert_eq!(
-            mesh.beneath(face, &Point::new(x, y, 3.0), &Vec3::z()),
-            Some((there, face))
-        );
-        assert!((there - Point::new(x, y, 0.0)).norm() < 1e-12, "{there}");
-    }
-    // Beyond the faces that a walk passes, and beyond the border.
-    assert_eq!(beneath(39.5, 38.5), None);
-    assert_eq!(beneath(-1.0, 2.0), None);
-    // Nor along a direction that the sheet leans from by more than a walk goes on.
-    let flat = Vec3::new(1.0, 0.0, 0.1).normalize();
-    assert_eq!(mesh.beneath(0, &Point::new(5.0, 5.0, 0.5), &flat), None);
 }
 
 /// Where a vertex has its neighbours listed they are those that one comes by face by face; on a border, and where two

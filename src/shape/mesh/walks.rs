@@ -18,6 +18,8 @@ const WALK_MAX: u32 = 48;
 const GLANCE: u32 = 8;
 /// ... and where it would need so many times what is left at that rate, it is given up: two in three end nowhere.
 const TOO_FAR: f64 = 1.5;
+/// Steps of a walk between two questions whether it is to go on: out of cold memory each takes half a microsecond.
+const STEPS_PER_ASK: u32 = 4;
 /// A face that leans further from the direction of a walk (cosine) is not walked onto.
 const LEAN: f64 = 0.3;
 /// The ends of an edge that lies across a direction differ in height by less than this share of the face's.
@@ -40,13 +42,15 @@ impl Mesh {
     ///
     /// * `beyond_m` - a place that reaches farther, along `direction` from the origin, is of no interest.
     /// * `trails` - of climbs over this mesh: where one came by, this one goes on from its end, if that is higher.
-    /// * returns - the vertex; `None` where the climb leads beyond, or does not end within 48 corners.
+    /// * `go_on` - asked every few corners. A climb that is left off goes on by its own trail when it is begun again.
+    /// * returns - the vertex; `None` where the climb leads beyond, does not end within 48 corners, or is left off.
     pub(crate) fn climb(
         &self,
         face: u32,
         direction: &Vec3,
         beyond_m: f64,
         trails: &mut Trails<Climb>,
+        mut go_on: impl FnMut() -> bool,
     ) -> Option<u32> {
         let height = |vertex: u32| direction.dot(&self.vertices[vertex as usize].coords);
         let corners = self.faces[face as usize].map(|vertex| (height(vertex), vertex));
@@ -57,6 +61,9 @@ impl Mesh {
         let mut hops = 0;
         let top = loop {
             if best.0 > beyond_m || hops >= HOPS_MAX {
+                break None;
+            }
+            if hops % STEPS_PER_ASK == STEPS_PER_ASK - 1 && !go_on() {
                 break None;
             }
             let vertex = best.1;
@@ -191,13 +198,15 @@ impl Mesh {
     /// The place of the surface that a point lies over, looking along `direction`: from `face` on, over its neighbours.
     ///
     /// * `direction` - unit, outward where the mesh is a solid.
-    /// * returns - the place, and its face; `None` where the surface ends or turns away on the way there, or it is more
-    ///   than 48 faces off.
+    /// * `go_on` - asked every few faces.
+    /// * returns - the place, and its face; `None` where the surface ends or turns away on the way there, it is more
+    ///   than 48 faces off, or the walk is left off.
     pub(crate) fn beneath(
         &self,
         mut face: u32,
         point: &Point,
         direction: &Vec3,
+        mut go_on: impl FnMut() -> bool,
     ) -> Option<(Point, u32)> {
         let same = SAME * self.radius;
         let mut first_m = 0.0;
@@ -213,6 +222,9 @@ impl Mesh {
             if out <= same {
                 let lift = normal.dot(&(point - corners[0])) / rise;
                 return Some((point - direction * lift, face));
+            }
+            if step % STEPS_PER_ASK == STEPS_PER_ASK - 1 && !go_on() {
+                return None;
             }
             match step {
                 0 => first_m = out,
@@ -267,3 +279,6 @@ fn farthest_side(corners: &[Point; 3], point: &Point, direction: &Vec3, sign: f6
     let (k, square) = sides.fold((0, f64::NEG_INFINITY), farther);
     (k, square.abs().sqrt().copysign(square))
 }
+
+#[cfg(test)]
+mod tests;

@@ -21,6 +21,10 @@ pub(super) struct Known {
     pub(super) sought: bool,
     /// Bounds of the wholes at this pose, when they were asked for.
     pub(super) floor_m: f64,
+    /// The search for contact points that is going on, by its number.
+    pub(super) walks: Option<u64>,
+    /// Times that the points of the last leaves were cut off.
+    pub(super) cuts: u32,
 }
 
 impl Default for Known {
@@ -34,6 +38,8 @@ impl Default for Known {
             asked_last: false,
             sought: false,
             floor_m: f64::NEG_INFINITY,
+            walks: None,
+            cuts: 0,
         }
     }
 }

@@ -7,21 +7,21 @@ use crate::math::Interval;
 use crate::narrow::exact::Closest;
 use crate::narrow::mesh::{manifold, side};
 use crate::shape::{Held, Obb};
+use crate::time::Meter;
 
 /// What two leaves cost, in tests of a box against a pack, which say when the clock is to be read again: a proof that
 /// they are apart, ...
 const PROOF_COST: u64 = 4;
-/// ... their distance, ...
+/// ... and their distance. Contact points look at the clock themselves.
 pub(super) const LEAF_COST: u64 = 16;
-/// ... and contact points.
-const POINTS_COST: u64 = 128;
+/// So often the points of two leaves are cut off in a row; in the end they are asked for whatever it takes.
+const CUTS_MAX: u32 = 8;
 
 impl CarriedFront {
     /// Queries two leaves.
     ///
     /// * `known_m` - a bound on their gap that holds at this pose.
     /// * `exact` - their distance is wanted; else any proof that they are apart will do.
-    /// * returns - what it cost, in tests of a box against a pack.
     pub(super) fn leaves(
         &mut self,
         store: &mut FrontStore,
@@ -29,9 +29,10 @@ impl CarriedFront {
         (a, b): (Side<'_>, Side<'_>),
         known_m: f64,
         exact: bool,
-    ) -> u64 {
+        meter: &mut Meter<'_>,
+    ) {
         let (Held::Triangle(i), Held::Triangle(j)) = (a.held(id_a), b.held(id_b)) else {
-            return PROOF_COST;
+            return meter.charge_weighted(1, PROOF_COST);
         };
         let (leaf_a, leaf_b) = ((a, i), (b, j));
         // Once the pair touches, only what touches too is of interest.
@@ -42,7 +43,7 @@ impl CarriedFront {
             Err(gap) => {
                 // Farther than the nearest known: that is proof enough.
                 self.keep_leaf(store, id_a, id_b, gap.max(known_m));
-                return PROOF_COST;
+                return meter.charge_weighted(1, PROOF_COST);
             }
         };
         let low = closest.gap.min.max(known_m);
@@ -56,9 +57,9 @@ impl CarriedFront {
                 (self.last, self.witness) = (Some((id_a, id_b)), Some(contact));
             }
             self.keep_leaf(store, id_a, id_b, low);
-            return LEAF_COST;
+            return meter.charge_weighted(1, LEAF_COST);
         }
-        let mut cost = LEAF_COST;
+        let mut whole = true;
         // Certified, or zero within its rounding: touching collides.
         if closest.gap.max <= 8.0 * self.at.slop || closest.finished {
             let deeper = |w: &LeafContact| closest.best_m < w.closest.best_m;
@@ -69,10 +70,13 @@ impl CarriedFront {
             }
             self.known.touches = true;
             if self.known.points_wanted {
-                cost += POINTS_COST;
                 let patches = (&mut self.contacts, &mut store.contacts);
                 let walks = &mut store.walks;
-                manifold::points(leaf_a, leaf_b, &self.at, &contact, patches, walks);
+                let patient = self.known.cuts >= CUTS_MAX;
+                let mut go_on = || meter.refresh() || patient;
+                whole = manifold::points(
+                    leaf_a, leaf_b, &self.at, &contact, patches, walks, &mut go_on,
+                );
             }
         } else {
             self.known.blurred = true;
@@ -82,9 +86,16 @@ impl CarriedFront {
             a: id_a,
             b: id_b,
         };
-        let kept = store.open.push(&mut self.touching, touching);
-        self.note_room(kept);
-        cost
+        if whole {
+            self.known.cuts = 0;
+            let kept = store.open.push(&mut self.touching, touching);
+            self.note_room(kept);
+        } else {
+            // It is to be asked for its points again.
+            self.known.cuts += 1;
+            self.look_into(store, touching);
+        }
+        meter.charge_dear(1);
     }
 
     /// The upper bound on the gap that a query of two leaves proves, metres.

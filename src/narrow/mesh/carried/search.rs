@@ -82,8 +82,8 @@ impl CarriedFront {
     ) {
         let child = match (a.held(open.a), b.held(open.b)) {
             (Held::Triangle(held_a), Held::Triangle(held_b)) => {
-                let cost = self.leaves(store, (open.a, open.b), (a, b), f64::NEG_INFINITY, exact);
-                meter.charge_weighted(1, cost);
+                let places = (open.a, open.b);
+                self.leaves(store, places, (a, b), f64::NEG_INFINITY, exact, meter);
                 if !exact && !self.known.touches {
                     self.seek([held_a, held_b], (a, b), meter);
                 }
@@ -239,8 +239,7 @@ impl CarriedFront {
     ) {
         if group.leaf {
             let pair = group.pair(group.mask.trailing_zeros());
-            let cost = self.leaves(store, pair, sides, f64::NEG_INFINITY, exact);
-            meter.charge_weighted(1, cost);
+            self.leaves(store, pair, sides, f64::NEG_INFINITY, exact, meter);
         } else {
             self.test(store, group, sides, f64::NEG_INFINITY);
             meter.charge(1);
@@ -261,9 +260,7 @@ impl CarriedFront {
         let known_m = self.drift.left_m(group.expiry_m);
         if group.leaf {
             let pair = group.pair(group.mask.trailing_zeros());
-            let cost = self.leaves(store, pair, sides, known_m, true);
-            meter.charge_weighted(1, cost);
-            return;
+            return self.leaves(store, pair, sides, known_m, true, meter);
         }
         let mut gaps = self.gaps(&group, sides);
         for gap in &mut gaps {
@@ -293,8 +290,8 @@ impl CarriedFront {
         let known_m = gaps[nearest as usize];
         match (sides.0.held(id_a), sides.1.held(id_b)) {
             (Held::Triangle(_), Held::Triangle(_)) => {
-                let cost = self.leaves(store, (id_a, id_b), sides, known_m, true);
-                meter.charge_weighted(2, cost);
+                self.leaves(store, (id_a, id_b), sides, known_m, true, meter);
+                meter.charge(1);
             }
             (held_a, held_b) => {
                 let child = self.children((id_a, held_a), (id_b, held_b), sides);

@@ -71,19 +71,19 @@ impl<'a> Leaf<'a> {
     }
 
     /// How far the surface about this leaf reaches along a direction, from A's origin, and the vertex of a mesh there;
-    /// `None`: beyond `beyond_m`.
+    /// `None`: beyond `beyond_m`, or the walk was left off.
     pub(super) fn reach(
         &self,
         direction: &Vec3,
         beyond_m: f64,
-        walks: &mut Walks,
+        (walks, go_on): (&mut Walks, &mut impl FnMut() -> bool),
     ) -> Option<(f64, Option<u32>)> {
         let (own, offset) = (self.turn(direction), self.offset(direction));
         let (height, top) = match self.side {
             Side::Convex(convex) => (own.dot(&convex.support(&own).coords), None),
             Side::Mesh(mesh) => {
                 let trails = walks.tops(self.is_b);
-                let top = mesh.climb(self.place, &own, beyond_m - offset, trails)?;
+                let top = mesh.climb(self.place, &own, beyond_m - offset, trails, go_on)?;
                 (own.dot(&mesh.vertices()[top as usize].coords), Some(top))
             }
         };
@@ -96,12 +96,12 @@ impl<'a> Leaf<'a> {
         &self,
         direction: &Vec3,
         beyond_m: f64,
-        walks: &mut Walks,
+        (walks, go_on): (&mut Walks, &mut impl FnMut() -> bool),
     ) -> Option<f64> {
         let crest = (self.mesh()).and_then(|mesh| mesh.crest(self.place, &self.turn(direction)));
         match crest {
             Some(height) => Some(height + self.offset(direction)),
-            None => (self.reach(direction, beyond_m, walks)).map(|(height, _)| height),
+            None => (self.reach(direction, beyond_m, (walks, go_on))).map(|(height, _)| height),
         }
     }
 

@@ -1,0 +1,89 @@
+//! Contact points that are cut off in the middle of a leaf's: those of a search that nobody cuts off.
+
+use crate::oracle::meshes;
+use crate::oracle::rng::Rng;
+use crate::support::{CASES, KINDS, any_mesh, place, shape};
+use sweepd::math::{Pose, relative};
+use sweepd::narrow::mesh::{CarriedFront, FrontStore, Goal, LeafContact, Search};
+use sweepd::shape::Shape;
+use sweepd::time::{Clock, ManualClock, Meter};
+
+/// What is told of a pair, and in how many turns.
+struct Told {
+    covered: Option<Vec<(u32, u32)>>,
+    points: Vec<[u64; 7]>,
+    least_m: f64,
+    turns: u64,
+}
+
+fn bits(point: &LeafContact) -> [u64; 7] {
+    let closest = &point.closest;
+    let [a, b] = [&closest.point_a, &closest.point_b].map(|p| p.coords.map(f64::to_bits));
+    [a.x, a.y, a.z, b.x, b.y, b.z, point.feature]
+}
+
+/// The contact set of a pair, in turns that end when the clock was read `reads` times; 0: in one.
+fn contacts(a: &Shape, b: &Shape, pos12: &Pose, reads: u64) -> Told {
+    let clock = ManualClock::new(0);
+    clock.step_each_read(1);
+    let (mut store, mut front) = (FrontStore::default(), CarriedFront::default());
+    front.start(&mut store, a, b, pos12, Search::Carried);
+    let mut turns = 0;
+    loop {
+        turns += 1;
+        let deadline_ns = (reads > 0).then(|| clock.monotonic_ns() + 2 + reads);
+        let mut meter = Meter::new(&clock, deadline_ns, None);
+        if front.advance(&mut store, a, b, Goal::Contacts, u64::MAX, &mut meter) {
+            break;
+        }
+        assert!(turns < 1_000_000, "comes to no end");
+    }
+    Told {
+        covered: front.covered(&store, a, b),
+        points: front.contacts(&store).iter().map(bits).collect(),
+        least_m: (front.contacts(&store).iter())
+            .map(|c| c.closest.best_m)
+            .fold(f64::INFINITY, f64::min),
+        turns,
+    }
+}
+
+#[test]
+fn contact_sets_in_pieces_are_those_of_a_search_at_once() {
+    let (mut cut, mut other) = (0, 0);
+    for case in 0..CASES {
+        let mut rng = Rng::new(31_000_000 + case);
+        let (kind_a, kind_b) = (rng.below(KINDS), rng.below(KINDS));
+        let ((a, _), (b, _)) = (any_mesh(&mut rng, kind_a), any_mesh(&mut rng, kind_b));
+        let (pose_a, pose_b) = place(&mut rng, &a, &b, usize::try_from(case % 3).unwrap());
+        let pos12 = relative(&pose_a, &pose_b);
+        let (whole, pieces) = (
+            contacts(&a, &b, &pos12, 0),
+            contacts(&a, &b, &pos12, 8 + case % 5),
+        );
+        assert!(whole.covered == pieces.covered, "case {case}");
+        assert_eq!(whole.least_m, pieces.least_m, "case {case}");
+        // A walk that begins again may come by another trail: then it ends at another place that reaches as far.
+        other += u64::from(whole.points != pieces.points);
+        cut += u64::from(!whole.points.is_empty() && pieces.turns > 4);
+    }
+    assert!(cut > CASES / 8, "{cut}");
+    assert!(100 * other <= CASES, "{other}");
+}
+
+#[test]
+fn long_walks_are_cut_off_and_gone_on_with() {
+    let a = shape(&meshes::bumpy_sphere(40, 50, 0.1), None);
+    let b = shape(&meshes::torus(1.0, 0.3, 40, 30), None);
+    for shift in [0.35, 0.7, 1.0] {
+        let pos12 = Pose::translation(shift, 0.1, 0.2);
+        let whole = contacts(&a, &b, &pos12, 0);
+        let pieces = contacts(&a, &b, &pos12, 6);
+        assert!(
+            !whole.points.is_empty() && pieces.turns > 100,
+            "{shift}: {} turns",
+            pieces.turns
+        );
+        assert!(whole.points == pieces.points, "{shift}");
+    }
+}
