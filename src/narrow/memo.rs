@@ -73,6 +73,8 @@ pub(super) struct Memo {
     pub(super) witness: Option<Witness>,
     /// Where the next query starts from.
     pub(super) warm: Warm,
+    /// What the last query of a pair that takes one took, nanoseconds.
+    pub(super) query_ns: u32,
     /// Tick of the poses the contacts belong to.
     pub(super) contacts_tick: u64,
     pub(super) active_at: u32,
@@ -127,6 +129,7 @@ impl Memo {
             born: 0,
             witness: None,
             warm: Warm::default(),
+            query_ns: 0,
             contacts_tick: 0,
             active_at: NONE,
             cursor: NONE,

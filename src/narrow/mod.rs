@@ -55,7 +55,7 @@ use arena::Arena;
 use cursor::Cursor;
 use memo::{Hot, Memo};
 use mesh::{CarriedFront, FrontStore, Search};
-use order::Urgency;
+use order::{RankCost, Urgency};
 use pool::{NONE, Pool};
 use refit::Refits;
 use sweep::Sweeps;
@@ -111,6 +111,7 @@ pub struct Narrow {
     urgencies: Vec<Urgency>,
     /// Work with its ranks, while it is ordered.
     keyed: Vec<(u64, PairSlot)>,
+    rank_cost: RankCost,
     /// Contacts of the query at hand.
     found: Vec<Contact>,
     /// The contacts that a set had before, while ids are handed on.

@@ -50,11 +50,42 @@ const BATCH: usize = 128;
 /// Parts that a list can be in while the front of it is put in order: each is at least a quarter of the one around it.
 const PARTS_MAX: usize = 64;
 
-/// What it takes at most to rank a pair and to part the list a first time, nanoseconds (measured: 4 to 10).
-pub(super) const RANK_NS: u64 = 16;
+/// What it takes to rank a pair and to part the list a first time, nanoseconds: learned from list to list, and never
+/// believed to be less than it is on a good day (measured: 4 to 10 without a viewpoint; with one two bodies are looked
+/// up and an angle is taken), nor more than so many times as much: that was something else.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RankCost {
+    /// Without a viewpoint, and with one.
+    ns: [u64; 2],
+}
 
-/// The same where the scene has a viewpoint: two bodies are looked up and an angle is taken.
-pub(super) const RANK_SEEN_NS: u64 = 160;
+const RANK_NS: [u64; 2] = [16, 160];
+const RANK_TIMES_MAX: u64 = 8;
+/// Lists of fewer pairs teach nothing: what is read once counts for more than the pairs.
+const RANK_LEARN_MIN: usize = 256;
+
+impl Default for RankCost {
+    fn default() -> Self {
+        Self { ns: RANK_NS }
+    }
+}
+
+impl RankCost {
+    /// Of a list of so many pairs, nanoseconds.
+    pub(super) fn of(&self, pairs: usize, gaze: bool) -> u64 {
+        pairs as u64 * self.ns[usize::from(gaze)]
+    }
+
+    fn learn(&mut self, took_ns: u64, pairs: usize, gaze: bool) {
+        if took_ns == 0 || pairs < RANK_LEARN_MIN {
+            return;
+        }
+        let at = usize::from(gaze);
+        let (least, now) = (RANK_NS[at], self.ns[at]);
+        let each_ns = (took_ns / pairs as u64).max(now - now.div_ceil(32));
+        self.ns[at] = each_ns.clamp(least, RANK_TIMES_MAX * least);
+    }
+}
 
 /// The fastest approach counts as this many times the age: what comes nearer by much more than its size since it was
 /// last asked is up to four times as urgent as what does not.
@@ -195,13 +226,14 @@ impl Line {
 }
 
 impl Narrow {
-    /// Begins a list of work: gathers the ranks, orders nothing yet.
+    /// Begins a list of work: gathers the ranks, and puts the first batch in order.
     pub(super) fn line_up(
         &mut self,
         work: &[PairSlot],
         order: Order,
         world: &World,
         gaze: Option<Gaze>,
+        meter: &mut Meter<'_>,
     ) -> Line {
         self.keyed.clear();
         if order != Order::AsFound {
@@ -220,19 +252,25 @@ impl Narrow {
                 })),
             }
         }
-        Line::new(order, work.len())
+        let mut line = Line::new(order, work.len());
+        let took_ns = self.order_next(&mut line, 0, world, meter);
+        if order != Order::AsFound {
+            (self.rank_cost).learn(took_ns, work.len(), gaze.is_some());
+        }
+        line
     }
 
-    /// Puts the next batch in order when the work has come as far as the last.
+    /// Puts the next batch in order when the work has come as far as the last; returns what it took since the clock was
+    /// last read.
     pub(super) fn order_next(
         &mut self,
         line: &mut Line,
         at: usize,
         world: &World,
         meter: &mut Meter<'_>,
-    ) {
+    ) -> u64 {
         if at < line.ready {
-            return;
+            return 0;
         }
         let Self { keyed, hot, .. } = self;
         match line.order {
@@ -244,7 +282,7 @@ impl Narrow {
                 (rank, id(hot.a), id(hot.b))
             }),
         }
-        meter.refresh();
+        meter.charge_dear(0)
     }
 }
 

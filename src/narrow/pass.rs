@@ -7,7 +7,7 @@ use crate::time::Meter;
 use crate::world::{AHEAD, World};
 
 use super::Narrow;
-use super::order::{Order, RANK_NS, RANK_SEEN_NS};
+use super::order::Order;
 
 /// One pass over a list of work.
 pub(super) struct Pass<'a, Idle> {
@@ -32,16 +32,11 @@ impl Narrow {
             return work;
         }
         let gaze = world.gaze();
-        let rank_ns = if gaze.is_some() {
-            RANK_SEEN_NS
-        } else {
-            RANK_NS
-        };
         // To rank them all takes a while too. Where nothing could be done in what is left then, they come as they
         // stand: by the last ranking, then the new ones.
-        let ranked = meter.has_ns(work.len() as u64 * rank_ns);
+        let ranked = meter.has_ns(self.rank_cost.of(work.len(), gaze.is_some()));
         let order = if ranked { order } else { Order::AsFound };
-        let mut line = self.line_up(&work, order, world, gaze);
+        let mut line = self.line_up(&work, order, world, gaze, meter);
         while !work.is_empty() && meter.open() {
             let (mut at, mut left) = (0, 0);
             while at < work.len() {

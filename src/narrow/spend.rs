@@ -15,6 +15,9 @@ use super::pass::Pass;
 use super::query::{add_manifold, is_simple, retest, shape_gap, shape_pose, sound, witness_of};
 use super::{NONE, Narrow, Wanted};
 
+/// What a query is expected to take at most, nanoseconds: what takes longer was held up.
+const QUERY_NS_MAX: u64 = 100_000;
+
 /// What a query found, and when and where it holds.
 struct Answer {
     gap: Interval,
@@ -118,21 +121,31 @@ impl Narrow {
         bounds && (!contacts || !colliding || memo.contacts_tick >= memo.tested)
     }
 
-    /// One turn of work on a pair; whether nothing is left to do for `goal`.
+    /// One turn of work on a pair; whether nothing is left to do for `goal`. Where a query would take longer than what
+    /// is left, the meter closes.
     fn work(&mut self, slot: PairSlot, goal: Goal, world: &World, meter: &mut Meter<'_>) -> bool {
         let hot = self.hot[slot.index()];
         let (Some(a), Some(b)) = (world.body(hot.a), world.body(hot.b)) else {
             return true;
         };
+        let simple = match (&*a.shapes, &*b.shapes) {
+            ([one], [other]) => is_simple(&one.shape, &other.shape),
+            _ => false,
+        };
+        let query_ns = &mut self.memos[slot.index()].query_ns;
+        if simple && !meter.begins(u64::from(*query_ns)) {
+            // What took long once, for whatever reason, is not put off for ever.
+            *query_ns -= *query_ns / 8;
+            return false;
+        }
         self.urgencies[slot.index()].note_turn(self.tick);
         let turns = &mut self.memos[slot.index()].turns;
         *turns = turns.wrapping_add(1);
         let mut open = false;
-        if let ([one], [other]) = (&*a.shapes, &*b.shapes)
-            && is_simple(&one.shape, &other.shape)
-        {
+        if simple {
             self.query_once(slot, (a, b), goal);
-            meter.charge_dear(1);
+            let took_ns = meter.charge_dear(1).min(QUERY_NS_MAX);
+            self.memos[slot.index()].query_ns = u32::try_from(took_ns).unwrap_or(u32::MAX);
         } else if let ([one], [other]) = (&*a.shapes, &*b.shapes)
             && has_front(&one.shape, &other.shape)
         {

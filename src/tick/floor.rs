@@ -62,7 +62,7 @@ impl Laps {
     }
 }
 
-/// When the narrow phase of a tick began, on the wall and by the thread's CPU clock.
+/// When work that is to end in time began, on the wall and by the thread's CPU clock.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Began {
     wall_ns: u64,
@@ -75,6 +75,27 @@ impl Began {
             wall_ns: clock.monotonic_ns(),
             cpu_ns: clock.thread_cpu_ns(),
         }
+    }
+
+    pub(super) fn wall_ns(&self) -> u64 {
+        self.wall_ns
+    }
+
+    /// What was left until a moment when it began.
+    pub(super) fn left_ns(&self, end_ns: u64) -> u64 {
+        end_ns.saturating_sub(self.wall_ns)
+    }
+
+    /// By how much this thread has passed a deadline: what was late before it began is not its doing, and what others
+    /// had of its core neither.
+    pub(super) fn passed_ns(&self, deadline_ns: u64, clock: &dyn Clock) -> u64 {
+        let now_ns = clock.monotonic_ns();
+        let late_ns = now_ns.saturating_sub(deadline_ns.max(self.wall_ns));
+        if late_ns == 0 {
+            return 0;
+        }
+        let cpu_ns = clock.thread_cpu_ns().saturating_sub(self.cpu_ns);
+        late_ns.saturating_sub((now_ns - self.wall_ns).saturating_sub(cpu_ns))
     }
 }
 
@@ -139,7 +160,7 @@ impl Floor {
     /// Time to keep back for publishing and sending, of `left_ns` until the tick's end.
     pub(super) fn reserve_ns(&self, left_ns: u64) -> u64 {
         let certain_ns = self.recent_ns + self.send_ns + CLOSING_NS;
-        let rest_ns = left_ns.saturating_sub(self.median_ns + self.send_ns + CLOSING_NS);
+        let rest_ns = left_ns.saturating_sub(self.usual_ns() + CLOSING_NS);
         let longest_ns = self.maxima_ns.iter().copied().max().unwrap_or(0);
         let worse_ns = longest_ns + longest_ns / 4;
         let safe_ns = (self.median_ns + rest_ns / 4 * SAFETY_QUARTERS).min(worse_ns);
@@ -156,17 +177,14 @@ impl Floor {
         self.send_ns = decayed(self.send_ns).max(send_ns);
     }
 
-    /// The narrow phase was to end at `deadline_ns`, and did now.
-    ///
-    /// * `began` - when it began: what was late before is not its doing, and what others had of its core neither.
-    pub(super) fn note_narrowed(&mut self, began: Began, deadline_ns: u64, clock: &dyn Clock) {
-        let now_ns = clock.monotonic_ns();
-        let late_ns = now_ns.saturating_sub(deadline_ns.max(began.wall_ns));
-        if late_ns > 0 {
-            let cpu_ns = clock.thread_cpu_ns().saturating_sub(began.cpu_ns);
-            let others_ns = (now_ns - began.wall_ns).saturating_sub(cpu_ns);
-            self.late_ns = late_ns.saturating_sub(others_ns);
-        }
+    /// By how much the narrow phase passed its deadline in this tick.
+    pub(super) fn note_late(&mut self, late_ns: u64) {
+        self.late_ns = late_ns;
+    }
+
+    /// What publishing and sending mostly take.
+    pub(super) fn usual_ns(&self) -> u64 {
+        self.median_ns + self.send_ns
     }
 
     fn note_ending(&mut self, ending_ns: u64) {
@@ -244,16 +262,15 @@ mod tests {
     }
 
     #[test]
-    fn what_the_narrow_phase_passes_its_deadline_by_is_kept_back_and_what_was_late_before_is_not() {
+    fn a_deadline_is_passed_by_what_this_thread_did_and_not_by_what_was_late_before_or_others_had()
+    {
         let late_us = |began_us: u64, deadline_us: u64, ran_us: u64, others_us: u64| {
             let clock = ManualClock::new(1_000 * began_us);
             let mut began = Began::now(&clock);
             clock.advance(1_000 * (ran_us + others_us));
             // The clock by hand knows of no others: the thread had run for so much longer before.
             began.cpu_ns += 1_000 * others_us;
-            let mut floor = Floor::default();
-            floor.note_narrowed(began, 1_000 * deadline_us, &clock);
-            floor.late_ns / 1_000
+            began.passed_ns(1_000 * deadline_us, &clock) / 1_000
         };
         assert_eq!(late_us(100, 200, 130, 0), 30);
         assert_eq!(late_us(100, 200, 80, 0), 0);

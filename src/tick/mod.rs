@@ -283,7 +283,11 @@ impl Engine {
         let done = self.narrow.spend(&mut self.world, wanted, &mut meter);
         let units = meter.spent();
         if let Some((began, deadline_ns)) = began.zip(deadline_ns) {
-            (self.floor).note_narrowed(began, deadline_ns, self.clock.as_ref());
+            let late_ns = began.passed_ns(deadline_ns, self.clock.as_ref());
+            self.floor.note_late(late_ns);
+            let above_ns = end_ns.map_or(0, |end_ns| began.left_ns(end_ns));
+            self.rest
+                .leave(above_ns.saturating_sub(self.floor.usual_ns()));
         }
         let open = end_ns.filter(|_| !done && budget.units.is_none());
         self.rest.open = open.map(|end_ns| (wanted, end_ns));

@@ -12,7 +12,7 @@
 use crate::ids::PairSlot;
 use crate::limits::REGIONS_PER_PAIR_MAX;
 use crate::math::Pose;
-use crate::narrow::order::{Line, RANK_SEEN_NS};
+use crate::narrow::order::Line;
 use crate::narrow::{NONE, Narrow, Order, Wanted};
 use crate::time::{Meter, Reserve};
 use crate::wire::Verdict;
@@ -92,7 +92,7 @@ impl Narrow {
         wanted: Wanted,
         meter: &mut Meter<'_>,
     ) {
-        let ranked_ns = self.active.len() as u64 * RANK_SEEN_NS;
+        let ranked_ns = self.rank_cost.of(self.active.len(), true);
         if !wanted.regions || !meter.open() || !meter.has_ns(ranked_ns + CLOSING_NS) {
             return;
         }
