@@ -14,6 +14,9 @@ use crate::time::Meter;
 const PROOF_COST: u64 = 4;
 /// ... and their distance. Contact points look at the clock themselves.
 pub(super) const LEAF_COST: u64 = 16;
+/// Every so many times that walks for contact points ask whether to go on the clock is read: at each, being stoppable
+/// costs a contact set 6 % (`benches/time_critical`).
+const ASKS_PER_READ: u32 = 2;
 /// So often the points of two leaves are cut off in a row; in the end they are asked for whatever it takes.
 const CUTS_MAX: u32 = 8;
 
@@ -73,7 +76,16 @@ impl CarriedFront {
                 let patches = (&mut self.contacts, &mut store.contacts);
                 let walks = &mut store.walks;
                 let patient = self.known.cuts >= CUTS_MAX;
-                let mut go_on = || meter.refresh() || patient;
+                let mut asked = 0;
+                let mut go_on = || {
+                    asked += 1;
+                    let open = if asked % ASKS_PER_READ == 0 {
+                        meter.refresh()
+                    } else {
+                        meter.open()
+                    };
+                    open || patient
+                };
                 whole = manifold::points(
                     leaf_a, leaf_b, &self.at, &contact, patches, walks, &mut go_on,
                 );
