@@ -7,8 +7,8 @@
 //! the end over the other trees.
 //!
 //! `cargo bench --bench time_critical [-- --quick] [--cold] [METHOD..]`, and `-- regions` for approximate contacts
-//! alone (see `regions`), `-- distance` for the distance of one pair; `-- peers FOLDER` is a part of
-//! `benches/mesh_peers.py`.
+//! alone (see `regions`), `-- distance` for the distance of one pair, `-- interruptible` for what it costs that work can
+//! be stopped; `-- peers FOLDER` is a part of `benches/mesh_peers.py`.
 
 #![allow(
     clippy::cast_precision_loss,
@@ -22,6 +22,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod distance;
+mod interruptible;
 #[path = "../../tests/oracle/mod.rs"]
 mod oracle;
 mod peers;
@@ -202,6 +203,10 @@ fn main() {
     }
     if only.iter().any(|name| name == "distance") {
         distance::run(&shapes);
+        return;
+    }
+    if only.iter().any(|name| name == "interruptible") {
+        interruptible::run(&shapes, quick);
         return;
     }
     if only.iter().any(|name| name == "regions") {

@@ -72,12 +72,24 @@ pub struct Ours {
 impl Ours {
     pub fn ask(&mut self, a: &Shape, b: &Shape, rel: &Pose, goal: Goal) -> Found {
         let mut meter = Meter::unlimited(&SystemClock);
-        self.front
-            .start(&mut self.store, a, b, rel, Search::Carried);
-        assert!(
-            self.front
-                .advance(&mut self.store, a, b, goal, u64::MAX, &mut meter)
-        );
+        self.ask_in_slices(a, b, rel, goal, u64::MAX, &mut meter)
+    }
+
+    /// The same in turns of so many units, by a meter that stays open.
+    pub fn ask_in_slices(
+        &mut self,
+        a: &Shape,
+        b: &Shape,
+        rel: &Pose,
+        goal: Goal,
+        slice_units: u64,
+        meter: &mut Meter<'_>,
+    ) -> Found {
+        let Self { store, front } = self;
+        front.start(store, a, b, rel, Search::Carried);
+        while !front.advance(store, a, b, goal, slice_units, meter) {
+            assert!(meter.open());
+        }
         let gap = self.front.interval();
         Found {
             touches: gap.max <= 0.0,
