@@ -72,7 +72,7 @@ struct Ours {
     /// Whether time is that of the wall: where threads work, not all of it is this one's.
     by_wall: bool,
     /// What all frames did, summed.
-    work: [u64; 5],
+    work: [u64; 6],
     frames: u64,
 }
 
@@ -87,7 +87,7 @@ impl Ours {
             // Far from the origin we get the far boxes, the peers the same ones near: f32 would spoil theirs.
             offset_m: if scene.kind == Kind::Far { 1e7 } else { 0.0 },
             by_wall: false,
-            work: [0; 5],
+            work: [0; 6],
             frames: 0,
         }
     }
@@ -140,7 +140,8 @@ impl Runner for Ours {
             rebuilds,
             ..
         } = self.broad.work();
-        let done = [swaps, tests, renewed, cells, rebuilds];
+        let events = self.delta.began.len() + self.delta.ended.len();
+        let done = [swaps, tests, renewed, cells, events as u64, rebuilds];
         for (sum, done) in self.work.iter_mut().zip(done) {
             *sum += done;
         }
@@ -157,14 +158,15 @@ impl Runner for Ours {
     }
 
     fn told(&self) -> String {
-        let [swaps, tests, renewed, cells, rebuilds] = self.work;
+        let [swaps, tests, renewed, cells, events, rebuilds] = self.work;
         let mean = |sum: u64| sum / self.frames.max(1);
         format!(
-            "a frame: swaps {}; tests {}; renewed {}; cells {}; in all: rebuilds {rebuilds}",
+            "a frame: swaps {}; tests {}; renewed {}; cells {}; events {}; in all: rebuilds {rebuilds}",
             mean(swaps),
             mean(tests),
             mean(renewed),
-            mean(cells)
+            mean(cells),
+            mean(events)
         )
     }
 }

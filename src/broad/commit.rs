@@ -23,6 +23,8 @@ pub(super) struct Found {
     pub(super) began: Vec<PairKey>,
     /// Pairs taken out of the set, with the order of the delta.
     ended: Vec<((BodyId, BodyId), Ended)>,
+    /// ... and those of boxes that parted, in the order of keys.
+    parted: Vec<Ended>,
     /// Pairs to be stored, with the order of the delta, while they are put in it.
     ranked: Vec<((BodyId, BodyId), PairKey)>,
     /// Stored pairs to look at, while some are taken out.
@@ -88,6 +90,13 @@ impl<X: Proxies, P: PairPolicy> Judge<'_, X, P> {
             && self.policy.allows(low, high)
     }
 
+    /// Whether a stored pair whose boxes have parted ends.
+    fn lets_go(&self, key: PairKey) -> bool {
+        debug_assert!(!self.overlaps(key), "{key:?} was told to have parted");
+        let (low, high) = key.slots();
+        !self.is_unconditional(key) && !self.policy.keeps(low) && !self.policy.keeps(high)
+    }
+
     /// Why a stored pair ends; `None` when it stays. Filters are asked only if `refiltered`.
     pub(super) fn ends(&self, key: PairKey, refiltered: bool) -> Option<EndCause> {
         let (low, high) = key.slots();
@@ -107,6 +116,7 @@ impl Found {
     pub(super) fn close_tick(&mut self, bodies: usize) {
         give_back(&mut self.began, bodies);
         give_back(&mut self.ended, bodies);
+        give_back(&mut self.parted, bodies);
         give_back(&mut self.ranked, bodies);
         give_back(&mut self.slots, bodies);
         give_back(&mut self.doomed, bodies);
@@ -129,31 +139,29 @@ impl Found {
     /// Takes out the stored pairs of boxes that parted, unless something else keeps them.
     pub(super) fn part(
         &mut self,
-        parted: &[PairKey],
+        parted: &mut [PairKey],
         judge: &Judge<'_, impl Proxies, impl PairPolicy>,
         pairs: &mut PairSet,
     ) {
+        // In the order of the delta, and of memory.
+        parted.sort_unstable();
         // Each step for all pairs before the next one: memory for the steps to come is asked for meanwhile.
-        let mut doomed = std::mem::take(&mut self.doomed);
-        self.slots.clear();
+        let mut doomed = std::mem::take(&mut self.slots);
+        doomed.clear();
         for (at, key) in parted.iter().enumerate() {
             pairs.prefetch_find(parted, at);
-            if let Some(ahead) = parted.get(at + AHEAD) {
-                judge.prefetch(*ahead);
-            }
-            let Some(slot) = pairs.find(*key) else {
-                continue;
-            };
-            if let Some(cause) = judge.ends(*key, false) {
-                doomed.push((slot, cause));
-                self.slots.push(slot);
+            if let Some(slot) = pairs.find(*key).filter(|_| judge.lets_go(*key)) {
+                doomed.push(slot);
             }
         }
-        for (at, (slot, cause)) in doomed.drain(..).enumerate() {
-            pairs.prefetch_remove(&self.slots, at);
-            self.end(slot, cause, judge.members, pairs);
+        for (at, slot) in doomed.iter().enumerate() {
+            pairs.prefetch_remove(&doomed, at);
+            if let Some(key) = pairs.remove(*slot) {
+                let (slot, cause) = (*slot, EndCause::Separated);
+                self.parted.push(Ended { slot, key, cause });
+            }
         }
-        self.doomed = doomed;
+        self.slots = doomed;
     }
 
     /// Stores what begins and fills the delta.
@@ -163,17 +171,22 @@ impl Found {
         pairs: &mut PairSet,
         delta: &mut PairDelta,
     ) {
-        self.ended.sort_unstable_by_key(|(rank, _)| *rank);
-        delta.ended.extend(self.ended.iter().map(|(_, e)| *e));
+        if self.ended.is_empty() && judge.members.ids_ascend() {
+            // As a rule ids ascend with slots: then keys are in the order of ids.
+            delta.ended.extend_from_slice(&self.parted);
+        } else {
+            let parted = self.parted.iter();
+            (self.ended).extend(parted.map(|ended| (judge.members.rank(ended.key), *ended)));
+            self.ended.sort_unstable_by_key(|(rank, _)| *rank);
+            delta.ended.extend(self.ended.iter().map(|(_, e)| *e));
+        }
         self.select(judge, pairs);
         self.truncated.clear();
         self.truncated.extend_from_slice(pairs.truncated());
         pairs.forget_missing();
         pairs.reserve(self.began.len());
         for (at, key) in self.began.iter().enumerate() {
-            if let Some(ahead) = self.began.get(at + AHEAD) {
-                pairs.prefetch_insert(*ahead);
-            }
+            pairs.prefetch_insert(&self.began, at);
             match pairs.insert(*key) {
                 Some(slot) => delta.began.push(slot),
                 None => pairs.miss(*key),
@@ -204,7 +217,6 @@ impl Found {
             }
         }
         self.began.truncate(kept);
-        // As a rule ids ascend with slots, and so do these.
         if !judge.members.ids_ascend() {
             let keys = self.began.iter();
             self.ranked.clear();

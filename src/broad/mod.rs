@@ -220,7 +220,7 @@ impl BroadPhase {
                     parted: &mut self.parted,
                 };
                 order.update(tick, &mut self.work);
-                self.found.part(&self.parted, &judge, pairs);
+                self.found.part(&mut self.parted, &judge, pairs);
                 touched::begin(&judge, &mut self.found);
             }
         }

@@ -244,9 +244,9 @@ impl<P: Proxies> Work for TakeLanes<'_, P> {
         let origin = order.origin;
         let mut jumps = 0;
         for block in 0..order.live.len() {
-            ask_ahead(&order.slot_of, block, proxies);
             for lane in ones(order.live[block]) {
                 let rank = block * WIDTH + lane;
+                ask_ahead(&order.slot_of, rank, proxies);
                 let aabb = proxies.aabb(BodySlot(order.slot_of[rank]));
                 let (min, max) = (aabb.min.coords.as_ref(), aabb.max.coords.as_ref());
                 let one = lanes.outward(min, max, &origin).corners();

@@ -14,8 +14,9 @@ const STRETCHES: usize = 3 * HORIZON as usize;
 /// One in so many did not move, and all are taken.
 const NEARLY_ALL: usize = 16;
 
-/// How many blocks ahead boxes are asked for: a block takes some 100 ns, memory about as long.
-const AHEAD: usize = 2;
+/// How many ranks ahead boxes are asked for: one takes some 10 ns, memory ten times as long. One with each, for a
+/// processor waits for only so many at a time.
+const AHEAD: usize = 24;
 /// How many bodies ahead, where few moved, what is known of them is.
 const AHEAD_BODIES: usize = 8;
 
@@ -110,13 +111,11 @@ impl Order {
     }
 }
 
-/// Asks for the boxes of a block to come while one is taken: those of the world stand in another order.
+/// Asks for a box to come while another is taken: those of the world stand in another order.
 #[inline(always)]
-pub(super) fn ask_ahead<P: Proxies>(slot_of: &[u32], block: usize, proxies: &P) {
-    if let Some(ahead) = slot_of[block * WIDTH..].chunks_exact(WIDTH).nth(AHEAD) {
-        for slot in ahead.iter().filter(|slot| **slot != NONE) {
-            prefetch(proxies.aabb(BodySlot(*slot)));
-        }
+pub(super) fn ask_ahead<P: Proxies>(slot_of: &[u32], rank: usize, proxies: &P) {
+    if let Some(slot) = slot_of.get(rank + AHEAD).filter(|slot| **slot != NONE) {
+        prefetch(proxies.aabb(BodySlot(*slot)));
     }
 }
 
@@ -137,10 +136,10 @@ impl<P: Proxies> Work for LoadBlocks<'_, '_, P> {
             if moved == 0 {
                 continue;
             }
-            ask_ahead(&order.slot_of, block, tick.proxies);
             let mut out = 0;
             for lane in ones(moved) {
                 let rank = block * WIDTH + lane;
+                ask_ahead(&order.slot_of, rank, tick.proxies);
                 let slot = BodySlot(order.slot_of[rank]);
                 let holds = order.take(lanes, tick.proxies, slot, rank);
                 out |= u16::from(!holds) << lane;

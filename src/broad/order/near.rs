@@ -96,6 +96,7 @@ impl Order {
         } = &mut self.afresh.verlet;
         found.clear();
         let (exact, slot_of) = (&self.exact[..], &self.slot_of[..]);
+        let (told, proxies) = (tick.parted.len(), tick.proxies);
         let lost = self.level.run(Look {
             exact,
             out,
@@ -107,6 +108,15 @@ impl Order {
             parted: tick.parted,
         });
         self.hits -= lost;
+        // What is still there is found again, and told as begun, which of a pair that is stored means nothing.
+        let mut kept = told;
+        for at in told..tick.parted.len() {
+            let key = tick.parted[at];
+            let (one, other) = key.slots();
+            tick.parted[kept] = key;
+            kept += usize::from(!proxies.aabb(one).overlaps(proxies.aabb(other)));
+        }
+        tick.parted.truncate(kept);
         for Found { at, now } in found.iter() {
             let entry = &mut entries[*at as usize];
             let slots = entry.ranks().map(|rank| BodySlot(slot_of[rank]));
@@ -198,7 +208,8 @@ fn ask_ahead(exact: &[Down], entries: &[Near], at: usize) {
     }
 }
 
-/// One pass over the list: drops the dead, finds what changed. Returns how many of the dead overlapped.
+/// One pass over the list: drops the dead, finds what changed. Returns how many of the dead overlapped; their pairs may
+/// have parted.
 struct Look<'a> {
     exact: &'a [Down],
     out: &'a [u16],

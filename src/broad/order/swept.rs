@@ -92,15 +92,21 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
         let (origin, mut jumps) = (order.origin, 0);
         let opens = phase == Phase::Opens;
         let makes = matches!(phase, Phase::Makes | Phase::Ends);
+        let mut before = [Down::EMPTY; WIDTH];
         for block in 0..order.live.len() {
-            ask_ahead(&order.slot_of, block, proxies);
             let live = order.live[block];
-            let slots = &order.slot_of.as_chunks().0[block];
+            let slots = &order.slot_of[block * WIDTH..];
             let exact = &mut order.exact.as_chunks_mut().0[block];
             let swept = &mut order.afresh.verlet.swept.as_chunks_mut().0[block];
             let fat = &mut order.fat[block];
-            let before = *exact;
-            let out = live & !take(lanes, (proxies, origin), (slots, live), exact, swept);
+            let boxes = (proxies, origin);
+            let out = take(
+                lanes,
+                boxes,
+                (slots, live),
+                (exact, &mut before),
+                (swept, opens),
+            );
             if phase == Phase::Ends {
                 for lane in ones(live) {
                     swept[lane] = Down::of(fat.get(lane)).open();
@@ -156,23 +162,30 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
     }
 }
 
-/// Takes the boxes of a block; returns the lanes whose box stays in its swept one.
+/// Takes the boxes of a block; returns the lanes whose box has left its swept one.
+///
+/// * `before` - takes the former boxes of those lanes, and with `all` of every one; what nobody asks for is not read.
 #[inline(always)]
 fn take<L: Lanes, P: Proxies>(
     lanes: L,
     (proxies, origin): (&P, [f64; 3]),
-    (slots, live): (&[u32; WIDTH], u16),
-    exact: &mut [Down; WIDTH],
-    swept: &[Down; WIDTH],
+    (slots, live): (&[u32], u16),
+    (exact, before): (&mut [Down; WIDTH], &mut [Down; WIDTH]),
+    (swept, all): (&[Down; WIDTH], bool),
 ) -> u16 {
-    let mut stays = 0;
+    let mut out = 0;
     for lane in ones(live) {
+        ask_ahead(slots, lane, proxies);
         let aabb = proxies.aabb(BodySlot(slots[lane]));
         let now = outward(lanes, aabb, &origin);
+        let stays = lanes.holds(&swept[lane], &now);
+        if all | !stays {
+            before[lane] = exact[lane];
+        }
         exact[lane] = now;
-        stays |= u16::from(lanes.holds(&swept[lane], &now)) << lane;
+        out |= u16::from(!stays) << lane;
     }
-    stays
+    out
 }
 
 /// What lies within both boxes.

@@ -38,19 +38,37 @@ impl PairSet {
             self.prefetch_head(body);
         }
         for at in next.next.into_iter().chain(next.prev) {
-            if let Some(node) = self.nodes.get(at as usize) {
-                prefetch(node);
-            }
+            self.prefetch_node(at);
         }
     }
 
-    /// Asks for what the insertion of a pair will touch to be brought near.
+    /// Of a list of pairs to be put in, asks for what that of one a few places on will touch to be brought near.
     #[inline]
-    pub(crate) fn prefetch_insert(&self, key: PairKey) {
-        self.index.prefetch(key.bits());
+    pub(crate) fn prefetch_insert(&self, keys: &[PairKey], at: usize) {
+        if let Some(key) = keys.get(at + 2 * AHEAD) {
+            self.index.prefetch(key.bits());
+            let (low, high) = key.slots();
+            self.prefetch_head(low);
+            self.prefetch_head(high);
+        }
+        let Some(key) = keys.get(at + AHEAD) else {
+            return;
+        };
+        let place = self.free.len().checked_sub(1 + AHEAD);
+        let place = place.map(|at| self.free[at]);
+        // It goes before the youngest pair of each of the two.
         let (low, high) = key.slots();
-        self.prefetch_head(low);
-        self.prefetch_head(high);
+        let seconds = [low, high].map(|body| self.heads.get(body.index()).map(|head| head.first));
+        for at in seconds.into_iter().chain([place]).flatten() {
+            self.prefetch_node(at);
+        }
+    }
+
+    #[inline]
+    fn prefetch_node(&self, at: u32) {
+        if let Some(node) = self.nodes.get(at as usize) {
+            prefetch(node);
+        }
     }
 
     #[inline]
