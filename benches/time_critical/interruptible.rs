@@ -64,10 +64,11 @@ pub fn run(shapes: &[Arc<Shape>], quick: bool) {
             let mut sums_ns = [0, 0];
             let mut sums_units = [0, 0];
             for &pair in &pairs {
-                for stop in [false, true] {
+                let first = pair % 2 == 0;
+                for stop in [first, !first] {
                     let from_ns = SystemClock.thread_cpu_ns();
-                    let found = ask(&mut ours, couple(pair), goal, stop ^ (pair % 2 == 0));
-                    let way = usize::from(stop ^ (pair % 2 == 0));
+                    let found = ask(&mut ours, couple(pair), goal, stop);
+                    let way = usize::from(stop);
                     sums_ns[way] += SystemClock.thread_cpu_ns() - from_ns;
                     sums_units[way] += found.units;
                 }

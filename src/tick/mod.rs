@@ -262,9 +262,9 @@ impl Engine {
             order: self.end.order(budget),
         };
         let end_ns = self.end.at_ns();
-        let began = end_ns.map(|_| Began::now(self.clock.as_ref()));
+        let began = Began::now(self.clock.as_ref());
         let deadline_ns = end_ns.map(|end_ns| {
-            let left_ns = end_ns.saturating_sub(self.clock.monotonic_ns());
+            let left_ns = began.left_ns(end_ns);
             end_ns - self.floor.reserve_ns(left_ns).min(end_ns)
         });
         let mut row = self.bare_tick(input);
@@ -282,10 +282,10 @@ impl Engine {
         );
         let done = self.narrow.spend(&mut self.world, wanted, &mut meter);
         let units = meter.spent();
-        if let Some((began, deadline_ns)) = began.zip(deadline_ns) {
+        if let Some((end_ns, deadline_ns)) = end_ns.zip(deadline_ns) {
             let late_ns = began.passed_ns(deadline_ns, self.clock.as_ref());
             self.floor.note_late(late_ns);
-            let above_ns = end_ns.map_or(0, |end_ns| began.left_ns(end_ns));
+            let above_ns = began.left_ns(end_ns);
             self.rest
                 .leave(above_ns.saturating_sub(self.floor.usual_ns()));
         }

@@ -31,15 +31,15 @@ pub(super) struct Rest {
     pub(super) units: u64,
     /// Kept back of the tick's end, nanoseconds.
     last_ns: u64,
-    /// The most that may be.
+    /// The most that may be, unless that is less than [`LAST_NS`].
     most_ns: u64,
 }
 
 impl Rest {
     /// Takes what the budget leaves above the floor, nanoseconds.
     pub(super) fn leave(&mut self, above_ns: u64) {
-        self.most_ns = (above_ns / LAST_PARTS).max(LAST_NS);
-        self.last_ns = self.last_ns.clamp(LAST_NS, self.most_ns);
+        self.most_ns = above_ns / LAST_PARTS;
+        self.keep(self.last_ns);
     }
 
     /// Work went on until a tick's end, and passed it by `late_ns` more than was kept back.
@@ -49,7 +49,11 @@ impl Rest {
         } else {
             self.last_ns.saturating_sub(IN_TIME_NS)
         };
-        self.last_ns = last_ns.clamp(LAST_NS, self.most_ns);
+        self.keep(last_ns);
+    }
+
+    fn keep(&mut self, last_ns: u64) {
+        self.last_ns = last_ns.min(self.most_ns).max(LAST_NS);
     }
 }
 

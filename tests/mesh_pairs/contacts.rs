@@ -2,7 +2,7 @@
 
 use crate::oracle::meshes;
 use crate::oracle::rng::Rng;
-use crate::support::{CASES, KINDS, any_mesh, place, shape};
+use crate::support::{CASES, any_two, shape, way};
 use sweepd::math::{Pose, relative};
 use sweepd::narrow::mesh::{CarriedFront, FrontStore, Goal, LeafContact, Search};
 use sweepd::shape::Shape;
@@ -53,9 +53,7 @@ fn contact_sets_in_pieces_are_those_of_a_search_at_once() {
     let (mut cut, mut other) = (0, 0);
     for case in 0..CASES {
         let mut rng = Rng::new(31_000_000 + case);
-        let (kind_a, kind_b) = (rng.below(KINDS), rng.below(KINDS));
-        let ((a, _), (b, _)) = (any_mesh(&mut rng, kind_a), any_mesh(&mut rng, kind_b));
-        let (pose_a, pose_b) = place(&mut rng, &a, &b, usize::try_from(case % 3).unwrap());
+        let (a, b, [pose_a, pose_b], _) = any_two(&mut rng, way(case));
         let pos12 = relative(&pose_a, &pose_b);
         let (whole, pieces) = (
             contacts(&a, &b, &pos12, 0),

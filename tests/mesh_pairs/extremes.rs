@@ -2,7 +2,7 @@
 
 use crate::oracle::meshes;
 use crate::oracle::rng::Rng;
-use crate::support::{CASES, KINDS, any_mesh, place, run, shape};
+use crate::support::{CASES, KINDS, any_mesh, any_two, place, run, shape, way};
 use sweepd::math::{Interval, Pose, Quat, Vec3, relative};
 use sweepd::narrow::mesh::{FrontStore, Goal, MeshQuery, Walk};
 use sweepd::time::{ManualClock, Meter};
@@ -46,8 +46,7 @@ fn needles_of_a_billionth_of_their_length_are_legal() {
         let needle = shape(&meshes::cuboid(thin), None);
         let kind = rng.below(KINDS);
         let (other, name) = any_mesh(&mut rng, kind);
-        let how = usize::try_from(case % 3).unwrap();
-        let (pose_a, pose_b) = place(&mut rng, &needle, &other, how);
+        let (pose_a, pose_b) = place(&mut rng, &needle, &other, way(case));
         run(
             &needle,
             &other,
@@ -92,9 +91,7 @@ fn a_walk_used_again_answers_as_a_new_one() {
     let mut old = Walk::default();
     for case in 0..CASES {
         let mut rng = Rng::new(14_000_000 + case);
-        let (kind_a, kind_b) = (rng.below(KINDS), rng.below(KINDS));
-        let ((a, _), (b, _)) = (any_mesh(&mut rng, kind_a), any_mesh(&mut rng, kind_b));
-        let (pose_a, pose_b) = place(&mut rng, &a, &b, usize::try_from(case % 3).unwrap());
+        let (a, b, [pose_a, pose_b], _) = any_two(&mut rng, way(case));
         let pos12 = relative(&pose_a, &pose_b);
         let mut new = Walk::default();
         let spent = [&mut old, &mut new].map(|walk| {

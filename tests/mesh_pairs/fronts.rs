@@ -3,7 +3,7 @@
 use crate::oracle::Truth;
 use crate::oracle::meshes;
 use crate::oracle::rng::Rng;
-use crate::support::{CASES, KINDS, any_convex, any_mesh, place, shape, truth_of};
+use crate::support::{CASES, KINDS, any_convex, any_mesh, any_two, place, shape, truth_of, way};
 use sweepd::math::{Pose, Quat, Vec3, relative};
 use sweepd::narrow::mesh::{CarriedFront, FrontStore, Goal, Search, has_front};
 use sweepd::shape::Shape;
@@ -300,8 +300,7 @@ fn cases(seed: u64, count: u64, search: Search, whole: bool) {
         } else {
             any_mesh(&mut rng, kind_b)
         };
-        let how = usize::try_from(case % 3).unwrap();
-        let (mut pose_a, mut pose_b) = place(&mut rng, &a, &b, how);
+        let (mut pose_a, mut pose_b) = place(&mut rng, &a, &b, way(case));
         if rng.below(5) == 0 {
             let far = rng.vector(1e7);
             for pose in [&mut pose_a, &mut pose_b] {
@@ -432,9 +431,7 @@ fn a_front_used_again_answers_as_a_new_one() {
     let (mut store, mut old) = (FrontStore::default(), CarriedFront::default());
     for case in 0..CASES {
         let mut rng = Rng::new(25_000_000 + case);
-        let (kind_a, kind_b) = (rng.below(KINDS), rng.below(KINDS));
-        let ((a, _), (b, _)) = (any_mesh(&mut rng, kind_a), any_mesh(&mut rng, kind_b));
-        let (pose_a, pose_b) = place(&mut rng, &a, &b, usize::try_from(case % 3).unwrap());
+        let (a, b, [pose_a, pose_b], _) = any_two(&mut rng, way(case));
         let pos12 = relative(&pose_a, &pose_b);
         let mut new = CarriedFront::default();
         let spent = [&mut old, &mut new].map(|front| {
@@ -455,9 +452,7 @@ fn contact_points_are_made_when_they_are_asked_for_and_are_those_of_a_query_for_
     let mut touched = 0;
     for case in 0..CASES {
         let mut rng = Rng::new(26_000_000 + case);
-        let (kind_a, kind_b) = (rng.below(KINDS), rng.below(KINDS));
-        let ((a, _), (b, _)) = (any_mesh(&mut rng, kind_a), any_mesh(&mut rng, kind_b));
-        let (pose_a, pose_b) = place(&mut rng, &a, &b, usize::try_from(case % 3).unwrap());
+        let (a, b, [pose_a, pose_b], _) = any_two(&mut rng, way(case));
         let pos12 = relative(&pose_a, &pose_b);
         let mut store = FrontStore::default();
         let mut run = |goals: &[Goal]| {
@@ -524,9 +519,7 @@ fn a_front_without_room_is_sound_and_says_that_it_is_not_certain() {
     let (mut decided, mut undecided, mut lumped) = (0, 0, 0);
     for case in 0..CASES {
         let mut rng = Rng::new(26_000_000 + case);
-        let (kind_a, kind_b) = (rng.below(KINDS), rng.below(KINDS));
-        let ((a, _), (b, _)) = (any_mesh(&mut rng, kind_a), any_mesh(&mut rng, kind_b));
-        let (pose_a, mut pose_b) = place(&mut rng, &a, &b, usize::try_from(case % 3).unwrap());
+        let (a, b, [pose_a, mut pose_b], _) = any_two(&mut rng, way(case));
         let home = pose_b;
         // Room for some groups and open pairs, and none for others.
         let mut store = FrontStore::with_room(rng.below(40), rng.below(60));

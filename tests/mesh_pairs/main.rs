@@ -26,7 +26,7 @@ mod timing;
 
 use oracle::meshes;
 use oracle::rng::Rng;
-use support::{CASES, KINDS, any_convex, any_mesh, convex, place, placed, run, shape, sweep};
+use support::{CASES, KINDS, any_convex, any_mesh, convex, place, placed, run, shape, sweep, way};
 use sweepd::math::{Point, Pose, Vec3};
 use sweepd::narrow::mesh::{Goal, Walk};
 use sweepd::shape::Convex;
@@ -63,7 +63,7 @@ fn law_1_meshes_and_convex_shapes_hold_the_truth_at_every_interruption() {
         let mut rng = Rng::new(6_000_000 + case);
         let kind = rng.below(KINDS);
         let ((mesh, name_a), (other, name_b)) = (any_mesh(&mut rng, kind), any_convex(&mut rng));
-        let (pose_a, pose_b) = place(&mut rng, &mesh, &other, usize::try_from(case % 3).unwrap());
+        let (pose_a, pose_b) = place(&mut rng, &mesh, &other, way(case));
         let goal = [Goal::Verdict, Goal::Gap, Goal::Contacts][rng.below(3)];
         let what = format!("seed {} {name_a} - {name_b}", 6_000_000 + case);
         if rng.below(2) == 0 {

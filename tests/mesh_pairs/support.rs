@@ -315,14 +315,25 @@ pub fn place(rng: &mut Rng, a: &Shape, b: &Shape, how: usize) -> (Pose, Pose) {
     )
 }
 
+/// Two meshes of any kinds, their poses, and both names.
+pub fn any_two(rng: &mut Rng, how: usize) -> (Shape, Shape, [Pose; 2], String) {
+    let (kind_a, kind_b) = (rng.below(KINDS), rng.below(KINDS));
+    let ((a, name_a), (b, name_b)) = (any_mesh(rng, kind_a), any_mesh(rng, kind_b));
+    let (pose_a, pose_b) = place(rng, &a, &b, how);
+    (a, b, [pose_a, pose_b], format!("{name_a} - {name_b}"))
+}
+
+/// Which of the three ways of [`place`] is a case's turn.
+pub fn way(case: u64) -> usize {
+    usize::try_from(case % 3).unwrap()
+}
+
 pub fn sweep(seed: u64, how: usize, goal: Goal) {
     let mut overlapping = 0;
     for case in 0..CASES {
         let mut rng = Rng::new(seed + case);
-        let (kind_a, kind_b) = (rng.below(KINDS), rng.below(KINDS));
-        let ((a, name_a), (b, name_b)) = (any_mesh(&mut rng, kind_a), any_mesh(&mut rng, kind_b));
-        let (pose_a, pose_b) = place(&mut rng, &a, &b, how);
-        let what = format!("seed {} {name_a} - {name_b}", seed + case);
+        let (a, b, [pose_a, pose_b], names) = any_two(&mut rng, how);
+        let what = format!("seed {} {names}", seed + case);
         let end = run(&a, &b, &pose_a, &pose_b, goal, &what);
         overlapping += u64::from(end.min <= 0.0);
     }

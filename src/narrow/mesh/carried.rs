@@ -279,7 +279,7 @@ impl CarriedFront {
             self.ask_touching_again(store);
         }
         if goal == Goal::Contacts {
-            self.known.walks = Some(store.walks.go_on(self.known.walks));
+            self.known.walks = Some(store.walks.resume(self.known.walks));
         }
         let end = meter.spent().saturating_add(slice_units);
         loop {

@@ -54,7 +54,7 @@ impl Walks {
     /// Goes on with a search, or begins one: it is not to rest on what others have found. Returns its number.
     ///
     /// * `search` - what was returned last for the two at this pose, if anything was.
-    pub(super) fn go_on(&mut self, search: Option<u64>) -> u64 {
+    pub(super) fn resume(&mut self, search: Option<u64>) -> u64 {
         if search != Some(self.search) {
             self.tops.iter_mut().for_each(Trails::clear);
             self.feet.iter_mut().for_each(Trails::clear);
@@ -209,7 +209,7 @@ struct Chosen {
     top: Option<(u32, f64)>,
 }
 
-/// The normal, A to B, along which the two surfaces overlap least; `None`: the meter has closed.
+/// The normal, A to B, along which the two surfaces overlap least; `None`: left off, see [`points`].
 fn choose(
     a: &Leaf<'_>,
     b: &Leaf<'_>,
@@ -307,8 +307,8 @@ fn feature_of(a: &Leaf<'_>, b: &Leaf<'_>, feature: u32, base_is_b: bool) -> u64 
 }
 
 /// Corners of `of` behind the surface about `on`, and `top`, the one that lies deepest: a triangle that pokes through
-/// the surface has its corners over other triangles than the one that it crosses. Whether all were asked before the
-/// meter closed.
+/// the surface has its corners over other triangles than the one that it crosses. Returns whether it came to its end,
+/// see [`points`].
 fn corners(
     (on, of): (&Leaf<'_>, &Leaf<'_>),
     normal: &Vec3,

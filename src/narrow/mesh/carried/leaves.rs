@@ -76,16 +76,8 @@ impl CarriedFront {
                 let patches = (&mut self.contacts, &mut store.contacts);
                 let walks = &mut store.walks;
                 let patient = self.known.cuts >= CUTS_MAX;
-                let mut asked = 0;
-                let mut go_on = || {
-                    asked += 1;
-                    let open = if asked % ASKS_PER_READ == 0 {
-                        meter.refresh()
-                    } else {
-                        meter.open()
-                    };
-                    open || patient
-                };
+                let mut asks = 0;
+                let mut go_on = || goes_on(meter, &mut asks) || patient;
                 whole = manifold::points(
                     leaf_a, leaf_b, &self.at, &contact, patches, walks, &mut go_on,
                 );
@@ -201,5 +193,16 @@ impl<'a> Side<'a> {
             Self::Mesh(_) => i,
             Self::Convex(_) => u32::MAX,
         }
+    }
+}
+
+/// Whether the meter is open; the clock is read at every so many questions.
+#[inline]
+fn goes_on(meter: &mut Meter<'_>, asks: &mut u32) -> bool {
+    *asks += 1;
+    if (*asks).is_multiple_of(ASKS_PER_READ) {
+        meter.refresh()
+    } else {
+        meter.open()
     }
 }
