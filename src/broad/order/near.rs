@@ -199,12 +199,13 @@ impl Work for Settle<'_> {
     }
 }
 
-/// Asks for a box of an entry to come.
+/// Asks for the boxes of an entry to come: either may be of the block that the search was at.
 #[inline(always)]
 fn ask_ahead(exact: &[Down], entries: &[Near], at: usize) {
     if let Some(next) = entries.get(at + AHEAD) {
-        let [_, other] = next.ranks();
-        prefetch(&exact[other]);
+        for rank in next.ranks() {
+            prefetch(&exact[rank]);
+        }
     }
 }
 
