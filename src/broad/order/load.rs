@@ -131,17 +131,21 @@ impl<P: Proxies> Work for LoadBlocks<'_, '_, P> {
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) {
         let (order, tick) = (self.order, self.tick);
+        let origin = order.origin;
         for block in 0..order.live.len() {
             let moved = std::mem::take(&mut order.dirty[block]);
             if moved == 0 {
                 continue;
             }
+            let slots = &order.slot_of[block * WIDTH..];
+            let held = &order.held.as_chunks::<WIDTH>().0[block];
+            let exact = &mut order.exact.as_chunks_mut::<WIDTH>().0[block];
             let mut out = 0;
             for lane in ones(moved) {
-                let rank = block * WIDTH + lane;
-                ask_ahead(&order.slot_of, rank, tick.proxies);
-                let slot = BodySlot(order.slot_of[rank]);
-                let holds = order.take(lanes, tick.proxies, slot, rank);
+                ask_ahead(slots, lane, tick.proxies);
+                let aabb = tick.proxies.aabb(BodySlot(slots[lane]));
+                let corners = [aabb.min.coords.as_ref(), aabb.max.coords.as_ref()];
+                let holds = lanes.take(corners, &origin, &held[lane], &mut exact[lane]);
                 out |= u16::from(!holds) << lane;
             }
             if order.is_due(block) || out != 0 {
