@@ -189,7 +189,10 @@ impl Order {
         std::mem::swap(&mut self.afresh.held, &mut self.afresh.finds.met);
         self.tell_asked_afresh(tick.members, tick.began);
         if begins && stays {
-            self.begin_list(tick, work);
+            let crowding = self.crowding(self.afresh.verlet.pace.first_ticks());
+            if (self.afresh.verlet.pace).promises(self.hits, crowding, tests) {
+                self.begin_list(tick, work);
+            }
         }
     }
 

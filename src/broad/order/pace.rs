@@ -99,6 +99,26 @@ impl Pace {
         self.rest == 0 && hits as u64 * LOOK < plain * MEET
     }
 
+    /// Ticks that the first list is made for.
+    pub(super) fn first_ticks(&self) -> u32 {
+        self.ticks
+    }
+
+    /// Whether a first list would not be hopeless; where it would, it is not soon asked again.
+    ///
+    /// * `hits` - overlaps now.
+    /// * `crowding` - times more that will be near.
+    /// * `plain` - boxes compared with a block in a search of all boxes as they are.
+    pub(super) fn promises(&mut self, hits: usize, crowding: f64, plain: u64) -> bool {
+        #[allow(clippy::cast_precision_loss, reason = "a cost")]
+        let (looks, search) = ((hits as u64 * LOOK) as f64, (plain * MEET) as f64);
+        let promises = looks * crowding <= search;
+        if !promises {
+            self.fail();
+        }
+        promises
+    }
+
     /// Lists begin, all at once.
     ///
     /// * `plain` - boxes compared with a block in a search of all boxes as they are.
@@ -340,6 +360,14 @@ mod tests {
         pace.note_list(1000);
         pace.note_tick(100_000, 0, BODIES);
         assert!(pace.phase() == Phase::Opens && !pace.pays());
+    }
+
+    #[test]
+    fn what_flies_far_beside_its_size_is_not_listed_to_begin_with() {
+        let mut pace = Pace::default();
+        assert!(pace.promises(1000, 2.5, 1000));
+        assert!(!pace.promises(1000, 4.0, 1000));
+        assert!((0..REST_MIN - 1).all(|_| !pace.begins(0, 1000)) && pace.begins(0, 1000));
     }
 
     #[test]

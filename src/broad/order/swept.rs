@@ -17,6 +17,8 @@ const SWERVE: f32 = 0.25;
 const SWEEP_MAX: f32 = 2.0;
 /// Bodies ahead whose boxes are asked for.
 const AHEAD: usize = 16;
+/// Of so many blocks one is looked at for how far bodies go.
+const SAMPLE: usize = 8;
 
 impl Order {
     /// Notes where the bodies are, so that the boxes of this tick tell how they move.
@@ -26,6 +28,27 @@ impl Order {
                 self.exact[block * WIDTH + lane] = Down::of(self.fat[block].get(lane));
             }
         }
+    }
+
+    /// How many times more pairs will be near than overlap, if boxes are swept for some ticks: by how much the boxes
+    /// grow, in the mean over some blocks. To be asked once the places noted are those of the last tick and the blocks
+    /// hold this one's.
+    pub(super) fn crowding(&self, ticks: u32) -> f64 {
+        let (mut sum, mut count) = (0.0, 0_u32);
+        for block in (0..self.live.len()).step_by(SAMPLE) {
+            for lane in ones(self.live[block]) {
+                let now = Down::of(self.fat[block].get(lane));
+                let before = &self.exact[block * WIDTH + lane];
+                #[allow(clippy::cast_precision_loss, reason = "a few ticks")]
+                let swept = sweep(before, &now, ticks as f32);
+                let grown = f64::from(volume(&swept)) / f64::from(volume(&now));
+                if grown.is_finite() {
+                    sum += grown;
+                    count += 1;
+                }
+            }
+        }
+        sum / f64::from(count.max(1))
     }
 
     /// Takes every box; sweeps all anew where the next list is begun, else those that stray. Notes who does, and who
@@ -68,6 +91,12 @@ pub(super) fn sweep(before: &Down, now: &Down, ticks: f32) -> Down {
         *face -= if by < most { by } else { most };
     }
     swept
+}
+
+/// What a box holds, cubic metres.
+fn volume(one: &Down) -> f32 {
+    let [x, y, z, u, v, w] = one.corners();
+    (u - x) * (v - y) * (w - z)
 }
 
 /// See [`Order::take_swept`].
