@@ -262,11 +262,13 @@ impl Engine {
             order: self.end.order(budget),
         };
         let end_ns = self.end.at_ns();
-        let began = Began::now(self.clock.as_ref());
-        let deadline_ns = end_ns.map(|end_ns| {
-            let left_ns = began.left_ns(end_ns);
-            end_ns - self.floor.reserve_ns(left_ns).min(end_ns)
+        let timed = end_ns.map(|end_ns| {
+            let began = Began::now(self.clock.as_ref());
+            let above_ns = began.left_ns(end_ns);
+            let deadline_ns = end_ns - self.floor.reserve_ns(above_ns).min(end_ns);
+            (began, above_ns, deadline_ns)
         });
+        let deadline_ns = timed.map(|(_, _, deadline_ns)| deadline_ns);
         let mut row = self.bare_tick(input);
         let clock = Arc::clone(&self.clock);
         let mut beat = || {
@@ -282,10 +284,9 @@ impl Engine {
         );
         let done = self.narrow.spend(&mut self.world, wanted, &mut meter);
         let units = meter.spent();
-        if let Some((end_ns, deadline_ns)) = end_ns.zip(deadline_ns) {
+        if let Some((began, above_ns, deadline_ns)) = timed {
             let late_ns = began.passed_ns(deadline_ns, self.clock.as_ref());
             self.floor.note_late(late_ns);
-            let above_ns = began.left_ns(end_ns);
             self.rest
                 .leave(above_ns.saturating_sub(self.floor.usual_ns()));
         }

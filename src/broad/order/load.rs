@@ -2,7 +2,7 @@
 
 use super::fatten::HORIZON;
 use super::{BodySlot, NONE, Order, Proxies, Tick, ones, parts, small};
-use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch};
+use crate::simd::boxes::{Down, Hold, Lanes, WIDTH, Work, prefetch};
 
 /// Lanes that moved and have lived for half a round are renewed at their block's turn, or with a lane of their block
 /// that must be: the walk down the tree is then shared, and they would be next.
@@ -100,15 +100,23 @@ impl Order {
         slot: BodySlot,
         rank: usize,
     ) -> bool {
-        let aabb = proxies.aabb(slot);
-        let corners = [aabb.min.coords.as_ref(), aabb.max.coords.as_ref()];
-        lanes.take(
-            corners,
-            &self.origin,
-            &self.held[rank],
-            &mut self.exact[rank],
-        )
+        let (held, exact) = (&self.held[rank], &mut self.exact[rank]);
+        take(lanes, (proxies, &self.origin), slot, held, exact)
     }
+}
+
+/// Writes the box of a body; returns whether its fat box still holds it.
+#[inline(always)]
+fn take<L: Lanes, P: Proxies>(
+    lanes: L,
+    (proxies, origin): (&P, &[f64; 3]),
+    slot: BodySlot,
+    held: &Hold,
+    exact: &mut Down,
+) -> bool {
+    let aabb = proxies.aabb(slot);
+    let corners = [aabb.min.coords.as_ref(), aabb.max.coords.as_ref()];
+    lanes.take(corners, origin, held, exact)
 }
 
 /// Asks for a box to come while another is taken: those of the world stand in another order.
@@ -143,9 +151,8 @@ impl<P: Proxies> Work for LoadBlocks<'_, '_, P> {
             let mut out = 0;
             for lane in ones(moved) {
                 ask_ahead(slots, lane, tick.proxies);
-                let aabb = tick.proxies.aabb(BodySlot(slots[lane]));
-                let corners = [aabb.min.coords.as_ref(), aabb.max.coords.as_ref()];
-                let holds = lanes.take(corners, &origin, &held[lane], &mut exact[lane]);
+                let (boxes, slot) = ((tick.proxies, &origin), BodySlot(slots[lane]));
+                let holds = take(lanes, boxes, slot, &held[lane], &mut exact[lane]);
                 out |= u16::from(!holds) << lane;
             }
             if order.is_due(block) || out != 0 {
