@@ -1,7 +1,7 @@
 //! For how many ticks a Verlet list is made, when the next one is begun, and whether lists pay.
 //!
-//! In: counted work and how far bodies fly, never time, so that a replay chooses alike. Out: when the list is made anew,
-//! for how long, and when it is let go. The weights were measured once; they decide about cost alone.
+//! In: counted work and how far bodies fly, never time, so that a replay chooses alike. Out: when the list is made
+//! anew, for how long, and when it is let go. The weights were measured once; they decide about cost alone.
 
 use super::gear::MEET;
 use super::lay::LAY_TESTS;
