@@ -13,7 +13,7 @@
 //! is nearly every pair.
 
 use crate::math::Aabb;
-use crate::simd::boxes::{Down, Hold, Lanes, SLACK};
+use crate::simd::boxes::{Down, Hold, Lanes, SPARE};
 
 /// Ticks that a fat box is swept for. Renewing a body costs about 100 ns, each tick of sweep adds candidates that cost
 /// some 3 ns a tick: in the gas of the bench 8 to 16 come out alike.
@@ -121,8 +121,8 @@ impl Gait {
             fat.faces[k] = now.faces[k] - (clamped(out) + self.margin);
             core.faces[k] = now.faces[k] + (clamped(-out) + self.margin);
         }
-        core.faces[SLACK] = f32::INFINITY;
-        core.faces[SLACK + 4] = f32::INFINITY;
+        core.faces[SPARE] = f32::INFINITY;
+        core.faces[SPARE + 4] = f32::INFINITY;
         Hold {
             fat: fat.open(),
             core,
@@ -198,12 +198,8 @@ impl Gait {
         let mut then = *now;
         for (k, face) in then.faces.iter_mut().enumerate() {
             let out = (self.anchor[k] - *face) * share;
-            // What moves inward counts for nothing, and the spare lanes stay.
-            *face -= if k % 4 != SLACK && out > 0.0 {
-                out
-            } else {
-                0.0
-            };
+            // What moves inward counts for nothing.
+            *face -= if out > 0.0 { out } else { 0.0 };
         }
         !lanes.holds(&held.fat, &then)
     }

@@ -64,8 +64,11 @@ impl Hold {
     };
 }
 
-/// The first spare lane of a [`Down`]: how far rounding may have moved the box's faces, and twice as much.
-pub(crate) const SLACK: usize = 3;
+/// The first spare lane of a [`Down`]; the other is four further.
+pub(crate) const SPARE: usize = 3;
+/// What stands in the spare lanes of a box: two of them overlap there for sure, so that no kernel needs to leave the
+/// lanes out.
+const SPARE_FACE: f32 = -1.0 - f32::EPSILON;
 
 impl Down {
     /// No box: it holds nothing, meets nothing.
@@ -80,19 +83,19 @@ impl Down {
         [f[0], f[1], f[2], -f[4], -f[5], -f[6]]
     }
 
-    /// Of lower and upper corner; the spare lanes are zero.
+    /// Of lower and upper corner.
     #[inline(always)]
     pub(crate) fn of([x, y, z, u, v, w]: [f32; 6]) -> Self {
         Self {
-            faces: [x, y, z, 0.0, -u, -v, -w, 0.0],
+            faces: [x, y, z, SPARE_FACE, -u, -v, -w, SPARE_FACE],
         }
     }
 
     /// As an outer box: its spare lanes hold whatever stands in another's.
     #[inline(always)]
     pub(crate) fn open(mut self) -> Self {
-        self.faces[SLACK] = f32::NEG_INFINITY;
-        self.faces[SLACK + 4] = f32::NEG_INFINITY;
+        self.faces[SPARE] = f32::NEG_INFINITY;
+        self.faces[SPARE + 4] = f32::NEG_INFINITY;
         self
     }
 
@@ -107,16 +110,19 @@ impl Down {
 
 /// How much more than the rounding of a face tells two boxes surely overlap: rounding takes 2^-22 of a face's distance
 /// from the origin at most, on either side.
-const SLACK_SHARE: f32 = 1.0 / 1_048_576.0;
-/// What is taken off a face, as a share of it, before it is rounded to nearest: a step of an f32.
-pub(super) const STEP: f64 = f32::EPSILON as f64;
+pub(super) const SLACK_SHARE: f32 = 1.0 / 1_048_576.0;
+/// ... and so much besides, for what is rounded below the normal range.
+pub(super) const SLACK_LEAST: f32 = 8.0 * LEAST;
+/// What is taken off a face that was rounded to nearest, as a share of it: a step of an f32 or up to two, where
+/// rounding moved it by half a step at most.
+pub(super) const STEP: f32 = f32::EPSILON;
 /// What is taken off besides: below the normal range a step is less than the least normal number.
-pub(super) const LEAST: f64 = f32::MIN_POSITIVE as f64;
+pub(super) const LEAST: f32 = f32::MIN_POSITIVE;
 
-/// The slack of a box whose largest face is this far from the origin.
+/// The slack of a face that is this far from the origin.
 #[inline(always)]
-pub(crate) fn slack(largest: f32) -> f32 {
-    largest * SLACK_SHARE + 8.0 * f32::MIN_POSITIVE
+pub(crate) fn slack(far: f32) -> f32 {
+    far * SLACK_SHARE + SLACK_LEAST
 }
 
 /// What can be asked of sixteen boxes at once, and of single ones.
@@ -127,7 +133,7 @@ pub(crate) trait Lanes: Copy {
     /// The least box around some lanes; upside down (`+inf`, `-inf`) where all of them are empty.
     fn bound(self, block: &Boxes16, chosen: u16) -> [f32; 6];
 
-    /// A box rounded outward to f32, relative to an origin, with its slack.
+    /// A box rounded outward to f32, relative to an origin.
     ///
     /// * `min`, `max` - up to 1e38 in magnitude, or infinite outward.
     fn outward(self, min: &[f64; 3], max: &[f64; 3], origin: &[f64; 3]) -> Down;
@@ -141,7 +147,9 @@ pub(crate) trait Lanes: Copy {
         place: &mut Down,
     ) -> bool;
 
-    /// Whether two boxes are surely apart, and whether they surely overlap: on every axis by the slack of `a` at least.
+    /// Whether two boxes are surely apart, and whether they surely overlap: at every face by the slack of that of `a`
+    /// at least. That is enough for both: a face of `b` that is much farther out than that of `a` has a slack of no more
+    /// than a small share of how far the boxes overlap there.
     fn parts(self, a: &Down, b: &Down) -> (bool, bool);
 
     /// Whether `inner` lies inside `outer`. The spare lanes are compared too: those of `outer` are to be minus
@@ -161,6 +169,17 @@ fn mask(answers: &[bool; WIDTH]) -> u16 {
         bits |= u16::from(*yes) << lane;
     }
     bits
+}
+
+/// A face as an f32 that is not above it.
+#[inline(always)]
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "rounds to nearest, by half a step at most: a whole one is taken off"
+)]
+fn below(face: f64) -> f32 {
+    let nearest = face as f32;
+    nearest - (nearest.abs() * STEP + LEAST)
 }
 
 impl Lanes for Portable {
@@ -197,26 +216,14 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    #[allow(
-        clippy::cast_possible_truncation,
-        reason = "rounds to nearest, by half a step at most: a whole one was taken off"
-    )]
     fn outward(self, min: &[f64; 3], max: &[f64; 3], origin: &[f64; 3]) -> Down {
-        let mut down = Down { faces: [0.0; 8] };
-        let mut largest = 0.0_f32;
+        let mut down = Down {
+            faces: [SPARE_FACE; 8],
+        };
         for k in 0..3 {
-            let faces = [min[k] - origin[k], origin[k] - max[k]];
-            for (half, face) in faces.into_iter().enumerate() {
-                let below = (face - (face.abs() * STEP + LEAST)) as f32;
-                down.faces[k + 4 * half] = below;
-                largest = if below.abs() > largest {
-                    below.abs()
-                } else {
-                    largest
-                };
-            }
+            down.faces[k] = below(min[k] - origin[k]);
+            down.faces[k + 4] = below(origin[k] - max[k]);
         }
-        down.faces[SLACK] = slack(largest);
         down
     }
 
@@ -236,11 +243,11 @@ impl Lanes for Portable {
     fn parts(self, a: &Down, b: &Down) -> (bool, bool) {
         let (a, b) = (&a.faces, &b.faces);
         let (mut apart, mut sure) = (false, true);
-        for k in [0, 1, 2, 4, 5, 6] {
+        for k in 0..8 {
             // Lower face of the one minus upper face of the other: above zero where they are apart.
             let gap = a[k] + b[(k + 4) % 8];
             apart |= gap > 0.0;
-            sure &= gap <= -a[SLACK];
+            sure &= gap <= -slack(a[k].abs());
         }
         (apart, sure)
     }

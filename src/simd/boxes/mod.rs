@@ -21,7 +21,7 @@ mod lanes;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-pub(crate) use lanes::{Boxes16, Down, Hold, LANES, Lanes, Portable, SLACK, WIDTH, slack};
+pub(crate) use lanes::{Boxes16, Down, Hold, LANES, Lanes, Portable, SPARE, WIDTH, slack};
 
 /// A loop that is built once for each set of lanes.
 pub(crate) trait Work {

@@ -1,20 +1,20 @@
-//! The kernels in AVX2 and AVX-512. Only compares, subtractions and maxima, in the order of the twin, so that every
+//! The kernels in AVX2 and AVX-512. Only sums, products, compares and maxima, in the order of the twin, so that every
 //! bit is the twin's.
 
 use std::arch::x86_64::{
-    __m128, __m256, __m256d, __m512, _CMP_GT_OQ, _CMP_LE_OQ, _mm_andnot_ps, _mm_blend_ps,
-    _mm_cvtss_f32, _mm_max_ps, _mm_max_ss, _mm_movehl_ps, _mm_set1_ps, _mm_setzero_ps,
-    _mm_shuffle_ps, _mm256_add_pd, _mm256_add_ps, _mm256_and_ps, _mm256_and_si256,
-    _mm256_andnot_pd, _mm256_blendv_ps, _mm256_castps256_ps128, _mm256_castsi256_ps, _mm256_cmp_ps,
+    __m256, __m256d, __m512, _CMP_GT_OQ, _CMP_LE_OQ, _mm_cvtss_f32, _mm_max_ps, _mm_max_ss,
+    _mm_movehl_ps, _mm_shuffle_ps, _mm256_add_ps, _mm256_and_ps, _mm256_and_si256,
+    _mm256_andnot_ps, _mm256_blendv_ps, _mm256_castps256_ps128, _mm256_castsi256_ps, _mm256_cmp_ps,
     _mm256_cmpeq_epi32, _mm256_cvtpd_ps, _mm256_extractf128_ps, _mm256_load_ps, _mm256_loadu_ps,
-    _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_pd, _mm256_permute_ps, _mm256_permute2f128_ps,
-    _mm256_set_m128, _mm256_set_pd, _mm256_set1_epi32, _mm256_set1_pd, _mm256_set1_ps,
-    _mm256_setr_epi32, _mm256_setzero_ps, _mm256_slli_epi32, _mm256_store_ps, _mm256_sub_pd,
-    _mm256_xor_ps, _mm512_cmp_ps_mask, _mm512_loadu_ps, _mm512_set1_ps,
+    _mm256_maskload_pd, _mm256_max_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_or_ps,
+    _mm256_permute2f128_ps, _mm256_set_m128, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi32,
+    _mm256_setr_epi64x, _mm256_setr_pd, _mm256_setzero_ps, _mm256_slli_epi32, _mm256_store_ps,
+    _mm256_sub_pd, _mm256_sub_ps, _mm256_xor_ps, _mm512_cmp_ps_mask, _mm512_loadu_ps,
+    _mm512_set1_ps,
 };
 
 use super::Work;
-use super::lanes::{Boxes16, Down, Hold, LEAST, Lanes, STEP, WIDTH, slack};
+use super::lanes::{Boxes16, Down, Hold, LEAST, Lanes, SLACK_LEAST, SLACK_SHARE, STEP, WIDTH};
 
 /// Two halves of eight lanes or, where `WIDE`, sixteen at once for what gains by it. Only [`run_avx2`] and
 /// [`run_avx512`] make one: where one is, AVX2 is, and where a wide one is, AVX-512 F too.
@@ -96,34 +96,28 @@ fn one(down: &Down) -> __m256 {
     unsafe { _mm256_load_ps(down.faces.as_ptr()) }
 }
 
-/// Four faces, of which the last is none.
+/// A corner, and zero.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn below(face: __m256d) -> __m128 {
-    let far = _mm256_andnot_pd(_mm256_set1_pd(-0.0), face);
-    let off = _mm256_add_pd(
-        _mm256_mul_pd(far, _mm256_set1_pd(STEP)),
-        _mm256_set1_pd(LEAST),
-    );
-    _mm256_cvtpd_ps(_mm256_sub_pd(face, off))
+fn corner(p: &[f64; 3]) -> __m256d {
+    // SAFETY: the lanes that the mask leaves out are not read, and the three others are the array.
+    unsafe { _mm256_maskload_pd(p.as_ptr(), _mm256_setr_epi64x(-1, -1, -1, 0)) }
 }
 
 #[inline]
 #[target_feature(enable = "avx2")]
 fn outward_avx2(min: &[f64; 3], max: &[f64; 3], origin: &[f64; 3]) -> __m256 {
-    let corner = |p: &[f64; 3]| _mm256_set_pd(0.0, p[2], p[1], p[0]);
-    let from = corner(origin);
-    let low = below(_mm256_sub_pd(corner(min), from));
-    let high = below(_mm256_sub_pd(from, corner(max)));
-    // The largest of all lanes; the spare ones hold next to nothing.
-    let far = |faces| _mm_andnot_ps(_mm_set1_ps(-0.0), faces);
-    let both = _mm_max_ps(far(low), far(high));
-    let half = _mm_max_ps(both, _mm_movehl_ps(both, both));
-    let all = _mm_max_ss(half, _mm_shuffle_ps::<1>(half, half));
-    let slack = _mm_set1_ps(slack(_mm_cvtss_f32(all)));
-    let low = _mm_blend_ps::<8>(low, slack);
-    let high = _mm_blend_ps::<8>(high, _mm_setzero_ps());
-    _mm256_set_m128(high, low)
+    // The spare lanes become -1, and a step less.
+    let [x, y, z] = *origin;
+    let low = _mm256_sub_pd(corner(min), _mm256_setr_pd(x, y, z, 1.0));
+    let high = _mm256_sub_pd(_mm256_setr_pd(x, y, z, -1.0), corner(max));
+    let nearest = _mm256_set_m128(_mm256_cvtpd_ps(high), _mm256_cvtpd_ps(low));
+    let far = _mm256_andnot_ps(_mm256_set1_ps(-0.0), nearest);
+    let off = _mm256_add_ps(
+        _mm256_mul_ps(far, _mm256_set1_ps(STEP)),
+        _mm256_set1_ps(LEAST),
+    );
+    _mm256_sub_ps(nearest, off)
 }
 
 #[inline]
@@ -144,22 +138,20 @@ fn take_avx2(corners: [&[f64; 3]; 2], origin: &[f64; 3], hold: &Hold, place: &mu
     _mm256_movemask_ps(_mm256_and_ps(inside, around)) == 0xFF
 }
 
-/// The lanes that are faces.
-const FACES: i32 = 0x77;
-
 #[inline]
 #[target_feature(enable = "avx2")]
 fn parts_avx2(a: &Down, b: &Down) -> (bool, bool) {
     let (a, b) = (one(a), one(b));
     // The halves of `b` change places: lower faces meet upper ones.
     let gap = _mm256_add_ps(a, _mm256_permute2f128_ps::<1>(b, b));
-    // The slack, in the last lane of the lower half, on all lanes.
-    let low = _mm256_permute2f128_ps::<0>(a, a);
-    let slack = _mm256_permute_ps::<0xFF>(low);
-    let least = _mm256_xor_ps(slack, _mm256_set1_ps(-0.0));
+    let far_down = _mm256_or_ps(a, _mm256_set1_ps(-0.0));
+    let least = _mm256_sub_ps(
+        _mm256_mul_ps(far_down, _mm256_set1_ps(SLACK_SHARE)),
+        _mm256_set1_ps(SLACK_LEAST),
+    );
     let apart = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(gap, _mm256_setzero_ps()));
     let sure = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(gap, least));
-    (apart & FACES != 0, sure & FACES == FACES)
+    (apart != 0, sure == 0xFF)
 }
 
 #[inline]
