@@ -50,6 +50,9 @@ impl SourceSlot {
 pub struct PairKey(u64);
 
 impl PairKey {
+    /// Of no pair: greater than any other.
+    pub(crate) const NOBODY: Self = Self(u64::MAX);
+
     /// The key of two different bodies, in either order.
     #[must_use]
     pub fn new(one: BodySlot, other: BodySlot) -> Self {

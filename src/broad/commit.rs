@@ -1,11 +1,12 @@
 //! From suggestions to the pair set: one place decides, for every method, which pairs end, begin or do not fit.
 //!
-//! In: keys that a method found (in any order, doubled, already stored, not allowed: all the same) and pairs whose
-//! end has a cause. Out: the pair set changed and the delta filled, both in the order of body ids. Slots of pairs
+//! In: keys that a method found (in any order, doubled, already stored, not allowed: all the same), of boxes that
+//! overlap or of some that only may, and pairs whose end has a cause. Out: the pair set changed and the delta filled, both in the order of body ids. Slots of pairs
 //! therefore depend neither on the method nor on the slots of bodies.
 
 use super::Proxies;
 use super::forced::Forced;
+use super::keys::KeySort;
 use super::members::{IN, Members, UNBOUNDED};
 use super::order::give_back;
 use crate::ids::{BodyId, BodySlot, PairKey, PairSlot};
@@ -19,20 +20,23 @@ const AHEAD: usize = 8;
 /// What an update has found so far; memory is kept over updates.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Found {
-    /// Pairs that may have begun, and then those that did.
+    /// Pairs of boxes that overlap, and some that no box decides.
     pub(super) began: Vec<PairKey>,
+    /// Pairs of boxes that may overlap.
+    pub(super) maybe: Vec<PairKey>,
     /// Pairs taken out of the set, with the order of the delta.
     ended: Vec<((BodyId, BodyId), Ended)>,
     /// ... and those of boxes that parted, in the order of keys.
     parted: Vec<Ended>,
-    /// Pairs to be stored, with the order of the delta, while they are put in it.
+    /// Pairs that may have to be stored, with the order of the delta, while they are put in it.
     ranked: Vec<((BodyId, BodyId), PairKey)>,
-    /// Stored pairs to look at, while some are taken out.
+    /// Memory for those that look at each stored pair.
     pub(super) slots: Vec<PairSlot>,
     /// Stored pairs that end, and why.
     pub(super) doomed: Vec<(PairSlot, EndCause)>,
     /// Bodies that were truncated before this update.
     truncated: Vec<BodySlot>,
+    sort: KeySort,
 }
 
 /// What decides on a pair.
@@ -61,6 +65,12 @@ impl<X: Proxies, P: PairPolicy> Judge<'_, X, P> {
         }
     }
 
+    /// Whether both bodies are in.
+    fn is_inside(&self, key: PairKey) -> bool {
+        let (low, high) = key.slots();
+        self.members.has(low, IN) && self.members.has(high, IN)
+    }
+
     /// Whether two bodies with boxes meet.
     fn overlaps(&self, key: PairKey) -> bool {
         let (low, high) = key.slots();
@@ -80,13 +90,16 @@ impl<X: Proxies, P: PairPolicy> Judge<'_, X, P> {
         }
     }
 
-    /// Whether a pair that is not stored must be.
-    pub(super) fn begins(&self, key: PairKey) -> bool {
+    /// Whether a pair that is not stored must be, if it is one of [`Found::began`].
+    fn begins(&self, key: PairKey) -> bool {
         let (low, high) = key.slots();
-        let inside = self.members.has(low, IN) && self.members.has(high, IN);
+        let inside = self.is_inside(key);
+        debug_assert!(
+            !inside || self.is_unconditional(key) || self.overlaps(key),
+            "{key:?} was told to overlap"
+        );
         inside
-            && (self.is_unconditional(key)
-                || (self.overlaps(key) && !self.policy.keeps(low) && !self.policy.keeps(high)))
+            && (self.is_unconditional(key) || (!self.policy.keeps(low) && !self.policy.keeps(high)))
             && self.policy.allows(low, high)
     }
 
@@ -115,11 +128,13 @@ impl Found {
     /// Ends an update: what it needed more of than most do is given back.
     pub(super) fn close_tick(&mut self, bodies: usize) {
         give_back(&mut self.began, bodies);
+        give_back(&mut self.maybe, bodies);
         give_back(&mut self.ended, bodies);
         give_back(&mut self.parted, bodies);
         give_back(&mut self.ranked, bodies);
         give_back(&mut self.slots, bodies);
         give_back(&mut self.doomed, bodies);
+        self.sort.close_tick(bodies);
     }
 
     /// Takes a stored pair out.
@@ -139,29 +154,13 @@ impl Found {
     /// Takes out the stored pairs of boxes that parted, unless something else keeps them.
     pub(super) fn part(
         &mut self,
-        parted: &mut [PairKey],
+        parted: &mut Vec<PairKey>,
         judge: &Judge<'_, impl Proxies, impl PairPolicy>,
         pairs: &mut PairSet,
     ) {
         // In the order of the delta, and of memory.
-        parted.sort_unstable();
-        // Each step for all pairs before the next one: memory for the steps to come is asked for meanwhile.
-        let mut doomed = std::mem::take(&mut self.slots);
-        doomed.clear();
-        for (at, key) in parted.iter().enumerate() {
-            pairs.prefetch_find(parted, at);
-            if let Some(slot) = pairs.find(*key).filter(|_| judge.lets_go(*key)) {
-                doomed.push(slot);
-            }
-        }
-        for (at, slot) in doomed.iter().enumerate() {
-            pairs.prefetch_remove(&doomed, at);
-            if let Some(key) = pairs.remove(*slot) {
-                let (slot, cause) = (*slot, EndCause::Separated);
-                self.parted.push(Ended { slot, key, cause });
-            }
-        }
-        self.slots = doomed;
+        self.sort.sort(parted);
+        pairs.part(parted, |key| judge.lets_go(key), &mut self.parted);
     }
 
     /// Stores what begins and fills the delta.
@@ -180,18 +179,11 @@ impl Found {
             self.ended.sort_unstable_by_key(|(rank, _)| *rank);
             delta.ended.extend(self.ended.iter().map(|(_, e)| *e));
         }
-        self.select(judge, pairs);
+        self.rank(judge);
         self.truncated.clear();
         self.truncated.extend_from_slice(pairs.truncated());
         pairs.forget_missing();
-        pairs.reserve(self.began.len());
-        for (at, key) in self.began.iter().enumerate() {
-            pairs.prefetch_insert(&self.began, at);
-            match pairs.insert(*key) {
-                Some(slot) => delta.began.push(slot),
-                None => pairs.miss(*key),
-            }
-        }
+        pairs.insert_all(&self.began, |key| judge.begins(key), &mut delta.began);
         // What a body of unknown place misses cannot be found again by its box, so it stays marked.
         for slot in self.truncated.drain(..) {
             if judge.members.has(slot, IN) && judge.policy.keeps(slot) {
@@ -200,23 +192,19 @@ impl Found {
         }
     }
 
-    /// Of the suggestions those that must be stored and are not, in the order of ids.
-    fn select(&mut self, judge: &Judge<'_, impl Proxies, impl PairPolicy>, pairs: &PairSet) {
-        self.began.sort_unstable();
-        self.began.dedup();
-        let mut kept = 0;
-        for at in 0..self.began.len() {
-            pairs.prefetch_find(&self.began, at);
-            if let Some(ahead) = self.began.get(at + AHEAD) {
+    /// Puts what may have to be stored in the order of ids, each once.
+    fn rank(&mut self, judge: &Judge<'_, impl Proxies, impl PairPolicy>) {
+        for (at, key) in self.maybe.iter().enumerate() {
+            if let Some(ahead) = self.maybe.get(at + AHEAD) {
                 judge.prefetch(*ahead);
             }
-            let key = self.began[at];
-            if pairs.find(key).is_none() && judge.begins(key) {
-                self.began[kept] = key;
-                kept += 1;
+            let meet = judge.overlaps(*key) || judge.is_unconditional(*key);
+            if judge.is_inside(*key) && meet {
+                self.began.push(*key);
             }
         }
-        self.began.truncate(kept);
+        self.sort.sort(&mut self.began);
+        self.began.dedup();
         if !judge.members.ids_ascend() {
             let keys = self.began.iter();
             self.ranked.clear();

@@ -23,6 +23,7 @@ mod brute;
 mod commit;
 mod forced;
 mod grid;
+mod keys;
 mod members;
 mod of_world;
 mod order;
@@ -202,12 +203,12 @@ impl BroadPhase {
             Engine::Brute => brute::update(&judge, pairs, &mut self.found),
             Engine::Sap(sap) => {
                 touched::end(&judge, pairs, &mut self.found);
-                sap.update(&self.members, &mut self.found.began, &mut self.work);
+                sap.update(&self.members, &mut self.found.maybe, &mut self.work);
                 touched::begin(&judge, &mut self.found);
             }
             Engine::Grid(grid) => {
                 touched::end(&judge, pairs, &mut self.found);
-                grid.update(&self.members, &mut self.found.began, &mut self.work);
+                grid.update(&self.members, &mut self.found.maybe, &mut self.work);
                 touched::begin(&judge, &mut self.found);
             }
             Engine::Order(order) => {
@@ -245,6 +246,9 @@ impl BroadPhase {
                 }
                 self.causes[at] = removed.cause;
             }
+        }
+        if !changes.removed.is_empty() {
+            pairs.list();
         }
         for removed in &changes.removed {
             while let Some(slot) = pairs.first_of(removed.slot) {

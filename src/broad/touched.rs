@@ -4,7 +4,7 @@
 use super::Proxies;
 use super::commit::{Found, Judge};
 use super::members::{ASKED, IN, MOVED, REFILTERED, UNBOUNDED};
-use crate::ids::PairKey;
+use crate::ids::{BodySlot, PairKey};
 use crate::pairs::{PairPolicy, PairSet};
 
 /// Ends the pairs of moved and asked bodies whose boxes parted or whose filters changed.
@@ -16,15 +16,16 @@ pub(super) fn end(
     found: &mut Found,
 ) {
     let members = judge.members;
+    let looks = |slot: &BodySlot| members.has(*slot, MOVED | REFILTERED);
+    if members.touched().iter().any(looks) {
+        pairs.list();
+    }
     let mut doomed = std::mem::take(&mut found.doomed);
-    for slot in members.touched() {
-        if !members.has(*slot, MOVED | REFILTERED) {
-            continue;
-        }
+    for slot in members.touched().iter().filter(|slot| looks(slot)) {
         let mine = members.has(*slot, REFILTERED);
         for (pair, other) in pairs.partners(*slot) {
             // Of two such bodies the lower looks.
-            if other < *slot && members.has(other, MOVED | REFILTERED) {
+            if other < *slot && looks(&other) {
                 continue;
             }
             let refiltered = mine || members.has(other, REFILTERED);
@@ -46,18 +47,18 @@ pub(super) fn end(
 /// Suggests the pairs that no box decides: forced ones and those of unbounded bodies.
 pub(super) fn begin(judge: &Judge<'_, impl Proxies, impl PairPolicy>, found: &mut Found) {
     let members = judge.members;
-    found.began.extend_from_slice(judge.forced.changed());
+    found.maybe.extend_from_slice(judge.forced.changed());
     for slot in members.touched() {
         if !members.has(*slot, ASKED) || !members.has(*slot, IN) {
             continue;
         }
-        found.began.extend(judge.forced.of(*slot));
+        found.maybe.extend(judge.forced.of(*slot));
         let others = if members.has(*slot, UNBOUNDED) {
             members.bounded()
         } else {
             members.unbounded()
         };
         let keys = others.iter().map(|other| PairKey::new(*slot, *other));
-        found.began.extend(keys);
+        found.maybe.extend(keys);
     }
 }

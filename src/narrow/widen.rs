@@ -13,17 +13,22 @@ impl Narrow {
     /// Compares the pairs of every body that moved or whose status changed with their certificates.
     ///
     /// Undecided pairs of earlier ticks are in the work list already; this adds those that have become undecided.
-    pub fn widen(&mut self, world: &World, pairs: &PairSet) {
-        self.enlist_sweeps(world, pairs);
+    pub fn widen(&mut self, world: &World, pairs: &mut PairSet) {
         let changes = world.changes();
+        let changed = changes.moved.len() + changes.restated.len();
+        // Above this share a straight walk over the 24-byte records beats chasing each body's list.
+        let many = changed * 4 > world.slots_len();
+        let few = changed > 0 && !many;
+        if few || !changes.requery.is_empty() || !world.travelled().is_empty() {
+            pairs.list();
+        }
+        self.enlist_sweeps(world, pairs);
         for &body in &changes.requery {
             for slot in pairs.pairs_of(body) {
                 self.follow_rules(slot, world);
             }
         }
-        let changed = changes.moved.len() + changes.restated.len();
-        // Above this share a straight walk over the 24-byte records beats chasing each body's list.
-        if changed * 4 > world.slots_len() {
+        if many {
             for slot in 0..self.hot.len() {
                 self.ask_ahead_of_walk(slot, world);
                 if self.hot[slot].live {

@@ -53,18 +53,30 @@ impl Index {
     /// * `is_it` - whether the key at a place that is in the table is the one.
     #[inline]
     pub(crate) fn find(&self, hash: u64, is_it: impl Fn(u32) -> bool) -> Option<u32> {
+        let at = self.position(hash, is_it)?;
+        Some(self.table[at].place)
+    }
+
+    /// Where in the table a key stands.
+    #[inline]
+    fn position(&self, hash: u64, is_it: impl Fn(u32) -> bool) -> Option<usize> {
         if self.table.is_empty() {
             return None;
         }
-        let mixed = mix(hash);
+        self.search(mix(hash), is_it).ok()
+    }
+
+    /// Where in the table a key stands, or else the first free place on the way.
+    #[inline]
+    fn search(&self, mixed: u32, is_it: impl Fn(u32) -> bool) -> Result<usize, usize> {
         let mut at = self.home(mixed);
         loop {
             let entry = self.table[at];
             if entry.place == NONE {
-                return None;
+                return Err(at);
             }
             if entry.mixed == mixed && is_it(entry.place) {
-                return Some(entry.place);
+                return Ok(at);
             }
             at = self.after(at);
         }
@@ -87,8 +99,21 @@ impl Index {
 
     /// Notes the place of a key that is not in the table.
     ///
-    /// * `places` - so many there is room for in what holds the keys: the table grows when that does, at no other time.
+    /// * `places` - as for [`Index::grow`].
     pub(crate) fn insert(&mut self, hash: u64, place: u32, places: usize) {
+        self.grow(places);
+        self.put(Entry {
+            mixed: mix(hash),
+            place,
+        });
+        self.len += 1;
+    }
+
+    /// Room for one key more.
+    ///
+    /// * `places` - so many there is room for in what holds the keys: the table grows when that does, at no other time.
+    #[inline]
+    pub(crate) fn grow(&mut self, places: usize) {
         if OF * (self.len + 1) > TAKEN * self.table.len() {
             let size = (OF * places.max(self.len + 1)).div_ceil(TAKEN).max(LEAST);
             let old = std::mem::replace(&mut self.table, vec![EMPTY; size]);
@@ -96,10 +121,31 @@ impl Index {
                 self.put(entry);
             }
         }
-        self.put(Entry {
+    }
+
+    /// Where in the table a key belongs that is not in it, until the table next changes; `None` where the key is in it,
+    /// or the table has no room at all.
+    ///
+    /// * `is_it` - as for [`Index::find`].
+    #[inline]
+    pub(crate) fn vacancy(&self, hash: u64, is_it: impl Fn(u32) -> bool) -> Option<usize> {
+        if self.table.is_empty() {
+            return None;
+        }
+        match self.search(mix(hash), is_it) {
+            Ok(_) => None,
+            Err(free) => Some(free),
+        }
+    }
+
+    /// Notes the place of a key where [`Index::vacancy`] said.
+    #[inline]
+    pub(crate) fn fill(&mut self, at: usize, hash: u64, place: u32) {
+        debug_assert_eq!(self.table[at].place, NONE);
+        self.table[at] = Entry {
             mixed: mix(hash),
             place,
-        });
+        };
         self.len += 1;
     }
 
@@ -110,15 +156,31 @@ impl Index {
         if self.table.is_empty() {
             return;
         }
-        let mut hole = self.home(mix(hash));
-        while self.table[hole].place != place {
-            if self.table[hole].place == NONE {
+        let mut at = self.home(mix(hash));
+        while self.table[at].place != place {
+            if self.table[at].place == NONE {
                 debug_assert!(false, "only what is in the table is taken out");
                 return;
             }
-            hole = self.after(hole);
+            at = self.after(at);
         }
-        // What stands behind the hole and may not be cut off from its home moves into it.
+        self.close(at);
+    }
+
+    /// Takes a key out and returns its place; `None` where it is not in the table.
+    ///
+    /// * `is_it` - as for [`Index::find`].
+    #[inline]
+    pub(crate) fn take(&mut self, hash: u64, is_it: impl Fn(u32) -> bool) -> Option<u32> {
+        let at = self.position(hash, is_it)?;
+        let place = self.table[at].place;
+        self.close(at);
+        Some(place)
+    }
+
+    /// Empties a place of the table: what stands behind it and may not be cut off from its home moves into it.
+    #[inline]
+    fn close(&mut self, mut hole: usize) {
         let mut at = hole;
         loop {
             at = self.after(at);

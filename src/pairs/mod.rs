@@ -1,8 +1,8 @@
 //! The pair set: overlapping, allowed pairs only, so O(n + k) memory.
 //!
 //! In: what `broad` decides, its only writer. Out: [`PairSet`] (dense slots, the pairs of one body, lookup by key)
-//! and [`PairDelta`] (what began and ended in this tick). Each pair stands in the lists of its two bodies; a lookup by
-//! key goes through a table of places (`index`). A map of pairs that every tick walks or fills anew is what made one
+//! and [`PairDelta`] (what began and ended in this tick). While somebody asks for the pairs of single bodies, each pair
+//! stands in the lists of its two (`set::lists`); a lookup by key goes through a table of places (`index`). A map of pairs that every tick walks or fills anew is what made one
 //! known engine six times slower than its own tree; here only what begins and ends is looked up.
 
 use crate::ids::{BodySlot, PairKey, PairSlot};

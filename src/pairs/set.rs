@@ -1,61 +1,24 @@
-//! The set itself: dense slots, and for each body the list of its pairs.
+//! The set itself: dense slots, and what finds a pair by its key or by one of its bodies.
 
 use super::index::Index;
-use crate::ids::{BodySlot, PairKey, PairSlot};
+use super::{Ended, PairKey};
+use crate::ids::{BodySlot, PairSlot};
+use crate::wire::EndCause;
 
 mod ahead;
+mod free;
+mod lists;
 mod validate;
 
-/// No pair.
+use free::Free;
+use lists::Lists;
+
+/// No slot is that high.
 const NONE: u32 = u32::MAX;
-/// In place of the pair before, in the first of the two lists: no pair stands here. No slot is that high.
-const DEAD: u32 = NONE - 1;
 /// Least places that the set grows by, ...
 const LEAST: usize = 16;
 /// ... and one for so many: what the pairs of a scene come and go by. Their memory is most of that of a dense scene.
 const GROWTH: usize = 8;
-
-/// One place of the set: a pair, its neighbours in the lists of its two bodies (0: lower slot, 1: higher slot).
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    key: PairKey,
-    next: [u32; 2],
-    prev: [u32; 2],
-}
-
-impl Node {
-    /// A pair in no list yet.
-    fn new(key: PairKey) -> Self {
-        Self {
-            key,
-            next: [NONE; 2],
-            prev: [NONE; 2],
-        }
-    }
-
-    /// Whether a pair stands here.
-    fn is_live(&self) -> bool {
-        self.prev[0] != DEAD
-    }
-
-    /// The key's two bodies.
-    fn bodies(&self) -> [BodySlot; 2] {
-        let (low, high) = self.key.slots();
-        [low, high]
-    }
-
-    /// Which of the two lists is that of `body`.
-    fn side(&self, body: BodySlot) -> usize {
-        usize::from(self.key.slots().0 != body)
-    }
-}
-
-/// The first pair of a body and how many it has.
-#[derive(Clone, Copy, Debug)]
-struct Head {
-    first: u32,
-    len: u32,
-}
 
 /// The pairs of overlapping boxes that the filters allow.
 ///
@@ -63,10 +26,11 @@ struct Head {
 /// mixed up as long as they are dropped for each `PairDelta::ended`.
 #[derive(Clone, Debug)]
 pub struct PairSet {
-    nodes: Vec<Node>,
-    heads: Vec<Head>,
+    /// By slot; where no pair stands, [`PairKey::NOBODY`].
+    keys: Vec<PairKey>,
+    lists: Lists,
     index: Index,
-    free: Vec<u32>,
+    free: Free,
     /// Freed since the last `open_tick`: not to be reused yet.
     resting: Vec<u32>,
     len: usize,
@@ -84,10 +48,10 @@ impl PairSet {
     #[must_use]
     pub fn new(limit: usize) -> Self {
         Self {
-            nodes: Vec::new(),
-            heads: Vec::new(),
+            keys: Vec::new(),
+            lists: Lists::default(),
             index: Index::default(),
-            free: Vec::new(),
+            free: Free::default(),
             resting: Vec::new(),
             len: 0,
             limit: limit.min(NONE as usize / 2),
@@ -112,7 +76,7 @@ impl PairSet {
     /// One more than the highest slot index ever in use: the length for arrays that run parallel to the set.
     #[must_use]
     pub fn slots_len(&self) -> usize {
-        self.nodes.len()
+        self.keys.len()
     }
 
     /// Most pairs it holds.
@@ -145,141 +109,203 @@ impl PairSet {
     /// The bodies of a pair; `None` where no pair is.
     #[must_use]
     pub fn get(&self, slot: PairSlot) -> Option<PairKey> {
-        let node = self.nodes.get(slot.index())?;
-        node.is_live().then_some(node.key)
+        let key = self.keys.get(slot.index()).copied();
+        key.filter(|key| *key != PairKey::NOBODY)
     }
 
     /// Where the pair of two bodies is. Cost: one probe or two.
     #[must_use]
     pub fn find(&self, key: PairKey) -> Option<PairSlot> {
-        let is_it = |at: u32| self.nodes[at as usize].key == key;
+        let is_it = |at: u32| self.keys[at as usize] == key;
         self.index.find(key.bits(), is_it).map(PairSlot)
     }
 
-    /// How many pairs a body has.
+    /// How many pairs a body has. Cost: as [`PairSet::pairs_of`].
     #[must_use]
     pub fn pairs_len(&self, body: BodySlot) -> usize {
-        self.heads.get(body.index()).map_or(0, |h| h.len as usize)
+        if self.lists.is_kept() {
+            return self.lists.len_of(body);
+        }
+        self.pairs_of(body).count()
     }
 
-    /// The pairs of a body, the youngest first.
+    /// The pairs of a body, in no order that means anything.
+    ///
+    /// Cost: those pairs where the engine read such lists itself of late, else a look at every pair.
     pub fn pairs_of(&self, body: BodySlot) -> impl Iterator<Item = PairSlot> + '_ {
-        let mut at = self.heads.get(body.index()).map_or(NONE, |h| h.first);
-        std::iter::from_fn(move || {
-            let node = self.nodes.get(at as usize)?;
-            let here = PairSlot(at);
-            at = node.next[node.side(body)];
-            Some(here)
-        })
+        let listed = self.lists.is_kept().then(|| self.lists.of(body));
+        let looked = (!self.lists.is_kept()).then(|| {
+            self.iter().filter_map(move |(slot, key)| {
+                let (low, high) = key.slots();
+                (low == body || high == body).then_some(slot)
+            })
+        });
+        listed
+            .into_iter()
+            .flatten()
+            .chain(looked.into_iter().flatten())
     }
 
-    /// The bodies that a body is paired with, with the pair's slot.
+    /// The bodies that a body is paired with, with the pair's slot. Cost: as [`PairSet::pairs_of`].
     pub fn partners(&self, body: BodySlot) -> impl Iterator<Item = (PairSlot, BodySlot)> + '_ {
         self.pairs_of(body).map(move |slot| {
-            let node = &self.nodes[slot.index()];
-            (slot, node.bodies()[1 - node.side(body)])
+            let (low, high) = self.keys[slot.index()].slots();
+            (slot, if low == body { high } else { low })
         })
+    }
+
+    /// The pairs of single bodies are about to be asked for: from now on that costs those pairs alone.
+    pub(crate) fn list(&mut self) {
+        let (slots, room) = (self.keys.len(), self.keys.capacity());
+        let Self { lists, keys, .. } = self;
+        lists.ask(live(keys), slots, room);
     }
 
     /// All pairs, in the order of slots.
     pub fn iter(&self) -> impl Iterator<Item = (PairSlot, PairKey)> + '_ {
-        (0_u32..)
-            .zip(&self.nodes)
-            .filter_map(|(at, node)| node.is_live().then_some((PairSlot(at), node.key)))
+        live(&self.keys)
     }
 
     /// Begins a tick: slots freed in the one before may be used again, the lowest first.
     pub(crate) fn open_tick(&mut self) {
-        self.resting.sort_unstable_by(|a, b| b.cmp(a));
-        self.free.append(&mut self.resting);
+        for slot in self.resting.drain(..) {
+            self.free.put(slot);
+        }
     }
 
     /// Makes room for so many pairs more, as far as they may be stored. Pairs that begin together are told together, so
     /// that memory grows once by what they need and not by doubling.
     pub(crate) fn reserve(&mut self, more: usize) {
         let more = more.min(self.limit - self.len);
-        let len = self.nodes.len() + more.saturating_sub(self.free.len());
-        if len > self.nodes.capacity() {
+        let len = self.keys.len() + more.saturating_sub(self.free.len());
+        if len > self.keys.capacity() {
             let len = len + (len / GROWTH).max(LEAST);
-            self.nodes.reserve_exact(len - self.nodes.len());
+            self.keys.reserve_exact(len - self.keys.len());
+            self.free.cover(self.keys.capacity());
+            self.lists.cover(self.keys.capacity());
         }
     }
 
     /// Adds a pair that is not in the set; `None` when the set is full.
     pub(crate) fn insert(&mut self, key: PairKey) -> Option<PairSlot> {
+        self.index.grow(self.keys.capacity());
+        let at = self.vacancy(key)?;
+        self.insert_at(at, key)
+    }
+
+    /// Adds pairs, in this order, but for those that are in the set, as far as there is room for them; the others are
+    /// missed.
+    ///
+    /// * `begins` - whether one must be added.
+    pub(crate) fn insert_all(
+        &mut self,
+        keys: &[PairKey],
+        begins: impl Fn(PairKey) -> bool,
+        began: &mut Vec<PairSlot>,
+    ) {
+        if self.len + keys.len() > self.keys.capacity() {
+            let new = keys.iter().filter(|key| self.find(**key).is_none());
+            self.reserve(new.filter(|key| begins(**key)).count());
+        }
+        let first = began.len();
+        for (at, key) in keys.iter().enumerate() {
+            self.prefetch_insert(keys, at);
+            self.index.grow(self.keys.capacity());
+            if let Some(at) = self.vacancy(*key)
+                && begins(*key)
+            {
+                match self.insert_at(at, *key) {
+                    Some(slot) => began.push(slot),
+                    None => self.miss(*key),
+                }
+            }
+        }
+        self.lists.note_change(began.len() - first, self.len);
+    }
+
+    /// Where in the index a pair that is not in the set is to be noted.
+    #[inline]
+    fn vacancy(&self, key: PairKey) -> Option<usize> {
+        let is_it = |at: u32| self.keys[at as usize] == key;
+        self.index.vacancy(key.bits(), is_it)
+    }
+
+    /// Adds a pair whose place in the index is known.
+    #[inline]
+    fn insert_at(&mut self, place: usize, key: PairKey) -> Option<PairSlot> {
         if self.len >= self.limit {
             return None;
         }
-        let mut node = Node::new(key);
-        let at = if let Some(at) = self.free.pop() {
+        let at = if let Some(at) = self.free.take() {
+            self.keys[at as usize] = key;
             at
         } else {
             self.reserve(1);
-            self.nodes.push(node);
-            small(self.nodes.len() - 1)
+            self.keys.push(key);
+            small(self.keys.len() - 1)
         };
-        for (side, body) in node.bodies().into_iter().enumerate() {
-            let empty = Head {
-                first: NONE,
-                len: 0,
-            };
-            if self.heads.len() <= body.index() {
-                self.heads.resize(body.index() + 1, empty);
-            }
-            let head = &mut self.heads[body.index()];
-            node.next[side] = head.first;
-            let second = head.first;
-            *head = Head {
-                first: at,
-                len: head.len + 1,
-            };
-            if let Some(second) = self.nodes.get_mut(second as usize) {
-                let its_side = second.side(body);
-                second.prev[its_side] = at;
-            }
-        }
-        self.nodes[at as usize] = node;
-        self.index.insert(key.bits(), at, self.nodes.capacity());
+        self.lists.link(PairSlot(at), key);
+        self.index.fill(place, key.bits(), at);
         self.len += 1;
         Some(PairSlot(at))
     }
 
     /// Takes a pair out; its slot rests until the next tick. `None` where no pair is.
     pub(crate) fn remove(&mut self, slot: PairSlot) -> Option<PairKey> {
-        let node = *self.nodes.get(slot.index()).filter(|n| n.is_live())?;
-        for (side, body) in node.bodies().into_iter().enumerate() {
-            let (prev, next) = (node.prev[side], node.next[side]);
-            let head = &mut self.heads[body.index()];
-            head.len -= 1;
-            if prev == NONE {
-                head.first = next;
-            } else {
-                let before = &mut self.nodes[prev as usize];
-                let its_side = before.side(body);
-                before.next[its_side] = next;
-            }
-            if let Some(after) = self.nodes.get_mut(next as usize) {
-                let its_side = after.side(body);
-                after.prev[its_side] = prev;
-            }
-        }
-        self.index.remove(node.key.bits(), slot.0);
-        self.nodes[slot.index()].prev[0] = DEAD;
-        self.resting.push(slot.0);
-        self.len -= 1;
-        Some(node.key)
+        let key = self.get(slot)?;
+        self.lists.unlink(slot, key);
+        self.index.remove(key.bits(), slot.0);
+        self.bury(slot);
+        Some(key)
     }
 
-    /// The youngest pair of a body.
+    /// Takes pairs out that may be in the set, because their boxes have parted.
+    ///
+    /// * `goes` - whether one does go.
+    pub(crate) fn part(
+        &mut self,
+        keys: &[PairKey],
+        goes: impl Fn(PairKey) -> bool,
+        ended: &mut Vec<Ended>,
+    ) {
+        self.lists.note_change(keys.len(), self.len);
+        let (first, cause) = (ended.len(), EndCause::Separated);
+        for (at, key) in keys.iter().enumerate() {
+            self.prefetch_find(keys, at);
+            let slots = &self.keys;
+            let is_it = |at: u32| slots[at as usize] == *key && goes(*key);
+            if let Some(slot) = self.index.take(key.bits(), is_it).map(PairSlot) {
+                let key = *key;
+                ended.push(Ended { slot, key, cause });
+                self.bury(slot);
+            }
+        }
+        // Each step for all pairs before the next one: memory for the steps to come is asked for meanwhile.
+        if self.lists.is_kept() {
+            let ended = &ended[first..];
+            for (at, Ended { slot, key, .. }) in ended.iter().enumerate() {
+                self.prefetch_unlink(ended, at);
+                self.lists.unlink(*slot, *key);
+            }
+        }
+    }
+
+    /// Lets a slot rest.
+    fn bury(&mut self, slot: PairSlot) {
+        self.keys[slot.index()] = PairKey::NOBODY;
+        self.resting.push(slot.0);
+        self.len -= 1;
+    }
+
+    /// A pair of a body.
     pub(crate) fn first_of(&self, body: BodySlot) -> Option<PairSlot> {
-        let first = self.heads.get(body.index())?.first;
-        (first != NONE).then_some(PairSlot(first))
+        self.pairs_of(body).next()
     }
 
     /// Empties the set, keeps the memory; every slot may be used again at once.
     pub(crate) fn clear(&mut self) {
-        self.nodes.clear();
-        self.heads.clear();
+        self.keys.clear();
+        self.lists.clear();
         self.index.clear();
         self.free.clear();
         self.resting.clear();
@@ -315,6 +341,14 @@ impl PairSet {
     }
 }
 
+/// The pairs among the keys by slot.
+fn live(keys: &[PairKey]) -> impl Iterator<Item = (PairSlot, PairKey)> + '_ {
+    let slots = (0_u32..).map(PairSlot);
+    slots
+        .zip(keys.iter().copied())
+        .filter(|(_, key)| *key != PairKey::NOBODY)
+}
+
 /// An index as the 32 bits it is stored in; lengths here stay far below (see `limits`).
 fn small(index: usize) -> u32 {
     debug_assert!(index < NONE as usize);
@@ -322,53 +356,4 @@ fn small(index: usize) -> u32 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn key(a: u32, b: u32) -> PairKey {
-        PairKey::new(BodySlot(a), BodySlot(b))
-    }
-
-    #[test]
-    fn a_slot_freed_in_a_tick_is_not_reused_before_the_next() {
-        let mut set = PairSet::new(10);
-        let first = set.insert(key(1, 2)).unwrap();
-        assert_eq!(set.remove(first), Some(key(1, 2)));
-        let second = set.insert(key(1, 2)).unwrap();
-        assert_ne!(first, second);
-        set.open_tick();
-        assert_eq!(set.insert(key(3, 2)), Some(first));
-        assert_eq!(set.get(first), Some(key(2, 3)));
-        set.validate().unwrap();
-    }
-
-    #[test]
-    fn the_pairs_of_a_body_are_found_whatever_was_removed_between() {
-        let mut set = PairSet::new(100);
-        let slots: Vec<_> = (1..9).map(|b| set.insert(key(0, b)).unwrap()).collect();
-        set.insert(key(5, 6)).unwrap();
-        for at in [0, 3, 7, 4] {
-            set.remove(slots[at]);
-            set.validate().unwrap();
-        }
-        let left: Vec<u32> = set.partners(BodySlot(0)).map(|(_, b)| b.0).collect();
-        assert_eq!(left, [7, 6, 3, 2]);
-        assert!(set.find(key(6, 5)).is_some() && set.find(key(0, 5)).is_none());
-        assert_eq!(set.remove(slots[0]), None);
-        assert_eq!(set.get(PairSlot(99)), None);
-    }
-
-    #[test]
-    fn a_full_set_takes_no_pair_and_marks_both_bodies() {
-        let mut set = PairSet::new(1);
-        assert!(set.insert(key(0, 1)).is_some());
-        assert!(set.insert(key(0, 2)).is_none());
-        set.miss(key(0, 2));
-        assert!(set.is_truncated(BodySlot(0)) && set.is_truncated(BodySlot(2)));
-        assert!(!set.is_truncated(BodySlot(1)) && !set.is_truncated(BodySlot(77)));
-        assert_eq!((set.missing(), set.truncated().len()), (1, 2));
-        set.forget_missing();
-        assert_eq!((set.missing(), set.truncated().len()), (0, 0));
-        set.validate().unwrap();
-    }
-}
+mod tests;

@@ -248,7 +248,7 @@ impl Engine {
     fn widen(&mut self) {
         self.narrow
             .begin(self.tick, &self.world, &self.pairs, &self.delta);
-        self.narrow.widen(&self.world, &self.pairs);
+        self.narrow.widen(&self.world, &mut self.pairs);
     }
 
     /// Spends what the budget leaves above the floor; returns the units spent.

@@ -1,0 +1,90 @@
+//! Which slots of the set are free: a bit each, so that the lowest is found without any order being kept.
+
+/// Bits of a word.
+const BITS: usize = u64::BITS as usize;
+
+/// Free slots.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Free {
+    words: Vec<u64>,
+    /// No word before this one has any.
+    from: usize,
+    len: usize,
+}
+
+impl Free {
+    /// How many.
+    pub(super) fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Room for so many slots.
+    pub(super) fn cover(&mut self, slots: usize) {
+        let words = slots.div_ceil(BITS);
+        if words > self.words.len() {
+            self.words.reserve_exact(words - self.words.len());
+            self.words.resize(words, 0);
+        }
+    }
+
+    /// Frees a slot that is not free.
+    #[inline]
+    pub(super) fn put(&mut self, slot: u32) {
+        let at = slot as usize / BITS;
+        self.cover(slot as usize + 1);
+        debug_assert_eq!(self.words[at] >> (slot % u64::BITS) & 1, 0);
+        self.words[at] |= 1 << (slot % u64::BITS);
+        self.from = self.from.min(at);
+        self.len += 1;
+    }
+
+    /// Takes the lowest.
+    #[inline]
+    pub(super) fn take(&mut self) -> Option<u32> {
+        let rest = self.words.get(self.from..)?;
+        let ahead = rest.iter().position(|word| *word != 0);
+        self.from += ahead.unwrap_or(rest.len());
+        let word = self.words.get_mut(self.from)?;
+        let bit = word.trailing_zeros();
+        *word &= *word - 1;
+        self.len -= 1;
+        u32::try_from(self.from * BITS)
+            .ok()
+            .map(|first| first + bit)
+    }
+
+    /// None is.
+    pub(super) fn clear(&mut self) {
+        self.words.fill(0);
+        (self.from, self.len) = (0, 0);
+    }
+
+    /// Whether a slot is.
+    pub(super) fn has(&self, slot: usize) -> bool {
+        let word = self.words.get(slot / BITS);
+        word.is_some_and(|word| word >> (slot % BITS) & 1 == 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lowest_is_taken_first_whenever_it_was_freed() {
+        let mut free = Free::default();
+        assert_eq!(free.take(), None);
+        for slot in [70, 3, 200, 64] {
+            free.put(slot);
+        }
+        assert_eq!((free.take(), free.take()), (Some(3), Some(64)));
+        free.put(5);
+        assert!(free.has(5) && !free.has(64) && !free.has(1000));
+        let left = [free.take(), free.take(), free.take(), free.take()];
+        assert_eq!(left, [Some(5), Some(70), Some(200), None]);
+        assert_eq!(free.len(), 0);
+        free.put(1);
+        free.clear();
+        assert_eq!((free.take(), free.len()), (None, 0));
+    }
+}
