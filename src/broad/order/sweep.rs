@@ -18,15 +18,16 @@ use crate::simd::boxes::{Boxes16, LANES, Lanes, WIDTH, Work, prefetch, slack};
 
 /// Blocks near one that are worked on together: what the passes hand on stays in the first cache.
 const TOGETHER: usize = 64;
+/// Sides whose lanes make a word.
+const SIDES: usize = u64::BITS as usize / WIDTH;
 /// Blocks ahead whose boxes are asked for.
 const AHEAD: usize = 2;
 
-/// Lanes of a block, to be compared with the boxes of another, or of itself.
+/// A block of which some lanes are to be compared with the boxes of another, or of itself.
 #[derive(Clone, Copy, Debug, Default)]
 struct Side {
     block: u32,
     against: u32,
-    lanes: u16,
 }
 
 /// What a box met: the place of its side, its lane, and lanes of the other block.
@@ -98,8 +99,9 @@ struct Scratch {
     walk: Walk,
     /// Blocks near one.
     near: Vec<u32>,
-    /// One more than there can be, which the last step reads.
-    sides: [Side; TOGETHER + 1],
+    sides: [Side; TOGETHER],
+    /// ... and its lanes. A word more than there can be: some are read together.
+    lanes: [u16; TOGETHER + SIDES],
     /// As long as the most there can be, and one more.
     hits: Vec<Hit>,
     matrices: [Matrix; TOGETHER],
@@ -110,7 +112,8 @@ impl Default for Scratch {
         Self {
             walk: Walk::default(),
             near: Vec::new(),
-            sides: [Side::default(); TOGETHER + 1],
+            sides: [Side::default(); TOGETHER],
+            lanes: [0; TOGETHER + SIDES],
             hits: Vec::new(),
             matrices: [[0; WIDTH]; TOGETHER],
         }
@@ -173,7 +176,7 @@ impl Work for Sweep<'_> {
             tests += near.len() as u64;
             for some in near.chunks(TOGETHER) {
                 let (sides, boxes) = scratch.sift(lanes, field, block, some);
-                let hits = scratch.compare(lanes, field, boxes);
+                let hits = scratch.compare(lanes, field, sides);
                 if self.search == Search::Near {
                     scratch.list(hits, &mut listed);
                 } else {
@@ -216,58 +219,59 @@ impl Scratch {
             let columns = lanes.meets(&field.fat[*other as usize], bound);
             let (few, many) = (rows.count_ones(), columns.count_ones());
             let rows_are_fewer = few <= many;
-            let (block, other) = (small(block), *other);
+            let (block, against) = (small(block), *other);
             self.sides[kept] = if rows_are_fewer {
-                Side {
-                    block,
-                    against: other,
-                    lanes: rows,
-                }
+                Side { block, against }
             } else {
                 Side {
-                    block: other,
+                    block: against,
                     against: block,
-                    lanes: columns,
                 }
             };
+            self.lanes[kept] = if rows_are_fewer { rows } else { columns };
             let any = (rows != 0) & (columns != 0);
             kept += usize::from(any);
             boxes += if any { few.min(many) as usize } else { 0 };
         }
+        self.lanes[kept..kept + SIDES].fill(0);
         (kept, boxes)
     }
 
     /// Compares each box of the sides with the block that it is near; returns how many met any.
     #[inline(always)]
-    fn compare<L: Lanes>(&mut self, lanes: L, field: Field<'_>, boxes: usize) -> usize {
-        let (mut at, mut left, mut kept) = (0, self.sides[0].lanes, 0);
-        for _ in 0..boxes {
-            let side = &self.sides[at];
-            let lane = left.trailing_zeros();
-            let one = field.fat[side.block as usize].get(lane as usize);
-            // Within a block each pair once, and none of a body with itself.
-            let within = side.block == side.against;
-            let among = if within {
-                (u16::MAX << (lane & 15)) << 1
-            } else {
-                u16::MAX
-            };
-            let met = lanes.meets(&field.fat[side.against as usize], &one) & among;
-            #[allow(clippy::cast_possible_truncation, reason = "below 16, below TOGETHER")]
-            let hit = Hit {
-                side: at as u16,
-                lane: lane as u16,
-                met,
-            };
-            self.hits[kept] = hit;
-            kept += usize::from(met != 0);
-            left &= left.wrapping_sub(1);
-            at += usize::from(left == 0);
-            left = if left == 0 {
-                self.sides[at].lanes
-            } else {
-                left
-            };
+    fn compare<L: Lanes>(&mut self, lanes: L, field: Field<'_>, sides: usize) -> usize {
+        let mut kept = 0;
+        for first in (0..sides).step_by(SIDES) {
+            // How many lanes a side has is a guess that fails: it is made once for some.
+            let some = self.lanes[first..first + SIDES].iter().rev();
+            let mut left = some.fold(0, |left, lanes| left << WIDTH | u64::from(*lanes));
+            while left != 0 {
+                let bit = left.trailing_zeros() as usize;
+                left &= left - 1;
+                let (at, lane) = (first + bit / WIDTH, bit % WIDTH);
+                let side = &self.sides[at % TOGETHER];
+                // Within a block each pair once, and none of a body with itself.
+                let within = side.block == side.against;
+                let among = if within {
+                    (u16::MAX << lane) << 1
+                } else {
+                    u16::MAX
+                };
+                // Both are at hand before a lane is read: it then goes from memory to all lanes in one step.
+                let (block, against) = (
+                    &field.fat[side.block as usize],
+                    &field.fat[side.against as usize],
+                );
+                let met = lanes.meets(against, &block.get(lane)) & among;
+                #[allow(clippy::cast_possible_truncation, reason = "below 16, below TOGETHER")]
+                let hit = Hit {
+                    side: at as u16,
+                    lane: lane as u16,
+                    met,
+                };
+                self.hits[kept] = hit;
+                kept += usize::from(met != 0);
+            }
         }
         kept
     }
@@ -297,8 +301,9 @@ impl Scratch {
             };
             let matrix = &mut self.matrices[usize::from(hit.side)];
             for (row, line) in matrix.iter_mut().enumerate() {
-                // A compare with a constant a row: wide on every level.
-                *line |= if rows & (1 << row) != 0 { columns } else { 0 };
+                // The row's bit to the top, and then to all: wide on every level.
+                let all = (rows << (WIDTH - 1 - row)).cast_signed() >> (WIDTH - 1);
+                *line |= columns & all.cast_unsigned();
             }
             // Drawn in by its slack: what meets that surely overlaps it, as `Lanes::parts` tells.
             let by = slack(farthest(field.tree.bound(one)));

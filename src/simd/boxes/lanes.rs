@@ -187,12 +187,9 @@ impl Lanes for Portable {
     fn meets(self, block: &Boxes16, one: &[f32; 6]) -> u16 {
         let f = &block.faces;
         let answers = std::array::from_fn(|i| {
-            (f[0][i] <= one[3])
-                & (f[1][i] <= one[4])
-                & (f[2][i] <= one[5])
-                & (one[0] <= f[3][i])
-                & (one[1] <= f[4][i])
-                & (one[2] <= f[5][i])
+            // What is NaN parts nobody on a lower face, and meets nobody on an upper one.
+            let parted = (one[3] < f[0][i]) | (one[4] < f[1][i]) | (one[5] < f[2][i]);
+            !parted & (one[0] <= f[3][i]) & (one[1] <= f[4][i]) & (one[2] <= f[5][i])
         });
         mask(&answers)
     }
