@@ -132,7 +132,7 @@ impl Order {
             let boxed = self.exact[from];
             let one = boxed.corners();
             let far = if block < self.sorted {
-                far_from(&one, &self.quarters[block / WIDTH])
+                far_from(&centre(&one), &self.quarters[block / WIDTH])
             } else {
                 f32::INFINITY
             };

@@ -15,6 +15,8 @@ use crate::simd::boxes::{Boxes16, Down, Hold, Portable, WIDTH};
 const WORN_PER_BODY: u64 = 20;
 /// One block in so many stays empty after a sort, for bodies that find no free lane where they belong.
 pub(super) const ATTIC: usize = 16;
+/// A block that is no farther from a body than this, in mean sides of its box, is as good as one that is nearer.
+const NEAR_ENOUGH: f32 = 0.5;
 /// How far from its place on the curve a body may find a free lane, blocks.
 const STRAY: usize = 20;
 
@@ -136,14 +138,25 @@ impl Order {
         let key = self.sorter.frame.key(one);
         let sorted = &self.keys[..self.sorted];
         let home = sorted.partition_point(|first| *first <= key);
+        let (class, middle) = (Sorter::class_of(key), centre(one));
+        let side = (0..3).map(|k| one[k + 3] - one[k]).sum::<f32>() / 3.0;
+        let enough = side * side * (NEAR_ENOUGH * NEAR_ENOUGH);
         let mut best = (f32::INFINITY, None);
-        for block in home.saturating_sub(STRAY)..(home + STRAY).min(self.sorted) {
-            let fits = self.live[block] != u16::MAX
-                && Sorter::class_of(self.keys[block]) == Sorter::class_of(key);
-            if fits {
-                let far = far_from(one, &self.homes[block]);
+        // Outward from where it belongs, to the first that the box would hardly stretch.
+        'outward: for step in 0..STRAY {
+            for block in [home.checked_sub(step + 1), Some(home + step)] {
+                let Some(block) = block.filter(|block| *block < self.sorted) else {
+                    continue;
+                };
+                if self.live[block] == u16::MAX || Sorter::class_of(self.keys[block]) != class {
+                    continue;
+                }
+                let far = far_from(&middle, &self.homes[block]);
                 if far < best.0 {
                     best = (far, Some(block));
+                }
+                if far <= enough {
+                    break 'outward;
                 }
             }
         }
@@ -339,12 +352,11 @@ pub(super) fn widen(home: &mut [f32; 6], place: &[f32; 3]) {
     }
 }
 
-/// How far the middle of a box is from a part of space, squared; infinite where that is empty, or the box has no end.
-pub(super) fn far_from(one: &[f32; 6], home: &[f32; 6]) -> f32 {
+/// How far a place is from a part of space, squared; infinite where that is empty.
+pub(super) fn far_from(place: &[f32; 3], home: &[f32; 6]) -> f32 {
     let mut sum = 0.0;
     for k in 0..3 {
-        let middle = one[k] * 0.5 + one[k + 3] * 0.5;
-        let apart = (home[k] - middle).max(middle - home[k + 3]).max(0.0);
+        let apart = (home[k] - place[k]).max(place[k] - home[k + 3]).max(0.0);
         sum += apart * apart;
     }
     sum
