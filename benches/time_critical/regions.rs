@@ -100,7 +100,7 @@ impl Alone {
         // Meshes that deform are refitted out of what is spent; there are none here.
         let mut world = self.world.borrow_mut();
         narrow.begin(1, &world, &self.pairs, &self.delta);
-        narrow.widen(&world, &self.pairs);
+        narrow.widen(&world, &mut self.pairs.clone());
         let clock = SystemClock;
         let mut meter = Meter::new(&clock, None, units);
         narrow.spend(&mut world, WANTED, &mut meter);

@@ -188,7 +188,7 @@ impl Stage {
         let from_ns = self.clock.monotonic_ns();
         self.narrow
             .begin(self.tick, &self.world, &self.pairs, &self.delta);
-        self.narrow.widen(&self.world, &self.pairs);
+        self.narrow.widen(&self.world, &mut self.pairs);
         self.clock.monotonic_ns() - from_ns
     }
 

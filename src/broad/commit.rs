@@ -1,8 +1,8 @@
 //! From suggestions to the pair set: one place decides, for every method, which pairs end, begin or do not fit.
 //!
 //! In: keys that a method found (in any order, doubled, already stored, not allowed: all the same), of boxes that
-//! overlap or of some that only may, and pairs whose end has a cause. Out: the pair set changed and the delta filled, both in the order of body ids. Slots of pairs
-//! therefore depend neither on the method nor on the slots of bodies.
+//! overlap or of some that only may, and pairs whose end has a cause. Out: the pair set changed and the delta filled,
+//! both in the order of body ids. Slots of pairs therefore depend neither on the method nor on the slots of bodies.
 
 use super::Proxies;
 use super::forced::Forced;

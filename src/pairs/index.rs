@@ -132,10 +132,7 @@ impl Index {
         if self.table.is_empty() {
             return None;
         }
-        match self.search(mix(hash), is_it) {
-            Ok(_) => None,
-            Err(free) => Some(free),
-        }
+        self.search(mix(hash), is_it).err()
     }
 
     /// Notes the place of a key where [`Index::vacancy`] said.

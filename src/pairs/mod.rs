@@ -2,8 +2,9 @@
 //!
 //! In: what `broad` decides, its only writer. Out: [`PairSet`] (dense slots, the pairs of one body, lookup by key)
 //! and [`PairDelta`] (what began and ended in this tick). While somebody asks for the pairs of single bodies, each pair
-//! stands in the lists of its two (`set::lists`); a lookup by key goes through a table of places (`index`). A map of pairs that every tick walks or fills anew is what made one
-//! known engine six times slower than its own tree; here only what begins and ends is looked up.
+//! stands in the lists of its two (`set::lists`); a lookup by key goes through a table of places (`index`). A map of
+//! pairs that every tick walks or fills anew is what made one known engine six times slower than its own tree; here
+//! only what begins and ends is looked up.
 
 use crate::ids::{BodySlot, PairKey, PairSlot};
 use crate::wire::EndCause;

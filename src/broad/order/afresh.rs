@@ -178,7 +178,7 @@ impl Order {
         finds.spare();
         team.reserve(blocks, self.len);
         if stays {
-            let lists = [&mut *tick.began, &mut *tick.parted];
+            let lists = [&mut *tick.parted, &mut *tick.began];
             tell_difference([&*held, &finds.met], gone, &self.slot_of, lists);
             self.tell_jumped(tick);
         } else {

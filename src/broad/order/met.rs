@@ -213,57 +213,53 @@ fn write_down(
 
 /// Reports what is in one of two ticks alone, whose lanes are the same but for those whose body left before the second.
 ///
-/// * `lists` - what began, what parted.
+/// Which of the two has a record, and which a bit, are guesses that fail: they choose what is read and where it is
+/// written, and no branch.
+///
+/// * `lists` - what parted, what began.
 pub(super) fn tell_difference(
     [before, now]: [&Met; 2],
     gone: &[u16],
     slot_of: &[u32],
-    [began, parted]: [&mut Vec<PairKey>; 2],
+    mut lists: [&mut Vec<PairKey>; 2],
 ) {
     const NONE: Matrix = [0; WIDTH];
     for block in 0..now.blocks() {
         let (mut old, mut new) = (before.of(block), now.of(block));
-        loop {
-            let last = |met: &Met, rest: &std::ops::Range<usize>| {
-                rest.clone().next().map_or(u32::MAX, |at| met.others[at])
+        while !(old.is_empty() && new.is_empty()) {
+            let head = |met: &Met, rest: &std::ops::Range<usize>| {
+                if rest.is_empty() {
+                    u32::MAX
+                } else {
+                    met.others[rest.start]
+                }
             };
-            let heads = [last(before, &old), last(now, &new)];
+            let heads = [head(before, &old), head(now, &new)];
             let other = heads[0].min(heads[1]);
-            if other == u32::MAX {
-                break;
-            }
-            let was = old.next_if(heads[0] == other);
-            let is = new.next_if(heads[1] == other);
-            let was = was.map_or(&NONE, |at| &before.hits[at]);
-            let is = is.map_or(&NONE, |at| &now.hits[at]);
+            let [had, has] = heads.map(|head| usize::from(head == other));
+            let record = |met: &'_ Met, at: usize, there: usize| {
+                let hits = met.hits.get(at).unwrap_or(&NONE);
+                *[&NONE, hits][there]
+            };
+            let mut was = record(before, old.start, had);
+            let is = record(now, new.start, has);
+            old.start += had;
+            new.start += has;
             let other = other as usize;
-            let mut was = *was;
             if gone[block] | gone[other] != 0 {
                 was = without(&was, gone[block], gone[other]);
             }
-            if was == *is {
+            if was == is {
                 continue;
             }
-            let key = |row: usize, lane: usize| {
+            let differs = std::array::from_fn(|row| was[row] ^ is[row]);
+            each(&differs, |row, lane| {
                 let slots = [block * WIDTH + row, other * WIDTH + lane];
                 let [one, other] = slots.map(|rank| BodySlot(slot_of[rank]));
-                PairKey::new(one, other)
-            };
-            each(&minus(is, &was), |row, lane| began.push(key(row, lane)));
-            each(&minus(&was, is), |row, lane| parted.push(key(row, lane)));
+                let begins = usize::from(is[row] >> lane & 1);
+                lists[begins].push(PairKey::new(one, other));
+            });
         }
-    }
-}
-
-/// The next of a range, if it is wanted.
-trait NextIf {
-    fn next_if(&mut self, wanted: bool) -> Option<usize>;
-}
-
-impl NextIf for std::ops::Range<usize> {
-    #[inline(always)]
-    fn next_if(&mut self, wanted: bool) -> Option<usize> {
-        if wanted { self.next() } else { None }
     }
 }
 

@@ -80,7 +80,7 @@ fn the_pairs_of_a_body_are_the_same_whether_lists_are_kept_or_not() {
         keys.dedup();
         // What has an even body stays, and what has a body of three begins.
         let goes = |key: PairKey| key.slots().0.0 % 2 == 1;
-        let begins = |key: PairKey| key.slots().1.0 % 3 != 0;
+        let begins = |key: PairKey| !key.slots().1.0.is_multiple_of(3);
         let mut ended = Vec::new();
         set.part(&keys, goes, &mut ended);
         for Ended { slot, key, cause } in ended {

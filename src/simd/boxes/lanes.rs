@@ -148,8 +148,8 @@ pub(crate) trait Lanes: Copy {
     ) -> bool;
 
     /// Whether two boxes are surely apart, and whether they surely overlap: at every face by the slack of that of `a`
-    /// at least. That is enough for both: a face of `b` that is much farther out than that of `a` has a slack of no more
-    /// than a small share of how far the boxes overlap there.
+    /// at least. That is enough for both: a face of `b` that is much farther out than that of `a` was rounded by no
+    /// more than a small share of how far the boxes overlap there.
     fn parts(self, a: &Down, b: &Down) -> (bool, bool);
 
     /// Whether `inner` lies inside `outer`. The spare lanes are compared too: those of `outer` are to be minus

@@ -196,9 +196,8 @@ fn what_is_told_of_rounded_boxes_is_true_of_the_boxes() {
     let mut open = 0;
     for seed in 0..rounds {
         let state = &mut (seed + 1);
-        #[allow(clippy::cast_precision_loss, reason = "any number will do")]
-        let mut unit = || next(state) as f64 / 2.0_f64.powi(31);
-        let mut one_of = |some: &[f64]| some[(unit() * some.len() as f64) as usize];
+        let at = |state: &mut u64, below: usize| usize::try_from(next(state)).unwrap() % below;
+        let mut one_of = |some: &[f64]| some[at(state, some.len())];
         // Two boxes that touch at a face on one axis, but for a little; far out or not, of any size.
         let (far, far_too) = (
             one_of(&[0.0, 1e-30, 1.0, 1e7]),
@@ -206,7 +205,9 @@ fn what_is_told_of_rounded_boxes_is_true_of_the_boxes() {
         );
         let (side, other_side) = (one_of(&[1e-6, 1.0, 1e4]), one_of(&[1e-6, 1.0, 1e12]));
         let little = one_of(&[0.0, 1e-45, -1e-45, 1e-9, -1e-9, 1e-3, -1e-3, 0.5, -0.5]);
-        let axis = one_of(&[0.0, 1.0, 2.0]) as usize;
+        let axis = at(state, 3);
+        #[allow(clippy::cast_precision_loss, reason = "any number will do")]
+        let mut unit = || next(state) as f64 / 2.0_f64.powi(31);
         let low = [far, far_too, unit()];
         let high = low.map(|x| x + side);
         let mut low_too = low.map(|x| x - other_side * unit());

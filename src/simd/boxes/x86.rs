@@ -82,8 +82,8 @@ fn bits(low: __m256, high: __m256) -> u16 {
 #[target_feature(enable = "avx2")]
 fn meets_half(block: &Boxes16, one: &[f32; 6], at: usize) -> __m256 {
     let f = &block.faces;
-    // `one[k + 3] < face[k]` parts them, `one[k] <= face[k + 3]` does not: the face is the second operand of both, which
-    // alone may stand in memory.
+    // `one[k + 3] < face[k]` parts them, `one[k] <= face[k + 3]` does not: the face is the second operand of both,
+    // which alone may stand in memory.
     let parted =
         |k: usize| _mm256_cmp_ps::<_CMP_LT_OQ>(_mm256_set1_ps(one[k + 3]), half(&f[k], at));
     let high = |k: usize| _mm256_cmp_ps::<_CMP_LE_OQ>(_mm256_set1_ps(one[k]), half(&f[k + 3], at));
