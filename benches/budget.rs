@@ -24,7 +24,7 @@ mod stage;
 
 use std::sync::Arc;
 
-use common::{Bench, Flight, kept_rows, provenance, quantile, row, save};
+use common::{Bench, Flight, arguments, kept_rows, provenance, quantile, row, save};
 use stage::{Courses, bodies, shapes};
 use sweepd::builtin::pool;
 use sweepd::shape::Shape;
@@ -75,8 +75,9 @@ fn start(scene: &str, meshes: &[Arc<Shape>]) -> (Bench, Motion) {
 }
 
 fn main() {
-    let quick = std::env::args().any(|arg| arg == "--quick");
-    let named = |scene: &str| std::env::args().any(|arg| arg == scene);
+    let arguments = arguments(|one| one == "--quick" || SCENES.contains(&one));
+    let quick = arguments.iter().any(|one| one == "--quick");
+    let named = |scene: &str| arguments.iter().any(|one| one == scene);
     let all = !SCENES.iter().any(|scene| named(scene));
     let ticks = if quick { 60 } else { 2_000 };
     let meshes = shapes();

@@ -21,7 +21,7 @@ mod oracle;
 use std::path::Path;
 use std::sync::Arc;
 
-use common::{provenance, quantile, row, save};
+use common::{arguments, provenance, quantile, row, save};
 use oracle::meshes::{bumpy_sphere, trimesh};
 use sweepd::daemon::build_shapes;
 use sweepd::ids::BodyId;
@@ -211,7 +211,7 @@ fn a_third(text: &str, table: &mut Table) {
 }
 
 fn main() {
-    let quick = std::env::args().any(|arg| arg == "--quick");
+    let quick = !arguments(|one| one == "--quick").is_empty();
     // 19,880 triangles, diameter about 2 m.
     let mesh = trimesh(&bumpy_sphere(71, 142, 0.06), None);
     let text = format!(

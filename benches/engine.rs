@@ -15,7 +15,7 @@
 
 mod common;
 
-use common::{Bench, Flight, provenance, quantile, row, save};
+use common::{Bench, Flight, arguments, provenance, quantile, row, save};
 use rapier3d_f64::prelude::{
     ActiveCollisionTypes, BroadPhaseBvh, ColliderBuilder, ColliderHandle, ColliderSet,
     CollisionPipeline, IslandManager, NarrowPhase, Pose as RapierPose, RigidBodySet, Vector,
@@ -152,8 +152,10 @@ const SETTLE: usize = 20;
 const SEED: u64 = 11;
 
 fn main() {
-    let quick = std::env::args().any(|arg| arg == "--quick");
-    let case = std::env::args().skip_while(|arg| arg != "--case").nth(1);
+    let number = |argument: &str| argument.parse().is_ok_and(|case: usize| case < CASES.len());
+    let arguments = arguments(|one| matches!(one, "--quick" | "--case") || number(one));
+    let quick = arguments.iter().any(|one| one == "--quick");
+    let case = arguments.iter().skip_while(|one| *one != "--case").nth(1);
     if let Some((bodies, moving, percent, ticks)) = case.map(|n| CASES[n.parse::<usize>().unwrap()])
     {
         println!("{}", run(bodies, moving, percent, ticks));

@@ -9,7 +9,7 @@ mod common;
 
 use std::fmt::Write as _;
 
-use common::{Bench, provenance, quantile, save};
+use common::{Bench, arguments, provenance, quantile, save};
 use sweepd::builtin::Random;
 use sweepd::time::Budget;
 use sweepd::wire::{Demand, Stage};
@@ -36,7 +36,7 @@ fn dense(bodies: usize, seed: u64) -> String {
 }
 
 fn main() {
-    let quick = std::env::args().any(|arg| arg == "--quick");
+    let quick = !arguments(|one| one == "--quick").is_empty();
     let (seed, bodies) = (5, 10_000);
     let ticks = if quick { 30 } else { 200 };
     let mut csv = String::from(

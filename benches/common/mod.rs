@@ -184,6 +184,17 @@ pub fn quantile(times: &mut [u64], share: f64) -> u64 {
     times[at]
 }
 
+/// The arguments, but for cargo's own. Ends where one is unknown: a bench may run for minutes and save what it found.
+pub fn arguments(is_known: impl Fn(&str) -> bool) -> Vec<String> {
+    let all = std::env::args().skip(1);
+    let mine: Vec<String> = all.filter(|argument| argument != "--bench").collect();
+    if let Some(unknown) = mine.iter().find(|argument| !is_known(argument)) {
+        println!("unknown argument {unknown}: the first lines of this bench name those it has");
+        std::process::exit(2);
+    }
+    mine
+}
+
 /// Machine, commit and compiler, as CSV columns.
 pub fn provenance() -> String {
     let run = |command: &str, args: &[&str]| {
