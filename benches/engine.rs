@@ -2,7 +2,7 @@
 //! both, in one run, tick by tick in turn. Timed on both sides: taking the poses in, broad phase, narrow phase,
 //! contacts; on ours also the filled outbox with all rows.
 //!
-//! `cargo bench --bench engine [-- --quick | --case N]`; a single case, counted from 0, is printed and not saved.
+//! `cargo bench --bench engine [-- --quick | --case=N]`; a single case, counted from 0, is printed and not saved.
 
 #![allow(
     clippy::unwrap_used,
@@ -152,12 +152,11 @@ const SETTLE: usize = 20;
 const SEED: u64 = 11;
 
 fn main() {
-    let number = |argument: &str| argument.parse().is_ok_and(|case: usize| case < CASES.len());
-    let arguments = arguments(|one| matches!(one, "--quick" | "--case") || number(one));
+    let one_case = |one: &str| CASES.get(one.strip_prefix("--case=")?.parse::<usize>().ok()?);
+    let arguments = arguments(|one| one == "--quick" || one_case(one).is_some());
     let quick = arguments.iter().any(|one| one == "--quick");
-    let case = arguments.iter().skip_while(|one| *one != "--case").nth(1);
-    if let Some((bodies, moving, percent, ticks)) = case.map(|n| CASES[n.parse::<usize>().unwrap()])
-    {
+    let case = arguments.iter().find_map(|one| one_case(one));
+    if let Some((bodies, moving, percent, ticks)) = case.copied() {
         println!("{}", run(bodies, moving, percent, ticks));
         return;
     }

@@ -154,7 +154,7 @@ impl Found {
     /// Takes out the stored pairs of boxes that parted, unless something else keeps them.
     pub(super) fn part(
         &mut self,
-        parted: &mut Vec<PairKey>,
+        parted: &mut [PairKey],
         judge: &Judge<'_, impl Proxies, impl PairPolicy>,
         pairs: &mut PairSet,
     ) {
@@ -179,7 +179,7 @@ impl Found {
             self.ended.sort_unstable_by_key(|(rank, _)| *rank);
             delta.ended.extend(self.ended.iter().map(|(_, e)| *e));
         }
-        self.rank(judge);
+        self.gather(judge);
         self.truncated.clear();
         self.truncated.extend_from_slice(pairs.truncated());
         pairs.forget_missing();
@@ -193,7 +193,7 @@ impl Found {
     }
 
     /// Puts what may have to be stored in the order of ids, each once.
-    fn rank(&mut self, judge: &Judge<'_, impl Proxies, impl PairPolicy>) {
+    fn gather(&mut self, judge: &Judge<'_, impl Proxies, impl PairPolicy>) {
         for (at, key) in self.maybe.iter().enumerate() {
             if let Some(ahead) = self.maybe.get(at + AHEAD) {
                 judge.prefetch(*ahead);

@@ -18,7 +18,7 @@ pub(super) struct KeySort {
 
 impl KeySort {
     /// Sorts.
-    pub(super) fn sort(&mut self, keys: &mut Vec<PairKey>) {
+    pub(super) fn sort(&mut self, keys: &mut [PairKey]) {
         if keys.len() < FEW {
             keys.sort_unstable();
             return;
@@ -51,7 +51,8 @@ impl KeySort {
             }
             from = to;
         }
-        std::mem::swap(keys, &mut self.dealt);
+        // Not exchanged: the list of the caller keeps the room that was made for it.
+        keys.copy_from_slice(&self.dealt);
     }
 
     /// Ends an update: what it needed more of than most do is given back.

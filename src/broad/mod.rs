@@ -6,8 +6,8 @@
 //! Six methods behind one door. [`Method::BruteForce`] looks at every pair: the twin, for ever. [`Method::Order`] keeps
 //! blocks of fat boxes and their candidates (see `order`). [`Method::SweepAndPrune`] keeps sorted lists of box ends
 //! (see `sap`). [`Method::UniformGrid`], [`Method::SpatialHash`] and [`Method::HierarchicalGrid`] keep bodies in cells
-//! (see `grid`). A method only suggests pairs; what is stored is decided in one place (`commit`), so all give the same
-//! pairs in the same slots, and the same delta.
+//! (see `grid`). A method only tells which boxes overlap, or may; what is stored is decided in one place (`commit`), so
+//! all give the same pairs in the same slots, and the same delta.
 //!
 //! The pairs are those of the f64 boxes, at any offset: what rounds boxes to f32 asks the f64 boxes where rounding
 //! could tell otherwise.
@@ -247,9 +247,7 @@ impl BroadPhase {
                 self.causes[at] = removed.cause;
             }
         }
-        if !changes.removed.is_empty() {
-            pairs.list();
-        }
+        pairs.list(changes.removed.len());
         for removed in &changes.removed {
             while let Some(slot) = pairs.first_of(removed.slot) {
                 let other = pairs.partners(removed.slot).next().map(|(_, b)| b);

@@ -17,9 +17,7 @@ pub(super) fn end(
 ) {
     let members = judge.members;
     let looks = |slot: &BodySlot| members.has(*slot, MOVED | REFILTERED);
-    if members.touched().iter().any(looks) {
-        pairs.list();
-    }
+    pairs.list(members.touched().iter().filter(|slot| looks(slot)).count());
     let mut doomed = std::mem::take(&mut found.doomed);
     for slot in members.touched().iter().filter(|slot| looks(slot)) {
         let mine = members.has(*slot, REFILTERED);

@@ -18,10 +18,8 @@ impl Narrow {
         let changed = changes.moved.len() + changes.restated.len();
         // Above this share a straight walk over the 24-byte records beats chasing each body's list.
         let many = changed * 4 > world.slots_len();
-        let few = changed > 0 && !many;
-        if few || !changes.requery.is_empty() || !world.travelled().is_empty() {
-            pairs.list();
-        }
+        let few = if many { 0 } else { changed };
+        pairs.list(few + changes.requery.len() + world.travelled().len());
         self.enlist_sweeps(world, pairs);
         for &body in &changes.requery {
             for slot in pairs.pairs_of(body) {

@@ -1,9 +1,9 @@
 //! Where what has a key stands: an open table from keys to places, so that a lookup does not walk lists.
 //!
 //! In: a hash of the key, and what tells the key at a place. The table holds a place and half of its mixed hash, eight
-//! bytes in all; a key is read from where it stands only where that half fits, so that to put in and to take out reads
-//! nothing but the table. For pairs: a body of a dense scene has tens of them, and there walks through lists took 71 %
-//! of a tick of the broad phase. Fixed hash, never iterated: nothing depends on its order.
+//! bytes in all; a key is read from where it stands only where that half fits: mostly once, and then it is the one.
+//! For pairs: a body of a dense scene has tens of them, and there walks through lists took 71 % of a tick of the broad
+//! phase. Fixed hash, never iterated: nothing depends on its order.
 //!
 //! The table is of any size, not only of powers of two, which would be up to twice what is needed: every place of it is
 //! touched, whatever it holds.

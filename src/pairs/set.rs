@@ -120,15 +120,6 @@ impl PairSet {
         self.index.find(key.bits(), is_it).map(PairSlot)
     }
 
-    /// How many pairs a body has. Cost: as [`PairSet::pairs_of`].
-    #[must_use]
-    pub fn pairs_len(&self, body: BodySlot) -> usize {
-        if self.lists.is_kept() {
-            return self.lists.len_of(body);
-        }
-        self.pairs_of(body).count()
-    }
-
     /// The pairs of a body, in no order that means anything.
     ///
     /// Cost: those pairs where the engine read such lists itself of late, else a look at every pair.
@@ -154,11 +145,10 @@ impl PairSet {
         })
     }
 
-    /// The pairs of single bodies are about to be asked for: from now on that costs those pairs alone.
-    pub(crate) fn list(&mut self) {
-        let (slots, room) = (self.keys.len(), self.keys.capacity());
+    /// The pairs of so many single bodies are about to be asked for: where that pays, it will cost those pairs alone.
+    pub(crate) fn list(&mut self, bodies: usize) {
         let Self { lists, keys, .. } = self;
-        lists.ask(live(keys), slots, room);
+        lists.ask(bodies, keys, live(keys));
     }
 
     /// All pairs, in the order of slots.
@@ -175,7 +165,7 @@ impl PairSet {
 
     /// Makes room for so many pairs more, as far as they may be stored. Pairs that begin together are told together, so
     /// that memory grows once by what they need and not by doubling.
-    pub(crate) fn reserve(&mut self, more: usize) {
+    fn reserve(&mut self, more: usize) {
         let more = more.min(self.limit - self.len);
         let len = self.keys.len() + more.saturating_sub(self.free.len());
         if len > self.keys.capacity() {
@@ -186,8 +176,9 @@ impl PairSet {
         }
     }
 
-    /// Adds a pair that is not in the set; `None` when the set is full.
+    /// Adds a pair; `None` when it is in the set already, or the set is full.
     pub(crate) fn insert(&mut self, key: PairKey) -> Option<PairSlot> {
+        self.reserve(1);
         self.index.grow(self.keys.capacity());
         let at = self.vacancy(key)?;
         self.insert_at(at, key)
@@ -203,13 +194,14 @@ impl PairSet {
         begins: impl Fn(PairKey) -> bool,
         began: &mut Vec<PairSlot>,
     ) {
-        if self.len + keys.len() > self.keys.capacity() {
+        let unused = self.keys.capacity() - self.keys.len();
+        if keys.len() > self.free.len() + unused {
             let new = keys.iter().filter(|key| self.find(**key).is_none());
             self.reserve(new.filter(|key| begins(**key)).count());
         }
-        let first = began.len();
         for (at, key) in keys.iter().enumerate() {
             self.prefetch_insert(keys, at);
+            self.reserve(1);
             self.index.grow(self.keys.capacity());
             if let Some(at) = self.vacancy(*key)
                 && begins(*key)
@@ -220,7 +212,7 @@ impl PairSet {
                 }
             }
         }
-        self.lists.note_change(began.len() - first, self.len);
+        self.lists.weigh(0, self.len);
     }
 
     /// Where in the index a pair that is not in the set is to be noted.
@@ -240,7 +232,6 @@ impl PairSet {
             self.keys[at as usize] = key;
             at
         } else {
-            self.reserve(1);
             self.keys.push(key);
             small(self.keys.len() - 1)
         };
@@ -268,7 +259,7 @@ impl PairSet {
         goes: impl Fn(PairKey) -> bool,
         ended: &mut Vec<Ended>,
     ) {
-        self.lists.note_change(keys.len(), self.len);
+        self.lists.weigh(keys.len(), self.len);
         let (first, cause) = (ended.len(), EndCause::Separated);
         for (at, key) in keys.iter().enumerate() {
             self.prefetch_find(keys, at);
@@ -342,7 +333,7 @@ impl PairSet {
 }
 
 /// The pairs among the keys by slot.
-fn live(keys: &[PairKey]) -> impl Iterator<Item = (PairSlot, PairKey)> + '_ {
+fn live(keys: &[PairKey]) -> impl Iterator<Item = (PairSlot, PairKey)> + Clone + '_ {
     let slots = (0_u32..).map(PairSlot);
     slots
         .zip(keys.iter().copied())

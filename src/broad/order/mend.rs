@@ -140,7 +140,7 @@ impl Order {
             if far <= side * side * DRIFT_SIDES * DRIFT_SIDES {
                 continue;
             }
-            let Some((near, to)) = self.lane_near(&one) else {
+            let Some((near, to)) = self.lane_near(&one, 0.0) else {
                 continue;
             };
             if near * NEARER >= far {

@@ -237,7 +237,7 @@ pub(super) fn tell_difference(
             let heads = [head(before, &old), head(now, &new)];
             let other = heads[0].min(heads[1]);
             let [had, has] = heads.map(|head| usize::from(head == other));
-            let record = |met: &'_ Met, at: usize, there: usize| {
+            let record = |met: &Met, at: usize, there: usize| {
                 let hits = met.hits.get(at).unwrap_or(&NONE);
                 *[&NONE, hits][there]
             };

@@ -81,7 +81,7 @@ pub(super) struct Tick<'a, P> {
     pub(super) members: &'a Members,
     pub(super) proxies: &'a P,
     pub(super) moved: &'a [BodySlot],
-    /// Pairs whose boxes may have begun to overlap.
+    /// Pairs whose boxes overlap: all that did not in the last tick, and any others.
     pub(super) began: &'a mut Vec<PairKey>,
     /// Pairs whose boxes parted.
     pub(super) parted: &'a mut Vec<PairKey>,

@@ -98,7 +98,9 @@ impl Order {
     /// A free lane for a body, the nearer the better, and its box.
     pub(super) fn lane_for<P: Proxies>(&self, slot: BodySlot, proxies: &P) -> Option<(u32, Down)> {
         let one = outward(Portable, proxies.aabb(slot), &self.origin);
-        let near = self.lane_near(&one.corners());
+        // So near, the box hardly stretches the block.
+        let enough = one.mean_side() * NEAR_ENOUGH;
+        let near = self.lane_near(&one.corners(), enough * enough);
         let rank = near
             .map(|(_, rank)| rank)
             .or_else(|| self.lane_in_attic())?;
@@ -134,15 +136,15 @@ impl Order {
 
     /// A free lane near a box's place on the curve, in the block whose part of space is nearest; and how far that is,
     /// squared.
-    pub(super) fn lane_near(&self, one: &[f32; 6]) -> Option<(f32, u32)> {
+    ///
+    /// * `enough` - a part of space that is no farther, squared, is as good as one that is nearer.
+    pub(super) fn lane_near(&self, one: &[f32; 6], enough: f32) -> Option<(f32, u32)> {
         let key = self.sorter.frame.key(one);
         let sorted = &self.keys[..self.sorted];
         let home = sorted.partition_point(|first| *first <= key);
         let (class, middle) = (Sorter::class_of(key), centre(one));
-        let side = (0..3).map(|k| one[k + 3] - one[k]).sum::<f32>() / 3.0;
-        let enough = side * side * (NEAR_ENOUGH * NEAR_ENOUGH);
         let mut best = (f32::INFINITY, None);
-        // Outward from where it belongs, to the first that the box would hardly stretch.
+        // Outward from where it belongs.
         'outward: for step in 0..STRAY {
             for block in [home.checked_sub(step + 1), Some(home + step)] {
                 let Some(block) = block.filter(|block| *block < self.sorted) else {
@@ -154,9 +156,9 @@ impl Order {
                 let far = far_from(&middle, &self.homes[block]);
                 if far < best.0 {
                     best = (far, Some(block));
-                }
-                if far <= enough {
-                    break 'outward;
+                    if far <= enough {
+                        break 'outward;
+                    }
                 }
             }
         }

@@ -41,7 +41,7 @@ impl Partial {
 
     /// Takes out the pairs of a body that left.
     pub(super) fn leave(&mut self, slot: BodySlot) {
-        self.pairs.list();
+        self.pairs.list(1);
         while let Some(first) = self.pairs.first_of(slot) {
             self.pairs.remove(first);
         }
@@ -77,7 +77,7 @@ impl Partial {
         began: &mut Vec<PairKey>,
     ) -> u64 {
         let mut tests = 0;
-        self.pairs.list();
+        self.pairs.list(members.touched().len());
         for slot in members.touched() {
             let mine = members.bounds(*slot);
             let asked = members.has(*slot, ASKED);

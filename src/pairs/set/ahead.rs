@@ -14,7 +14,7 @@ impl PairSet {
     /// Of a list of keys, asks for what the lookup of one a few places on will read to be brought near: a lookup is
     /// two reads anywhere, one after the other.
     #[inline]
-    pub(crate) fn prefetch_find(&self, keys: &[PairKey], at: usize) {
+    pub(super) fn prefetch_find(&self, keys: &[PairKey], at: usize) {
         if let Some(key) = keys.get(at + 2 * AHEAD) {
             self.index.prefetch(key.bits());
         }
@@ -47,7 +47,7 @@ impl PairSet {
                 self.lists.prefetch_heads(*key);
             }
         }
-        // It goes before the youngest pair of each of the two.
+        // It goes before the first pair of each of the two.
         if let Some(key) = keys.get(at + AHEAD).filter(|_| is_listed) {
             self.lists.prefetch_seconds(*key);
         }

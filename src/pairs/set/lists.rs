@@ -1,9 +1,10 @@
 //! For each body the list of its pairs: kept only while somebody reads them.
 //!
-//! In: pairs that come and go. Out: the pairs of one body, the youngest first. Where most bodies move, nobody asks for
-//! the pairs of one, and to keep the lists in step would be half of what a pair that comes or goes costs. So they are
-//! let go of once what they cost since the last question is as much as to make them anew, and made at the next one:
-//! never more than twice the cost of knowing beforehand.
+//! In: pairs that come and go. Out: the pairs of one body. Where most bodies move, nobody asks for the pairs of one,
+//! and to keep the lists in step would be half of what a pair that comes or goes costs. So they are let go of once what
+//! they cost since the last question is as much as to make them anew, and made when so many bodies have been asked for,
+//! each by a look at every pair, that this cost as much: all in all some twice the cost of knowing beforehand at most.
+//! Their memory stays for the next time.
 
 use crate::ids::{BodySlot, PairKey, PairSlot};
 use crate::simd::boxes::prefetch;
@@ -27,29 +28,20 @@ impl Half {
     };
 }
 
-/// The first place of a body's list, and how many there are.
-#[derive(Clone, Copy, Debug)]
-struct Head {
-    first: u32,
-    len: u32,
-}
-
-impl Head {
-    /// Of a body without pairs.
-    const NEW: Self = Self {
-        first: NONE,
-        len: 0,
-    };
-}
+/// To make the lists costs as much as so many looks at every pair: some 10 ns a pair, and half of one.
+const LOOKS: usize = 16;
 
 /// The lists of all bodies.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lists {
-    heads: Vec<Head>,
+    /// By body: the first place of its list.
+    heads: Vec<u32>,
     halves: Vec<Half>,
     is_kept: bool,
-    /// Pairs that came and went since the lists were last asked for.
+    /// Pairs that were put in and taken out since the lists were last asked for.
     upkeep: usize,
+    /// Bodies asked for since the lists were let go of.
+    asked: usize,
 }
 
 impl Lists {
@@ -58,36 +50,41 @@ impl Lists {
         self.is_kept
     }
 
-    /// They are read now: makes them if need be.
+    /// So many bodies are about to be asked for: makes the lists if that pays.
     ///
-    /// * `pairs` - all pairs of the set.
-    /// * `slots` - one more than the highest slot.
-    /// * `room` - so many slots there may be before the set grows.
+    /// * `keys` - by slot, as the set has them.
+    /// * `pairs` - those of the set.
     pub(super) fn ask(
         &mut self,
-        pairs: impl Iterator<Item = (PairSlot, PairKey)>,
-        slots: usize,
-        room: usize,
+        bodies: usize,
+        keys: &Vec<PairKey>,
+        pairs: impl Iterator<Item = (PairSlot, PairKey)> + Clone,
     ) {
+        if bodies == 0 {
+            return;
+        }
         self.upkeep = 0;
-        if self.is_kept {
+        self.asked = self.asked.saturating_add(bodies);
+        if self.is_kept || self.asked < LOOKS {
             return;
         }
         self.is_kept = true;
-        self.heads.clear();
+        self.cover(keys.capacity());
         self.halves.clear();
-        self.cover(room);
-        self.halves.resize(2 * slots, Half::NEW);
+        self.halves.resize(2 * keys.len(), Half::NEW);
+        let last = pairs.clone().map(|(_, key)| key.slots().1.index()).max();
+        self.heads.clear();
+        self.heads.resize(last.map_or(0, |last| last + 1), NONE);
         for (slot, key) in pairs {
             self.link(slot, key);
         }
+        self.upkeep = 0;
     }
 
     /// So many pairs are about to come or to go, of so many: lists that nobody reads are let go of.
-    pub(super) fn note_change(&mut self, changes: usize, pairs: usize) {
-        if self.is_kept {
-            self.upkeep += changes;
-            self.is_kept = self.upkeep <= pairs;
+    pub(super) fn weigh(&mut self, changes: usize, pairs: usize) {
+        if self.is_kept && self.upkeep + changes > pairs {
+            (self.is_kept, self.asked) = (false, 0);
         }
     }
 
@@ -112,17 +109,15 @@ impl Lists {
             return;
         }
         let (low, high) = key.slots();
+        self.upkeep += 1;
         if self.heads.len() <= high.index() {
-            self.heads.resize(high.index() + 1, Head::NEW);
+            self.heads.resize(high.index() + 1, NONE);
         }
         if self.halves.len() < 2 * slot.index() + 2 {
             self.halves.resize(2 * slot.index() + 2, Half::NEW);
         }
         for (at, body) in (2 * slot.0..).zip([low, high]) {
-            let head = &mut self.heads[body.index()];
-            let second = head.first;
-            head.first = at;
-            head.len += 1;
+            let second = std::mem::replace(&mut self.heads[body.index()], at);
             self.halves[at as usize] = Half {
                 next: second,
                 prev: NONE,
@@ -139,14 +134,13 @@ impl Lists {
         if !self.is_kept {
             return;
         }
+        self.upkeep += 1;
         let (low, high) = key.slots();
         for (at, body) in (2 * slot.index()..).zip([low, high]) {
             let Half { next, prev } = self.halves[at];
-            let head = &mut self.heads[body.index()];
-            head.len -= 1;
             match self.halves.get_mut(prev as usize) {
                 Some(before) => before.next = next,
-                None => head.first = next,
+                None => self.heads[body.index()] = next,
             }
             if let Some(behind) = self.halves.get_mut(next as usize) {
                 behind.prev = prev;
@@ -154,21 +148,16 @@ impl Lists {
         }
     }
 
-    /// The pairs of a body, the youngest first.
+    /// The pairs of a body.
     #[inline]
     pub(super) fn of(&self, body: BodySlot) -> impl Iterator<Item = PairSlot> + '_ {
-        let mut at = self.heads.get(body.index()).map_or(NONE, |h| h.first);
+        let mut at = self.heads.get(body.index()).copied().unwrap_or(NONE);
         std::iter::from_fn(move || {
             let half = self.halves.get(at as usize)?;
             let here = PairSlot(at / 2);
             at = half.next;
             Some(here)
         })
-    }
-
-    /// How many pairs a body has.
-    pub(super) fn len_of(&self, body: BodySlot) -> usize {
-        self.heads.get(body.index()).map_or(0, |h| h.len as usize)
     }
 
     /// Asks for what a pair that is to be taken out will touch to be brought near.
@@ -191,13 +180,13 @@ impl Lists {
         }
     }
 
-    /// Asks for what the pair behind a new one keeps to be brought near.
+    /// Asks for the first places of the lists of a pair's bodies to be brought near.
     #[inline]
     pub(super) fn prefetch_seconds(&self, key: PairKey) {
         let (low, high) = key.slots();
         for body in [low, high] {
-            let first = self.heads.get(body.index()).map_or(NONE, |head| head.first);
-            self.prefetch_half(first);
+            let first = self.heads.get(body.index());
+            self.prefetch_half(first.copied().unwrap_or(NONE));
         }
     }
 
@@ -214,7 +203,7 @@ impl Lists {
         }
     }
 
-    /// Checks the links both ways and the counts.
+    /// Checks the links both ways, and that each pair stands in two lists.
     ///
     /// * `key_at` - the pair in a slot.
     /// * `pairs` - how many there are.
@@ -229,8 +218,8 @@ impl Lists {
         let mut seen = 0;
         for (at, head) in (0_u32..).zip(&self.heads) {
             let body = BodySlot(at);
-            let (mut half, mut before, mut count) = (head.first, NONE, 0);
-            while half != NONE && count <= pairs {
+            let (mut half, mut before) = (*head, NONE);
+            while half != NONE && seen <= 2 * pairs {
                 let slot = PairSlot(half / 2);
                 let place = self.halves.get(half as usize);
                 let mine = key_at(slot).is_some_and(|key| {
@@ -241,13 +230,8 @@ impl Lists {
                     return Err(format!("the list of body slot {at} is broken at {slot:?}"));
                 };
                 (before, half) = (half, place.next);
-                count += 1;
+                seen += 1;
             }
-            if count != head.len as usize {
-                let told = head.len;
-                return Err(format!("body slot {at} has {count} pairs, not {told}"));
-            }
-            seen += count;
         }
         if seen != 2 * pairs {
             return Err(format!("{seen} list entries for {pairs} pairs"));
