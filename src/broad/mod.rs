@@ -248,16 +248,19 @@ impl BroadPhase {
             }
         }
         pairs.list(changes.removed.len());
+        let mut doomed = std::mem::take(&mut self.found.doomed);
         for removed in &changes.removed {
-            while let Some(slot) = pairs.first_of(removed.slot) {
-                let other = pairs.partners(removed.slot).next().map(|(_, b)| b);
-                let theirs = other
-                    .and_then(|b| self.causes.get(b.index()).copied())
-                    .filter(|cause| *cause != EndCause::None);
-                let cause = theirs.map_or(removed.cause, |c| c.min(removed.cause));
+            // All of a body at once: without lists each question is a look at every pair.
+            doomed.extend(pairs.partners(removed.slot).map(|(slot, other)| {
+                let theirs = self.causes.get(other.index()).copied();
+                let theirs = theirs.filter(|cause| *cause != EndCause::None);
+                (slot, theirs.map_or(removed.cause, |c| c.min(removed.cause)))
+            }));
+            for (slot, cause) in doomed.drain(..) {
                 self.found.end(slot, cause, &self.members, pairs);
             }
         }
+        self.found.doomed = doomed;
         for removed in &changes.removed {
             if let Some(cause) = self.causes.get_mut(removed.slot.index()) {
                 *cause = EndCause::None;

@@ -288,11 +288,6 @@ impl PairSet {
         self.len -= 1;
     }
 
-    /// A pair of a body.
-    pub(crate) fn first_of(&self, body: BodySlot) -> Option<PairSlot> {
-        self.pairs_of(body).next()
-    }
-
     /// Empties the set, keeps the memory; every slot may be used again at once.
     pub(crate) fn clear(&mut self) {
         self.keys.clear();

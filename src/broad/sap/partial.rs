@@ -42,8 +42,9 @@ impl Partial {
     /// Takes out the pairs of a body that left.
     pub(super) fn leave(&mut self, slot: BodySlot) {
         self.pairs.list(1);
-        while let Some(first) = self.pairs.first_of(slot) {
-            self.pairs.remove(first);
+        self.parted.extend(self.pairs.pairs_of(slot));
+        for pair in self.parted.drain(..) {
+            self.pairs.remove(pair);
         }
     }
 
