@@ -1,10 +1,18 @@
 //! Memory of many owners in one place, so that a tick at constant scene allocates nothing and what one gave back serves
 //! the others.
+//!
+//! It grows by chunks, each as large as all before it, and no item moves for it: one vector that doubles copied some
+//! megabytes now and then, a millisecond in which no deadline is looked at.
 
 /// Items of the smallest block.
 const BLOCK_MIN: usize = 4;
 /// Sizes of blocks: each is twice the one before.
 const CLASSES: usize = 24;
+/// Items of the first chunk.
+const CHUNK_MIN: usize = 256;
+/// Of a place in the arena so many bits are the item's place in its chunk, those above name the chunk.
+const PLACE_BITS: u32 = 26;
+const CHUNK_MAX: usize = 1 << PLACE_BITS;
 /// No block.
 const NONE: u32 = u32::MAX;
 
@@ -40,19 +48,23 @@ impl Run {
         self.len = 0;
     }
 
-    fn range(&self) -> std::ops::Range<usize> {
-        let at = self.at as usize;
-        at..at + self.len as usize
+    /// Its chunk, and where in it.
+    fn range(&self) -> (usize, std::ops::Range<usize>) {
+        let (chunk, at) = split(self.at);
+        (chunk, at..at + self.len as usize)
     }
 }
 
-/// Blocks of 4, 8, 16, ... items in one vector that only ever grows, up to a limit.
+/// Blocks of 4, 8, 16, ... items in chunks of which only ever more are added, up to a limit.
 ///
-/// A block that is given back serves the next owner, whole or split; blocks are not merged, so the vector is at most
+/// A block that is given back serves the next owner, whole or split; blocks are not merged, so the memory is at most
 /// the sum of what was ever in use at once of each size.
 #[derive(Debug)]
 pub(super) struct Arena<T> {
-    items: Vec<T>,
+    /// Each with all the room that it will ever have; what has not been a block yet was never touched.
+    chunks: Vec<Vec<T>>,
+    /// Items of all blocks.
+    len: usize,
     /// The first free block of each size.
     free: [u32; CLASSES],
     most: usize,
@@ -62,7 +74,8 @@ impl<T> Default for Arena<T> {
     /// Without a limit of its own.
     fn default() -> Self {
         Self {
-            items: Vec::new(),
+            chunks: Vec::new(),
+            len: 0,
             free: [NONE; CLASSES],
             most: NONE as usize,
         }
@@ -80,15 +93,17 @@ impl<T: Linked> Arena<T> {
 
     /// Bytes of all blocks, free ones included.
     pub(super) fn bytes(&self) -> usize {
-        self.items.len() * size_of::<T>()
+        self.len * size_of::<T>()
     }
 
     pub(super) fn all(&self, run: &Run) -> &[T] {
-        &self.items[run.range()]
+        let (chunk, range) = run.range();
+        self.chunks.get(chunk).map_or(&[], |items| &items[range])
     }
 
     pub(super) fn all_mut(&mut self, run: &Run) -> &mut [T] {
-        &mut self.items[run.range()]
+        let (chunk, range) = run.range();
+        (self.chunks.get_mut(chunk)).map_or(&mut [], |items| &mut items[range])
     }
 
     /// Appends an item; false, and nothing is changed, where there is no room.
@@ -96,20 +111,20 @@ impl<T: Linked> Arena<T> {
         if run.len == run.room && !self.grow(run, item) {
             return false;
         }
-        self.items[(run.at + run.len) as usize] = item;
+        *self.item_mut(run.at + run.len) = item;
         run.len += 1;
         true
     }
 
     pub(super) fn pop(&mut self, run: &mut Run) -> Option<T> {
         run.len = run.len.checked_sub(1)?;
-        Some(self.items[(run.at + run.len) as usize])
+        Some(*self.item_mut(run.at + run.len))
     }
 
     /// Takes an item out; the last one takes its place.
     pub(super) fn swap_remove(&mut self, run: &mut Run, at: usize) -> Option<T> {
         let last = self.pop(run)?;
-        let hole = self.items[run.range()].get_mut(at);
+        let hole = self.all_mut(run).get_mut(at);
         Some(hole.map_or(last, |hole| std::mem::replace(hole, last)))
     }
 
@@ -127,11 +142,16 @@ impl<T: Linked> Arena<T> {
         let Some(at) = self.take(class_of(room), filler) else {
             return false;
         };
-        self.items.copy_within(run.range(), at as usize);
+        let ((from, range), (to, first)) = (run.range(), split(at));
+        if from == to {
+            self.chunks[to].copy_within(range, first);
+        } else if let Ok([from, to]) = self.chunks.get_disjoint_mut([from, to]) {
+            to[first..first + range.len()].copy_from_slice(&from[range]);
+        }
         let moved = Run {
             at,
             len: run.len,
-            room: u32::try_from(room).unwrap_or(NONE),
+            room: small(room),
         };
         self.release(run);
         *run = moved;
@@ -142,27 +162,52 @@ impl<T: Linked> Arena<T> {
     fn take(&mut self, class: usize, filler: T) -> Option<u32> {
         let larger = (class..CLASSES).find(|&c| self.free[c] != NONE);
         let Some(larger) = larger else {
-            let at = self.items.len();
-            let end = at + (BLOCK_MIN << class);
-            if class >= CLASSES || end > self.most {
-                return None;
-            }
-            self.items.resize(end, filler);
-            return u32::try_from(at).ok();
+            return (class < CLASSES)
+                .then(|| self.add_block(BLOCK_MIN << class, filler))
+                .flatten();
         };
         let at = self.free[larger];
-        self.free[larger] = self.items[at as usize].next();
+        self.free[larger] = self.item_mut(at).next();
         for half in class..larger {
-            let rest = at as usize + (BLOCK_MIN << half);
-            self.give(u32::try_from(rest).unwrap_or(NONE), half);
+            let rest = at + small(BLOCK_MIN << half);
+            self.give(rest, half);
         }
         Some(at)
     }
 
+    /// A block that none was before: behind the others of a chunk, or in a new one.
+    fn add_block(&mut self, room: usize, filler: T) -> Option<u32> {
+        if self.len + room > self.most {
+            return None;
+        }
+        let has_room = |items: &Vec<T>| items.capacity().min(CHUNK_MAX) - items.len() >= room;
+        let chunk = match self.chunks.iter().rposition(has_room) {
+            Some(chunk) => chunk,
+            None if self.chunks.len() < (NONE >> PLACE_BITS) as usize => {
+                let all = self.len.clamp(CHUNK_MIN, CHUNK_MAX);
+                self.chunks.push(Vec::with_capacity(all.max(room)));
+                self.chunks.len() - 1
+            }
+            None => return None,
+        };
+        let items = &mut self.chunks[chunk];
+        let at = items.len();
+        items.resize(at + room, filler);
+        self.len += room;
+        Some(small(chunk) << PLACE_BITS | small(at))
+    }
+
     fn give(&mut self, at: u32, class: usize) {
-        let first = &mut self.items[at as usize];
-        *first = first.linked(self.free[class]);
+        let next = self.free[class];
+        let first = self.item_mut(at);
+        *first = first.linked(next);
         self.free[class] = at;
+    }
+
+    /// The item at a place of a block.
+    fn item_mut(&mut self, at: u32) -> &mut T {
+        let (chunk, at) = split(at);
+        &mut self.chunks[chunk][at]
     }
 }
 
@@ -211,6 +256,16 @@ impl<T: Linked + Ord> Arena<T> {
         items[at] = last;
         Some(top)
     }
+}
+
+/// The chunk that a place names, and the place in it.
+fn split(at: u32) -> (usize, usize) {
+    ((at >> PLACE_BITS) as usize, at as usize % CHUNK_MAX)
+}
+
+/// A count of items of one chunk, or of chunks.
+fn small(count: usize) -> u32 {
+    u32::try_from(count).unwrap_or(NONE)
 }
 
 /// Which size of block holds so many items; a power of two of [`BLOCK_MIN`].
@@ -319,5 +374,18 @@ mod tests {
         assert_eq!(arena.bytes(), before);
         assert!(!arena.push(&mut other, 32));
         assert_eq!(arena.all(&other), (0..32).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn growth_moves_the_items_of_the_run_that_grows_alone() {
+        let mut arena = Arena::new(1 << 16);
+        let (mut one, mut other) = (Run::default(), Run::default());
+        (0..8).for_each(|k| assert!(arena.push(&mut one, k)));
+        let place = arena.all(&one).as_ptr();
+        (0..10_000).for_each(|k| assert!(arena.push(&mut other, k)));
+        assert!(std::ptr::eq(place, arena.all(&one).as_ptr()));
+        assert_eq!(arena.all(&one), (0..8).collect::<Vec<_>>());
+        assert_eq!(arena.all(&other), (0..10_000).collect::<Vec<_>>());
+        assert!(arena.chunks.len() > 2);
     }
 }
