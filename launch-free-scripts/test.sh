@@ -14,21 +14,22 @@ if [ "${1:-}" != --rust-only ]; then
   # What the Python side needs, in an environment of its own.
   venv=$root/.venv-test
   [ -x "$venv/bin/python" ] || python3 -m venv "$venv"
-  "$venv/bin/pip" install --quiet --disable-pip-version-check pytest mujoco ./msgs/python
+  "$venv/bin/pip" install --quiet --disable-pip-version-check pytest pytest-xdist mujoco ./msgs/python
   export SWEEPD_PYTHON=$venv/bin/python
 fi
 
 cargo test --no-fail-fast
 # Tests against oracles count their cases by build: the large counts run here.
-cargo test --release --no-fail-fast --test engine --test soundness --test exact_pairs --test mesh_pairs \
+cargo test --release --no-fail-fast --test alloc --test engine --test soundness --test exact_pairs --test mesh_pairs \
   --test broad_phase --test geometry_cases --test mesh_manifolds --test sweep --test regions
 
 if [ "${1:-}" != --rust-only ]; then
   cargo build --quiet --release --bin sweepd
-  SWEEPD=${CARGO_TARGET_DIR:-$root/target}/release/sweepd "$SWEEPD_PYTHON" -m pytest -q tests/python --ignore tests/python/ros2
+  # Two at a time: they mostly wait for one another's messages.
+  SWEEPD=${CARGO_TARGET_DIR:-$root/target}/release/sweepd "$SWEEPD_PYTHON" -m pytest -q -n 2 tests/python --ignore tests/python/ros2
   ros2=$("$here/ros2_env.sh") && code=0 || code=$?
   if [ "$code" = 0 ]; then
-    SWEEPD=${CARGO_TARGET_DIR:-$root/target}/release/sweepd "$ros2" -m pytest -q -p no:cacheprovider tests/python/ros2
+    SWEEPD=${CARGO_TARGET_DIR:-$root/target}/release/sweepd "$ros2" -m pytest -q -n 2 -p no:cacheprovider tests/python/ros2
   elif [ "$code" = 3 ] && [ "${SWEEPD_ROS2:-}" != required ]; then
     echo "the tests with ROS 2 peers are skipped: see above"
   else

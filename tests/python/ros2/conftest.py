@@ -30,7 +30,9 @@ BEST_EFFORT = QoSProfile(depth=100, reliability=QoSReliabilityPolicy.BEST_EFFORT
 LATCHED = QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
 
 _CLONE_NEWNET = 0x40000000
-_domains = itertools.cycle(range(1 + os.getpid() % 50, 100))
+# Tests that run side by side have domains of their own: every eighth, from the worker's number on.
+_worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:]) % 8
+_domains = itertools.cycle(range(8 * (os.getpid() % 6) + 1 + _worker, 100, 8))
 
 
 def pytest_configure(config):
