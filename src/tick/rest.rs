@@ -17,7 +17,8 @@ const LAST_NS: u64 = 10_000;
 const LAST_PARTS: u64 = 8;
 /// What is kept back grows by this with each tick that passes its end in spite of it, ...
 const LATE_NS: u64 = 4_000;
-/// ... and shrinks by this with each that does not, nanoseconds: so one in a hundred and forty does.
+/// ... and shrinks by this with each that does not, nanoseconds: so, between these bounds, one in a
+/// hundred and forty does.
 const IN_TIME_NS: u64 = 28;
 
 /// The last tick's budget after its outbox was handed over.

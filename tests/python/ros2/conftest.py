@@ -30,9 +30,11 @@ BEST_EFFORT = QoSProfile(depth=100, reliability=QoSReliabilityPolicy.BEST_EFFORT
 LATCHED = QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL)
 
 _CLONE_NEWNET = 0x40000000
-# Tests that run side by side have domains of their own: every eighth, from the worker's number on.
-_worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:]) % 8
-_domains = itertools.cycle(range(8 * (os.getpid() % 6) + 1 + _worker, 100, 8))
+# Tests that run side by side take turns at the domains, from a place that differs from run to run.
+_workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+_worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+_run = os.getppid() if _workers > 1 else os.getpid()
+_domains = itertools.cycle(range(1 + _run % 50 + _worker, 100, _workers))
 
 
 def pytest_configure(config):
