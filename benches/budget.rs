@@ -86,7 +86,8 @@ fn main() {
     let meshes = shapes();
     let columns = "machine,commit,compiler,seed,scene,bodies,above_floor_us,ticks,floor_us,publish_p50_us,\
          overshoot_wall_p50_us,overshoot_wall_p99_us,overshoot_wall_p999_us,overshoot_cpu_p50_us,overshoot_cpu_p99_us,\
-         overshoot_cpu_p999_us,machine_cpu_p50_us,machine_cpu_p99_us,machine_cpu_p999_us,used_percent,used_before_publishing_percent,undecided_percent,used_cpu_percent\n";
+         overshoot_cpu_p999_us,machine_cpu_p50_us,machine_cpu_p99_us,machine_cpu_p999_us,used_percent,\
+         used_before_publishing_percent,undecided_percent,used_cpu_percent\n";
     let mut csv = String::from(columns);
     let from = provenance();
     for scene in SCENES {

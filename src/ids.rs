@@ -20,6 +20,13 @@ pub struct PairSlot(pub u32);
 #[repr(transparent)]
 pub struct SourceSlot(pub u32);
 
+/// An index, or a length, as the 32 bits it is stored in: see `limits` for how few there are of anything.
+#[inline]
+pub(crate) fn small(index: usize) -> u32 {
+    debug_assert!(u32::try_from(index).is_ok());
+    u32::try_from(index).unwrap_or(u32::MAX)
+}
+
 impl BodySlot {
     /// As an index.
     #[must_use]

@@ -5,7 +5,7 @@
 
 use super::Proxies;
 use super::order::give_back;
-use crate::ids::{BodyId, BodySlot, PairKey};
+use crate::ids::{BodyId, BodySlot, PairKey, small};
 use crate::math::Aabb;
 
 /// It is in the broad phase.
@@ -274,10 +274,4 @@ impl Members {
 /// How many ids are not above the one before.
 fn descents(ids: &[BodyId]) -> usize {
     ids.windows(2).filter(|two| two[0] >= two[1]).count()
-}
-
-/// An index as the 32 bits it is stored in; there are never more bodies than `limits::BODIES_MAX`.
-pub(super) fn small(index: usize) -> u32 {
-    debug_assert!(u32::try_from(index).is_ok());
-    u32::try_from(index).unwrap_or(u32::MAX)
 }

@@ -4,6 +4,8 @@
 //! It grows by chunks, each as large as all before it, and no item moves for it: one vector that doubles copied some
 //! megabytes now and then, a millisecond in which no deadline is looked at.
 
+use crate::ids::small;
+
 /// Items of the smallest block.
 const BLOCK_MIN: usize = 4;
 /// Sizes of blocks: each is twice the one before.
@@ -162,9 +164,7 @@ impl<T: Linked> Arena<T> {
     fn take(&mut self, class: usize, filler: T) -> Option<u32> {
         let larger = (class..CLASSES).find(|&c| self.free[c] != NONE);
         let Some(larger) = larger else {
-            return (class < CLASSES)
-                .then(|| self.add_block(BLOCK_MIN << class, filler))
-                .flatten();
+            return self.add_block(class, filler);
         };
         let at = self.free[larger];
         self.free[larger] = self.item_mut(at).next();
@@ -176,8 +176,9 @@ impl<T: Linked> Arena<T> {
     }
 
     /// A block that none was before: behind the others of a chunk, or in a new one.
-    fn add_block(&mut self, room: usize, filler: T) -> Option<u32> {
-        if self.len + room > self.most {
+    fn add_block(&mut self, class: usize, filler: T) -> Option<u32> {
+        let room = BLOCK_MIN << class;
+        if class >= CLASSES || self.len + room > self.most {
             return None;
         }
         let has_room = |items: &Vec<T>| items.capacity().min(CHUNK_MAX) - items.len() >= room;
@@ -261,11 +262,6 @@ impl<T: Linked + Ord> Arena<T> {
 /// The chunk that a place names, and the place in it.
 fn split(at: u32) -> (usize, usize) {
     ((at >> PLACE_BITS) as usize, at as usize % CHUNK_MAX)
-}
-
-/// A count of items of one chunk, or of chunks.
-fn small(count: usize) -> u32 {
-    u32::try_from(count).unwrap_or(NONE)
 }
 
 /// Which size of block holds so many items; a power of two of [`BLOCK_MIN`].

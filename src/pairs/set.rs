@@ -2,7 +2,7 @@
 
 use super::index::Index;
 use super::{Ended, PairKey};
-use crate::ids::{BodySlot, PairSlot};
+use crate::ids::{BodySlot, PairSlot, small};
 use crate::wire::EndCause;
 
 mod ahead;
@@ -333,12 +333,6 @@ fn live(keys: &[PairKey]) -> impl Iterator<Item = (PairSlot, PairKey)> + Clone +
     slots
         .zip(keys.iter().copied())
         .filter(|(_, key)| *key != PairKey::NOBODY)
-}
-
-/// An index as the 32 bits it is stored in; lengths here stay far below (see `limits`).
-fn small(index: usize) -> u32 {
-    debug_assert!(index < NONE as usize);
-    u32::try_from(index).unwrap_or(NONE)
 }
 
 #[cfg(test)]

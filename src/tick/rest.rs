@@ -17,8 +17,8 @@ const LAST_NS: u64 = 10_000;
 const LAST_PARTS: u64 = 8;
 /// What is kept back grows by this with each tick that passes its end in spite of it, ...
 const LATE_NS: u64 = 4_000;
-/// ... and shrinks by this with each that does not, nanoseconds: so, between these bounds, one in a
-/// hundred and forty does.
+/// ... and shrinks by this with each that does not, nanoseconds: so, between these bounds, one in a hundred and forty
+/// does.
 const IN_TIME_NS: u64 = 28;
 
 /// The last tick's budget after its outbox was handed over.
@@ -107,8 +107,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn so_much_is_kept_back_that_less_than_one_end_in_a_hundred_is_passed_and_never_more_than_its_part()
-     {
+    fn less_than_one_end_in_a_hundred_is_passed_and_never_more_than_its_part_is_kept_back() {
         let mut rest = Rest::default();
         rest.leave(1_200_000);
         // Each 100th end comes 60 us late, each 20th 25 us; the first are not told apart from the others' at once.

@@ -3,8 +3,7 @@
 //! Cells stand in an array, or, where the world has no end, in a pool that a table finds by their coordinates; there a
 //! cell without a body is given back at once.
 
-use crate::broad::members::small;
-use crate::ids::BodySlot;
+use crate::ids::{BodySlot, small};
 use crate::pairs::Index;
 
 /// No index.

@@ -17,8 +17,8 @@
 //! size).
 
 use super::Work;
-use super::members::{ASKED, CAME, MOVED, Members, small};
-use crate::ids::{BodySlot, PairKey};
+use super::members::{ASKED, CAME, MOVED, Members};
+use crate::ids::{BodySlot, PairKey, small};
 
 mod cells;
 mod lattice;

@@ -6,6 +6,7 @@
 
 use super::NONE;
 use super::idle::shed;
+use crate::ids::small;
 use crate::simd::boxes::{LANES, WIDTH, prefetch};
 
 /// Bits of lanes by lane.
@@ -338,10 +339,4 @@ pub(super) fn spare<T>(list: &mut Vec<T>, len: usize, some: usize) {
     if list.capacity() < len + len / 2 + some {
         room(list, 2 * len + 2 * some);
     }
-}
-
-/// An index as the 32 bits it is stored in.
-pub(super) fn small(index: usize) -> u32 {
-    debug_assert!(u32::try_from(index).is_ok());
-    u32::try_from(index).unwrap_or(NONE)
 }

@@ -4,9 +4,9 @@
 //! those of two ticks with the same lanes differ by their bits alone.
 
 use super::idle::shed;
-use super::links::{Matrix, room, small, spare};
+use super::links::{Matrix, room, spare};
 use super::{BodySlot, parts};
-use crate::ids::PairKey;
+use crate::ids::{PairKey, small};
 use crate::simd::boxes::WIDTH;
 
 /// The overlaps of a tick.

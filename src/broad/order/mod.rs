@@ -29,7 +29,7 @@
 
 use super::members::{ASKED, CAME, Members};
 use super::{Proxies, Work};
-use crate::ids::{BodySlot, PairKey};
+use crate::ids::{BodySlot, PairKey, small};
 use crate::simd::boxes::{Boxes16, Down, Hold, Level, WIDTH};
 use crate::wire::{BroadCause, BroadMode};
 
@@ -64,7 +64,7 @@ mod verlet;
 use afresh::Afresh;
 use fatten::Gait;
 pub(super) use idle::{give_back, is_thrifty};
-use links::{Links, small, spare};
+use links::{Links, spare};
 use tree::Tree;
 
 /// No index.

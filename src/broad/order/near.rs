@@ -2,10 +2,9 @@
 //!
 //! In: boxes by rank, lanes whose entries die. Out: pairs that began and pairs that parted.
 
-use super::links::small;
 use super::verlet::Verlet;
 use super::{BodySlot, NONE, Order, Proxies, Tick};
-use crate::ids::PairKey;
+use crate::ids::{PairKey, small};
 use crate::simd::boxes::{Down, Lanes, WIDTH, Work, prefetch};
 
 /// Entries ahead whose boxes are asked for.

@@ -8,9 +8,10 @@
 
 use super::afresh::Afresh;
 use super::idle::shed;
-use super::links::{room, small, spare};
+use super::links::{room, spare};
 use super::sweep::Search;
 use super::{Order, Proxies, Tick, Work as Done, is_thrifty};
+use crate::ids::small;
 
 impl Order {
     /// Begins the list, which is to be made in so many ticks. The first of several, in which all boxes are swept, has

@@ -2,10 +2,11 @@
 
 use super::fatten::{Gait, outward};
 use super::idle;
-use super::links::{room, small, spare};
+use super::links::{room, spare};
 use super::sort::{CLASSES_MAX, FILL, Frame, Sorter, centre};
 use super::tree::NO_BOUND;
 use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, ones, parts};
+use crate::ids::small;
 use crate::math::Aabb;
 use crate::simd::boxes::{Boxes16, Down, Hold, Portable, WIDTH};
 

@@ -7,10 +7,11 @@
 //! come near which block, how many they are and what they meet cannot be guessed: with a loop a pair of blocks, a
 //! branch guessed wrong took longer than the comparisons.
 
+use crate::ids::small;
 use std::ops::Range;
 
 use super::idle::shed;
-use super::links::{Matrix, room, small, spare};
+use super::links::{Matrix, room, spare};
 use super::met::Met;
 use super::near::Near;
 use super::tree::{Tree, Walk};

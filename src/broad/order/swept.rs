@@ -3,10 +3,10 @@
 //! In: the boxes of this tick and the last. Out: swept boxes, by rank and in the blocks; and who has left his.
 
 use super::fatten::outward;
-use super::links::small;
 use super::load::ask_ahead;
 use super::pace::Phase;
 use super::{BodySlot, NONE, Order, Proxies, ones};
+use crate::ids::small;
 use crate::simd::boxes::{Down, Lanes, WIDTH, Work, prefetch};
 
 /// What a swept box is padded by, in mean sides: what stands still but for its sender's rounding stays in, ...

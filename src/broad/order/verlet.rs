@@ -20,14 +20,13 @@ use super::afresh::Afresh;
 use super::fatten::outward;
 use super::idle::shed;
 use super::lay::Bound;
-use super::links::small;
 use super::near::{Found, Near, is_among};
 use super::pace::{Pace, Phase};
 use super::presort::SPLIT_TICKS_MAX;
 use super::shares::Shares;
 use super::swept::sweep;
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, Work as Done, parts};
-use crate::ids::PairKey;
+use crate::ids::{PairKey, small};
 use crate::simd::boxes::{Down, LANES, Lanes, Portable, WIDTH, Work};
 use crate::wire::BroadMode;
 

@@ -8,8 +8,8 @@
 //! (or among upper ends) of equal value decides nothing and is left as it comes; results are put in the order of ids
 //! later.
 
-use crate::broad::members::{Bounds, LEFT, Members, small};
-use crate::ids::BodySlot;
+use crate::broad::members::{Bounds, LEFT, Members};
+use crate::ids::{BodySlot, small};
 
 /// Tag of an end whose body left.
 const DEAD: u32 = u32::MAX;

@@ -8,8 +8,8 @@
 //! band where the later of the two begins, so exactly once. Bodies that touch many bands are compared with everything.
 
 use super::axis::Axis;
-use crate::broad::members::{Bounds, Members, small};
-use crate::ids::BodySlot;
+use crate::broad::members::{Bounds, Members};
+use crate::ids::{BodySlot, small};
 
 /// Bands that one body may stand in; one that touches more is compared with all.
 const BANDS_PER_BODY: usize = 4;
