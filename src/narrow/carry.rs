@@ -21,6 +21,9 @@ use super::{NONE, Narrow};
 /// come to them: when the clock is to be read.
 const RETEST_COST: u64 = 2;
 
+/// What taking a front to another pose costs in the same way, with what it takes to come to it from the pair before.
+const CARRY_COST: u64 = 4;
+
 /// A pair's turn doubles with each tick it waits for its verdict, up to so many times: what motion undoes in a tick may
 /// be more than a plain turn, and then equal turns for all would decide it never.
 const SLICE_DOUBLINGS_MAX: u64 = 6;
@@ -88,6 +91,7 @@ impl Narrow {
             front.start(store, one_shape, other_shape, &pos12, self.search);
         }
         front.move_to(store, one_shape, other_shape, &pos12);
+        meter.charge_weighted(0, CARRY_COST);
         self.counters.slices += 1;
         let slice_units = slice_units(memo.undecided_since, self.tick);
         let done = front.advance(store, one_shape, other_shape, goal, slice_units, meter);

@@ -6,13 +6,14 @@
 
 use super::Engine;
 use super::floor::Began;
+use super::interrupts::Interrupts;
 use crate::narrow::Wanted;
 use crate::time::Meter;
 use crate::world::{BuiltTree, TreeOf, WornTree};
 
-/// Kept back of the tick's end at least, nanoseconds: for the query that is under way then, for closing the work lists,
-/// and for what a machine takes from a thread now and then (an interrupt of some 20 us in a tick of a hundred).
-const LAST_NS: u64 = 10_000;
+/// Kept back of the tick's end at least, nanoseconds: for the query that is under way then, and for closing the work
+/// lists. Timers' interrupts are kept clear of, see [`Interrupts`].
+const LAST_NS: u64 = 6_000;
 /// Kept back at most, as a part of what the budget leaves above the floor.
 const LAST_PARTS: u64 = 8;
 /// What is kept back grows by this with each tick that passes its end in spite of it, ...
@@ -22,7 +23,7 @@ const LATE_NS: u64 = 4_000;
 const IN_TIME_NS: u64 = 28;
 
 /// The last tick's budget after its outbox was handed over.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Rest {
     /// What was asked of the narrow phase, and when the tick's time is up, `CLOCK_MONOTONIC` nanoseconds; `None`:
     /// nothing is left to do, or to do it in.
@@ -32,6 +33,8 @@ pub(super) struct Rest {
     pub(super) units: u64,
     /// Kept back of the tick's end, nanoseconds.
     last_ns: u64,
+    /// What interrupts the thread now and then, so that it does not at the tick's end.
+    pub(super) interrupts: Interrupts,
     /// The most that may be, unless that is less than [`LAST_NS`].
     most_ns: u64,
 }
@@ -84,7 +87,9 @@ impl Engine {
             return false;
         };
         let began = Began::now(self.clock.as_ref());
-        let left_ns = began.left_ns(end_ns).saturating_sub(self.rest.last_ns);
+        let clear_ns = (self.rest.interrupts).clear_end_ns(began.wall_ns(), end_ns);
+        let kept_ns = end_ns.saturating_sub(self.rest.last_ns);
+        let left_ns = began.left_ns(kept_ns.min(clear_ns));
         if left_ns == 0 {
             return false;
         }
@@ -92,6 +97,7 @@ impl Engine {
         let mut meter = Meter::new(self.clock.as_ref(), Some(stop_ns), None);
         let done = self.narrow.go_on(&mut self.world, wanted, &mut meter);
         self.rest.units += meter.spent();
+        self.rest.interrupts.note(meter.longest_gap());
         self.rest.spent_ns += self.clock.monotonic_ns().saturating_sub(began.wall_ns());
         if !done && left_ns <= slice_ns {
             (self.rest).note_end(began.passed_ns(end_ns, self.clock.as_ref()));

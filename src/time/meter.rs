@@ -27,8 +27,19 @@ pub struct Meter<'a> {
     units_to_next_read: u64,
     /// When the clock was last read; 0 where nothing asks for it.
     read_ns: u64,
+    /// Of the times between two reads.
+    longest: Gap,
     out_of_time: bool,
     beat: Option<Beat<'a>>,
+}
+
+/// A time between two reads of the clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Gap {
+    /// The first of the two, monotonic nanoseconds.
+    pub from_ns: u64,
+    /// Nanoseconds from it to the second.
+    pub ns: u64,
 }
 
 /// What is done at least each `period_ns` while work goes on, between two units.
@@ -42,8 +53,8 @@ struct Beat<'a> {
 /// (some 25 ns): at 8 the reads cost 2 %, at 32 a deadline would be passed by some six microseconds; ...
 const CHEAP_UNITS_PER_READ: u64 = 8;
 /// ... and where less is left than so many nanoseconds for each of them, fewer: out of cold memory a unit takes half a
-/// microsecond and more.
-const CHEAP_UNIT_NS: u64 = 1_000;
+/// microsecond and more, two on a slow machine.
+const CHEAP_UNIT_NS: u64 = 2_000;
 
 impl std::fmt::Debug for Meter<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -66,6 +77,7 @@ impl<'a> Meter<'a> {
             units_spent: 0,
             units_to_next_read: 0,
             read_ns: 0,
+            longest: Gap::default(),
             out_of_time: false,
             beat: None,
         };
@@ -189,6 +201,12 @@ impl<'a> Meter<'a> {
         self.units_spent
     }
 
+    /// The longest time between two reads of the clock so far.
+    #[must_use]
+    pub fn longest_gap(&self) -> Gap {
+        self.longest
+    }
+
     /// The clock this meter watches.
     #[must_use]
     pub fn clock(&self) -> &'a dyn Clock {
@@ -205,7 +223,14 @@ impl<'a> Meter<'a> {
         if self.deadline_ns.is_none() && self.beat.is_none() {
             return;
         }
-        let now_ns = self.clock.monotonic_ns().max(self.read_ns);
+        let from_ns = self.read_ns;
+        let now_ns = self.clock.monotonic_ns().max(from_ns);
+        if now_ns - from_ns > self.longest.ns && from_ns > 0 {
+            self.longest = Gap {
+                from_ns,
+                ns: now_ns - from_ns,
+            };
+        }
         self.read_ns = now_ns;
         if let Some(deadline_ns) = self.deadline_ns {
             self.out_of_time = now_ns >= deadline_ns;
@@ -293,6 +318,21 @@ mod tests {
             meter.charge_dear(1);
         }
         assert_eq!(beats, 3);
+    }
+
+    #[test]
+    fn a_meter_knows_its_longest_gap() {
+        let clock = ManualClock::new(500);
+        let mut meter = Meter::new(&clock, Some(u64::MAX), None);
+        for ns in [3, 40, 20] {
+            clock.advance(ns);
+            meter.charge_dear(1);
+        }
+        let gap = Gap {
+            from_ns: 503,
+            ns: 40,
+        };
+        assert_eq!(meter.longest_gap(), gap);
     }
 
     #[test]

@@ -40,21 +40,20 @@ impl Deep {
             return None;
         }
         let at = Placed::of(a, b, pos12);
-        let overlap_m = match (side_a, side_b) {
-            (Side::Mesh(one), Side::Mesh(other)) => {
-                meter.charge(1);
-                of_meshes(one, other, &at)?
-            }
-            (Side::Mesh(mesh), Side::Convex(convex)) => {
-                meter.charge_weighted(1, CONVEX_COST);
-                of_convex(mesh, (convex, b), &at.to_a(&b.centre), pos12)?
-            }
-            (Side::Convex(convex), Side::Mesh(mesh)) => {
-                meter.charge_weighted(1, CONVEX_COST);
-                of_convex(mesh, (convex, a), &at.to_b(&a.centre), &pos12.inverse())?
-            }
+        let (overlap_m, cost) = match (side_a, side_b) {
+            (Side::Mesh(one), Side::Mesh(other)) => (of_meshes(one, other, &at), 1),
+            (Side::Mesh(mesh), Side::Convex(convex)) => (
+                of_convex(mesh, (convex, b), &at.to_a(&b.centre), pos12),
+                CONVEX_COST,
+            ),
+            (Side::Convex(convex), Side::Mesh(mesh)) => (
+                of_convex(mesh, (convex, a), &at.to_b(&a.centre), &pos12.inverse()),
+                CONVEX_COST,
+            ),
             (Side::Convex(_), Side::Convex(_)) => return None,
         };
+        meter.charge_weighted(1, cost);
+        let overlap_m = overlap_m?;
         let depth_m = overlap_m - at.slop - 8.0 * ROUND * overlap_m.abs();
         self.lack = Lack::of(pos12, -depth_m);
         (depth_m > 0.0).then_some(depth_m)

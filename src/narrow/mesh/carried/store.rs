@@ -43,6 +43,13 @@ impl FrontStore {
         }
     }
 
+    /// Has memory at hand for what the next work will keep.
+    pub(in crate::narrow) fn touch_ahead(&mut self) {
+        self.groups.touch_ahead();
+        self.open.touch_ahead();
+        self.contacts.touch_ahead();
+    }
+
     /// Bytes in use by blocks, free ones included.
     #[must_use]
     pub fn bytes(&self) -> usize {

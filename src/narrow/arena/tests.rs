@@ -1,0 +1,142 @@
+//! Runs and heaps against those of the standard library; growth, limits, and memory touched ahead.
+
+use super::*;
+use proptest::prelude::*;
+use std::collections::BinaryHeap;
+
+impl Linked for u32 {
+    fn linked(self, next: u32) -> Self {
+        next
+    }
+
+    fn next(&self) -> u32 {
+        *self
+    }
+}
+
+proptest! {
+    /// Runs and heaps of the standard library side by side; most steps put in, some take out, few give back.
+    #[test]
+    fn runs_behave_as_heaps_of_their_own(
+        steps in proptest::collection::vec((0..5_usize, 0..100_u32, 0..200_u32), 0..1500)
+    ) {
+        let mut arena = Arena::new(1 << 16);
+        let mut runs: [(Run, BinaryHeap<u32>); 5] = Default::default();
+        for (at, kind, item) in steps {
+            let (run, twin) = &mut runs[at];
+            match kind {
+                0 => {
+                    arena.release(run);
+                    twin.clear();
+                }
+                1..70 => {
+                    prop_assert!(arena.push_heap(run, item));
+                    twin.push(item);
+                }
+                _ => prop_assert_eq!(arena.pop_heap(run), twin.pop()),
+            }
+            prop_assert_eq!((arena.peek(run), run.len()), (twin.peek(), twin.len()));
+        }
+        for (mut run, mut twin) in runs {
+            while let Some(item) = twin.pop() {
+                prop_assert_eq!(arena.pop_heap(&mut run), Some(item));
+            }
+            prop_assert!(run.is_empty());
+        }
+    }
+
+    /// The same for vectors.
+    #[test]
+    fn runs_behave_as_vectors_of_their_own(
+        steps in proptest::collection::vec((0..5_usize, 0..100_u32, 0..40_usize), 0..1500)
+    ) {
+        let mut arena = Arena::new(1 << 16);
+        let mut runs: [(Run, Vec<u32>); 5] = Default::default();
+        for (item, (at, kind, place)) in (0..).zip(steps) {
+            let (run, twin) = &mut runs[at];
+            match kind {
+                0 => {
+                    arena.release(run);
+                    twin.clear();
+                }
+                1 => {
+                    run.clear();
+                    twin.clear();
+                }
+                2..20 => prop_assert_eq!(arena.pop(run), twin.pop()),
+                20..30 => {
+                    let there = (place < twin.len()).then(|| twin.swap_remove(place));
+                    if there.is_some() {
+                        prop_assert_eq!(arena.swap_remove(run, place), there);
+                    }
+                }
+                _ => {
+                    prop_assert!(arena.push(run, item));
+                    twin.push(item);
+                }
+            }
+            prop_assert_eq!(arena.all(run), twin.as_slice());
+        }
+    }
+}
+
+#[test]
+fn a_full_arena_says_so_and_what_is_given_back_is_used_again() {
+    let mut arena = Arena::new(64);
+    let (mut one, mut other) = (Run::default(), Run::default());
+    let mut count = 0;
+    while arena.push(&mut one, count) {
+        count += 1;
+    }
+    // Blocks of 4, 8, 16 and 32: the next would be one of 64.
+    assert_eq!(count, 32);
+    assert_eq!(arena.all(&one), (0..32).collect::<Vec<_>>());
+    // Those that it grew out of are left to others, and then its own.
+    (0..16).for_each(|k| assert!(arena.push(&mut other, k)));
+    let before = arena.bytes();
+    arena.release(&mut one);
+    (16..32).for_each(|k| assert!(arena.push(&mut other, k)));
+    assert_eq!(arena.bytes(), before);
+    assert!(!arena.push(&mut other, 32));
+    assert_eq!(arena.all(&other), (0..32).collect::<Vec<_>>());
+}
+
+#[test]
+fn growth_moves_the_items_of_the_run_that_grows_alone() {
+    let mut arena = Arena::new(1 << 16);
+    let (mut one, mut other) = (Run::default(), Run::default());
+    (0..8).for_each(|k| assert!(arena.push(&mut one, k)));
+    let place = arena.all(&one).as_ptr();
+    (0..10_000).for_each(|k| assert!(arena.push(&mut other, k)));
+    assert!(std::ptr::eq(place, arena.all(&one).as_ptr()));
+    assert_eq!(arena.all(&one), (0..8).collect::<Vec<_>>());
+    assert_eq!(arena.all(&other), (0..10_000).collect::<Vec<_>>());
+    assert!(arena.chunks.len() > 2);
+}
+
+#[test]
+fn memory_is_touched_ahead_a_little_at_a_time_and_nothing_is_in_it() {
+    let mut arena = Arena::new(1 << 20);
+    arena.touch_ahead();
+    let mut runs: Vec<Run> = (0..10_000).map(|_| Run::default()).collect();
+    for (item, run) in (0..).zip(&mut runs) {
+        assert!(arena.push(run, item));
+    }
+    let bytes = arena.bytes();
+    let last = arena
+        .chunks
+        .last()
+        .map(|items| (items.len(), items.capacity()));
+    let (len, room) = last.unwrap_or_default();
+    let page = PAGE / size_of::<u32>();
+    assert!(room > len + PAGES_AHEAD * page);
+    for calls in 1..=PAGES_AHEAD {
+        arena.touch_ahead();
+        let touched = arena.touched - len;
+        assert_eq!(touched, (calls * PAGES_AT_ONCE).min(PAGES_AHEAD) * page);
+    }
+    assert_eq!(arena.bytes(), bytes);
+    for (item, run) in (0..).zip(&runs) {
+        assert_eq!(arena.all(run), [item]);
+    }
+}
