@@ -111,7 +111,7 @@ fn with_work_of_its_own_it_leaves_the_rest_of_each_frame_to_the_daemon_and_tells
         "--instance",
         &desk.instance,
         "--rate",
-        "100",
+        "20",
         "--work",
         "1ms..3ms",
         "--frames",
@@ -130,9 +130,21 @@ fn with_work_of_its_own_it_leaves_the_rest_of_each_frame_to_the_daemon_and_tells
     let work = figures("the source's own work");
     assert!(1.0 <= work[0] && work[3] <= 3.0, "{text}");
     // What is left is said: never more than the frame without the work.
-    assert!(figures("left for the tick")[3] < 9.0, "{text}");
+    assert!(figures("left for the tick")[3] < 49.0, "{text}");
     assert!(figures("until the result was there")[0] >= 1.0, "{text}");
-    assert!(text.contains("of 40 frames over 10.0 ms"), "{text}");
+    let count = |what: &str| -> usize {
+        let (before, _) = text.split_once(what).unwrap();
+        before
+            .split_whitespace()
+            .next_back()
+            .unwrap()
+            .parse()
+            .unwrap()
+    };
+    // The work is short beside the frame and nearly all of it is left for the tick: then a result is late, or cut short,
+    // only where others take the cores, and that seldom (0 or 1 of 40 with 4 busy processes on 2 cores).
+    assert!(count(" of 40 frames over 50.0 ms") <= 8, "{text}");
+    assert!(count(" stopped with pairs undecided") <= 8, "{text}");
     assert!(text.contains("; 0 without a result"), "{text}");
 }
 

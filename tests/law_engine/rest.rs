@@ -19,7 +19,7 @@ fn two(at: [f64; 2]) -> Rig {
 }
 
 /// What a tick keeps back of its end for the query under way.
-const LAST_NS: u64 = 10_000;
+const LAST_NS: u64 = 6_000;
 const TOUCHING: [f64; 2] = [1.2, 1.2];
 const APART: [f64; 2] = [1.5, 1.5];
 

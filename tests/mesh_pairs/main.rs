@@ -21,6 +21,8 @@ mod extremes;
 mod fronts;
 mod half_space;
 mod laws;
+mod odd;
+mod profile;
 mod support;
 mod timing;
 

@@ -1,0 +1,398 @@
+//! Goal: the more work mesh pairs are given, the more of them are decided, from nothing and in motion; and without a
+//! limit intervals are narrow.
+//! Method: pairs of closed meshes, a third overlapping, a third within 1 % of the size, a third apart, driven through
+//! the rooms by hand with budgets in work units. Each verdict is compared with the truth of an unlimited twin: walks to
+//! the end over the other trees, nothing carried over.
+
+use std::sync::Arc;
+
+use crate::oracle::meshes;
+use crate::oracle::rng::Rng;
+use crate::support::shape;
+use sweepd::broad::{BroadPhase, Method};
+use sweepd::ids::{BodyId, PairSlot};
+use sweepd::math::{Interval, Pose, Quat, Vec3, relative};
+use sweepd::narrow::mesh::{Goal, Walk};
+use sweepd::narrow::{Narrow, Order, Wanted};
+use sweepd::pairs::{PairDelta, PairSet};
+use sweepd::report::rig::row;
+use sweepd::scene::{BodySpec, PlacedSpec, Scene, SourceSpec};
+use sweepd::shape::{Shape, ShapeSpec};
+use sweepd::time::{ManualClock, Meter};
+use sweepd::wire::{Inbox, Verdict, WIRE_VERSION, frame_flags, name_bytes};
+use sweepd::world::{PlacedShape, World};
+
+const SEED: u64 = 40_000_000;
+/// Pairs of the profile: so many that what the hard ones cost leaves no factor of two out, for in such a gap twice the
+/// budget would decide no more.
+const PAIRS: usize = 120;
+/// Ticks of motion.
+const TICKS: usize = 40;
+/// Rows, columns and bumps of the profile's bodies: 2,208, 3,480 and 4,900 triangles.
+const BALLS: [(usize, usize, f64); 3] = [(24, 48, 0.0), (30, 60, 0.04), (36, 70, 0.06)];
+/// Of a body but for its bumps, metres.
+const DIAMETER_M: f64 = 2.0;
+/// Distance at which no two of them can touch: more than twice a radius of 1.06, metres.
+const FAR_M: f64 = 2.13;
+/// Motion of a surface point a tick, metres: 0.5 % of the diameter, half of it by the way and half by the turn.
+const PACE_M: f64 = 0.005 * DIAMETER_M;
+/// How far a pair goes to and fro from where it begins, metres: the near ones begin and cease to touch.
+const SWING_M: f64 = 0.015 * DIAMETER_M;
+/// Between pairs, metres: no box reaches another pair's, though it is widened by [`REPORT_M`].
+const SPACING_M: f64 = 20.0;
+/// Pairs nearer than this are reported with their intervals, metres: all that are asked for them.
+const REPORT_M: f64 = 2.0;
+/// The least budget of a cold start: of fewer units hardly a hard pair's first turn is left to share.
+const UNITS_MIN: u64 = 128;
+/// Budgets a tick in motion, each twice the one before; the last is more than a tick takes.
+const UNITS: [u64; 8] = [64, 128, 256, 512, 1_024, 2_048, 4_096, 8_192];
+/// From frame to frame, nanoseconds.
+const FRAME_NS: u64 = 10_000_000;
+
+const VERDICTS: Wanted = Wanted {
+    contacts: false,
+    bounds: false,
+    regions: false,
+    order: Order::Counted,
+};
+const GAPS: Wanted = Wanted {
+    bounds: true,
+    ..VERDICTS
+};
+
+/// How one pair moves: B about A, to and fro, turning.
+#[derive(Clone)]
+struct Course {
+    /// Places of the two shapes.
+    kinds: [usize; 2],
+    a: Pose,
+    /// Unit, world frame, from A to B.
+    away: Vec3,
+    /// Between the origins of the two, metres.
+    distance: f64,
+    /// About which it moves, metres.
+    middle: f64,
+    /// Metres a tick.
+    speed: f64,
+    /// Radians a tick, world frame.
+    spin: Vec3,
+    turn: Quat,
+}
+
+impl Course {
+    /// A pair at rest, far apart.
+    fn new(place: usize, kinds: [usize; 2], away: Vec3, rng: &mut Rng) -> Self {
+        let home = Vec3::new((place % 10) as f64, (place / 10) as f64, 0.0) * SPACING_M;
+        let at = home + rng.vector(0.5);
+        Self {
+            kinds,
+            a: rng.pose(at),
+            away,
+            distance: FAR_M,
+            middle: FAR_M,
+            speed: 0.0,
+            spin: Vec3::zeros(),
+            turn: rng.rotation(),
+        }
+    }
+
+    fn b(&self) -> Pose {
+        let from = self.a.translation.vector;
+        Pose::from_parts((from + self.away * self.distance).into(), self.turn)
+    }
+
+    /// One tick.
+    fn advance(&mut self) {
+        self.distance += self.speed;
+        if (self.distance - self.middle).abs() > SWING_M {
+            self.speed = -self.speed;
+            self.distance += 2.0 * self.speed;
+        }
+        let turn = Quat::from_scaled_axis(self.spin) * self.turn;
+        self.turn = Quat::new_normalize(turn.into_inner());
+    }
+
+    /// What a walk to the end, without a limit, says of the gap at the poses of now.
+    fn twin(&self, shapes: &[Arc<Shape>], goal: Goal, walk: &mut Walk) -> Interval {
+        let [a, b] = self.kinds.map(|kind| &*shapes[kind]);
+        let clock = ManualClock::new(0);
+        let mut meter = Meter::unlimited(&clock);
+        walk.start(a, b, &relative(&self.a, &self.b()));
+        assert!(walk.advance(a, b, goal, u64::MAX, &mut meter));
+        walk.interval()
+    }
+
+    /// Brings the two nearer, each time by a share of their gap: by law 3.2 they stay apart.
+    fn approach(&mut self, shapes: &[Arc<Shape>], times: usize, share: f64, walk: &mut Walk) {
+        for _ in 0..times {
+            let gap = self.twin(shapes, Goal::Gap, walk);
+            self.distance -= share * gap.min.max(0.0);
+        }
+    }
+}
+
+/// Bumpy balls of so many rows and columns.
+fn balls(sizes: &[(usize, usize, f64)]) -> Vec<Arc<Shape>> {
+    let ball = |&(rows, columns, bump): &(usize, usize, f64)| {
+        Arc::new(shape(&meshes::bumpy_sphere(rows, columns, bump), None))
+    };
+    sizes.iter().map(ball).collect()
+}
+
+/// The profile's pairs: apart, near and overlapping ones in turn.
+fn courses(shapes: &[Arc<Shape>]) -> Vec<Course> {
+    let (mut rng, mut walk) = (Rng::new(SEED), Walk::default());
+    let course = |pair: usize| {
+        // Near a diagonal the boxes overlap wherever the bodies are.
+        let away = (Vec3::new(1.0, 1.0, 1.0) + rng.vector(0.2)).normalize();
+        let kinds = [pair / 3 % 3, pair / 9 % 3];
+        let mut course = Course::new(pair, kinds, away, &mut rng);
+        // To where they all but touch, and from there apart or into one another.
+        course.approach(shapes, 8, 0.999, &mut walk);
+        course.distance += match pair % 3 {
+            0 => rng.range(0.04, 0.3),
+            // From a hundredth of the size down to a ten thousandth: some are much harder to tell than others.
+            1 => [1.0, -1.0][rng.below(2)] * DIAMETER_M * 10.0_f64.powf(rng.range(-4.0, -2.0)),
+            _ => -rng.range(0.04, 0.6),
+        };
+        course.middle = course.distance;
+        course.speed = [0.5, -0.5][rng.below(2)] * PACE_M;
+        course.spin = rng.direction() * (0.5 * PACE_M);
+        course
+    };
+    (0..PAIRS).map(course).collect()
+}
+
+/// The rooms before the narrow phase, the narrow phase, and how all pairs move.
+struct Stage {
+    world: World,
+    pairs: PairSet,
+    narrow: Narrow,
+    broad: BroadPhase,
+    delta: PairDelta,
+    inbox: Inbox,
+    courses: Vec<Course>,
+    tick: u64,
+}
+
+impl Stage {
+    fn new(shapes: &[Arc<Shape>], courses: &[Course], report_m: f64) -> Self {
+        let ids = 1..=2 * courses.len() as u64;
+        let scene = Scene {
+            sources: vec![SourceSpec {
+                name: "feed".to_owned(),
+                timeout_ns: 1 << 60,
+                ros2: None,
+            }],
+            bodies: ids.map(|id| body(id, report_m)).collect(),
+            ..Scene::default()
+        };
+        let placed = |kind: usize| -> Arc<[PlacedShape]> {
+            let (shape, pose) = (Arc::clone(&shapes[kind]), Pose::identity());
+            Arc::from(vec![PlacedShape { shape, pose }])
+        };
+        let kinds = courses.iter().flat_map(|course| course.kinds);
+        let placed = kinds.map(placed).collect();
+        let world = World::new(&scene, placed, FRAME_NS).unwrap();
+        let mut stage = Self {
+            world,
+            pairs: PairSet::new(1 << 12),
+            narrow: Narrow::new(16),
+            broad: BroadPhase::new(Method::SweepAndPrune),
+            delta: PairDelta::default(),
+            inbox: Inbox::default(),
+            courses: courses.to_vec(),
+            tick: 0,
+        };
+        stage.admit();
+        stage
+    }
+
+    /// Moves every pair by one tick and lets the rooms before the narrow phase follow.
+    fn advance(&mut self) {
+        self.courses.iter_mut().for_each(Course::advance);
+        self.admit();
+    }
+
+    fn admit(&mut self) {
+        self.tick += 1;
+        let now_ns = self.tick * FRAME_NS;
+        self.inbox.clear();
+        let frame = self.inbox.push();
+        frame.header.schema = WIRE_VERSION;
+        frame.header.source = name_bytes("feed");
+        (frame.header.session, frame.header.seq) = (1, self.tick);
+        frame.header.flags = frame_flags::FULL;
+        frame.received_ns = now_ns;
+        for (pair, course) in (0_u64..).zip(&self.courses) {
+            let (a, b) = (&course.a, course.b());
+            frame.transforms.push(row(2 * pair + 1, a));
+            frame.transforms.push(row(2 * pair + 2, &b));
+        }
+        self.world.begin_tick(self.tick);
+        for frame in self.inbox.frames() {
+            self.world.admit(frame, now_ns);
+        }
+        self.world.age(now_ns);
+        self.delta.clear();
+        self.broad.update(
+            self.world.changes(),
+            &self.world,
+            self.world.filters(),
+            &mut self.pairs,
+            &mut self.delta,
+        );
+        // Every pair is a candidate.
+        assert_eq!(self.pairs.len(), self.courses.len());
+    }
+
+    /// The narrow phase's part of a tick; whether all that is wanted is done.
+    ///
+    /// * `units` - its budget; `None`: no limit.
+    fn work(&mut self, units: Option<u64>, wanted: Wanted) -> bool {
+        self.narrow
+            .begin(self.tick, &self.world, &self.pairs, &self.delta);
+        self.narrow.widen(&self.world, &mut self.pairs);
+        let clock = ManualClock::new(0);
+        let mut meter = Meter::new(&clock, None, units);
+        let done = self.narrow.spend(&mut self.world, wanted, &mut meter);
+        self.narrow.validate(&self.pairs).unwrap();
+        done
+    }
+
+    /// Whether each pair collides, as far as it is decided.
+    fn verdicts(&self) -> Vec<Option<bool>> {
+        let mut all = vec![None; self.courses.len()];
+        for (slot, _) in self.pairs.iter() {
+            let verdict = self.narrow.finding(slot).unwrap().verdict;
+            let decided = verdict != Verdict::Possible;
+            all[self.pair_of(slot)] = decided.then_some(verdict == Verdict::Colliding);
+        }
+        all
+    }
+
+    /// Whether each pair truly collides.
+    fn truth(&self, shapes: &[Arc<Shape>], walk: &mut Walk) -> Vec<bool> {
+        let collides = |course: &Course| course.twin(shapes, Goal::Verdict, walk).min <= 0.0;
+        self.courses.iter().map(collides).collect()
+    }
+
+    fn pair_of(&self, slot: PairSlot) -> usize {
+        let (low, _) = self.pairs.get(slot).unwrap().slots();
+        let id = self.world.body(low).unwrap().id.0;
+        usize::try_from((id - 1) / 2).unwrap()
+    }
+}
+
+fn body(id: u64, report_within_m: f64) -> BodySpec {
+    // What is built is handed over beside the scene.
+    let shape = PlacedSpec {
+        shape: ShapeSpec::Sphere { radius: 1.0 },
+        pose: Pose::identity(),
+    };
+    BodySpec {
+        source: Some(0),
+        report_within_m,
+        ..BodySpec::new(format!("b{id}"), BodyId(id), vec![shape])
+    }
+}
+
+/// Compares the verdicts there are with the truth; yields how many there are.
+fn judge(found: &[Option<bool>], truth: &[bool], what: &str) -> usize {
+    for (pair, (said, collides)) in found.iter().zip(truth).enumerate() {
+        let right = said.is_none_or(|said| said == *collides);
+        assert!(right, "{what}: pair {pair} collides: {collides}");
+    }
+    found.iter().flatten().count()
+}
+
+#[test]
+fn the_profile_rises_with_work() {
+    let shapes = balls(&BALLS);
+    let courses = courses(&shapes);
+    rises_cold(&shapes, &courses);
+    rises_in_motion(&shapes, &courses);
+}
+
+/// Each budget from nothing, doubled until all is decided: no step is in vain.
+fn rises_cold(shapes: &[Arc<Shape>], courses: &[Course]) {
+    let stage = Stage::new(shapes, courses, 0.0);
+    let truth = stage.truth(shapes, &mut Walk::default());
+    // The sample has to be one.
+    let colliding = truth.iter().filter(|collides| **collides).count();
+    let (least, most) = (PAIRS / 3, 2 * PAIRS / 3);
+    assert!((least..=most).contains(&colliding), "{colliding}");
+    let (mut decided, mut units) = (0, UNITS_MIN);
+    while decided < PAIRS {
+        let mut stage = Stage::new(shapes, courses, 0.0);
+        stage.work(Some(units), VERDICTS);
+        let what = format!("seed {SEED}, cold, {units} units");
+        let now = judge(&stage.verdicts(), &truth, &what);
+        assert!(now > decided, "{what}: {now} pairs after {decided}");
+        (decided, units) = (now, 2 * units);
+    }
+    // Fewer than four budgets would be no profile.
+    assert!(units >= 16 * UNITS_MIN, "{units}");
+}
+
+/// The same budget each tick, a run for each budget: what counts is the share of a whole run.
+fn rises_in_motion(shapes: &[Arc<Shape>], courses: &[Course]) {
+    let (mut stage, mut walk) = (Stage::new(shapes, courses, 0.0), Walk::default());
+    let truth = |_| {
+        let truth = stage.truth(shapes, &mut walk);
+        stage.advance();
+        truth
+    };
+    let truths: Vec<Vec<bool>> = (0..TICKS).map(truth).collect();
+    let mut shares: Vec<f64> = Vec::new();
+    for units in UNITS.map(Some).into_iter().chain([None]) {
+        let mut stage = Stage::new(shapes, courses, 0.0);
+        let what = format!("seed {SEED}, {units:?} units a tick");
+        let mut decided = 0;
+        for (tick, truth) in truths.iter().enumerate() {
+            stage.work(units, VERDICTS);
+            let at = format!("{what}, tick {tick}");
+            decided += judge(&stage.verdicts(), truth, &at);
+            stage.advance();
+        }
+        let share = decided as f64 / (PAIRS * TICKS) as f64;
+        let last = shares.last().copied().unwrap_or(0.0);
+        // Motion may favour the smaller budget for a tick or two: another pair has the turn there.
+        assert!(share >= last - 0.01, "{what}: {share} after {last}");
+        shares.push(share);
+    }
+    assert_eq!(shares.last(), Some(&1.0), "{shares:?}");
+    assert!(shares[0] < 0.99, "nothing is left to rise: {shares:?}");
+}
+
+#[test]
+fn without_a_limit_intervals_are_narrow() {
+    // 19,880 triangles each.
+    let shapes = balls(&[(71, 142, 0.06), (71, 142, 0.03)]);
+    let seed = SEED + 1;
+    let (mut rng, mut walk) = (Rng::new(seed), Walk::default());
+    let course = |pair: usize| {
+        let away = rng.direction();
+        let mut course = Course::new(pair, [pair % 2, pair / 2 % 2], away, &mut rng);
+        course.distance = rng.range(FAR_M, 3.0);
+        let times = rng.below(3);
+        course.approach(&shapes, times, 0.9, &mut walk);
+        course
+    };
+    let courses: Vec<Course> = (0..40).map(course).collect();
+    let mut stage = Stage::new(&shapes, &courses, REPORT_M);
+    assert!(stage.work(None, GAPS), "all is done");
+    for (slot, _) in stage.pairs.iter() {
+        let pair = stage.pair_of(slot);
+        let finding = stage.narrow.finding(slot).unwrap();
+        let (gap, verdict) = (finding.gap, finding.verdict);
+        let what = format!("seed {seed}, pair {pair}: {verdict}, {gap:?}");
+        // They are apart, all nearer than what is reported: not `possible`.
+        assert_eq!(verdict, Verdict::Near, "{what}");
+        assert!(gap.width() <= 1e-9 * DIAMETER_M, "{what}");
+        let twin = courses[pair].twin(&shapes, Goal::Gap, &mut walk);
+        let both = gap.widened(1e-11 * DIAMETER_M);
+        let meet = both.min <= twin.max && twin.min <= both.max;
+        assert!(meet, "{what}, by the twin {twin:?}");
+    }
+}
