@@ -5,7 +5,7 @@
 
 mod meter;
 
-pub use meter::{Gap, Meter, Reserve, Share};
+pub use meter::{Meter, Pause, Reserve, Share};
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -5,6 +5,7 @@
 //! megabytes now and then, a millisecond in which no deadline is looked at.
 
 use crate::ids::small;
+use crate::time::Meter;
 
 /// Items of the smallest block.
 const BLOCK_MIN: usize = 4;
@@ -19,8 +20,9 @@ const CHUNK_MAX: usize = 1 << PLACE_BITS;
 const PAGE: usize = 4096;
 /// ... so many times that are touched ahead of their use, ...
 const PAGES_AHEAD: usize = 8;
-/// ... and at most so many at once.
+/// ... and at most so many at once, each where so much time is left, nanoseconds.
 const PAGES_AT_ONCE: usize = 2;
+const PAGE_NS: u64 = 40_000;
 /// No block.
 const NONE: u32 = u32::MAX;
 
@@ -69,7 +71,7 @@ impl Run {
 /// the sum of what was ever in use at once of each size.
 #[derive(Debug)]
 pub(super) struct Arena<T> {
-    /// Each with all the room that it will ever have; what has not been a block yet was never touched.
+    /// Each with all the room that it will ever have.
     chunks: Vec<Vec<T>>,
     /// Items of all blocks.
     len: usize,
@@ -208,9 +210,10 @@ impl<T: Linked> Arena<T> {
         Some(small(chunk) << PLACE_BITS | small(at))
     }
 
-    /// Touches memory that the next blocks will be in, a little at a time, so that the operating system gives it now:
-    /// that takes 1 us a page, on a virtual machine up to 30, and is not to come at the end of a tick.
-    pub(super) fn touch_ahead(&mut self) {
+    /// Touches memory that the next blocks will be in, a little at a time and where there is time for it, so that the
+    /// operating system gives it now: that takes 1 us a page, on a virtual machine up to 30, and is not to come at the
+    /// end of a tick.
+    pub(super) fn touch_ahead(&mut self, meter: &mut Meter<'_>) {
         let Some(items) = self.chunks.last_mut() else {
             return;
         };
@@ -221,8 +224,12 @@ impl<T: Linked> Arena<T> {
         let end = (len + PAGES_AHEAD * page).min(items.capacity());
         let first = self.touched.max(len);
         for at in (first..end).step_by(page).take(PAGES_AT_ONCE) {
+            if !meter.has_ns(PAGE_NS) {
+                return;
+            }
             items.spare_capacity_mut()[at - len].write(filler);
             self.touched = at + page;
+            meter.refresh();
         }
     }
 

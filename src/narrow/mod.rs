@@ -203,7 +203,7 @@ impl Narrow {
     ///
     /// * `world` - nothing of it is changed but boxes in trees.
     pub fn spend(&mut self, world: &mut World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
-        self.front_store.touch_ahead();
+        self.front_store.touch_ahead(meter);
         self.spend_on_refits(world, wanted, meter);
         let done = self.spend_on_pairs(world, wanted, meter);
         self.go_on_with_refits(world, meter);
@@ -231,7 +231,7 @@ impl Narrow {
         if !std::mem::replace(&mut self.left_is_news, true) {
             self.left.clear();
         }
-        self.front_store.touch_ahead();
+        self.front_store.touch_ahead(meter);
         self.go_on_with_refits(world, meter);
         self.spend_on_verdicts(world, wanted, meter) && self.spend_on_reports(world, wanted, meter)
     }

@@ -5,13 +5,15 @@
 //! but for such an interrupt is late by as much as it takes. It is due at a known moment, though: work that it would
 //! carry past its end can end before it. That costs a tick some 2 us on average, where two timers take 50 us each.
 
-use crate::time::Gap;
+use crate::time::Pause;
 
-/// Gaps remembered, the oldest overwritten first, ...
+/// Pauses remembered, the oldest overwritten first, ...
 const SEEN: usize = 64;
-/// ... and for how long, nanoseconds: a host's clock drifts against the guest's (7 us a second where it was measured).
-const RECENT_NS: u64 = 1_000_000_000;
-/// Shorter gaps between two reads of the clock are work, nanoseconds.
+/// ... and for how long, nanoseconds. An interrupt that ticks end before is not seen: where each tick has the same place
+/// among them, it has to be met anew when this is over. Longer, and a place is kept to that the timer has left: a host's
+/// clock drifts against the guest's, by 7 us a second where it was measured.
+const RECENT_NS: u64 = 10_000_000_000;
+/// Shorter pauses between two reads of the clock are work, nanoseconds.
 const SHORTEST_NS: u64 = 18_000;
 /// A thread that was away for longer met more than a timer.
 const LONGEST_NS: u64 = 100_000;
@@ -19,53 +21,57 @@ const LONGEST_NS: u64 = 100_000;
 const PERIOD_NS: u64 = 1_000_000;
 /// Places so near are one timer's, nanoseconds: the clock was last read as long before as a unit of work takes.
 const NEAR_NS: u64 = 10_000;
-/// So many gaps at one place are a timer: long units of work lie anywhere.
+/// So many pauses at one place are a timer: long units of work lie anywhere.
 const AGREE: usize = 5;
 /// Work that is to end before an interrupt ends so much before it is due, nanoseconds.
 const BEFORE_NS: u64 = 2_000;
 
-/// Gaps between two reads of the clock that may have been interrupts.
-#[derive(Clone, Copy, Debug)]
+/// Pauses between two reads of the clock that may have been interrupts.
+#[derive(Clone, Debug)]
 pub(super) struct Interrupts {
-    seen: [Gap; SEEN],
+    seen: [Pause; SEEN],
     next: usize,
 }
 
 impl Default for Interrupts {
     fn default() -> Self {
         Self {
-            seen: [Gap::default(); SEEN],
+            seen: [Pause::default(); SEEN],
             next: 0,
         }
     }
 }
 
 impl Interrupts {
-    /// Takes the longest gap of a stretch of work.
-    pub(super) fn note(&mut self, gap: Gap) {
-        if gap.ns >= SHORTEST_NS {
-            let ns = gap.ns.min(LONGEST_NS);
-            self.seen[self.next % SEEN] = Gap { ns, ..gap };
+    /// Takes the longest pause of a stretch of work.
+    pub(super) fn note(&mut self, pause: Pause) {
+        if (SHORTEST_NS..=LONGEST_NS).contains(&pause.ns) {
+            self.seen[self.next % SEEN] = pause;
             self.next += 1;
         }
     }
 
-    /// When work is to end that goes on now and has until `end_ns`: then, or before the first interrupt that would
-    /// carry it past that.
-    pub(super) fn clear_end_ns(&self, now_ns: u64, end_ns: u64) -> u64 {
-        let since_ns = end_ns.saturating_sub(RECENT_NS);
-        let is_recent = |gap: &&Gap| gap.ns > 0 && gap.from_ns >= since_ns && gap.from_ns <= end_ns;
-        let recent = || self.seen.iter().filter(is_recent);
-        let of_one_timer = |one: &Gap, other: &Gap| {
+    /// When work is to end that goes on at `now_ns` and has until `end_ns`: then, or before the first interrupt that
+    /// would carry it past that; before now, where that is just due.
+    ///
+    /// * `closing_ns` - what comes after the last unit of work.
+    pub(super) fn clear_end_ns(&self, now_ns: u64, end_ns: u64, closing_ns: u64) -> u64 {
+        let lately = end_ns.saturating_sub(RECENT_NS)..=end_ns;
+        let recent = || {
+            let seen = self.seen.iter().filter(|pause| pause.ns > 0);
+            seen.filter(|pause| lately.contains(&pause.from_ns))
+        };
+        let of_one_timer = |one: &Pause, other: &Pause| {
             let apart_ns = one.from_ns.abs_diff(other.from_ns) % PERIOD_NS;
             apart_ns.min(PERIOD_NS - apart_ns) <= NEAR_NS
         };
-        // The last time before the end when the timer that made this gap, if one did, will interrupt.
-        let due_ns = |gap: &Gap| end_ns - (end_ns - gap.from_ns) % PERIOD_NS;
+        // The last time before the end when the timer that made this pause, if one did, will interrupt.
+        let due_ns = |pause: &Pause| end_ns - (end_ns - pause.from_ns) % PERIOD_NS;
         recent()
-            .filter(|gap| due_ns(gap) + gap.ns > end_ns && due_ns(gap) > now_ns + BEFORE_NS)
-            .filter(|gap| recent().filter(|other| of_one_timer(gap, other)).count() >= AGREE)
-            .map(|gap| due_ns(gap) - BEFORE_NS)
+            .filter(|pause| due_ns(pause) + pause.ns + closing_ns > end_ns)
+            .filter(|pause| due_ns(pause) + NEAR_NS > now_ns)
+            .filter(|pause| recent().filter(|other| of_one_timer(pause, other)).count() >= AGREE)
+            .map(|pause| due_ns(pause) - BEFORE_NS)
             .fold(end_ns, u64::min)
     }
 }
@@ -74,13 +80,15 @@ impl Interrupts {
 mod tests {
     use super::*;
 
+    const CLOSING_NS: u64 = 5_000;
+
     /// A machine whose timers interrupt work: a guest's at 250 Hz for 50 us, and a host's at 1,000 Hz for 30 us, which
     /// drifts by 7 us a second.
-    fn timers(now_ns: u64, until_ns: u64) -> impl Iterator<Item = Gap> {
+    fn timers(now_ns: u64, until_ns: u64) -> impl Iterator<Item = Pause> {
         let due = move |first_ns: u64, period_ns: u64, ns: u64| {
             let after = now_ns.saturating_sub(first_ns).div_ceil(period_ns);
             let from_ns = first_ns + after * period_ns;
-            (from_ns < until_ns).then_some(Gap { from_ns, ns })
+            (from_ns < until_ns).then_some(Pause { from_ns, ns })
         };
         let guest = due(977_000, 4_000_000, 50_000);
         let host = due(438_000, 1_000_007, 30_000);
@@ -102,13 +110,13 @@ mod tests {
     fn work_ends_before_a_timer_that_would_carry_it_past_its_end_and_gives_up_little() {
         let (mut interrupts, mut random) = (Interrupts::default(), scattered());
         let (mut late, mut unaware, mut given_up_ns) = (0, 0, 0);
-        let mut now_ns = 5_000_000_000_u64;
+        let mut now_ns = 50_000_000_000_u64;
         for tick in 0..20_000 {
             let end_ns = now_ns + 100_000;
-            let clear_ns = interrupts.clear_end_ns(now_ns, end_ns);
-            assert!(clear_ns > now_ns && clear_ns <= end_ns);
+            let clear_ns = interrupts.clear_end_ns(now_ns, end_ns, CLOSING_NS);
+            assert!(clear_ns + BEFORE_NS + NEAR_NS >= now_ns && clear_ns <= end_ns);
             let passes =
-                |stop_ns| timers(now_ns, stop_ns).any(|t| t.from_ns + t.ns > end_ns + 5_000);
+                |stop_ns| timers(now_ns, stop_ns).any(|timer| timer.from_ns + timer.ns > end_ns);
             if tick > 1_000 {
                 unaware += u32::from(passes(end_ns));
                 late += u32::from(passes(clear_ns));
@@ -117,12 +125,12 @@ mod tests {
             // The clock was last read some time before; one stretch in thirty holds a long unit of work instead.
             let jitter_ns = random() % 3_000;
             if let Some(timer) = timers(now_ns, clear_ns).max_by_key(|timer| timer.ns) {
-                interrupts.note(Gap {
+                interrupts.note(Pause {
                     from_ns: timer.from_ns - jitter_ns,
                     ns: timer.ns + jitter_ns,
                 });
             } else if random() % 30 == 0 {
-                interrupts.note(Gap {
+                interrupts.note(Pause {
                     from_ns: now_ns + random() % 80_000,
                     ns: 20_000,
                 });
@@ -135,56 +143,67 @@ mod tests {
     }
 
     #[test]
+    fn a_tick_that_has_one_place_among_interrupts_meets_few() {
+        let mut interrupts = Interrupts::default();
+        let mut late = 0;
+        // 100 Hz beside a guest's timer at 250 Hz: each second tick would be carried past its end by 30 us.
+        for tick in 0..10_000_u64 {
+            let now_ns = 1_000_000_000 + tick * 10_000_000 + 697_000;
+            let end_ns = now_ns + 300_000;
+            let clear_ns = interrupts.clear_end_ns(now_ns, end_ns, CLOSING_NS);
+            let mut met = timers(now_ns, clear_ns).filter(|timer| timer.ns == 50_000);
+            if let Some(timer) = met.next() {
+                interrupts.note(timer);
+                late += 1;
+            }
+        }
+        assert!((5..100).contains(&late), "{late} of 10,000");
+    }
+
+    #[test]
     fn long_units_of_work_are_no_timer() {
         let (mut interrupts, mut random) = (Interrupts::default(), scattered());
         let mut heeded = 0;
         for tick in 0..10_000_u64 {
             let now_ns = 1_000_000_000 + tick * 730_001;
             let end_ns = now_ns + 100_000;
-            heeded += u32::from(interrupts.clear_end_ns(now_ns, end_ns) < end_ns);
-            interrupts.note(Gap {
+            heeded += u32::from(interrupts.clear_end_ns(now_ns, end_ns, CLOSING_NS) < end_ns);
+            interrupts.note(Pause {
                 from_ns: now_ns + random() % 80_000,
                 ns: 20_000,
             });
         }
         assert!(heeded < 600, "{heeded} of 10,000");
         let mut short = Interrupts::default();
-        (0..64).for_each(|at| {
-            short.note(Gap {
+        for at in 1..=64 {
+            short.note(Pause {
                 from_ns: at * PERIOD_NS,
                 ns: 9_000,
             });
-        });
-        assert_eq!(
-            short.clear_end_ns(64 * PERIOD_NS - 50_000, 64 * PERIOD_NS + 1_000),
-            64 * PERIOD_NS + 1_000
-        );
+        }
+        let (now_ns, end_ns) = (65 * PERIOD_NS - 50_000, 65 * PERIOD_NS + 1_000);
+        assert_eq!(short.clear_end_ns(now_ns, end_ns, 0), end_ns);
     }
 
     #[test]
-    fn what_was_seen_long_ago_is_forgotten() {
+    fn an_interrupt_counts_until_it_has_come_and_is_forgotten_when_none_comes() {
         let mut interrupts = Interrupts::default();
-        (1..10).for_each(|at| {
-            interrupts.note(Gap {
+        for at in 1..10 {
+            interrupts.note(Pause {
                 from_ns: at * PERIOD_NS,
                 ns: 30_000,
             });
-        });
-        let end_ns = 20 * PERIOD_NS + 10_000;
-        assert_eq!(
-            interrupts.clear_end_ns(end_ns - 50_000, end_ns),
-            end_ns - 12_000
-        );
-        // It is there already, or would be over in time.
-        assert_eq!(interrupts.clear_end_ns(end_ns - 10_000, end_ns), end_ns);
-        assert_eq!(
-            interrupts.clear_end_ns(end_ns - 10_000, end_ns + 25_000),
-            end_ns + 25_000
-        );
-        let later_ns = end_ns + RECENT_NS;
-        assert_eq!(
-            interrupts.clear_end_ns(later_ns - 50_000, later_ns),
-            later_ns
-        );
+        }
+        let due_ns = 20 * PERIOD_NS;
+        let clear = |now_ns, end_ns| interrupts.clear_end_ns(now_ns, end_ns, CLOSING_NS);
+        let before_ns = due_ns - BEFORE_NS;
+        assert_eq!(clear(due_ns - 50_000, due_ns + 10_000), before_ns);
+        // Just due, it is waited for by nobody; then it has come.
+        assert_eq!(clear(due_ns + 5_000, due_ns + 34_000), before_ns);
+        assert_eq!(clear(due_ns + 11_000, due_ns + 34_000), due_ns + 34_000);
+        // It would be over in time, and closing after it.
+        assert_eq!(clear(due_ns - 50_000, due_ns + 36_000), due_ns + 36_000);
+        let later_ns = due_ns + RECENT_NS + 10_000;
+        assert_eq!(clear(later_ns - 50_000, later_ns), later_ns);
     }
 }

@@ -285,7 +285,7 @@ impl Engine {
         );
         let done = self.narrow.spend(&mut self.world, wanted, &mut meter);
         let units = meter.spent();
-        self.rest.interrupts.note(meter.longest_gap());
+        self.rest.interrupts.note(meter.longest_pause());
         if let Some((began, above_ns, deadline_ns)) = timed {
             let late_ns = began.passed_ns(deadline_ns, self.clock.as_ref());
             self.floor.note_late(late_ns);

@@ -33,10 +33,10 @@ pub(super) struct Rest {
     pub(super) units: u64,
     /// Kept back of the tick's end, nanoseconds.
     last_ns: u64,
-    /// What interrupts the thread now and then, so that it does not at the tick's end.
-    pub(super) interrupts: Interrupts,
     /// The most that may be, unless that is less than [`LAST_NS`].
     most_ns: u64,
+    /// What interrupts the thread now and then, so that it does not at the tick's end.
+    pub(super) interrupts: Interrupts,
 }
 
 impl Rest {
@@ -87,8 +87,9 @@ impl Engine {
             return false;
         };
         let began = Began::now(self.clock.as_ref());
-        let clear_ns = (self.rest.interrupts).clear_end_ns(began.wall_ns(), end_ns);
-        let kept_ns = end_ns.saturating_sub(self.rest.last_ns);
+        let last_ns = self.rest.last_ns;
+        let kept_ns = end_ns.saturating_sub(last_ns);
+        let clear_ns = (self.rest.interrupts).clear_end_ns(began.wall_ns(), end_ns, last_ns);
         let left_ns = began.left_ns(kept_ns.min(clear_ns));
         if left_ns == 0 {
             return false;
@@ -97,9 +98,9 @@ impl Engine {
         let mut meter = Meter::new(self.clock.as_ref(), Some(stop_ns), None);
         let done = self.narrow.go_on(&mut self.world, wanted, &mut meter);
         self.rest.units += meter.spent();
-        self.rest.interrupts.note(meter.longest_gap());
+        self.rest.interrupts.note(meter.longest_pause());
         self.rest.spent_ns += self.clock.monotonic_ns().saturating_sub(began.wall_ns());
-        if !done && left_ns <= slice_ns {
+        if !done && left_ns <= slice_ns && kept_ns <= clear_ns {
             (self.rest).note_end(began.passed_ns(end_ns, self.clock.as_ref()));
         }
         let more = !done && left_ns > slice_ns;

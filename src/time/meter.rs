@@ -27,15 +27,14 @@ pub struct Meter<'a> {
     units_to_next_read: u64,
     /// When the clock was last read; 0 where nothing asks for it.
     read_ns: u64,
-    /// Of the times between two reads.
-    longest: Gap,
+    longest: Pause,
     out_of_time: bool,
     beat: Option<Beat<'a>>,
 }
 
 /// A time between two reads of the clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Gap {
+pub struct Pause {
     /// The first of the two, monotonic nanoseconds.
     pub from_ns: u64,
     /// Nanoseconds from it to the second.
@@ -77,7 +76,7 @@ impl<'a> Meter<'a> {
             units_spent: 0,
             units_to_next_read: 0,
             read_ns: 0,
-            longest: Gap::default(),
+            longest: Pause::default(),
             out_of_time: false,
             beat: None,
         };
@@ -113,7 +112,7 @@ impl<'a> Meter<'a> {
         self.count(units);
         self.units_to_next_read = self.units_to_next_read.saturating_sub(units);
         if self.units_to_next_read == 0 {
-            self.look();
+            self.look_after_units();
         }
     }
 
@@ -122,7 +121,7 @@ impl<'a> Meter<'a> {
         self.count(units);
         self.units_to_next_read = self.units_to_next_read.saturating_sub(weight);
         if self.units_to_next_read == 0 {
-            self.look();
+            self.look_after_units();
         }
     }
 
@@ -131,7 +130,11 @@ impl<'a> Meter<'a> {
     pub fn charge_dear(&mut self, units: u64) -> u64 {
         let before_ns = self.read_ns;
         self.count(units);
-        self.look();
+        if units > 0 {
+            self.look_after_units();
+        } else {
+            self.look();
+        }
         self.read_ns - before_ns
     }
 
@@ -201,9 +204,10 @@ impl<'a> Meter<'a> {
         self.units_spent
     }
 
-    /// The longest time between two reads of the clock so far.
+    /// The longest time between two reads of the clock so far in which nothing was done but units of work; what was not
+    /// charged may take long by itself.
     #[must_use]
-    pub fn longest_gap(&self) -> Gap {
+    pub fn longest_pause(&self) -> Pause {
         self.longest
     }
 
@@ -218,19 +222,22 @@ impl<'a> Meter<'a> {
         self.units_left = self.units_left.saturating_sub(units);
     }
 
+    /// Reads the clock after units of work.
+    fn look_after_units(&mut self) {
+        let from_ns = self.read_ns;
+        self.look();
+        let ns = self.read_ns - from_ns;
+        if ns > self.longest.ns && from_ns > 0 {
+            self.longest = Pause { from_ns, ns };
+        }
+    }
+
     fn look(&mut self) {
         self.units_to_next_read = CHEAP_UNITS_PER_READ;
         if self.deadline_ns.is_none() && self.beat.is_none() {
             return;
         }
-        let from_ns = self.read_ns;
-        let now_ns = self.clock.monotonic_ns().max(from_ns);
-        if now_ns - from_ns > self.longest.ns && from_ns > 0 {
-            self.longest = Gap {
-                from_ns,
-                ns: now_ns - from_ns,
-            };
-        }
+        let now_ns = self.clock.monotonic_ns().max(self.read_ns);
         self.read_ns = now_ns;
         if let Some(deadline_ns) = self.deadline_ns {
             self.out_of_time = now_ns >= deadline_ns;
@@ -321,18 +328,20 @@ mod tests {
     }
 
     #[test]
-    fn a_meter_knows_its_longest_gap() {
+    fn a_meter_knows_its_longest_pause_in_units_of_work() {
         let clock = ManualClock::new(500);
         let mut meter = Meter::new(&clock, Some(u64::MAX), None);
-        for ns in [3, 40, 20] {
+        for (units, ns) in [(1, 3), (0, 90), (1, 40), (1, 20)] {
             clock.advance(ns);
-            meter.charge_dear(1);
+            meter.charge_dear(units);
         }
-        let gap = Gap {
-            from_ns: 503,
+        clock.advance(70);
+        meter.refresh();
+        let pause = Pause {
+            from_ns: 593,
             ns: 40,
         };
-        assert_eq!(meter.longest_gap(), gap);
+        assert_eq!(meter.longest_pause(), pause);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Runs and heaps against those of the standard library; growth, limits, and memory touched ahead.
 
 use super::*;
+use crate::time::ManualClock;
 use proptest::prelude::*;
 use std::collections::BinaryHeap;
 
@@ -116,8 +117,10 @@ fn growth_moves_the_items_of_the_run_that_grows_alone() {
 
 #[test]
 fn memory_is_touched_ahead_a_little_at_a_time_and_nothing_is_in_it() {
+    let clock = ManualClock::new(0);
+    let mut meter = Meter::unlimited(&clock);
     let mut arena = Arena::new(1 << 20);
-    arena.touch_ahead();
+    arena.touch_ahead(&mut meter);
     let mut runs: Vec<Run> = (0..10_000).map(|_| Run::default()).collect();
     for (item, run) in (0..).zip(&mut runs) {
         assert!(arena.push(run, item));
@@ -130,8 +133,11 @@ fn memory_is_touched_ahead_a_little_at_a_time_and_nothing_is_in_it() {
     let (len, room) = last.unwrap_or_default();
     let page = PAGE / size_of::<u32>();
     assert!(room > len + PAGES_AHEAD * page);
+    let mut short = Meter::new(&clock, Some(PAGE_NS), None);
+    arena.touch_ahead(&mut short);
+    assert!(arena.touched <= len, "there was no time for it");
     for calls in 1..=PAGES_AHEAD {
-        arena.touch_ahead();
+        arena.touch_ahead(&mut meter);
         let touched = arena.touched - len;
         assert_eq!(touched, (calls * PAGES_AT_ONCE).min(PAGES_AHEAD) * page);
     }

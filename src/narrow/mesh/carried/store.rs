@@ -6,6 +6,7 @@ use crate::narrow::arena::{Arena, Linked, Run};
 use crate::narrow::mesh::LeafContact;
 use crate::narrow::mesh::manifold::Walks;
 use crate::shape::BoxId;
+use crate::time::Meter;
 
 /// Groups of all fronts together, 24 bytes each: some 10,000 pairs of 20,000-triangle meshes. Beyond it what is proved
 /// apart is lumped together, pair by pair.
@@ -44,10 +45,10 @@ impl FrontStore {
     }
 
     /// Has memory at hand for what the next work will keep.
-    pub(in crate::narrow) fn touch_ahead(&mut self) {
-        self.groups.touch_ahead();
-        self.open.touch_ahead();
-        self.contacts.touch_ahead();
+    pub(in crate::narrow) fn touch_ahead(&mut self, meter: &mut Meter<'_>) {
+        self.groups.touch_ahead(meter);
+        self.open.touch_ahead(meter);
+        self.contacts.touch_ahead(meter);
     }
 
     /// Bytes in use by blocks, free ones included.
