@@ -8,17 +8,17 @@
 use crate::time::Pause;
 
 /// Pauses remembered, the oldest overwritten first, ...
-const SEEN: usize = 64;
-/// ... and for how long, nanoseconds. An interrupt that ticks end before is not seen: where each tick has the same place
-/// among them, it has to be met anew when this is over. Longer, and a place is kept to that the timer has left: a host's
-/// clock drifts against the guest's, by 7 us a second where it was measured.
+const SEEN: usize = 128;
+/// ... and for how long, nanoseconds. An interrupt that ticks end before is not seen: where each tick has the same
+/// place among them, it has to be met anew when this is over. Longer, and a place is kept to that the timer has left: a
+/// host's clock drifts against the guest's, by 7 us a second where it was measured.
 const RECENT_NS: u64 = 10_000_000_000;
 /// Shorter pauses between two reads of the clock are work, nanoseconds.
 const SHORTEST_NS: u64 = 18_000;
 /// A thread that was away for longer met more than a timer.
 const LONGEST_NS: u64 = 100_000;
-/// At 1,000 Hz, and at what divides it, all of a timer's interrupts have the same place in this, nanoseconds.
-const PERIOD_NS: u64 = 1_000_000;
+/// At 1,000 and 250 Hz all of a timer's interrupts have few places in this, nanoseconds.
+const PERIOD_NS: u64 = 4_000_000;
 /// Places so near are one timer's, nanoseconds: the clock was last read as long before as a unit of work takes.
 const NEAR_NS: u64 = 10_000;
 /// So many pauses at one place are a timer: long units of work lie anywhere.
