@@ -27,6 +27,7 @@ pub struct Meter<'a> {
     units_to_next_read: u64,
     /// When the clock was last read; 0 where nothing asks for it.
     read_ns: u64,
+    /// In units of work.
     longest: Pause,
     out_of_time: bool,
     beat: Option<Beat<'a>>,
@@ -109,11 +110,7 @@ impl<'a> Meter<'a> {
 
     /// Charges `units` of cheap work (node tests); the clock is read after some of them.
     pub fn charge(&mut self, units: u64) {
-        self.count(units);
-        self.units_to_next_read = self.units_to_next_read.saturating_sub(units);
-        if self.units_to_next_read == 0 {
-            self.look_after_units();
-        }
+        self.charge_weighted(units, units);
     }
 
     /// Charges `units` that cost as much as `weight` cheap ones: the clock is read that much sooner.
@@ -121,21 +118,20 @@ impl<'a> Meter<'a> {
         self.count(units);
         self.units_to_next_read = self.units_to_next_read.saturating_sub(weight);
         if self.units_to_next_read == 0 {
-            self.look_after_units();
+            let pause = self.look();
+            self.note(pause);
         }
     }
 
     /// Charges `units` of dear work (an exact query, some microseconds) and reads the clock at once; returns what it
     /// took since the clock was read before, nanoseconds, 0 without a deadline.
     pub fn charge_dear(&mut self, units: u64) -> u64 {
-        let before_ns = self.read_ns;
         self.count(units);
+        let pause = self.look();
         if units > 0 {
-            self.look_after_units();
-        } else {
-            self.look();
+            self.note(pause);
         }
-        self.read_ns - before_ns
+        pause.ns
     }
 
     /// Reads the clock now, after work that was not charged; whether another unit may be spent.
@@ -222,22 +218,22 @@ impl<'a> Meter<'a> {
         self.units_left = self.units_left.saturating_sub(units);
     }
 
-    /// Reads the clock after units of work.
-    fn look_after_units(&mut self) {
-        let from_ns = self.read_ns;
-        self.look();
-        let ns = self.read_ns - from_ns;
-        if ns > self.longest.ns && from_ns > 0 {
-            self.longest = Pause { from_ns, ns };
+    /// Units of work alone took that time.
+    fn note(&mut self, pause: Pause) {
+        if pause.ns > self.longest.ns {
+            self.longest = pause;
         }
     }
 
-    fn look(&mut self) {
+    /// Reads the clock, and beats when it is time; returns what went by since the read before, nothing where nobody
+    /// asks for the time.
+    fn look(&mut self) -> Pause {
         self.units_to_next_read = CHEAP_UNITS_PER_READ;
         if self.deadline_ns.is_none() && self.beat.is_none() {
-            return;
+            return Pause::default();
         }
-        let now_ns = self.clock.monotonic_ns().max(self.read_ns);
+        let from_ns = self.read_ns;
+        let now_ns = self.clock.monotonic_ns().max(from_ns);
         self.read_ns = now_ns;
         if let Some(deadline_ns) = self.deadline_ns {
             self.out_of_time = now_ns >= deadline_ns;
@@ -247,7 +243,11 @@ impl<'a> Meter<'a> {
         if let Some(beat) = self.beat.as_mut().filter(|beat| now_ns >= beat.next_ns) {
             beat.next_ns = now_ns.saturating_add(beat.period_ns);
             (beat.call)();
+            // What it took was no work.
+            self.read_ns = self.clock.monotonic_ns().max(now_ns);
         }
+        let ns = now_ns - from_ns;
+        Pause { from_ns, ns }
     }
 }
 
@@ -342,6 +342,18 @@ mod tests {
             ns: 40,
         };
         assert_eq!(meter.longest_pause(), pause);
+    }
+
+    #[test]
+    fn what_is_done_at_a_beat_is_no_pause_in_work() {
+        let clock = ManualClock::new(500);
+        let mut long = || clock.advance(1_000);
+        let mut meter = Meter::new(&clock, Some(u64::MAX), None).with_beat(500, 10, &mut long);
+        for _ in 0..4 {
+            clock.advance(7);
+            meter.charge_dear(1);
+        }
+        assert_eq!(meter.longest_pause().ns, 7);
     }
 
     #[test]

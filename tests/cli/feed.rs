@@ -134,12 +134,8 @@ fn with_work_of_its_own_it_leaves_the_rest_of_each_frame_to_the_daemon_and_tells
     assert!(figures("until the result was there")[0] >= 1.0, "{text}");
     let count = |what: &str| -> usize {
         let (before, _) = text.split_once(what).unwrap();
-        before
-            .split_whitespace()
-            .next_back()
-            .unwrap()
-            .parse()
-            .unwrap()
+        let last = before.split_whitespace().next_back();
+        last.unwrap().parse().unwrap()
     };
     // The work is short beside the frame and nearly all of it is left for the tick: then a result is late, or cut short,
     // only where others take the cores, and that seldom (0 or 1 of 40 with 4 busy processes on 2 cores).

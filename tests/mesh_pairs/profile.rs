@@ -1,7 +1,7 @@
 //! Goal: the more work mesh pairs are given, the more of them are decided, from nothing and in motion; and without a
 //! limit intervals are narrow.
-//! Method: pairs of closed meshes, a third overlapping, a third within 1 % of the size, a third apart, driven through
-//! the rooms by hand with budgets in work units. Each verdict is compared with the truth of an unlimited twin: walks to
+//! Method: pairs of closed meshes, a third overlapping, a third within 1 % of the size, a third apart, in an engine that
+//! is fed by hand with budgets in work units. Each verdict is compared with the truth of an unlimited twin: walks to
 //! the end over the other trees, nothing carried over.
 
 use std::sync::Arc;
@@ -9,18 +9,15 @@ use std::sync::Arc;
 use crate::oracle::meshes;
 use crate::oracle::rng::Rng;
 use crate::support::shape;
-use sweepd::broad::{BroadPhase, Method};
-use sweepd::ids::{BodyId, PairSlot};
+use sweepd::ids::BodyId;
 use sweepd::math::{Interval, Pose, Quat, Vec3, relative};
 use sweepd::narrow::mesh::{Goal, Walk};
-use sweepd::narrow::{Narrow, Order, Wanted};
-use sweepd::pairs::{PairDelta, PairSet};
-use sweepd::report::rig::row;
+use sweepd::report::rig::{Rig, row};
 use sweepd::scene::{BodySpec, PlacedSpec, Scene, SourceSpec};
 use sweepd::shape::{Shape, ShapeSpec};
-use sweepd::time::{ManualClock, Meter};
-use sweepd::wire::{Inbox, Verdict, WIRE_VERSION, frame_flags, name_bytes};
-use sweepd::world::{PlacedShape, World};
+use sweepd::time::{Budget, Clock, ManualClock, Meter};
+use sweepd::wire::{PairRow, Verdict, pair_flags};
+use sweepd::world::PlacedShape;
 
 const SEED: u64 = 40_000_000;
 /// Pairs of the profile: so many that what the hard ones cost leaves no factor of two out, for in such a gap twice the
@@ -48,17 +45,6 @@ const UNITS_MIN: u64 = 128;
 const UNITS: [u64; 8] = [64, 128, 256, 512, 1_024, 2_048, 4_096, 8_192];
 /// From frame to frame, nanoseconds.
 const FRAME_NS: u64 = 10_000_000;
-
-const VERDICTS: Wanted = Wanted {
-    contacts: false,
-    bounds: false,
-    regions: false,
-    order: Order::Counted,
-};
-const GAPS: Wanted = Wanted {
-    bounds: true,
-    ..VERDICTS
-};
 
 /// How one pair moves: B about A, to and fro, turning.
 #[derive(Clone)]
@@ -163,16 +149,11 @@ fn courses(shapes: &[Arc<Shape>]) -> Vec<Course> {
     (0..PAIRS).map(course).collect()
 }
 
-/// The rooms before the narrow phase, the narrow phase, and how all pairs move.
+/// An engine, and how all its pairs move.
 struct Stage {
-    world: World,
-    pairs: PairSet,
-    narrow: Narrow,
-    broad: BroadPhase,
-    delta: PairDelta,
-    inbox: Inbox,
+    rig: Rig,
+    clock: Arc<ManualClock>,
     courses: Vec<Course>,
-    tick: u64,
 }
 
 impl Stage {
@@ -192,96 +173,59 @@ impl Stage {
             Arc::from(vec![PlacedShape { shape, pose }])
         };
         let kinds = courses.iter().flat_map(|course| course.kinds);
-        let placed = kinds.map(placed).collect();
-        let world = World::new(&scene, placed, FRAME_NS).unwrap();
-        let mut stage = Self {
-            world,
-            pairs: PairSet::new(1 << 12),
-            narrow: Narrow::new(16),
-            broad: BroadPhase::new(Method::SweepAndPrune),
-            delta: PairDelta::default(),
-            inbox: Inbox::default(),
+        let placed: Vec<_> = kinds.map(placed).collect();
+        let clock = Arc::new(ManualClock::new(FRAME_NS));
+        let rig = Rig::new(&scene, &placed, Arc::clone(&clock) as Arc<dyn Clock>).unwrap();
+        Self {
+            rig,
+            clock,
             courses: courses.to_vec(),
-            tick: 0,
-        };
-        stage.admit();
-        stage
+        }
     }
 
-    /// Moves every pair by one tick and lets the rooms before the narrow phase follow.
-    fn advance(&mut self) {
-        self.courses.iter_mut().for_each(Course::advance);
-        self.admit();
-    }
-
-    fn admit(&mut self) {
-        self.tick += 1;
-        let now_ns = self.tick * FRAME_NS;
-        self.inbox.clear();
-        let frame = self.inbox.push();
-        frame.header.schema = WIRE_VERSION;
-        frame.header.source = name_bytes("feed");
-        (frame.header.session, frame.header.seq) = (1, self.tick);
-        frame.header.flags = frame_flags::FULL;
-        frame.received_ns = now_ns;
-        for (pair, course) in (0_u64..).zip(&self.courses) {
-            let (a, b) = (&course.a, course.b());
-            frame.transforms.push(row(2 * pair + 1, a));
-            frame.transforms.push(row(2 * pair + 2, &b));
-        }
-        self.world.begin_tick(self.tick);
-        for frame in self.inbox.frames() {
-            self.world.admit(frame, now_ns);
-        }
-        self.world.age(now_ns);
-        self.delta.clear();
-        self.broad.update(
-            self.world.changes(),
-            &self.world,
-            self.world.filters(),
-            &mut self.pairs,
-            &mut self.delta,
-        );
+    /// A tick at the poses of now.
+    fn tick(&mut self, budget: Budget) {
+        self.clock.advance(FRAME_NS);
+        let rows = (0_u64..).zip(&self.courses).flat_map(|(pair, course)| {
+            let ids = [2 * pair + 1, 2 * pair + 2];
+            [row(ids[0], &course.a), row(ids[1], &course.b())]
+        });
+        self.rig.tick(&[rows.collect()], budget);
+        self.rig.engine().validate().unwrap();
         // Every pair is a candidate.
-        assert_eq!(self.pairs.len(), self.courses.len());
+        assert_eq!(self.rig.out().tick.candidates, self.courses.len() as u64);
     }
 
-    /// The narrow phase's part of a tick; whether all that is wanted is done.
-    ///
-    /// * `units` - its budget; `None`: no limit.
-    fn work(&mut self, units: Option<u64>, wanted: Wanted) -> bool {
-        self.narrow
-            .begin(self.tick, &self.world, &self.pairs, &self.delta);
-        self.narrow.widen(&self.world, &mut self.pairs);
-        let clock = ManualClock::new(0);
-        let mut meter = Meter::new(&clock, None, units);
-        let done = self.narrow.spend(&mut self.world, wanted, &mut meter);
-        self.narrow.validate(&self.pairs).unwrap();
-        done
+    /// Rows of pairs that are no farther apart than is told, with the pair's place.
+    fn told(&self) -> impl Iterator<Item = (usize, &PairRow)> {
+        let rows = self.rig.out().pairs.iter();
+        let there = rows.filter(|row| row.flags & pair_flags::GONE == 0);
+        there.map(|row| (usize::try_from((row.body_a - 1) / 2).unwrap(), row))
     }
 
     /// Whether each pair collides, as far as it is decided.
     fn verdicts(&self) -> Vec<Option<bool>> {
-        let mut all = vec![None; self.courses.len()];
-        for (slot, _) in self.pairs.iter() {
-            let verdict = self.narrow.finding(slot).unwrap().verdict;
+        let mut all = vec![Some(false); self.courses.len()];
+        for (pair, row) in self.told() {
+            let verdict = Verdict::from_code(row.verdict).unwrap();
             let decided = verdict != Verdict::Possible;
-            all[self.pair_of(slot)] = decided.then_some(verdict == Verdict::Colliding);
+            all[pair] = decided.then_some(verdict == Verdict::Colliding);
         }
+        let open = all.iter().filter(|verdict| verdict.is_none()).count();
+        assert_eq!(self.rig.out().tick.possible, open as u64);
         all
     }
+}
 
-    /// Whether each pair truly collides.
-    fn truth(&self, shapes: &[Arc<Shape>], walk: &mut Walk) -> Vec<bool> {
-        let collides = |course: &Course| course.twin(shapes, Goal::Verdict, walk).min <= 0.0;
-        self.courses.iter().map(collides).collect()
-    }
+/// Moves every pair by one tick.
+fn advance(courses: &mut [Course]) {
+    courses.iter_mut().for_each(Course::advance);
+}
 
-    fn pair_of(&self, slot: PairSlot) -> usize {
-        let (low, _) = self.pairs.get(slot).unwrap().slots();
-        let id = self.world.body(low).unwrap().id.0;
-        usize::try_from((id - 1) / 2).unwrap()
-    }
+/// Whether each pair truly collides.
+fn truth(courses: &[Course], shapes: &[Arc<Shape>], walk: &mut Walk) -> Vec<bool> {
+    let mut collides = |course: &Course| course.twin(shapes, Goal::Verdict, walk).min <= 0.0;
+    courses.iter().map(&mut collides).collect()
 }
 
 fn body(id: u64, report_within_m: f64) -> BodySpec {
@@ -316,8 +260,7 @@ fn the_profile_rises_with_work() {
 
 /// Each budget from nothing, doubled until all is decided: no step is in vain.
 fn rises_cold(shapes: &[Arc<Shape>], courses: &[Course]) {
-    let stage = Stage::new(shapes, courses, 0.0);
-    let truth = stage.truth(shapes, &mut Walk::default());
+    let truth = truth(courses, shapes, &mut Walk::default());
     // The sample has to be one.
     let colliding = truth.iter().filter(|collides| **collides).count();
     let (least, most) = (PAIRS / 3, 2 * PAIRS / 3);
@@ -325,7 +268,7 @@ fn rises_cold(shapes: &[Arc<Shape>], courses: &[Course]) {
     let (mut decided, mut units) = (0, UNITS_MIN);
     while decided < PAIRS {
         let mut stage = Stage::new(shapes, courses, 0.0);
-        stage.work(Some(units), VERDICTS);
+        stage.tick(Budget::units(units));
         let what = format!("seed {SEED}, cold, {units} units");
         let now = judge(&stage.verdicts(), &truth, &what);
         assert!(now > decided, "{what}: {now} pairs after {decided}");
@@ -337,23 +280,24 @@ fn rises_cold(shapes: &[Arc<Shape>], courses: &[Course]) {
 
 /// The same budget each tick, a run for each budget: what counts is the share of a whole run.
 fn rises_in_motion(shapes: &[Arc<Shape>], courses: &[Course]) {
-    let (mut stage, mut walk) = (Stage::new(shapes, courses, 0.0), Walk::default());
+    let (mut moving, mut walk) = (courses.to_vec(), Walk::default());
     let truth = |_| {
-        let truth = stage.truth(shapes, &mut walk);
-        stage.advance();
+        let truth = truth(&moving, shapes, &mut walk);
+        advance(&mut moving);
         truth
     };
     let truths: Vec<Vec<bool>> = (0..TICKS).map(truth).collect();
     let mut shares: Vec<f64> = Vec::new();
-    for units in UNITS.map(Some).into_iter().chain([None]) {
+    let budgets = UNITS.map(Budget::units).into_iter();
+    for budget in budgets.chain([Budget::UNLIMITED]) {
         let mut stage = Stage::new(shapes, courses, 0.0);
-        let what = format!("seed {SEED}, {units:?} units a tick");
+        let what = format!("seed {SEED}, {:?} units a tick", budget.units);
         let mut decided = 0;
         for (tick, truth) in truths.iter().enumerate() {
-            stage.work(units, VERDICTS);
+            stage.tick(budget);
             let at = format!("{what}, tick {tick}");
             decided += judge(&stage.verdicts(), truth, &at);
-            stage.advance();
+            advance(&mut stage.courses);
         }
         let share = decided as f64 / (PAIRS * TICKS) as f64;
         let last = shares.last().copied().unwrap_or(0.0);
@@ -381,11 +325,11 @@ fn without_a_limit_intervals_are_narrow() {
     };
     let courses: Vec<Course> = (0..40).map(course).collect();
     let mut stage = Stage::new(&shapes, &courses, REPORT_M);
-    assert!(stage.work(None, GAPS), "all is done");
-    for (slot, _) in stage.pairs.iter() {
-        let pair = stage.pair_of(slot);
-        let finding = stage.narrow.finding(slot).unwrap();
-        let (gap, verdict) = (finding.gap, finding.verdict);
+    stage.tick(Budget::UNLIMITED);
+    let mut told = 0;
+    for (pair, row) in stage.told() {
+        let gap = Interval::new(row.gap_min_m, row.gap_max_m);
+        let verdict = Verdict::from_code(row.verdict).unwrap();
         let what = format!("seed {seed}, pair {pair}: {verdict}, {gap:?}");
         // They are apart, all nearer than what is reported: not `possible`.
         assert_eq!(verdict, Verdict::Near, "{what}");
@@ -394,5 +338,7 @@ fn without_a_limit_intervals_are_narrow() {
         let both = gap.widened(1e-11 * DIAMETER_M);
         let meet = both.min <= twin.max && twin.min <= both.max;
         assert!(meet, "{what}, by the twin {twin:?}");
+        told += 1;
     }
+    assert_eq!(told, courses.len());
 }
