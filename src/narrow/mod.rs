@@ -23,6 +23,7 @@ mod arena;
 mod ask;
 mod carry;
 mod contacts;
+mod cover;
 mod cursor;
 mod finding;
 mod memo;

@@ -5,14 +5,7 @@
 //! A. Out: a sound interval of their gap at the pose it works at, a witness, contacts. Stops after any unit, and goes
 //! on at the same pose or at another.
 //!
-//! Every pair of leaves is covered by exactly one entry at any time ([`CarriedFront::covered`] counts them):
-//! - a [`Group`] of pairs of boxes proved apart by `g` when the pair's path was `M`: it holds while the path is less
-//!   than `g + M`, at no cost; the group that expires soonest is on top of a heap, so the heap is at once the front,
-//!   the best-first queue and the bound;
-//! - an open pair of boxes that may touch;
-//! - a group apart at this pose by less than can be carried to another, or a pair of leaves found touching: at the next
-//!   pose it is open again;
-//! - what was lumped together when there was no room: one expiry for all of it, and a new start when that is up.
+//! Every pair of leaves is covered by exactly one entry at any time (see `cover`; [`CarriedFront::covered`] counts them).
 //!
 //! The path `S` runs over anchors (poses), and `d` is the displacement from the newest: what is apart by `g` now holds
 //! while `S + d < g + S - d` (DESIGN 4.6; here of the relative pose, so two that move together do not move). An anchor
@@ -34,18 +27,17 @@ use super::containment::{Containment, ShellTests};
 use super::deep::Deep;
 use super::parting::Parting;
 use super::patches::Patches;
-use super::placed::{Placed, lag_of};
+use super::placed::{Placed, lag_of, moved};
 use super::query::Goal;
 use super::retest::{reach_of, tree_of};
 use super::side::{self, Side};
 use crate::math::{Pose, ROUND};
-use crate::narrow::arena::Run;
+use crate::narrow::cover::Cover;
+pub use crate::narrow::cover::Search;
 use crate::shape::{BoxId, Obb, Shape};
 use crate::time::Meter;
 
 mod count;
-mod cover;
-pub(super) mod drift;
 mod glance;
 mod known;
 mod leaves;
@@ -54,13 +46,8 @@ mod store;
 mod touch;
 mod unproved;
 
-pub use cover::Search;
-pub(super) use cover::lanes;
-use cover::{Group, Open, OpenList};
-use drift::Drift;
 use known::Known;
 pub use store::FrontStore;
-use store::Proved;
 use touch::Crossing;
 
 /// A front that has split into so many times its fresh size, and [`STALE_MORE`], starts anew: entries only ever split.
@@ -86,18 +73,7 @@ pub struct CarriedFront {
     /// Started, and not released since.
     started: bool,
     at: Placed,
-    drift: Drift,
-    proved: Proved,
-    open: OpenList,
-    /// Apart at this pose by what stands for the expiry, and by no more than can be told at another.
-    passing: Run,
-    /// The least gap of them, metres; infinite: there are none.
-    passing_m: f64,
-    /// Leaves found touching at this pose.
-    touching: Run,
-    /// When what was lumped together is no longer proved apart; infinite: nothing was; minus infinity: something found
-    /// no room at all, and nothing is proved until the next start.
-    lumped_expiry_m: f64,
+    cover: Cover,
     /// Boxes of a side that is convex.
     whole: [Option<Obb>; 2],
     solids: bool,
@@ -156,10 +132,7 @@ impl CarriedFront {
 
     /// Forgets everything and gives its memory back.
     pub fn release(&mut self, store: &mut FrontStore) {
-        self.proved.release(&mut store.groups);
-        store.groups.release(&mut self.passing);
-        self.open.release(&mut store.open);
-        store.open.release(&mut self.touching);
+        self.cover.release(&mut store.entries);
         self.contacts.release(&mut store.contacts);
         // Another pair may have it next.
         self.started = false;
@@ -182,27 +155,24 @@ impl CarriedFront {
             self.start_over(store, a, b);
             return;
         }
-        self.drift.follow(a, b, pos12);
+        (self.cover.drift).follow(pos12, |from, to| moved(a, b, from, to));
         if bent_m > self.bent_m {
-            self.drift.add(bent_m - self.bent_m, bent_m);
+            self.cover.drift.add(bent_m - self.bent_m, bent_m);
             self.bent_m = bent_m;
             self.shells.drop_test();
             self.measure_depth(a, b);
         }
         let stale = self.fresh_len > 0 && self.len() > STALE_TIMES * self.fresh_len + STALE_MORE;
         // Few digits would be left of expiries after a long way.
-        let far = self.drift.path_m > PATH_MAX * (a.radius + b.radius);
-        let lost =
-            self.lumped_expiry_m < f64::INFINITY && self.drift.left_m(self.lumped_expiry_m) <= 0.0;
-        let leap = self.drift.last_m > LEAP * a.radius.min(b.radius);
+        let far = self.cover.drift.path_m > PATH_MAX * (a.radius + b.radius);
+        let lost = self.cover.is_lost();
+        let step_m = self.cover.drift.last_m;
+        let leap = step_m > LEAP * a.radius.min(b.radius);
         // Where most is used up, the roots are the shorter way: large boxes tell more than many small ones.
-        let gone = |g: &&Group| self.drift.left_m(g.expiry_m) <= 0.0;
-        let proved = store.groups.all(&self.proved.heap);
         let worn = self.fresh_len > 0
-            && WORN_TIMES * proved.iter().filter(gone).count() > self.fresh_steps;
+            && WORN_TIMES * self.cover.expired_len(&store.entries) > self.fresh_steps;
         // Where a long step has lost the touch, what is left open is far from the next one.
-        let adrift =
-            !self.touching.is_empty() && self.drift.last_m > ADRIFT * a.radius.min(b.radius);
+        let adrift = !self.cover.touching.is_empty() && step_m > ADRIFT * a.radius.min(b.radius);
         if worn || adrift || stale || far || lost || leap || self.search != Search::Carried {
             self.start_over(store, a, b);
             return;
@@ -210,34 +180,9 @@ impl CarriedFront {
         self.known = Known::default();
         self.witness = None;
         self.contacts.clear();
-        self.ask_touching_again(store);
-        while let Some(group) = store.groups.pop(&mut self.passing) {
-            self.prove(store, group.expired());
-        }
-        self.passing_m = f64::INFINITY;
-        if self.drift.left_m(self.shells_expiry_m) <= 0.0 {
+        self.cover.arrive(&mut store.entries);
+        if self.cover.drift.left_m(self.shells_expiry_m) <= 0.0 {
             self.shells.start(self.solids);
-        }
-    }
-
-    /// Leaves that were found touching are open again.
-    fn ask_touching_again(&mut self, store: &mut FrontStore) {
-        while let Some(touching) = store.open.pop(&mut self.touching) {
-            self.look_into(store, touching);
-        }
-    }
-
-    /// Takes an anchor at this pose: from here on what is found holds at it to the last digit.
-    fn anchor_here(&mut self, store: &mut FrontStore) {
-        if !self.drift.anchor_here(&self.at.pos12) {
-            return;
-        }
-        self.passing_m = f64::INFINITY;
-        for at in (0..self.passing.len()).rev() {
-            // What does not outlast this pose after all is put back: behind those that are still to come.
-            if let Some(group) = store.groups.swap_remove(&mut self.passing, at) {
-                self.keep(store, group, group.expiry_m);
-            }
         }
     }
 
@@ -269,14 +214,14 @@ impl CarriedFront {
         };
         if goal > Goal::Verdict && self.known.floor_m == f64::NEG_INFINITY {
             self.measure_wholes((a, side_a), (b, side_b));
-            self.anchor_here(store);
+            self.cover.anchor_here(&mut store.entries, &self.at.pos12);
         }
         if goal == Goal::Contacts
             && !std::mem::replace(&mut self.known.points_wanted, true)
             && self.known.touches
         {
             // A verdict ends at the first that touches: there are few.
-            self.ask_touching_again(store);
+            self.cover.ask_touching_again(&mut store.entries);
         }
         if goal == Goal::Contacts {
             self.known.walks = Some(store.walks.resume(self.known.walks));
@@ -296,7 +241,7 @@ impl CarriedFront {
     /// Entries held, open or proved.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.proved.len() + self.open.len() + self.passing.len() + self.touching.len()
+        self.cover.len()
     }
 
     /// Whether it was started, and not released since: what it covers may still be lumped together, entry by entry.
@@ -316,14 +261,9 @@ impl CarriedFront {
         let (Some(side_a), Some(side_b)) = (Side::of(a), Side::of(b)) else {
             return;
         };
-        self.drift = Drift::at(&self.at.pos12);
-        self.proved.clear();
-        self.passing.clear();
-        self.passing_m = f64::INFINITY;
-        self.open.clear(self.search);
-        self.touching.clear();
+        self.cover
+            .start(&mut store.entries, &self.at.pos12, self.search);
         self.contacts.clear();
-        self.lumped_expiry_m = f64::INFINITY;
         (self.fresh_len, self.steps) = (0, 0);
         self.known = Known::default();
         self.witness = None;
@@ -334,12 +274,6 @@ impl CarriedFront {
         self.shells.forget();
         self.shells.start(self.solids);
         self.shells_expiry_m = f64::NEG_INFINITY;
-        let roots = Open {
-            low: 0.0,
-            a: BoxId::ROOT,
-            b: BoxId::ROOT,
-        };
-        self.look_into(store, roots);
     }
 
     /// The least depth that the two can have, as they are now.

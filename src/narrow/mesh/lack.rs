@@ -1,6 +1,6 @@
 //! A glance that told nothing, and how far the pair has to move before it can.
 
-use super::carried::drift::moved;
+use super::placed::moved;
 use crate::math::Pose;
 use crate::shape::Shape;
 

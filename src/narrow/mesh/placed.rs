@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::retest::reach_of;
-use crate::math::{Point, Pose, ROUND, Vec3, f32_near};
+use crate::math::{Point, Pose, ROUND, Vec3, displacement, f32_near};
 use crate::shape::{Obb, ObbPack, Shape};
 use crate::simd::obb::{GAP_ROUND, LANES, One, gaps};
 
@@ -102,4 +102,13 @@ impl Placed {
 /// How far what is in boxes may be outside of them, both together, metres, rounded up.
 pub(super) fn lag_of(a: &Shape, b: &Shape) -> f64 {
     (a.lag_m() + b.lag_m()) * (1.0 + 2.0 * ROUND)
+}
+
+/// How far any point of the smaller one's surface moves, seen from the other, metres, rounded up.
+pub(super) fn moved(a: &Shape, b: &Shape, from: &Pose, to: &Pose) -> f64 {
+    if a.radius < b.radius {
+        displacement(&from.inverse(), &to.inverse(), &a.centre, a.radius)
+    } else {
+        displacement(from, to, &b.centre, b.radius)
+    }
 }

@@ -5,7 +5,6 @@
 
 use std::collections::BinaryHeap;
 
-use super::carried::lanes;
 use super::placed::Placed;
 use super::retest::tree_of;
 use super::shared::shared;
@@ -13,6 +12,7 @@ use super::side::Side;
 use super::{CarriedFront, FrontStore};
 use crate::math::{Point, Pose, ROUND, Vec3, f32_up};
 use crate::narrow::approx::{Slab, Spot};
+use crate::narrow::cover::lanes;
 use crate::shape::{BoxId, Cone, Held, Mesh, Obb, Shape};
 use crate::simd::obb::LANES;
 

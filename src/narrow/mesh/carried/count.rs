@@ -1,7 +1,7 @@
 //! What a front covers, leaf by leaf: the check of its invariant.
 
-use super::cover::lanes;
 use super::{CarriedFront, FrontStore, Side};
+use crate::narrow::cover::lanes;
 use crate::shape::{BoxId, Held, Shape};
 
 impl CarriedFront {
@@ -10,26 +10,15 @@ impl CarriedFront {
     #[must_use]
     pub fn covered(&self, store: &FrontStore, a: &Shape, b: &Shape) -> Option<Vec<(u32, u32)>> {
         let (side_a, side_b) = (Side::of(a)?, Side::of(b)?);
-        if self.lumped_expiry_m < f64::INFINITY {
-            return None;
-        }
         let mut all = Vec::new();
-        let mut add = |(of_a, of_b): (BoxId, BoxId)| {
+        let whole = self.cover.visit_all(&store.entries, |of_a, of_b| {
             let (leaves_a, leaves_b) = (leaves(side_a, of_a), leaves(side_b, of_b));
             for &i in &leaves_a {
                 all.extend(leaves_b.iter().map(|&j| (i, j)));
             }
-        };
-        let groups = [&self.proved.heap, &self.passing].map(|run| store.groups.all(run));
-        for group in groups.into_iter().flatten() {
-            lanes(group.mask).for_each(|lane| add(group.pair(lane)));
-        }
-        let pairs = [self.open.all(&store.open), store.open.all(&self.touching)];
-        for open in pairs.into_iter().flatten() {
-            add((open.a, open.b));
-        }
+        });
         all.sort_unstable();
-        Some(all)
+        whole.then_some(all)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::store::FrontStore;
 use super::{CarriedFront, Containment, Goal, LeafContact};
-use crate::math::{Interval, ROUND};
+use crate::math::Interval;
 
 /// What is known at the pose worked at.
 #[derive(Clone, Copy, Debug)]
@@ -62,8 +62,7 @@ impl CarriedFront {
     /// Whether 0 in the interval of a reached goal means touching (law 3.4).
     #[must_use]
     pub fn is_certain(&self) -> bool {
-        let covered = self.drift.left_m(self.lumped_expiry_m) > 0.0;
-        self.known.touches || (covered && !self.known.blurred)
+        self.known.touches || (self.cover.holds_lumped() && !self.known.blurred)
     }
 
     /// The leaves with the least gap met at this pose; where one shape is within the other, with the normal that leads
@@ -96,20 +95,13 @@ impl CarriedFront {
 
     /// A lower bound on the distance of the surfaces, metres; minus infinity while they may touch.
     pub(super) fn surfaces_low(&self) -> f64 {
-        if !self.open.is_empty() || self.known.touches {
+        if !self.cover.open.is_empty() || self.known.touches {
             return f64::NEG_INFINITY;
         }
         if self.known.blurred {
             return self.known.leaf_low.min(0.0);
         }
-        let soonest_m = self.proved.soonest_m().min(self.lumped_expiry_m);
-        let carried = self.drift.left_m(soonest_m);
-        let proved = carried.min(self.passing_m);
-        if proved > 0.0 {
-            proved.min(self.known.high)
-        } else {
-            f64::NEG_INFINITY
-        }
+        self.cover.low_m().min(self.known.high)
     }
 
     /// What is known of it at this pose.
@@ -122,9 +114,10 @@ impl CarriedFront {
 
     pub(super) fn reached(&self, goal: Goal) -> bool {
         if self.known.touches {
-            return goal < Goal::Contacts || (self.open.is_empty() && !self.has_expired());
+            return goal < Goal::Contacts
+                || (self.cover.open.is_empty() && !self.cover.has_expired());
         }
-        if !self.open.is_empty() || self.has_expired() {
+        if !self.cover.open.is_empty() || self.cover.has_expired() {
             return false;
         }
         if self.known.blurred {
@@ -134,22 +127,15 @@ impl CarriedFront {
             Containment::Open => false,
             // The nearest points lead out: only a contact set wants them.
             Containment::Inside if goal < Goal::Contacts => true,
-            _ => goal == Goal::Verdict || self.nearest_m() + self.fuzz_m() >= self.known.leaf_low,
+            _ => {
+                goal == Goal::Verdict
+                    || self.cover.nearest_m() + self.fuzz_m() >= self.known.leaf_low
+            }
         }
-    }
-
-    /// Whether the soonest group is no longer proved apart.
-    pub(super) fn has_expired(&self) -> bool {
-        self.drift.left_m(self.proved.soonest_m()) <= 0.0
-    }
-
-    /// The least bound of what can still be looked into, metres.
-    fn nearest_m(&self) -> f64 {
-        self.drift.left_m(self.proved.soonest_m())
     }
 
     /// What cannot be told apart at this pose, metres.
     fn fuzz_m(&self) -> f64 {
-        self.at.slop + 16.0 * ROUND * self.drift.path_m
+        self.at.slop + self.cover.fuzz_m()
     }
 }

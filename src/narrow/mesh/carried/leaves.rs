@@ -1,9 +1,9 @@
 //! Two leaves of a front: triangles, or a convex shape.
 
-use super::cover::Group;
 use super::store::FrontStore;
-use super::{BoxId, CarriedFront, Crossing, LeafContact, Open, Side};
+use super::{BoxId, CarriedFront, Crossing, LeafContact, Side};
 use crate::math::Interval;
+use crate::narrow::cover::{Group, Open};
 use crate::narrow::exact::Closest;
 use crate::narrow::mesh::{manifold, side};
 use crate::shape::{Held, Obb};
@@ -92,12 +92,11 @@ impl CarriedFront {
         };
         if whole {
             self.known.cuts = 0;
-            let kept = store.open.push(&mut self.touching, touching);
-            self.note_room(kept);
+            self.cover.touch(&mut store.entries, touching);
         } else {
             // It is to be asked for its points again.
             self.known.cuts += 1;
-            self.look_into(store, touching);
+            self.cover.look_into(&mut store.entries, touching);
         }
         meter.charge_dear(1);
     }
@@ -111,15 +110,8 @@ impl CarriedFront {
     }
 
     fn keep_leaf(&mut self, store: &mut FrontStore, id_a: BoxId, id_b: BoxId, gap: f64) {
-        let group = Group {
-            expiry_m: 0.0,
-            one: id_a,
-            pack: id_b.pack(),
-            mask: 1 << id_b.lane(),
-            pack_is_b: true,
-            leaf: true,
-        };
-        self.keep(store, group, gap);
+        let group = Group::of_leaves(id_a, id_b);
+        self.cover.keep(&mut store.entries, group, gap);
     }
 }
 

@@ -1,9 +1,9 @@
 //! One step of work on a front: a box against a pack, two leaves, or a node of an inside test.
 
-use super::cover::{Group, Open, lanes};
 use super::leaves::{LEAF_COST, contact};
 use super::store::FrontStore;
 use super::{BoxId, CarriedFront, Containment, Goal, Side};
+use crate::narrow::cover::{Group, Open};
 use crate::narrow::mesh::side;
 use crate::shape::Held;
 use crate::simd::obb::LANES;
@@ -22,10 +22,10 @@ impl CarriedFront {
         if gap_wanted && !std::mem::replace(&mut self.known.asked_last, true) {
             self.bound_by_last(a, b);
             meter.charge_weighted(1, LEAF_COST);
-        } else if let Some(open) = self.open.pop(&mut store.open) {
+        } else if let Some(open) = self.cover.open.pop(&mut store.entries.open) {
             self.expand(store, &open, (a, b), gap_wanted, meter);
-        } else if self.has_expired() {
-            if let Some(group) = self.proved.pop(&mut store.groups) {
+        } else if self.cover.has_expired() {
+            if let Some(group) = self.cover.proved.pop(&mut store.entries.groups) {
                 self.retest(store, &group, (a, b), gap_wanted, meter);
             }
         } else if self.shells.state() == Containment::Open {
@@ -53,7 +53,7 @@ impl CarriedFront {
             self.fresh_len = self.len();
             self.fresh_steps = self.steps;
         }
-        let expiry_m = self.drift.expiry(low).unwrap_or(f64::NEG_INFINITY);
+        let expiry_m = self.cover.drift.expiry(low).unwrap_or(f64::NEG_INFINITY);
         self.shells_expiry_m = self.shells_expiry_m.max(expiry_m);
     }
 
@@ -141,7 +141,7 @@ impl CarriedFront {
         }
     }
 
-    /// Tests a group: what is apart is a group again, what may touch is open, the deepest on top.
+    /// Tests a group at this pose.
     ///
     /// * `known_m` - a bound that holds for all of it at this pose.
     fn test(
@@ -151,81 +151,8 @@ impl CarriedFront {
         sides: (Side<'_>, Side<'_>),
         known_m: f64,
     ) {
-        let gaps = self.gaps(group, sides).map(|gap| gap.max(known_m));
-        let (mut apart, mut least) = (0_u8, f64::INFINITY);
-        // What would not outlast this pose is looked into: smaller boxes are farther apart. Without a branch: which of
-        // them are apart is as good as random.
-        let lasting_m = if known_m > 0.0 {
-            f64::NEG_INFINITY
-        } else {
-            self.drift.lasting_m()
-        };
-        for (lane, &gap) in gaps.iter().enumerate() {
-            let is_apart = (gap > lasting_m) & (group.mask >> lane & 1 == 1);
-            apart |= u8::from(is_apart) << lane;
-            least = if is_apart { least.min(gap) } else { least };
-        }
-        let mut deep = [(0.0, 0_u32); LANES];
-        let mut count = 0;
-        for lane in lanes(group.mask & !apart) {
-            let gap = gaps[lane as usize];
-            // Sorted in: the deepest last.
-            let mut at = count;
-            while at > 0 && deep[at - 1].0 < gap {
-                deep[at] = deep[at - 1];
-                at -= 1;
-            }
-            deep[at] = (gap, lane);
-            count += 1;
-        }
-        if apart != 0 {
-            let mask = apart;
-            self.keep(store, Group { mask, ..*group }, least);
-        }
-        for &(low, lane) in &deep[..count] {
-            let (a, b) = group.pair(lane);
-            self.look_into(store, Open { low, a, b });
-        }
-    }
-
-    /// Keeps a group that is apart by `gap` at this pose; where there is no room, only its expiry.
-    pub(super) fn keep(&mut self, store: &mut FrontStore, group: Group, gap: f64) {
-        match self.drift.expiry(gap) {
-            Some(expiry_m) => self.prove(store, Group { expiry_m, ..group }),
-            None if gap > 0.0 => {
-                self.passing_m = self.passing_m.min(gap);
-                let expiry_m = gap;
-                let kept = (store.groups).push(&mut self.passing, Group { expiry_m, ..group });
-                self.note_room(kept);
-            }
-            // Not apart after all: every pair stays covered.
-            None => {
-                for lane in lanes(group.mask) {
-                    let (a, b) = group.pair(lane);
-                    self.look_into(store, Open { low: gap, a, b });
-                }
-            }
-        }
-    }
-
-    /// Takes a group in until it expires.
-    pub(super) fn prove(&mut self, store: &mut FrontStore, group: Group) {
-        if !self.proved.push(&mut store.groups, group) {
-            self.lumped_expiry_m = self.lumped_expiry_m.min(group.expiry_m);
-        }
-    }
-
-    /// Takes a pair in that may touch.
-    pub(super) fn look_into(&mut self, store: &mut FrontStore, open: Open) {
-        let kept = self.open.push(&mut store.open, open);
-        self.note_room(kept);
-    }
-
-    /// What found no room is no longer covered: then nothing is proved until the next start.
-    pub(super) fn note_room(&mut self, kept: bool) {
-        if !kept {
-            self.lumped_expiry_m = f64::NEG_INFINITY;
-        }
+        let gaps = self.gaps(group, sides);
+        (self.cover).take(&mut store.entries, group, gaps, known_m);
     }
 
     /// Tests a group whose proof has expired.
@@ -253,41 +180,17 @@ impl CarriedFront {
         sides: (Side<'_>, Side<'_>),
         meter: &mut Meter<'_>,
     ) {
-        let Some(group) = self.proved.pop(&mut store.groups) else {
+        let Some(group) = self.cover.proved.pop(&mut store.entries.groups) else {
             return;
         };
         // What is stored holds at this pose; a new test may be lower by rounding.
-        let known_m = self.drift.left_m(group.expiry_m);
+        let known_m = self.cover.drift.left_m(group.expiry_m);
         if group.leaf {
             let pair = group.pair(group.mask.trailing_zeros());
             return self.leaves(store, pair, sides, known_m, true, meter);
         }
-        let mut gaps = self.gaps(&group, sides);
-        for gap in &mut gaps {
-            *gap = gap.max(known_m);
-        }
-        let (mut nearest, mut rest_m) = (group.mask.trailing_zeros(), f64::INFINITY);
-        for lane in lanes(group.mask) {
-            if gaps[lane as usize] < gaps[nearest as usize] {
-                nearest = lane;
-            }
-        }
-        let rest = group.mask & !(1 << nearest);
-        for lane in lanes(rest) {
-            rest_m = rest_m.min(gaps[lane as usize]);
-        }
-        if rest != 0 {
-            self.keep(
-                store,
-                Group {
-                    mask: rest,
-                    ..group
-                },
-                rest_m,
-            );
-        }
-        let (id_a, id_b) = group.pair(nearest);
-        let known_m = gaps[nearest as usize];
+        let gaps = self.gaps(&group, sides).map(|gap| gap.max(known_m));
+        let ((id_a, id_b), known_m) = (self.cover).part_nearest(&mut store.entries, &group, &gaps);
         match (sides.0.held(id_a), sides.1.held(id_b)) {
             (Held::Triangle(_), Held::Triangle(_)) => {
                 self.leaves(store, (id_a, id_b), sides, known_m, true, meter);

@@ -1,10 +1,9 @@
 //! What a front has not proved apart, at whatever pose: where a pair may still touch.
 
-use super::cover::lanes;
-use super::drift::moved;
 use super::{CarriedFront, Containment, FrontStore, LeafContact, bent_of, trees_of};
 use crate::math::{Pose, ROUND};
 use crate::narrow::mesh::PATCH_POINTS;
+use crate::narrow::mesh::placed::moved;
 use crate::shape::{BoxId, Shape};
 
 impl CarriedFront {
@@ -37,34 +36,9 @@ impl CarriedFront {
         &self,
         store: &FrontStore,
         moved_m: f64,
-        mut visit: impl FnMut(BoxId, BoxId),
+        visit: impl FnMut(BoxId, BoxId),
     ) -> bool {
-        if self.drift.left_m(self.lumped_expiry_m) <= moved_m {
-            return false;
-        }
-        for open in [self.open.all(&store.open), store.open.all(&self.touching)]
-            .into_iter()
-            .flatten()
-        {
-            visit(open.a, open.b);
-        }
-        // Of groups that pass, the expiry is their gap at the front's pose.
-        let passing = store.groups.all(&self.passing).iter();
-        let passed = passing.filter(|group| group.expiry_m <= moved_m);
-        let any = self.drift.left_m(self.proved.soonest_m()) <= moved_m;
-        let proved = if any {
-            store.groups.all(&self.proved.heap)
-        } else {
-            &[]
-        };
-        let expired = (proved.iter()).filter(|group| self.drift.left_m(group.expiry_m) <= moved_m);
-        for group in passed.chain(expired) {
-            for lane in lanes(group.mask) {
-                let (a, b) = group.pair(lane);
-                visit(a, b);
-            }
-        }
-        true
+        self.cover.unproved(&store.entries, moved_m, visit)
     }
 
     /// Contacts found at the front's own pose if it is there, two of each patch; none elsewhere.
@@ -83,7 +57,7 @@ impl CarriedFront {
     /// from the front's; a pair that touches at the front's own pose counts as not.
     pub(in crate::narrow::mesh) fn holds_none(&self, moved_m: f64) -> bool {
         let outside = self.shells.state() == Containment::Outside
-            && self.drift.left_m(self.shells_expiry_m) > moved_m;
+            && self.cover.drift.left_m(self.shells_expiry_m) > moved_m;
         !self.solids || outside || (moved_m == 0.0 && self.known.touches)
     }
 }

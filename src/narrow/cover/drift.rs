@@ -1,22 +1,21 @@
 //! How far a pair has moved since its certificates were made: a path over anchors, and what has been gone since the
 //! last.
 
-use crate::math::{Pose, ROUND, displacement};
-use crate::shape::Shape;
+use crate::math::{Pose, ROUND};
 
-/// Motion of one shape seen from the other.
+/// Motion of the second of a pair seen from the first.
 #[derive(Clone, Debug)]
-pub(super) struct Drift {
+pub(in crate::narrow) struct Drift {
     anchor: Pose,
     /// The anchor before, and how far the two are apart, metres.
     before: Pose,
     stride_m: f64,
     /// `S`: length of the path over all anchors, metres, rounded up.
-    pub(super) path_m: f64,
+    pub(in crate::narrow) path_m: f64,
     /// `d`: displacement from the anchor, metres, rounded up.
     offset_m: f64,
     /// Displacement at the last move, from the anchor of then, metres.
-    pub(super) last_m: f64,
+    pub(in crate::narrow) last_m: f64,
 }
 
 impl Default for Drift {
@@ -26,7 +25,7 @@ impl Default for Drift {
 }
 
 impl Drift {
-    pub(super) fn at(pose: &Pose) -> Self {
+    pub(in crate::narrow) fn at(pose: &Pose) -> Self {
         Self {
             anchor: *pose,
             before: *pose,
@@ -37,12 +36,14 @@ impl Drift {
         }
     }
 
-    /// Moves to a pose of `b` seen from `a`; takes an anchor where the way leads on from the last two.
-    pub(super) fn follow(&mut self, a: &Shape, b: &Shape, pos12: &Pose) {
-        self.offset_m = moved(a, b, &self.anchor, pos12);
+    /// Moves to a pose of the second seen from the first; takes an anchor where the way leads on from the last two.
+    ///
+    /// * `moved` - how far any point of the smaller one moves from one pose to another, metres, rounded up.
+    pub(in crate::narrow) fn follow(&mut self, pos12: &Pose, moved: impl Fn(&Pose, &Pose) -> f64) {
+        self.offset_m = moved(&self.anchor, pos12);
         self.last_m = self.offset_m;
         // Back and forth between two places is farther from neither than they are from each other.
-        if moved(a, b, &self.before, pos12) >= self.stride_m + 0.5 * self.offset_m {
+        if moved(&self.before, pos12) >= self.stride_m + 0.5 * self.offset_m {
             self.anchor_here(pos12);
         }
     }
@@ -50,14 +51,14 @@ impl Drift {
     /// Adds what the two deformed by, metres.
     ///
     /// * `sum_m` - of which size the numbers were whose difference it is.
-    pub(super) fn add(&mut self, bent_m: f64, sum_m: f64) {
+    pub(in crate::narrow) fn add(&mut self, bent_m: f64, sum_m: f64) {
         let path_m = self.path_m + bent_m + 2.0 * ROUND * sum_m;
         self.path_m = path_m + 2.0 * ROUND * path_m;
         self.last_m += bent_m;
     }
 
     /// Takes an anchor at the pose last moved to; whether it was none before.
-    pub(super) fn anchor_here(&mut self, pos12: &Pose) -> bool {
+    pub(in crate::narrow) fn anchor_here(&mut self, pos12: &Pose) -> bool {
         if self.offset_m == 0.0 {
             return false;
         }
@@ -69,12 +70,12 @@ impl Drift {
     }
 
     /// The path at which a gap found at this pose is used up, rounded down; `None` where it does not outlast this pose.
-    pub(super) fn expiry(&self, gap: f64) -> Option<f64> {
+    pub(in crate::narrow) fn expiry(&self, gap: f64) -> Option<f64> {
         self.outlasts(gap).then(|| self.used_up_at(gap))
     }
 
     /// A gap found at this pose that is greater than this outlasts it, metres; one not as great may.
-    pub(super) fn lasting_m(&self) -> f64 {
+    pub(in crate::narrow) fn lasting_m(&self) -> f64 {
         // What is used up at once, and what is rounded on the way there and back.
         2.0 * self.offset_m + 16.0 * ROUND * (self.path_m + self.offset_m)
     }
@@ -91,17 +92,8 @@ impl Drift {
     }
 
     /// The gap that an expiry proves at this pose, rounded down; zero or less: none.
-    pub(super) fn left_m(&self, expiry_m: f64) -> f64 {
+    pub(in crate::narrow) fn left_m(&self, expiry_m: f64) -> f64 {
         let spent_m = self.path_m + self.offset_m;
         (expiry_m - spent_m) - 4.0 * ROUND * spent_m
-    }
-}
-
-/// How far any point of the smaller one's surface moves, seen from the other, metres, rounded up.
-pub(in crate::narrow::mesh) fn moved(a: &Shape, b: &Shape, from: &Pose, to: &Pose) -> f64 {
-    if a.radius < b.radius {
-        displacement(&from.inverse(), &to.inverse(), &a.centre, a.radius)
-    } else {
-        displacement(from, to, &b.centre, b.radius)
     }
 }

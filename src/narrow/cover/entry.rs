@@ -1,34 +1,46 @@
-//! The entries of a front: pairs of boxes that may touch, and groups of pairs proved apart until the pair has moved so
+//! The entries of a cover: pairs of boxes that may touch, and groups of pairs proved apart until the pair has moved so
 //! far.
 
 use std::cmp::Ordering;
 
 pub use crate::config::MeshSearch as Search;
-use crate::narrow::arena::{Arena, Run};
+use crate::narrow::arena::{Arena, Linked, Run};
 use crate::shape::BoxId;
 
 /// A box of one side against boxes of one pack of the other side, all proved apart.
 ///
 /// One expiry stands for up to eight pairs: what tests one of them tests all.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Group {
+pub(in crate::narrow) struct Group {
     /// Path of the pair at which the proof ends: gap at the test plus the path until then, rounded down, metres.
-    pub(super) expiry_m: f64,
+    pub(in crate::narrow) expiry_m: f64,
     /// The single box.
-    pub(super) one: BoxId,
+    pub(in crate::narrow) one: BoxId,
     /// The pack of the other side.
-    pub(super) pack: u32,
+    pub(in crate::narrow) pack: u32,
     /// Which boxes of the pack.
-    pub(super) mask: u8,
+    pub(in crate::narrow) mask: u8,
     /// Whether the pack is B's.
-    pub(super) pack_is_b: bool,
+    pub(in crate::narrow) pack_is_b: bool,
     /// One pair of leaves whose boxes touch and whose triangles do not.
-    pub(super) leaf: bool,
+    pub(in crate::narrow) leaf: bool,
 }
 
 impl Group {
+    /// One pair of leaves.
+    pub(in crate::narrow) fn of_leaves(a: BoxId, b: BoxId) -> Self {
+        Self {
+            expiry_m: 0.0,
+            one: a,
+            pack: b.pack(),
+            mask: 1 << b.lane(),
+            pack_is_b: true,
+            leaf: true,
+        }
+    }
+
     /// The same, no longer proved.
-    pub(super) fn expired(self) -> Self {
+    pub(in crate::narrow) fn expired(self) -> Self {
         Self {
             expiry_m: f64::NEG_INFINITY,
             ..self
@@ -36,7 +48,7 @@ impl Group {
     }
 
     /// The pair of one lane, A's box first.
-    pub(super) fn pair(&self, lane: u32) -> (BoxId, BoxId) {
+    pub(in crate::narrow) fn pair(&self, lane: u32) -> (BoxId, BoxId) {
         let other = BoxId::new(self.pack, lane);
         if self.pack_is_b {
             (self.one, other)
@@ -47,7 +59,7 @@ impl Group {
 }
 
 /// The lanes of a mask, ascending.
-pub(in crate::narrow::mesh) fn lanes(mask: u8) -> impl Iterator<Item = u32> {
+pub(in crate::narrow) fn lanes(mask: u8) -> impl Iterator<Item = u32> {
     let mut rest = mask;
     std::iter::from_fn(move || {
         let lane = rest.trailing_zeros();
@@ -80,11 +92,11 @@ impl Eq for Group {}
 
 /// A pair of boxes that may touch.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Open {
+pub(in crate::narrow) struct Open {
     /// About how far the boxes overlap at their test, negative metres: for the order only.
-    pub(super) low: f64,
-    pub(super) a: BoxId,
-    pub(super) b: BoxId,
+    pub(in crate::narrow) low: f64,
+    pub(in crate::narrow) a: BoxId,
+    pub(in crate::narrow) b: BoxId,
 }
 
 impl Ord for Open {
@@ -109,9 +121,9 @@ impl PartialEq for Open {
 
 impl Eq for Open {}
 
-/// The pairs of one front that may touch, in the order of a search.
+/// The pairs of one pair that may touch, in the order of a search.
 #[derive(Debug, Default)]
-pub(super) struct OpenList {
+pub(in crate::narrow) struct OpenList {
     search: Search,
     /// A stack, a queue, or a heap.
     items: Run,
@@ -120,14 +132,14 @@ pub(super) struct OpenList {
 }
 
 impl OpenList {
-    pub(super) fn clear(&mut self, search: Search) {
+    pub(in crate::narrow) fn clear(&mut self, search: Search) {
         self.search = search;
         self.items.clear();
         self.head = 0;
     }
 
     /// False where there is no room.
-    pub(super) fn push(&mut self, arena: &mut Arena<Open>, open: Open) -> bool {
+    pub(in crate::narrow) fn push(&mut self, arena: &mut Arena<Open>, open: Open) -> bool {
         if self.search == Search::Priority {
             arena.push_heap(&mut self.items, open)
         } else {
@@ -135,7 +147,7 @@ impl OpenList {
         }
     }
 
-    pub(super) fn pop(&mut self, arena: &mut Arena<Open>) -> Option<Open> {
+    pub(in crate::narrow) fn pop(&mut self, arena: &mut Arena<Open>) -> Option<Open> {
         match self.search {
             Search::Priority => arena.pop_heap(&mut self.items),
             Search::BreadthFirst => {
@@ -151,22 +163,99 @@ impl OpenList {
         }
     }
 
-    pub(super) fn is_empty(&self) -> bool {
+    pub(in crate::narrow) fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(in crate::narrow) fn len(&self) -> usize {
         self.items.len() - self.head
     }
 
     /// The pairs, in no order.
-    pub(super) fn all<'a>(&self, arena: &'a Arena<Open>) -> &'a [Open] {
+    pub(in crate::narrow) fn all<'a>(&self, arena: &'a Arena<Open>) -> &'a [Open] {
         &arena.all(&self.items)[self.head..]
     }
 
     /// Gives its memory back.
-    pub(super) fn release(&mut self, arena: &mut Arena<Open>) {
+    pub(in crate::narrow) fn release(&mut self, arena: &mut Arena<Open>) {
         arena.release(&mut self.items);
         self.head = 0;
+    }
+}
+
+/// The groups of one pair, the one that expires soonest at hand.
+#[derive(Debug)]
+pub(in crate::narrow) struct Proved {
+    pub(in crate::narrow) heap: Run,
+    /// Expiry of its top, as a path, metres; infinite when there is none.
+    soonest_m: f64,
+}
+
+impl Default for Proved {
+    fn default() -> Self {
+        Self {
+            heap: Run::default(),
+            soonest_m: f64::INFINITY,
+        }
+    }
+}
+
+impl Proved {
+    pub(in crate::narrow) fn soonest_m(&self) -> f64 {
+        self.soonest_m
+    }
+
+    pub(in crate::narrow) fn len(&self) -> usize {
+        self.heap.len()
+    }
+
+    /// False where there is no room.
+    pub(in crate::narrow) fn push(&mut self, arena: &mut Arena<Group>, group: Group) -> bool {
+        let pushed = arena.push_heap(&mut self.heap, group);
+        self.note_top(arena);
+        pushed
+    }
+
+    pub(in crate::narrow) fn pop(&mut self, arena: &mut Arena<Group>) -> Option<Group> {
+        let top = arena.pop_heap(&mut self.heap);
+        self.note_top(arena);
+        top
+    }
+
+    pub(in crate::narrow) fn clear(&mut self) {
+        self.heap.clear();
+        self.soonest_m = f64::INFINITY;
+    }
+
+    pub(in crate::narrow) fn release(&mut self, arena: &mut Arena<Group>) {
+        arena.release(&mut self.heap);
+        self.soonest_m = f64::INFINITY;
+    }
+
+    fn note_top(&mut self, arena: &Arena<Group>) {
+        self.soonest_m = (arena.peek(&self.heap)).map_or(f64::INFINITY, |g| g.expiry_m);
+    }
+}
+
+impl Linked for Group {
+    fn linked(self, next: u32) -> Self {
+        Self { pack: next, ..self }
+    }
+
+    fn next(&self) -> u32 {
+        self.pack
+    }
+}
+
+impl Linked for Open {
+    fn linked(self, next: u32) -> Self {
+        Self {
+            a: BoxId(next),
+            ..self
+        }
+    }
+
+    fn next(&self) -> u32 {
+        self.a.0
     }
 }

@@ -1,0 +1,378 @@
+//! What is proved of a pair: every pair of leaves is covered by exactly one entry at any time, at whatever pose.
+//!
+//! In: gaps of boxes at the pose worked at. Out: the next boxes to look into, a sound bound on all of them. An entry is
+//! - a [`Group`] of pairs of boxes proved apart by `g` when the pair's path was `M`: it holds while the path is less
+//!   than `g + M`, at no cost; the group that expires soonest is on top of a heap, so the heap is at once the front,
+//!   the best-first queue and the bound;
+//! - an open pair of boxes that may touch;
+//! - a group apart at this pose by less than can be carried to another, or a pair of leaves found touching: at the next
+//!   pose it is open again;
+//! - what was lumped together when there was no room: one expiry for all of it, and a new start when that is up.
+//!
+//! What boxes and leaves are is its user's: triangles of two meshes (`mesh/carried`), shapes of two bodies
+//! (`compound`).
+
+mod drift;
+mod entry;
+
+pub(super) use drift::Drift;
+pub use entry::Search;
+pub(super) use entry::{Group, Open, OpenList, Proved, lanes};
+
+use crate::math::{Pose, ROUND};
+use crate::shape::BoxId;
+use crate::simd::obb::LANES;
+use crate::time::Meter;
+
+use super::arena::{Arena, Run};
+
+/// Where all pairs keep their entries.
+#[derive(Debug)]
+pub(super) struct Entries {
+    pub(super) groups: Arena<Group>,
+    pub(super) open: Arena<Open>,
+}
+
+impl Entries {
+    /// At most so many of all pairs together.
+    pub(super) fn with_room(groups: usize, open: usize) -> Self {
+        Self {
+            groups: Arena::new(groups),
+            open: Arena::new(open),
+        }
+    }
+
+    /// See `Arena::touch_ahead`.
+    pub(super) fn touch_ahead(&mut self, meter: &mut Meter<'_>) {
+        self.groups.touch_ahead(meter);
+        self.open.touch_ahead(meter);
+    }
+
+    /// Bytes of all blocks, free ones included.
+    pub(super) fn bytes(&self) -> usize {
+        self.groups.bytes() + self.open.bytes()
+    }
+}
+
+/// The entries of one pair, used with one [`Entries`] until it is released.
+#[derive(Debug)]
+pub(super) struct Cover {
+    pub(super) drift: Drift,
+    pub(super) proved: Proved,
+    pub(super) open: OpenList,
+    /// Apart at this pose by what stands for the expiry, and by no more than can be told at another.
+    pub(super) passing: Run,
+    /// The least gap of them, metres; infinite: there are none.
+    passing_m: f64,
+    /// Leaves found touching at this pose.
+    pub(super) touching: Run,
+    /// When what was lumped together is no longer proved apart; infinite: nothing was; minus infinity: something found
+    /// no room at all, and nothing is proved until the next start.
+    lumped_expiry_m: f64,
+}
+
+impl Default for Cover {
+    fn default() -> Self {
+        Self {
+            drift: Drift::default(),
+            proved: Proved::default(),
+            open: OpenList::default(),
+            passing: Run::default(),
+            passing_m: f64::INFINITY,
+            touching: Run::default(),
+            lumped_expiry_m: f64::INFINITY,
+        }
+    }
+}
+
+impl Cover {
+    /// Forgets everything, and has the two roots open at a pose.
+    pub(super) fn start(&mut self, entries: &mut Entries, pose: &Pose, search: Search) {
+        self.drift = Drift::at(pose);
+        self.proved.clear();
+        self.passing.clear();
+        self.passing_m = f64::INFINITY;
+        self.open.clear(search);
+        self.touching.clear();
+        self.lumped_expiry_m = f64::INFINITY;
+        let roots = Open {
+            low: 0.0,
+            a: BoxId::ROOT,
+            b: BoxId::ROOT,
+        };
+        self.look_into(entries, roots);
+    }
+
+    /// Gives its memory back.
+    pub(super) fn release(&mut self, entries: &mut Entries) {
+        self.proved.release(&mut entries.groups);
+        entries.groups.release(&mut self.passing);
+        self.open.release(&mut entries.open);
+        entries.open.release(&mut self.touching);
+    }
+
+    /// Entries held, open or proved.
+    pub(super) fn len(&self) -> usize {
+        self.proved.len() + self.open.len() + self.passing.len() + self.touching.len()
+    }
+
+    /// Whether some were lumped together.
+    pub(super) fn is_lumped(&self) -> bool {
+        self.lumped_expiry_m < f64::INFINITY
+    }
+
+    /// Whether what was lumped together is no longer proved apart, so that nothing but a new start helps.
+    pub(super) fn is_lost(&self) -> bool {
+        self.is_lumped() && !self.holds_lumped()
+    }
+
+    /// Whether what was lumped together is still proved apart, if anything was.
+    pub(super) fn holds_lumped(&self) -> bool {
+        self.drift.left_m(self.lumped_expiry_m) > 0.0
+    }
+
+    /// How many groups are no longer proved apart.
+    pub(super) fn expired_len(&self, entries: &Entries) -> usize {
+        let gone = |group: &&Group| self.drift.left_m(group.expiry_m) <= 0.0;
+        let proved = entries.groups.all(&self.proved.heap);
+        proved.iter().filter(gone).count()
+    }
+
+    /// The pair has come to another pose: what held at the one before alone is asked again.
+    pub(super) fn arrive(&mut self, entries: &mut Entries) {
+        self.ask_touching_again(entries);
+        while let Some(group) = entries.groups.pop(&mut self.passing) {
+            self.prove(entries, group.expired());
+        }
+        self.passing_m = f64::INFINITY;
+    }
+
+    /// Leaves that were found touching are open again.
+    pub(super) fn ask_touching_again(&mut self, entries: &mut Entries) {
+        while let Some(touching) = entries.open.pop(&mut self.touching) {
+            self.look_into(entries, touching);
+        }
+    }
+
+    /// Takes an anchor at this pose: from here on what is found holds at it to the last digit.
+    pub(super) fn anchor_here(&mut self, entries: &mut Entries, pose: &Pose) {
+        if !self.drift.anchor_here(pose) {
+            return;
+        }
+        self.passing_m = f64::INFINITY;
+        for at in (0..self.passing.len()).rev() {
+            // What does not outlast this pose after all is put back: behind those that are still to come.
+            if let Some(group) = entries.groups.swap_remove(&mut self.passing, at) {
+                self.keep(entries, group, group.expiry_m);
+            }
+        }
+    }
+
+    /// Takes the outcome of a group's test in: what is apart is a group again, what may touch is open, the deepest on
+    /// top.
+    ///
+    /// * `gaps` - of the group's pairs at this pose, lane by lane.
+    /// * `known_m` - a bound that holds for all of it at this pose.
+    pub(super) fn take(
+        &mut self,
+        entries: &mut Entries,
+        group: &Group,
+        gaps: [f64; LANES],
+        known_m: f64,
+    ) {
+        let gaps = gaps.map(|gap| gap.max(known_m));
+        let (mut apart, mut least) = (0_u8, f64::INFINITY);
+        // What would not outlast this pose is looked into: smaller boxes are farther apart. Without a branch: which of
+        // them are apart is as good as random.
+        let lasting_m = if known_m > 0.0 {
+            f64::NEG_INFINITY
+        } else {
+            self.drift.lasting_m()
+        };
+        for (lane, &gap) in gaps.iter().enumerate() {
+            let is_apart = (gap > lasting_m) & (group.mask >> lane & 1 == 1);
+            apart |= u8::from(is_apart) << lane;
+            least = if is_apart { least.min(gap) } else { least };
+        }
+        let mut deep = [(0.0, 0_u32); LANES];
+        let mut count = 0;
+        for lane in lanes(group.mask & !apart) {
+            let gap = gaps[lane as usize];
+            // Sorted in: the deepest last.
+            let mut at = count;
+            while at > 0 && deep[at - 1].0 < gap {
+                deep[at] = deep[at - 1];
+                at -= 1;
+            }
+            deep[at] = (gap, lane);
+            count += 1;
+        }
+        if apart != 0 {
+            let mask = apart;
+            self.keep(entries, Group { mask, ..*group }, least);
+        }
+        for &(low, lane) in &deep[..count] {
+            let (a, b) = group.pair(lane);
+            self.look_into(entries, Open { low, a, b });
+        }
+    }
+
+    /// Keeps all of a group but its nearest pair, which is returned with its gap.
+    ///
+    /// * `gaps` - of the group's pairs at this pose, lane by lane.
+    pub(super) fn part_nearest(
+        &mut self,
+        entries: &mut Entries,
+        group: &Group,
+        gaps: &[f64; LANES],
+    ) -> ((BoxId, BoxId), f64) {
+        let (mut nearest, mut rest_m) = (group.mask.trailing_zeros(), f64::INFINITY);
+        for lane in lanes(group.mask) {
+            if gaps[lane as usize] < gaps[nearest as usize] {
+                nearest = lane;
+            }
+        }
+        let mask = group.mask & !(1 << nearest);
+        for lane in lanes(mask) {
+            rest_m = rest_m.min(gaps[lane as usize]);
+        }
+        if mask != 0 {
+            self.keep(entries, Group { mask, ..*group }, rest_m);
+        }
+        (group.pair(nearest), gaps[nearest as usize])
+    }
+
+    /// Keeps a group that is apart by `gap` at this pose; where there is no room, only its expiry.
+    pub(super) fn keep(&mut self, entries: &mut Entries, group: Group, gap: f64) {
+        match self.drift.expiry(gap) {
+            Some(expiry_m) => self.prove(entries, Group { expiry_m, ..group }),
+            None if gap > 0.0 => {
+                self.passing_m = self.passing_m.min(gap);
+                let expiry_m = gap;
+                let kept = (entries.groups).push(&mut self.passing, Group { expiry_m, ..group });
+                self.note_room(kept);
+            }
+            // Not apart after all: every pair stays covered.
+            None => {
+                for lane in lanes(group.mask) {
+                    let (a, b) = group.pair(lane);
+                    self.look_into(entries, Open { low: gap, a, b });
+                }
+            }
+        }
+    }
+
+    /// Takes a group in until it expires.
+    fn prove(&mut self, entries: &mut Entries, group: Group) {
+        if !self.proved.push(&mut entries.groups, group) {
+            self.lumped_expiry_m = self.lumped_expiry_m.min(group.expiry_m);
+        }
+    }
+
+    /// Takes a pair in that may touch.
+    pub(super) fn look_into(&mut self, entries: &mut Entries, open: Open) {
+        let kept = self.open.push(&mut entries.open, open);
+        self.note_room(kept);
+    }
+
+    /// Takes a pair of leaves in that was found touching at this pose.
+    pub(super) fn touch(&mut self, entries: &mut Entries, touching: Open) {
+        let kept = entries.open.push(&mut self.touching, touching);
+        self.note_room(kept);
+    }
+
+    /// What found no room is no longer covered: then nothing is proved until the next start.
+    fn note_room(&mut self, kept: bool) {
+        if !kept {
+            self.lumped_expiry_m = f64::NEG_INFINITY;
+        }
+    }
+
+    /// A lower bound on the gap of all that is proved apart at this pose, metres; minus infinity where some is not.
+    pub(super) fn low_m(&self) -> f64 {
+        let soonest_m = self.proved.soonest_m().min(self.lumped_expiry_m);
+        let proved = self.drift.left_m(soonest_m).min(self.passing_m);
+        if proved > 0.0 {
+            proved
+        } else {
+            f64::NEG_INFINITY
+        }
+    }
+
+    /// Whether the soonest group is no longer proved apart.
+    pub(super) fn has_expired(&self) -> bool {
+        self.nearest_m() <= 0.0
+    }
+
+    /// The least bound of what can still be looked into, metres.
+    pub(super) fn nearest_m(&self) -> f64 {
+        self.drift.left_m(self.proved.soonest_m())
+    }
+
+    /// What expiries cannot tell apart, metres.
+    pub(super) fn fuzz_m(&self) -> f64 {
+        16.0 * ROUND * self.drift.path_m
+    }
+
+    /// Visits every pair of boxes that is not proved apart at a pose `moved_m` away from the one worked at. All that
+    /// the two share at that pose is under these.
+    ///
+    /// * returns - false where some pairs were lumped together and are not known any more: then nothing is visited.
+    pub(super) fn unproved(
+        &self,
+        entries: &Entries,
+        moved_m: f64,
+        mut visit: impl FnMut(BoxId, BoxId),
+    ) -> bool {
+        if self.drift.left_m(self.lumped_expiry_m) <= moved_m {
+            return false;
+        }
+        for open in self.unsettled(entries) {
+            visit(open.a, open.b);
+        }
+        // Of groups that pass, the expiry is their gap at this pose.
+        let passing = entries.groups.all(&self.passing).iter();
+        let passed = passing.filter(|group| group.expiry_m <= moved_m);
+        let any = self.nearest_m() <= moved_m;
+        let proved = if any {
+            entries.groups.all(&self.proved.heap)
+        } else {
+            &[]
+        };
+        let expired = (proved.iter()).filter(|group| self.drift.left_m(group.expiry_m) <= moved_m);
+        for group in passed.chain(expired) {
+            for lane in lanes(group.mask) {
+                let (a, b) = group.pair(lane);
+                visit(a, b);
+            }
+        }
+        true
+    }
+
+    /// Visits every pair of boxes that is covered; `false` where some were lumped together for want of room.
+    pub(super) fn visit_all(&self, entries: &Entries, mut visit: impl FnMut(BoxId, BoxId)) -> bool {
+        if self.is_lumped() {
+            return false;
+        }
+        let groups = [&self.proved.heap, &self.passing].map(|run| entries.groups.all(run));
+        for group in groups.into_iter().flatten() {
+            for lane in lanes(group.mask) {
+                let (a, b) = group.pair(lane);
+                visit(a, b);
+            }
+        }
+        for open in self.unsettled(entries) {
+            visit(open.a, open.b);
+        }
+        true
+    }
+
+    /// Pairs of boxes that may touch, and leaves that do.
+    fn unsettled<'a>(&self, entries: &'a Entries) -> impl Iterator<Item = &'a Open> + use<'a> {
+        let pairs = [
+            self.open.all(&entries.open),
+            entries.open.all(&self.touching),
+        ];
+        pairs.into_iter().flatten()
+    }
+}
