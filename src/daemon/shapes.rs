@@ -7,13 +7,13 @@ use crate::ids::BodyId;
 use crate::scene::{BodySpec, Scene};
 use crate::shape::{Library, Shape};
 use crate::transport::BodyNote;
-use crate::world::PlacedShape;
+use crate::world::{Parts, PlacedShape};
 
 /// The built shapes of a scene.
 #[derive(Debug)]
 pub struct Shapes {
     /// One list a body, in the scene's order.
-    pub bodies: Vec<Arc<[PlacedShape]>>,
+    pub bodies: Vec<Parts>,
     /// What `check` shows: sizes, open meshes, turned shells.
     pub warnings: Vec<String>,
     /// The shapes by spec, for edits that use them again.
@@ -41,7 +41,7 @@ pub fn build_shapes(scene: &Scene) -> Result<Shapes> {
 }
 
 /// Built shapes at their places in a body.
-pub(super) fn place(body: &BodySpec, shapes: Vec<Arc<Shape>>) -> Arc<[PlacedShape]> {
+pub(super) fn place(body: &BodySpec, shapes: Vec<Arc<Shape>>) -> Parts {
     let placed = body.shapes.iter().zip(shapes);
     placed
         .map(|(spec, shape)| PlacedShape {

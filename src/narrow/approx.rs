@@ -43,11 +43,11 @@ use crate::shape::{Cone, Obb};
 use crate::wire::{BodyStatus, Level, Verdict};
 use crate::world::{Body, World};
 
+use super::Narrow;
+use super::compound::Waiting;
 use super::finding::Finding;
 use super::memo::bent;
-use super::mesh::CarriedFront;
 use super::sweep::Passage;
-use super::{NONE, Narrow};
 
 use gather::{Ball, SPOTS_MAX, cut, gather};
 use pace::Pace;
@@ -95,6 +95,9 @@ pub(super) struct Approx {
     /// Of the shape pair at hand, in the order of its front, then by size.
     raw: Vec<Spot>,
     heap: BinaryHeap<Spot>,
+    waiting: Waiting,
+    /// Places of the shape pairs that may touch.
+    near: Vec<(u32, u32)>,
     /// Of the body pair, A's body frame.
     all: Vec<Spot>,
     /// Contacts found by now of a pair that is not finished: for the guesses, not for the spheres.
@@ -252,13 +255,6 @@ impl Narrow {
                 .regions
                 .push(guess.region(ball, spots, &approx.found));
         }
-    }
-
-    /// The front of a pair of single shapes; one that was never started knows nothing.
-    fn front_of(&self, slot: PairSlot) -> Option<&CarriedFront> {
-        let memo = self.memos.get(slot.index())?;
-        let front = (memo.front != NONE).then(|| self.fronts.get(memo.front))?;
-        front.filter(|front| front.is_started())
     }
 }
 

@@ -6,13 +6,15 @@
 use crate::math::{Interval, relative};
 use crate::time::Meter;
 use crate::wire::Verdict;
-use crate::world::Body;
+use crate::world::{Body, PlacedShape};
 
 use super::Counters;
-use super::arena::Arena;
+use super::compound::{CompoundFront, Tools};
+use super::contacts::Contact;
 use super::cursor::{Cursor, Room, Turn};
 use super::memo::{Witness, bent};
-use super::mesh::{FrontStore, Goal, Search};
+use super::mesh::{Goal, Search};
+use super::shelves::Shelves;
 
 /// What is known of two bodies after a query of their own.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,37 +39,29 @@ pub struct Asked {
 /// Two bodies that have half-spaces have no gap (law 3.2): their interval stays unknown.
 #[must_use]
 pub fn gap_between(a: &Body, b: &Body, report_m: f64, meter: &mut Meter<'_>) -> Asked {
-    let mut cursor = Cursor::default();
-    let rel = relative(&a.pose, &b.pose);
-    cursor.start((rel, bent(a, b)), 0.0, 0, Goal::Gap);
-    let (mut counters, mut fronts) = (Counters::default(), FrontStore::default());
-    let (mut contacts, mut found) = (Arena::default(), Vec::new());
-    let mut room = Room {
-        search: Search::default(),
-        fronts: &mut fronts,
-        contacts: &mut contacts,
-        found: &mut found,
+    let found = match (&*a.shapes, &*b.shapes) {
+        _ if a.unbounded && b.unbounded => Found::default(),
+        ([one], [other]) => of_shapes((a, b), (one, other), report_m, meter),
+        _ => of_parts((a, b), report_m, meter),
     };
-    let finished = !(a.unbounded && b.unbounded)
-        && loop {
-            match cursor.turn(&mut room, (a, b), report_m, meter, &mut counters) {
-                Turn::Finished => break true,
-                Turn::Open if !meter.open() => break false,
-                Turn::Open => {}
-            }
-        };
+    let Found {
+        finished,
+        certain,
+        witness,
+        ..
+    } = found;
     let gap = if finished {
-        cursor.gap
+        found.gap
     } else {
         let wholes = whole_bounds(a, b);
-        let max = wholes.max.min(cursor.upper());
+        let max = wholes.max.min(found.gap.max);
         Interval {
             min: wholes.min.min(max),
             max,
         }
     };
     // An overlap that is proved is no touch, however near 0 its upper end: that of meshes is a bound, not a depth.
-    let touching = finished && cursor.certain && gap.contains(0.0) && gap.max > 0.0;
+    let touching = finished && certain && gap.contains(0.0) && gap.max > 0.0;
     Asked {
         gap,
         verdict: if gap.max <= 0.0 || touching {
@@ -81,7 +75,93 @@ pub fn gap_between(a: &Body, b: &Body, report_m: f64, meter: &mut Meter<'_>) -> 
         },
         touching,
         finished,
+        witness,
+    }
+}
+
+/// How far a query came.
+struct Found {
+    gap: Interval,
+    finished: bool,
+    /// 0 inside the interval of a finished query means touching.
+    certain: bool,
+    witness: Option<Witness>,
+}
+
+impl Default for Found {
+    fn default() -> Self {
+        Self {
+            gap: Interval::UNKNOWN,
+            finished: false,
+            certain: false,
+            witness: None,
+        }
+    }
+}
+
+/// Of two bodies of one shape each.
+fn of_shapes(
+    (a, b): (&Body, &Body),
+    shapes: (&PlacedShape, &PlacedShape),
+    report_m: f64,
+    meter: &mut Meter<'_>,
+) -> Found {
+    let (mut bench, mut cursor) = (Bench::default(), Cursor::default());
+    let rel = relative(&a.pose, &b.pose);
+    cursor.start((0, 0), (rel, bent(a, b)), 0.0, 0, Goal::Gap);
+    let Shelves {
+        store, contacts, ..
+    } = &mut bench.shelves;
+    let mut room = Room {
+        fronts: store,
+        contacts,
+        search: Search::default(),
+    };
+    let mut turn = Turn::Open;
+    while turn == Turn::Open && meter.open() {
+        turn = cursor.turn(&mut room, shapes, report_m, meter, &mut bench.counters);
+    }
+    let max = cursor.upper();
+    Found {
+        gap: Interval::new(cursor.gap.min.min(max), max),
+        finished: turn == Turn::Finished,
+        certain: cursor.certain,
         witness: cursor.witness,
+    }
+}
+
+/// Of two bodies of which at least one has several shapes.
+fn of_parts((a, b): (&Body, &Body), report_m: f64, meter: &mut Meter<'_>) -> Found {
+    let (mut bench, mut front) = (Bench::default(), CompoundFront::default());
+    let mut tools = bench.tools();
+    front.move_to(&mut tools, (a, b), &relative(&a.pose, &b.pose));
+    let asked = (Goal::Gap, report_m);
+    let finished = front.advance(&mut tools, (a, b), asked, u64::MAX, meter);
+    Found {
+        gap: front.interval(),
+        finished,
+        certain: front.is_certain(),
+        witness: front.witness(),
+    }
+}
+
+/// What a query of its own keeps what it finds on.
+#[derive(Default)]
+struct Bench {
+    shelves: Shelves,
+    found: Vec<Contact>,
+    counters: Counters,
+}
+
+impl Bench {
+    fn tools(&mut self) -> Tools<'_> {
+        Tools {
+            shelves: &mut self.shelves,
+            found: &mut self.found,
+            counters: &mut self.counters,
+            search: Search::default(),
+            tick: 0,
+        }
     }
 }
 

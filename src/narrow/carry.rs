@@ -13,7 +13,7 @@ use crate::world::{Body, PlacedShape};
 
 use super::cursor::SLICE_UNITS;
 use super::memo::{Witness, bent};
-use super::mesh::{CarriedFront, Goal, LeafContact, Search, numbered};
+use super::mesh::{CarriedFront, FrontStore, Goal, LeafContact, Search, numbered};
 use super::query::{leaf_contact, shape_pose, sound, witness_of};
 use super::{NONE, Narrow};
 
@@ -29,19 +29,6 @@ const CARRY_COST: u64 = 4;
 const SLICE_DOUBLINGS_MAX: u64 = 6;
 
 impl Narrow {
-    /// Gives back what work on a pair keeps from turn to turn.
-    pub(super) fn give_back(&mut self, slot: PairSlot) {
-        let memo = &mut self.memos[slot.index()];
-        if let Some(cursor) = self.cursors.get_mut(memo.cursor) {
-            cursor.release(&mut self.front_store, &mut self.found_store);
-        }
-        self.cursors.give(&mut memo.cursor);
-        if let Some(front) = self.fronts.get_mut(memo.front) {
-            front.release(&mut self.front_store);
-        }
-        self.fronts.give(&mut memo.front);
-    }
-
     /// One turn of a pair on its front; whether there is more to do for `goal`.
     pub(super) fn turn_front(
         &mut self,
@@ -56,12 +43,12 @@ impl Narrow {
         let due = goal == Goal::Verdict && self.witness_due(slot);
         let memo = &mut self.memos[slot.index()];
         if memo.front == NONE {
-            memo.front = self.fronts.take(CarriedFront::default);
+            memo.front = self.shelves.fronts.take(CarriedFront::default);
         }
-        let Some(front) = self.fronts.get_mut(memo.front) else {
+        let Some(front) = self.shelves.fronts.get_mut(memo.front) else {
             return false;
         };
-        let store = &mut self.front_store;
+        let store = &mut self.shelves.store;
         let credit_m = a.motion.credit_m() + b.motion.credit_m();
         let bent_m = bent(a, b);
         let (one_shape, other_shape) = (&one.shape, &other.shape);
@@ -78,7 +65,7 @@ impl Narrow {
                 (memo.bent_m, memo.finished, memo.tight) = (bent_m, false, false);
                 match told {
                     Glance::Touch(Some(leaf)) => {
-                        memo.witness = Some(seen_at(one, other, &pos12, &leaf));
+                        memo.witness = Some(seen_at((one, other), (0, 0), &pos12, &leaf));
                     }
                     Glance::Touch(None) => {}
                     // Where it touched or was nearest once is not where it does or is now.
@@ -108,7 +95,7 @@ impl Narrow {
         memo.finished = whole && front.is_certain();
         memo.tight = whole && goal != Goal::Verdict;
         if let Some(leaf) = front.witness() {
-            memo.witness = Some(seen_at(one, other, &pos12, &leaf));
+            memo.witness = Some(seen_at((one, other), (0, 0), &pos12, &leaf));
         } else if memo.gap.min > 0.0 && memo.witness.is_some_and(|w| w.best_m <= 0.0) {
             // Where it touched says nothing of a pair that is apart.
             memo.witness = None;
@@ -117,11 +104,10 @@ impl Narrow {
             let gap = memo.gap;
             self.found.clear();
             if gap.min <= 0.0 {
-                let seen = |leaf| leaf_contact((one, other), (0, 0), &pos12, leaf, gap);
-                self.found.extend(numbered(front.contacts(store)).map(seen));
-                let way_out = front.way_out(store);
-                self.found
-                    .extend(way_out.as_ref().map(|leaf| seen((leaf, 0))));
+                let seen = |(leaf, patch): (LeafContact, u32)| {
+                    leaf_contact((one, other), (0, 0), &pos12, (&leaf, patch), gap)
+                };
+                self.found.extend(found_on(front, store).map(seen));
             }
             self.keep_contacts(slot, a.radius.min(b.radius));
         }
@@ -129,8 +115,18 @@ impl Narrow {
     }
 }
 
+/// What a front found once its goal is a contact set and reached: points of touching leaves, with each the number of
+/// its patch; of a shape within another the way out.
+pub(super) fn found_on(
+    front: &CarriedFront,
+    store: &FrontStore,
+) -> impl Iterator<Item = (LeafContact, u32)> {
+    let points = numbered(front.contacts(store)).map(|(point, patch)| (*point, patch));
+    points.chain(front.way_out(store).map(|point| (point, 0)))
+}
+
 /// Units of a turn of a pair without a verdict since a tick, 0 of one that is decided and asked for more.
-fn slice_units(undecided_since: u64, tick: u64) -> u64 {
+pub(super) fn slice_units(undecided_since: u64, tick: u64) -> u64 {
     let waited = match undecided_since {
         0 => 0,
         since => tick.saturating_sub(since),
@@ -139,7 +135,7 @@ fn slice_units(undecided_since: u64, tick: u64) -> u64 {
 }
 
 /// What a glance at a pair says, without a search of its front.
-enum Glance {
+pub(super) enum Glance {
     /// It touches still: where it did, or at these leaves.
     Touch(Option<LeafContact>),
     /// Balls within the two overlap so deep, metres.
@@ -151,11 +147,19 @@ enum Glance {
 }
 
 impl Glance {
+    /// The leaves that it touches at, where they were found just now.
+    pub(super) fn leaf(&self) -> Option<LeafContact> {
+        match *self {
+            Self::Touch(leaf) => leaf,
+            Self::Deep(_) | Self::Apart(_) | Self::Nothing => None,
+        }
+    }
+
     /// The pair's interval at these very poses.
     ///
     /// * `now` - what motion left of the one before: the lower end of a pair that touches.
     /// * `sound` - makes a bound on the two shapes one on the two bodies.
-    fn gap(&self, now: Interval, sound: impl Fn(Interval) -> Interval) -> Interval {
+    pub(super) fn gap(&self, now: Interval, sound: impl Fn(Interval) -> Interval) -> Interval {
         match *self {
             // A certified touch; how deep it is at most has not been asked again.
             Self::Touch(_) => Interval::new(now.min.min(0.0), 0.0),
@@ -169,7 +173,7 @@ impl Glance {
 /// Looks at a pair where it touched last, or else at what balls within the two, and then a plane, would say.
 ///
 /// * `touched` - whether it touched when it was last looked at.
-fn glance(
+pub(super) fn glance(
     front: &mut CarriedFront,
     (a, b): (&Shape, &Shape),
     pos12: &Pose,
@@ -193,11 +197,16 @@ fn glance(
     beside.map_or(Glance::Nothing, |leaf| Glance::Touch(Some(leaf)))
 }
 
-/// Two leaves as the witness of a pair of single shapes.
-fn seen_at(one: &PlacedShape, other: &PlacedShape, pos12: &Pose, leaf: &LeafContact) -> Witness {
+/// Two leaves as the witness of the bodies.
+pub(super) fn seen_at(
+    (one, other): (&PlacedShape, &PlacedShape),
+    places: (u32, u32),
+    pos12: &Pose,
+    leaf: &LeafContact,
+) -> Witness {
     Witness {
         triangle_a: leaf.triangle_a,
         triangle_b: leaf.triangle_b,
-        ..witness_of(one, other, pos12, &leaf.closest, (0, 0))
+        ..witness_of(one, other, pos12, &leaf.closest, places)
     }
 }

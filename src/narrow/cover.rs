@@ -86,8 +86,13 @@ impl Default for Cover {
 }
 
 impl Cover {
-    /// Forgets everything, and has the two roots open at a pose.
-    pub(super) fn start(&mut self, entries: &mut Entries, pose: &Pose, search: Search) {
+    /// Forgets everything: at a pose these pairs of roots are open, which everything is below.
+    pub(super) fn start(
+        &mut self,
+        entries: &mut Entries,
+        (pose, search): (&Pose, Search),
+        roots: impl Iterator<Item = (BoxId, BoxId)>,
+    ) {
         self.drift = Drift::at(pose);
         self.proved.clear();
         self.passing.clear();
@@ -95,12 +100,9 @@ impl Cover {
         self.open.clear(search);
         self.touching.clear();
         self.lumped_expiry_m = f64::INFINITY;
-        let roots = Open {
-            low: 0.0,
-            a: BoxId::ROOT,
-            b: BoxId::ROOT,
-        };
-        self.look_into(entries, roots);
+        for (a, b) in roots {
+            self.look_into(entries, Open { low: 0.0, a, b });
+        }
     }
 
     /// Gives its memory back.

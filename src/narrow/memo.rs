@@ -80,6 +80,7 @@ pub(super) struct Memo {
     pub(super) active_at: u32,
     pub(super) cursor: u32,
     pub(super) front: u32,
+    pub(super) compound: u32,
     pub(super) contacts: u32,
     /// Regions of the pair as they were last made to be kept.
     pub(super) regions: u32,
@@ -134,6 +135,7 @@ impl Memo {
             active_at: NONE,
             cursor: NONE,
             front: NONE,
+            compound: NONE,
             contacts: NONE,
             regions: NONE,
             turns: 0,
@@ -200,7 +202,7 @@ pub(super) fn changed_since(a: &Body, b: &Body, (then, bent_m): (&Pose, f64), no
 ///
 /// The displacement of the smaller body's surface seen from the other; for a half-space the change of the centre's
 /// height above its plane, plus what the relative turn adds.
-fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f64 {
+pub(super) fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f64 {
     if then == now {
         return 0.0;
     }

@@ -57,6 +57,7 @@ pub use contacts::{LEAF_CONTACTS_MAX, LeafContact};
 pub use deep::overlap;
 pub use parting::parted;
 pub use patches::{PATCH_POINTS, PATCHES_MAX, numbered};
+pub(in crate::narrow) use placed::Placed;
 pub use query::{Goal, MeshQuery};
 pub use retest::retest_witness;
 pub(in crate::narrow) use scan::{PlaneScan, Scan, behind};

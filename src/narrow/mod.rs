@@ -22,6 +22,7 @@ mod approx;
 mod arena;
 mod ask;
 mod carry;
+mod compound;
 mod contacts;
 mod cover;
 mod cursor;
@@ -32,6 +33,8 @@ mod pass;
 mod pool;
 mod query;
 mod refit;
+mod reports;
+mod shelves;
 mod spend;
 mod sweep;
 mod widen;
@@ -52,13 +55,13 @@ use crate::wire::{BodyStatus, Verdict};
 use crate::world::World;
 
 use approx::{Approx, Kept};
-use arena::Arena;
-use cursor::Cursor;
+use compound::CompoundFront;
 use memo::{Hot, Memo};
-use mesh::{CarriedFront, FrontStore, Search};
+use mesh::Search;
 use order::{RankCost, Urgency};
 use pool::{NONE, Pool};
 use refit::Refits;
+use shelves::Shelves;
 use sweep::Sweeps;
 
 /// What the narrow phase did in this tick.
@@ -98,12 +101,9 @@ pub struct Narrow {
     undecided: Vec<PairSlot>,
     /// Active pairs whose bounds or contacts are older than their poses.
     refresh: Vec<PairSlot>,
-    cursors: Pool<Cursor>,
-    /// What is carried of pairs of single shapes of which one is a mesh.
-    fronts: Pool<CarriedFront>,
-    front_store: FrontStore,
-    /// Contacts that cursors have found.
-    found_store: Arena<Contact>,
+    /// What is carried of pairs of which one body has several shapes.
+    compounds: Pool<CompoundFront>,
+    shelves: Shelves,
     search: Search,
     sweeps: Sweeps,
     refits: Refits,
@@ -125,6 +125,10 @@ pub struct Narrow {
     contacts_per_pair: usize,
     contacts_wanted: bool,
     bounds_wanted: bool,
+    /// There was no time for all bounds in the tick before.
+    scarce: bool,
+    /// Pairs that lack what is worked on.
+    level: Vec<PairSlot>,
     tick: u64,
 }
 
@@ -204,9 +208,10 @@ impl Narrow {
     ///
     /// * `world` - nothing of it is changed but boxes in trees.
     pub fn spend(&mut self, world: &mut World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
-        self.front_store.touch_ahead(meter);
+        self.shelves.store.touch_ahead(meter);
         self.spend_on_refits(world, wanted, meter);
         let done = self.spend_on_pairs(world, wanted, meter);
+        self.note_scarcity(wanted);
         self.go_on_with_refits(world, meter);
         done
     }
@@ -232,7 +237,7 @@ impl Narrow {
         if !std::mem::replace(&mut self.left_is_news, true) {
             self.left.clear();
         }
-        self.front_store.touch_ahead(meter);
+        self.shelves.store.touch_ahead(meter);
         self.go_on_with_refits(world, meter);
         self.spend_on_verdicts(world, wanted, meter) && self.spend_on_reports(world, wanted, meter)
     }

@@ -1,10 +1,10 @@
-//! Spending the budget: verdicts first, oldest first, in slices; then what is listened to.
+//! Spending the budget: verdicts first, oldest first, in slices; and one turn of work on a pair, whatever it is for.
 
 use crate::ids::PairSlot;
 use crate::math::{Interval, relative};
 use crate::time::Meter;
 use crate::wire::Verdict;
-use crate::world::{Body, World};
+use crate::world::{Body, PlacedShape, World};
 
 use super::contacts::ContactSet;
 use super::cursor::{Cursor, Room, Turn};
@@ -58,72 +58,15 @@ impl Narrow {
         self.undecided.is_empty()
     }
 
-    /// Refreshes bounds and contacts of reported pairs; whether all are done.
-    pub(super) fn spend_on_reports(
-        &mut self,
-        world: &World,
-        wanted: Wanted,
-        meter: &mut Meter<'_>,
-    ) -> bool {
-        self.follow_demand(wanted);
-        if !(wanted.bounds || wanted.contacts) {
-            return true;
-        }
-        let goal = if wanted.contacts {
-            Goal::Contacts
-        } else {
-            Goal::Gap
-        };
-        let work = std::mem::take(&mut self.refresh);
-        let pass = Pass {
-            world,
-            order: wanted.order,
-            idle: |narrow: &Self, slot: PairSlot| {
-                let reported = matches!(
-                    narrow.hot[slot.index()].verdict,
-                    Verdict::Near | Verdict::Colliding
-                );
-                !reported || narrow.fresh(slot, wanted.contacts)
-            },
-        };
-        self.refresh = self.spend_on(work, &pass, meter, |narrow, slot, meter| {
-            let done = (pass.idle)(narrow, slot) || narrow.work(slot, goal, world, meter);
-            narrow.memos[slot.index()].refreshing = !done;
-            done
-        });
-        self.refresh.is_empty()
-    }
-
-    /// When somebody begins to listen, pairs at rest owe them what was left out before.
-    fn follow_demand(&mut self, wanted: Wanted) {
-        let more =
-            (wanted.contacts && !self.contacts_wanted) || (wanted.bounds && !self.bounds_wanted);
-        self.contacts_wanted = wanted.contacts;
-        self.bounds_wanted = wanted.bounds;
-        if !more {
-            return;
-        }
-        for at in 0..self.active.len() {
-            let slot = self.active[at];
-            let memo = &mut self.memos[slot.index()];
-            if !memo.refreshing {
-                memo.refreshing = true;
-                self.refresh.push(slot);
-            }
-        }
-    }
-
-    /// Whether a reported pair's bounds (and contacts) belong to this tick's poses.
-    fn fresh(&self, slot: PairSlot, contacts: bool) -> bool {
-        let memo = &self.memos[slot.index()];
-        let colliding = self.hot[slot.index()].verdict == Verdict::Colliding;
-        let bounds = memo.tight && (memo.tested == self.tick || memo.rest);
-        bounds && (!contacts || !colliding || memo.contacts_tick >= memo.tested)
-    }
-
     /// One turn of work on a pair; whether nothing is left to do for `goal`. Where a query would take longer than what
     /// is left, the meter closes.
-    fn work(&mut self, slot: PairSlot, goal: Goal, world: &World, meter: &mut Meter<'_>) -> bool {
+    pub(super) fn work(
+        &mut self,
+        slot: PairSlot,
+        goal: Goal,
+        world: &World,
+        meter: &mut Meter<'_>,
+    ) -> bool {
         let hot = self.hot[slot.index()];
         let (Some(a), Some(b)) = (world.body(hot.a), world.body(hot.b)) else {
             return true;
@@ -154,8 +97,11 @@ impl Narrow {
             self.retest_witness(slot, (a, b));
             meter.charge_dear(1);
             open = true;
+        } else if let ([one], [other]) = (&*a.shapes, &*b.shapes) {
+            let turn = self.turn_cursor(slot, (a, b), (one, other), goal, meter);
+            open = turn == Turn::Open;
         } else {
-            open = self.turn_cursor(slot, (a, b), goal, meter) == Turn::Open;
+            open = self.turn_compound(slot, (a, b), goal, meter);
         }
         self.widen_pair(slot, world);
         let memo = &self.memos[slot.index()];
@@ -218,35 +164,35 @@ impl Narrow {
         }
     }
 
-    /// One turn of a pair that takes several: resumed where it stopped, or started at this tick's poses.
+    /// One turn of a mesh and a half-space: resumed where it stopped, or started at this tick's poses.
     fn turn_cursor(
         &mut self,
         slot: PairSlot,
         (a, b): (&Body, &Body),
+        shapes: (&PlacedShape, &PlacedShape),
         goal: Goal,
         meter: &mut Meter<'_>,
     ) -> Turn {
         let memo = &mut self.memos[slot.index()];
         let fresh = memo.cursor == NONE;
         if fresh {
-            memo.cursor = self.cursors.take(Cursor::default);
+            memo.cursor = self.shelves.cursors.take(Cursor::default);
         }
-        let Some(cursor) = self.cursors.get_mut(memo.cursor) else {
+        let Some(cursor) = self.shelves.cursors.get_mut(memo.cursor) else {
             return Turn::Finished;
         };
         if fresh || (cursor.goal == Goal::Verdict && goal != Goal::Verdict) {
             let credit_m = a.motion.credit_m() + b.motion.credit_m();
             let rel = relative(&a.pose, &b.pose);
-            cursor.start((rel, bent(a, b)), credit_m, self.tick, goal);
+            cursor.start((0, 0), (rel, bent(a, b)), credit_m, self.tick, goal);
         }
         let mut room = Room {
             search: self.search,
-            fronts: &mut self.front_store,
-            contacts: &mut self.found_store,
-            found: &mut self.found,
+            fronts: &mut self.shelves.store,
+            contacts: &mut self.shelves.contacts,
         };
         let (report_m, counters) = (memo.report_m, &mut self.counters);
-        let turn = cursor.turn(&mut room, (a, b), report_m, meter, counters);
+        let turn = cursor.turn(&mut room, shapes, report_m, meter, counters);
         let certified = cursor.upper() <= 0.0 && memo.now.max > 0.0;
         if turn == Turn::Open && !certified {
             return Turn::Open;
@@ -274,11 +220,11 @@ impl Narrow {
         let contacts = cursor.goal == Goal::Contacts && turn == Turn::Finished;
         if contacts {
             self.found.clear();
-            (self.found).extend_from_slice(cursor.found(&self.found_store));
+            (self.found).extend_from_slice(cursor.found(&self.shelves.contacts));
         }
         if turn == Turn::Finished {
-            cursor.release(&mut self.front_store, &mut self.found_store);
-            self.cursors.give(&mut memo.cursor);
+            cursor.release(&mut self.shelves.store, &mut self.shelves.contacts);
+            self.shelves.cursors.give(&mut memo.cursor);
         }
         self.store(slot, &answer);
         if contacts {

@@ -14,7 +14,7 @@ use crate::wire::{
     Demand, FrameHeader, Inbox, Outbox, TickCause, TransformRow, VertexHeader, WIRE_VERSION,
     frame_flags, name_bytes, vertex_flags,
 };
-use crate::world::PlacedShape;
+use crate::world::Parts;
 
 /// The session that all frames of a report are of.
 const SESSION: u64 = 1;
@@ -60,11 +60,7 @@ impl Rig {
     ///
     /// # Errors
     /// `Error::Scene` when the scene holds more than its limits allow.
-    pub fn new(
-        scene: &Scene,
-        shapes: &[Arc<[PlacedShape]>],
-        clock: Arc<dyn Clock>,
-    ) -> Result<Self> {
+    pub fn new(scene: &Scene, shapes: &[Parts], clock: Arc<dyn Clock>) -> Result<Self> {
         let engine = Engine::new(scene, shapes.to_vec(), 1, Arc::clone(&clock))?;
         let deforming = scene.bodies.iter().zip(shapes).filter(|(b, _)| b.deforms);
         let vertices = deforming.filter_map(|(body, placed)| {

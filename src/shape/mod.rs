@@ -22,7 +22,7 @@ pub(crate) use load::find_mesh;
 pub use mesh::Mesh;
 pub(crate) use mesh::{
     Ball, Below, BoxId, Climb, Cone, Held, Inside, NODES_WAITING_MAX, NewTree, NoVertex, Node, Obb,
-    ObbPack, Trails, TreeJob, can_be_vertices, side,
+    ObbPack, ObbTree, Trails, TreeJob, can_be_vertices, side,
 };
 pub use spec::ShapeSpec;
 

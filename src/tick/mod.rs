@@ -31,7 +31,7 @@ use crate::wire::{
     BroadCause, BroadMode, Demand, MessageHeader, Outbox, Reason, RejectReason, Stage, State,
     TickRow, WIRE_VERSION,
 };
-use crate::world::{Admission, ChangeSet, PlacedShape, World};
+use crate::world::{Admission, ChangeSet, Parts, World};
 
 use end::End;
 use floor::{Began, Floor, Laps};
@@ -90,7 +90,7 @@ impl Engine {
     /// `Error::Scene` when the scene holds more than its limits allow.
     pub fn new(
         scene: &Scene,
-        shapes: Vec<Arc<[PlacedShape]>>,
+        shapes: Vec<Parts>,
         boot_id: u64,
         clock: Arc<dyn Clock>,
     ) -> Result<Self> {

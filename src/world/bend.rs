@@ -63,7 +63,7 @@ impl Body {
     pub(super) fn bending_shape(&mut self) -> Option<&mut Shape> {
         self.vertices.as_ref()?;
         // Somebody who measures the body at this moment holds it as it was.
-        let placed = Arc::make_mut(&mut self.shapes).first_mut()?;
+        let placed = self.shapes.only_mut()?;
         Some(Arc::make_mut(&mut placed.shape))
     }
 

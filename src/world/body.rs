@@ -1,24 +1,13 @@
 //! One body, its motion bound, and the changes of a tick.
 
-use std::sync::Arc;
-
 use crate::config::OnStale;
 use crate::ids::{BodyId, BodySlot, SourceSlot};
 use crate::math::{Aabb, Point, Pose, displacement};
-use crate::shape::Shape;
 use crate::wire::{BodyStatus, EndCause, RejectReason};
 
 use super::bend::Vertices;
+use super::parts::Parts;
 use super::path::Path;
-
-/// A shape at its place in a body.
-#[derive(Clone, Debug)]
-pub struct PlacedShape {
-    /// Shared geometry.
-    pub shape: Arc<Shape>,
-    /// Its pose in the body's frame.
-    pub pose: Pose,
-}
 
 /// A body as the engine sees it in this tick.
 #[derive(Clone, Debug)]
@@ -30,7 +19,7 @@ pub struct Body {
     /// Raised when a body of this name is put again; caches carry it.
     pub generation: u32,
     /// Its shapes.
-    pub shapes: Arc<[PlacedShape]>,
+    pub shapes: Parts,
     /// Whether frames may move it.
     pub moves: bool,
     /// Whether one of its shapes is a half-space: no box, no motion accumulators.

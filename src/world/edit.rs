@@ -6,10 +6,10 @@
 use std::sync::Arc;
 
 use super::World;
-use super::body::PlacedShape;
 use super::census::slot_at;
 use super::filters::{ENABLED, Hot, LIVE, MOVES, NO_GROUP, UNBOUNDED};
 use super::names::NameId;
+use super::parts::{Parts, PlacedShape};
 use super::place::{Entry, new_body};
 use crate::ids::{BodyId, BodySlot, SourceSlot};
 use crate::math::Pose;
@@ -24,7 +24,7 @@ pub enum Edit {
         /// What it is; id 0: the one its name had in this boot, or the least that is free.
         body: Arc<BodySpec>,
         /// Its built shapes, in the order of `body.shapes`.
-        shapes: Arc<[PlacedShape]>,
+        shapes: Parts,
     },
     /// Takes a body out.
     Remove {
@@ -164,7 +164,7 @@ impl World {
     }
 
     /// Puts a body, unless the very same is there.
-    fn put(&mut self, spec: &Arc<BodySpec>, shapes: &Arc<[PlacedShape]>) -> bool {
+    fn put(&mut self, spec: &Arc<BodySpec>, shapes: &Parts) -> bool {
         let known = self.names.find_name(&spec.name).and_then(|n| n.slot);
         if let Some(slot) = known {
             if self.is_same(slot, spec, shapes) {

@@ -5,9 +5,9 @@
 use std::collections::BTreeMap;
 
 use super::World;
-use super::body::PlacedShape;
 use super::edit::Edit;
 use super::edit_rules::is_rule_of;
+use super::parts::PlacedShape;
 use super::rules::sides_of;
 use crate::ids::BodyId;
 use crate::limits::{EXTENT_MAX_M, PRIORITY_MAX, PRIORITY_MIN, SHAPES_PER_BODY_MAX};

@@ -21,6 +21,7 @@ mod filters;
 mod gaze;
 mod lists;
 mod names;
+mod parts;
 mod path;
 mod place;
 mod rules;
@@ -35,10 +36,12 @@ use std::sync::Arc;
 pub use admit::Admission;
 pub use ahead::AHEAD;
 pub use bend::Vertices;
-pub use body::{Body, ChangeSet, Motion, PlacedShape, Removed};
+pub use body::{Body, ChangeSet, Motion, Removed};
 pub use edit::{Applied, Edit};
 pub use filters::{Because, Filters};
 pub use gaze::Gaze;
+pub(crate) use parts::PartTree;
+pub use parts::{Parts, PlacedShape};
 pub use path::{Leg, Path};
 pub use source::SourceState;
 pub use tag::Tag;
@@ -123,11 +126,7 @@ impl World {
     /// # Errors
     /// `Error::Scene` when the scene does not hold together: names or ids twice, a reference to nothing, shapes
     /// missing, too many bodies.
-    pub fn new(
-        scene: &Scene,
-        shapes: Vec<Arc<[PlacedShape]>>,
-        clock_now_boot_ns: u64,
-    ) -> Result<Self> {
+    pub fn new(scene: &Scene, shapes: Vec<Parts>, clock_now_boot_ns: u64) -> Result<Self> {
         if shapes.len() != scene.bodies.len() {
             let (given, wanted) = (shapes.len(), scene.bodies.len());
             return Err(Error::Scene(format!(

@@ -10,7 +10,7 @@
 use crate::limits::{LEG_TURNS_MAX, LEGS_MAX};
 use crate::math::{Aabb, Point, Pose, Quat, ROUND, Vec3};
 
-use super::body::PlacedShape;
+use super::parts::PlacedShape;
 use super::place::tight_box;
 
 /// A turn below this has no axis that could be told from rounding (32-bit senders: 1e-7), radians.

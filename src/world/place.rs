@@ -6,9 +6,10 @@ use std::sync::Arc;
 
 use super::World;
 use super::bend::Vertices;
-use super::body::{Body, Motion, PlacedShape};
+use super::body::{Body, Motion};
 use super::filters::{Hot, KEEPS};
 use super::names::NameId;
+use super::parts::{Parts, PlacedShape};
 use super::path::Path;
 use super::tag::Tag;
 use crate::config::OnStale;
@@ -285,11 +286,7 @@ fn cause_of(status: BodyStatus) -> EndCause {
 }
 
 /// A body at rest at its start pose, from what the scene says of it.
-pub(super) fn new_body(
-    spec: &BodySpec,
-    shapes: Arc<[PlacedShape]>,
-    generation: u32,
-) -> (Body, Aabb) {
+pub(super) fn new_body(spec: &BodySpec, shapes: Parts, generation: u32) -> (Body, Aabb) {
     let unbounded = shapes
         .iter()
         .any(|s| matches!(s.shape.geometry, Geometry::HalfSpace { .. }));

@@ -23,7 +23,7 @@ use sweepd::wire::{
     Demand, FrameHeader, Inbox, Outbox, TickCause, TransformRow, VertexHeader, WIRE_VERSION,
     frame_flags, name_bytes, vertex_flags,
 };
-use sweepd::world::{Body, PlacedShape};
+use sweepd::world::{Body, Parts};
 
 /// Nanoseconds between two frames.
 pub const FRAME_NS: u64 = 10_000_000;
@@ -244,7 +244,7 @@ impl Drive {
 }
 
 /// Bodies that deform, with their vertices as the scene has them.
-fn bending(scene: &Scene, shapes: &[Arc<[PlacedShape]>]) -> Vec<(u64, Vec<[f32; 3]>)> {
+fn bending(scene: &Scene, shapes: &[Parts]) -> Vec<(u64, Vec<[f32; 3]>)> {
     let bodies = scene.bodies.iter().zip(shapes);
     let bent = bodies.filter(|(body, _)| body.deforms);
     bent.map(|(body, placed)| {

@@ -16,7 +16,7 @@ fn put(bodies: &[String]) -> Edit {
     let shapes = sweepd::daemon::build_shapes(&scene).unwrap().bodies;
     Edit::Put {
         body: Arc::new(scene.bodies.last().unwrap().clone()),
-        shapes: Arc::clone(shapes.last().unwrap()),
+        shapes: shapes.last().unwrap().clone(),
     }
 }
 

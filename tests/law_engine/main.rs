@@ -16,6 +16,7 @@ mod oracle;
 
 mod ask;
 mod deadline;
+mod degrade;
 mod edits;
 mod events;
 mod limits;

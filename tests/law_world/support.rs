@@ -12,7 +12,7 @@ use sweepd::shape::{Geometry, Mesh, Shape, ShapeSpec};
 use sweepd::wire::{
     BodyStatus, EndCause, Frame, RejectReason, TransformRow, WIRE_VERSION, frame_flags, name_bytes,
 };
-use sweepd::world::{Admission, Body, Edit, PlacedShape, World};
+use sweepd::world::{Admission, Body, Edit, Parts, PlacedShape, World};
 
 pub(crate) const MS: u64 = 1_000_000;
 /// The time-out of every source here.
@@ -21,7 +21,7 @@ pub(crate) const TIMEOUT_NS: u64 = 500 * MS;
 pub(crate) const START_NS: u64 = 10_000 * MS;
 
 /// A cube of 1 m, centred.
-pub(crate) fn cube() -> Arc<[PlacedShape]> {
+pub(crate) fn cube() -> Parts {
     let corner = |k: usize| {
         let at = |bit: usize| if k & bit == 0 { -0.5 } else { 0.5 };
         Point::new(at(1), at(2), at(4))
@@ -47,14 +47,14 @@ pub(crate) fn cube() -> Arc<[PlacedShape]> {
         radius: mesh.radius(),
         geometry: Geometry::Mesh(mesh),
     };
-    Arc::from([PlacedShape {
+    Parts::from([PlacedShape {
         shape: Arc::new(shape),
         pose: Pose::identity(),
     }])
 }
 
 /// A half-space.
-pub(crate) fn floor() -> Arc<[PlacedShape]> {
+pub(crate) fn floor() -> Parts {
     let everywhere = Point::new(f64::INFINITY, f64::INFINITY, f64::INFINITY);
     let shape = Shape {
         aabb: sweepd::math::Aabb {
@@ -68,7 +68,7 @@ pub(crate) fn floor() -> Arc<[PlacedShape]> {
             offset: 0.0,
         },
     };
-    Arc::from([PlacedShape {
+    Parts::from([PlacedShape {
         shape: Arc::new(shape),
         pose: Pose::identity(),
     }])

@@ -90,3 +90,31 @@ fn long_walks_are_cut_off_and_gone_on_with() {
         assert!(other * 10 <= pieces.points.len(), "{shift}: {other}");
     }
 }
+
+#[test]
+fn bug_walks_of_another_pair_were_gone_on_with_when_less_was_asked_for_than_contacts() {
+    let large = shape(&meshes::bumpy_sphere(40, 50, 0.1), None);
+    let small = shape(&meshes::bumpy_sphere(5, 6, 0.1), None);
+    let pos12 = Pose::translation(0.4, 0.1, 0.2);
+    let clock = ManualClock::new(0);
+    let mut store = FrontStore::default();
+    let mut fronts = [CarriedFront::default(), CarriedFront::default()];
+    let meshes = [&small, &large];
+    for (front, mesh) in fronts.iter_mut().zip(meshes) {
+        front.start(&mut store, mesh, mesh, &pos12, Search::Carried);
+    }
+    // Their contacts by turns, cut off all the time; now and then no more than the gap.
+    for turn in 0..40_000 {
+        let (front, mesh) = (&mut fronts[turn % 2], meshes[turn % 2]);
+        let goal = [Goal::Contacts, Goal::Gap, Goal::Verdict][turn / 2 % 3];
+        let mut meter = Meter::new(&clock, None, Some(1));
+        front.advance(&mut store, mesh, mesh, goal, 1, &mut meter);
+    }
+    for (front, mesh) in fronts.iter_mut().zip(meshes) {
+        let mut meter = Meter::unlimited(&clock);
+        assert!(front.advance(&mut store, mesh, mesh, Goal::Contacts, u64::MAX, &mut meter));
+        let cut: Vec<_> = front.contacts(&store).to_vec();
+        let whole = contacts(mesh, mesh, &pos12, 0);
+        assert!(!cut.is_empty() && cut.len() >= whole.points.len() / 2);
+    }
+}

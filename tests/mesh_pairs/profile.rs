@@ -17,7 +17,7 @@ use sweepd::scene::{BodySpec, PlacedSpec, Scene, SourceSpec};
 use sweepd::shape::{Shape, ShapeSpec};
 use sweepd::time::{Budget, Clock, ManualClock, Meter};
 use sweepd::wire::{PairRow, Verdict, pair_flags};
-use sweepd::world::PlacedShape;
+use sweepd::world::{Parts, PlacedShape};
 
 const SEED: u64 = 40_000_000;
 /// Pairs of the profile: so many that what the hard ones cost leaves no factor of two out, for in such a gap twice the
@@ -168,9 +168,9 @@ impl Stage {
             bodies: ids.map(|id| body(id, report_m)).collect(),
             ..Scene::default()
         };
-        let placed = |kind: usize| -> Arc<[PlacedShape]> {
+        let placed = |kind: usize| -> Parts {
             let (shape, pose) = (Arc::clone(&shapes[kind]), Pose::identity());
-            Arc::from(vec![PlacedShape { shape, pose }])
+            Parts::from([PlacedShape { shape, pose }])
         };
         let kinds = courses.iter().flat_map(|course| course.kinds);
         let placed: Vec<_> = kinds.map(placed).collect();

@@ -4,11 +4,12 @@ use crate::ids::PairSlot;
 use crate::limits::REGION_SHAPE_PAIRS_MAX;
 use crate::math::{Pose, ROUND, Vec3, relative};
 use crate::narrow::Narrow;
+use crate::narrow::compound::PairWalk;
 use crate::narrow::contacts::Contact;
 use crate::narrow::mesh::{CarriedFront, PlaneScan, Scan, behind};
 use crate::narrow::query::{shape_pose, sphere_bound};
 use crate::shape::{Cone, Geometry, Mesh, Obb, Shape};
-use crate::world::PlacedShape;
+use crate::world::{Body, PlacedShape};
 
 use super::gather::{SPOTS_MAX, push};
 use super::pace::Pace;
@@ -18,6 +19,8 @@ use super::{Approx, FOUND_MAX, Standing, boxes};
 /// Spots smaller than this share of the smaller body's radius are not split: they are no larger than what a sphere
 /// round a few of them is too large by.
 const ENOUGH: f64 = 0.02;
+/// Looks at boxes that are above the shapes, for each pair of shapes that may be looked at.
+const LOOKS_PER_SHAPE_PAIR: usize = 4;
 
 /// A pair of shapes at this tick's poses.
 struct Pair<'a> {
@@ -42,29 +45,25 @@ impl Narrow {
     ) {
         let Standing { a, b, complete, .. } = *of;
         let rel = relative(&a.pose, &b.pose);
-        if a.shapes.len() * b.shapes.len() > REGION_SHAPE_PAIRS_MAX {
+        if find_near((a, b), &rel, pace, approx) {
+            for at in 0..approx.near.len() {
+                let places = approx.near[at];
+                let one = &a.shapes[places.0 as usize];
+                let other = &b.shapes[places.1 as usize];
+                let size = rel.translation.vector.norm() + reach(one) + reach(other);
+                let pair = Pair {
+                    one,
+                    other,
+                    pos12: shape_pose(one, other, &rel),
+                    slop_m: 32.0 * ROUND * size,
+                    complete,
+                };
+                let front = self.front_at(slot, places);
+                self.collect_shapes(&pair, front, a.radius.min(b.radius), pace, approx);
+            }
+        } else {
             approx.clipped = true;
             push(&mut approx.all, boxes(a, b));
-        } else {
-            let mut place = 0;
-            for one in a.shapes.iter() {
-                for other in b.shapes.iter() {
-                    let front = self.front_at(slot, place);
-                    place += 1;
-                    if sphere_bound(one, other, &rel) > 0.0 {
-                        continue;
-                    }
-                    let size = rel.translation.vector.norm() + reach(one) + reach(other);
-                    let pair = Pair {
-                        one,
-                        other,
-                        pos12: shape_pose(one, other, &rel),
-                        slop_m: 32.0 * ROUND * size,
-                        complete,
-                    };
-                    self.collect_shapes(&pair, front, a.radius.min(b.radius), pace, approx);
-                }
-            }
         }
         if complete {
             for contact in self.contacts(slot).0 {
@@ -73,12 +72,14 @@ impl Narrow {
         }
     }
 
-    /// The front of the `place`th pair of shapes: that of a pair of single shapes, or the one under way.
-    fn front_at(&self, slot: PairSlot, place: usize) -> Option<&CarriedFront> {
+    /// The front of a pair of shapes by their places; one that was never started knows nothing.
+    fn front_at(&self, slot: PairSlot, places: (u32, u32)) -> Option<&CarriedFront> {
         let memo = self.memos.get(slot.index())?;
-        let resumed = self.cursors.get(memo.cursor);
-        let under_way = resumed.and_then(|cursor| cursor.front_of(place));
-        under_way.or_else(|| self.front_of(slot))
+        if let Some(compound) = self.compounds.get(memo.compound) {
+            return compound.front_of(&self.shelves, places);
+        }
+        let front = self.shelves.fronts.get(memo.front)?;
+        front.is_started().then_some(front)
     }
 
     fn collect_shapes(
@@ -124,10 +125,11 @@ impl Narrow {
     ) {
         approx.raw.clear();
         let (mut many, mut full) = (0, false);
-        let known = front.filter(|front| scan.unproved(front, &self.front_store, |_, _| many += 1));
+        let known =
+            front.filter(|front| scan.unproved(front, &self.shelves.store, |_, _| many += 1));
         let looked_at = known.filter(|_| pace.allows(many));
         if let Some(front) = looked_at {
-            scan.unproved(front, &self.front_store, |a, b| {
+            scan.unproved(front, &self.shelves.store, |a, b| {
                 let spot = pace.look().then(|| scan.spot(a, b)).flatten();
                 let Some(spot) = spot else { return };
                 if approx.raw.len() == SPOTS_MAX {
@@ -144,7 +146,7 @@ impl Narrow {
             approx.raw.extend(scan.whole());
         }
         for front in front.into_iter().filter(|_| !pair.complete) {
-            for leaf in front.found_at(&self.front_store, &pair.pos12) {
+            for leaf in front.found_at(&self.shelves.store, &pair.pos12) {
                 let c = &leaf.closest;
                 if approx.found.len() < FOUND_MAX {
                     let spot = Spot::found(&c.point_a, &c.point_b, c.normal, -c.best_m);
@@ -183,6 +185,34 @@ impl Narrow {
         raw.extend(heap.drain());
         pair.flush(scan, approx);
     }
+}
+
+/// Lists the pairs of shapes whose boxes and balls may touch; false: there are too many, or no more looks.
+fn find_near(
+    (a, b): (&Body, &Body),
+    rel: &Pose,
+    pace: &mut Pace<'_, '_>,
+    approx: &mut Approx,
+) -> bool {
+    let Approx { waiting, near, .. } = approx;
+    near.clear();
+    let mut walk = PairWalk::new((a, b), rel, waiting);
+    let (mut looks, mut whole) = (0, true);
+    let mut look = || {
+        looks += 1;
+        whole = pace.look() && looks <= LOOKS_PER_SHAPE_PAIR * REGION_SHAPE_PAIRS_MAX;
+        whole
+    };
+    while let Some((i, j)) = walk.next(&mut look, |low| low <= 0.0) {
+        if sphere_bound(&a.shapes[i as usize], &b.shapes[j as usize], rel) > 0.0 {
+            continue;
+        }
+        if near.len() == REGION_SHAPE_PAIRS_MAX {
+            return false;
+        }
+        near.push((i, j));
+    }
+    whole
 }
 
 impl Pair<'_> {

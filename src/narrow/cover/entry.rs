@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 
 pub use crate::config::MeshSearch as Search;
 use crate::narrow::arena::{Arena, Linked, Run};
-use crate::shape::BoxId;
+use crate::shape::{BoxId, Held};
 
 /// A box of one side against boxes of one pack of the other side, all proved apart.
 ///
@@ -36,6 +36,37 @@ impl Group {
             mask: 1 << b.lane(),
             pack_is_b: true,
             leaf: true,
+        }
+    }
+
+    /// The box that stays and the pack that takes the other's place, of two of which at least one is no leaf: the
+    /// larger is parted, so that both shrink alike. Its mask is yet to be set.
+    pub(in crate::narrow) fn parting(
+        (id_a, held_a): (BoxId, Held),
+        (id_b, held_b): (BoxId, Held),
+        b_is_larger: impl FnOnce() -> bool,
+    ) -> Self {
+        let pack_is_b = match (held_a, held_b) {
+            (Held::Pack(_), Held::Pack(_)) => b_is_larger(),
+            (held_a, _) => matches!(held_a, Held::Triangle(_)),
+        };
+        let (one, parted) = if pack_is_b {
+            (id_a, held_b)
+        } else {
+            (id_b, held_a)
+        };
+        let pack = match parted {
+            Held::Pack(pack) => pack,
+            // Not reached: of two leaves none is parted.
+            Held::Triangle(_) => 0,
+        };
+        Self {
+            expiry_m: f64::NEG_INFINITY,
+            one,
+            pack,
+            mask: 0,
+            pack_is_b,
+            leaf: false,
         }
     }
 

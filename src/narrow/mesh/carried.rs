@@ -5,7 +5,8 @@
 //! A. Out: a sound interval of their gap at the pose it works at, a witness, contacts. Stops after any unit, and goes
 //! on at the same pose or at another.
 //!
-//! Every pair of leaves is covered by exactly one entry at any time (see `cover`; [`CarriedFront::covered`] counts them).
+//! Every pair of leaves is covered by exactly one entry at any time (see `cover`; [`CarriedFront::covered`] counts
+//! them).
 //!
 //! The path `S` runs over anchors (poses), and `d` is the displacement from the newest: what is apart by `g` now holds
 //! while `S + d < g + S - d` (DESIGN 4.6; here of the relative pose, so two that move together do not move). An anchor
@@ -223,7 +224,8 @@ impl CarriedFront {
             // A verdict ends at the first that touches: there are few.
             self.cover.ask_touching_again(&mut store.entries);
         }
-        if goal == Goal::Contacts {
+        if self.known.points_wanted {
+            // Also for less than contacts: their search, cut off before, goes on with it at this pose.
             self.known.walks = Some(store.walks.resume(self.known.walks));
         }
         let end = meter.spent().saturating_add(slice_units);
@@ -261,8 +263,8 @@ impl CarriedFront {
         let (Some(side_a), Some(side_b)) = (Side::of(a), Side::of(b)) else {
             return;
         };
-        self.cover
-            .start(&mut store.entries, &self.at.pos12, self.search);
+        let (from, roots) = ((&self.at.pos12, self.search), [(BoxId::ROOT, BoxId::ROOT)]);
+        (self.cover).start(&mut store.entries, from, roots.into_iter());
         self.contacts.clear();
         (self.fresh_len, self.steps) = (0, 0);
         self.known = Known::default();

@@ -9,15 +9,15 @@ use crate::simd::obb::{GAP_ROUND, LANES, One, gaps};
 
 /// A relative pose as matrix and vector.
 #[derive(Clone, Debug)]
-pub(super) struct Placed {
-    pub(super) pos12: Pose,
+pub(in crate::narrow) struct Placed {
+    pub(in crate::narrow) pos12: Pose,
     /// Rotation of B's frame seen from A.
-    pub(super) rotation: Matrix3<f64>,
-    translation: Vec3,
+    pub(in crate::narrow) rotation: Matrix3<f64>,
+    pub(in crate::narrow) translation: Vec3,
     /// Bound on the rounding of any distance computed between the two, metres.
-    pub(super) slop: f64,
+    pub(in crate::narrow) slop: f64,
     /// How far what is in boxes may be outside of them, both sides together, metres: of meshes that deform.
-    pub(super) lag_m: f64,
+    pub(in crate::narrow) lag_m: f64,
 }
 
 impl Default for Placed {
@@ -34,7 +34,7 @@ impl Default for Placed {
 
 impl Placed {
     /// * `reach_a`, `reach_b` - greatest distance of a vertex from the local origin, metres.
-    pub(super) fn new(pos12: &Pose, reach_a: f64, reach_b: f64) -> Self {
+    pub(in crate::narrow) fn new(pos12: &Pose, reach_a: f64, reach_b: f64) -> Self {
         let translation = pos12.translation.vector;
         Self {
             pos12: *pos12,
@@ -54,17 +54,17 @@ impl Placed {
     }
 
     /// A point of B's frame in A's.
-    pub(super) fn to_a(&self, point: &Point) -> Point {
+    pub(in crate::narrow) fn to_a(&self, point: &Point) -> Point {
         Point::from(self.rotation * point.coords + self.translation)
     }
 
     /// A point of A's frame in B's.
-    pub(super) fn to_b(&self, point: &Point) -> Point {
+    pub(in crate::narrow) fn to_b(&self, point: &Point) -> Point {
         Point::from(self.rotation.tr_mul(&(point.coords - self.translation)))
     }
 
     /// A direction of A's frame in B's.
-    pub(super) fn turn_to_b(&self, direction: &Vec3) -> Vec3 {
+    pub(in crate::narrow) fn turn_to_b(&self, direction: &Vec3) -> Vec3 {
         self.rotation.tr_mul(direction)
     }
 
@@ -72,7 +72,12 @@ impl Placed {
     /// they may touch, and then of no meaning but for an order. Lanes without a box yield anything.
     ///
     /// * `pack_is_b` - the pack is of B and `one` of A, else the other way round.
-    pub(super) fn gaps(&self, one: &Obb, pack: &ObbPack, pack_is_b: bool) -> [f64; LANES] {
+    pub(in crate::narrow) fn gaps(
+        &self,
+        one: &Obb,
+        pack: &ObbPack,
+        pack_is_b: bool,
+    ) -> [f64; LANES] {
         let (centre, axes) = if pack_is_b {
             (self.to_b(&one.centre), self.rotation.tr_mul(&one.axes))
         } else {

@@ -171,11 +171,6 @@ impl MeshQuery {
         found.chain(within.map(|point| (point, 0)))
     }
 
-    /// The front of a pair of surfaces.
-    pub(in crate::narrow) fn front(&self) -> Option<&CarriedFront> {
-        (self.kind == Kind::Surfaces).then_some(&self.front)
-    }
-
     /// Forgets everything and gives its memory back.
     pub fn release(&mut self, store: &mut FrontStore) {
         self.kind = Kind::Idle;

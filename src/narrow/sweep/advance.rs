@@ -13,6 +13,7 @@
 
 use crate::math::{Interval, Pose, ROUND, Vec3};
 use crate::narrow::Counters;
+use crate::narrow::compound::{PairWalk, Waiting};
 use crate::narrow::exact::Warm;
 use crate::narrow::mesh::{FrontStore, Goal, MeshQuery};
 use crate::narrow::query::{is_simple, shape_gap, shape_pose, sound, sphere_bound};
@@ -20,7 +21,7 @@ use crate::shape::Geometry;
 use crate::time::Meter;
 use crate::world::{Body, PlacedShape};
 
-use super::motion::{Moment, Span};
+use super::motion::{Moment, Span, arm, balls, reach_of, time_of};
 
 /// Balls are good enough while they are apart by this share of the smaller one's radius: then a query would gain
 /// little.
@@ -49,6 +50,7 @@ pub(super) enum Ahead {
 pub(super) struct Tools {
     fronts: FrontStore,
     meshes: MeshQuery,
+    waiting: Waiting,
 }
 
 /// Where work is done.
@@ -70,22 +72,42 @@ impl Work<'_, '_> {
         warm: &mut Warm,
     ) -> Ahead {
         let (mut least, mut nearest_m, mut unsure) = (wanted, f64::INFINITY, false);
-        for one in a.shapes.iter() {
-            for other in b.shapes.iter() {
-                if !self.meter.open() {
-                    return Ahead::Cut;
-                }
-                match self.shapes((one, other), moment, least, warm) {
-                    Ahead::Free { time, gap_m } => {
-                        if time < least || gap_m < nearest_m {
-                            nearest_m = gap_m;
-                        }
-                        least = least.min(time);
+        // What is in two boxes comes nearer no faster than any point of the two bodies.
+        let speed = moment.speed(reach_of(a), reach_of(b));
+        let mut waiting = std::mem::take(&mut self.tools.waiting);
+        let mut walk = PairWalk::new((a, b), &moment.rel, &mut waiting);
+        let (mut end, mut refused) = (None, false);
+        let soon = |low_m: f64, least: f64| low_m <= 0.0 || low_m / speed < least;
+        loop {
+            let test = || {
+                refused = !self.meter.open();
+                self.meter.charge(u64::from(!refused));
+                !refused
+            };
+            let next = walk.next(test, |low_m| soon(low_m - moment.slop, least));
+            if refused || (next.is_some() && !self.meter.open()) {
+                end = Some(Ahead::Cut);
+                break;
+            }
+            let Some((i, j)) = next else { break };
+            let pair = (&a.shapes[i as usize], &b.shapes[j as usize]);
+            match self.shapes(pair, moment, least, warm) {
+                Ahead::Free { time, gap_m } => {
+                    if time < least || gap_m < nearest_m {
+                        nearest_m = gap_m;
                     }
-                    Ahead::Unsure => unsure = true,
-                    end => return end,
+                    least = least.min(time);
+                }
+                Ahead::Unsure => unsure = true,
+                touches_or_cut => {
+                    end = Some(touches_or_cut);
+                    break;
                 }
             }
+        }
+        self.tools.waiting = waiting;
+        if let Some(end) = end {
+            return end;
         }
         if unsure {
             return Ahead::Unsure;
@@ -148,7 +170,7 @@ impl Work<'_, '_> {
     ) -> Ahead {
         let speed = moment.speed(arm(one, &moment.a).1, arm(other, &moment.b).1);
         let shapes = (&*one.shape, &*other.shape);
-        let Tools { fronts, meshes } = &mut *self.tools;
+        let Tools { fronts, meshes, .. } = &mut *self.tools;
         meshes.start(fronts, shapes.0, shapes.1, pos12);
         self.counters.slices += 1;
         loop {
@@ -181,7 +203,7 @@ impl Work<'_, '_> {
 
     /// Gives memory back.
     pub(super) fn release(&mut self) {
-        let Tools { fronts, meshes } = &mut *self.tools;
+        let Tools { fronts, meshes, .. } = &mut *self.tools;
         meshes.release(fronts);
     }
 }
@@ -198,42 +220,6 @@ fn touch(gap: Interval, finished: bool) -> Ahead {
 
 fn widened(gap: Interval, slop: f64) -> Interval {
     if slop == 0.0 { gap } else { gap.widened(slop) }
-}
-
-/// Distance of a shape's centre from the pivot, and of its farthest point.
-fn arm(placed: &PlacedShape, span: &Span) -> (f64, f64) {
-    let arm = (placed.pose * placed.shape.centre - span.pivot).norm();
-    let arm = arm * (1.0 + 8.0 * ROUND) + 8.0 * ROUND * span.pivot.coords.amax();
-    (arm, arm + placed.shape.radius)
-}
-
-/// For how long two balls stay apart: along the line between their centres now.
-fn balls(one: &PlacedShape, other: &PlacedShape, moment: &Moment, bound_m: f64) -> f64 {
-    let (from, to) = (
-        moment.a.pose * (one.pose * one.shape.centre),
-        moment.b.pose * (other.pose * other.shape.centre),
-    );
-    let direction = (to - from).try_normalize(0.0).unwrap_or_else(Vec3::z);
-    // The farther apart, the better is the line known; what rounding may turn it by costs as much of the speed.
-    let velocity = moment.closing_velocity();
-    let turned = moment.a.swing(arm(one, &moment.a).0) + moment.b.swing(arm(other, &moment.b).0);
-    let off = 16.0 * ROUND * (velocity.amax() + turned);
-    let closing = -velocity.dot(&direction) + turned + off;
-    // A slab between two balls along one direction: as wide as they are apart.
-    let slack = 32.0
-        * ROUND
-        * (from.coords.amax() + to.coords.amax() + one.shape.radius + other.shape.radius);
-    time_of(bound_m - slack, closing)
-}
-
-fn time_of(gap_m: f64, closing: f64) -> f64 {
-    if gap_m <= 0.0 {
-        0.0
-    } else if closing <= 0.0 {
-        f64::INFINITY
-    } else {
-        gap_m / closing
-    }
 }
 
 /// The slab between two convex shapes that are apart: along a fixed direction, everything of A lies below it,

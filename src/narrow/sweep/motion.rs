@@ -4,7 +4,7 @@
 //! where this tick has it, all the way; of one that jumps nothing is asked meanwhile.
 
 use crate::math::{Point, Pose, ROUND, Vec3, relative};
-use crate::world::{Body, Leg, Path};
+use crate::world::{Body, Leg, Path, PlacedShape};
 
 /// A body's motion for a while, per unit of the share: the pivot goes straight, the body turns about a fixed axis.
 #[derive(Clone, Copy, Debug)]
@@ -163,4 +163,40 @@ impl Moment {
 /// How far a body's surface is from its pivot.
 pub(super) fn reach_of(body: &Body) -> f64 {
     way(body).map_or(body.radius, Path::reach)
+}
+
+/// Distance of a shape's centre from the pivot, and of its farthest point.
+pub(super) fn arm(placed: &PlacedShape, span: &Span) -> (f64, f64) {
+    let arm = (placed.pose * placed.shape.centre - span.pivot).norm();
+    let arm = arm * (1.0 + 8.0 * ROUND) + 8.0 * ROUND * span.pivot.coords.amax();
+    (arm, arm + placed.shape.radius)
+}
+
+/// For how long two balls stay apart: along the line between their centres now.
+pub(super) fn balls(one: &PlacedShape, other: &PlacedShape, moment: &Moment, bound_m: f64) -> f64 {
+    let (from, to) = (
+        moment.a.pose * (one.pose * one.shape.centre),
+        moment.b.pose * (other.pose * other.shape.centre),
+    );
+    let direction = (to - from).try_normalize(0.0).unwrap_or_else(Vec3::z);
+    // The farther apart, the better is the line known; what rounding may turn it by costs as much of the speed.
+    let velocity = moment.closing_velocity();
+    let turned = moment.a.swing(arm(one, &moment.a).0) + moment.b.swing(arm(other, &moment.b).0);
+    let off = 16.0 * ROUND * (velocity.amax() + turned);
+    let closing = -velocity.dot(&direction) + turned + off;
+    // A slab between two balls along one direction: as wide as they are apart.
+    let slack = 32.0
+        * ROUND
+        * (from.coords.amax() + to.coords.amax() + one.shape.radius + other.shape.radius);
+    time_of(bound_m - slack, closing)
+}
+
+pub(super) fn time_of(gap_m: f64, closing: f64) -> f64 {
+    if gap_m <= 0.0 {
+        0.0
+    } else if closing <= 0.0 {
+        f64::INFINITY
+    } else {
+        gap_m / closing
+    }
 }

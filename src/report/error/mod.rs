@@ -23,7 +23,7 @@ use crate::builtin::Pattern;
 use crate::error::Result;
 use crate::scene::Scene;
 use crate::time::{Budget, Clock, SystemClock};
-use crate::world::PlacedShape;
+use crate::world::Parts;
 
 use course::Course;
 use lane::{Lane, Twin};
@@ -55,7 +55,7 @@ pub struct Setup<'a> {
     /// The scene.
     pub scene: &'a Scene,
     /// Its built shapes, in its order.
-    pub shapes: &'a [Arc<[PlacedShape]>],
+    pub shapes: &'a [Parts],
     /// How bodies move.
     pub motion: Pattern,
     /// Frames a second.
@@ -178,8 +178,8 @@ pub fn run(
 }
 
 /// Median diameter of the bodies that have one, metres.
-fn size_m(shapes: &[Arc<[PlacedShape]>]) -> f64 {
-    let of = |placed: &Arc<[PlacedShape]>| {
+fn size_m(shapes: &[Parts]) -> f64 {
+    let of = |placed: &Parts| {
         let boxes = placed.iter().map(|p| p.shape.aabb_at(&p.pose));
         let whole = boxes.reduce(|a, b| a.merged(&b))?;
         let size = 2.0 * whole.half_extents().norm();

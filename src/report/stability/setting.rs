@@ -1,7 +1,5 @@
 //! The scene that a case is played in. In: a [`Case`]. Out: what an engine is made of.
 
-use std::sync::Arc;
-
 use super::stage::{Actor, Asked, Case, Pos};
 use super::truth::Truth;
 use crate::error::Result;
@@ -10,7 +8,7 @@ use crate::math::Pose;
 use crate::scene::{BodySpec, PlacedSpec, Scene, SourceSpec};
 use crate::shape::{Library, ShapeSpec};
 use crate::wire::TransformRow;
-use crate::world::PlacedShape;
+use crate::world::{Parts, PlacedShape};
 
 /// How far bodies are told apart: well beyond every gap that is asked, so that each of them has a row.
 pub(super) fn reach_of(scene: &Scene, (i, j): (usize, usize)) -> f64 {
@@ -58,7 +56,7 @@ fn body(id: u64, actor: &Actor, report_within_m: f64) -> BodySpec {
 }
 
 /// The shapes of its bodies.
-pub(super) fn shapes(scene: &Scene) -> Result<Vec<Arc<[PlacedShape]>>> {
+pub(super) fn shapes(scene: &Scene) -> Result<Vec<Parts>> {
     let built = scene.build_shapes(&mut Library::new(), |_, _| {})?;
     let placed = scene.bodies.iter().zip(built.shapes).map(|(body, shapes)| {
         let parts = body.shapes.iter().zip(shapes);

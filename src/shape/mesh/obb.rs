@@ -9,6 +9,7 @@
 
 use nalgebra::Matrix3;
 
+mod boxes;
 mod fit;
 
 use fit::{Fitted, fit};
@@ -63,7 +64,7 @@ pub(crate) struct ObbPack {
 /// What a box holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Held {
-    /// One triangle, by its place in the mesh.
+    /// One triangle, by its place in the mesh; of a tree over the shapes of a body one shape.
     Triangle(u32),
     /// The boxes of a pack.
     Pack(u32),

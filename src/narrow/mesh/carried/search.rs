@@ -102,30 +102,12 @@ impl CarriedFront {
         (id_b, held_b): (BoxId, Held),
         (a, b): (Side<'_>, Side<'_>),
     ) -> Group {
-        let part_b = match (held_a, held_b) {
-            (Held::Pack(_), Held::Pack(_)) => {
-                b.size(id_b, &self.whole[1]) > a.size(id_a, &self.whole[0])
-            }
-            (held_a, _) => matches!(held_a, Held::Triangle(_)),
-        };
-        let (one, parted, side) = if part_b {
-            (id_a, held_b, b)
-        } else {
-            (id_b, held_a, a)
-        };
-        let pack = match parted {
-            Held::Pack(pack) => pack,
-            // Not reached: of two leaves none is parted.
-            Held::Triangle(_) => 0,
-        };
-        Group {
-            expiry_m: f64::NEG_INFINITY,
-            one,
-            pack,
-            mask: side.pack(pack).map_or(0, |p| p.mask),
-            pack_is_b: part_b,
-            leaf: false,
-        }
+        let group = Group::parting((id_a, held_a), (id_b, held_b), || {
+            b.size(id_b, &self.whole[1]) > a.size(id_a, &self.whole[0])
+        });
+        let side = if group.pack_is_b { b } else { a };
+        let mask = side.pack(group.pack).map_or(0, |p| p.mask);
+        Group { mask, ..group }
     }
 
     /// The gaps of a group's pairs at this pose.

@@ -31,11 +31,16 @@ pub(super) fn fit(part: &[(u32, Vec3)], corners: &impl Fn(u32) -> [Point; 3]) ->
             candidates[1]
         }
     };
-    let (centre, _) = extents(&axes, &all);
+    around(axes, all)
+}
+
+/// The box along these axes around points.
+pub(super) fn around(axes: Matrix3<f64>, corners: Vec<Point>) -> Fitted {
+    let (centre, _) = extents(&axes, &corners);
     Fitted {
         axes,
         centre,
-        corners: all,
+        corners,
     }
 }
 

@@ -1,0 +1,342 @@
+//! Two bodies of which at least one has several shapes: a front over pairs of their shapes, which is carried from pose
+//! to pose as that of two meshes is over triangles.
+//!
+//! In: two bodies, and one pose after the other of B seen from A. Out: a sound interval of their gap at the pose worked
+//! at, a witness, contacts. Stops after any unit, and goes on at the same pose or at another.
+//!
+//! Every pair of shapes is covered by exactly one entry at any time (see `cover`). A leaf is a pair of shapes: one
+//! exact query of two convex ones; of a mesh and another a front of its own, which is carried too (`leaf`). So a robot
+//! of a hundred parts asks those few pairs of parts that are near one another, and of these those that have moved.
+//!
+//! The orders are those of two meshes: depth first, deepest overlap first, for a verdict; best first for the bounds;
+//! depth first to the end for the contact set. Half-spaces fit into no box: each is a root of its own (`side`).
+//!
+//! Refused: one tree of all triangles of all shapes of a body (shapes are shared between bodies, and a solid's inside
+//! and a convex shape's depth belong to the shape); asking all pairs of shapes (65,536 of each are allowed).
+
+mod leaf;
+mod side;
+mod turn;
+mod walk;
+
+#[cfg(test)]
+mod tests;
+
+pub(super) use leaf::Tools;
+pub(super) use walk::{PairWalk, Waiting};
+
+use crate::math::{Interval, Pose};
+use crate::shape::{BoxId, Held};
+use crate::time::Meter;
+use crate::world::Body;
+
+use super::arena::Run;
+use super::cover::{Cover, Group, Open};
+use super::memo::{Witness, bent, relative_motion};
+use super::mesh::{CarriedFront, Goal, Placed, Search};
+use super::shelves::Shelves;
+
+use leaf::Inner;
+use side::{Side, children, gaps, placed};
+
+/// As of two meshes (`mesh/carried`): a front that has split into so many times its fresh size, and [`STALE_MORE`],
+/// starts anew; ...
+const STALE_TIMES: usize = 3;
+const STALE_MORE: usize = 32;
+/// ... one of which so many times the used-up groups exceed the steps of a fresh start; ...
+const WORN_TIMES: usize = 3;
+/// ... one whose path is so many sizes of the two long; ...
+const PATH_MAX: f64 = 64.0;
+/// ... and one that goes this share of the smaller body's radius between two poses.
+const LEAP: f64 = 0.1;
+
+/// The front of one pair of bodies; used with the same [`Tools`] from its start to its release.
+#[derive(Debug, Default)]
+pub(super) struct CompoundFront {
+    search: Search,
+    /// Started, and not released since.
+    started: bool,
+    at: Placed,
+    cover: Cover,
+    known: Known,
+    /// Contacts found at this pose.
+    found: Run,
+    /// What is kept of pairs of shapes of which one is a mesh, by their places.
+    inner: Vec<Inner>,
+    /// Least gap that the two can have, metres.
+    floor_m: f64,
+    /// Sum of what the two have deformed, when they were last looked at, metres.
+    bent_m: f64,
+    /// Entries when a goal was first reached after the last fresh start, 0: not yet; and the steps until then.
+    fresh_len: usize,
+    fresh_steps: usize,
+    steps: usize,
+}
+
+/// What is known at the pose worked at.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    /// The farthest goal asked for.
+    goal: Goal,
+    /// Least lower end of the pairs of shapes asked for that goal, and least upper end of all, metres.
+    low: f64,
+    high: f64,
+    /// 0 inside the interval of every pair of shapes asked means that it touches.
+    certain: bool,
+    witness: Option<Witness>,
+}
+
+impl Default for Known {
+    fn default() -> Self {
+        Self {
+            goal: Goal::Verdict,
+            low: f64::INFINITY,
+            high: f64::INFINITY,
+            certain: true,
+            witness: None,
+        }
+    }
+}
+
+/// What one turn is for.
+#[derive(Clone, Copy)]
+struct Asked {
+    goal: Goal,
+    /// What is farther than this is of no interest for a verdict, metres.
+    report_m: f64,
+    /// Of the meter, when the turn ends.
+    end: u64,
+}
+
+impl CompoundFront {
+    /// Takes the pair to a pose of B seen from A, and to the vertices of now; what was proved is carried over as far as
+    /// it holds. The first time it starts there.
+    pub(super) fn move_to(&mut self, tools: &mut Tools<'_>, (a, b): (&Body, &Body), rel: &Pose) {
+        let sides = (Side::of(a), Side::of(b));
+        let bent_m = bent(a, b);
+        let at = placed(&sides.0, &sides.1, rel);
+        if !self.started {
+            (self.started, self.at, self.bent_m) = (true, at, bent_m);
+            self.search = tools.search;
+            self.start_over(tools, (&sides.0, &sides.1));
+            return;
+        }
+        let moved = self.at.pos12 != *rel || bent_m.to_bits() != self.bent_m.to_bits();
+        self.at = at;
+        if !moved {
+            return;
+        }
+        let drift = &mut self.cover.drift;
+        drift.follow(rel, |from, to| relative_motion(a, b, from, to));
+        if bent_m > self.bent_m {
+            drift.add(bent_m - self.bent_m, bent_m);
+            self.bent_m = bent_m;
+        }
+        let size_m = a.radius.min(b.radius);
+        let stale =
+            self.fresh_len > 0 && self.cover.len() > STALE_TIMES * self.fresh_len + STALE_MORE;
+        let far = self.cover.drift.path_m > PATH_MAX * size_m;
+        let leap = self.cover.drift.last_m > LEAP * size_m;
+        let worn = self.fresh_len > 0
+            && WORN_TIMES * self.cover.expired_len(&tools.shelves.store.entries) > self.fresh_steps;
+        if worn || stale || far || leap || self.cover.is_lost() || self.search != Search::Carried {
+            self.start_over(tools, (&sides.0, &sides.1));
+            return;
+        }
+        self.known = Known::default();
+        self.found.clear();
+        self.cover.arrive(&mut tools.shelves.store.entries);
+    }
+
+    /// Goes on at the pose until the goal is reached (true), `slice_units` are spent, or the meter closes.
+    ///
+    /// * `report_m` - what is farther is of no interest for a verdict, metres.
+    ///
+    /// Units: a box against a pack, a query of two convex shapes, and those of mesh pairs.
+    pub(super) fn advance(
+        &mut self,
+        tools: &mut Tools<'_>,
+        (a, b): (&Body, &Body),
+        (goal, report_m): (Goal, f64),
+        slice_units: u64,
+        meter: &mut Meter<'_>,
+    ) -> bool {
+        let sides = (&Side::of(a), &Side::of(b));
+        if goal > self.known.goal {
+            // Pairs of shapes that touch have been asked for less.
+            (self.known.goal, self.known.low, self.known.certain) = (goal, f64::INFINITY, true);
+            self.found.clear();
+            let entries = &mut tools.shelves.store.entries;
+            self.cover.anchor_here(entries, &self.at.pos12);
+            self.cover.ask_touching_again(entries);
+        }
+        let asked = Asked {
+            goal,
+            report_m: report_m.max(0.0),
+            end: meter.spent().saturating_add(slice_units),
+        };
+        loop {
+            if self.reached(&asked) {
+                if self.fresh_len == 0 {
+                    (self.fresh_len, self.fresh_steps) = (self.cover.len(), self.steps);
+                }
+                return true;
+            }
+            if meter.spent() >= asked.end || !meter.open() {
+                return false;
+            }
+            self.step(tools, sides, &asked, meter);
+        }
+    }
+
+    /// What is known of the gap at this pose, metres: sound at any interruption.
+    pub(super) fn interval(&self) -> Interval {
+        let Known { low, high, .. } = self.known;
+        let low = if self.cover.open.is_empty() {
+            low.min(self.cover.low_m()).max(self.floor_m)
+        } else {
+            self.floor_m
+        };
+        Interval::new(low.min(high), high)
+    }
+
+    /// Whether 0 in the interval of a reached goal means touching (law 3.4).
+    pub(super) fn is_certain(&self) -> bool {
+        self.known.certain && self.cover.holds_lumped()
+    }
+
+    /// Where the pair of shapes with the least upper end asked at this pose is nearest or deepest.
+    pub(super) fn witness(&self) -> Option<Witness> {
+        self.known.witness
+    }
+
+    /// The front of a pair of shapes by their places, where there is one.
+    pub(super) fn front_of<'a>(
+        &self,
+        shelves: &'a Shelves,
+        places: (u32, u32),
+    ) -> Option<&'a CarriedFront> {
+        let at = self
+            .inner
+            .binary_search_by_key(&places, |inner| inner.places);
+        let front = shelves.fronts.get(self.inner[at.ok()?].front)?;
+        front.is_started().then_some(front)
+    }
+
+    /// Forgets everything and gives its memory back.
+    pub(super) fn release(&mut self, shelves: &mut Shelves) {
+        self.cover.release(&mut shelves.store.entries);
+        shelves.contacts.release(&mut self.found);
+        for mut inner in self.inner.drain(..) {
+            inner.release(shelves);
+        }
+        self.started = false;
+    }
+
+    /// Everything from the roots, at the pose it is at.
+    fn start_over(&mut self, tools: &mut Tools<'_>, (a, b): (&Side<'_>, &Side<'_>)) {
+        let entries = &mut tools.shelves.store.entries;
+        // Two half-spaces have no gap (law 3.2).
+        let roots = a
+            .roots()
+            .flat_map(|of_a| b.roots().map(move |of_b| (of_a, of_b)))
+            .filter(|&(of_a, of_b)| !(a.is_plane(of_a) && b.is_plane(of_b)));
+        (self.cover).start(entries, (&self.at.pos12, self.search), roots);
+        self.known = Known::default();
+        self.found.clear();
+        (self.fresh_len, self.fresh_steps, self.steps) = (0, 0, 0);
+        // Pieces part when moved by both radii, and a point within a solid is no deeper than it is large.
+        let size_m = a.body.radius + b.body.radius;
+        self.floor_m = -size_m * (1.0 + 8.0 * f64::EPSILON) - self.at.slop;
+        // Of pairs of shapes that were not asked since the last fresh start nothing is kept.
+        self.inner.retain_mut(|inner| {
+            let asked = std::mem::take(&mut inner.asked);
+            if !asked {
+                inner.release(tools.shelves);
+            }
+            asked
+        });
+    }
+
+    fn reached(&self, asked: &Asked) -> bool {
+        if asked.goal == Goal::Verdict && self.known.high <= 0.0 {
+            return true;
+        }
+        if !self.cover.open.is_empty() || self.cover.has_expired() {
+            return false;
+        }
+        let nearest_m = self.cover.nearest_m();
+        nearest_m > self.margin_m(asked.goal, asked)
+            || nearest_m + self.cover.fuzz_m() + self.at.slop >= self.known.low
+    }
+
+    /// What is farther than this is of no interest for a goal, metres.
+    fn margin_m(&self, goal: Goal, asked: &Asked) -> f64 {
+        match goal {
+            Goal::Verdict => asked.report_m,
+            Goal::Gap | Goal::Contacts => self.known.high.max(0.0),
+        }
+    }
+
+    /// One step: an open pair of boxes, one no longer proved apart, or the nearest of all.
+    fn step(
+        &mut self,
+        tools: &mut Tools<'_>,
+        sides: (&Side<'_>, &Side<'_>),
+        asked: &Asked,
+        meter: &mut Meter<'_>,
+    ) {
+        self.steps += 1;
+        let entries = &mut tools.shelves.store.entries;
+        if let Some(Open { a, b, .. }) = self.cover.open.pop(&mut entries.open) {
+            return self.look_below(tools, sides, (a, b), f64::NEG_INFINITY, asked, meter);
+        }
+        let expired = self.cover.has_expired();
+        if !expired {
+            // For a verdict too, where it is whether they are near: what is found is to hold to the last digit.
+            self.cover.anchor_here(entries, &self.at.pos12);
+        }
+        let Some(group) = self.cover.proved.pop(&mut entries.groups) else {
+            return;
+        };
+        // What is stored holds at this pose; a new test may be lower by rounding.
+        let known_m = if expired {
+            f64::NEG_INFINITY
+        } else {
+            self.cover.drift.left_m(group.expiry_m)
+        };
+        if group.leaf {
+            let pair = group.pair(group.mask.trailing_zeros());
+            return self.leaf(tools, sides, pair, known_m, asked, meter);
+        }
+        let gaps = gaps(&group, sides, &self.at).map(|gap| gap.max(known_m));
+        meter.charge(1);
+        if expired {
+            return self.cover.take(entries, &group, gaps, known_m);
+        }
+        let (pair, known_m) = self.cover.part_nearest(entries, &group, &gaps);
+        self.look_below(tools, sides, pair, known_m, asked, meter);
+    }
+
+    /// Replaces a pair of boxes by smaller ones, or queries two shapes.
+    ///
+    /// * `known_m` - a bound on their gap that holds at this pose.
+    fn look_below(
+        &mut self,
+        tools: &mut Tools<'_>,
+        sides: (&Side<'_>, &Side<'_>),
+        (id_a, id_b): (BoxId, BoxId),
+        known_m: f64,
+        asked: &Asked,
+        meter: &mut Meter<'_>,
+    ) {
+        let held = (sides.0.held(id_a), sides.1.held(id_b));
+        if let (Held::Triangle(_), Held::Triangle(_)) = held {
+            return self.leaf(tools, sides, (id_a, id_b), known_m, asked, meter);
+        }
+        let group: Group = children((sides.0, id_a), (sides.1, id_b));
+        let gaps = gaps(&group, sides, &self.at);
+        (self.cover).take(&mut tools.shelves.store.entries, &group, gaps, known_m);
+        meter.charge(1);
+    }
+}

@@ -1,0 +1,358 @@
+//! A pair of shapes of two bodies: one exact query, a front of its own where one is a mesh, or a query at one pose
+//! where the other is a half-space.
+
+use crate::math::{Interval, Pose};
+use crate::narrow::Counters;
+use crate::narrow::arena::Arena;
+use crate::narrow::carry::{found_on, glance, seen_at};
+use crate::narrow::contacts::Contact;
+use crate::narrow::cover::{Group, Open};
+use crate::narrow::cursor::{Cursor, Room, Turn};
+use crate::narrow::exact::Warm;
+use crate::narrow::memo::{Witness, bent, changed_since};
+use crate::narrow::mesh::{CarriedFront, Goal, LeafContact, Search, has_front};
+use crate::narrow::pool::NONE;
+use crate::narrow::query::{
+    add_manifold, is_simple, leaf_contact, shape_gap, shape_pose, sound, sphere_bound, witness_of,
+};
+use crate::narrow::shelves::Shelves;
+use crate::shape::{BoxId, Held};
+use crate::time::Meter;
+use crate::world::{Body, PlacedShape};
+
+use super::side::Side;
+use super::{Asked, CompoundFront};
+
+/// What is kept of two shapes that are farther apart than so many times the smaller one's radius is given back: they
+/// will not be asked for long.
+const FAR: f64 = 1.0;
+
+/// What fronts of bodies work with.
+pub(in crate::narrow) struct Tools<'a> {
+    pub(in crate::narrow) shelves: &'a mut Shelves,
+    /// Contacts of the query at hand.
+    pub(in crate::narrow) found: &'a mut Vec<Contact>,
+    pub(in crate::narrow) counters: &'a mut Counters,
+    /// How surfaces are searched.
+    pub(in crate::narrow) search: Search,
+    pub(in crate::narrow) tick: u64,
+}
+
+/// What is kept of a pair of shapes of which one is a mesh.
+#[derive(Debug)]
+pub(super) struct Inner {
+    /// Of the shapes in their bodies.
+    pub(super) places: (u32, u32),
+    /// Of two surfaces, or a surface and a convex shape.
+    pub(super) front: u32,
+    /// Of a mesh and a half-space: its query, while it is under way.
+    cursor: u32,
+    /// It touched when it was last asked.
+    touched: bool,
+    /// It was asked since the last fresh start.
+    pub(super) asked: bool,
+}
+
+impl Inner {
+    fn new(places: (u32, u32)) -> Self {
+        Self {
+            places,
+            front: NONE,
+            cursor: NONE,
+            touched: false,
+            asked: true,
+        }
+    }
+
+    /// Gives its memory back.
+    pub(super) fn release(&mut self, shelves: &mut Shelves) {
+        shelves.give_front(&mut self.front);
+        shelves.give_cursor(&mut self.cursor);
+    }
+}
+
+/// Two shapes at the pose worked at.
+struct Pair<'a> {
+    bodies: (&'a Body, &'a Body),
+    one: &'a PlacedShape,
+    other: &'a PlacedShape,
+    places: (u32, u32),
+    rel: Pose,
+    /// Of the second shape seen from the first.
+    pos12: Pose,
+}
+
+/// What a query of two shapes found at the pose worked at.
+struct Answer {
+    gap: Interval,
+    /// 0 inside the interval means touching.
+    certain: bool,
+    witness: Option<Witness>,
+}
+
+impl CompoundFront {
+    /// Queries a pair of shapes, as far as the farthest goal asked for at this pose; what is not finished stays open.
+    ///
+    /// * `known_m` - a bound on their gap that holds at this pose.
+    pub(super) fn leaf(
+        &mut self,
+        tools: &mut Tools<'_>,
+        (a, b): (&Side<'_>, &Side<'_>),
+        (id_a, id_b): (BoxId, BoxId),
+        known_m: f64,
+        asked: &Asked,
+        meter: &mut Meter<'_>,
+    ) {
+        let (Held::Triangle(i), Held::Triangle(j)) = (a.held(id_a), b.held(id_b)) else {
+            return;
+        };
+        let (Some(one), Some(other)) =
+            (a.body.shapes.get(i as usize), b.body.shapes.get(j as usize))
+        else {
+            return;
+        };
+        let rel = self.at.pos12;
+        let leaf = Group::of_leaves(id_a, id_b);
+        let bound_m = sphere_bound(one, other, &rel).max(known_m);
+        if bound_m > self.margin_m(self.known.goal, asked) {
+            meter.charge(1);
+            return self
+                .cover
+                .keep(&mut tools.shelves.store.entries, leaf, bound_m);
+        }
+        let pair = Pair {
+            bodies: (a.body, b.body),
+            one,
+            other,
+            places: (i, j),
+            rel,
+            pos12: shape_pose(one, other, &rel),
+        };
+        let answer = if is_simple(&one.shape, &other.shape) {
+            let answer = self.query_once(tools, &pair);
+            meter.charge_dear(1);
+            Some(answer)
+        } else if has_front(&one.shape, &other.shape) {
+            self.turn_inner(tools, &pair, asked, meter)
+        } else {
+            self.turn_cursor(tools, &pair, asked, meter)
+        };
+        let entries = &mut tools.shelves.store.entries;
+        let (low, a, b) = (f64::NEG_INFINITY, id_a, id_b);
+        let Some(answer) = answer else {
+            return self.cover.look_into(entries, Open { low, a, b });
+        };
+        let gap = answer.gap;
+        self.known.low = self.known.low.min(gap.min.max(known_m));
+        self.known.certain &= answer.certain || !gap.contains(0.0);
+        if gap.max < self.known.high {
+            self.known.high = gap.max;
+            self.known.witness = answer.witness;
+        }
+        if gap.min > 0.0 {
+            self.cover.keep(entries, leaf, gap.min.max(known_m));
+            if gap.min > FAR * one.shape.radius.min(other.shape.radius) {
+                self.forget_inner(tools.shelves, pair.places);
+            }
+        } else {
+            self.cover.touch(entries, Open { low, a, b });
+        }
+    }
+
+    /// The one query that decides two shapes without meshes.
+    fn query_once(&mut self, tools: &mut Tools<'_>, pair: &Pair<'_>) -> Answer {
+        tools.counters.queries += 1;
+        let shapes = (&pair.one.shape, &pair.other.shape);
+        let closest = shape_gap(shapes.0, shapes.1, &pair.pos12, &mut Warm::default());
+        let Some(closest) = closest else {
+            // Not reached: two half-spaces are no pair, and nothing is known of them.
+            let (gap, certain, witness) = (Interval::UNKNOWN, false, None);
+            return Answer {
+                gap,
+                certain,
+                witness,
+            };
+        };
+        if self.known.goal == Goal::Contacts && closest.gap.min <= 0.0 {
+            tools.counters.manifolds += 1;
+            tools.found.clear();
+            add_manifold(pair.bodies, pair.places, &pair.pos12, &closest, tools.found);
+            for &contact in &*tools.found {
+                tools.shelves.contacts.push(&mut self.found, contact);
+            }
+        }
+        let (one, other) = (pair.one, pair.other);
+        Answer {
+            gap: sound(closest.gap, one, other, &pair.rel),
+            certain: closest.finished,
+            witness: Some(witness_of(one, other, &pair.pos12, &closest, pair.places)),
+        }
+    }
+
+    /// A turn of the front of two shapes; `None`: there is more to do.
+    fn turn_inner(
+        &mut self,
+        tools: &mut Tools<'_>,
+        pair: &Pair<'_>,
+        asked: &Asked,
+        meter: &mut Meter<'_>,
+    ) -> Option<Answer> {
+        let (margin_m, goal) = (self.margin_m(self.known.goal, asked), self.known.goal);
+        let inner = self.inner_at(pair.places);
+        let Shelves {
+            fronts,
+            store,
+            contacts,
+            ..
+        } = &mut *tools.shelves;
+        if inner.front == NONE {
+            inner.front = fronts.take(CarriedFront::default);
+        }
+        let front = fronts.get_mut(inner.front)?;
+        let (one, other) = (pair.one, pair.other);
+        let shapes = (&*one.shape, &*other.shape);
+        let bodies = |gap| sound(gap, one, other, &pair.rel);
+        let seen = |leaf: LeafContact| seen_at((one, other), pair.places, &pair.pos12, &leaf);
+        if goal == Goal::Verdict && tools.search == Search::Carried {
+            let told = glance(front, shapes, &pair.pos12, inner.touched, meter);
+            let gap = told.gap(Interval::UNKNOWN, bodies);
+            if gap.max <= 0.0 || gap.min > margin_m {
+                inner.touched = gap.max <= 0.0;
+                return Some(Answer {
+                    gap,
+                    certain: true,
+                    witness: told.leaf().map(seen),
+                });
+            }
+        }
+        if !front.is_started() {
+            front.start(store, shapes.0, shapes.1, &pair.pos12, tools.search);
+        }
+        front.move_to(store, shapes.0, shapes.1, &pair.pos12);
+        tools.counters.slices += 1;
+        let left = asked.end.saturating_sub(meter.spent()).max(1);
+        let done = front.advance(store, shapes.0, shapes.1, goal, left, meter);
+        let gap = bodies(front.interval());
+        let far = gap.min > margin_m;
+        if !done && !far {
+            // What is known of its upper end holds for the whole.
+            self.known.high = self.known.high.min(gap.max);
+            return None;
+        }
+        inner.touched = gap.max <= 0.0;
+        let certain = far || front.is_certain();
+        let witness = front.witness().map(seen);
+        if goal == Goal::Contacts && gap.min <= 0.0 {
+            for (leaf, patch) in found_on(front, store) {
+                let leaf = (&leaf, patch);
+                let contact = leaf_contact((one, other), pair.places, &pair.pos12, leaf, gap);
+                contacts.push(&mut self.found, contact);
+            }
+        }
+        Some(Answer {
+            gap,
+            certain,
+            witness,
+        })
+    }
+
+    /// A turn of the query of a mesh and a half-space, which is finished at the pose it was begun at; `None`: there is
+    /// more to do.
+    fn turn_cursor(
+        &mut self,
+        tools: &mut Tools<'_>,
+        pair: &Pair<'_>,
+        asked: &Asked,
+        meter: &mut Meter<'_>,
+    ) -> Option<Answer> {
+        let margin_m = self.margin_m(self.known.goal, asked);
+        let (a, b) = pair.bodies;
+        let (goal, now) = (self.known.goal, (pair.rel, bent(a, b)));
+        let inner = self.inner_at(pair.places);
+        let Shelves {
+            cursors,
+            store,
+            contacts,
+            ..
+        } = &mut *tools.shelves;
+        let fresh = inner.cursor == NONE;
+        if fresh {
+            inner.cursor = cursors.take(Cursor::default);
+        }
+        let cursor = cursors.get_mut(inner.cursor)?;
+        if fresh || cursor.goal < goal {
+            cursor.start(pair.places, now, 0.0, tools.tick, goal);
+        }
+        let shapes = (pair.one, pair.other);
+        let mut room = Room {
+            fronts: store,
+            contacts,
+            search: tools.search,
+        };
+        let turn = cursor.turn(&mut room, shapes, asked.report_m, meter, tools.counters);
+        let since_m = changed_since(a, b, (&cursor.rel, cursor.bent_m), &pair.rel);
+        let whole = turn == Turn::Finished;
+        let low = if whole {
+            cursor.gap.min
+        } else {
+            f64::NEG_INFINITY
+        };
+        let gap = Interval::new(low.min(cursor.upper()), cursor.upper()).widened(since_m);
+        self.known.high = self.known.high.min(gap.max);
+        let here = whole && since_m == 0.0;
+        let decided = goal == Goal::Verdict && (gap.max <= 0.0 || gap.min > margin_m);
+        if whole && !here && !decided {
+            // It tells of another pose: once more, at this one.
+            cursor.start(pair.places, now, 0.0, tools.tick, goal);
+        }
+        if !here && !decided {
+            return None;
+        }
+        let answer = Answer {
+            gap,
+            certain: !here || cursor.certain,
+            witness: cursor.witness,
+        };
+        if here && goal == Goal::Contacts {
+            for at in 0..cursor.found(contacts).len() {
+                let contact = cursor.found(contacts)[at];
+                contacts.push(&mut self.found, contact);
+            }
+        }
+        if whole {
+            self.forget_inner(tools.shelves, pair.places);
+        }
+        Some(answer)
+    }
+
+    /// What is kept of a pair of shapes.
+    fn inner_at(&mut self, places: (u32, u32)) -> &mut Inner {
+        let at = match self
+            .inner
+            .binary_search_by_key(&places, |inner| inner.places)
+        {
+            Ok(at) => at,
+            Err(at) => {
+                self.inner.insert(at, Inner::new(places));
+                at
+            }
+        };
+        let inner = &mut self.inner[at];
+        inner.asked = true;
+        inner
+    }
+
+    fn forget_inner(&mut self, shelves: &mut Shelves, places: (u32, u32)) {
+        let at = self
+            .inner
+            .binary_search_by_key(&places, |inner| inner.places);
+        if let Ok(at) = at {
+            self.inner.remove(at).release(shelves);
+        }
+    }
+
+    /// The contacts found at this pose: all of them once `Goal::Contacts` is reached.
+    pub(super) fn contacts<'a>(&self, contacts: &'a Arena<Contact>) -> &'a [Contact] {
+        contacts.all(&self.found)
+    }
+}

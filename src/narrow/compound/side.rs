@@ -1,0 +1,192 @@
+//! One body of a pair as boxes: the tree over its shapes, or the box of its only one; half-spaces stand beside it.
+
+use crate::math::{Pose, ROUND, Vec3};
+use crate::narrow::cover::Group;
+use crate::narrow::mesh::Placed;
+use crate::shape::{BoxId, Geometry, Held, Obb, ObbPack, ObbTree};
+use crate::simd::obb::{GAP_ROUND, LANES};
+use crate::world::{Body, PartTree, PlacedShape};
+
+/// Marks a half-space in a [`BoxId`]: the rest is its place in the body, which is below `limits::SHAPES_PER_BODY_MAX`.
+const PLANE: u32 = 1 << 30;
+
+/// One body of a pair.
+pub(super) struct Side<'a> {
+    pub(super) body: &'a Body,
+    /// Of several shapes.
+    tree: Option<&'a PartTree>,
+    /// Of one shape that has a box.
+    whole: Obb,
+}
+
+/// A half-space in some frame: `normal . x <= offset`.
+struct Plane {
+    normal: Vec3,
+    offset: f64,
+}
+
+impl<'a> Side<'a> {
+    pub(super) fn of(body: &'a Body) -> Self {
+        let tree = body.shapes.tree();
+        let whole = match &*body.shapes {
+            [only] if only.shape.radius.is_finite() => around(only),
+            _ => Obb::EVERYWHERE,
+        };
+        Self { body, tree, whole }
+    }
+
+    /// The boxes that everything is below.
+    pub(super) fn roots(&self) -> impl Iterator<Item = BoxId> {
+        let boxes = self.tree.is_none_or(|tree| tree.boxes.is_some());
+        let planes = self.tree.map_or(&[][..], |tree| &tree.planes);
+        let root = boxes.then_some(BoxId::ROOT);
+        root.into_iter()
+            .chain(planes.iter().map(|place| BoxId(place | PLANE)))
+    }
+
+    /// What a box holds; a triangle stands for a shape.
+    pub(super) fn held(&self, id: BoxId) -> Held {
+        if id.0 & PLANE != 0 {
+            return Held::Triangle(id.0 & !PLANE);
+        }
+        self.boxes()
+            .map_or(Held::Triangle(0), |boxes| boxes.held(id))
+    }
+
+    /// Whether a box stands for a half-space.
+    pub(super) fn is_plane(&self, id: BoxId) -> bool {
+        self.plane(id).is_some()
+    }
+
+    /// How large a box is, to be compared with another: the sum of its half sides' squares, square metres.
+    pub(super) fn size(&self, id: BoxId) -> f32 {
+        self.obb(id).half.iter().map(|h| h * h).sum()
+    }
+
+    /// The boxes that share a parent.
+    pub(super) fn pack(&self, pack: u32) -> Option<&'a ObbPack> {
+        self.boxes()?.packs().get(pack as usize)
+    }
+
+    fn boxes(&self) -> Option<&'a ObbTree> {
+        self.tree?.boxes.as_ref()
+    }
+
+    fn obb(&self, id: BoxId) -> Obb {
+        match self.boxes() {
+            Some(boxes) if id.0 & PLANE == 0 => boxes.get(id),
+            _ => self.whole,
+        }
+    }
+
+    /// The half-space that a box stands for, body frame.
+    fn plane(&self, id: BoxId) -> Option<Plane> {
+        if id.0 & PLANE == 0 && self.tree.is_some() {
+            return None;
+        }
+        let placed = self.body.shapes.get((id.0 & !PLANE) as usize)?;
+        let Geometry::HalfSpace { normal, offset } = &placed.shape.geometry else {
+            return None;
+        };
+        let normal = placed.pose.rotation * normal;
+        let offset = offset + normal.dot(&placed.pose.translation.vector);
+        Some(Plane { normal, offset })
+    }
+
+    /// Greatest distance of a number that it is told by from its body's origin, metres.
+    pub(super) fn reach(&self) -> f64 {
+        if !self.body.unbounded {
+            return self.body.centre.coords.norm() + self.body.radius;
+        }
+        let of = |placed: &PlacedShape| {
+            let own = match &placed.shape.geometry {
+                Geometry::HalfSpace { offset, .. } => offset.abs(),
+                _ => placed.shape.centre.coords.norm() + placed.shape.radius,
+            };
+            placed.pose.translation.vector.norm() + own
+        };
+        self.body.shapes.iter().map(of).fold(0.0, f64::max)
+    }
+}
+
+/// Where two bodies stand, ready for their boxes.
+pub(super) fn placed(a: &Side<'_>, b: &Side<'_>, rel: &Pose) -> Placed {
+    let lag = |side: &Side<'_>| match &*side.body.shapes {
+        [only] => only.shape.lag_m(),
+        // Of bodies of several shapes none deforms.
+        _ => 0.0,
+    };
+    Placed {
+        lag_m: (lag(a) + lag(b)) * (1.0 + 2.0 * ROUND),
+        ..Placed::new(rel, a.reach(), b.reach())
+    }
+}
+
+/// The box that stays and the pack that takes the other's place, of two boxes of which at least one is no leaf.
+pub(super) fn children((a, id_a): (&Side<'_>, BoxId), (b, id_b): (&Side<'_>, BoxId)) -> Group {
+    let (held_a, held_b) = (a.held(id_a), b.held(id_b));
+    let group = Group::parting((id_a, held_a), (id_b, held_b), || {
+        b.size(id_b) > a.size(id_a)
+    });
+    let side = if group.pack_is_b { b } else { a };
+    let mask = side.pack(group.pack).map_or(0, |pack| pack.mask);
+    Group { mask, ..group }
+}
+
+/// Sound lower bounds on the gaps of a group's pairs, metres; zero or less where they may touch.
+pub(super) fn gaps(group: &Group, (a, b): (&Side<'_>, &Side<'_>), at: &Placed) -> [f64; LANES] {
+    let (one, other) = if group.pack_is_b { (a, b) } else { (b, a) };
+    let Some(pack) = other.pack(group.pack) else {
+        return [f64::NEG_INFINITY; LANES];
+    };
+    match one.plane(group.one) {
+        Some(plane) => plane.seen_from_other(at, group.pack_is_b).gaps(pack, at),
+        None => at.gaps(&one.obb(group.one), pack, group.pack_is_b),
+    }
+}
+
+impl Plane {
+    /// In B's frame where it is A's, in A's where it is B's.
+    fn seen_from_other(&self, at: &Placed, is_a: bool) -> Self {
+        let shift = at.pos12.translation.vector;
+        if is_a {
+            let normal = at.turn_to_b(&self.normal);
+            let offset = self.offset - self.normal.dot(&shift);
+            Self { normal, offset }
+        } else {
+            let normal = at.rotation * self.normal;
+            let offset = self.offset + normal.dot(&shift);
+            Self { normal, offset }
+        }
+    }
+
+    /// How far each box of a pack is above it at least, metres. Lanes without a box yield anything.
+    fn gaps(&self, pack: &ObbPack, at: &Placed) -> [f64; LANES] {
+        let boxes = &pack.boxes;
+        std::array::from_fn(|lane| {
+            let centre =
+                pack.origin.coords + Vec3::from_fn(|k, _| f64::from(boxes.centre[k][lane]));
+            let reach: f64 = (0..3)
+                .map(|k| {
+                    let axis = Vec3::from_fn(|j, _| f64::from(boxes.axes[k][j][lane]));
+                    f64::from(boxes.half[k][lane]) * self.normal.dot(&axis).abs()
+                })
+                .sum();
+            // Axes in f32 are at right angles to one another but for their rounding.
+            let half: f64 = (0..3).map(|k| f64::from(boxes.half[k][lane])).sum();
+            let rounding =
+                16.0 * ROUND * (centre.lp_norm(1) + self.offset.abs()) + GAP_ROUND * half;
+            self.normal.dot(&centre) - reach - self.offset - at.slop - at.lag_m - rounding
+        })
+    }
+}
+
+/// The box around a shape at its place, along the shape's own axes.
+fn around(placed: &PlacedShape) -> Obb {
+    let own = Obb::around(&placed.shape.aabb);
+    Obb {
+        centre: placed.pose * own.centre,
+        axes: *placed.pose.rotation.to_rotation_matrix().matrix(),
+        half: own.half,
+    }
+}

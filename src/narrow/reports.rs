@@ -1,0 +1,120 @@
+//! What is owed to whoever listens, once every pair has its verdict: bounds first, then contacts.
+//!
+//! What is left out when the time is up, first of all: manifolds and contact sets, then bounds, then verdicts; what
+//! boxes and motion say is there in any case. So contacts have what bounds leave. Two convex bodies that collide get
+//! their bound along with their contacts, for one query says both, unless there was no time for all bounds in the tick
+//! before: then those of all pairs come before contacts of any.
+
+use crate::ids::PairSlot;
+use crate::time::Meter;
+use crate::wire::Verdict;
+use crate::world::World;
+
+use super::mesh::Goal;
+use super::pass::Pass;
+use super::{Narrow, Wanted};
+
+impl Narrow {
+    /// Refreshes bounds and contacts of reported pairs; whether all are done.
+    pub(super) fn spend_on_reports(
+        &mut self,
+        world: &World,
+        wanted: Wanted,
+        meter: &mut Meter<'_>,
+    ) -> bool {
+        self.follow_demand(wanted);
+        let at_once = wanted.contacts && !self.scarce;
+        if wanted.bounds {
+            self.spend_on_level(world, wanted, Goal::Gap, meter, |narrow, slot| {
+                narrow.lacks_bound(slot) && !(at_once && narrow.says_both(slot))
+            });
+        }
+        if wanted.contacts {
+            self.spend_on_level(world, wanted, Goal::Contacts, meter, Self::lacks_contacts);
+        }
+        let mut all = std::mem::take(&mut self.refresh);
+        all.retain(|&slot| {
+            let lacks = (wanted.bounds && self.lacks_bound(slot))
+                || (wanted.contacts && self.lacks_contacts(slot));
+            self.memos[slot.index()].refreshing = lacks;
+            lacks
+        });
+        self.refresh = all;
+        self.refresh.is_empty()
+    }
+
+    /// Turns of the pairs on the list that lack this much.
+    fn spend_on_level(
+        &mut self,
+        world: &World,
+        wanted: Wanted,
+        goal: Goal,
+        meter: &mut Meter<'_>,
+        lacks: impl Fn(&Self, PairSlot) -> bool,
+    ) {
+        if !meter.open() {
+            return;
+        }
+        let mut work = std::mem::take(&mut self.level);
+        work.clear();
+        work.extend(self.refresh.iter().filter(|&&slot| lacks(self, slot)));
+        let pass = Pass {
+            world,
+            order: wanted.order,
+            idle: |narrow: &Self, slot: PairSlot| !lacks(narrow, slot),
+        };
+        self.level = self.spend_on(work, &pass, meter, |narrow, slot, meter| {
+            (pass.idle)(narrow, slot) || narrow.work(slot, goal, world, meter)
+        });
+    }
+
+    /// When somebody begins to listen, pairs at rest owe them what was left out before.
+    fn follow_demand(&mut self, wanted: Wanted) {
+        let more =
+            (wanted.contacts && !self.contacts_wanted) || (wanted.bounds && !self.bounds_wanted);
+        self.contacts_wanted = wanted.contacts;
+        self.bounds_wanted = wanted.bounds;
+        if !more {
+            return;
+        }
+        for at in 0..self.active.len() {
+            let slot = self.active[at];
+            let memo = &mut self.memos[slot.index()];
+            if !memo.refreshing {
+                memo.refreshing = true;
+                self.refresh.push(slot);
+            }
+        }
+    }
+
+    /// Takes note of whether there was time for the bounds that somebody listens to.
+    pub(super) fn note_scarcity(&mut self, wanted: Wanted) {
+        let lacks = |&slot: &PairSlot| self.lacks_bound(slot);
+        self.scarce = wanted.bounds && self.refresh.iter().any(lacks);
+    }
+
+    /// Whether a reported pair's bound is older than its poses.
+    fn lacks_bound(&self, slot: PairSlot) -> bool {
+        let verdict = self.hot[slot.index()].verdict;
+        matches!(verdict, Verdict::Near | Verdict::Colliding) && !self.is_tight(slot)
+    }
+
+    /// Whether the query for a pair's contacts says its bound, and is no dearer: two convex bodies that collide.
+    fn says_both(&self, slot: PairSlot) -> bool {
+        let hot = &self.hot[slot.index()];
+        hot.verdict == Verdict::Colliding && !hot.meshed
+    }
+
+    /// Whether a colliding pair's contacts are older than its poses.
+    fn lacks_contacts(&self, slot: PairSlot) -> bool {
+        let memo = &self.memos[slot.index()];
+        self.hot[slot.index()].verdict == Verdict::Colliding
+            && !(self.is_tight(slot) && memo.contacts_tick >= memo.tested)
+    }
+
+    /// Whether a pair's interval is as narrow as its exact query makes it, at this tick's poses.
+    fn is_tight(&self, slot: PairSlot) -> bool {
+        let memo = &self.memos[slot.index()];
+        memo.tight && (memo.tested == self.tick || memo.rest)
+    }
+}

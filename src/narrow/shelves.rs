@@ -1,0 +1,53 @@
+//! Where queries that take several turns keep what they find, for all pairs.
+
+use super::Narrow;
+use super::arena::Arena;
+use super::contacts::Contact;
+use super::cursor::Cursor;
+use super::mesh::{CarriedFront, FrontStore};
+use super::pool::Pool;
+use crate::ids::PairSlot;
+
+/// The queries, and their entries.
+#[derive(Debug, Default)]
+pub(super) struct Shelves {
+    /// Of meshes and half-spaces.
+    pub(super) cursors: Pool<Cursor>,
+    /// What is carried of pairs of shapes of which one is a mesh.
+    pub(super) fronts: Pool<CarriedFront>,
+    /// The entries of fronts.
+    pub(super) store: FrontStore,
+    /// Contacts that cursors and pairs of several shapes have found.
+    pub(super) contacts: Arena<Contact>,
+}
+
+impl Shelves {
+    /// Takes a front back, if `at` is one.
+    pub(super) fn give_front(&mut self, at: &mut u32) {
+        if let Some(front) = self.fronts.get_mut(*at) {
+            front.release(&mut self.store);
+        }
+        self.fronts.give(at);
+    }
+
+    /// Takes a cursor back, if `at` is one.
+    pub(super) fn give_cursor(&mut self, at: &mut u32) {
+        if let Some(cursor) = self.cursors.get_mut(*at) {
+            cursor.release(&mut self.store, &mut self.contacts);
+        }
+        self.cursors.give(at);
+    }
+}
+
+impl Narrow {
+    /// Gives back what work on a pair keeps from turn to turn.
+    pub(super) fn give_back(&mut self, slot: PairSlot) {
+        let memo = &mut self.memos[slot.index()];
+        self.shelves.give_cursor(&mut memo.cursor);
+        self.shelves.give_front(&mut memo.front);
+        if let Some(front) = self.compounds.get_mut(memo.compound) {
+            front.release(&mut self.shelves);
+        }
+        self.compounds.give(&mut memo.compound);
+    }
+}
