@@ -5,15 +5,20 @@ use sweepd::ids::BodyId;
 use sweepd::math::{Pose, Quat, Vec3};
 use sweepd::scene::{BodySpec, PlacedSpec, Scene, SourceSpec};
 use sweepd::shape::Geometry;
-use sweepd::world::PlacedShape;
-
-use std::sync::Arc;
+use sweepd::world::Parts;
 
 use crate::bends::Bend;
-use crate::kinds::{BENDING, HALF_SPACE, Solid, any};
+use crate::kinds::{BENDING, HALF_SPACE, NAMES, Solid, any};
 use crate::oracle::meshes::Soup;
 use crate::oracle::rng::Rng;
+use crate::regimes::{Regime, Shares};
 use crate::truth::{Bounds, bounds};
+
+/// Directions that a search of the oracle begins with.
+const SAMPLES: u32 = 240;
+/// So often a couple is moved to where it is to be before it stays where it is: out of one another, to the gap asked
+/// for, and once more for what is thin and was passed through.
+const MOVES_MAX: usize = 3;
 
 pub struct Part {
     pub solid: Solid,
@@ -33,15 +38,26 @@ pub struct Couple {
     pub kinds: (usize, usize),
     /// By id: 2k + 1 and 2k + 2.
     pub bodies: [Body; 2],
+    /// The truth of each pair of their parts, those of the first body's first part first.
+    pub gaps: Vec<Bounds>,
     home: Vec3,
     mode: usize,
+    regime: Regime,
 }
 
+/// The truth of two bodies.
 pub fn gap_of(a: &Body, b: &Body, samples: u32) -> Bounds {
-    let mut least = Bounds {
-        low: f64::INFINITY,
-        high: f64::INFINITY,
-    };
+    least(&gaps_of(a, b, samples))
+}
+
+fn least(gaps: &[Bounds]) -> Bounds {
+    gaps.iter()
+        .fold(Bounds::FAR, |least, gap| least.least(*gap))
+}
+
+/// The truth of each pair of their parts.
+fn gaps_of(a: &Body, b: &Body, samples: u32) -> Vec<Bounds> {
+    let mut gaps = Vec::new();
     // Seen from A's place: far from the origin sums of poses lose what their difference keeps.
     let shift = b.pose.translation.vector - a.pose.translation.vector;
     let pose_a = Pose::from_parts(Vec3::zeros().into(), a.pose.rotation);
@@ -49,10 +65,10 @@ pub fn gap_of(a: &Body, b: &Body, samples: u32) -> Bounds {
     for one in &a.parts {
         for other in &b.parts {
             let (at_a, at_b) = (pose_a * one.local, pose_b * other.local);
-            least = least.least(bounds((&one.solid, at_a), (&other.solid, at_b), samples));
+            gaps.push(bounds((&one.solid, at_a), (&other.solid, at_b), samples));
         }
     }
-    least
+    gaps
 }
 
 /// A body of a kind; one in four has a second shape. With it what a scene says.
@@ -92,8 +108,53 @@ fn any_body(rng: &mut Rng, kind: usize, s: f64, id: u64, group: u32) -> (Body, B
 }
 
 impl Couple {
-    /// Places the second body anew: overlapping, within a hundredth, or anywhere near.
-    pub fn place(&mut self, rng: &mut Rng) {
+    /// The truth of the two.
+    pub fn gap(&self) -> Bounds {
+        least(&self.gaps)
+    }
+
+    /// The size of the larger one, metres.
+    pub fn large(&self) -> f64 {
+        self.bodies[0].size.max(self.bodies[1].size)
+    }
+
+    /// The size of the smaller one, metres.
+    pub fn small(&self) -> f64 {
+        self.bodies[0].size.min(self.bodies[1].size)
+    }
+
+    /// How far the truth may be off, metres: by rounding, and the search of directions creeps along the ridges that
+    /// circles make.
+    pub fn missed(&self) -> f64 {
+        let mut parts = self.bodies.iter().flat_map(|body| &body.parts);
+        let curved = |solid: &Solid| matches!(solid, Solid::Cylinder(..) | Solid::Cone(..));
+        if parts.any(|part| curved(&part.solid)) {
+            1e-6 * self.large()
+        } else {
+            self.noise()
+        }
+    }
+
+    /// What rounding may be, metres.
+    pub fn noise(&self) -> f64 {
+        1e-11 * self.large()
+    }
+
+    /// What they are, and how large.
+    pub fn names(&self) -> String {
+        let ((one, other), [a, b]) = (self.kinds, &self.bodies);
+        let (one, other) = (NAMES[one], NAMES[other]);
+        format!("{one} - {other} sizes {} {}", a.size, b.size)
+    }
+
+    /// The first place.
+    pub fn begin(&mut self, rng: &mut Rng) {
+        self.place(rng);
+        self.settle(rng, true);
+    }
+
+    /// Places both anew: one deep in the other, or about where they begin to touch.
+    fn place(&mut self, rng: &mut Rng) {
         let home = self.home;
         let [a, b] = &mut self.bodies;
         a.pose = Pose::from_parts((home + rng.vector(0.1 * a.size)).into(), rng.rotation());
@@ -111,34 +172,62 @@ impl Couple {
                 reach = a.size.max(b.size) * 2.0;
             }
         }
-        let from = a.pose.translation.vector;
-        let regime = rng.below(3);
-        let mut distance = if regime == 0 {
+        // Of those that are to be close some are so in a hole or a cavity.
+        let deep = match self.regime {
+            Regime::Overlapping => true,
+            Regime::Close => rng.below(4) == 0,
+            Regime::Free => rng.below(3) == 0,
+        };
+        let distance = if deep {
             rng.range(0.0, 0.4)
         } else {
             rng.range(0.8, 1.1)
         } * reach;
-        b.pose = Pose::from_parts((from + away * distance).into(), rotation);
-        if regime == 1 {
-            for _ in 0..6 {
-                let gap = gap_of(a, b, 60).high;
-                if gap.abs() < 1e-4 * b.size.min(a.size) || gap < 0.0 {
-                    break;
-                }
-                distance -= 0.999 * gap;
-                b.pose.translation.vector = from + away * distance;
+        let at = a.pose.translation.vector + away * distance;
+        b.pose = Pose::from_parts(at.into(), rotation);
+    }
+
+    /// Moves the second body to where the two are to be, and takes note of the truth there.
+    ///
+    /// One move does for two that are apart, whatever they are: what comes nearer by less than its distance does not
+    /// touch, and the nearest points stay the nearest.
+    ///
+    /// * `moved` - whether either moved or deformed since the last time.
+    fn settle(&mut self, rng: &mut Rng, moved: bool) {
+        let small = self.small();
+        let [a, b] = &mut self.bodies;
+        if moved {
+            self.gaps = gaps_of(a, b, SAMPLES);
+        }
+        for _ in 0..MOVES_MAX {
+            let gap = least(&self.gaps);
+            if self.regime.holds(&gap, small) {
+                return;
             }
-            let nudge = [0.01, -0.01, 1e-4, -1e-4, 1e-7, -1e-7][rng.below(6)];
-            b.pose.translation.vector += away * (nudge * rng.unit() * a.size.min(b.size));
+            let (from, at) = (a.pose.translation.vector, b.pose.translation.vector);
+            let to = match gap.way {
+                Some(way) => at + way * (self.regime.gap(rng, small) - gap.high),
+                // Out of one another, whatever they are.
+                None => {
+                    let out = (at - from).try_normalize(1e-9);
+                    from + out.unwrap_or_else(|| rng.direction()) * (a.size + b.size)
+                }
+            };
+            b.pose.translation.vector = to;
+            self.gaps = gaps_of(a, b, SAMPLES);
         }
     }
 
-    /// One tick of motion.
-    pub fn step(&mut self, rng: &mut Rng) {
+    /// One tick of motion; then the second body is where the two are to be.
+    ///
+    /// * `shares` - of the scene so far.
+    pub fn step(&mut self, rng: &mut Rng, shares: &Shares) {
         if rng.below(6) == 0 {
             self.mode = rng.below(7);
+            self.regime = shares.lacking();
         }
-        let small = self.bodies[0].size.min(self.bodies[1].size);
+        let small = self.small();
+        let mut moved = self.mode != 0;
         match self.mode {
             0 => {}
             1 => {
@@ -178,9 +267,13 @@ impl Couple {
                 && let Solid::Mesh(soup, _) = &mut part.solid
             {
                 bend.step(rng, soup, 0.5 * body.size);
+                moved = true;
             }
-            body.pose.rotation = Quat::new_normalize(body.pose.rotation.into_inner());
+            if self.mode != 0 {
+                body.pose.rotation = Quat::new_normalize(body.pose.rotation.into_inner());
+            }
         }
+        self.settle(rng, moved);
     }
 }
 
@@ -195,7 +288,7 @@ pub fn any_scene(rng: &mut Rng, kinds: &[(usize, usize)]) -> (Vec<Couple>, Scene
     let mut specs = Vec::new();
     for (k, &(one, other)) in kinds.iter().enumerate() {
         let ratio = if rng.below(5) == 0 {
-            10.0_f64.powf(rng.range(2.0, 3.5))
+            10.0_f64.powf(rng.range(2.0, 6.0))
         } else {
             1.0
         };
@@ -209,8 +302,10 @@ pub fn any_scene(rng: &mut Rng, kinds: &[(usize, usize)]) -> (Vec<Couple>, Scene
         couples.push(Couple {
             kinds: (one, other),
             bodies: [a, b],
+            gaps: Vec::new(),
             home,
             mode: rng.below(7),
+            regime: Regime::of(k),
         });
     }
     let scene = Scene {
@@ -228,7 +323,7 @@ pub fn any_scene(rng: &mut Rng, kinds: &[(usize, usize)]) -> (Vec<Couple>, Scene
 }
 
 /// Takes over the meshes that were built: a height field's is made there, and shells may be turned round.
-pub fn take_meshes(couples: &mut [Couple], built: &[Arc<[PlacedShape]>]) {
+pub fn take_meshes(couples: &mut [Couple], built: &[Parts]) {
     for (at, shapes) in built.iter().enumerate() {
         for (part, placed) in couples[at / 2].bodies[at % 2]
             .parts

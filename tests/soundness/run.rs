@@ -10,13 +10,15 @@ use sweepd::wire::{
     Demand, FrameHeader, Inbox, Outbox, TickCause, TransformRow, Verdict, WIRE_VERSION,
     frame_flags, name_bytes,
 };
-
-use crate::bends;
 use sweepd::world::{BuiltTree, WornTree};
 
-use crate::couples::{Body, Couple, any_scene, gap_of, take_meshes};
-use crate::kinds::{NAMES, Solid};
+use crate::bends;
+use crate::couples::{Couple, any_scene, gap_of, take_meshes};
+use crate::fronts::{Checked, Fronts};
+use crate::kinds::Solid;
 use crate::oracle::rng::Rng;
+use crate::regimes::Shares;
+use crate::tally::{Fault, Tally};
 use crate::truth::Bounds;
 
 /// Ticks of a scene.
@@ -25,9 +27,9 @@ pub const TICKS: u64 = 24;
 /// What was seen so far.
 #[derive(Default)]
 pub struct Run {
-    pub pair_ticks: u64,
-    pub overlapping: u64,
-    pub close: u64,
+    pub shares: Shares,
+    pub fronts: Checked,
+    pub tally: Tally,
     undecided: [u64; 4],
     /// Ticks after which the last engine went on and was not done.
     went_on: u64,
@@ -35,6 +37,13 @@ pub struct Run {
     pub trees: u64,
     by_kind: BTreeMap<(usize, usize), u64>,
     within_rounding: u64,
+}
+
+/// What an engine says of a pair.
+struct Said {
+    verdict: Verdict,
+    low: f64,
+    high: f64,
 }
 
 impl Run {
@@ -55,33 +64,21 @@ impl Run {
             .unwrap()
         });
         for couple in &mut couples {
-            couple.place(&mut rng);
+            couple.begin(&mut rng);
         }
+        let (mut fronts, mut shares) = (Fronts::new(seed), Shares::default());
         let mut inbox = Inbox::default();
         let mut built_trees: [Option<BuiltTree>; 4] = [const { None }; 4];
         for tick in 1..=TICKS {
             fill(&mut inbox, &couples, &clock, tick);
-            let whole = run(&mut engines[0], &inbox, &clock, Budget::UNLIMITED)
-                .tick
-                .units;
-            // Often early: then refits of what deforms are cut, too.
-            let most = [0, whole, whole / 8, whole / 30][rng.below(4)];
-            let stop = rng.bits() % (most + 1);
-            run(&mut engines[1], &inbox, &clock, Budget::units(stop));
-            run(&mut engines[2], &inbox, &clock, Budget::units(whole / 2));
-            // Each look at the clock takes 100 ns, and sending is said to take 100 us: the work stops anywhere, and
-            // time is left to go on.
-            clock.step_each_read(100);
-            let budget = Budget::time_ns(100_000 + rng.bits() % (100 * whole + 1));
-            run(&mut engines[3], &inbox, &clock, budget);
-            engines[3].note_sent(100_000);
-            clock.step_each_read(0);
-            for engine in &engines {
-                engine.validate().unwrap();
-            }
+            tick_all(&mut engines, &inbox, &clock, &mut rng);
+            let what = format!("seed {seed} tick {tick}");
             for (k, couple) in couples.iter().enumerate() {
-                let outs = [0, 1, 2, 3].map(|e: usize| engines[e].outbox());
-                self.compare(k as u64, couple, outs, &format!("seed {seed} tick {tick}"));
+                shares.count(&couple.gap(), couple.small());
+                self.compare(k, couple, &engines, &what);
+                let world = engines[k % 4].world();
+                let told = (&mut self.fronts, &mut self.tally);
+                fronts.tick(k, couple, world, told, &what);
             }
             clock.step_each_read(100);
             self.went_on += u64::from(engines[3].work_on(rng.bits() % 20_000));
@@ -95,88 +92,51 @@ impl Run {
                 }
             }
             for couple in &mut couples {
-                couple.step(&mut rng);
+                couple.step(&mut rng, &shares);
             }
         }
     }
 
-    fn compare(&mut self, k: u64, couple: &Couple, outs: [&Outbox; 4], what: &str) {
+    fn compare(&mut self, k: usize, couple: &Couple, engines: &[Engine; 4], what: &str) {
         let [a, b] = &couple.bodies;
-        let size = a.size.max(b.size);
-        let noise = 1e-11 * size;
-        // The search of directions creeps along the ridges that circles make.
-        let curved = |body: &Body| {
-            body.parts
-                .iter()
-                .any(|part| matches!(part.solid, Solid::Cylinder(..) | Solid::Cone(..)))
-        };
-        let missed = if curved(a) || curved(b) {
-            1e-6 * size
-        } else {
-            noise
-        };
-        let mut truth = gap_of(a, b, 240);
-        self.pair_ticks += 1;
+        let (noise, missed) = (couple.noise(), couple.missed());
+        let mut truth = couple.gap();
+        self.shares.count(&truth, couple.small());
         *self.by_kind.entry(couple.kinds).or_default() += 1;
-        self.overlapping += u64::from(truth.high < 0.0);
-        self.close += u64::from(truth.high.abs() < 0.02 * a.size.min(b.size));
-        for (engine, out) in outs.into_iter().enumerate() {
-            let ids = (2 * k + 1, 2 * k + 2);
-            let row = out.pairs.iter().find(|row| (row.body_a, row.body_b) == ids);
-            let row = row.filter(|row| row.verdict != Verdict::None.code());
-            let verdict = row.map_or(Verdict::Apart, |row| {
-                Verdict::from_code(row.verdict).unwrap()
-            });
-            let (low, high) =
-                row.map_or((0.0, f64::INFINITY), |row| (row.gap_min_m, row.gap_max_m));
-            let (one, other) = couple.kinds;
-            let tell = |truth: Bounds| {
-                if std::env::var_os("SWEEPD_TELL").is_some() {
-                    println!("{row:?}");
-                    for body in [a, b] {
-                        println!("{:?}", body.pose);
-                        for part in &body.parts {
-                            println!("  {:?} at {:?}", part.solid, part.local);
-                        }
-                    }
-                }
-                format!(
-                    "{what} engine {engine} {} - {} sizes {} {}: {verdict} [{low:e}, {high:e}], truth {truth:?}",
-                    NAMES[one], NAMES[other], a.size, b.size
-                )
-            };
-            if low > truth.high + missed {
+        for (place, engine) in engines.iter().enumerate() {
+            let said = Said::of(engine.outbox(), k);
+            if said.low > truth.high + missed {
                 // The search may have missed the best direction: search again before accusing.
                 truth = gap_of(a, b, 4_000);
             }
-            assert!(
-                low <= truth.high + missed,
-                "above the truth: {}",
-                tell(truth)
-            );
-            assert!(
-                high >= truth.low - noise,
-                "below the truth: {}",
-                tell(truth)
-            );
-            if truth.high < -missed {
-                assert!(
-                    matches!(verdict, Verdict::Colliding | Verdict::Possible),
-                    "missed: {}",
-                    tell(truth)
-                );
+            let tell = |fault: &str| {
+                let what = format!("{fault}: {what} engine {place}");
+                said.tell(&what, couple, truth)
+            };
+            let above = said.low > truth.high + missed;
+            let below = said.high < truth.low - noise;
+            let tally = &mut self.tally;
+            tally.note(Fault::Interval, u64::from(above), || {
+                tell("above the truth")
+            });
+            tally.note(Fault::Interval, u64::from(below), || {
+                tell("below the truth")
+            });
+            let denied = !matches!(said.verdict, Verdict::Colliding | Verdict::Possible);
+            let lost = denied && truth.depth() > missed;
+            let made_up = said.verdict == Verdict::Colliding && truth.low > noise;
+            tally.note(Fault::Verdict, u64::from(lost), || tell("missed"));
+            tally.note(Fault::Verdict, u64::from(made_up), || tell("made up"));
+            if said.verdict != Verdict::Possible {
+                continue;
             }
-            if truth.low > noise {
-                assert_ne!(verdict, Verdict::Colliding, "{}", tell(truth));
-            }
-            if verdict == Verdict::Possible {
-                self.undecided[engine] += 1;
-                if engine == 0 {
-                    // Without a limit only what cannot be told from touching is left open.
-                    self.within_rounding += 1;
-                    let open = truth.low <= 1e-9 * size && truth.high >= -1e-9 * size;
-                    assert!(open, "left open: {}", tell(truth));
-                }
+            self.undecided[place] += 1;
+            if place == 0 {
+                // Without a limit only what cannot be told from touching is left open.
+                self.within_rounding += 1;
+                let least = 1e-9 * couple.large();
+                let told_apart = truth.low > least || truth.depth() > least;
+                tally.note(Fault::Verdict, u64::from(told_apart), || tell("left open"));
             }
         }
     }
@@ -186,14 +146,23 @@ impl Run {
     }
 
     pub fn report(&self) {
-        let share = |n: u64| 100.0 * n as f64 / self.pair_ticks as f64;
+        let (all, fronts) = (self.shares.all, self.fronts);
+        let share = |n: u64| 100.0 * n as f64 / all as f64;
         println!(
-            "{} pair-ticks, each against four engines; {} kinds of pairs, at least {} each; {:.1} % overlap, {:.1} % within 2 %",
-            self.pair_ticks,
+            "{all} pair-ticks, each against four engines; {} kinds of pairs, at least {} each",
             self.by_kind.len(),
-            self.fewest(),
-            share(self.overlapping),
-            share(self.close)
+            self.fewest()
+        );
+        println!(
+            "{} overlap ({:.1} %), {} are apart by no more than 1 % of the smaller body's size ({:.1} %)",
+            self.shares.overlapping,
+            share(self.shares.overlapping),
+            self.shares.close,
+            share(self.shares.close)
+        );
+        println!(
+            "fronts in {} pair-ticks, {} times stopped and looked into, {} pairs of leaves",
+            fronts.pair_ticks, fronts.covers, fronts.leaf_pairs
         );
         println!(
             "unresolved: {:.3} % without limit ({} within rounding of touching), {:.2} % at a random stop, {:.2} % at half the work, {:.2} % at a deadline, which went on {} times and was not done then",
@@ -205,6 +174,65 @@ impl Run {
             self.went_on
         );
         println!("{} trees were built anew", self.trees);
+        println!("{}", self.tally);
+    }
+}
+
+impl Said {
+    /// Of the couple in a place of the scene.
+    fn of(out: &Outbox, place: usize) -> Self {
+        let first = 2 * place as u64 + 1;
+        let of_couple = |body_a: u64, body_b: u64| (body_a, body_b) == (first, first + 1);
+        let row = (out.pairs.iter()).find(|row| of_couple(row.body_a, row.body_b));
+        let row = row.filter(|row| row.verdict != Verdict::None.code());
+        row.map_or(
+            Self {
+                verdict: Verdict::Apart,
+                low: 0.0,
+                high: f64::INFINITY,
+            },
+            |row| Self {
+                verdict: Verdict::from_code(row.verdict).unwrap(),
+                low: row.gap_min_m,
+                high: row.gap_max_m,
+            },
+        )
+    }
+
+    fn tell(&self, what: &str, couple: &Couple, truth: Bounds) -> String {
+        if std::env::var_os("SWEEPD_TELL").is_some() {
+            for body in &couple.bodies {
+                println!("{:?}", body.pose);
+                for part in &body.parts {
+                    println!("  {:?} at {:?}", part.solid, part.local);
+                }
+            }
+        }
+        let (verdict, low, high) = (self.verdict, self.low, self.high);
+        let names = couple.names();
+        format!("{what} {names}: {verdict} [{low:e}, {high:e}], truth {truth:?}")
+    }
+}
+
+/// One tick of each engine, within what each has.
+fn tick_all(engines: &mut [Engine; 4], inbox: &Inbox, clock: &ManualClock, rng: &mut Rng) {
+    let whole = run(&mut engines[0], inbox, clock, Budget::UNLIMITED)
+        .tick
+        .units;
+    // Often early: then refits of what deforms are cut, too.
+    let most = [0, 1, whole, whole / 8, whole / 30][rng.below(5)];
+    let stop = rng.bits() % (most + 1);
+    run(&mut engines[1], inbox, clock, Budget::units(stop));
+    run(&mut engines[2], inbox, clock, Budget::units(whole / 2));
+    // Each look at the clock takes 100 ns, and sending is said to take 100 us: the work stops anywhere, and time is
+    // left to go on.
+    clock.step_each_read(100);
+    let budget = Budget::time_ns(100_000 + rng.bits() % (100 * whole + 1));
+    run(&mut engines[3], inbox, clock, budget);
+    engines[3].note_sent(100_000);
+    clock.step_each_read(0);
+    for engine in engines {
+        engine.validate().unwrap();
     }
 }
 
