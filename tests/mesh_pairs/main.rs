@@ -15,6 +15,7 @@
 #[path = "../oracle/mod.rs"]
 mod oracle;
 
+mod apart;
 mod contacts;
 mod deep;
 mod extremes;
