@@ -23,27 +23,22 @@
 
 mod common;
 
-use std::io::{BufRead, BufReader, Read};
+use std::io::Read as _;
 use std::os::unix::net::UnixDatagram;
 use std::path::PathBuf;
-use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use common::{provenance, save};
+use common::{another, place, preempted, provenance, save};
 use sweepd::time::{Clock, SystemClock};
 use sweepd::transport::Door;
 use sweepd::transport::client::{ClientOptions, FrameInfo, Rows, Topics};
-use sweepd::transport::iceoryx::{Place, Server, ServerOptions};
+use sweepd::transport::iceoryx::{Server, ServerOptions};
 use sweepd::wire::{Inbox, Outbox, PairRow, TransformRow, WIRE_VERSION};
 
 const SECOND_NS: u64 = 1_000_000_000;
 const FRAMES_DEFAULT: usize = 20_000;
 /// Frames before the measurement: connections, growth of slices, page faults.
 const FRAMES_WARM: usize = 500;
-
-fn place(root: &str) -> Place {
-    Place::new("bench").unwrap().under(root, "swbench_")
-}
 
 /// How long both sides look before they sleep; `None`: the default.
 fn spin_ns(how: &str) -> Option<u64> {
@@ -60,15 +55,7 @@ fn echo(frames: usize) -> String {
     std::fs::create_dir_all(&root).unwrap();
     let (here, there) = (root.join("here"), root.join("there"));
     let socket = UnixDatagram::bind(&here).unwrap();
-    let mut other = Command::new(std::env::current_exe().unwrap())
-        .args(["echo", there.to_str().unwrap(), here.to_str().unwrap()])
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut line = String::new();
-    BufReader::new(other.stdout.as_mut().unwrap())
-        .read_line(&mut line)
-        .unwrap();
+    let mut other = another(&["echo", there.to_str().unwrap(), here.to_str().unwrap()]);
     let clock = SystemClock;
     let mut byte = [1];
     let before = preempted("self") + preempted(&other.id().to_string());
@@ -170,16 +157,6 @@ fn at(sorted: &[u64], share: f64) -> f64 {
     us
 }
 
-/// How often the scheduler took the core from a process that wanted to go on.
-fn preempted(process: &str) -> u64 {
-    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
-    let mut lines = status.lines();
-    let count = lines.find_map(|line| line.strip_prefix("nonvoluntary_ctxt_switches:"));
-    count
-        .and_then(|count| count.trim().parse().ok())
-        .unwrap_or(0)
-}
-
 fn report(how: &str, bodies: u64, latencies_ns: &mut [u64], preempted: u64) -> String {
     latencies_ns.sort_unstable();
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
@@ -199,16 +176,7 @@ fn report(how: &str, bodies: u64, latencies_ns: &mut [u64], preempted: u64) -> S
 fn measure(how: &str, bodies: u64, frames: usize) -> String {
     let root = std::env::temp_dir().join(format!("swbench_{}", std::process::id()));
     let root = root.to_str().unwrap().to_owned();
-    let mut daemon = Command::new(std::env::current_exe().unwrap())
-        .args(["serve", &root, how])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut line = String::new();
-    BufReader::new(daemon.stdout.as_mut().unwrap())
-        .read_line(&mut line)
-        .unwrap();
+    let mut daemon = another(&["serve", &root, how]);
     let mut client = ClientOptions {
         place: place(&root),
         source: Some("sim".to_owned()),

@@ -8,7 +8,9 @@
     reason = "shared by benches that each use a part of it"
 )]
 
+use std::io::{BufRead as _, BufReader};
 use std::path::Path;
+use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 
 use sweepd::builtin::Random;
@@ -17,11 +19,12 @@ use sweepd::math::{Pose, Vec3};
 use sweepd::scene::Scene;
 use sweepd::tick::{Engine, TickInput};
 use sweepd::time::{Budget, Clock, SystemClock};
+use sweepd::transport::iceoryx::Place;
 use sweepd::wire::{
     Demand, FrameHeader, Inbox, Outbox, TickCause, TransformRow, WIRE_VERSION, frame_flags,
     name_bytes,
 };
-use sweepd::world::PlacedShape;
+use sweepd::world::Parts;
 
 /// An engine and the frame it is fed with.
 pub struct Bench {
@@ -50,7 +53,7 @@ impl Bench {
     }
 
     /// * `shapes` - of each body of the scene.
-    pub fn of(scene: Scene, shapes: Vec<Arc<[PlacedShape]>>) -> Self {
+    pub fn of(scene: Scene, shapes: Vec<Parts>) -> Self {
         let clock = Arc::new(SystemClock);
         let engine = Engine::new(&scene, shapes, 1, Arc::clone(&clock) as Arc<dyn Clock>).unwrap();
         let moving = scene.bodies.iter().filter(|body| body.moves);
@@ -184,6 +187,36 @@ pub fn quantile(times: &mut [u64], share: f64) -> u64 {
     times[at]
 }
 
+/// The shared memory of a bench and of the process that it starts, with files of their own.
+pub fn place(root: &str) -> Place {
+    Place::new("bench").unwrap().under(root, "swbench_")
+}
+
+/// This program again, once it has said `READY`; it is to end when its standard input does.
+pub fn another(args: &[&str]) -> Child {
+    let mut child = Command::new(std::env::current_exe().unwrap())
+        .args(args)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    BufReader::new(child.stdout.as_mut().unwrap())
+        .read_line(&mut line)
+        .unwrap();
+    child
+}
+
+/// How often the scheduler took the core from a process that wanted to go on.
+pub fn preempted(process: &str) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let mut lines = status.lines();
+    let count = lines.find_map(|line| line.strip_prefix("nonvoluntary_ctxt_switches:"));
+    count
+        .and_then(|count| count.trim().parse().ok())
+        .unwrap_or(0)
+}
+
 /// The arguments, but for cargo's own. Ends where one is unknown: a bench may run for minutes and save what it found.
 pub fn arguments(is_known: impl Fn(&str) -> bool) -> Vec<String> {
     let all = std::env::args().skip(1);
@@ -198,7 +231,7 @@ pub fn arguments(is_known: impl Fn(&str) -> bool) -> Vec<String> {
 /// Machine, commit and compiler, as CSV columns.
 pub fn provenance() -> String {
     let run = |command: &str, args: &[&str]| {
-        let out = std::process::Command::new(command).args(args).output();
+        let out = Command::new(command).args(args).output();
         out.map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned())
             .unwrap_or_default()
     };

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rustix::process::Signal;
 use sweepd::transport::client::{Client, Heard};
-use sweepd::wire::State;
+use sweepd::wire::{State, TickCause};
 
 use super::{code, err};
 use crate::live::{Desk, SECOND_NS, TWO_SPHERES, output, state, tick_until, until};
@@ -105,20 +105,29 @@ fn with_work_of_its_own_it_leaves_the_rest_of_each_frame_to_the_daemon_and_tells
     let desk = Desk::new();
     let path = pool(&desk, "12");
     let _daemon = desk.start("run", &[&path, "--mode", "on_frame=feed"]);
-    let ended = output(&[
-        "feed",
-        &path,
-        "--instance",
-        &desk.instance,
+    let mut reader = desk.client(None);
+    let args = [
+        path.as_str(),
         "--rate",
         "20",
         "--work",
         "1ms..3ms",
         "--frames",
         "40",
-    ]);
-    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
-    let text = String::from_utf8_lossy(&ended.stdout).into_owned();
+    ];
+    let mut feed = desk.start("feed", &args);
+    let mut given_ns = Vec::new();
+    tick_until(&mut reader, "the last frame", |tick| {
+        if tick.cause == TickCause::Frame.code() {
+            given_ns.push(tick.budget_ns);
+        }
+        tick.sources[0].seq == 40
+    });
+    assert_eq!(feed.end().0.code(), Some(0), "{}", feed.stderr());
+    // A daemon that has no budget of its own has what the frame leaves it, and no more.
+    assert!(!given_ns.is_empty());
+    assert!(given_ns.iter().all(|ns| *ns < 49_000_000), "{given_ns:?}");
+    let text = feed.stdout();
     let figures = |name: &str| -> Vec<f64> {
         let line = text.lines().find(|line| line.contains(name)).unwrap();
         let (_, after) = line.split_once(name).unwrap();

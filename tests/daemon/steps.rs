@@ -3,7 +3,8 @@
 use std::time::Instant;
 
 use sweepd::builtin::{Random, pool};
-use sweepd::transport::client::{Client, Heard};
+use sweepd::time::{Clock as _, SystemClock};
+use sweepd::transport::client::{Client, FrameInfo, Heard, Rows};
 use sweepd::wire::{ContactKind, Event, Stage, State, TickCause, Verdict, name_str};
 
 use crate::live::{Desk, SECOND_NS, TWO_SPHERES, at, send, state, step, tick_until, words};
@@ -78,6 +79,46 @@ fn each_step_in_lockstep_has_the_pairs_and_contacts_of_its_own_frame() {
     assert_eq!(names, [Some("a"), Some("b")]);
     drop(client);
     assert_eq!(daemon.stop().0.code(), Some(0), "{}", daemon.stderr());
+}
+
+#[test]
+fn the_time_that_a_frame_leaves_bounds_the_work_of_its_tick() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    let hour_ns = 3_600 * SECOND_NS;
+    let says = |deadline_ns, time_left_ns| FrameInfo {
+        deadline_ns,
+        time_left_ns,
+        ..FrameInfo::default()
+    };
+    let mut tick_of = |info: &FrameInfo, place: f64| {
+        let mut rows = [at(1, 0.0), at(2, 0.0)];
+        rows[1].position = [place; 3];
+        client
+            .step(info, Rows::Poses(&rows), 30 * SECOND_NS)
+            .unwrap();
+        *client.view().tick()
+    };
+    // They overlap there, which takes work to tell; and here not even their boxes do.
+    let (touching, apart) = (0.4, 5.0);
+    let late_ns = SystemClock.monotonic_ns() + hour_ns;
+    for (late, enough) in [
+        (says(1, 0), says(late_ns, 0)),
+        (says(0, 1), says(0, hour_ns)),
+    ] {
+        let tick = tick_of(&late, touching);
+        assert!(tick.budget_ns <= 1, "{} ns", tick.budget_ns);
+        assert_eq!((tick.units, tick.possible, tick.overrun), (0, 1, 1));
+        let tick = tick_of(&enough, touching);
+        assert!(tick.budget_ns <= hour_ns, "{} ns", tick.budget_ns);
+        assert_eq!((tick.possible, tick.overrun), (0, 0));
+        assert_eq!(tick_of(&FrameInfo::default(), apart).possible, 0);
+        // Who says nothing has no end.
+        let tick = tick_of(&FrameInfo::default(), touching);
+        assert_eq!((tick.possible, tick.budget_ns), (0, u64::MAX));
+        tick_of(&FrameInfo::default(), apart);
+    }
 }
 
 #[test]
