@@ -1,31 +1,41 @@
 #!/usr/bin/env python3
 """Pairs of meshes to the end, cold, beside parry3d-f64, coal and FCL.
 
-    python3 benches/mesh_peers.py [--rounds N]      # needs `pip install coal python-fcl numpy` (here: 3.0.3, 0.7.0.11)
+    python3 benches/mesh_peers.py [--rounds N] [--csv FILE] [--no-cpp]
+
+Needs `pip install coal python-fcl numpy` (here: 3.0.3, 0.7.0.11). For FCL from C++ it installs by apt-get what is not
+there of g++ and libfcl-dev, and compiles for some three minutes, once; `--no-cpp` leaves that out.
 
 200 pairs of closed meshes of 19,880 triangles at the same poses, each asked for its verdict, then for its distance where
 it is apart, or for all its contacts where it touches. CPU time of one thread around each single call, libraries one
 after the other in each round; the median of a pair's rounds counts. sweepd and parry3d-f64 are called from Rust
-(`cargo bench --bench time_critical -- peers FOLDER`, once a round); coal and FCL from Python, so that a Python call is in
-their time: what it takes is measured with two distant spheres and told beside them ("call"). That holds no contact:
-python-fcl's `collide` also builds a Python object and four numpy arrays for each contact, some 40 % of its time for all
-contacts; coal's results stay in C++.
+(`cargo bench --bench time_critical -- peers FOLDER`, once a round); coal and FCL from Python, so that a Python call is
+in their time: what it takes is measured with two distant spheres and told beside them ("call"). That holds no contact:
+python-fcl's `collide` also builds a Python object and four numpy arrays for each contact; coal's results stay in C++.
+So FCL is also called from C++ ("fcl-cpp": `benches/peers/mesh_fcl.cpp`, once a round), and that is the timing of its
+contact sets. Nearly all of FCL is templates, which Debian's library holds as compiled for any x86-64; here they are
+compiled from Debian's headers with -O3 -march=native, for ours too uses what the processor has.
 
 Nothing is carried from one query to the next in any of them. Trees are built before; FCL and coal have boxes around
-triangles in groups of one (their default), OBBRSS. Solids: ours also proves that neither lies within the other, which
-the others do not ask; no pair here does. Contacts: ours are the points of manifolds by surface; parry's are points of
-manifolds by triangle pair; coal's and FCL's are one or more for each pair of triangles that cross, up to 100,000.
+triangles in groups of one (their default), OBBRSS; "fcl-cpp OBB/RSS" has lighter ones, OBB to collide and RSS for the
+distance. Solids: ours also proves that neither lies within the other, which the others do not ask; no pair here does.
+Contacts: ours are the points of manifolds by surface; parry's are points of manifolds by triangle pair; coal's and
+FCL's are one or more for each pair of triangles that cross, up to 100,000.
 
 Verdicts and distances are compared: with ours to 1e-6 m, which is 5e-7 of the diameter; pairs nearer to touching than
 that are exempt, and counted.
 
-Writes `benches/results/mesh_peers.csv` and prints the table of the README.
+Writes `benches/results/mesh_peers.csv`, or FILE, and prints the table of the README.
 """
 
 import argparse
+import os
+import re
+import shutil
 import statistics
 import struct
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -38,6 +48,9 @@ ROOT = Path(__file__).resolve().parent.parent
 TOLERANCE_M = 1e-6
 CONTACTS_MAX = 100_000
 SEED = 17
+FCL_SOURCE = ROOT / "benches/peers/mesh_fcl.cpp"
+FCL_HEADERS = Path("/usr/include/fcl")
+FCL_FLAGS = ("-std=c++17", "-O3", "-march=native", "-DNDEBUG")
 
 
 def read_mesh(path):
@@ -166,9 +179,52 @@ def machine():
     return f"{fields['model name']} family {fields['cpu family']} model {fields['model']}"
 
 
-def rust_rows(binary, folder):
-    subprocess.run([*binary, "peers", str(folder)], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
-    for line in (folder / "rust.csv").read_text().splitlines()[1:]:
+def install_fcl():
+    missing = [] if shutil.which("c++") else ["g++"]
+    if not FCL_HEADERS.is_dir():
+        missing.append("libfcl-dev")
+    if not missing:
+        return
+    as_root = [] if os.geteuid() == 0 else ["sudo", "-n"]
+    try:
+        for words in (["update"], ["install", "-y", "--no-install-recommends", *missing]):
+            subprocess.run([*as_root, "apt-get", *words], check=True, stdout=sys.stderr)
+    except (OSError, subprocess.CalledProcessError):
+        sys.exit(
+            f"mesh_peers.py: FCL from C++ needs {' '.join(missing)}, which may not be installed from here: "
+            "install them, or run with --no-cpp."
+        )
+
+
+def build_fcl():
+    """FCL called from C++, compiled for this machine; anew where its source, headers or this file changed."""
+    install_fcl()
+    folder = ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "mesh_fcl"
+    binary = folder / "mesh_fcl"
+    # A header that a package brought has the time of its making, but the change of its place is of now.
+    newest = max(path.stat().st_ctime for path in (FCL_SOURCE, FCL_HEADERS / "config.h", Path(__file__)))
+    if binary.exists() and binary.stat().st_mtime > newest:
+        return binary
+    # By `extern template` a header leaves its templates to Debian's library, whatever the flags here. All of them are
+    # compiled here, not some: Eigen aligns its matrices by the flags, so that the two would not fit together.
+    for header in FCL_HEADERS.rglob("*.h"):
+        copy = folder / "include/fcl" / header.relative_to(FCL_HEADERS)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_text(re.sub(r"extern template\b.*?;", "", header.read_text(), flags=re.DOTALL))
+    print("compiling FCL, some three minutes", file=sys.stderr, flush=True)
+    headers = [f"-I{folder / 'include'}", "-isystem", "/usr/include/eigen3"]
+    subprocess.run(["c++", *FCL_FLAGS, *headers, str(FCL_SOURCE), "-o", str(binary), "-lfcl", "-lccd"], check=True)
+    return binary
+
+
+def cpp_compiler():
+    return f"c++ {command('c++', '-dumpfullversion', '-dumpversion')} {' '.join(FCL_FLAGS[1:3])}"
+
+
+def rows(command_words, path):
+    """Those that a program wrote, of Rust or C++: both in the same columns."""
+    subprocess.run(command_words, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+    for line in path.read_text().splitlines()[1:]:
         pair, library, job, ns, touches, low, high, contacts = line.split(",")
         yield int(pair), library, job, int(ns), touches == "1", float(low), float(high), int(contacts)
 
@@ -177,7 +233,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--binary", nargs="*", default=["cargo", "bench", "-q", "--bench", "time_critical", "--"])
+    parser.add_argument("--csv", type=Path, default=ROOT / "benches/results/mesh_peers.csv")
+    parser.add_argument("--no-cpp", action="store_true", help="leave FCL from C++ out")
     args = parser.parse_args()
+    from_cpp = None if args.no_cpp else build_fcl()
     took, answers = {}, {}
 
     def note(library, job, pair, ns, touches, low, high, contacts):
@@ -189,7 +248,7 @@ def main():
         libraries = None
         for number in range(args.rounds):
             jobs = []
-            for row in rust_rows(args.binary, folder):
+            for row in rows([*args.binary, "peers", str(folder)], folder / "rust.csv"):
                 pair, library, job, *rest = row
                 note(library, job, pair, *rest)
                 if library == "sweepd":
@@ -205,16 +264,21 @@ def main():
                     asked = library.pair(pair % 4, (pair + 1) % 4, placed)
                     ns, touches, distance, contacts = library.ask(asked, job)
                     note(library.name, job, pair, ns, touches, distance, distance, contacts)
+            if from_cpp:
+                (folder / "jobs.txt").write_text("".join(f"{pair} {job}\n" for pair, job in jobs))
+                for pair, library, job, *rest in rows([str(from_cpp), str(folder)], folder / "fcl.csv"):
+                    note(library, job, pair, *rest)
             print(f"round {number + 1} of {args.rounds}", flush=True)
-    report(args.rounds, took, answers, calls)
+    report(args.csv, args.rounds, took, answers, calls)
 
 
-def report(rounds, took, answers, calls):
+def report(csv, rounds, took, answers, calls):
     columns = (
         "machine,commit,compiler,seed,library,job,pairs,rounds,p50_us,p90_us,mean_us,call_us,"
         "contacts_mean,disagree,exempt"
     )
-    head = f"{machine()},{command('git', 'rev-parse', '--short', 'HEAD')},{command('rustc', '--version')},{SEED}"
+    head = f"{machine()},{command('git', 'rev-parse', '--short', 'HEAD')}"
+    rustc = command("rustc", "--version")
     lines, table = [columns], {}
     for (library, job), pairs in sorted(took.items()):
         medians = sorted(statistics.median(each) / 1e3 for each in pairs.values())
@@ -235,12 +299,13 @@ def report(rounds, took, answers, calls):
         p50, p90 = (medians[min(len(medians) - 1, int(share * len(medians)))] for share in (0.5, 0.9))
         mean = statistics.fmean(medians)
         call = calls.get(library, 0.0)
+        compiler = cpp_compiler() if library.startswith("fcl-cpp") else rustc
         lines.append(
-            f"{head},{library},{job},{len(pairs)},{rounds},{p50:.2f},{p90:.2f},{mean:.2f},{call:.2f},"
+            f"{head},{compiler},{SEED},{library},{job},{len(pairs)},{rounds},{p50:.2f},{p90:.2f},{mean:.2f},{call:.2f},"
             f"{contacts / len(pairs):.1f},{disagree},{exempt}"
         )
         table[library, job] = (p50, mean, disagree, exempt, contacts / len(pairs))
-    (ROOT / "benches/results/mesh_peers.csv").write_text("\n".join(lines) + "\n")
+    csv.write_text("\n".join(lines) + "\n")
     print("\n".join(lines))
     print("\n| library | verdict, p50 / mean | distance | contacts (how many) | other answers, exempt |\n| --- | --- | --- | --- | --- |")
     for library in sorted({library for library, _ in table}, key=lambda name: table[name, "verdict"][1]):
