@@ -12,10 +12,11 @@ use sweepd::narrow::mesh::Goal;
 use sweepd::shape::Shape;
 use sweepd::time::{Clock, SystemClock};
 
+use crate::SEED;
 use crate::common::{provenance, quantile, save};
 use crate::peers::{Ours, ask_parry, theirs};
 use crate::stage::{Courses, DIAMETER_M, PAIRS};
-use crate::{SEED, us};
+use crate::table::us;
 
 /// Gaps, percent of the diameter.
 const GAPS: [f64; 3] = [0.5, 2.0, 5.0];

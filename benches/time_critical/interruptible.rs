@@ -14,6 +14,7 @@ use crate::SEED;
 use crate::common::{provenance, quantile, save};
 use crate::peers::{Found, Ours};
 use crate::stage::{Courses, PAIRS};
+use crate::table;
 
 /// Units of a turn.
 const SLICE_UNITS: u64 = 32;
@@ -78,8 +79,8 @@ pub fn run(shapes: &[Arc<Shape>], quick: bool) {
             ratios.push(sums_ns[1] * 100_000 / sums_ns[0]);
             (0..2).for_each(|way| times[way].push(sums_ns[way]));
         }
-        let us = |times: &mut [u64]| crate::us(quantile(times, 0.5));
-        let cost = crate::us(quantile(&mut ratios, 0.5)) - 100.0;
+        let us = |times: &mut [u64]| table::us(quantile(times, 0.5));
+        let cost = table::us(quantile(&mut ratios, 0.5)) - 100.0;
         let line = format!(
             "{job},{},{rounds},{units},{:.1},{:.1},{cost:.1}",
             pairs.len(),

@@ -18,7 +18,7 @@ use sweepd::pairs::{PairDelta, PairSet};
 use sweepd::shape::{Geometry, Shape};
 use sweepd::time::{Clock, Meter, SystemClock};
 use sweepd::wire::{FrameHeader, Inbox, WIRE_VERSION, frame_flags, name_bytes};
-use sweepd::world::{PlacedShape, World};
+use sweepd::world::{Parts, PlacedShape, World};
 
 use crate::common::{provenance, quantile, row, save};
 use crate::oracle::Triangle;
@@ -53,7 +53,7 @@ impl Alone {
         let placed = shapes.map(|shape| {
             let shape = Arc::clone(shape);
             let pose = Pose::identity();
-            Arc::from(vec![PlacedShape { shape, pose }])
+            Parts::from([PlacedShape { shape, pose }])
         });
         let clock = SystemClock;
         let mut world = World::new(&scene, placed.to_vec(), clock.boottime_ns()).unwrap();
@@ -127,7 +127,7 @@ struct Tally {
 }
 
 /// Shares of the diameter and angles are kept as whole millionths.
-fn millionths(x: f64) -> u64 {
+pub fn millionths(x: f64) -> u64 {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

@@ -1,7 +1,9 @@
-//! The baseline that keeps nothing but, on request, the triangles that touched last: every tick each pair's walk starts
-//! again at the tick's poses.
+//! The baseline that keeps nothing but, on request, the triangles that touched last: every tick each pair's search
+//! starts again from the roots, at the tick's poses.
 
-use sweepd::narrow::mesh::{Goal, Walk, retest_witness};
+use sweepd::math::{Interval, Pose};
+use sweepd::narrow::mesh::{CarriedFront, FrontStore, Goal, Search, Walk, retest_witness};
+use sweepd::shape::Shape;
 use sweepd::time::Meter;
 
 use crate::stage::{PAIRS, Stage};
@@ -9,23 +11,81 @@ use crate::stage::{PAIRS, Stage};
 /// Node tests of a pair's turn, as in the engine.
 const SLICE_UNITS: u64 = 32;
 
+/// One search for each pair.
+pub enum Trees {
+    /// Over the boxes in the bodies' frames.
+    Walks(Vec<Walk>),
+    /// Over the oriented boxes, in the engine's own order for verdicts.
+    Fronts(Vec<CarriedFront>, Box<FrontStore>),
+}
+
+impl Trees {
+    pub fn walks() -> Self {
+        Self::Walks((0..PAIRS).map(|_| Walk::default()).collect())
+    }
+
+    pub fn fronts() -> Self {
+        let fronts = (0..PAIRS).map(|_| CarriedFront::default());
+        Self::Fronts(fronts.collect(), Box::default())
+    }
+
+    fn start(&mut self, pair: usize, [a, b]: [&Shape; 2], pos12: &Pose) {
+        match self {
+            Self::Walks(walks) => walks[pair].start(a, b, pos12),
+            Self::Fronts(fronts, store) => {
+                fronts[pair].start(store, a, b, pos12, Search::Restart);
+            }
+        }
+    }
+
+    /// One turn; whether there is a verdict.
+    fn advance(&mut self, pair: usize, [a, b]: [&Shape; 2], meter: &mut Meter<'_>) -> bool {
+        let goal = Goal::Verdict;
+        match self {
+            Self::Walks(walks) => walks[pair].advance(a, b, goal, SLICE_UNITS, meter),
+            Self::Fronts(fronts, store) => {
+                fronts[pair].advance(store, a, b, goal, SLICE_UNITS, meter)
+            }
+        }
+    }
+
+    fn interval(&self, pair: usize) -> Interval {
+        match self {
+            Self::Walks(walks) => walks[pair].interval(),
+            Self::Fronts(fronts, _) => fronts[pair].interval(),
+        }
+    }
+
+    /// The triangles that are nearest or touch.
+    fn witness(&self, pair: usize) -> Option<(u32, u32)> {
+        let witness = match self {
+            Self::Walks(walks) => walks[pair].witness(),
+            Self::Fronts(fronts, _) => fronts[pair].witness(),
+        };
+        witness.map(|leaves| (leaves.triangle_a, leaves.triangle_b))
+    }
+}
+
 pub struct Restart {
-    walks: Vec<Walk>,
+    trees: Trees,
     witnesses: Vec<Option<(u32, u32)>>,
     cached: bool,
+    /// The pair's search has begun in this tick.
+    started: Vec<bool>,
     /// Verdict at this tick's poses: colliding, apart, or unknown.
     pub verdicts: Vec<Option<bool>>,
     /// Ticks since the last verdict.
-    pub ages: Vec<u64>,
+    ages: Vec<u64>,
 }
 
 impl Restart {
     /// * `cached` - last tick's witness is asked first.
-    pub fn new(cached: bool) -> Self {
+    pub fn new(trees: Trees, cached: bool) -> Self {
         Self {
-            walks: (0..PAIRS).map(|_| Walk::default()).collect(),
+            trees,
             witnesses: vec![None; PAIRS],
             cached,
+            started: vec![false; PAIRS],
             verdicts: vec![None; PAIRS],
             ages: vec![0; PAIRS],
         }
@@ -33,6 +93,7 @@ impl Restart {
 
     pub fn spend(&mut self, stage: &Stage, meter: &mut Meter<'_>) {
         self.verdicts.fill(None);
+        self.started.fill(false);
         let mut order: Vec<usize> = (0..PAIRS).collect();
         order.sort_by_key(|&pair| (std::cmp::Reverse(self.ages[pair]), pair));
         if self.cached {
@@ -47,30 +108,38 @@ impl Restart {
                 }
             }
         }
-        let mut started = [false; PAIRS];
         order.retain(|&pair| self.verdicts[pair].is_none());
         while meter.open() && !order.is_empty() {
             order.retain(|&pair| {
                 if !meter.open() {
                     return true;
                 }
-                let [a, b] = stage.couple(pair);
-                let walk = &mut self.walks[pair];
-                if !std::mem::replace(&mut started[pair], true) {
-                    walk.start(a, b, &stage.pose(pair));
+                let couple = stage.couple(pair);
+                if !std::mem::replace(&mut self.started[pair], true) {
+                    self.trees.start(pair, couple, &stage.pose(pair));
                 }
-                if !walk.advance(a, b, Goal::Verdict, SLICE_UNITS, meter) {
+                if !self.trees.advance(pair, couple, meter) {
                     return true;
                 }
-                let collides = walk.interval().min <= 0.0;
+                let collides = self.trees.interval(pair).min <= 0.0;
                 self.verdicts[pair] = Some(collides);
-                let witness = walk.witness().filter(|_| collides);
-                self.witnesses[pair] = witness.map(|w| (w.triangle_a, w.triangle_b));
+                self.witnesses[pair] = self.trees.witness(pair).filter(|_| collides);
                 false
             });
         }
         for (age, verdict) in self.ages.iter_mut().zip(&self.verdicts) {
             *age = if verdict.is_some() { 0 } else { *age + 1 };
+        }
+    }
+
+    /// What is known of a pair's gap at this tick's poses.
+    pub fn gap(&self, pair: usize) -> Interval {
+        if self.verdicts[pair] == Some(true) {
+            Interval::new(f64::NEG_INFINITY, 0.0)
+        } else if self.started[pair] {
+            self.trees.interval(pair)
+        } else {
+            Interval::UNKNOWN
         }
     }
 }

@@ -14,7 +14,7 @@ use sweepd::scene::{BodySpec, PlacedSpec, Scene, SourceSpec};
 use sweepd::shape::{Geometry, Mesh, Shape, ShapeSpec};
 use sweepd::time::{Clock, Meter, SystemClock};
 use sweepd::wire::{FrameHeader, Inbox, TransformRow, WIRE_VERSION, frame_flags, name_bytes};
-use sweepd::world::{PlacedShape, World};
+use sweepd::world::{Parts, PlacedShape, World};
 
 use crate::common::row;
 
@@ -131,12 +131,12 @@ impl Courses {
 }
 
 /// All bodies with their shapes: the two of a pair have different ones.
-pub fn bodies(shapes: &[Arc<Shape>]) -> (Scene, Vec<Arc<[PlacedShape]>>) {
+pub fn bodies(shapes: &[Arc<Shape>]) -> (Scene, Vec<Parts>) {
     let scene = scene((0..2 * PAIRS).map(|k| body(k as u64 + 1)).collect());
     let placed = (0..2 * PAIRS).map(|k| {
         let shape = Arc::clone(&shapes[(k / 2 + k % 2) % shapes.len()]);
         let pose = Pose::identity();
-        Arc::from(vec![PlacedShape { shape, pose }])
+        Parts::from([PlacedShape { shape, pose }])
     });
     (scene, placed.collect())
 }
@@ -158,7 +158,17 @@ pub struct Stage {
 impl Stage {
     /// * `percent` - motion of a surface point a tick, percent of the diameter; each pair 0.2 to 3 times that.
     pub fn new(shapes: &[Arc<Shape>], percent: f64, seed: u64) -> Self {
-        let (scene, placed) = bodies(shapes);
+        Self::reporting(shapes, percent, seed, 0.0)
+    }
+
+    /// As `new`, at the same poses.
+    ///
+    /// * `within_m` - pairs nearer than this are reported: their bounds are worked on when the verdicts are there.
+    pub fn reporting(shapes: &[Arc<Shape>], percent: f64, seed: u64, within_m: f64) -> Self {
+        let (mut scene, placed) = bodies(shapes);
+        for body in &mut scene.bodies {
+            body.report_within_m = within_m;
+        }
         let clock = SystemClock;
         let world = World::new(&scene, placed, clock.boottime_ns()).unwrap();
         let mut stage = Self {
