@@ -16,9 +16,13 @@ pub fn of_convex(a: At<'_>, b: At<'_>, samples: u32) -> ([f64; 2], Vec3) {
         return ([gap; 2], n);
     };
     let (low, n) = exact(a, b, &one, &other);
-    // A direction that is off by the rounding of its corners proves less by that times the larger one's size.
+    // A direction that is off by the rounding of its corners proves less, by that times the larger one's size: the
+    // smaller the distance of the cores beside it, the more. Where neither core reaches into the other the distance of
+    // their surfaces is the gap, too.
+    let core_m = low + one.radius + other.radius;
     let (small, large) = (one.size.min(other.size), one.size.max(other.size));
-    let high = if large > LARGE * small && low > -1e-3 * small {
+    let blurred = large > LARGE * small || core_m.abs() < 1e-4 * large;
+    let high = if blurred && core_m > -1e-3 * small {
         low.max(one.distance(&other))
     } else {
         low
