@@ -136,7 +136,8 @@ impl CompoundFront {
         let stale =
             self.fresh_len > 0 && self.cover.len() > STALE_TIMES * self.fresh_len + STALE_MORE;
         let far = self.cover.drift.path_m > PATH_MAX * size_m;
-        let leap = self.cover.drift.last_m > LEAP * size_m;
+        // Of bodies that both have a half-space nobody knows how far they went.
+        let leap = self.cover.drift.last_m > LEAP * size_m || size_m == f64::INFINITY;
         let worn = self.fresh_len > 0
             && WORN_TIMES * self.cover.expired_len(&tools.shelves.store.entries) > self.fresh_steps;
         if worn || stale || far || leap || self.cover.is_lost() || self.search != Search::Carried {
@@ -297,7 +298,8 @@ impl CompoundFront {
             self.cover.anchor_here(entries, &self.at.pos12);
         }
         let Some(group) = self.cover.proved.pop(&mut entries.groups) else {
-            return;
+            // Not reached: where nothing is left the goal is.
+            return meter.charge(1);
         };
         // What is stored holds at this pose; a new test may be lower by rounding.
         let known_m = if expired {

@@ -282,3 +282,30 @@ fn a_walk_over_pairs_of_shapes_leaves_out_none_that_may_touch() {
         }
     }
 }
+
+#[test]
+fn bug_two_bodies_that_both_have_a_half_space_came_to_no_end_at_another_pose() {
+    let mut random = Random::new(7);
+    let [_, a] = bodies(&mut random, [1, 3], Planes::Beside);
+    let [_, b] = bodies(&mut random, [1, 4], Planes::Beside);
+    let clock = ManualClock::new(0);
+    let (mut shelves, mut found, mut counters) =
+        (Shelves::default(), Vec::new(), Counters::default());
+    let mut front = CompoundFront::default();
+    for step in 0..6 {
+        let at = Vec3::new(0.0, 0.0, 3.0 + 0.001 * f64::from(step));
+        let rel = Pose::from_parts(at.into(), Quat::identity());
+        let mut tools = Tools {
+            shelves: &mut shelves,
+            found: &mut found,
+            counters: &mut counters,
+            search: Search::Carried,
+            tick: 1,
+        };
+        front.move_to(&mut tools, (&a, &b), &rel);
+        // Each step tells something new: some hundred are enough.
+        let mut meter = Meter::new(&clock, None, Some(1_000));
+        let asked = (Goal::Gap, 0.0);
+        assert!(front.advance(&mut tools, (&a, &b), asked, u64::MAX, &mut meter));
+    }
+}
