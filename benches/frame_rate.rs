@@ -46,7 +46,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use common::{another, arguments, place, preempted, provenance, quantile, save};
+use common::{another, arguments, end, place, preempted, provenance, quantile, save};
 use stage::{Courses, PAIRS, bodies, shapes};
 use sweepd::builtin::Random;
 use sweepd::config::Mode;
@@ -340,7 +340,7 @@ fn measure(case: &Case) -> String {
     let budget = case
         .budget_ns
         .map_or("none".to_owned(), |ns| ns.to_string());
-    let mut daemon = case.says.map(|_| another(&["serve", &root, &budget]));
+    let daemon = case.says.map(|_| another(&["serve", &root, &budget]));
     let mut asker = case.says.map(|says| Asker::connect(&root, says));
     let id = daemon.as_ref().map(|daemon| daemon.id().to_string());
     let switches = || preempted("self") + id.as_deref().map_or(0, preempted);
@@ -349,11 +349,7 @@ fn measure(case: &Case) -> String {
     let line = line(case, tally, switches() - before);
     eprintln!("{line}");
     drop(asker);
-    if let Some(daemon) = &mut daemon {
-        drop(daemon.stdin.take());
-        daemon.wait().unwrap();
-    }
-    let _left = std::fs::remove_dir_all(&root);
+    end(daemon, &root);
     line
 }
 

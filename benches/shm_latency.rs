@@ -28,7 +28,7 @@ use std::os::unix::net::UnixDatagram;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use common::{another, place, preempted, provenance, save};
+use common::{another, end, place, preempted, provenance, save};
 use sweepd::time::{Clock, SystemClock};
 use sweepd::transport::Door;
 use sweepd::transport::client::{ClientOptions, FrameInfo, Rows, Topics};
@@ -55,7 +55,7 @@ fn echo(frames: usize) -> String {
     std::fs::create_dir_all(&root).unwrap();
     let (here, there) = (root.join("here"), root.join("there"));
     let socket = UnixDatagram::bind(&here).unwrap();
-    let mut other = another(&["echo", there.to_str().unwrap(), here.to_str().unwrap()]);
+    let other = another(&["echo", there.to_str().unwrap(), here.to_str().unwrap()]);
     let clock = SystemClock;
     let mut byte = [1];
     let before = preempted("self") + preempted(&other.id().to_string());
@@ -69,8 +69,7 @@ fn echo(frames: usize) -> String {
         .collect();
     let switches = preempted("self") + preempted(&other.id().to_string());
     socket.send_to(&[0], &there).unwrap();
-    other.wait().unwrap();
-    let _left = std::fs::remove_dir_all(&root);
+    end(Some(other), &root);
     report("socket_echo", 0, &mut latencies_ns, switches - before)
 }
 
@@ -176,7 +175,7 @@ fn report(how: &str, bodies: u64, latencies_ns: &mut [u64], preempted: u64) -> S
 fn measure(how: &str, bodies: u64, frames: usize) -> String {
     let root = std::env::temp_dir().join(format!("swbench_{}", std::process::id()));
     let root = root.to_str().unwrap().to_owned();
-    let mut daemon = another(&["serve", &root, how]);
+    let daemon = another(&["serve", &root, how]);
     let mut client = ClientOptions {
         place: place(&root),
         source: Some("sim".to_owned()),
@@ -222,9 +221,7 @@ fn measure(how: &str, bodies: u64, frames: usize) -> String {
     }
     let line = report(how, bodies, &mut latencies_ns, switches() - before);
     drop(client);
-    drop(daemon.stdin.take());
-    daemon.wait().unwrap();
-    let _left = std::fs::remove_dir_all(&root);
+    end(Some(daemon), &root);
     line
 }
 

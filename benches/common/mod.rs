@@ -121,6 +121,15 @@ impl Bench {
 
 pub use sweepd::report::rig::row;
 
+/// Ends a daemon that [`another`] started, and takes away what it left.
+pub fn end(daemon: Option<Child>, root: impl AsRef<Path>) {
+    if let Some(mut daemon) = daemon {
+        drop(daemon.stdin.take());
+        daemon.wait().unwrap();
+    }
+    let _left = std::fs::remove_dir_all(root);
+}
+
 /// Bodies that fly straight and turn evenly, bouncing off the walls of their cube.
 pub struct Flight {
     pub poses: Vec<Pose>,
