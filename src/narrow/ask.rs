@@ -147,14 +147,14 @@ fn of_parts((a, b): (&Body, &Body), report_m: f64, meter: &mut Meter<'_>) -> Fou
 
 /// What a query of its own keeps what it finds on.
 #[derive(Default)]
-struct Bench {
-    shelves: Shelves,
+pub(super) struct Bench {
+    pub(super) shelves: Shelves,
     found: Vec<Contact>,
     counters: Counters,
 }
 
 impl Bench {
-    fn tools(&mut self) -> Tools<'_> {
+    pub(super) fn tools(&mut self) -> Tools<'_> {
         Tools {
             shelves: &mut self.shelves,
             found: &mut self.found,

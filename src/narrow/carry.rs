@@ -11,18 +11,18 @@ use crate::shape::Shape;
 use crate::time::Meter;
 use crate::world::{Body, PlacedShape};
 
+use super::Narrow;
 use super::cursor::SLICE_UNITS;
-use super::memo::{Witness, bent};
+use super::memo::{Memo, Witness, bent};
 use super::mesh::{CarriedFront, FrontStore, Goal, LeafContact, Search, numbered};
 use super::query::{leaf_contact, shape_pose, sound, witness_of};
-use super::{NONE, Narrow};
 
 /// What asking two triangles whether they surely cross costs, in tests of a box against a pack, with what it takes to
 /// come to them: when the clock is to be read.
 const RETEST_COST: u64 = 2;
 
 /// What taking a front to another pose costs in the same way, with what it takes to come to it from the pair before.
-const CARRY_COST: u64 = 4;
+pub(super) const CARRY_COST: u64 = 4;
 
 /// A pair's turn doubles with each tick it waits for its verdict, up to so many times: what motion undoes in a tick may
 /// be more than a plain turn, and then equal turns for all would decide it never.
@@ -42,10 +42,7 @@ impl Narrow {
         let pos12 = shape_pose(one, other, &rel);
         let due = goal == Goal::Verdict && self.witness_due(slot);
         let memo = &mut self.memos[slot.index()];
-        if memo.front == NONE {
-            memo.front = self.shelves.fronts.take(CarriedFront::default);
-        }
-        let Some(front) = self.shelves.fronts.get_mut(memo.front) else {
+        let Some(front) = self.shelves.fronts.get_or_take(&mut memo.front) else {
             return false;
         };
         let store = &mut self.shelves.store;
@@ -82,23 +79,14 @@ impl Narrow {
         self.counters.slices += 1;
         let slice_units = slice_units(memo.undecided_since, self.tick);
         let done = front.advance(store, one_shape, other_shape, goal, slice_units, meter);
-        let found = sound(front.interval(), one, other, &rel);
-        let now = memo.now;
-        if !done && found.min <= now.min && found.max >= now.max {
+        let told = Told {
+            gap: sound(front.interval(), one, other, &rel),
+            done,
+            certain: front.is_certain(),
+            witness: (front.witness()).map(|leaf| seen_at((one, other), (0, 0), &pos12, &leaf)),
+        };
+        if !memo.take_over(&told, goal, (a, b, &rel), self.tick) {
             return true;
-        }
-        // What was known before holds at these poses too.
-        memo.gap = found.meet(now);
-        (memo.rel, memo.credit_m, memo.tested) = (rel, credit_m, self.tick);
-        memo.bent_m = bent_m;
-        let whole = done && !(goal == Goal::Verdict && memo.gap.max <= 0.0);
-        memo.finished = whole && front.is_certain();
-        memo.tight = whole && goal != Goal::Verdict;
-        if let Some(leaf) = front.witness() {
-            memo.witness = Some(seen_at((one, other), (0, 0), &pos12, &leaf));
-        } else if memo.gap.min > 0.0 && memo.witness.is_some_and(|w| w.best_m <= 0.0) {
-            // Where it touched says nothing of a pair that is apart.
-            memo.witness = None;
         }
         if done && goal == Goal::Contacts {
             let gap = memo.gap;
@@ -112,6 +100,47 @@ impl Narrow {
             self.keep_contacts(slot, a.radius.min(b.radius));
         }
         !done
+    }
+}
+
+/// What a turn on a front has told of a pair at this tick's poses.
+pub(super) struct Told {
+    pub(super) gap: Interval,
+    /// The goal is reached.
+    pub(super) done: bool,
+    /// 0 inside the interval of a reached goal means touching.
+    pub(super) certain: bool,
+    pub(super) witness: Option<Witness>,
+}
+
+impl Memo {
+    /// Takes over what a turn towards a goal told; false: it told nothing new.
+    pub(super) fn take_over(
+        &mut self,
+        told: &Told,
+        goal: Goal,
+        (a, b, rel): (&Body, &Body, &Pose),
+        tick: u64,
+    ) -> bool {
+        let (found, now) = (told.gap, self.now);
+        if !told.done && found.min <= now.min && found.max >= now.max {
+            return false;
+        }
+        // What was known before holds at these poses too.
+        self.gap = found.meet(now);
+        self.rel = *rel;
+        self.credit_m = a.motion.credit_m() + b.motion.credit_m();
+        (self.bent_m, self.tested) = (bent(a, b), tick);
+        let whole = told.done && !(goal == Goal::Verdict && self.gap.max <= 0.0);
+        self.finished = whole && told.certain;
+        self.tight = whole && goal != Goal::Verdict;
+        if told.witness.is_some() {
+            self.witness = told.witness;
+        } else if self.gap.min > 0.0 && self.witness.is_some_and(|w| w.best_m <= 0.0) {
+            // Where it touched says nothing of a pair that is apart.
+            self.witness = None;
+        }
+        true
     }
 }
 

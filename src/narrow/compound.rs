@@ -9,7 +9,8 @@
 //! of a hundred parts asks those few pairs of parts that are near one another, and of these those that have moved.
 //!
 //! The orders are those of two meshes: depth first, deepest overlap first, for a verdict; best first for the bounds;
-//! depth first to the end for the contact set. Half-spaces fit into no box: each is a root of its own (`side`).
+//! depth first to the end for the contact set. Half-spaces fit into no box: each is a root of its own (`side`). Two
+//! bodies that both have one have no gap (law 3.2) and are no pair (`world/filters`).
 //!
 //! Refused: one tree of all triangles of all shapes of a body (shapes are shared between bodies, and a solid's inside
 //! and a convex shape's depth belong to the shape); asking all pairs of shapes (65,536 of each are allowed).
@@ -31,24 +32,13 @@ use crate::time::Meter;
 use crate::world::Body;
 
 use super::arena::Run;
-use super::cover::{Cover, Group, Open};
+use super::cover::{Cover, Group, Open, Wear};
 use super::memo::{Witness, bent, relative_motion};
 use super::mesh::{CarriedFront, Goal, Placed, Search};
 use super::shelves::Shelves;
 
 use leaf::Inner;
 use side::{Side, children, gaps, placed};
-
-/// As of two meshes (`mesh/carried`): a front that has split into so many times its fresh size, and [`STALE_MORE`],
-/// starts anew; ...
-const STALE_TIMES: usize = 3;
-const STALE_MORE: usize = 32;
-/// ... one of which so many times the used-up groups exceed the steps of a fresh start; ...
-const WORN_TIMES: usize = 3;
-/// ... one whose path is so many sizes of the two long; ...
-const PATH_MAX: f64 = 64.0;
-/// ... and one that goes this share of the smaller body's radius between two poses.
-const LEAP: f64 = 0.1;
 
 /// The front of one pair of bodies; used with the same [`Tools`] from its start to its release.
 #[derive(Debug, Default)]
@@ -67,10 +57,8 @@ pub(super) struct CompoundFront {
     floor_m: f64,
     /// Sum of what the two have deformed, when they were last looked at, metres.
     bent_m: f64,
-    /// Entries when a goal was first reached after the last fresh start, 0: not yet; and the steps until then.
-    fresh_len: usize,
-    fresh_steps: usize,
-    steps: usize,
+    /// Settled: a goal was reached.
+    wear: Wear,
 }
 
 /// What is known at the pose worked at.
@@ -132,15 +120,9 @@ impl CompoundFront {
             drift.add(bent_m - self.bent_m, bent_m);
             self.bent_m = bent_m;
         }
-        let size_m = a.radius.min(b.radius);
-        let stale =
-            self.fresh_len > 0 && self.cover.len() > STALE_TIMES * self.fresh_len + STALE_MORE;
-        let far = self.cover.drift.path_m > PATH_MAX * size_m;
-        // Of bodies that both have a half-space nobody knows how far they went.
-        let leap = self.cover.drift.last_m > LEAP * size_m || size_m == f64::INFINITY;
-        let worn = self.fresh_len > 0
-            && WORN_TIMES * self.cover.expired_len(&tools.shelves.store.entries) > self.fresh_steps;
-        if worn || stale || far || leap || self.cover.is_lost() || self.search != Search::Carried {
+        let entries = &tools.shelves.store.entries;
+        let over = (self.wear).is_over(&self.cover, entries, [a.radius, b.radius]);
+        if over || self.search != Search::Carried {
             self.start_over(tools, (&sides.0, &sides.1));
             return;
         }
@@ -178,9 +160,7 @@ impl CompoundFront {
         };
         loop {
             if self.reached(&asked) {
-                if self.fresh_len == 0 {
-                    (self.fresh_len, self.fresh_steps) = (self.cover.len(), self.steps);
-                }
+                self.wear.note_settled(&self.cover);
                 return true;
             }
             if meter.spent() >= asked.end || !meter.open() {
@@ -217,10 +197,8 @@ impl CompoundFront {
         shelves: &'a Shelves,
         places: (u32, u32),
     ) -> Option<&'a CarriedFront> {
-        let at = self
-            .inner
-            .binary_search_by_key(&places, |inner| inner.places);
-        let front = shelves.fronts.get(self.inner[at.ok()?].front)?;
+        let at = self.place_of(places).ok()?;
+        let front = shelves.fronts.get(self.inner[at].front)?;
         front.is_started().then_some(front)
     }
 
@@ -237,15 +215,12 @@ impl CompoundFront {
     /// Everything from the roots, at the pose it is at.
     fn start_over(&mut self, tools: &mut Tools<'_>, (a, b): (&Side<'_>, &Side<'_>)) {
         let entries = &mut tools.shelves.store.entries;
-        // Two half-spaces have no gap (law 3.2).
-        let roots = a
-            .roots()
-            .flat_map(|of_a| b.roots().map(move |of_b| (of_a, of_b)))
-            .filter(|&(of_a, of_b)| !(a.is_plane(of_a) && b.is_plane(of_b)));
+        let pairs_with = |of_a| b.roots().map(move |of_b| (of_a, of_b));
+        let roots = a.roots().flat_map(pairs_with);
         (self.cover).start(entries, (&self.at.pos12, self.search), roots);
         self.known = Known::default();
         self.found.clear();
-        (self.fresh_len, self.fresh_steps, self.steps) = (0, 0, 0);
+        self.wear = Wear::default();
         // Pieces part when moved by both radii, and a point within a solid is no deeper than it is large.
         let size_m = a.body.radius + b.body.radius;
         self.floor_m = -size_m * (1.0 + 8.0 * f64::EPSILON) - self.at.slop;
@@ -287,7 +262,7 @@ impl CompoundFront {
         asked: &Asked,
         meter: &mut Meter<'_>,
     ) {
-        self.steps += 1;
+        self.wear.note_step();
         let entries = &mut tools.shelves.store.entries;
         if let Some(Open { a, b, .. }) = self.cover.open.pop(&mut entries.open) {
             return self.look_below(tools, sides, (a, b), f64::NEG_INFINITY, asked, meter);

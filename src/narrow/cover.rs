@@ -14,10 +14,12 @@
 
 mod drift;
 mod entry;
+mod wear;
 
 pub(super) use drift::Drift;
 pub use entry::Search;
 pub(super) use entry::{Group, Open, OpenList, Proved, lanes};
+pub(super) use wear::Wear;
 
 use crate::math::{Pose, ROUND};
 use crate::shape::BoxId;
@@ -124,7 +126,7 @@ impl Cover {
     }
 
     /// Whether what was lumped together is no longer proved apart, so that nothing but a new start helps.
-    pub(super) fn is_lost(&self) -> bool {
+    fn is_lost(&self) -> bool {
         self.is_lumped() && !self.holds_lumped()
     }
 
@@ -134,7 +136,7 @@ impl Cover {
     }
 
     /// How many groups are no longer proved apart.
-    pub(super) fn expired_len(&self, entries: &Entries) -> usize {
+    fn expired_len(&self, entries: &Entries) -> usize {
         let gone = |group: &&Group| self.drift.left_m(group.expiry_m) <= 0.0;
         let proved = entries.groups.all(&self.proved.heap);
         proved.iter().filter(gone).count()

@@ -29,6 +29,17 @@ impl<T> Pool<T> {
         self.free.pop().unwrap_or(NONE)
     }
 
+    /// The object at a place, or one that is taken where there is none yet.
+    pub(super) fn get_or_take(&mut self, at: &mut u32) -> Option<&mut T>
+    where
+        T: Default,
+    {
+        if *at == NONE {
+            *at = self.take(T::default);
+        }
+        self.get_mut(*at)
+    }
+
     /// Gives an object back.
     pub(super) fn give(&mut self, at: &mut u32) {
         if *at != NONE {

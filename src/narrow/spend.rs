@@ -7,7 +7,7 @@ use crate::wire::Verdict;
 use crate::world::{Body, PlacedShape, World};
 
 use super::contacts::ContactSet;
-use super::cursor::{Cursor, Room, Turn};
+use super::cursor::{Room, Turn};
 use super::memo::{Witness, bent, changed_since};
 use super::mesh::{Goal, has_front};
 use super::order::Order;
@@ -175,10 +175,7 @@ impl Narrow {
     ) -> Turn {
         let memo = &mut self.memos[slot.index()];
         let fresh = memo.cursor == NONE;
-        if fresh {
-            memo.cursor = self.shelves.cursors.take(Cursor::default);
-        }
-        let Some(cursor) = self.shelves.cursors.get_mut(memo.cursor) else {
+        let Some(cursor) = self.shelves.cursors.get_or_take(&mut memo.cursor) else {
             return Turn::Finished;
         };
         if fresh || (cursor.goal == Goal::Verdict && goal != Goal::Verdict) {

@@ -4,7 +4,7 @@ use std::ops::Deref;
 use std::sync::Arc;
 
 use crate::math::Pose;
-use crate::shape::{ObbTree, Shape};
+use crate::shape::{Geometry, ObbTree, Shape};
 
 /// A shape at its place in a body.
 #[derive(Clone, Debug)]
@@ -13,6 +13,20 @@ pub struct PlacedShape {
     pub shape: Arc<Shape>,
     /// Its pose in the body's frame.
     pub pose: Pose,
+}
+
+impl PlacedShape {
+    /// Greatest distance of a number that it is told by from its body's origin, metres: of its points, or of where a
+    /// half-space stands.
+    pub(crate) fn reach_m(&self) -> f64 {
+        let own = match &self.shape.geometry {
+            Geometry::HalfSpace { offset, .. } => offset.abs(),
+            Geometry::Convex(_) | Geometry::Mesh(_) => {
+                self.shape.centre.coords.norm() + self.shape.radius
+            }
+        };
+        self.pose.translation.vector.norm() + own
+    }
 }
 
 /// The shapes of a body in the scene's order: a slice of them. A clone shares them.
@@ -31,6 +45,8 @@ pub(crate) struct PartTree {
     pub(crate) boxes: Option<ObbTree>,
     /// Places of the half-spaces, which fit into no box.
     pub(crate) planes: Vec<u32>,
+    /// Greatest [`PlacedShape::reach_m`].
+    pub(crate) reach_m: f64,
 }
 
 impl Parts {
@@ -70,6 +86,7 @@ impl PartTree {
         Self {
             boxes: (!boxes.is_empty()).then(|| ObbTree::over(&boxes)),
             planes,
+            reach_m: shapes.iter().map(PlacedShape::reach_m).fold(0.0, f64::max),
         }
     }
 }

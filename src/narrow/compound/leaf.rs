@@ -7,16 +7,16 @@ use crate::narrow::arena::Arena;
 use crate::narrow::carry::{found_on, glance, seen_at};
 use crate::narrow::contacts::Contact;
 use crate::narrow::cover::{Group, Open};
-use crate::narrow::cursor::{Cursor, Room, Turn};
+use crate::narrow::cursor::{Room, Turn};
 use crate::narrow::exact::Warm;
 use crate::narrow::memo::{Witness, bent, changed_since};
-use crate::narrow::mesh::{CarriedFront, Goal, LeafContact, Search, has_front};
+use crate::narrow::mesh::{Goal, LeafContact, Search, has_front};
 use crate::narrow::pool::NONE;
 use crate::narrow::query::{
     add_manifold, is_simple, leaf_contact, shape_gap, shape_pose, sound, sphere_bound, witness_of,
 };
 use crate::narrow::shelves::Shelves;
-use crate::shape::{BoxId, Held};
+use crate::shape::BoxId;
 use crate::time::Meter;
 use crate::world::{Body, PlacedShape};
 
@@ -103,16 +103,14 @@ impl CompoundFront {
         asked: &Asked,
         meter: &mut Meter<'_>,
     ) {
-        let (Held::Triangle(i), Held::Triangle(j)) = (a.held(id_a), b.held(id_b)) else {
-            return;
-        };
-        let (Some(one), Some(other)) =
-            (a.body.shapes.get(i as usize), b.body.shapes.get(j as usize))
-        else {
-            return;
+        let (low, leaf) = (f64::NEG_INFINITY, Group::of_leaves(id_a, id_b));
+        let (Some((i, one)), Some((j, other))) = (a.shape(id_a), b.shape(id_b)) else {
+            // Not reached: nothing is known of what is not there.
+            (self.known.low, self.known.certain) = (low, false);
+            let (a, b) = (id_a, id_b);
+            return (self.cover).touch(&mut tools.shelves.store.entries, Open { low, a, b });
         };
         let rel = self.at.pos12;
-        let leaf = Group::of_leaves(id_a, id_b);
         let bound_m = sphere_bound(one, other, &rel).max(known_m);
         if bound_m > self.margin_m(self.known.goal, asked) {
             meter.charge(1);
@@ -138,7 +136,7 @@ impl CompoundFront {
             self.turn_cursor(tools, &pair, asked, meter)
         };
         let entries = &mut tools.shelves.store.entries;
-        let (low, a, b) = (f64::NEG_INFINITY, id_a, id_b);
+        let (a, b) = (id_a, id_b);
         let Some(answer) = answer else {
             return self.cover.look_into(entries, Open { low, a, b });
         };
@@ -205,10 +203,7 @@ impl CompoundFront {
             contacts,
             ..
         } = &mut *tools.shelves;
-        if inner.front == NONE {
-            inner.front = fronts.take(CarriedFront::default);
-        }
-        let front = fronts.get_mut(inner.front)?;
+        let front = fronts.get_or_take(&mut inner.front)?;
         let (one, other) = (pair.one, pair.other);
         let shapes = (&*one.shape, &*other.shape);
         let bodies = |gap| sound(gap, one, other, &pair.rel);
@@ -276,10 +271,7 @@ impl CompoundFront {
             ..
         } = &mut *tools.shelves;
         let fresh = inner.cursor == NONE;
-        if fresh {
-            inner.cursor = cursors.take(Cursor::default);
-        }
-        let cursor = cursors.get_mut(inner.cursor)?;
+        let cursor = cursors.get_or_take(&mut inner.cursor)?;
         if fresh || cursor.goal < goal {
             cursor.start(pair.places, now, 0.0, tools.tick, goal);
         }
@@ -325,28 +317,24 @@ impl CompoundFront {
         Some(answer)
     }
 
+    /// Where what is kept of a pair of shapes is, or would be.
+    pub(super) fn place_of(&self, places: (u32, u32)) -> Result<usize, usize> {
+        (self.inner).binary_search_by_key(&places, |inner| inner.places)
+    }
+
     /// What is kept of a pair of shapes.
     fn inner_at(&mut self, places: (u32, u32)) -> &mut Inner {
-        let at = match self
-            .inner
-            .binary_search_by_key(&places, |inner| inner.places)
-        {
-            Ok(at) => at,
-            Err(at) => {
-                self.inner.insert(at, Inner::new(places));
-                at
-            }
-        };
+        let at = self.place_of(places).unwrap_or_else(|at| {
+            self.inner.insert(at, Inner::new(places));
+            at
+        });
         let inner = &mut self.inner[at];
         inner.asked = true;
         inner
     }
 
     fn forget_inner(&mut self, shelves: &mut Shelves, places: (u32, u32)) {
-        let at = self
-            .inner
-            .binary_search_by_key(&places, |inner| inner.places);
-        if let Ok(at) = at {
+        if let Ok(at) = self.place_of(places) {
             self.inner.remove(at).release(shelves);
         }
     }

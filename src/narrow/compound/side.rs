@@ -53,9 +53,12 @@ impl<'a> Side<'a> {
             .map_or(Held::Triangle(0), |boxes| boxes.held(id))
     }
 
-    /// Whether a box stands for a half-space.
-    pub(super) fn is_plane(&self, id: BoxId) -> bool {
-        self.plane(id).is_some()
+    /// The shape that a leaf stands for, and its place in the body.
+    pub(super) fn shape(&self, id: BoxId) -> Option<(u32, &'a PlacedShape)> {
+        match self.held(id) {
+            Held::Triangle(place) => Some((place, self.body.shapes.get(place as usize)?)),
+            Held::Pack(_) => None,
+        }
     }
 
     /// How large a box is, to be compared with another: the sum of its half sides' squares, square metres.
@@ -84,7 +87,7 @@ impl<'a> Side<'a> {
         if id.0 & PLANE == 0 && self.tree.is_some() {
             return None;
         }
-        let placed = self.body.shapes.get((id.0 & !PLANE) as usize)?;
+        let (_, placed) = self.shape(id)?;
         let Geometry::HalfSpace { normal, offset } = &placed.shape.geometry else {
             return None;
         };
@@ -94,18 +97,13 @@ impl<'a> Side<'a> {
     }
 
     /// Greatest distance of a number that it is told by from its body's origin, metres.
-    pub(super) fn reach(&self) -> f64 {
-        if !self.body.unbounded {
-            return self.body.centre.coords.norm() + self.body.radius;
+    fn reach_m(&self) -> f64 {
+        match (self.tree, &*self.body.shapes) {
+            (Some(tree), _) => tree.reach_m,
+            (None, [only]) => only.reach_m(),
+            // Not reached: without a tree there is but one.
+            (None, _) => f64::INFINITY,
         }
-        let of = |placed: &PlacedShape| {
-            let own = match &placed.shape.geometry {
-                Geometry::HalfSpace { offset, .. } => offset.abs(),
-                _ => placed.shape.centre.coords.norm() + placed.shape.radius,
-            };
-            placed.pose.translation.vector.norm() + own
-        };
-        self.body.shapes.iter().map(of).fold(0.0, f64::max)
     }
 }
 
@@ -118,7 +116,7 @@ pub(super) fn placed(a: &Side<'_>, b: &Side<'_>, rel: &Pose) -> Placed {
     };
     Placed {
         lag_m: (lag(a) + lag(b)) * (1.0 + 2.0 * ROUND),
-        ..Placed::new(rel, a.reach(), b.reach())
+        ..Placed::new(rel, a.reach_m(), b.reach_m())
     }
 }
 

@@ -7,6 +7,7 @@ use crate::builtin::Random;
 use crate::daemon::build_shapes;
 use crate::math::{Quat, Vec3};
 use crate::narrow::Counters;
+use crate::narrow::ask::Bench;
 use crate::narrow::contacts::Contact;
 use crate::narrow::cursor::{Cursor, Room, Turn};
 use crate::narrow::shelves::Shelves;
@@ -156,8 +157,7 @@ fn step_on(random: &mut Random, rel: &mut Pose, way: &mut Vec3) {
 fn drive(random: &mut Random, counts: [usize; 2], planes: Planes, steps: usize) -> [usize; 3] {
     let [a, b] = &bodies(random, counts, planes);
     let clock = ManualClock::new(0);
-    let (mut shelves, mut found, mut counters) =
-        (Shelves::default(), Vec::new(), Counters::default());
+    let mut bench = Bench::default();
     let mut front = CompoundFront::default();
     let mut rel = Pose::from_parts(Vec3::new(0.0, 0.0, 1.5).into(), turned(random, 3.0));
     let mut way = Vec3::new(0.0, 0.0, -0.01);
@@ -165,13 +165,7 @@ fn drive(random: &mut Random, counts: [usize; 2], planes: Planes, steps: usize) 
     for step in 0..steps {
         step_on(random, &mut rel, &mut way);
         let (gap, colliding) = twin((a, b), &rel);
-        let mut tools = Tools {
-            shelves: &mut shelves,
-            found: &mut found,
-            counters: &mut counters,
-            search: Search::Carried,
-            tick: 1,
-        };
+        let mut tools = bench.tools();
         front.move_to(&mut tools, (a, b), &rel);
         for turn in 0..3 {
             let goal = [Goal::Verdict, Goal::Gap, Goal::Contacts][turn];
@@ -209,9 +203,9 @@ fn drive(random: &mut Random, counts: [usize; 2], planes: Planes, steps: usize) 
         let [of_a, of_b] = [a, b].map(|body| u32::try_from(body.shapes.len()).unwrap());
         let pairs = (0..of_a).flat_map(|i| (0..of_b).map(move |j| (i, j)));
         let all: Vec<_> = pairs.collect();
-        assert_eq!(covered(&front, &shelves, (a, b)), all, "step {step}");
+        assert_eq!(covered(&front, &bench.shelves, (a, b)), all, "step {step}");
     }
-    front.release(&mut shelves);
+    front.release(&mut bench.shelves);
     seen
 }
 
@@ -234,20 +228,13 @@ fn two_bodies_of_many_shapes_ask_a_few_pairs_and_fewer_on_their_way() {
     let mut random = Random::new(3);
     let [a, b] = &bodies(&mut random, [400, 400], Planes::None);
     let clock = ManualClock::new(0);
-    let (mut shelves, mut found, mut counters) =
-        (Shelves::default(), Vec::new(), Counters::default());
+    let mut bench = Bench::default();
     let mut front = CompoundFront::default();
     let mut units = Vec::new();
     for step in 0..40 {
         let at = Vec3::new(0.0, 0.0, 2.6 - 0.0005 * f64::from(step));
         let rel = Pose::from_parts(at.into(), Quat::identity());
-        let mut tools = Tools {
-            shelves: &mut shelves,
-            found: &mut found,
-            counters: &mut counters,
-            search: Search::Carried,
-            tick: 1,
-        };
+        let mut tools = bench.tools();
         let mut meter = Meter::new(&clock, None, None);
         front.move_to(&mut tools, (a, b), &rel);
         let asked = (Goal::Verdict, 0.0);
@@ -280,32 +267,5 @@ fn a_walk_over_pairs_of_shapes_leaves_out_none_that_may_touch() {
             let every = a.shapes.len() * b.shapes.len();
             assert!(planes == Planes::Only || near.len() * 2 < every);
         }
-    }
-}
-
-#[test]
-fn bug_two_bodies_that_both_have_a_half_space_came_to_no_end_at_another_pose() {
-    let mut random = Random::new(7);
-    let [_, a] = bodies(&mut random, [1, 3], Planes::Beside);
-    let [_, b] = bodies(&mut random, [1, 4], Planes::Beside);
-    let clock = ManualClock::new(0);
-    let (mut shelves, mut found, mut counters) =
-        (Shelves::default(), Vec::new(), Counters::default());
-    let mut front = CompoundFront::default();
-    for step in 0..6 {
-        let at = Vec3::new(0.0, 0.0, 3.0 + 0.001 * f64::from(step));
-        let rel = Pose::from_parts(at.into(), Quat::identity());
-        let mut tools = Tools {
-            shelves: &mut shelves,
-            found: &mut found,
-            counters: &mut counters,
-            search: Search::Carried,
-            tick: 1,
-        };
-        front.move_to(&mut tools, (&a, &b), &rel);
-        // Each step tells something new: some hundred are enough.
-        let mut meter = Meter::new(&clock, None, Some(1_000));
-        let asked = (Goal::Gap, 0.0);
-        assert!(front.advance(&mut tools, (&a, &b), asked, u64::MAX, &mut meter));
     }
 }

@@ -33,8 +33,8 @@ use super::query::Goal;
 use super::retest::{reach_of, tree_of};
 use super::side::{self, Side};
 use crate::math::{Pose, ROUND};
-use crate::narrow::cover::Cover;
 pub use crate::narrow::cover::Search;
+use crate::narrow::cover::{Cover, Wear};
 use crate::shape::{BoxId, Obb, Shape};
 use crate::time::Meter;
 
@@ -51,21 +51,9 @@ use known::Known;
 pub use store::FrontStore;
 use touch::Crossing;
 
-/// A front that has split into so many times its fresh size, and [`STALE_MORE`], starts anew: entries only ever split.
-const STALE_TIMES: usize = 3;
-const STALE_MORE: usize = 128;
-/// A front starts anew when so many times its used-up groups exceed the steps that a fresh start took: at 0.5 % of the
-/// diameter a tick 2,000 units in place of 2,130 (2), 2,270 (1) and 2,230 (8), at 2 % 4,070 in place of 4,110, at 0.1 %
-/// no difference (`benches/time_critical`).
-const WORN_TIMES: usize = 3;
 /// Steps beyond this share of the smaller body's radius start anew where the touch is lost: 5,300 units in place of
 /// 7,300 at 2 % of the diameter a tick, 3,400 in place of 3,700 at 0.5 %; at 0.02 more pairs stay open within a limit.
 const ADRIFT: f64 = 0.04;
-/// Length of a path, in sizes of the two, after which expiries are measured anew.
-const PATH_MAX: f64 = 64.0;
-/// Beyond this share of the smaller body's radius between two poses, nothing much would be left of a front.
-const LEAP: f64 = 0.1;
-
 /// The front of one pair; its entries are in a [`FrontStore`], the same one from [`CarriedFront::start`] to
 /// [`CarriedFront::release`].
 #[derive(Debug, Default)]
@@ -83,11 +71,8 @@ pub struct CarriedFront {
     shells: ShellTests,
     /// Until when the answer of the inside tests holds, as a path, metres.
     shells_expiry_m: f64,
-    /// Entries when the surfaces were last found apart from a fresh start; 0: not yet.
-    fresh_len: usize,
-    /// Steps since the last fresh start, and until the surfaces were found apart from it.
-    steps: usize,
-    fresh_steps: usize,
+    /// Settled: the surfaces were found apart.
+    wear: Wear,
     /// Known at this pose.
     known: Known,
     /// The leaves that were nearest or touched last.
@@ -163,18 +148,11 @@ impl CarriedFront {
             self.shells.drop_test();
             self.measure_depth(a, b);
         }
-        let stale = self.fresh_len > 0 && self.len() > STALE_TIMES * self.fresh_len + STALE_MORE;
-        // Few digits would be left of expiries after a long way.
-        let far = self.cover.drift.path_m > PATH_MAX * (a.radius + b.radius);
-        let lost = self.cover.is_lost();
-        let step_m = self.cover.drift.last_m;
-        let leap = step_m > LEAP * a.radius.min(b.radius);
-        // Where most is used up, the roots are the shorter way: large boxes tell more than many small ones.
-        let worn = self.fresh_len > 0
-            && WORN_TIMES * self.cover.expired_len(&store.entries) > self.fresh_steps;
+        let over = (self.wear).is_over(&self.cover, &store.entries, [a.radius, b.radius]);
         // Where a long step has lost the touch, what is left open is far from the next one.
-        let adrift = !self.cover.touching.is_empty() && step_m > ADRIFT * a.radius.min(b.radius);
-        if worn || adrift || stale || far || lost || leap || self.search != Search::Carried {
+        let adrift = !self.cover.touching.is_empty()
+            && self.cover.drift.last_m > ADRIFT * a.radius.min(b.radius);
+        if over || adrift || self.search != Search::Carried {
             self.start_over(store, a, b);
             return;
         }
@@ -266,7 +244,7 @@ impl CarriedFront {
         let (from, roots) = ((&self.at.pos12, self.search), [(BoxId::ROOT, BoxId::ROOT)]);
         (self.cover).start(&mut store.entries, from, roots.into_iter());
         self.contacts.clear();
-        (self.fresh_len, self.steps) = (0, 0);
+        self.wear = Wear::default();
         self.known = Known::default();
         self.witness = None;
         self.whole = [(a, side_a), (b, side_b)].map(|(shape, side)| side.whole(shape));

@@ -18,7 +18,7 @@ impl CarriedFront {
         meter: &mut Meter<'_>,
     ) {
         let gap_wanted = goal > Goal::Verdict;
-        self.steps += 1;
+        self.wear.note_step();
         if gap_wanted && !std::mem::replace(&mut self.known.asked_last, true) {
             self.bound_by_last(a, b);
             meter.charge_weighted(1, LEAF_COST);
@@ -49,10 +49,7 @@ impl CarriedFront {
         if low <= 0.0 {
             return;
         }
-        if self.fresh_len == 0 {
-            self.fresh_len = self.len();
-            self.fresh_steps = self.steps;
-        }
+        self.wear.note_settled(&self.cover);
         let expiry_m = self.cover.drift.expiry(low).unwrap_or(f64::NEG_INFINITY);
         self.shells_expiry_m = self.shells_expiry_m.max(expiry_m);
     }

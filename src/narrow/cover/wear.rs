@@ -1,0 +1,56 @@
+//! When a cover is the longer way: entries only ever split, and what is used up is asked again one by one.
+
+use super::{Cover, Entries};
+
+/// A cover that has split into so many times its fresh size, and [`STALE_MORE`], starts anew.
+const STALE_TIMES: usize = 3;
+const STALE_MORE: usize = 128;
+/// A cover starts anew when so many times its used-up groups exceed the steps that a fresh start took. Of meshes at
+/// 0.5 % of the diameter a tick 2,000 units in place of 2,130 (2), 2,270 (1) and 2,230 (8), at 2 % 4,070 in place of
+/// 4,110, at 0.1 % no difference (`benches/time_critical`).
+const WORN_TIMES: usize = 3;
+/// Length of a path, in sizes of the two, after which expiries are measured anew: few digits are left of them.
+const PATH_MAX: f64 = 64.0;
+/// Beyond this share of the smaller one's radius between two poses, nothing much would be left.
+const LEAP: f64 = 0.1;
+
+/// What was counted since the last fresh start.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::narrow) struct Wear {
+    /// Entries when the pair was first settled, 0: not yet; and the steps until then.
+    fresh_len: usize,
+    fresh_steps: usize,
+    steps: usize,
+}
+
+impl Wear {
+    /// A step of work was done.
+    pub(in crate::narrow) fn note_step(&mut self) {
+        self.steps += 1;
+    }
+
+    /// The pair is settled: the first time after a fresh start says how much a fresh start takes.
+    pub(in crate::narrow) fn note_settled(&mut self, cover: &Cover) {
+        if self.fresh_len == 0 {
+            (self.fresh_len, self.fresh_steps) = (cover.len(), self.steps);
+        }
+    }
+
+    /// Whether the roots are the shorter way at the pose moved to: large boxes tell more than many small ones.
+    ///
+    /// * `radii_m` - of the two.
+    pub(in crate::narrow) fn is_over(
+        &self,
+        cover: &Cover,
+        entries: &Entries,
+        radii_m: [f64; 2],
+    ) -> bool {
+        let (drift, [a, b]) = (&cover.drift, radii_m);
+        let settled = self.fresh_len > 0;
+        cover.is_lost()
+            || drift.path_m > PATH_MAX * (a + b)
+            || drift.last_m > LEAP * a.min(b)
+            || settled && cover.len() > STALE_TIMES * self.fresh_len + STALE_MORE
+            || settled && WORN_TIMES * cover.expired_len(entries) > self.fresh_steps
+    }
+}
