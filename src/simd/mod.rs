@@ -1,9 +1,10 @@
 //! Kernels that work on many numbers at once, each beside a scalar twin of equal bits.
 //!
 //! The one room where `unsafe` is lifted, each block with what it relies on: calls of code that is compiled for more
-//! than the least of its processor family, and inside it loads and stores of whole registers (`boxes/x86.rs`). No
-//! kernel multiplies and adds in one rounding, so the same bits come out on every machine.
+//! than the least of its processor family, and inside it loads and stores of whole registers (`boxes/x86.rs`,
+//! `aligned.rs`). No kernel multiplies and adds in one rounding, so the same bits come out on every machine.
 
+pub mod aligned;
 pub mod boxes;
 pub mod obb;
 

@@ -19,14 +19,12 @@ use super::{Mesh, ObbTree, Tree};
 use crate::limits::{DEFORMING_TRIANGLES_MAX, DEFORMING_VERTICES_MAX, EXTENT_MAX_M};
 use crate::math::{Aabb, Point, ROUND, Vec3, greater, lesser};
 use crate::shape::ShapeError;
+use crate::simd::aligned;
 use crate::simd::obb::LANES;
 
 mod tree;
 
 pub(crate) use tree::{NewTree, TreeJob};
-
-/// Centres and half sides are sums and differences of f32, each off by half an ulp at most: four are added.
-const GROW: f32 = 1.0 + 4.0 * f32::EPSILON;
 
 /// Two corners of a box; the last number is padding.
 #[derive(Clone, Copy, Debug)]
@@ -325,20 +323,20 @@ fn around(rows: &[[f32; 4]], face: &[u32; 3]) -> Corners {
     corners
 }
 
-/// Fits packs to vertices, those below having been fitted before; returns the surface of their boxes.
+/// Fits packs to vertices, those below having been fitted before; returns an eighth of the surface of their boxes.
 fn fit(
     packs: &mut [ObbPack],
     boxes: &mut [Corners],
     (rows, faces): (&[[f32; 4]], &[[u32; 3]]),
     range: std::ops::Range<usize>,
 ) -> f32 {
-    let mut surface = 0.0;
+    let mut surface = [0.0; LANES];
     // A pack stands before those below it.
     for at in range.rev() {
         let pack = &mut packs[at];
         let mut all = Corners::NOTHING;
         // Lanes without a box stay points at the origin.
-        let (mut low, mut high) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+        let (mut low, mut high) = ([[0.0; 4]; LANES], [[0.0; 4]; LANES]);
         let mut mask = pack.mask;
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize;
@@ -348,40 +346,12 @@ fn fit(
                 super::Held::Triangle(face) => around(rows, &faces[face as usize]),
             };
             all.merge(&corners);
-            for k in 0..3 {
-                low[k][lane] = corners.low[k];
-                high[k][lane] = corners.high[k];
-            }
+            (low[lane], high[lane]) = (corners.low, corners.high);
         }
-        surface += set_boxes(pack, &low, &high);
+        pack.reach = aligned::set(&mut pack.boxes, &low, &high, &mut surface);
         boxes[at] = all;
     }
-    surface
-}
-
-/// Writes the boxes of a pack; returns an eighth of their surface. All lanes at once: plain loops over them become
-/// vector instructions, and a refit takes two thirds of the time.
-#[inline(always)]
-fn set_boxes(pack: &mut ObbPack, low: &[[f32; LANES]; 3], high: &[[f32; LANES]; 3]) -> f32 {
-    let mut reach = [0.0_f32; LANES];
-    let mut half = [[0.0_f32; LANES]; 3];
-    for k in 0..3 {
-        for lane in 0..LANES {
-            let centre = 0.5 * low[k][lane] + 0.5 * high[k][lane];
-            let side = greater(high[k][lane] - centre, centre - low[k][lane]);
-            half[k][lane] = side * GROW + f32::MIN_POSITIVE;
-            pack.boxes.centre[k][lane] = centre;
-            reach[lane] += centre.abs() + half[k][lane];
-        }
-    }
-    pack.boxes.half = half;
-    pack.reach = reach.iter().fold(0.0, |a, &b| greater(a, b)) * GROW * GROW;
-    let mut area = [0.0_f32; LANES];
-    for (lane, area) in area.iter_mut().enumerate() {
-        let [x, y, z] = [half[0][lane], half[1][lane], half[2][lane]];
-        *area = x * y + y * z + z * x;
-    }
-    area.iter().sum()
+    surface.iter().sum()
 }
 
 #[cfg(test)]
