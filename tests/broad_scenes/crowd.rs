@@ -67,3 +67,21 @@ fn many_bodies_in_each_gear_by_turns_are_exact() {
     frames(&mut rig, &mut scene, 26, true);
     rig.validate();
 }
+
+#[test]
+fn a_crowd_is_searched_once_more_when_it_is_laid_anew_and_stays_exact() {
+    let mut scene = Scene::new(Kind::Dense, 1000, 13);
+    let mut rig = Rig::geared("from scratch", &[true], 1000, false);
+    rig.start(&scene.boxes);
+    let (mut before, mut twice) = (u64::MAX, 0);
+    for frame in 0..200 {
+        scene.step();
+        rig.take(&scene);
+        rig.tick(&exact::pairs(&scene.boxes), &format!("frame {frame}"));
+        let tests = rig.work().tests;
+        twice += u32::from(tests * 2 > before.saturating_mul(3));
+        before = tests;
+    }
+    assert!(twice > 0, "never laid anew");
+    rig.validate();
+}

@@ -22,7 +22,7 @@ use super::probe::Probe;
 use super::sweep::{Finds, Search};
 use super::team::Team;
 use super::verlet::Verlet;
-use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, Work as Done, give_back, parts};
+use super::{BodySlot, MANY_CAME, Order, Proxies, Tick, Work as Done, give_back, parts};
 use crate::broad::members::{ASKED, CAME, Members};
 use crate::ids::PairKey;
 use crate::simd::boxes::prefetch;
@@ -120,9 +120,19 @@ impl Order {
     pub(super) fn work_afresh<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Done) {
         work.way = Some((BroadMode::Scratch, self.afresh.gear.cause));
         self.update_afresh(tick, work);
-        let Afresh { verlet, gear, .. } = &mut self.afresh;
-        let mean = verlet.pace.mean().filter(|_| verlet.on);
-        gear.note_scratch(tick.members.bounded().len(), mean.unwrap_or(work.tests));
+        let Afresh {
+            verlet,
+            gear,
+            finds,
+            ..
+        } = &mut self.afresh;
+        // Where bodies were laid anew the boxes may have been searched twice.
+        let tests = if verlet.on {
+            verlet.pace.mean().unwrap_or(work.tests)
+        } else {
+            finds.tests
+        };
+        gear.note_scratch(tick.members.bounded().len(), tests);
         self.probe(tick);
     }
 
@@ -151,39 +161,30 @@ impl Order {
             Lay::Anew
         };
         let stays = lanes == Lay::Stays;
-        if !stays {
+        // Overlaps that are carried to other lanes take as long as another search, each as a box compared with a block.
+        let crowded = lanes == Lay::Presorted && self.hits as u64 > self.afresh.finds.tests;
+        if !(stays || crowded) {
             if was {
                 self.carry_held();
             }
-            if lanes == Lay::Anew || !self.lay_presorted(tick) {
-                self.lay_anew(tick);
-            }
+            self.lay(lanes, tick);
         }
-        let Afresh { finds, team, .. } = &mut self.afresh;
-        let blocks = self.live.len();
-        let lanes = (&mut self.live, &mut self.fat, &mut self.tree);
-        team.search(self.level, lanes, 0..blocks, finds, Search::Overlaps);
-        let tests = finds.tests;
-        work.tests += tests;
-        self.ask_open(tick.proxies);
-        let Afresh {
-            held,
-            finds,
-            team,
-            gone,
-            ..
-        } = &mut self.afresh;
-        self.hits = finds.met.hits();
-        held.spare_for(finds.met.len(), blocks);
-        finds.spare();
-        team.reserve(blocks, self.len);
-        if stays {
+        let tests = self.find_overlaps(tick, work);
+        if stays || crowded {
+            let Afresh {
+                held, finds, gone, ..
+            } = &self.afresh;
             let lists = [&mut *tick.parted, &mut *tick.began];
-            tell_difference([&*held, &finds.met], gone, &self.slot_of, lists);
+            tell_difference([held, &finds.met], gone, &self.slot_of, lists);
             self.tell_jumped(tick);
         } else {
-            self.afresh.usual = tests;
             self.tell_carried(tick);
+        }
+        if crowded {
+            self.lay(lanes, tick);
+            self.afresh.usual = self.find_overlaps(tick, work);
+        } else if !stays {
+            self.afresh.usual = tests;
         }
         self.afresh.gone.fill(0);
         std::mem::swap(&mut self.afresh.held, &mut self.afresh.finds.met);
@@ -196,21 +197,30 @@ impl Order {
         }
     }
 
-    /// Bodies left: they give up their lanes, and their pairs are no difference.
-    pub(super) fn leave_afresh(&mut self, left: &[BodySlot]) {
-        self.afresh.presort.note_left(left.len());
-        for slot in left {
-            let Some(rank) = self.rank(*slot) else {
-                continue;
-            };
-            let (block, lane) = parts(rank);
-            self.rank_of[slot.index()] = NONE;
-            self.slot_of[rank as usize] = NONE;
-            self.live[block] &= !(1 << lane);
-            self.fat[block].set(lane, &[f32::NAN; 6]);
-            self.afresh.gone[block] |= 1 << lane;
-            self.len -= 1;
+    /// Gives the bodies lanes in another order.
+    fn lay<P: Proxies>(&mut self, lanes: Lay, tick: &Tick<'_, P>) {
+        if lanes == Lay::Anew || !self.lay_presorted(tick) {
+            self.lay_anew(tick);
         }
+    }
+
+    /// Finds every overlap; returns the boxes compared with a block.
+    fn find_overlaps<P: Proxies>(&mut self, tick: &Tick<'_, P>, work: &mut Done) -> u64 {
+        let Afresh { finds, team, .. } = &mut self.afresh;
+        let blocks = self.live.len();
+        let lanes = (&mut self.live, &mut self.fat, &mut self.tree);
+        team.search(self.level, lanes, 0..blocks, finds, Search::Overlaps);
+        let tests = finds.tests;
+        work.tests += tests;
+        self.ask_open(tick.proxies);
+        let Afresh {
+            held, finds, team, ..
+        } = &mut self.afresh;
+        self.hits = finds.met.hits();
+        held.spare_for(finds.met.len(), blocks);
+        finds.spare();
+        team.reserve(blocks, self.len);
+        tests
     }
 
     /// Gives who came a lane, takes every box, sorts some more where a sort is under way or due, and tells what becomes

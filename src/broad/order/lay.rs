@@ -8,7 +8,7 @@ use super::load::ask_ahead;
 use super::place::{ATTIC, grow, middle};
 use super::sort::{FILL, Frame, Sorter};
 use super::tree::NO_BOUND;
-use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, is_thrifty, ones, small};
+use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, is_thrifty, ones, parts, small};
 use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work, prefetch};
 
 /// Boxes compared with a block in the time that laying a body anew takes.
@@ -68,6 +68,23 @@ impl Order {
         self.close_blocks(bodies.len(), bodies.len());
     }
 
+    /// Bodies left: they give up their lanes, and their pairs are no difference.
+    pub(super) fn leave_afresh(&mut self, left: &[BodySlot]) {
+        self.afresh.presort.note_left(left.len());
+        for slot in left {
+            let Some(rank) = self.rank(*slot) else {
+                continue;
+            };
+            let (block, lane) = parts(rank);
+            self.rank_of[slot.index()] = NONE;
+            self.slot_of[rank as usize] = NONE;
+            self.live[block] &= !(1 << lane);
+            self.fat[block].set(lane, &[f32::NAN; 6]);
+            self.afresh.gone[block] |= 1 << lane;
+            self.len -= 1;
+        }
+    }
+
     /// Takes everything out of the blocks.
     pub(super) fn clear_blocks(&mut self, bodies: &[BodySlot]) {
         self.live.clear();
@@ -118,7 +135,6 @@ impl Order {
             jumped,
             finds,
             presort,
-            spoilt,
             ..
         } = &mut self.afresh;
         for lanes in [gone, jumped] {
@@ -130,13 +146,11 @@ impl Order {
         room(&mut self.homeless, seats);
         room(&mut self.worklist, 2 * seats);
         finds.reserve(blocks, bodies);
+        // What a sort of many bodies takes is made by the first one, and kept: fresh pages for it are a tenth of a tick.
         if !is_thrifty(bodies) {
             presort.reserve(bodies + seats, seats);
             room(&mut self.boxes, bodies + seats);
             spare(&mut self.carried, self.hits, bodies);
-        } else if *spoilt == 0 {
-            presort.give_back();
-            self.give_back_sort();
         }
     }
 
