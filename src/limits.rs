@@ -71,8 +71,9 @@ pub const PRIORITY_MAX: f64 = 100.0;
 /// Greatest `weight` of a viewpoint, for the same reason.
 pub const VIEW_WEIGHT_MAX: f64 = 100.0;
 /// Poses between two ticks that the path of a continuous body follows; beyond it only its box knows of them, and its
-/// pairs are told as open. More than one comes only where frames are partial, or a tick takes longer than a frame.
-pub const LEGS_MAX: usize = 8;
+/// pairs are told as open. More than one comes where a tick takes longer than a frame, or ticks come at a rate of their
+/// own: a simulator of 1,000 frames a second has 17 between two of 60 ticks.
+pub const LEGS_MAX: usize = 32;
 /// Whole turns between two poses that a declared angular velocity may add; beyond it a pair is told as open. A drill at
 /// 100,000 turns a minute makes 1667 in a second.
 pub const LEG_TURNS_MAX: f64 = 4096.0;

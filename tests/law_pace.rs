@@ -9,6 +9,8 @@
 #[path = "law_world/support.rs"]
 mod support;
 
+use std::sync::Arc;
+
 use sweepd::config::{Config, Mode};
 use sweepd::ids::SourceSlot;
 use sweepd::scene::Scene;
@@ -340,6 +342,36 @@ fn law_4_4_a_round_takes_the_newest_frame_of_each_live_source() {
     assert_eq!(ticks[2].at_ms, 12.0);
     assert!(taken(&ticks[2], "sim", 3) && taken(&ticks[2], "robot", 2));
     assert_eq!(daemon.passed_of(0), 1);
+}
+
+#[test]
+fn law_1_no_frame_of_a_source_that_moves_a_continuous_body_is_passed_over() {
+    for mode in modes() {
+        let mut daemon = Daemon::of(mode.clone());
+        // A body that is put while the daemon runs; the robot, which leads no tick, is its source.
+        let mut bullet = moving("bullet", 4);
+        (bullet.source, bullet.continuous) = (Some(1), true);
+        daemon.edits.push(Edit::Put {
+            body: Arc::new(bullet),
+            shapes: cube(),
+        });
+        daemon.run(3.0, Vec::new());
+        for source in 0..2 {
+            let followed = daemon.world.is_followed(source);
+            assert_eq!(followed, source == 1);
+            daemon.pacer.set_followed(source, followed);
+        }
+        let frames = (1..=40).map(|seq| (4.0 + 0.25 * seq as f64, robot(seq)));
+        let frames = frames.chain([(15.0, sim(1))]).collect();
+        let ticks = daemon.run(200.0, frames);
+        let of_robot = |t: &Tick| {
+            let frames = t.frames.iter().filter(|(name, _)| name == "robot");
+            frames.map(|(_, seq)| *seq).collect::<Vec<u64>>()
+        };
+        let taken: Vec<u64> = ticks.iter().flat_map(of_robot).collect();
+        assert_eq!(taken, (1..=40).collect::<Vec<u64>>(), "{mode:?}");
+        assert_eq!(daemon.passed_of(1), 0, "{mode:?}");
+    }
 }
 
 #[test]

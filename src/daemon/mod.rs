@@ -75,7 +75,7 @@ impl<'a> Daemon<'a> {
         clock: Arc<dyn Clock>,
         door: &'a mut dyn Door,
     ) -> Result<Self> {
-        Ok(Self {
+        let mut daemon = Self {
             builder: Builder::start(shapes.library, scene, Arc::clone(&clock))?,
             engine: Engine::new(scene, shapes.bodies, boot_id, Arc::clone(&clock))?,
             pacer: Pacer::new(&scene.config, &scene.sources)?,
@@ -88,7 +88,17 @@ impl<'a> Daemon<'a> {
             tick_asked: false,
             tree_asked: None,
             progress: Arc::default(),
-        })
+        };
+        daemon.follow();
+        Ok(daemon)
+    }
+
+    /// Tells the pacer whose frames move continuous bodies.
+    fn follow(&mut self) {
+        let world = self.engine.world();
+        for source in 0..world.sources().len() {
+            self.pacer.set_followed(source, world.is_followed(source));
+        }
     }
 
     /// Raises this counter from now on, each round and each heartbeat of a long tick.
@@ -294,6 +304,9 @@ impl<'a> Daemon<'a> {
     /// Answers the requests whose edits the last tick applied or refused.
     fn settle_edits(&mut self) {
         self.tell_bodies();
+        if !self.ready.is_empty() {
+            self.follow();
+        }
         self.ready.clear();
         for at in 0..self.engine.outcomes().len() {
             let outcome = &self.engine.outcomes()[at];

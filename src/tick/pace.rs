@@ -42,6 +42,8 @@ struct Source {
     sent: bool,
     /// It was late for a round and is not waited for until its next frame.
     late: bool,
+    /// Each of its frames counts: none is passed over for a newer one.
+    followed: bool,
     passed: u64,
 }
 
@@ -88,6 +90,7 @@ impl Pacer {
             session: 0,
             sent: false,
             late: false,
+            followed: false,
             passed: 0,
         };
         Ok(Self {
@@ -120,6 +123,13 @@ impl Pacer {
         }
     }
 
+    /// Sets whether each frame of a source counts: see `World::is_followed`.
+    pub fn set_followed(&mut self, source: usize, followed: bool) {
+        if let Some(source) = self.sources.get_mut(source) {
+            source.followed = followed;
+        }
+    }
+
     /// Takes everything out of an inbox and leaves it empty.
     pub fn take(&mut self, inbox: &mut Inbox, now_ns: u64) {
         for frame in inbox.frames_mut() {
@@ -138,12 +148,11 @@ impl Pacer {
                     since_ns.get_or_insert(received_ns);
                 }
             }
-            let alone = matches!(self.beat, Beat::OnFrame(lead) if place == Some(lead));
+            let leads = |at| matches!(self.beat, Beat::OnFrame(lead) if at == lead);
+            let alone = place.is_some_and(|at| leads(at) || self.sources[at].followed);
             let passed = self.queue.put(frame, place, alone);
-            match place.and_then(|p| self.sources.get_mut(p)) {
-                Some(source) => source.passed += passed,
-                None => self.passed_of_none += passed,
-            }
+            let source = place.and_then(|p| self.sources.get_mut(p));
+            *source.map_or(&mut self.passed_of_none, |source| &mut source.passed) += passed;
         }
         for frame in inbox.vertices_mut() {
             let name = name_str(&frame.header.source).map(name_bytes);

@@ -39,6 +39,8 @@ pub struct SourceState {
     pub(super) rows: Vec<BodySlot>,
     /// A frame that needs a later scene revision.
     pub(super) waiting: Waiting,
+    /// Whether a continuous body goes where its frames say.
+    pub(super) followed: bool,
 }
 
 /// A frame that waits for a scene revision; its memory is kept.
@@ -68,6 +70,7 @@ impl SourceState {
             pose_frame: 0,
             rows: Vec::with_capacity(bodies),
             waiting: Waiting::default(),
+            followed: false,
         }
     }
 
@@ -118,6 +121,13 @@ impl super::World {
         if let Some(state) = self.sources.get_mut(source) {
             state.timeout_ns = timeout_ns;
         }
+    }
+
+    /// Whether a continuous body goes where the frames of a source say: each of them is then a part of its way, and
+    /// none may be passed over for a newer one.
+    #[must_use]
+    pub fn is_followed(&self, source: usize) -> bool {
+        self.sources.get(source).is_some_and(|state| state.followed)
     }
 }
 

@@ -138,15 +138,30 @@ impl World {
     }
 
     /// Sees to it that continuous bodies that hang on another turn about its centre, and that it keeps its way for
-    /// them.
+    /// them; and notes whose frames move any.
     pub(super) fn link_paths(&mut self) {
+        for source in &mut self.sources {
+            source.followed = false;
+        }
         for index in 0..self.bodies.len() {
             let slot = slot_at(index);
-            let Some(body) = self.body(slot).filter(|body| body.path.is_some()) else {
+            let Some(body) = self.body(slot) else {
+                continue;
+            };
+            let Some(path) = &body.path else {
                 continue;
             };
             let entry = &self.entries[index];
             let (root, local) = (entry.root, entry.root_pose);
+            let mover = self.body(root).and_then(|root| root.source);
+            if path.is_of_continuous()
+                && let Some(source) = mover
+            {
+                self.sources[source.index()].followed = true;
+            }
+            let Some(body) = self.body(slot) else {
+                continue;
+            };
             let Some(root_body) = self.body(root).filter(|root| !root.unbounded) else {
                 continue;
             };

@@ -2,7 +2,7 @@
 
 use sweepd::wire::{Event, Reason, State, Verdict, pair_flags};
 
-use crate::live::{Desk, at, state, step};
+use crate::live::{Desk, at, send, state, step, tick_until};
 
 const WALL: &str = r#"
 [run]
@@ -61,4 +61,28 @@ fn a_bullet_through_a_wall_is_told_with_its_time_and_a_teleport_is_no_bullet() {
     );
     let jumps: Vec<_> = seen.iter().map(|(.., jumped)| *jumped).collect();
     assert_eq!(jumps, [false, false, false, false, true]);
+}
+
+#[test]
+fn a_bullet_that_is_back_before_a_tick_looks_has_hit_the_wall() {
+    let desk = Desk::new();
+    let scene = WALL.replace("on_frame = \"sim\"", "rate = 4");
+    let _daemon = desk.run(&scene, &[]);
+    let mut client = desk.source("sim");
+    send(&mut client, &[at(2, -40.0)]);
+    tick_until(&mut client, "where it starts", |tick| tick.unknown == 0);
+    // Right after a tick: the next one has all three frames, and the last one is where the bullet was.
+    for x in [-40.0, 60.0, -40.0] {
+        send(&mut client, &[at(2, x)]);
+    }
+    let hit = tick_until(&mut client, "a hit on the way", |tick| {
+        tick.reasons & Reason::Swept.bit() != 0
+    });
+    assert_eq!(state(&hit), State::Colliding);
+    let rows = &client.view().pairs().expect("listened to").rows;
+    let row = rows
+        .iter()
+        .find(|row| row.flags & pair_flags::SWEPT_HIT != 0)
+        .expect("the hit");
+    assert_eq!(row.verdict, Verdict::Apart.code());
 }

@@ -2,6 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use sweepd::limits::LEGS_MAX;
 use sweepd::math::{Pose, Quat, Vec3};
 use sweepd::wire::{Event, PairRow, Reason, State, Verdict, pair_flags};
 
@@ -227,9 +228,10 @@ fn frames_skipped_between_two_ticks_are_swept_too() {
 #[test]
 fn more_poses_than_are_kept_leave_a_way_open() {
     let mut rig = plate(SWEPT);
+    let height = |k| if k == LEGS_MAX + 2 { -1.0 } else { 1.0 };
     rig.send_several(
-        12,
-        |k, rig| rig.place(2, &at(k as f64, 0.0, if k == 10 { -1.0 } else { 1.0 })),
+        LEGS_MAX + 4,
+        |k, rig| rig.place(2, &at(0.1 * k as f64, 0.0, height(k))),
         ALL,
     );
     let row = rig.pair(1, 2).unwrap();
@@ -250,9 +252,13 @@ fn a_body_that_hangs_on_one_with_more_poses_than_are_kept_is_open_too() {
         ],
     ));
     rig.send(ALL);
-    // In its eleventh pose alone it is near the ball.
-    let height = |k| if k == 10 { 7.0 } else { 0.0 };
-    rig.send_several(12, |k, rig| rig.place(2, &at(-2.0, 0.0, height(k))), ALL);
+    // In one pose alone it is near the ball, and that is not kept.
+    let height = |k| if k == LEGS_MAX + 2 { 7.0 } else { 0.0 };
+    rig.send_several(
+        LEGS_MAX + 4,
+        |k, rig| rig.place(2, &at(-2.0, 0.0, height(k))),
+        ALL,
+    );
     assert!(open(rig.pair(1, 3).unwrap()), "{:?}", rig.pair(1, 3));
 }
 

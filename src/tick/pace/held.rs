@@ -1,7 +1,8 @@
 //! Frames that wait for their tick, in order of receipt; their memory goes round between here and the inbox.
 //!
 //! In: the frames of a drain. Out: the frames of a tick. A full frame stands for the older ones of its session, which
-//! are passed over and counted; a partial one does not, because those may hold bodies that it lacks.
+//! are passed over and counted; a partial one does not, because those may hold bodies that it lacks, and one of a
+//! source that moves continuous bodies does not, because those are on their way.
 
 use crate::limits::{FRAMES_PER_DRAIN_MAX, VERTEX_FRAMES_WAITING_MAX};
 use crate::wire::{Frame, Inbox, VertexFrame, WIRE_VERSION, frame_flags};
@@ -28,7 +29,8 @@ impl Queue {
 
     /// Takes one frame out of an inbox.
     ///
-    /// * `stands_alone` - each frame of this source makes a tick of its own: none is passed over for a newer one.
+    /// * `stands_alone` - each frame of this source makes a tick of its own, or is a part of a body's way: none is
+    ///   passed over for a newer one.
     /// * returns - how many frames of its source are passed over for it.
     pub(super) fn put(
         &mut self,
