@@ -17,8 +17,9 @@
 //! For who goes before a pair that has waited `T >= w max(H + 2, R + 1)` ticks has waited itself for at least
 //! `T / w - 1 >= R`: its weight is at most `w` times as much, and no head start makes up for it. So within the next `R`
 //! ticks nobody goes before it twice, and nobody at all who was not waiting at their begin: `N` turns are enough.
-//! (`tests/law_engine/schedule.rs` holds runs against it.) A turn decides a convex pair. A mesh pair may need several,
-//! and motion may undo them faster than a budget renews them; its turns grow while it waits (`carry`).
+//! (`tests/law_engine/schedule.rs` holds runs against it, and `tests` runs of meshes.) A turn decides a convex pair. A
+//! mesh pair may need several, and motion may undo them faster than a budget renews them; its turns grow while it waits
+//! (`carry`).
 //!
 //! Reports (bounds, contacts) have what verdicts leave, in the same order.
 
@@ -293,81 +294,4 @@ fn seen(gaze: &Gaze, (a, b): (&Body, &Body)) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn batches_give_the_order_of_one_sort_and_none_is_long() {
-        let mut random = 7_u32;
-        let mut items: Vec<u32> = (0..10_000)
-            .map(|_| {
-                random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                random >> 20
-            })
-            .collect();
-        let mut sorted = items.clone();
-        sorted.sort_unstable();
-        let mut line = Line::new(Order::Aged, items.len());
-        while line.ready < items.len() {
-            let before = line.ready;
-            line.advance(&mut items, |&item| item);
-            assert!(line.ready > before && line.ready <= before + BATCH);
-            assert_eq!(items[before..line.ready], sorted[before..line.ready]);
-        }
-        let mut none = Line::new(Order::Aged, 0);
-        none.advance(&mut [0_u32; 0], |&item| item);
-        assert_eq!(none.ready, 0);
-    }
-
-    fn urgency(since: Option<u32>, turn: u32, weight: f32, touched: bool) -> Urgency {
-        Urgency {
-            since: since.unwrap_or(0),
-            turn,
-            weight,
-            undecided: since.is_some(),
-            touched,
-        }
-    }
-
-    #[test]
-    fn last_ticks_contacts_have_a_head_start_then_waiting_times_weight() {
-        let order = [
-            // Waited for long, and so before contacts.
-            urgency(Some(70), 70, 1.0, false),
-            urgency(None, 100, 1.0, true),
-            urgency(Some(98), 98, 4.0, false),
-            urgency(Some(90), 90, 1.0, true),
-            urgency(Some(100), 100, 0.5, true),
-            urgency(Some(95), 95, 1.0, false),
-            urgency(None, 100, 4.0, false),
-            urgency(None, 100, 1.0, false),
-        ];
-        let ranks = order.map(|urgency| urgency.rank(100, 1.0));
-        assert!(ranks.is_sorted(), "{ranks:?}");
-    }
-
-    #[test]
-    fn a_pair_that_no_turn_decides_counts_as_no_older_than_the_head_start() {
-        let hopeless = urgency(Some(1), 1_000, 1.0, false);
-        let waits = |turn| urgency(Some(turn), turn, 1.0, false).rank(1_000, 1.0);
-        assert_eq!(hopeless.rank(1_000, 1.0), waits(1_000 - HEAD_START));
-        assert!(waits(1_000 - HEAD_START - 1) < hopeless.rank(1_000, 1.0));
-        // Ticks beyond 32 bits.
-        let late = u64::from(u32::MAX) + 10;
-        let older = urgency(Some(u32::MAX - 5), u32::MAX - 5, 1.0, false);
-        assert!(older.rank(late, 1.0) < urgency(Some(3), 3, 1.0, false).rank(late, 1.0));
-    }
-
-    #[test]
-    fn what_comes_nearer_is_more_urgent_but_never_by_more_than_the_stated_factor() {
-        let of = |closing_m: f64| {
-            let mut urgency = Urgency::default();
-            urgency.weigh(2.0, closing_m, 0.5);
-            urgency.weight
-        };
-        let weights = [f64::NAN, -1.0, 0.0, 0.1, 0.5, 10.0, 1e300, f64::INFINITY].map(of);
-        assert!(weights.is_sorted(), "{weights:?}");
-        assert!(weights[0] > 1.999 && weights[0] <= 2.0, "{weights:?}");
-        assert!(weights[4] > 4.99 && weights[7] <= 8.0, "{weights:?}");
-    }
-}
+mod tests;

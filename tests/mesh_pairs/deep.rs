@@ -3,7 +3,9 @@
 use crate::oracle::Truth;
 use crate::oracle::meshes;
 use crate::oracle::rng::Rng;
-use crate::support::{CASES, KINDS, any_convex, any_mesh, convex, place, shape, truth_of};
+use crate::support::{
+    CASES, KINDS, any_convex, any_mesh, convex, is_surface, place, shape, truth_of,
+};
 use sweepd::math::{Pose, Quat, Vec3, relative};
 use sweepd::narrow::mesh::{CarriedFront, FrontStore, Search, overlap};
 use sweepd::shape::{Convex, Shape};
@@ -39,7 +41,6 @@ fn law_3_2_what_balls_tell_is_no_deeper_than_the_overlap() {
             ((&b, pose_b), (&a, pose_a))
         };
         let depth_m = told(a, b, &relative(&pose_a, &pose_b));
-        let is_surface = |name: &str| matches!(name, "patch" | "triangle" | "slivers");
         solid += u64::from(how == 1 && !is_surface(name_a) && !is_surface(name_b));
         let Some(depth_m) = depth_m else { continue };
         let what = format!("seed {seed} {name_a} - {name_b}, {depth_m} m");

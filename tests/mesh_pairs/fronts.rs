@@ -45,15 +45,15 @@ fn step(rng: &mut Rng, pose: &Pose, home: &Pose, small: f64) -> Pose {
     next
 }
 
-struct Couple<'a> {
-    a: &'a Shape,
-    b: &'a Shape,
-    pose_a: Pose,
-    pose_b: Pose,
+pub struct Couple<'a> {
+    pub a: &'a Shape,
+    pub b: &'a Shape,
+    pub pose_a: Pose,
+    pub pose_b: Pose,
 }
 
 /// Takes a front through poses, stops it at random, and compares it with the truth each time.
-fn drive(rng: &mut Rng, couple: &mut Couple<'_>, search: Search, whole: bool, what: &str) {
+pub fn drive(rng: &mut Rng, couple: &mut Couple<'_>, search: Search, whole: bool, what: &str) {
     let (a, b) = (couple.a, couple.b);
     assert!(has_front(a, b), "{what}");
     let (size, tolerance) = (a.radius.max(b.radius), 1e-11 * (a.radius + b.radius));

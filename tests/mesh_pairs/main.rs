@@ -21,9 +21,11 @@ mod deep;
 mod extremes;
 mod fronts;
 mod half_space;
+mod holes;
 mod laws;
 mod odd;
 mod profile;
+mod public_cases;
 mod support;
 mod timing;
 

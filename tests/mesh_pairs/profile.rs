@@ -228,7 +228,7 @@ fn truth(courses: &[Course], shapes: &[Arc<Shape>], walk: &mut Walk) -> Vec<bool
     courses.iter().map(&mut collides).collect()
 }
 
-fn body(id: u64, report_within_m: f64) -> BodySpec {
+pub fn body(id: u64, report_within_m: f64) -> BodySpec {
     // What is built is handed over beside the scene.
     let shape = PlacedSpec {
         shape: ShapeSpec::Sphere { radius: 1.0 },

@@ -227,7 +227,10 @@ pub fn any_mesh(rng: &mut Rng, kind: usize) -> (Shape, &'static str) {
         1 => (meshes::cuboid(Vec3::new(1.0, 0.6, 0.3)), "cuboid"),
         2 => (meshes::torus(1.0, 0.3, 9, 6), "torus"),
         3 => (meshes::bumpy_sphere(7, 8, 0.1), "bumpy sphere"),
-        4 => (meshes::patch(rng, 4), "patch"),
+        4 => match rng.below(3) {
+            0 => (meshes::patch(rng, 4), "patch"),
+            kind => holed(rng, kind - 1),
+        },
         5 => (
             meshes::cuboid(one).and(meshes::cuboid(one * 0.6).inverted()),
             "box with a cavity",
@@ -256,6 +259,26 @@ pub fn any_mesh(rng: &mut Rng, kind: usize) -> (Shape, &'static str) {
 }
 
 pub const KINDS: usize = 12;
+
+/// What was closed before some of its faces were taken out, one of two kinds, and its name: a surface.
+pub fn holed(rng: &mut Rng, kind: usize) -> (Soup, &'static str) {
+    match kind {
+        0 => (meshes::open_box(Vec3::new(1.0, 0.8, 0.9)), "open box"),
+        _ => (meshes::holed_sphere(rng, 7, 8, 0.1), "sphere with holes"),
+    }
+}
+
+/// Whether the name of a mesh or of a convex shape is that of a surface.
+pub fn is_surface(name: &str) -> bool {
+    let surfaces = [
+        "patch",
+        "open box",
+        "sphere with holes",
+        "slivers",
+        "triangle",
+    ];
+    surfaces.contains(&name)
+}
 
 /// One convex shape whose faces the oracle can have.
 pub fn any_convex(rng: &mut Rng) -> (Shape, &'static str) {

@@ -45,6 +45,24 @@ impl Soup {
             .extend(other.faces.into_iter().map(|f| f.map(|i| i + first)));
         self
     }
+
+    /// Without some of its faces, by place, and without the vertices that no other face names.
+    pub fn without(self, mut is_gone: impl FnMut(usize) -> bool) -> Self {
+        let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+        let mut places = vec![None; self.vertices.len()];
+        for (number, face) in self.faces.iter().enumerate() {
+            if is_gone(number) {
+                continue;
+            }
+            faces.push(face.map(|old| {
+                *places[old as usize].get_or_insert_with(|| {
+                    vertices.push(self.vertices[old as usize]);
+                    u32::try_from(vertices.len() - 1).unwrap()
+                })
+            }));
+        }
+        Self::new(vertices, faces)
+    }
 }
 
 pub fn tetrahedron(rng: &mut Rng) -> Soup {
@@ -77,6 +95,35 @@ pub fn cuboid(half: Vec3) -> Soup {
         .flat_map(|&[a, b, c, d]: &[u32; 4]| [[a, b, c], [a, c, d]])
         .collect();
     Soup::new(vertices, faces)
+}
+
+/// A cuboid without its lid, the side towards +z: a surface, however much it holds.
+pub fn open_box(half: Vec3) -> Soup {
+    cuboid(half).without(|face| face / 2 == 1)
+}
+
+/// The hull of a few points in general position: every triple with all others on one side.
+pub fn hull(points: &[Vec3]) -> Soup {
+    let mut faces = Vec::new();
+    let n = points.len();
+    for i in 0..n {
+        for j in i + 1..n {
+            for k in j + 1..n {
+                let normal = (points[j] - points[i]).cross(&(points[k] - points[i]));
+                let others = (0..n).filter(|m| ![i, j, k].contains(m));
+                let sides: Vec<f64> = others
+                    .map(|m| normal.dot(&(points[m] - points[i])))
+                    .collect();
+                let face = [i, j, k].map(|v| u32::try_from(v).unwrap());
+                if sides.iter().all(|s| *s < 0.0) {
+                    faces.push(face);
+                } else if sides.iter().all(|s| *s > 0.0) {
+                    faces.push([face[0], face[2], face[1]]);
+                }
+            }
+        }
+    }
+    Soup::new(points.iter().map(|p| Point::from(*p)).collect(), faces)
 }
 
 fn index(row: usize, column: usize, columns: usize) -> u32 {
@@ -126,6 +173,12 @@ pub fn bumpy_sphere(rows: usize, columns: usize, bump: f64) -> Soup {
         }
     }
     Soup::new(vertices, faces)
+}
+
+/// A bumpy sphere of which about every fifth face is out, the first one in any case: a surface with holes.
+pub fn holed_sphere(rng: &mut Rng, rows: usize, columns: usize, bump: f64) -> Soup {
+    let whole = bumpy_sphere(rows, columns, bump);
+    whole.without(|face| face == 0 || rng.below(5) == 0)
 }
 
 /// An open, wavy sheet in x and y.

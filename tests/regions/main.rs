@@ -15,6 +15,7 @@ mod budget;
 mod harness;
 #[path = "../oracle/mod.rs"]
 mod oracle;
+mod response;
 mod truth;
 
 use harness::Drive;

@@ -136,10 +136,11 @@ fn some_solid(rng: &mut Rng) -> Soup {
 }
 
 fn some_surface(rng: &mut Rng) -> Soup {
-    if rng.below(2) == 0 {
-        meshes::patch(rng, 4)
-    } else {
-        meshes::slivers(rng)
+    match rng.below(4) {
+        0 => meshes::patch(rng, 4),
+        1 => meshes::slivers(rng),
+        2 => meshes::open_box(Vec3::new(0.8, 0.8, 0.8)),
+        _ => meshes::holed_sphere(rng, 5, 5, 0.15),
     }
 }
 
@@ -180,7 +181,7 @@ impl Solid {
     pub fn between(&self) -> [Soup; 2] {
         match self {
             Self::Cuboid(h) => [meshes::cuboid(*h), meshes::cuboid(*h)],
-            Self::Points(p) => [hull(p), hull(p)],
+            Self::Points(p) => [meshes::hull(p), meshes::hull(p)],
             Self::Triangle(p) => {
                 let soup = Soup::new(p.map(Point::from).to_vec(), vec![[0, 1, 2]]);
                 [soup.clone(), soup]
@@ -218,28 +219,4 @@ fn prism(low: f64, high: f64, h: f64, outside: f64) -> Soup {
         }
     }
     Soup::new(vertices, faces)
-}
-
-/// The hull of a few points in general position: every triple with all others on one side.
-fn hull(points: &[Vec3]) -> Soup {
-    let mut faces = Vec::new();
-    let n = points.len();
-    for i in 0..n {
-        for j in i + 1..n {
-            for k in j + 1..n {
-                let normal = (points[j] - points[i]).cross(&(points[k] - points[i]));
-                let others = (0..n).filter(|m| ![i, j, k].contains(m));
-                let sides: Vec<f64> = others
-                    .map(|m| normal.dot(&(points[m] - points[i])))
-                    .collect();
-                let face = [i as u32, j as u32, k as u32];
-                if sides.iter().all(|s| *s < 0.0) {
-                    faces.push(face);
-                } else if sides.iter().all(|s| *s > 0.0) {
-                    faces.push([face[0], face[2], face[1]]);
-                }
-            }
-        }
-    }
-    Soup::new(points.iter().map(|p| Point::from(*p)).collect(), faces)
 }

@@ -10,8 +10,8 @@ use crate::oracle::meshes::{cuboid, trimesh};
 use crate::rig::{ALL, FRAME_NS, NONE, Rig, body, has, scene};
 
 const PLATE: &str = "{ type = \"box\", half_extents = [5.0, 5.0, 0.0005] }";
-const SHOT: &str = "{ type = \"sphere\", radius = 0.01 }";
-const SWEPT: &str = "continuous = true";
+pub const SHOT: &str = "{ type = \"sphere\", radius = 0.01 }";
+pub const SWEPT: &str = "continuous = true";
 
 fn at(x: f64, y: f64, z: f64) -> Pose {
     Pose::translation(x, y, z)
@@ -25,7 +25,8 @@ fn open(row: &PairRow) -> bool {
     row.flags & pair_flags::SWEPT_OPEN != 0
 }
 
-fn is_near(row: &PairRow, toi: f64, close: f64) {
+/// A hit at a share of the motion, which is told as nearly as wanted.
+pub fn is_near(row: &PairRow, toi: f64, close: f64) {
     assert!(hit(row), "{row:?}");
     assert!(
         row.toi_min <= toi + 1e-12

@@ -23,5 +23,6 @@ mod boxes;
 mod budgets;
 mod cases;
 mod pairs;
+mod sheets;
 mod truth;
 mod walls;

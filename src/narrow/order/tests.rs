@@ -1,0 +1,305 @@
+//! Goal: work comes in the order that is stated, and no pair of meshes waits longer for a turn than is stated. Method:
+//! lists and urgencies by hand; and runs of the whole engine under a budget that is far too small, in which the turns
+//! that each pair has had are read after every tick.
+
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
+use std::sync::Arc;
+
+use super::*;
+use crate::builtin::Random;
+use crate::daemon::build_shapes;
+use crate::ids::{BodyId, PairKey};
+use crate::scene::Scene;
+use crate::tick::{Engine, TickInput};
+use crate::time::{Budget, Clock, ManualClock};
+use crate::wire::{
+    Demand, FrameHeader, Inbox, TickCause, TransformRow, Verdict, WIRE_VERSION, frame_flags,
+    name_bytes,
+};
+
+#[test]
+fn batches_give_the_order_of_one_sort_and_none_is_long() {
+    let mut random = 7_u32;
+    let mut items: Vec<u32> = (0..10_000)
+        .map(|_| {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            random >> 20
+        })
+        .collect();
+    let mut sorted = items.clone();
+    sorted.sort_unstable();
+    let mut line = Line::new(Order::Aged, items.len());
+    while line.ready < items.len() {
+        let before = line.ready;
+        line.advance(&mut items, |&item| item);
+        assert!(line.ready > before && line.ready <= before + BATCH);
+        assert_eq!(items[before..line.ready], sorted[before..line.ready]);
+    }
+    let mut none = Line::new(Order::Aged, 0);
+    none.advance(&mut [0_u32; 0], |&item| item);
+    assert_eq!(none.ready, 0);
+}
+
+fn urgency(since: Option<u32>, turn: u32, weight: f32, touched: bool) -> Urgency {
+    Urgency {
+        since: since.unwrap_or(0),
+        turn,
+        weight,
+        undecided: since.is_some(),
+        touched,
+    }
+}
+
+#[test]
+fn last_ticks_contacts_have_a_head_start_then_waiting_times_weight() {
+    let order = [
+        // Waited for long, and so before contacts.
+        urgency(Some(70), 70, 1.0, false),
+        urgency(None, 100, 1.0, true),
+        urgency(Some(98), 98, 4.0, false),
+        urgency(Some(90), 90, 1.0, true),
+        urgency(Some(100), 100, 0.5, true),
+        urgency(Some(95), 95, 1.0, false),
+        urgency(None, 100, 4.0, false),
+        urgency(None, 100, 1.0, false),
+    ];
+    let ranks = order.map(|urgency| urgency.rank(100, 1.0));
+    assert!(ranks.is_sorted(), "{ranks:?}");
+}
+
+#[test]
+fn a_pair_that_no_turn_decides_counts_as_no_older_than_the_head_start() {
+    let hopeless = urgency(Some(1), 1_000, 1.0, false);
+    let waits = |turn| urgency(Some(turn), turn, 1.0, false).rank(1_000, 1.0);
+    assert_eq!(hopeless.rank(1_000, 1.0), waits(1_000 - HEAD_START));
+    assert!(waits(1_000 - HEAD_START - 1) < hopeless.rank(1_000, 1.0));
+    // Ticks beyond 32 bits.
+    let late = u64::from(u32::MAX) + 10;
+    let older = urgency(Some(u32::MAX - 5), u32::MAX - 5, 1.0, false);
+    assert!(older.rank(late, 1.0) < urgency(Some(3), 3, 1.0, false).rank(late, 1.0));
+}
+
+#[test]
+fn what_comes_nearer_is_more_urgent_but_never_by_more_than_the_stated_factor() {
+    let of = |closing_m: f64| {
+        let mut urgency = Urgency::default();
+        urgency.weigh(2.0, closing_m, 0.5);
+        urgency.weight
+    };
+    let weights = [f64::NAN, -1.0, 0.0, 0.1, 0.5, 10.0, 1e300, f64::INFINITY].map(of);
+    assert!(weights.is_sorted(), "{weights:?}");
+    assert!(weights[0] > 1.999 && weights[0] <= 2.0, "{weights:?}");
+    assert!(weights[4] > 4.99 && weights[7] <= 8.0, "{weights:?}");
+}
+
+/// Pairs of meshes that wait, from the left to the right; in two of three the one is held in a hollow of the other.
+const PAIRS: u32 = 24;
+/// Between two of them, metres.
+const APART_M: f64 = 8.0;
+/// Priority of every second one; that of the others is 1.
+const PRIORITY: f64 = 2.0;
+/// Weight of what is in view: all but the last five.
+const VIEW_WEIGHT: f64 = 2.0;
+/// A ball is of so many rings and sides.
+const RINGS: u32 = 12;
+const SIDES: u32 = 24;
+
+/// A ball of 528 triangles; of a hollow they look inward.
+fn ball(radius_m: f64, hollow: bool) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let mut vertices = vec![[0.0, 0.0, radius_m], [0.0, 0.0, -radius_m]];
+    for ring in 1..RINGS {
+        let (s, c) = (PI * f64::from(ring) / f64::from(RINGS)).sin_cos();
+        for side in 0..SIDES {
+            let (y, x) = (TAU * f64::from(side) / f64::from(SIDES)).sin_cos();
+            vertices.push([x * s, y * s, c].map(|at| radius_m * at));
+        }
+    }
+    let at = |ring: u32, side: u32| 2 + (ring - 1) * SIDES + side % SIDES;
+    let mut faces = Vec::new();
+    for side in 0..SIDES {
+        faces.push([0, at(1, side), at(1, side + 1)]);
+        faces.push([1, at(RINGS - 1, side + 1), at(RINGS - 1, side)]);
+        for ring in 1..RINGS - 1 {
+            let (a, b) = (at(ring, side), at(ring + 1, side));
+            let (c, d) = (at(ring + 1, side + 1), at(ring, side + 1));
+            faces.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    if hollow {
+        for face in &mut faces {
+            face.swap(1, 2);
+        }
+    }
+    (vertices, faces)
+}
+
+fn trimesh(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> String {
+    format!("{{ type = \"trimesh\", vertices = {vertices:?}, faces = {faces:?} }}")
+}
+
+/// A large ball with a hollow that a ball of radius 1 m has a few centimetres of room in.
+fn shell() -> String {
+    let (mut vertices, mut faces) = ball(2.0, false);
+    let first = 2 + (RINGS - 1) * SIDES;
+    let (inner, inward) = ball(1.05, true);
+    vertices.extend(inner);
+    faces.extend(inward.into_iter().map(|face| face.map(|at| at + first)));
+    trimesh(&vertices, &faces)
+}
+
+/// Whether the second of a pair is in the hollow of the first: no plane parts these, and no turn of a small budget says
+/// that they are apart. The others stand side by side.
+fn is_held(pair: u32) -> bool {
+    !pair.is_multiple_of(3)
+}
+
+/// All pairs, and who looks at most of them from aside.
+fn scene() -> String {
+    let (vertices, faces) = ball(1.0, false);
+    let (ball, shell) = (trimesh(&vertices, &faces), shell());
+    let mut text = format!(
+        "[viewpoint]\nposition = [60.0, -100.0, 0.0]\ndirection = [0.0, 1.0, 0.0]\n\
+         half_angle_rad = 0.7\nweight = {VIEW_WEIGHT:?}\n[[source]]\nname = \"feed\"\n"
+    );
+    for pair in 0..PAIRS {
+        let first = if is_held(pair) { &shell } else { &ball };
+        let priority = if pair % 2 == 1 { PRIORITY } else { 1.0 };
+        for (id, shape) in [(2 * pair + 1, first), (2 * pair + 2, &ball)] {
+            text += &format!(
+                "[[body]]\nname = \"b{id}\"\nid = {id}\npriority = {priority:?}\nshape = {shape}\n"
+            );
+        }
+    }
+    text
+}
+
+/// The next poses: the second of each pair is put elsewhere beside the first or in its hollow, turned by any angle, so
+/// that nothing is left of what was proved.
+fn poses(random: &mut Random) -> Vec<TransformRow> {
+    let mut rows = Vec::new();
+    for pair in 0..PAIRS {
+        let x = APART_M * f64::from(pair);
+        rows.push(TransformRow {
+            body: u64::from(2 * pair + 1),
+            position: [x, 0.0, 0.0],
+            orientation: [0.0, 0.0, 0.0, 1.0],
+            ..TransformRow::default()
+        });
+        let [dx, dy, dz] = if is_held(pair) {
+            [0.0; 3].map(|_: f64| random.range(-0.01, 0.01))
+        } else {
+            // Off all axes: the boxes overlap while the balls are apart.
+            let (distance_m, turn) = (random.range(2.06, 2.2), random.range(0.0, TAU));
+            let flat_m = distance_m * (2.0_f64 / 3.0).sqrt();
+            let (y, x) = turn.sin_cos();
+            [flat_m * x, flat_m * y, distance_m / 3.0_f64.sqrt()]
+        };
+        rows.push(TransformRow {
+            body: u64::from(2 * pair + 2),
+            position: [x + dx, dy, dz],
+            orientation: random.quaternion(),
+            ..TransformRow::default()
+        });
+    }
+    rows
+}
+
+/// A frame of all bodies, and a tick.
+fn send(engine: &mut Engine, clock: &ManualClock, rows: &[TransformRow], budget: Budget) {
+    clock.advance(10_000_000);
+    let mut inbox = Inbox::default();
+    let frame = inbox.push();
+    frame.header = FrameHeader {
+        session: 11,
+        epoch: 1,
+        seq: engine.ticks() + 1,
+        source: name_bytes("feed"),
+        flags: frame_flags::FULL,
+        schema: WIRE_VERSION,
+        ..FrameHeader::default()
+    };
+    frame.received_ns = clock.boottime_ns();
+    frame.set_transforms(rows);
+    engine.tick(TickInput {
+        inbox: &inbox,
+        edits: &[],
+        demand: Demand {
+            pairs: true,
+            ..Demand::default()
+        },
+        budget,
+        cause: TickCause::Frame,
+        cause_source: None,
+        woke_ns: clock.monotonic_ns(),
+        pulse: None,
+    });
+}
+
+/// Turns that a pair has had so far, and whether it waits for its verdict.
+fn turns_of(engine: &Engine, pair: u32) -> (u32, bool) {
+    let body = |id: u32| engine.world().slot_of(BodyId(u64::from(id))).unwrap();
+    let key = PairKey::new(body(2 * pair + 1), body(2 * pair + 2));
+    let slot = engine.pairs().find(key).unwrap();
+    let verdict = engine.narrow().finding(slot).unwrap().verdict;
+    let turns = engine.narrow().memos[slot.index()].turns;
+    (turns, verdict == Verdict::Possible)
+}
+
+/// Ticks that a pair waits for a turn at most, as `order` states it.
+///
+/// * `pairs` - that wait at the same time; `turns` - a tick; `ratio` - of the greatest weight to the least.
+fn longest_wait(pairs: u32, turns: u32, ratio: f64) -> f64 {
+    let round = pairs.div_ceil(turns);
+    ratio * f64::from((HEAD_START + 2).max(round + 1)) + f64::from(round)
+}
+
+#[test]
+fn law_4_7_no_pair_of_meshes_waits_longer_for_a_turn_than_is_stated() {
+    const UNITS: u64 = 24;
+    const TICKS: u32 = 600;
+    let clock = Arc::new(ManualClock::new(1_000_000_000));
+    let scene = Scene::parse(&scene(), "test", Path::new(".")).unwrap();
+    let shapes = build_shapes(&scene).unwrap().bodies;
+    let mut engine = Engine::new(&scene, shapes, 7, Arc::clone(&clock) as Arc<dyn Clock>).unwrap();
+    let mut random = Random::new(43);
+    send(&mut engine, &clock, &poses(&mut random), Budget::UNLIMITED);
+    // So few units are one turn a tick.
+    let most = longest_wait(PAIRS, 1, PRIORITY * CLOSING_WEIGHT * VIEW_WEIGHT);
+    assert!(f64::from(TICKS) > most, "who starves is to be seen");
+    let mut before: Vec<u32> = (0..PAIRS).map(|pair| turns_of(&engine, pair).0).collect();
+    let (mut waits, mut had) = ([0_u32; PAIRS as usize], [0_u32; PAIRS as usize]);
+    let (mut longest, mut open) = (0_u32, 0_u32);
+    for tick in 0..TICKS {
+        let rows = poses(&mut random);
+        send(&mut engine, &clock, &rows, Budget::units(UNITS));
+        for pair in 0..PAIRS {
+            let at = pair as usize;
+            let (turns, waiting) = turns_of(&engine, pair);
+            let had_turn = std::mem::replace(&mut before[at], turns) != turns;
+            had[at] += u32::from(had_turn);
+            waits[at] = if had_turn || !waiting {
+                0
+            } else {
+                waits[at] + 1
+            };
+            longest = longest.max(waits[at]);
+            open += u32::from(waiting && is_held(pair));
+            assert!(
+                f64::from(waits[at]) <= most,
+                "pair {pair}: {} of {most} ticks in tick {tick}",
+                waits[at]
+            );
+        }
+    }
+    println!("longest wait {longest} of {most} ticks, turns by pair {had:?}");
+    let held = (0..PAIRS).filter(|pair| is_held(*pair)).count();
+    assert!(
+        open as usize > TICKS as usize * held / 2,
+        "the budget is to be too small for them: {open}"
+    );
+    // Those before it by their weight took more than one round.
+    assert!(longest > PAIRS, "{longest} ticks");
+    // In the middle of the view and of high priority, against neither.
+    assert!(had[7] > 2 * had[20], "{had:?}");
+}
