@@ -11,9 +11,9 @@ use crate::time::Budget;
 pub enum Mode {
     /// Lockstep: one tick for each frame of this source, in order, none skipped in silence.
     OnFrame(String),
-    /// A round: the newest frame of each live source.
+    /// A round: the newest frame of each live source, and all of one that moves continuous bodies.
     OnAll,
-    /// So many ticks a second on the newest state, hertz.
+    /// So many ticks a second on the newest state, hertz; it too with all frames of one that moves continuous bodies.
     Rate(f64),
 }
 

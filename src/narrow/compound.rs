@@ -121,8 +121,8 @@ impl CompoundFront {
             self.bent_m = bent_m;
         }
         let entries = &tools.shelves.store.entries;
-        let over = (self.wear).is_over(&self.cover, entries, [a.radius, b.radius]);
-        if over || self.search != Search::Carried {
+        let worn = (self.wear).is_worn_out(&self.cover, entries, [a.radius, b.radius]);
+        if worn || self.search != Search::Carried {
             self.start_over(tools, (&sides.0, &sides.1));
             return;
         }

@@ -13,3 +13,9 @@ pub mod obb;
 pub fn prepare() {
     let _best = boxes::Level::best();
 }
+
+/// The greater of two; of a number that is none and another: the other. One instruction.
+#[inline(always)]
+fn greater(x: f32, y: f32) -> f32 {
+    if x > y { x } else { y }
+}

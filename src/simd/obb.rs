@@ -8,6 +8,8 @@
 //! 1, so a positive separation along one is too small at worst. Zero or less: the boxes may touch, and the number only
 //! says by how much, for an order.
 
+use super::greater;
+
 /// Boxes in a pack.
 pub const LANES: usize = 8;
 
@@ -152,12 +154,6 @@ impl std::ops::Mul for Wide {
         }
         self
     }
-}
-
-/// The greater of two; of a number that is none and another: the other. One instruction.
-#[inline(always)]
-fn greater(x: f32, y: f32) -> f32 {
-    if x > y { x } else { y }
 }
 
 /// Three products of lanes, summed from the left.

@@ -7,7 +7,7 @@
 //!
 //! In every mode a tick goes out at least each heartbeat, at the nearest time-out and after an edit. With `on_frame`
 //! those ticks take no frame and judge ages only; with `on_all` they leave a round that is under way alone; with a
-//! rate every tick takes the newest state.
+//! rate every tick takes the newest state. Of a source that moves continuous bodies all frames are taken, in each mode.
 
 mod held;
 

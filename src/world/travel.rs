@@ -145,21 +145,10 @@ impl World {
         }
         for index in 0..self.bodies.len() {
             let slot = slot_at(index);
-            let Some(body) = self.body(slot) else {
-                continue;
-            };
-            let Some(path) = &body.path else {
-                continue;
-            };
             let entry = &self.entries[index];
             let (root, local) = (entry.root, entry.root_pose);
-            let mover = self.body(root).and_then(|root| root.source);
-            if path.is_of_continuous()
-                && let Some(source) = mover
-            {
-                self.sources[source.index()].followed = true;
-            }
-            let Some(body) = self.body(slot) else {
+            self.note_followed(slot, root);
+            let Some(body) = self.body(slot).filter(|body| body.path.is_some()) else {
                 continue;
             };
             let Some(root_body) = self.body(root).filter(|root| !root.unbounded) else {
@@ -185,6 +174,15 @@ impl World {
             {
                 path.set_pivot(pivot, reach);
             }
+        }
+    }
+
+    /// Notes that the frames of a body's source move it, where it is continuous.
+    fn note_followed(&mut self, slot: BodySlot, root: BodySlot) {
+        let path = self.body(slot).and_then(|body| body.path.as_ref());
+        let mover = self.body(root).and_then(|root| root.source);
+        if let Some(source) = mover.filter(|_| path.is_some_and(|path| path.is_of_continuous())) {
+            self.sources[source.index()].followed = true;
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use sweepd::wire::{Event, Reason, State, Verdict, pair_flags};
 
+use crate::edits::done;
 use crate::live::{Desk, at, send, state, step, tick_until};
 
 const WALL: &str = r#"
@@ -66,9 +67,15 @@ fn a_bullet_through_a_wall_is_told_with_its_time_and_a_teleport_is_no_bullet() {
 #[test]
 fn a_bullet_that_is_back_before_a_tick_looks_has_hit_the_wall() {
     let desk = Desk::new();
-    let scene = WALL.replace("on_frame = \"sim\"", "rate = 4");
+    let (wall, bullet) = WALL.rsplit_once("[[body]]").unwrap();
+    let scene = wall.replace("on_frame = \"sim\"", "rate = 4");
+    assert!(bullet.contains("bullet"));
     let _daemon = desk.run(&scene, &[]);
     let mut client = desk.source("sim");
+    let put = r#"{"put": {"name": "bullet", "id": 2, "source": "sim", "continuous": true,
+                          "shape": {"type": "sphere", "radius": 0.004}}}"#;
+    let rev = done(&mut client, put);
+    tick_until(&mut client, "the edit", |tick| tick.header.scene_rev >= rev);
     send(&mut client, &[at(2, -40.0)]);
     tick_until(&mut client, "where it starts", |tick| tick.unknown == 0);
     // Right after a tick: the next one has all three frames, and the last one is where the bullet was.

@@ -14,7 +14,7 @@ fn ask(client: &mut Client, edits: &str) -> Answer {
 }
 
 /// The edit is done; returns its scene revision.
-fn done(client: &mut Client, edits: &str) -> u64 {
+pub(crate) fn done(client: &mut Client, edits: &str) -> u64 {
     let answer = ask(client, edits);
     assert!(answer.ok, "{answer:?}");
     answer.scene_rev

@@ -199,8 +199,10 @@ impl Order {
 
     /// Gives the bodies lanes in another order.
     fn lay<P: Proxies>(&mut self, lanes: Lay, tick: &Tick<'_, P>) {
-        if lanes == Lay::Anew || !self.lay_presorted(tick) {
-            self.lay_anew(tick);
+        match lanes {
+            Lay::Stays => {}
+            Lay::Presorted if self.lay_presorted(tick) => {}
+            Lay::Presorted | Lay::Anew => self.lay_anew(tick),
         }
     }
 

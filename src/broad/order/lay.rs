@@ -146,7 +146,6 @@ impl Order {
         room(&mut self.homeless, seats);
         room(&mut self.worklist, 2 * seats);
         finds.reserve(blocks, bodies);
-        // What a sort of many bodies takes is made by the first one and kept: fresh pages for it are a tenth of a tick.
         if !is_thrifty(bodies) {
             presort.reserve(bodies + seats, seats);
             room(&mut self.boxes, bodies + seats);

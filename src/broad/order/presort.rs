@@ -110,6 +110,7 @@ impl Order {
         let presort = &mut self.afresh.presort;
         presort.bodies.clear();
         self.boxes.clear();
+        // Made by the first sort of many bodies and kept: fresh pages for it are a tenth of a tick.
         room(&mut presort.bodies, self.len);
         room(&mut self.boxes, self.len);
         for (block, live) in self.live.iter().enumerate() {

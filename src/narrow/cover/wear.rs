@@ -39,18 +39,35 @@ impl Wear {
     /// Whether the roots are the shorter way at the pose moved to: large boxes tell more than many small ones.
     ///
     /// * `radii_m` - of the two.
-    pub(in crate::narrow) fn is_over(
+    pub(in crate::narrow) fn is_worn_out(
         &self,
         cover: &Cover,
         entries: &Entries,
         radii_m: [f64; 2],
     ) -> bool {
         let (drift, [a, b]) = (&cover.drift, radii_m);
+        // One of the two may have no end.
+        let size_m = if (a + b).is_finite() { a + b } else { a.min(b) };
         let settled = self.fresh_len > 0;
         cover.is_lost()
-            || drift.path_m > PATH_MAX * (a + b)
+            || drift.path_m > PATH_MAX * size_m
             || drift.last_m > LEAP * a.min(b)
             || settled && cover.len() > STALE_TIMES * self.fresh_len + STALE_MORE
             || settled && WORN_TIMES * cover.expired_len(entries) > self.fresh_steps
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_way_wears_out_what_is_proved_also_beside_what_has_no_end() {
+        let (mut cover, entries, wear) =
+            (Cover::default(), Entries::with_room(0, 0), Wear::default());
+        let radii_m = [f64::INFINITY, 1.0];
+        assert!(!wear.is_worn_out(&cover, &entries, radii_m));
+        cover.drift.path_m = PATH_MAX + 1.0;
+        assert!(wear.is_worn_out(&cover, &entries, radii_m));
     }
 }

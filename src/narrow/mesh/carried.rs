@@ -148,11 +148,11 @@ impl CarriedFront {
             self.shells.drop_test();
             self.measure_depth(a, b);
         }
-        let over = (self.wear).is_over(&self.cover, &store.entries, [a.radius, b.radius]);
+        let worn = (self.wear).is_worn_out(&self.cover, &store.entries, [a.radius, b.radius]);
         // Where a long step has lost the touch, what is left open is far from the next one.
         let adrift = !self.cover.touching.is_empty()
             && self.cover.drift.last_m > ADRIFT * a.radius.min(b.radius);
-        if over || adrift || self.search != Search::Carried {
+        if worn || adrift || self.search != Search::Carried {
             self.start_over(store, a, b);
             return;
         }
