@@ -84,3 +84,18 @@ fn a_crowd_is_searched_once_more_when_it_is_laid_anew_and_stays_exact() {
     assert!(tests.windows(3).filter(peak).count() > 0, "{tests:?}");
     rig.validate();
 }
+
+#[test]
+fn bodies_at_rest_keep_to_their_first_fat_boxes() {
+    let mut scene = Scene::new(Kind::Pile, BODIES, 13);
+    let mut rig = Rig::new(Level::best(), BODIES, false);
+    rig.start(&scene.boxes);
+    let mut sorts = |_| frames(&mut rig, &mut scene, 1, true) == [BroadMode::Sort];
+    assert!((0..40).any(&mut sorts), "never sorted");
+    for _ in 0..8 {
+        frames(&mut rig, &mut scene, 1, true);
+        let renewed = rig.work().renewed;
+        assert!(renewed * 20 < BODIES as u64, "{renewed} renewed");
+    }
+    rig.validate();
+}

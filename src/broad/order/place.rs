@@ -293,6 +293,7 @@ impl Order {
             }
         }
         self.gaits.clear();
+        let span = self.afresh.probe.span();
         let order = self.sorter.sort(boxes);
         for (key, index) in order {
             let starts = self.keys.last().is_none_or(|first| {
@@ -320,8 +321,11 @@ impl Order {
             let middle = centre(&boxes[index as usize]);
             widen(&mut self.homes[block], &middle);
             widen(&mut self.quarters[block / WIDTH], &middle);
+            let one = &boxes[index as usize];
+            let side = (one[3] - one[0] + one[4] - one[1] + one[5] - one[2]) / 3.0;
+            let guess = || span.map_or(Gait::NEW, |span| Gait::at_rest(span * side));
             let gait = self.former.get(index as usize).copied();
-            self.gaits[rank] = gait.unwrap_or(Gait::NEW);
+            self.gaits[rank] = gait.unwrap_or_else(guess);
         }
         self.sorted = self.live.len();
         let blocks = self.sorted + self.sorted / ATTIC + 1;

@@ -3,7 +3,8 @@
 //! In: the boxes of some bodies, in each tick of a while. Out: how often they escape from fat boxes that nobody else
 //! sees, and what the search meets meanwhile. Where they escape no more seldom than when candidates were given up, and
 //! as much is met, candidates are not tried again: a trial takes several times what the ticks about it take, a probe
-//! next to nothing.
+//! next to nothing. And where most of them are at rest, all bodies begin with boxes as wide as theirs when candidates
+//! are tried again: else each would have to learn it, most in the very next tick.
 
 use super::fatten::{Gait, HORIZON};
 use super::gear::Footing;
@@ -80,6 +81,22 @@ impl Probe {
             self.escapes += counts * u64::from(!stays);
             self.watched += counts;
         }
+    }
+
+    /// What bodies at rest span, in their mean sides, where most of those that are watched are at rest.
+    pub(super) fn span(&self) -> Option<f32> {
+        let mut spans = [0.0; 2 * SAMPLE];
+        let mut count = 0;
+        let known = self
+            .bodies
+            .iter()
+            .filter_map(|one| one.gait.span(&one.hold));
+        for (place, span) in spans.iter_mut().zip(known) {
+            *place = span;
+            count += 1;
+        }
+        spans[..count].sort_unstable_by(f32::total_cmp);
+        (count * 2 > self.bodies.len()).then(|| spans[count / 2])
     }
 
     /// What it comes to.
