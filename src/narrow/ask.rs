@@ -9,6 +9,7 @@ use crate::wire::Verdict;
 use crate::world::{Body, PlacedShape};
 
 use super::Counters;
+use super::carry::Told;
 use super::compound::{CompoundFront, Tools};
 use super::contacts::Contact;
 use super::cursor::{Cursor, Room, Turn};
@@ -40,12 +41,12 @@ pub struct Asked {
 #[must_use]
 pub fn gap_between(a: &Body, b: &Body, report_m: f64, meter: &mut Meter<'_>) -> Asked {
     let found = match (&*a.shapes, &*b.shapes) {
-        _ if a.unbounded && b.unbounded => Found::default(),
+        _ if a.unbounded && b.unbounded => Told::NOTHING,
         ([one], [other]) => of_shapes((a, b), (one, other), report_m, meter),
         _ => of_parts((a, b), report_m, meter),
     };
-    let Found {
-        finished,
+    let Told {
+        done: finished,
         certain,
         witness,
         ..
@@ -79,33 +80,13 @@ pub fn gap_between(a: &Body, b: &Body, report_m: f64, meter: &mut Meter<'_>) -> 
     }
 }
 
-/// How far a query came.
-struct Found {
-    gap: Interval,
-    finished: bool,
-    /// 0 inside the interval of a finished query means touching.
-    certain: bool,
-    witness: Option<Witness>,
-}
-
-impl Default for Found {
-    fn default() -> Self {
-        Self {
-            gap: Interval::UNKNOWN,
-            finished: false,
-            certain: false,
-            witness: None,
-        }
-    }
-}
-
 /// Of two bodies of one shape each.
 fn of_shapes(
     (a, b): (&Body, &Body),
     shapes: (&PlacedShape, &PlacedShape),
     report_m: f64,
     meter: &mut Meter<'_>,
-) -> Found {
+) -> Told {
     let (mut bench, mut cursor) = (Bench::default(), Cursor::default());
     let rel = relative(&a.pose, &b.pose);
     cursor.start((0, 0), (rel, bent(a, b)), 0.0, 0, Goal::Gap);
@@ -122,24 +103,24 @@ fn of_shapes(
         turn = cursor.turn(&mut room, shapes, report_m, meter, &mut bench.counters);
     }
     let max = cursor.upper();
-    Found {
+    Told {
         gap: Interval::new(cursor.gap.min.min(max), max),
-        finished: turn == Turn::Finished,
+        done: turn == Turn::Finished,
         certain: cursor.certain,
         witness: cursor.witness,
     }
 }
 
 /// Of two bodies of which at least one has several shapes.
-fn of_parts((a, b): (&Body, &Body), report_m: f64, meter: &mut Meter<'_>) -> Found {
+fn of_parts((a, b): (&Body, &Body), report_m: f64, meter: &mut Meter<'_>) -> Told {
     let (mut bench, mut front) = (Bench::default(), CompoundFront::default());
     let mut tools = bench.tools();
     front.move_to(&mut tools, (a, b), &relative(&a.pose, &b.pose));
     let asked = (Goal::Gap, report_m);
-    let finished = front.advance(&mut tools, (a, b), asked, u64::MAX, meter);
-    Found {
+    let done = front.advance(&mut tools, (a, b), asked, u64::MAX, meter);
+    Told {
         gap: front.interval(),
-        finished,
+        done,
         certain: front.is_certain(),
         witness: front.witness(),
     }

@@ -46,8 +46,6 @@ impl Narrow {
             return false;
         };
         let store = &mut self.shelves.store;
-        let credit_m = a.motion.credit_m() + b.motion.credit_m();
-        let bent_m = bent(a, b);
         let (one_shape, other_shape) = (&one.shape, &other.shape);
         if goal == Goal::Verdict && self.search == Search::Carried || due {
             if due {
@@ -58,8 +56,8 @@ impl Narrow {
             let gap = told.gap(memo.now, |gap| sound(gap, one, other, &rel));
             if gap.max <= 0.0 || gap.min > memo.report_m.max(0.0) {
                 memo.gap = gap;
-                (memo.rel, memo.credit_m, memo.tested) = (rel, credit_m, self.tick);
-                (memo.bent_m, memo.finished, memo.tight) = (bent_m, false, false);
+                memo.note_asked((a, b), &rel, self.tick);
+                (memo.finished, memo.tight) = (false, false);
                 match told {
                     Glance::Touch(Some(leaf)) => {
                         memo.witness = Some(seen_at((one, other), (0, 0), &pos12, &leaf));
@@ -103,7 +101,8 @@ impl Narrow {
     }
 }
 
-/// What a turn on a front has told of a pair at this tick's poses.
+/// What a front or a query has told of a pair at the poses it was asked at.
+#[derive(Debug)]
 pub(super) struct Told {
     pub(super) gap: Interval,
     /// The goal is reached.
@@ -113,7 +112,24 @@ pub(super) struct Told {
     pub(super) witness: Option<Witness>,
 }
 
+impl Told {
+    /// Of what was not asked.
+    pub(super) const NOTHING: Self = Self {
+        gap: Interval::UNKNOWN,
+        done: false,
+        certain: false,
+        witness: None,
+    };
+}
+
 impl Memo {
+    /// It is asked at the poses of this tick: what is told of it holds there.
+    pub(super) fn note_asked(&mut self, (a, b): (&Body, &Body), rel: &Pose, tick: u64) {
+        self.rel = *rel;
+        self.credit_m = a.motion.credit_m() + b.motion.credit_m();
+        (self.bent_m, self.tested) = (bent(a, b), tick);
+    }
+
     /// Takes over what a turn towards a goal told; false: it told nothing new.
     pub(super) fn take_over(
         &mut self,
@@ -128,9 +144,7 @@ impl Memo {
         }
         // What was known before holds at these poses too.
         self.gap = found.meet(now);
-        self.rel = *rel;
-        self.credit_m = a.motion.credit_m() + b.motion.credit_m();
-        (self.bent_m, self.tested) = (bent(a, b), tick);
+        self.note_asked((a, b), rel, tick);
         let whole = told.done && !(goal == Goal::Verdict && self.gap.max <= 0.0);
         self.finished = whole && told.certain;
         self.tight = whole && goal != Goal::Verdict;

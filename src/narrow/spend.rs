@@ -145,10 +145,7 @@ impl Narrow {
         };
         self.counters.queries += 1;
         let witness = witness_of(&a.shapes[0], &b.shapes[0], &pos12, &closest, (0, 0));
-        memo.rel = rel;
-        memo.credit_m = a.motion.credit_m() + b.motion.credit_m();
-        memo.bent_m = bent(a, b);
-        memo.tested = self.tick;
+        memo.note_asked((a, b), &rel, self.tick);
         memo.tight = closest.finished;
         let answer = Answer {
             gap: sound(closest.gap, &a.shapes[0], &b.shapes[0], &rel),
@@ -264,10 +261,7 @@ impl Narrow {
             min: memo.now.min.min(closest.gap.max),
             max: closest.gap.max,
         };
-        memo.rel = rel;
-        memo.credit_m = a.motion.credit_m() + b.motion.credit_m();
-        memo.bent_m = bent(a, b);
-        memo.tested = self.tick;
+        memo.note_asked((a, b), &rel, self.tick);
         memo.finished = false;
         memo.tight = false;
         memo.witness = Some(Witness {

@@ -393,4 +393,4 @@ fn radius(vertices: &[Point], faces: &[[u32; 3]], centre: &Point) -> f64 {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -20,6 +20,8 @@ pub use error::ShapeError;
 pub use library::Library;
 pub(crate) use load::find_mesh;
 pub use mesh::Mesh;
+#[cfg(test)]
+pub(crate) use mesh::tests::ball;
 pub(crate) use mesh::{
     Ball, Below, BoxId, Climb, Cone, Held, Inside, NODES_WAITING_MAX, NewTree, NoVertex, Node, Obb,
     ObbPack, ObbTree, Trails, TreeJob, can_be_vertices, side,

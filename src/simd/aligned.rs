@@ -155,18 +155,11 @@ mod x86 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::numbers;
 
     #[test]
     fn the_kernel_and_its_twin_agree_bit_for_bit() {
-        let mut state = 7_u64;
-        let mut next = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            #[allow(clippy::cast_precision_loss, reason = "24 bits")]
-            let x = (state >> 40) as f32;
-            x / 8_388_608.0 - 1.0
-        };
+        let mut next = numbers(7);
         for round in 0..if cfg!(miri) { 10 } else { 2_000 } {
             // Up to what a body may reach to, and down to sides whose squares are no normal numbers.
             let exponent = if round % 2 == 0 {

@@ -19,3 +19,17 @@ pub fn prepare() {
 fn greater(x: f32, y: f32) -> f32 {
     if x > y { x } else { y }
 }
+
+/// Numbers from a seed, in [-1, 1).
+#[cfg(test)]
+fn numbers(seed: u64) -> impl FnMut() -> f32 {
+    let mut state = seed;
+    move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        #[allow(clippy::cast_precision_loss, reason = "24 bits")]
+        let x = (state >> 40) as f32;
+        x / 8_388_608.0 - 1.0
+    }
+}

@@ -263,19 +263,7 @@ pub fn gaps_scalar(one: &One, pack: &Pack) -> [f32; LANES] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Numbers from a seed, in [-1, 1).
-    fn numbers(seed: u64) -> impl FnMut() -> f32 {
-        let mut state = seed;
-        move || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            #[allow(clippy::cast_precision_loss, reason = "24 bits")]
-            let x = (state >> 40) as f32;
-            x / 8_388_608.0 - 1.0
-        }
-    }
+    use crate::simd::numbers;
 
     fn axes(next: &mut impl FnMut() -> f32) -> [[f32; 3]; 3] {
         let turn = nalgebra::UnitQuaternion::from_scaled_axis(nalgebra::Vector3::new(

@@ -180,8 +180,9 @@ impl World {
     /// Notes that the frames of a body's source move it, where it is continuous.
     fn note_followed(&mut self, slot: BodySlot, root: BodySlot) {
         let path = self.body(slot).and_then(|body| body.path.as_ref());
-        let mover = self.body(root).and_then(|root| root.source);
-        if let Some(source) = mover.filter(|_| path.is_some_and(|path| path.is_of_continuous())) {
+        if path.is_some_and(|path| path.is_of_continuous())
+            && let Some(source) = self.body(root).and_then(|root| root.source)
+        {
             self.sources[source.index()].followed = true;
         }
     }

@@ -74,10 +74,8 @@ fn a_crowd_is_searched_once_more_when_it_is_laid_anew_and_stays_exact() {
     let mut rig = Rig::geared("from scratch", &[true], 1000, false);
     rig.start(&scene.boxes);
     let mut tests = Vec::new();
-    for frame in 0..200 {
-        scene.step();
-        rig.take(&scene);
-        rig.tick(&exact::pairs(&scene.boxes), &format!("frame {frame}"));
+    for _ in 0..200 {
+        frames(&mut rig, &mut scene, 1, true);
         tests.push(rig.work().tests);
     }
     let peak = |three: &&[u64]| three[1] * 2 > 3 * three[0].max(three[2]);

@@ -52,6 +52,23 @@ pub struct Couple<'a> {
     pub pose_b: Pose,
 }
 
+impl<'a> Couple<'a> {
+    /// Two at their poses, either of them first.
+    pub fn either_way(rng: &mut Rng, one: (&'a Shape, Pose), other: (&'a Shape, Pose)) -> Self {
+        let ((a, pose_a), (b, pose_b)) = if rng.below(2) == 0 {
+            (one, other)
+        } else {
+            (other, one)
+        };
+        Self {
+            a,
+            b,
+            pose_a,
+            pose_b,
+        }
+    }
+}
+
 /// Takes a front through poses, stops it at random, and compares it with the truth each time.
 pub fn drive(rng: &mut Rng, couple: &mut Couple<'_>, search: Search, whole: bool, what: &str) {
     let (a, b) = (couple.a, couple.b);
@@ -308,17 +325,7 @@ fn cases(seed: u64, count: u64, search: Search, whole: bool) {
             }
         }
         let what = format!("seed {} {name_a} - {name_b} {search:?}", seed + case);
-        let (a, b, pose_a, pose_b) = if rng.below(2) == 0 {
-            (&a, &b, pose_a, pose_b)
-        } else {
-            (&b, &a, pose_b, pose_a)
-        };
-        let mut couple = Couple {
-            a,
-            b,
-            pose_a,
-            pose_b,
-        };
+        let mut couple = Couple::either_way(&mut rng, (&a, pose_a), (&b, pose_b));
         drive(&mut rng, &mut couple, search, whole, &what);
     }
 }

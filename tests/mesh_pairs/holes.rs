@@ -75,17 +75,7 @@ fn law_1_meshes_with_holes_hold_the_truth_at_every_pose_of_a_front() {
         };
         let (pose_a, pose_b) = place(&mut rng, &mesh, &other, way(case));
         let what = format!("seed {seed} {name_a} - {name_b}");
-        let (a, b, pose_a, pose_b) = if rng.below(2) == 0 {
-            (&mesh, &other, pose_a, pose_b)
-        } else {
-            (&other, &mesh, pose_b, pose_a)
-        };
-        let mut couple = Couple {
-            a,
-            b,
-            pose_a,
-            pose_b,
-        };
+        let mut couple = Couple::either_way(&mut rng, (&mesh, pose_a), (&other, pose_b));
         drive(&mut rng, &mut couple, Search::Carried, case % 4 < 2, &what);
     }
 }

@@ -160,14 +160,14 @@ impl Order {
         } else {
             Lay::Anew
         };
-        let stays = lanes == Lay::Stays;
+        let (stays, presorted) = (lanes == Lay::Stays, lanes == Lay::Presorted);
         // Overlaps that are carried to other lanes take as long as another search, each as a box compared with a block.
-        let crowded = lanes == Lay::Presorted && self.hits as u64 > self.afresh.finds.tests;
+        let crowded = presorted && self.hits as u64 > self.afresh.finds.tests;
         if !(stays || crowded) {
             if was {
                 self.carry_held();
             }
-            self.lay(lanes, tick);
+            self.lay(presorted, tick);
         }
         let tests = self.find_overlaps(tick, work);
         if stays || crowded {
@@ -181,7 +181,7 @@ impl Order {
             self.tell_carried(tick);
         }
         if crowded {
-            self.lay(lanes, tick);
+            self.lay(presorted, tick);
             self.afresh.usual = self.find_overlaps(tick, work);
         } else if !stays {
             self.afresh.usual = tests;
@@ -197,12 +197,11 @@ impl Order {
         }
     }
 
-    /// Gives the bodies lanes in another order.
-    fn lay<P: Proxies>(&mut self, lanes: Lay, tick: &Tick<'_, P>) {
-        match lanes {
-            Lay::Stays => {}
-            Lay::Presorted if self.lay_presorted(tick) => {}
-            Lay::Presorted | Lay::Anew => self.lay_anew(tick),
+    /// Gives the bodies lanes in another order: in the one that was sorted ahead, if there is one and it has a lane for
+    /// each.
+    fn lay<P: Proxies>(&mut self, presorted: bool, tick: &Tick<'_, P>) {
+        if !(presorted && self.lay_presorted(tick)) {
+            self.lay_anew(tick);
         }
     }
 

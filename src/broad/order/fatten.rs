@@ -78,13 +78,14 @@ impl Gait {
         }
     }
 
-    /// What a body at rest spans, in its mean sides; `None`: it is not at rest.
+    /// What a body at rest spans, in its mean sides; `None`: it is not at rest, or has no hold that tells.
     pub(super) fn span(&self, held: &Hold) -> Option<f32> {
         let side = Down { faces: self.anchor }.mean_side();
         let widest = (0..3).fold(0.0, |widest: f32, k| {
             widest.max(held.core.faces[k] - held.fat.faces[k])
         });
-        (self.rest > REST_AFTER && side > 0.0).then_some(widest / side)
+        let span = widest / side;
+        (self.rest > REST_AFTER && span.is_finite()).then_some(span)
     }
 
     /// The hold of a body whose box is `now`, and what is learned from how long the last one held.

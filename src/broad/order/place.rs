@@ -318,12 +318,14 @@ impl Order {
             let (rank, body) = (block * WIDTH + lane, bodies[index as usize]);
             self.slot_of[rank] = body.0;
             self.rank_of[body.index()] = small(rank);
-            let middle = centre(&boxes[index as usize]);
+            let one = &boxes[index as usize];
+            let middle = centre(one);
             widen(&mut self.homes[block], &middle);
             widen(&mut self.quarters[block / WIDTH], &middle);
-            let one = &boxes[index as usize];
-            let side = (one[3] - one[0] + one[4] - one[1] + one[5] - one[2]) / 3.0;
-            let guess = || span.map_or(Gait::NEW, |span| Gait::at_rest(span * side));
+            let guess = || {
+                let side = (one[3] - one[0] + one[4] - one[1] + one[5] - one[2]) / 3.0;
+                span.map_or(Gait::NEW, |span| Gait::at_rest(span * side))
+            };
             let gait = self.former.get(index as usize).copied();
             self.gaits[rank] = gait.unwrap_or_else(guess);
         }

@@ -7,12 +7,13 @@ use crate::builtin::Random;
 use crate::daemon::build_shapes;
 use crate::math::{Quat, Vec3};
 use crate::narrow::Counters;
-use crate::narrow::ask::Bench;
+use crate::narrow::ask::{Bench, gap_between};
 use crate::narrow::contacts::Contact;
 use crate::narrow::cursor::{Cursor, Room, Turn};
 use crate::narrow::shelves::Shelves;
 use crate::scene::Scene;
 use crate::time::{ManualClock, Meter};
+use crate::wire::Verdict;
 use crate::world::World;
 
 /// Of bodies of that many shapes: mixed ones, some meshes among them; with a half-space as the last of B's, or alone.
@@ -267,5 +268,21 @@ fn a_walk_over_pairs_of_shapes_leaves_out_none_that_may_touch() {
             let every = a.shapes.len() * b.shapes.len();
             assert!(planes == Planes::Only || near.len() * 2 < every);
         }
+    }
+}
+
+#[test]
+fn bug_two_bodies_that_both_have_a_half_space_came_to_no_end_at_another_pose() {
+    let mut random = Random::new(7);
+    let [_, a] = bodies(&mut random, [1, 3], Planes::Beside);
+    let [_, mut b] = bodies(&mut random, [1, 4], Planes::Beside);
+    let clock = ManualClock::new(0);
+    for step in 0..6 {
+        b.pose = Pose::translation(0.0, 0.0, 3.0 + 0.001 * f64::from(step));
+        // They have no gap, and nothing is worked for one.
+        let mut meter = Meter::new(&clock, None, Some(1_000));
+        let asked = gap_between(&a, &b, 0.0, &mut meter);
+        assert!(!asked.finished && asked.verdict == Verdict::Possible);
+        assert_eq!((asked.gap, meter.spent()), (Interval::UNKNOWN, 0));
     }
 }

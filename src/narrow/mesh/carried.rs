@@ -54,6 +54,7 @@ use touch::Crossing;
 /// Steps beyond this share of the smaller body's radius start anew where the touch is lost: 5,300 units in place of
 /// 7,300 at 2 % of the diameter a tick, 3,400 in place of 3,700 at 0.5 %; at 0.02 more pairs stay open within a limit.
 const ADRIFT: f64 = 0.04;
+
 /// The front of one pair; its entries are in a [`FrontStore`], the same one from [`CarriedFront::start`] to
 /// [`CarriedFront::release`].
 #[derive(Debug, Default)]

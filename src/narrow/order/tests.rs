@@ -2,7 +2,7 @@
 //! lists and urgencies by hand; and runs of the whole engine under a budget that is far too small, in which the turns
 //! that each pair has had are read after every tick.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -10,13 +10,13 @@ use super::*;
 use crate::builtin::Random;
 use crate::daemon::build_shapes;
 use crate::ids::{BodyId, PairKey};
+use crate::math::{Pose, Vec3};
+use crate::report::rig::{Rig, row};
 use crate::scene::Scene;
-use crate::tick::{Engine, TickInput};
-use crate::time::{Budget, Clock, ManualClock};
-use crate::wire::{
-    Demand, FrameHeader, Inbox, TickCause, TransformRow, Verdict, WIRE_VERSION, frame_flags,
-    name_bytes,
-};
+use crate::shape::ball;
+use crate::tick::Engine;
+use crate::time::{Budget, ManualClock};
+use crate::wire::{TransformRow, Verdict};
 
 #[test]
 fn batches_give_the_order_of_one_sort_and_none_is_long() {
@@ -101,51 +101,27 @@ const APART_M: f64 = 8.0;
 const PRIORITY: f64 = 2.0;
 /// Weight of what is in view: all but the last five.
 const VIEW_WEIGHT: f64 = 2.0;
-/// A ball is of so many rings and sides.
-const RINGS: u32 = 12;
-const SIDES: u32 = 24;
-
-/// A ball of 528 triangles; of a hollow they look inward.
-fn ball(radius_m: f64, hollow: bool) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
-    let mut vertices = vec![[0.0, 0.0, radius_m], [0.0, 0.0, -radius_m]];
-    for ring in 1..RINGS {
-        let (s, c) = (PI * f64::from(ring) / f64::from(RINGS)).sin_cos();
-        for side in 0..SIDES {
-            let (y, x) = (TAU * f64::from(side) / f64::from(SIDES)).sin_cos();
-            vertices.push([x * s, y * s, c].map(|at| radius_m * at));
-        }
-    }
-    let at = |ring: u32, side: u32| 2 + (ring - 1) * SIDES + side % SIDES;
-    let mut faces = Vec::new();
-    for side in 0..SIDES {
-        faces.push([0, at(1, side), at(1, side + 1)]);
-        faces.push([1, at(RINGS - 1, side + 1), at(RINGS - 1, side)]);
-        for ring in 1..RINGS - 1 {
-            let (a, b) = (at(ring, side), at(ring + 1, side));
-            let (c, d) = (at(ring + 1, side + 1), at(ring, side + 1));
-            faces.extend([[a, b, c], [a, c, d]]);
-        }
-    }
-    if hollow {
-        for face in &mut faces {
-            face.swap(1, 2);
-        }
-    }
-    (vertices, faces)
+/// A ball of 528 triangles as text.
+fn ball_text() -> String {
+    let mesh = ball(12, 0.0);
+    trimesh(mesh.vertices().iter().map(|v| v.coords), mesh.faces())
 }
 
-fn trimesh(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> String {
+fn trimesh(vertices: impl Iterator<Item = Vec3>, faces: &[[u32; 3]]) -> String {
+    let vertices: Vec<[f64; 3]> = vertices.map(Into::into).collect();
     format!("{{ type = \"trimesh\", vertices = {vertices:?}, faces = {faces:?} }}")
 }
 
 /// A large ball with a hollow that a ball of radius 1 m has a few centimetres of room in.
 fn shell() -> String {
-    let (mut vertices, mut faces) = ball(2.0, false);
-    let first = 2 + (RINGS - 1) * SIDES;
-    let (inner, inward) = ball(1.05, true);
-    vertices.extend(inner);
-    faces.extend(inward.into_iter().map(|face| face.map(|at| at + first)));
-    trimesh(&vertices, &faces)
+    let mesh = ball(12, 0.0);
+    let at = |radius_m: f64| mesh.vertices().iter().map(move |v| v.coords * radius_m);
+    let first = u32::try_from(mesh.vertices().len()).unwrap();
+    // Those of the hollow look inward.
+    let inward = |[a, b, c]: [u32; 3]| [a, c, b].map(|at| at + first);
+    let inward = mesh.faces().iter().copied().map(inward);
+    let faces: Vec<[u32; 3]> = mesh.faces().iter().copied().chain(inward).collect();
+    trimesh(at(2.0).chain(at(1.05)), &faces)
 }
 
 /// Whether the second of a pair is in the hollow of the first: no plane parts these, and no turn of a small budget says
@@ -156,8 +132,7 @@ fn is_held(pair: u32) -> bool {
 
 /// All pairs, and who looks at most of them from aside.
 fn scene() -> String {
-    let (vertices, faces) = ball(1.0, false);
-    let (ball, shell) = (trimesh(&vertices, &faces), shell());
+    let (ball, shell) = (ball_text(), shell());
     let mut text = format!(
         "[viewpoint]\nposition = [60.0, -100.0, 0.0]\ndirection = [0.0, 1.0, 0.0]\n\
          half_angle_rad = 0.7\nweight = {VIEW_WEIGHT:?}\n[[source]]\nname = \"feed\"\n"
@@ -180,12 +155,10 @@ fn poses(random: &mut Random) -> Vec<TransformRow> {
     let mut rows = Vec::new();
     for pair in 0..PAIRS {
         let x = APART_M * f64::from(pair);
-        rows.push(TransformRow {
-            body: u64::from(2 * pair + 1),
-            position: [x, 0.0, 0.0],
-            orientation: [0.0, 0.0, 0.0, 1.0],
-            ..TransformRow::default()
-        });
+        rows.push(row(
+            u64::from(2 * pair + 1),
+            &Pose::translation(x, 0.0, 0.0),
+        ));
         let [dx, dy, dz] = if is_held(pair) {
             [0.0; 3].map(|_: f64| random.range(-0.01, 0.01))
         } else {
@@ -196,44 +169,11 @@ fn poses(random: &mut Random) -> Vec<TransformRow> {
             [flat_m * x, flat_m * y, distance_m / 3.0_f64.sqrt()]
         };
         rows.push(TransformRow {
-            body: u64::from(2 * pair + 2),
-            position: [x + dx, dy, dz],
             orientation: random.quaternion(),
-            ..TransformRow::default()
+            ..row(u64::from(2 * pair + 2), &Pose::translation(x + dx, dy, dz))
         });
     }
     rows
-}
-
-/// A frame of all bodies, and a tick.
-fn send(engine: &mut Engine, clock: &ManualClock, rows: &[TransformRow], budget: Budget) {
-    clock.advance(10_000_000);
-    let mut inbox = Inbox::default();
-    let frame = inbox.push();
-    frame.header = FrameHeader {
-        session: 11,
-        epoch: 1,
-        seq: engine.ticks() + 1,
-        source: name_bytes("feed"),
-        flags: frame_flags::FULL,
-        schema: WIRE_VERSION,
-        ..FrameHeader::default()
-    };
-    frame.received_ns = clock.boottime_ns();
-    frame.set_transforms(rows);
-    engine.tick(TickInput {
-        inbox: &inbox,
-        edits: &[],
-        demand: Demand {
-            pairs: true,
-            ..Demand::default()
-        },
-        budget,
-        cause: TickCause::Frame,
-        cause_source: None,
-        woke_ns: clock.monotonic_ns(),
-        pulse: None,
-    });
 }
 
 /// Turns that a pair has had so far, and whether it waits for its verdict.
@@ -258,24 +198,24 @@ fn longest_wait(pairs: u32, turns: u32, ratio: f64) -> f64 {
 fn law_4_7_no_pair_of_meshes_waits_longer_for_a_turn_than_is_stated() {
     const UNITS: u64 = 24;
     const TICKS: u32 = 600;
-    let clock = Arc::new(ManualClock::new(1_000_000_000));
     let scene = Scene::parse(&scene(), "test", Path::new(".")).unwrap();
     let shapes = build_shapes(&scene).unwrap().bodies;
-    let mut engine = Engine::new(&scene, shapes, 7, Arc::clone(&clock) as Arc<dyn Clock>).unwrap();
+    let mut rig = Rig::new(&scene, &shapes, Arc::new(ManualClock::new(1_000_000_000))).unwrap();
     let mut random = Random::new(43);
-    send(&mut engine, &clock, &poses(&mut random), Budget::UNLIMITED);
+    rig.tick(&[poses(&mut random)], Budget::UNLIMITED);
     // So few units are one turn a tick.
     let most = longest_wait(PAIRS, 1, PRIORITY * CLOSING_WEIGHT * VIEW_WEIGHT);
     assert!(f64::from(TICKS) > most, "who starves is to be seen");
-    let mut before: Vec<u32> = (0..PAIRS).map(|pair| turns_of(&engine, pair).0).collect();
+    let mut before: Vec<u32> = (0..PAIRS)
+        .map(|pair| turns_of(rig.engine(), pair).0)
+        .collect();
     let (mut waits, mut had) = ([0_u32; PAIRS as usize], [0_u32; PAIRS as usize]);
     let (mut longest, mut open) = (0_u32, 0_u32);
     for tick in 0..TICKS {
-        let rows = poses(&mut random);
-        send(&mut engine, &clock, &rows, Budget::units(UNITS));
+        rig.tick(&[poses(&mut random)], Budget::units(UNITS));
         for pair in 0..PAIRS {
             let at = pair as usize;
-            let (turns, waiting) = turns_of(&engine, pair);
+            let (turns, waiting) = turns_of(rig.engine(), pair);
             let had_turn = std::mem::replace(&mut before[at], turns) != turns;
             had[at] += u32::from(had_turn);
             waits[at] = if had_turn || !waiting {

@@ -212,7 +212,7 @@ fn the_box_of_a_large_mesh_holds_it_and_is_hardly_larger() {
 }
 
 /// A ball of 4 n (n - 1) triangles, closed, with bumps of this size.
-pub(super) fn ball(n: u32, bump: f64) -> Mesh {
+pub(crate) fn ball(n: u32, bump: f64) -> Mesh {
     let (mut vertices, mut faces) = (vec![Point::new(0.0, 0.0, 1.0)], Vec::new());
     for row in 1..n {
         for column in 0..2 * n {
