@@ -16,7 +16,7 @@
 
 use super::gear::Gear;
 use super::lay::{LAY_TESTS, TakeLanes};
-use super::met::{Met, tell_all, tell_asked, tell_difference};
+use super::met::{Met, TellDifference, tell_all, tell_asked};
 use super::presort::{Presort, SPLIT_TICKS_MAX, split_ticks};
 use super::probe::Probe;
 use super::sweep::{Finds, Search};
@@ -171,11 +171,14 @@ impl Order {
         }
         let tests = self.find_overlaps(tick, work);
         if stays || crowded {
-            let Afresh {
-                held, finds, gone, ..
-            } = &self.afresh;
-            let lists = [&mut *tick.parted, &mut *tick.began];
-            tell_difference([held, &finds.met], gone, &self.slot_of, lists);
+            self.level.run(TellDifference {
+                before: &self.afresh.held,
+                now: &self.afresh.finds.met,
+                gone: &self.afresh.gone,
+                slot_of: &self.slot_of,
+                parted: tick.parted,
+                began: tick.began,
+            });
             self.tell_jumped(tick);
         } else {
             self.tell_carried(tick);
@@ -373,6 +376,7 @@ impl Order {
             }
         }
         self.check_presort(members)?;
+        self.check_homes()?;
         self.tree.validate(&self.fat)?;
         if self.afresh.verlet.on {
             return self.check_listed(bodies, proxies);

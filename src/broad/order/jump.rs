@@ -6,7 +6,10 @@
 use super::afresh::Afresh;
 use super::lay::Bound;
 use super::{BodySlot, MANY_CAME, NONE, Order, PairKey, Proxies, Tick, ones, parts, small};
-use crate::simd::boxes::WIDTH;
+use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch};
+
+/// Bodies ahead whose boxes are asked for.
+const AHEAD: usize = 8;
 
 impl Order {
     /// Gives who came and who jumped a lane; whether there was one for each.
@@ -37,23 +40,16 @@ impl Order {
     /// was a lane for each. Who has one keeps it.
     pub(super) fn seat_all<P: Proxies>(&mut self, bodies: &[BodySlot], proxies: &P) -> bool {
         let mut blocks = std::mem::take(&mut self.worklist);
-        let mut all = true;
-        for slot in bodies {
-            if self.rank(*slot).is_some() {
-                continue;
-            }
-            let Some((rank, one)) = self.lane_for(*slot, proxies) else {
-                all = false;
-                break;
-            };
-            self.sit(*slot, rank, one);
-            let (block, lane) = parts(rank);
-            self.fat[block].set(lane, &one.corners());
-            blocks.push(small(block));
-        }
+        let level = self.level;
+        let all = level.run(Seat {
+            order: self,
+            bodies,
+            proxies,
+            blocks: &mut blocks,
+        });
         blocks.sort_unstable();
         blocks.dedup();
-        self.level.run(Bound {
+        level.run(Bound {
             order: self,
             blocks: blocks.iter().map(|block| *block as usize),
         });
@@ -91,5 +87,38 @@ impl Order {
                 tick.parted.push(key);
             }
         }
+    }
+}
+
+/// Gives bodies without one a lane each, and notes their blocks; whether there was a lane for each.
+struct Seat<'a, P> {
+    order: &'a mut Order,
+    bodies: &'a [BodySlot],
+    proxies: &'a P,
+    blocks: &'a mut Vec<u32>,
+}
+
+impl<P: Proxies> Work for Seat<'_, P> {
+    type Out = bool;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> bool {
+        let (order, bodies) = (self.order, self.bodies);
+        for (at, slot) in bodies.iter().enumerate() {
+            if let Some(ahead) = bodies.get(at + AHEAD) {
+                prefetch(self.proxies.aabb(*ahead));
+            }
+            if order.rank(*slot).is_some() {
+                continue;
+            }
+            let Some((rank, one)) = order.lane_for(lanes, *slot, self.proxies) else {
+                return false;
+            };
+            order.sit(*slot, rank, one);
+            let (block, lane) = parts(rank);
+            order.fat[block].set(lane, &one.corners());
+            self.blocks.push(small(block));
+        }
+        true
     }
 }

@@ -3,11 +3,11 @@
 //! In: every box. Out: lanes, the tree over their blocks, and how much more of space the blocks take than they did.
 
 use super::afresh::{Afresh, FRAME_TICKS};
+use super::home::NO_HOMES;
 use super::links::{room, spare};
 use super::load::ask_ahead;
 use super::place::{ATTIC, grow, middle};
 use super::sort::{FILL, Frame, Sorter};
-use super::tree::NO_BOUND;
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, is_thrifty, ones, parts, small};
 use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work, prefetch};
 
@@ -111,7 +111,7 @@ impl Order {
         self.slot_of.resize(blocks * WIDTH, NONE);
         self.exact.resize(blocks * WIDTH, Down::EMPTY);
         self.fat.resize(blocks, Boxes16::EMPTY);
-        self.homes.resize(blocks, NO_BOUND);
+        self.homes.resize(blocks.div_ceil(WIDTH), NO_HOMES);
         self.tree.reset(blocks);
         self.tree.reserve();
         self.bound_all(bodies);
@@ -126,8 +126,9 @@ impl Order {
             order: self,
             blocks: 0..blocks,
         });
-        for (block, home) in self.homes.iter_mut().enumerate() {
-            *home = *self.tree.bound(block);
+        for block in 0..blocks {
+            let bound = *self.tree.bound(block);
+            self.set_home(block, &bound);
         }
         self.measure();
         let Afresh {

@@ -11,9 +11,7 @@ use super::{
     BodySlot, NONE, Order, Proxies, Tick, Work as Done, column, is_thrifty, ones, parts, small,
 };
 use crate::ids::PairKey;
-use crate::simd::boxes::{
-    Boxes16, Down, Hold, LANES, Lanes, Portable, WIDTH, Work, prefetch, slack,
-};
+use crate::simd::boxes::{Boxes16, Down, Hold, LANES, Lanes, WIDTH, Work, prefetch, slack};
 
 /// What a look at an entry found; the place of the entry, and:
 #[derive(Clone, Copy, Debug)]
@@ -146,18 +144,12 @@ impl Order {
     pub(super) fn look_at_moved<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
         self.entries.clear();
         self.give_back_list();
-        for at in 0..tick.moved.len() {
-            self.ask_ahead(&tick.moved[at..]);
-            let slot = tick.moved[at];
-            if let Some(rank) = self.rank(slot) {
-                self.look_at(rank, tick, done);
-            }
-        }
-        for at in 0..self.homeless.len() {
-            if let Some(rank) = self.rank(self.homeless[at]) {
-                self.look_at(rank, tick, done);
-            }
-        }
+        let level = self.level;
+        level.run(LookAtMoved {
+            order: self,
+            tick,
+            done,
+        });
     }
 
     /// Asks for what the bodies to come are looked at by: they stand far from one another.
@@ -175,6 +167,7 @@ impl Order {
     }
 
     /// Looks at the candidates of one body by its f64 box: for so few pairs the list would not pay.
+    #[inline(always)]
     fn look_at<P: Proxies>(&mut self, rank: u32, tick: &mut Tick<'_, P>, done: &mut Done) {
         let (block, lane) = parts(rank);
         let mut rows = std::mem::take(&mut self.rows);
@@ -243,61 +236,6 @@ impl Order {
             self.links.bits_mut(row.record).hit[line] ^= flips;
         }
     }
-
-    /// Every live entry is a candidate with its state, and every candidate that is not sure is listed once; while the
-    /// list is kept.
-    pub(super) fn check_list(&self) -> Result<(), String> {
-        if !self.listed {
-            return Ok(());
-        }
-        let mut seen: Vec<[u32; 2]> = Vec::new();
-        for entry in &self.entries {
-            let ranks = entry.ranks();
-            let [first, second] = ranks.map(|rank| self.ages[rank as usize]);
-            if ages(first, second) != entry.ages() {
-                continue;
-            }
-            let ((a, row), (b, lane)) = (parts(ranks[0]), parts(ranks[1]));
-            let Some(record) = self.links.find(small(a), small(b)) else {
-                return Err(format!("{ranks:?} are listed, their blocks have no record"));
-            };
-            let bits = self.links.bits(record);
-            let bit = (
-                bits.cand[row] >> lane & 1 == 1,
-                bits.hit[row] >> lane & 1 == 1,
-            );
-            if bit != (true, entry.is_hit()) {
-                return Err(format!("{ranks:?} are listed, the matrix has {bit:?}"));
-            }
-            seen.push(ranks);
-        }
-        let listed = seen.len();
-        seen.sort_unstable();
-        seen.dedup();
-        let mut wanted = 0;
-        for record in 0..self.links.len() {
-            if self.links.blocks(record)[0] != NONE {
-                let [a, b] = self.links.blocks(record).map(|block| block as usize);
-                let bits = self.links.bits(record);
-                for row in 0..WIDTH {
-                    let sure = Portable.meets(&self.sure[b], &self.sure[a].get(row));
-                    if sure & bits.cand[row] & !bits.hit[row] != 0 {
-                        return Err(format!(
-                            "row {row} of {record} holds sure pairs without a hit"
-                        ));
-                    }
-                    wanted += (bits.cand[row] & !sure).count_ones() as usize;
-                }
-            }
-        }
-        if listed != seen.len() || listed != wanted {
-            return Err(format!(
-                "{listed} listed, {} different, {wanted} candidates",
-                seen.len()
-            ));
-        }
-        Ok(())
-    }
 }
 
 /// What the f64 box of a body that keeps to its hold is sure to hold: the core, less what rounding may have added.
@@ -318,6 +256,33 @@ pub(super) fn sure(hold: &Hold) -> [f32; 6] {
             core[k] - slack
         }
     })
+}
+
+/// See [`Order::look_at_moved`].
+struct LookAtMoved<'a, 'b, P> {
+    order: &'a mut Order,
+    tick: &'a mut Tick<'b, P>,
+    done: &'a mut Done,
+}
+
+impl<P: Proxies> Work for LookAtMoved<'_, '_, P> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, _: L) {
+        let Self { order, tick, done } = self;
+        let (moved, came) = (tick.moved, order.homeless.len());
+        for at in 0..moved.len() + came {
+            let slot = match moved.get(at) {
+                Some(slot) => *slot,
+                None => order.homeless[at - moved.len()],
+            };
+            order.ask_ahead(moved.get(at..).unwrap_or(&[]));
+            if let Some(rank) = order.rank(slot) {
+                order.look_at(rank, tick, done);
+            }
+        }
+    }
 }
 
 /// Lists every candidate.

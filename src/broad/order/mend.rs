@@ -5,8 +5,8 @@
 //! within a quarter the bodies are dealt to the blocks anew when these have spread.
 
 use super::fatten::Gait;
+use super::home::{far_from, widen};
 use super::links::room;
-use super::place::{far_from, widen};
 use super::sort::{Sorter, centre, split};
 use super::tree::NO_BOUND;
 use super::{BodySlot, NONE, Order, ones, small};
@@ -96,7 +96,7 @@ impl Order {
     fn follow(&mut self, quarter: usize) {
         let blocks = quarter * WIDTH..(quarter * WIDTH + WIDTH).min(self.live.len());
         let (mut sum, mut bodies) = ([0.0_f32; 3], 0.0_f32);
-        for block in blocks.clone() {
+        for block in blocks {
             for lane in ones(self.live[block]) {
                 let middle = centre(&self.exact[block * WIDTH + lane].corners());
                 for k in 0..3 {
@@ -115,12 +115,15 @@ impl Order {
             return;
         }
         let by: [f32; 3] = std::array::from_fn(|k| now[k] - before[k]);
-        let homes = self.homes[blocks].iter_mut();
+        if by.iter().any(|by| !by.is_finite()) {
+            return;
+        }
         // An empty part of space is infinite, and stays what it is.
-        for home in homes.chain([&mut self.quarters[quarter]]) {
-            for k in 0..3 {
-                home[k] += by[k];
-                home[k + 3] += by[k];
+        let (homes, quarter) = (&mut self.homes[quarter], &mut self.quarters[quarter]);
+        for (k, faces) in homes.faces.iter_mut().enumerate() {
+            quarter[k] += by[k % 3];
+            for face in faces {
+                *face += by[k % 3];
             }
         }
     }
@@ -171,7 +174,7 @@ impl Order {
                     &centre(&self.exact[block * WIDTH + lane].corners()),
                 );
             }
-            dealt += extent(&self.homes[block]);
+            dealt += extent(&self.home(block));
             now += extent(&spread);
         }
         now > dealt * MIXED
@@ -217,7 +220,7 @@ impl Order {
                 let rank = block * WIDTH + lane;
                 self.seat(seat.slot, small(rank), seat.exact);
                 (self.gaits[rank], self.held[rank]) = (seat.gait, seat.held);
-                widen(&mut self.homes[block], middle);
+                self.widen_home(block, middle);
             }
         }
         self.mender = mender;
@@ -263,7 +266,7 @@ impl Order {
         if self.listed {
             self.sure[block] = Boxes16::EMPTY;
         }
-        self.homes[block] = NO_BOUND;
+        self.set_home(block, &NO_BOUND);
         self.worklist.push(small(block));
     }
 }

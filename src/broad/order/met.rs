@@ -3,11 +3,12 @@
 //! In: boxes in their lanes, the tree over the blocks. Out: the overlaps of a tick in the order of blocks, so that
 //! those of two ticks with the same lanes differ by their bits alone.
 
+use super::bits::{Gathered, MATRICES};
 use super::idle::shed;
 use super::links::{Matrix, room, spare};
 use super::{BodySlot, parts};
 use crate::ids::{PairKey, small};
-use crate::simd::boxes::WIDTH;
+use crate::simd::boxes::{Lanes, WIDTH, Work};
 
 /// The overlaps of a tick.
 #[derive(Debug, Default)]
@@ -95,11 +96,23 @@ impl Met {
         self.firsts.push(small(self.others.len()));
     }
 
-    /// A record of the block at hand; its overlaps are counted by [`Met::add`].
+    /// Records of the block at hand; those that hold any overlap are kept. Overlaps are counted by [`Met::add`].
     #[inline(always)]
-    pub(super) fn push(&mut self, other: u32, hits: Matrix) {
-        self.others.push(other);
-        self.hits.push(hits);
+    pub(super) fn push_all<'a>(
+        &mut self,
+        records: impl ExactSizeIterator<Item = (u32, &'a Matrix)>,
+    ) {
+        // Which hold any is a guess that fails: all are written, and those without are written over.
+        let mut kept = self.others.len();
+        self.others.resize(kept + records.len(), 0);
+        self.hits.resize(kept + records.len(), [0; WIDTH]);
+        for (other, hits) in records {
+            self.others[kept] = other;
+            self.hits[kept] = *hits;
+            kept += usize::from(hits.iter().fold(0, |all, row| all | row) != 0);
+        }
+        self.others.truncate(kept);
+        self.hits.truncate(kept);
     }
 
     /// Counts overlaps.
@@ -155,6 +168,7 @@ impl Met {
         slot_of: &[u32],
         carried: &mut Vec<(u32, u32)>,
     ) {
+        let mut gathered = Gathered::new();
         for block in 0..self.blocks() {
             for at in self.of(block) {
                 let other = self.others[at] as usize;
@@ -168,12 +182,15 @@ impl Met {
                 }
                 let goes = minus(&all, &stays);
                 let left = without(&goes, gone[block], gone[other]);
-                write_down(&left, [block, other], slot_of, carried);
+                if gathered.put(&left, [block, other]) {
+                    write_down(&mut gathered, slot_of, carried);
+                }
                 let lost = goes.iter().map(|row| row.count_ones() as usize);
                 self.count -= lost.sum::<usize>();
                 self.hits[at] = stays;
             }
         }
+        write_down(&mut gathered, slot_of, carried);
     }
 
     /// Writes every overlap down as two body slots, and forgets it; not those of lanes that lost their body.
@@ -184,6 +201,7 @@ impl Met {
         carried: &mut Vec<(u32, u32)>,
     ) {
         carried.reserve(self.count);
+        let mut gathered = Gathered::new();
         for block in 0..self.blocks() {
             for at in self.of(block) {
                 let other = self.others[at] as usize;
@@ -191,76 +209,126 @@ impl Met {
                 if gone[block] | gone[other] != 0 {
                     left = without(&left, gone[block], gone[other]);
                 }
-                write_down(&left, [block, other], slot_of, carried);
+                if gathered.put(&left, [block, other]) {
+                    write_down(&mut gathered, slot_of, carried);
+                }
             }
         }
+        write_down(&mut gathered, slot_of, carried);
         self.clear();
     }
 }
 
-/// Writes the overlaps of a record down as two body slots.
-#[inline(always)]
-fn write_down(
-    hits: &Matrix,
-    [block, other]: [usize; 2],
-    slot_of: &[u32],
-    carried: &mut Vec<(u32, u32)>,
-) {
-    each(hits, |row, lane| {
-        carried.push((slot_of[block * WIDTH + row], slot_of[other * WIDTH + lane]));
-    });
+/// A record that differs from that of the tick before, and its blocks.
+#[derive(Clone, Copy, Debug, Default)]
+struct Change {
+    was: Matrix,
+    is: Matrix,
+    blocks: [usize; 2],
 }
+
+/// So many are gathered before they are told.
+const CHANGES: usize = MATRICES;
 
 /// Reports what is in one of two ticks alone, whose lanes are the same but for those whose body left before the second.
 ///
-/// Which of the two has a record, and which a bit, are guesses that fail: they choose what is read and where it is
-/// written, and no branch.
-///
-/// * `lists` - what parted, what began.
-pub(super) fn tell_difference(
-    [before, now]: [&Met; 2],
-    gone: &[u16],
-    slot_of: &[u32],
-    mut lists: [&mut Vec<PairKey>; 2],
-) {
-    const NONE: Matrix = [0; WIDTH];
-    for block in 0..now.blocks() {
-        let (mut old, mut new) = (before.of(block), now.of(block));
-        while !(old.is_empty() && new.is_empty()) {
-            let head = |met: &Met, rest: &std::ops::Range<usize>| {
-                if rest.is_empty() {
-                    u32::MAX
-                } else {
-                    met.others[rest.start]
+/// Which of the two has a record is a guess that fails: it chooses what is read, and no branch.
+pub(super) struct TellDifference<'a> {
+    pub(super) before: &'a Met,
+    pub(super) now: &'a Met,
+    /// By block: lanes whose body has left since the one before.
+    pub(super) gone: &'a [u16],
+    /// By rank: the body slot.
+    pub(super) slot_of: &'a [u32],
+    /// Takes what is in the one before alone.
+    pub(super) parted: &'a mut Vec<PairKey>,
+    /// Takes what is new.
+    pub(super) began: &'a mut Vec<PairKey>,
+}
+
+impl Work for TellDifference<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, _: L) {
+        const NONE: Matrix = [0; WIDTH];
+        let Self {
+            before,
+            now,
+            gone,
+            slot_of,
+            parted,
+            began,
+        } = self;
+        let mut changes = [Change::default(); CHANGES];
+        let mut len = 0;
+        let mut gathered = Gathered::new();
+        for block in 0..now.blocks() {
+            let (mut old, mut new) = (before.of(block), now.of(block));
+            while !(old.is_empty() && new.is_empty()) {
+                let head = |met: &Met, rest: &std::ops::Range<usize>| {
+                    if rest.is_empty() {
+                        u32::MAX
+                    } else {
+                        met.others[rest.start]
+                    }
+                };
+                let heads = [head(before, &old), head(now, &new)];
+                let other = heads[0].min(heads[1]);
+                let [had, has] = heads.map(|head| usize::from(head == other));
+                let record = |met: &Met, at: usize, there: usize| {
+                    let hits = met.hits.get(at).unwrap_or(&NONE);
+                    *[&NONE, hits][there]
+                };
+                let mut was = record(before, old.start, had);
+                let is = record(now, new.start, has);
+                old.start += had;
+                new.start += has;
+                let blocks = [block, other as usize];
+                if gone[block] | gone[other as usize] != 0 {
+                    was = without(&was, gone[block], gone[other as usize]);
                 }
-            };
-            let heads = [head(before, &old), head(now, &new)];
-            let other = heads[0].min(heads[1]);
-            let [had, has] = heads.map(|head| usize::from(head == other));
-            let record = |met: &Met, at: usize, there: usize| {
-                let hits = met.hits.get(at).unwrap_or(&NONE);
-                *[&NONE, hits][there]
-            };
-            let mut was = record(before, old.start, had);
-            let is = record(now, new.start, has);
-            old.start += had;
-            new.start += has;
-            let other = other as usize;
-            if gone[block] | gone[other] != 0 {
-                was = without(&was, gone[block], gone[other]);
+                changes[len] = Change { was, is, blocks };
+                len += usize::from(was != is);
+                if len == CHANGES {
+                    flush(&changes, &mut gathered, slot_of, [parted, began]);
+                    len = 0;
+                }
             }
-            if was == is {
-                continue;
-            }
-            let differs = std::array::from_fn(|row| was[row] ^ is[row]);
-            each(&differs, |row, lane| {
-                let slots = [block * WIDTH + row, other * WIDTH + lane];
-                let [one, other] = slots.map(|rank| BodySlot(slot_of[rank]));
-                let begins = usize::from(is[row] >> lane & 1);
-                lists[begins].push(PairKey::new(one, other));
-            });
         }
+        flush(&changes[..len], &mut gathered, slot_of, [parted, began]);
     }
+}
+
+/// Tells what went and what came.
+#[inline(always)]
+fn flush(
+    changes: &[Change],
+    gathered: &mut Gathered,
+    slot_of: &[u32],
+    [parted, began]: [&mut Vec<PairKey>; 2],
+) {
+    for Change { was, is, blocks } in changes {
+        _ = gathered.put(&minus(was, is), *blocks);
+    }
+    tell(gathered, slot_of, parted);
+    for Change { was, is, blocks } in changes {
+        _ = gathered.put(&minus(is, was), *blocks);
+    }
+    tell(gathered, slot_of, began);
+}
+
+/// Tells what is gathered as pairs of bodies.
+#[inline(always)]
+fn tell(gathered: &mut Gathered, slot_of: &[u32], list: &mut Vec<PairKey>) {
+    let key = |one, other| PairKey::new(BodySlot(one), BodySlot(other));
+    gathered.tell(slot_of, list, PairKey::NOBODY, key);
+}
+
+/// Writes what is gathered down as two body slots each.
+#[inline(always)]
+fn write_down(gathered: &mut Gathered, slot_of: &[u32], carried: &mut Vec<(u32, u32)>) {
+    gathered.tell(slot_of, carried, (0, 0), |one, other| (one, other));
 }
 
 /// Reports every overlap.
@@ -282,16 +350,16 @@ fn tell_some(
     began: &mut Vec<PairKey>,
     left: impl Fn(&Matrix, usize, usize) -> Matrix,
 ) {
+    let mut gathered = Gathered::new();
     for block in 0..met.blocks() {
         for at in met.of(block) {
             let other = met.others[at] as usize;
-            each(&left(&met.hits[at], block, other), |row, lane| {
-                let slots = [block * WIDTH + row, other * WIDTH + lane];
-                let [one, other] = slots.map(|rank| BodySlot(slot_of[rank]));
-                began.push(PairKey::new(one, other));
-            });
+            if gathered.put(&left(&met.hits[at], block, other), [block, other]) {
+                tell(&mut gathered, slot_of, began);
+            }
         }
     }
+    tell(&mut gathered, slot_of, began);
 }
 
 /// The bits that lie neither in some rows nor in some columns.
@@ -313,18 +381,4 @@ fn minus(one: &Matrix, other: &Matrix) -> Matrix {
         left[row] = one[row] & !other[row];
     }
     left
-}
-
-/// Row and lane of each bit. Four rows at a time: most have none.
-#[inline(always)]
-fn each(hits: &Matrix, mut with: impl FnMut(usize, usize)) {
-    for (some, rows) in hits.chunks_exact(4).enumerate() {
-        let words = rows.iter().rev().map(|row| u64::from(*row));
-        let mut bits = words.fold(0, |bits, row| bits << WIDTH | row);
-        while bits != 0 {
-            let at = bits.trailing_zeros() as usize;
-            bits &= bits - 1;
-            with(some * 4 + at / WIDTH, at % WIDTH);
-        }
-    }
 }

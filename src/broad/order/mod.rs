@@ -2,9 +2,9 @@
 //!
 //! In: which bodies left, came, moved. Out: pairs of boxes that began to overlap and pairs that parted.
 //!
-//! * **Order.** Bodies stand in blocks of sixteen, in Morton order within classes of size, largest first (`place`).
-//!   No axis is privileged, so a floor, a sheet or a tower needs no special case, and a huge body beside tiny ones
-//!   stretches no block but its own. An implicit tree stands over the blocks (`tree`).
+//! * **Order.** Bodies stand in blocks of sixteen, in Morton order within classes of size, largest first (`place`,
+//!   `home`). No axis is privileged, so a floor, a sheet or a tower needs no special case, and a huge body beside tiny
+//!   ones stretches no block but its own. An implicit tree stands over the blocks (`tree`).
 //! * **Fat boxes** (`fatten`): a body inside its own costs one containment test.
 //! * **Candidates** (`links`): for each two blocks that come near one another a matrix of 16 by 16 bits. They change
 //!   only where a body left its fat box (`renew`), a few blocks in each tick rather than all at once.
@@ -34,9 +34,11 @@ use crate::simd::boxes::{Boxes16, Down, Hold, Level, WIDTH};
 use crate::wire::{BroadCause, BroadMode};
 
 mod afresh;
+mod bits;
 mod entry;
 mod fatten;
 mod gear;
+mod home;
 mod idle;
 mod jump;
 mod lay;
@@ -62,6 +64,7 @@ mod validate;
 mod verlet;
 
 use afresh::Afresh;
+use bits::{column, ones, parts};
 use fatten::Gait;
 pub(super) use idle::{give_back, is_thrifty};
 use links::{Links, spare};
@@ -118,8 +121,9 @@ pub(super) struct Order {
     sorter: sort::Sorter,
     /// By block: the least key that was sorted into it.
     keys: Vec<u64>,
-    /// By block: the part of space that its bodies' middles filled when they were sorted into it; nothing in the attic.
-    homes: Vec<[f32; 6]>,
+    /// By sixteen blocks: the part of space that the middles of each one's bodies filled when they were sorted into it;
+    /// nothing in the attic. Without candidates the bounds of their boxes when they were laid.
+    homes: Vec<Boxes16>,
     /// By sixteen blocks: the part of space that their bodies filled after the last sort of all.
     quarters: Vec<[f32; 6]>,
     /// ... and the middle of its bodies at its last turn, or NaN.
@@ -355,45 +359,5 @@ impl Order {
     /// Sets which level of instructions is used; for tests.
     pub(super) fn use_level(&mut self, level: Level) {
         self.level = level;
-    }
-}
-
-/// Block and lane.
-#[inline(always)]
-fn parts(rank: u32) -> (usize, usize) {
-    (rank as usize / WIDTH, rank as usize % WIDTH)
-}
-
-/// Bit `lane` of each row, as bits.
-#[inline(always)]
-fn column(matrix: &links::Matrix, lane: usize) -> u16 {
-    let mut bits = 0;
-    for (row, line) in matrix.iter().enumerate() {
-        bits |= (line >> lane & 1) << row;
-    }
-    bits
-}
-
-/// The places of the ones, lowest first.
-#[inline(always)]
-fn ones(bits: u16) -> Ones {
-    Ones(bits)
-}
-
-/// See [`ones`].
-#[derive(Clone, Copy, Debug)]
-struct Ones(u16);
-
-impl Iterator for Ones {
-    type Item = usize;
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<usize> {
-        if self.0 == 0 {
-            return None;
-        }
-        let at = self.0.trailing_zeros() as usize % WIDTH;
-        self.0 &= self.0 - 1;
-        Some(at)
     }
 }

@@ -23,7 +23,7 @@ const VAIN: u32 = 3;
 /// ... for so many ticks; four times as many each time that they prove no better.
 const REST_MIN: u32 = 64;
 const REST_MAX: u32 = 2048;
-/// One in so many strays in a tick, and the next list is begun in the one that follows.
+/// One in so many strays, comes or jumps in a tick, and the next list is begun in the one that follows.
 const MANY_STRAY: usize = 32;
 
 /// What a tick is to the list in use.

@@ -1,6 +1,7 @@
 //! Who stands where: lanes are given up and taken, and from time to time everything is sorted anew.
 
 use super::fatten::{Gait, outward};
+use super::home::{NO_HOMES, widen};
 use super::idle;
 use super::links::{room, spare};
 use super::sort::{CLASSES_MAX, FILL, Frame, Sorter, centre};
@@ -16,10 +17,6 @@ use crate::simd::boxes::{Boxes16, Down, Hold, Portable, WIDTH};
 const WORN_PER_BODY: u64 = 20;
 /// One block in so many stays empty after a sort, for bodies that find no free lane where they belong.
 pub(super) const ATTIC: usize = 16;
-/// A block that is no farther from a body than this, in mean sides of its box, is as good as one that is nearer.
-const NEAR_ENOUGH: f32 = 0.5;
-/// How far from its place on the curve a body may find a free lane, blocks.
-const STRAY: usize = 20;
 
 impl Order {
     /// Takes a body's lane away.
@@ -86,7 +83,7 @@ impl Order {
     pub(super) fn settle<P: Proxies>(&mut self, tick: &Tick<'_, P>) -> bool {
         for at in 0..self.homeless.len() {
             let slot = self.homeless[at];
-            let Some((rank, one)) = self.lane_for(slot, tick.proxies) else {
+            let Some((rank, one)) = self.lane_for(Portable, slot, tick.proxies) else {
                 return false;
             };
             // How it got here says nothing of where it goes.
@@ -94,18 +91,6 @@ impl Order {
             self.seat(slot, rank, one);
         }
         true
-    }
-
-    /// A free lane for a body, the nearer the better, and its box.
-    pub(super) fn lane_for<P: Proxies>(&self, slot: BodySlot, proxies: &P) -> Option<(u32, Down)> {
-        let one = outward(Portable, proxies.aabb(slot), &self.origin);
-        // So near, the box hardly stretches the block.
-        let enough = one.mean_side() * NEAR_ENOUGH;
-        let near = self.lane_near(&one.corners(), enough * enough);
-        let rank = near
-            .map(|(_, rank)| rank)
-            .or_else(|| self.lane_in_attic())?;
-        Some((rank, one))
     }
 
     /// Gives a body a free lane, where it is to be renewed.
@@ -125,47 +110,6 @@ impl Order {
         self.len += 1;
         self.lanes_changed += 1;
         self.exact[rank as usize] = one;
-    }
-
-    /// A free lane in an attic block.
-    fn lane_in_attic(&self) -> Option<u32> {
-        let mut attic = self.sorted..self.live.len();
-        let block = attic.find(|block| self.live[*block] != u16::MAX)?;
-        let lane = (!self.live[block]).trailing_zeros() as usize;
-        Some(small(block * WIDTH + lane))
-    }
-
-    /// A free lane near a box's place on the curve, in the block whose part of space is nearest; and how far that is,
-    /// squared.
-    ///
-    /// * `enough` - a part of space that is no farther, squared, is as good as one that is nearer.
-    pub(super) fn lane_near(&self, one: &[f32; 6], enough: f32) -> Option<(f32, u32)> {
-        let key = self.sorter.frame.key(one);
-        let sorted = &self.keys[..self.sorted];
-        let home = sorted.partition_point(|first| *first <= key);
-        let (class, middle) = (Sorter::class_of(key), centre(one));
-        let mut best = (f32::INFINITY, None);
-        // Outward from where it belongs.
-        'outward: for step in 0..STRAY {
-            for block in [home.checked_sub(step + 1), Some(home + step)] {
-                let Some(block) = block.filter(|block| *block < self.sorted) else {
-                    continue;
-                };
-                if self.live[block] == u16::MAX || Sorter::class_of(self.keys[block]) != class {
-                    continue;
-                }
-                let far = far_from(&middle, &self.homes[block]);
-                if far < best.0 {
-                    best = (far, Some(block));
-                    if far <= enough {
-                        break 'outward;
-                    }
-                }
-            }
-        }
-        let block = best.1?;
-        let lane = (!self.live[block]).trailing_zeros() as usize;
-        Some((best.0, small(block * WIDTH + lane)))
     }
 
     /// Sorts everything anew: every body, the homeless too, gets a lane and a fat box, and all candidates are found.
@@ -254,7 +198,7 @@ impl Order {
         }
         room(&mut self.exact, most * WIDTH);
         room(&mut self.keys, most);
-        room(&mut self.homes, most);
+        room(&mut self.homes, most / WIDTH + 1);
         room(&mut self.quarters, most / WIDTH + 1);
         room(&mut self.middles, most / WIDTH + 1);
         room(&mut self.fat, most);
@@ -294,8 +238,8 @@ impl Order {
         }
         self.gaits.clear();
         let span = self.afresh.probe.span();
-        let order = self.sorter.sort(boxes);
-        for (key, index) in order {
+        let mut sorter = std::mem::take(&mut self.sorter);
+        for (key, index) in sorter.sort(boxes) {
             let starts = self.keys.last().is_none_or(|first| {
                 let full = self
                     .live
@@ -306,9 +250,9 @@ impl Order {
             if starts {
                 self.keys.push(key);
                 self.live.push(0);
-                self.homes.push(NO_BOUND);
-                self.quarters
-                    .resize((self.live.len() - 1) / WIDTH + 1, NO_BOUND);
+                let some = (self.live.len() - 1) / WIDTH + 1;
+                self.homes.resize(some, NO_HOMES);
+                self.quarters.resize(some, NO_BOUND);
                 self.slot_of.resize(self.live.len() * WIDTH, NONE);
                 self.gaits.resize(self.live.len() * WIDTH, Gait::NEW);
             }
@@ -320,7 +264,7 @@ impl Order {
             self.rank_of[body.index()] = small(rank);
             let one = &boxes[index as usize];
             let middle = centre(one);
-            widen(&mut self.homes[block], &middle);
+            self.widen_home(block, &middle);
             widen(&mut self.quarters[block / WIDTH], &middle);
             let guess = || {
                 let side = (one[3] - one[0] + one[4] - one[1] + one[5] - one[2]) / 3.0;
@@ -329,10 +273,11 @@ impl Order {
             let gait = self.former.get(index as usize).copied();
             self.gaits[rank] = gait.unwrap_or_else(guess);
         }
+        self.sorter = sorter;
         self.sorted = self.live.len();
         let blocks = self.sorted + self.sorted / ATTIC + 1;
         self.live.resize(blocks, 0);
-        self.homes.resize(blocks, NO_BOUND);
+        self.homes.resize(blocks.div_ceil(WIDTH), NO_HOMES);
         self.quarters.resize(blocks.div_ceil(WIDTH), NO_BOUND);
         self.middles.resize(self.quarters.len(), [f32::NAN; 3]);
         self.slot_of.resize(blocks * WIDTH, NONE);
@@ -351,24 +296,6 @@ impl Order {
         self.ages.clear();
         self.ages.resize(blocks * WIDTH, 0);
     }
-}
-
-/// Makes a part of space hold a place.
-pub(super) fn widen(home: &mut [f32; 6], place: &[f32; 3]) {
-    for k in 0..3 {
-        home[k] = home[k].min(place[k]);
-        home[k + 3] = home[k + 3].max(place[k]);
-    }
-}
-
-/// How far a place is from a part of space, squared; infinite where that is empty.
-pub(super) fn far_from(place: &[f32; 3], home: &[f32; 6]) -> f32 {
-    let mut sum = 0.0;
-    for k in 0..3 {
-        let apart = (home[k] - place[k]).max(place[k] - home[k + 3]).max(0.0);
-        sum += apart * apart;
-    }
-    sum
 }
 
 /// Grows a list by body so that it has an entry for one.

@@ -337,12 +337,9 @@ impl Scratch {
     /// Records the matrices that hold any overlap.
     #[inline(always)]
     fn record(&self, block: usize, sides: usize, met: &mut Met) {
-        for (side, hits) in self.sides[..sides].iter().zip(&self.matrices) {
-            if hits.iter().fold(0, |all, row| all | row) != 0 {
-                // The other of the two, or itself.
-                met.push(side.block ^ side.against ^ small(block), *hits);
-            }
-        }
+        let sides = self.sides[..sides].iter().zip(&self.matrices);
+        // The other of the two, or itself.
+        met.push_all(sides.map(|(side, hits)| (side.block ^ side.against ^ small(block), hits)));
     }
 }
 

@@ -34,9 +34,11 @@ pub(super) struct Tree {
 pub(super) struct Walk {
     /// Nodes still to be looked at: level, node.
     stack: Vec<(u8, u32)>,
-    /// Lowest nodes that the blocks of a lowest node may meet.
+    /// Lowest nodes that the blocks of the lowest node at hand may meet; and by node, which of these blocks do.
     nodes: Vec<u32>,
-    /// ... and those of them with blocks near one, and which.
+    askers: Vec<u16>,
+    /// The nodes that the block at hand meets; and those with blocks near it, and which.
+    met: Vec<u32>,
     children: Vec<(u32, u16)>,
 }
 
@@ -46,6 +48,8 @@ impl Walk {
         let nodes = nodes_above(blocks);
         room(&mut self.stack, nodes);
         room(&mut self.nodes, nodes);
+        room(&mut self.askers, nodes);
+        room(&mut self.met, nodes);
         room(&mut self.children, nodes);
     }
 }
@@ -193,21 +197,35 @@ impl Tree {
         }
     }
 
-    /// Notes the lowest nodes from one on that it meets, for [`Tree::query_among`] of its blocks: a walk down the tree
-    /// that sixteen blocks share.
+    /// Notes the lowest nodes from one on that it meets, and which of its blocks meet each, for [`Tree::query_among`]
+    /// of these blocks: a walk down the tree that sixteen share.
     #[inline(always)]
     pub(super) fn query_nodes<L: Lanes>(&self, lanes: L, node: usize, walk: &mut Walk) {
-        let Walk { stack, nodes, .. } = walk;
+        let Walk {
+            stack,
+            nodes,
+            askers,
+            ..
+        } = walk;
         nodes.clear();
+        askers.clear();
         if self.height > 1 {
-            let bound = self.levels[1][node / WIDTH].get(node % WIDTH);
+            let bound_of = |node: usize| self.levels[1][node / WIDTH].get(node % WIDTH);
+            let bound = bound_of(node);
             #[allow(
                 clippy::cast_possible_truncation,
                 reason = "a node of at most 2^20 / 16"
             )]
             self.query_from(lanes, &bound, 1, node as u32, (stack, nodes));
+            let mine = &self.levels[0][node];
+            askers.extend(
+                nodes
+                    .iter()
+                    .map(|node| lanes.meets(mine, &bound_of(*node as usize))),
+            );
         } else {
             nodes.push(0);
+            askers.push(u16::MAX);
         }
     }
 
@@ -222,22 +240,34 @@ impl Tree {
     ) {
         let bound = &self.bounds[block as usize];
         let Walk {
-            nodes, children, ..
+            nodes,
+            askers,
+            met,
+            children,
+            ..
         } = walk;
-        // How many blocks a node has near is a guess that fails: it is neither in this loop nor in the next.
+        // Which nodes are met, and how many blocks one has near, are guesses that fail: no branch is taken on them.
+        met.clear();
+        met.resize(nodes.len(), 0);
+        let mut kept = 0;
+        for (node, askers) in nodes.iter().zip(askers.iter()) {
+            met[kept] = *node;
+            kept += usize::from(askers >> (block % LANES) & 1);
+        }
+        met.truncate(kept);
         children.clear();
-        children.resize(nodes.len() + 1, (0, 0));
-        let (mut kept, mut blocks) = (0, 0);
-        for node in nodes.iter() {
+        children.resize(kept + 1, (0, 0));
+        let (mut kept, mut count) = (0, 0);
+        for node in met.iter() {
             let early = block.saturating_sub(node * LANES);
             let after = u16::MAX.checked_shl(early).unwrap_or(0);
             let hits = lanes.meets(&self.levels[0][*node as usize], bound) & after;
             children[kept] = (node * LANES, hits);
             kept += usize::from(hits != 0);
-            blocks += hits.count_ones() as usize;
+            count += hits.count_ones() as usize;
         }
         found.clear();
-        found.resize(blocks, 0);
+        found.resize(count, 0);
         let (mut at, (mut first, mut left)) = (0, children[0]);
         for found in found {
             *found = first + left.trailing_zeros();
@@ -279,5 +309,39 @@ fn write(node: &mut Boxes16, lane: usize, bound: &[f32; 6]) {
         node.set(lane, bound);
     } else {
         node.set(lane, &[f32::NAN; 6]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::small;
+
+    #[test]
+    fn a_block_is_told_every_block_from_it_on_that_it_meets() {
+        for blocks in [1, 16, 17, 300] {
+            let mut tree = Tree::default();
+            tree.reset(blocks);
+            for block in (0..blocks).filter(|block| block % 5 != 2) {
+                let places = [block / 4 + block * 7 % 11, block % 4];
+                let [low, wide] = places.map(|at| f32::from(u16::try_from(at).unwrap()));
+                tree.set(block, [low, low, 0.0, low + wide, low + wide, 1.0]);
+            }
+            tree.refit(Portable);
+            let (mut walk, mut found) = (Walk::default(), Vec::new());
+            for block in 0..blocks {
+                if block.is_multiple_of(WIDTH) {
+                    tree.query_nodes(Portable, block / WIDTH, &mut walk);
+                }
+                tree.query_among(Portable, small(block), &mut walk, &mut found);
+                let one = tree.bound(block);
+                let meets = |other: &usize| {
+                    let other = tree.bound(*other);
+                    (0..3).all(|k| one[k] <= other[k + 3] && other[k] <= one[k + 3])
+                };
+                let wanted: Vec<u32> = (block..blocks).filter(meets).map(small).collect();
+                assert_eq!(found, wanted, "block {block} of {blocks}");
+            }
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Checks the whole structure against the boxes of the world.
 
-use super::{NONE, Order, Proxies, ones, parts};
+use super::entry::ages;
+use super::{NONE, Order, Proxies, ones, parts, small};
 use crate::broad::members::Members;
 use crate::broad::order::fatten::outward;
 use crate::ids::BodySlot;
@@ -17,6 +18,7 @@ impl Order {
         if self.afresh.on {
             return self.check_afresh(members, proxies);
         }
+        self.check_homes()?;
         let bodies = members.bounded();
         if bodies.len() != self.len {
             return Err(format!(
@@ -110,6 +112,73 @@ impl Order {
                     ));
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// Each block has a part of space, and each one in the order a key.
+    pub(super) fn check_homes(&self) -> Result<(), String> {
+        let (homes, blocks) = (self.homes.len(), self.live.len());
+        if homes != blocks.div_ceil(WIDTH) || self.keys.len() != self.sorted {
+            let (keys, sorted) = (self.keys.len(), self.sorted);
+            return Err(format!(
+                "{homes} runs of parts of space for {blocks} blocks, {keys} keys for {sorted}"
+            ));
+        }
+        Ok(())
+    }
+
+    /// Every live entry is a candidate with its state, and every candidate that is not sure is listed once; while the
+    /// list is kept.
+    fn check_list(&self) -> Result<(), String> {
+        if !self.listed {
+            return Ok(());
+        }
+        let mut seen: Vec<[u32; 2]> = Vec::new();
+        for entry in &self.entries {
+            let ranks = entry.ranks();
+            let [first, second] = ranks.map(|rank| self.ages[rank as usize]);
+            if ages(first, second) != entry.ages() {
+                continue;
+            }
+            let ((a, row), (b, lane)) = (parts(ranks[0]), parts(ranks[1]));
+            let Some(record) = self.links.find(small(a), small(b)) else {
+                return Err(format!("{ranks:?} are listed, their blocks have no record"));
+            };
+            let bits = self.links.bits(record);
+            let bit = (
+                bits.cand[row] >> lane & 1 == 1,
+                bits.hit[row] >> lane & 1 == 1,
+            );
+            if bit != (true, entry.is_hit()) {
+                return Err(format!("{ranks:?} are listed, the matrix has {bit:?}"));
+            }
+            seen.push(ranks);
+        }
+        let listed = seen.len();
+        seen.sort_unstable();
+        seen.dedup();
+        let mut wanted = 0;
+        for record in 0..self.links.len() {
+            if self.links.blocks(record)[0] != NONE {
+                let [a, b] = self.links.blocks(record).map(|block| block as usize);
+                let bits = self.links.bits(record);
+                for row in 0..WIDTH {
+                    let sure = Portable.meets(&self.sure[b], &self.sure[a].get(row));
+                    if sure & bits.cand[row] & !bits.hit[row] != 0 {
+                        return Err(format!(
+                            "row {row} of {record} holds sure pairs without a hit"
+                        ));
+                    }
+                    wanted += (bits.cand[row] & !sure).count_ones() as usize;
+                }
+            }
+        }
+        if listed != seen.len() || listed != wanted {
+            return Err(format!(
+                "{listed} listed, {} different, {wanted} candidates",
+                seen.len()
+            ));
         }
         Ok(())
     }

@@ -128,16 +128,18 @@ impl Order {
         let ahead = if opens { pace.open() } else { 0 };
         let span = pace.span(false);
         let jumped = self.take_swept(tick.proxies, phase, span);
-        let strays = self.afresh.verlet.strays.len() + came;
+        let known = self.afresh.verlet.strays.len() + came;
         self.look_listed(0, true, tick);
-        if strays * MANY_CAME > bodies || !self.seat_anew(jumped, tick) {
+        if known * MANY_CAME > bodies || !self.seat_anew(jumped, tick) {
             self.afresh.verlet.pace.fail();
             self.end_list();
             return false;
         }
-        work.renewed += strays as u64;
         self.afresh.presort.note_late(&self.homeless, bodies);
         self.sweep_seated();
+        // With those that jumped, who are new where they were seated.
+        let strays = self.afresh.verlet.strays.len();
+        work.renewed += strays as u64;
         self.list_strays(tick, work);
         match phase {
             Phase::Opens => self.open_next(ahead, work),

@@ -1,0 +1,175 @@
+//! Lanes as bits: one by one, and bits of matrices as pairs of what stands at their ranks.
+//!
+//! In: matrices of bits by two blocks. Out: a pair for each bit, in a list.
+//!
+//! How many bits a matrix has is a guess that fails, and most have one or two: what is not empty is gathered, and then
+//! gone through bit by bit as if it were one matrix, with no branch that depends on where one ends and the next begins.
+
+use super::links::Matrix;
+use crate::ids::small;
+use crate::simd::boxes::{LANES, WIDTH};
+
+/// Block and lane.
+#[inline(always)]
+pub(super) fn parts(rank: u32) -> (usize, usize) {
+    (rank as usize / WIDTH, rank as usize % WIDTH)
+}
+
+/// Bit `lane` of each row, as bits.
+#[inline(always)]
+pub(super) fn column(matrix: &Matrix, lane: usize) -> u16 {
+    let mut bits = 0;
+    for (row, line) in matrix.iter().enumerate() {
+        bits |= (line >> lane & 1) << row;
+    }
+    bits
+}
+
+/// The places of the ones, lowest first.
+#[inline(always)]
+pub(super) fn ones(bits: u16) -> Ones {
+    Ones(bits)
+}
+
+/// See [`ones`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ones(u16);
+
+impl Iterator for Ones {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        if self.0 == 0 {
+            return None;
+        }
+        let at = self.0.trailing_zeros() as usize % WIDTH;
+        self.0 &= self.0 - 1;
+        Some(at)
+    }
+}
+
+/// Rows of a matrix that make a word.
+const ROWS: usize = u64::BITS as usize / WIDTH;
+/// Words of a matrix.
+const WORDS: usize = WIDTH / ROWS;
+/// Words that are gathered before they are gone through: they stay in the first cache.
+const TOGETHER: usize = 256;
+/// Matrices that can be gathered without being told in between.
+pub(super) const MATRICES: usize = TOGETHER / WORDS;
+
+/// Some rows of a matrix, and the ranks of the first of them and of its first lane.
+#[derive(Clone, Copy, Debug, Default)]
+struct Word {
+    bits: u64,
+    row: u32,
+    lane: u32,
+}
+
+/// Words of matrices that hold any bit, to be told together.
+#[derive(Debug)]
+pub(super) struct Gathered {
+    /// The last is read when all are told, and never written.
+    words: [Word; TOGETHER + WORDS + 1],
+    len: usize,
+    bits: usize,
+}
+
+impl Gathered {
+    /// Without any.
+    pub(super) fn new() -> Self {
+        Self {
+            words: [Word::default(); TOGETHER + WORDS + 1],
+            len: 0,
+            bits: 0,
+        }
+    }
+
+    /// Gathers the bits of a matrix; whether there are so many that they are to be told before the next.
+    ///
+    /// * `blocks` - of its rows, and of its lanes.
+    #[inline(always)]
+    #[must_use]
+    pub(super) fn put(&mut self, matrix: &Matrix, blocks: [usize; 2]) -> bool {
+        let [row, lane] = blocks.map(|block| small(block * WIDTH));
+        for (row, rows) in (row..).step_by(ROWS).zip(matrix.as_chunks::<ROWS>().0) {
+            let lines = rows.iter().rev().map(|row| u64::from(*row));
+            let bits = lines.fold(0, |bits, row| bits << WIDTH | row);
+            self.words[self.len] = Word { bits, row, lane };
+            self.len += usize::from(bits != 0);
+            self.bits += bits.count_ones() as usize;
+        }
+        self.len > TOGETHER
+    }
+
+    /// Appends a pair for each bit gathered, by what a table says of its two ranks, and forgets them.
+    #[inline(always)]
+    pub(super) fn tell<T: Copy>(
+        &mut self,
+        table: &[u32],
+        list: &mut Vec<T>,
+        none: T,
+        pair: impl Fn(u32, u32) -> T,
+    ) {
+        let from = list.len();
+        list.resize(from + self.bits, none);
+        let (mut at, mut word) = (0, self.words[0]);
+        for place in &mut list[from..] {
+            let bit = word.bits.trailing_zeros();
+            let (row, lane) = (word.row + bit / LANES, word.lane + bit % LANES);
+            *place = pair(table[row as usize], table[lane as usize]);
+            word.bits &= word.bits.wrapping_sub(1);
+            at += usize::from(word.bits == 0);
+            let next = self.words[at];
+            word = if word.bits == 0 { next } else { word };
+        }
+        (self.len, self.bits) = (0, 0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_bit_is_told_once_however_many_are_gathered() {
+        let (mut state, mut gathered) = (1_u64, Gathered::new());
+        let mut next = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            state >> 33
+        };
+        // Ranks stand for themselves.
+        let table: Vec<u32> = (0..64 * LANES).collect();
+        for matrices in [0, 1, 2, 63, 500] {
+            let (mut told, mut wanted) = (Vec::new(), Vec::new());
+            for _ in 0..matrices {
+                let blocks = [(); 2].map(|()| usize::try_from(next() % 64).unwrap());
+                // Empty ones, full ones, and some of all shares of bits between.
+                let share = next() % 5;
+                let matrix = Matrix::map([0; WIDTH], |_: u16| {
+                    (0..LANES).fold(0, |bits, _| bits << 1 | u16::from(next() % 4 < share))
+                });
+                let [row, lane] = blocks.map(|block| small(block * WIDTH));
+                for (row, bits) in (row..).zip(matrix) {
+                    wanted.extend(ones(bits).map(|at| (row, lane + small(at))));
+                }
+                if gathered.put(&matrix, blocks) {
+                    gathered.tell(&table, &mut told, (0, 0), |one, other| (one, other));
+                }
+            }
+            gathered.tell(&table, &mut told, (0, 0), |one, other| (one, other));
+            assert_eq!(told, wanted, "{matrices} matrices");
+        }
+    }
+
+    #[test]
+    fn a_column_has_the_bits_of_its_lane() {
+        let matrix: Matrix = std::array::from_fn(|row| 1 << (row * 7 % WIDTH));
+        for lane in 0..WIDTH {
+            let rows: Vec<usize> = ones(column(&matrix, lane)).collect();
+            assert!(rows.iter().all(|row| row * 7 % WIDTH == lane) && rows.len() == 1);
+        }
+    }
+}

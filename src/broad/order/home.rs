@@ -1,0 +1,240 @@
+//! Where a body belongs: each block has a part of space, and who comes or moves away looks for a lane in a near one.
+//!
+//! In: a box, the blocks' parts of space. Out: a free lane.
+
+use super::fatten::outward;
+use super::sort::{Sorter, centre};
+use super::tree::NO_BOUND;
+use super::{BodySlot, Order, Proxies};
+use crate::ids::small;
+use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH};
+
+/// Where a block is no farther from a body than this, in mean sides of its box, the sixteen before and after are not
+/// asked.
+const NEAR_ENOUGH: f32 = 0.5;
+
+/// Nobody's parts of space.
+pub(super) const NO_HOMES: Boxes16 = Boxes16 {
+    faces: {
+        let [low, _, _, high, _, _] = NO_BOUND;
+        let (low, high) = ([low; WIDTH], [high; WIDTH]);
+        [low, low, low, high, high, high]
+    },
+};
+
+impl Order {
+    /// The part of space of a block.
+    #[inline(always)]
+    pub(super) fn home(&self, block: usize) -> [f32; 6] {
+        self.homes[block / WIDTH].get(block % WIDTH)
+    }
+
+    /// Sets the part of space of a block.
+    #[inline(always)]
+    pub(super) fn set_home(&mut self, block: usize, home: &[f32; 6]) {
+        self.homes[block / WIDTH].set(block % WIDTH, home);
+    }
+
+    /// Makes the part of space of a block hold a place.
+    pub(super) fn widen_home(&mut self, block: usize, place: &[f32; 3]) {
+        let mut home = self.home(block);
+        widen(&mut home, place);
+        self.set_home(block, &home);
+    }
+
+    /// A free lane for a body, the nearer the better, and its box.
+    #[inline(always)]
+    pub(super) fn lane_for<L: Lanes, P: Proxies>(
+        &self,
+        lanes: L,
+        slot: BodySlot,
+        proxies: &P,
+    ) -> Option<(u32, Down)> {
+        let one = outward(lanes, proxies.aabb(slot), &self.origin);
+        // So near, the box hardly stretches the block.
+        let enough = one.mean_side() * NEAR_ENOUGH;
+        let near = self.lane_near(&one.corners(), enough * enough);
+        let rank = near
+            .map(|(_, rank)| rank)
+            .or_else(|| self.lane_in_attic())?;
+        Some((rank, one))
+    }
+
+    /// A free lane near a box's place on the curve, in the block whose part of space is nearest of the sixteen where it
+    /// belongs, those before and those after; and how far that is, squared.
+    ///
+    /// * `enough` - a part of space that is no farther, squared, is as good as one that is nearer.
+    #[inline(always)]
+    pub(super) fn lane_near(&self, one: &[f32; 6], enough: f32) -> Option<(f32, u32)> {
+        let key = self.sorter.frame.key(one);
+        let after = self.keys[..self.sorted].partition_point(|first| *first <= key);
+        let mine = after.saturating_sub(1) / WIDTH;
+        let (class, middle) = (Sorter::class_of(key), centre(one));
+        let mut best = (f32::INFINITY, None);
+        // Sixteen at a time: which has room and is nearest is a guess that fails.
+        for quarter in [Some(mine), mine.checked_sub(1), Some(mine + 1)] {
+            let Some(quarter) = quarter.filter(|quarter| quarter * WIDTH < self.sorted) else {
+                continue;
+            };
+            let far = self.far_from_free(&middle, quarter, class);
+            let least = far.iter().fold(
+                f32::INFINITY,
+                |least, far| if *far < least { *far } else { least },
+            );
+            if least < best.0 {
+                let at = far.iter().position(|far| *far <= least);
+                best = (least, at.map(|at| quarter * WIDTH + at));
+                // Of a body without end that is infinite: one with room must have been found.
+                if least <= enough {
+                    break;
+                }
+            }
+        }
+        Some((best.0, self.free_lane(best.1?)))
+    }
+
+    /// The first free lane of a block that has one.
+    fn free_lane(&self, block: usize) -> u32 {
+        small(block * WIDTH) + (!self.live[block]).trailing_zeros()
+    }
+
+    /// How far a place is, squared, from the parts of space of sixteen blocks; infinite for those of another class or
+    /// without a free lane.
+    #[inline(always)]
+    fn far_from_free(&self, place: &[f32; 3], quarter: usize, class: u64) -> [f32; WIDTH] {
+        let blocks = quarter * WIDTH..(quarter * WIDTH + WIDTH).min(self.sorted);
+        // What lies beyond is no part of the order: the attic, and what was a block's before the last sort.
+        let mut live = [u16::MAX; WIDTH];
+        live[..blocks.len()].copy_from_slice(&self.live[blocks.clone()]);
+        let homes = &self.homes[quarter];
+        let mut far: [f32; WIDTH] = std::array::from_fn(|at| {
+            let far = far_from(place, &homes.get(at));
+            if live[at] == u16::MAX {
+                f32::INFINITY
+            } else {
+                far
+            }
+        });
+        let keys = &self.keys[blocks];
+        let other = |key: &u64| Sorter::class_of(*key) != class;
+        // Keys ascend.
+        if keys.first().is_some_and(other) || keys.last().is_some_and(other) {
+            for (far, key) in far.iter_mut().zip(keys) {
+                *far = if other(key) { f32::INFINITY } else { *far };
+            }
+        }
+        far
+    }
+
+    /// A free lane in an attic block.
+    fn lane_in_attic(&self) -> Option<u32> {
+        let mut attic = self.sorted..self.live.len();
+        let block = attic.find(|block| self.live[*block] != u16::MAX)?;
+        Some(self.free_lane(block))
+    }
+}
+
+/// Makes a part of space hold a place.
+pub(super) fn widen(home: &mut [f32; 6], place: &[f32; 3]) {
+    for k in 0..3 {
+        home[k] = home[k].min(place[k]);
+        home[k + 3] = home[k + 3].max(place[k]);
+    }
+}
+
+/// How far a place is from a part of space, squared; infinite where that is empty.
+#[inline(always)]
+pub(super) fn far_from(place: &[f32; 3], home: &[f32; 6]) -> f32 {
+    let mut sum = 0.0;
+    for k in 0..3 {
+        let (below, above) = (home[k] - place[k], place[k] - home[k + 3]);
+        let apart = if below > above { below } else { above };
+        let apart = if apart > 0.0 { apart } else { 0.0 };
+        sum += apart * apart;
+    }
+    sum
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp, reason = "distances that must be the same")]
+mod tests {
+    use super::*;
+    use crate::broad::order::parts;
+    use crate::broad::order::sort::Frame;
+    use crate::simd::boxes::Level;
+
+    /// Blocks in order: four whole quarters and a part.
+    const SORTED: usize = 75;
+
+    fn cube(next: &mut impl FnMut(u64) -> u16, side: f32) -> [f32; 6] {
+        let at = [(); 3].map(|()| f32::from(next(1000)));
+        std::array::from_fn(|k| if k < 3 { at[k] } else { at[k - 3] + side })
+    }
+
+    /// Blocks of two classes, a third of them full; what stands behind them holds every place.
+    fn stand(next: &mut impl FnMut(u64) -> u16) -> Order {
+        let mut order = Order::new(Level::Portable);
+        let side = |at| if at < 20 { 40.0 } else { 1.0 };
+        let mut homes: Vec<_> = (0..SORTED).map(|at| cube(next, side(at))).collect();
+        let frame = Frame::of(&homes);
+        homes.sort_by_key(|one| frame.key(one));
+        order.keys = homes.iter().map(|one| frame.key(one)).collect();
+        (order.sorter.frame, order.sorted) = (frame, SORTED);
+        order.live = vec![0x7FFF; SORTED + 5];
+        for live in &mut order.live[..SORTED] {
+            *live |= if next(3) == 0 { u16::MAX } else { 0 };
+        }
+        order.homes = vec![NO_HOMES; order.live.len().div_ceil(WIDTH)];
+        let all = [-1e6, -1e6, -1e6, 1e6, 1e6, 1e6];
+        for block in 0..order.homes.len() * WIDTH {
+            order.set_home(block, homes.get(block).unwrap_or(&all));
+        }
+        order
+    }
+
+    #[test]
+    fn the_lane_found_is_in_the_nearest_block_of_the_class_with_room() {
+        let mut state = 1_u64;
+        let mut next = |below| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            u16::try_from((state >> 33) % below).unwrap()
+        };
+        for _ in 0..50 {
+            let order = stand(&mut next);
+            for side in [1.0, 40.0, 1.0, 1.0] {
+                let one = cube(&mut next, side);
+                let key = order.sorter.frame.key(&one);
+                let after = order.keys.partition_point(|first| *first <= key);
+                let mine = after.saturating_sub(1) / WIDTH;
+                let blocks = mine.saturating_sub(1) * WIDTH..((mine + 2) * WIDTH).min(SORTED);
+                let far = |block: usize| far_from(&centre(&one), &order.home(block));
+                let wanted = blocks
+                    .filter(|block| order.live[*block] != u16::MAX)
+                    .filter(|block| Sorter::class_of(order.keys[*block]) == Sorter::class_of(key))
+                    .map(far)
+                    .min_by(f32::total_cmp);
+                // Nothing is near enough: all three quarters are looked at.
+                let found = order.lane_near(&one, -1.0);
+                assert_eq!(found.map(|(far, _)| far), wanted);
+                if let Some((least, rank)) = found {
+                    let (block, lane) = parts(rank);
+                    assert!(order.live[block] >> lane & 1 == 0 && far(block) == least);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn bug_a_body_without_end_looks_beyond_blocks_that_are_full() {
+        let mut order = Order::new(Level::Portable);
+        (order.keys, order.sorted) = (vec![0; 32], 32);
+        order.live = [[0x7FFF; WIDTH], [u16::MAX; WIDTH]].concat();
+        order.homes = vec![NO_HOMES; 2];
+        let unit = [-1.0, -1.0, -1.0, 1.0, 1.0, 1.0];
+        (0..32).for_each(|block| order.set_home(block, &unit));
+        let endless = unit.map(|face| face * f32::INFINITY);
+        assert!(order.lane_near(&endless, f32::INFINITY).is_some());
+    }
+}
