@@ -55,8 +55,6 @@ const ROWS: usize = u64::BITS as usize / WIDTH;
 const WORDS: usize = WIDTH / ROWS;
 /// Words that are gathered before they are gone through: they stay in the first cache.
 const TOGETHER: usize = 256;
-/// Matrices that can be gathered without being told in between.
-pub(super) const MATRICES: usize = TOGETHER / WORDS;
 
 /// Some rows of a matrix, and the ranks of the first of them and of its first lane.
 #[derive(Clone, Copy, Debug, Default)]
@@ -66,31 +64,38 @@ struct Word {
     lane: u32,
 }
 
-/// Words of matrices that hold any bit, to be told together.
-#[derive(Debug)]
-pub(super) struct Gathered {
+/// Words of matrices that hold any bit, told together: a pair for each bit, of what a table says of its two ranks.
+pub(super) struct Gathered<'a, T, F> {
+    table: &'a [u32],
+    pair: F,
+    list: &'a mut Vec<T>,
     /// The last is read when all are told, and never written.
     words: [Word; TOGETHER + WORDS + 1],
     len: usize,
     bits: usize,
 }
 
-impl Gathered {
+impl<'a, T, F: Fn(u32, u32) -> T> Gathered<'a, T, F> {
     /// Without any.
-    pub(super) fn new() -> Self {
+    ///
+    /// * `table` - by rank.
+    /// * `list` - pairs are appended to it.
+    pub(super) fn new(table: &'a [u32], list: &'a mut Vec<T>, pair: F) -> Self {
         Self {
+            table,
+            pair,
+            list,
             words: [Word::default(); TOGETHER + WORDS + 1],
             len: 0,
             bits: 0,
         }
     }
 
-    /// Gathers the bits of a matrix; whether there are so many that they are to be told before the next.
+    /// Gathers the bits of a matrix.
     ///
     /// * `blocks` - of its rows, and of its lanes.
     #[inline(always)]
-    #[must_use]
-    pub(super) fn put(&mut self, matrix: &Matrix, blocks: [usize; 2]) -> bool {
+    pub(super) fn put(&mut self, matrix: &Matrix, blocks: [usize; 2]) {
         let [row, lane] = blocks.map(|block| small(block * WIDTH));
         for (row, rows) in (row..).step_by(ROWS).zip(matrix.as_chunks::<ROWS>().0) {
             let lines = rows.iter().rev().map(|row| u64::from(*row));
@@ -99,30 +104,31 @@ impl Gathered {
             self.len += usize::from(bits != 0);
             self.bits += bits.count_ones() as usize;
         }
-        self.len > TOGETHER
+        if self.len > TOGETHER {
+            self.tell();
+        }
     }
 
-    /// Appends a pair for each bit gathered, by what a table says of its two ranks, and forgets them.
+    /// Tells what is left.
     #[inline(always)]
-    pub(super) fn tell<T: Copy>(
-        &mut self,
-        table: &[u32],
-        list: &mut Vec<T>,
-        none: T,
-        pair: impl Fn(u32, u32) -> T,
-    ) {
-        let from = list.len();
-        list.resize(from + self.bits, none);
-        let (mut at, mut word) = (0, self.words[0]);
-        for place in &mut list[from..] {
+    pub(super) fn finish(mut self) {
+        self.tell();
+    }
+
+    /// Tells what is gathered, and forgets it.
+    #[inline(always)]
+    fn tell(&mut self) {
+        let (words, table, pair) = (&self.words, self.table, &self.pair);
+        let (mut at, mut word) = (0, words[0]);
+        self.list.extend((0..self.bits).map(|_| {
             let bit = word.bits.trailing_zeros();
             let (row, lane) = (word.row + bit / LANES, word.lane + bit % LANES);
-            *place = pair(table[row as usize], table[lane as usize]);
             word.bits &= word.bits.wrapping_sub(1);
             at += usize::from(word.bits == 0);
-            let next = self.words[at];
+            let next = words[at];
             word = if word.bits == 0 { next } else { word };
-        }
+            pair(table[row as usize], table[lane as usize])
+        }));
         (self.len, self.bits) = (0, 0);
     }
 }
@@ -130,36 +136,32 @@ impl Gathered {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::builtin::Random;
 
     #[test]
     fn every_bit_is_told_once_however_many_are_gathered() {
-        let (mut state, mut gathered) = (1_u64, Gathered::new());
-        let mut next = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            state >> 33
-        };
+        let mut random = Random::new(1);
         // Ranks stand for themselves.
         let table: Vec<u32> = (0..64 * LANES).collect();
         for matrices in [0, 1, 2, 63, 500] {
             let (mut told, mut wanted) = (Vec::new(), Vec::new());
+            let mut gathered = Gathered::new(&table, &mut told, |one, other| (one, other));
             for _ in 0..matrices {
-                let blocks = [(); 2].map(|()| usize::try_from(next() % 64).unwrap());
+                let blocks = [(); 2].map(|()| usize::try_from(random.bits() % 64).unwrap());
                 // Empty ones, full ones, and some of all shares of bits between.
-                let share = next() % 5;
+                let share = random.bits() % 5;
                 let matrix = Matrix::map([0; WIDTH], |_: u16| {
-                    (0..LANES).fold(0, |bits, _| bits << 1 | u16::from(next() % 4 < share))
+                    (0..LANES).fold(0, |bits, _| {
+                        bits << 1 | u16::from(random.bits() % 4 < share)
+                    })
                 });
                 let [row, lane] = blocks.map(|block| small(block * WIDTH));
                 for (row, bits) in (row..).zip(matrix) {
                     wanted.extend(ones(bits).map(|at| (row, lane + small(at))));
                 }
-                if gathered.put(&matrix, blocks) {
-                    gathered.tell(&table, &mut told, (0, 0), |one, other| (one, other));
-                }
+                gathered.put(&matrix, blocks);
             }
-            gathered.tell(&table, &mut told, (0, 0), |one, other| (one, other));
+            gathered.finish();
             assert_eq!(told, wanted, "{matrices} matrices");
         }
     }

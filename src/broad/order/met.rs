@@ -3,7 +3,7 @@
 //! In: boxes in their lanes, the tree over the blocks. Out: the overlaps of a tick in the order of blocks, so that
 //! those of two ticks with the same lanes differ by their bits alone.
 
-use super::bits::{Gathered, MATRICES};
+use super::bits::Gathered;
 use super::idle::shed;
 use super::links::{Matrix, room, spare};
 use super::{BodySlot, parts};
@@ -168,7 +168,7 @@ impl Met {
         slot_of: &[u32],
         carried: &mut Vec<(u32, u32)>,
     ) {
-        let mut gathered = Gathered::new();
+        let mut gathered = Gathered::new(slot_of, carried, |one, other| (one, other));
         for block in 0..self.blocks() {
             for at in self.of(block) {
                 let other = self.others[at] as usize;
@@ -182,15 +182,13 @@ impl Met {
                 }
                 let goes = minus(&all, &stays);
                 let left = without(&goes, gone[block], gone[other]);
-                if gathered.put(&left, [block, other]) {
-                    write_down(&mut gathered, slot_of, carried);
-                }
+                gathered.put(&left, [block, other]);
                 let lost = goes.iter().map(|row| row.count_ones() as usize);
                 self.count -= lost.sum::<usize>();
                 self.hits[at] = stays;
             }
         }
-        write_down(&mut gathered, slot_of, carried);
+        gathered.finish();
     }
 
     /// Writes every overlap down as two body slots, and forgets it; not those of lanes that lost their body.
@@ -201,7 +199,7 @@ impl Met {
         carried: &mut Vec<(u32, u32)>,
     ) {
         carried.reserve(self.count);
-        let mut gathered = Gathered::new();
+        let mut gathered = Gathered::new(slot_of, carried, |one, other| (one, other));
         for block in 0..self.blocks() {
             for at in self.of(block) {
                 let other = self.others[at] as usize;
@@ -209,12 +207,10 @@ impl Met {
                 if gone[block] | gone[other] != 0 {
                     left = without(&left, gone[block], gone[other]);
                 }
-                if gathered.put(&left, [block, other]) {
-                    write_down(&mut gathered, slot_of, carried);
-                }
+                gathered.put(&left, [block, other]);
             }
         }
-        write_down(&mut gathered, slot_of, carried);
+        gathered.finish();
         self.clear();
     }
 }
@@ -227,8 +223,8 @@ struct Change {
     blocks: [usize; 2],
 }
 
-/// So many are gathered before they are told.
-const CHANGES: usize = MATRICES;
+/// So many are noted before their bits are gathered: they stay in the first cache.
+const CHANGES: usize = 64;
 
 /// Reports what is in one of two ticks alone, whose lanes are the same but for those whose body left before the second.
 ///
@@ -262,7 +258,8 @@ impl Work for TellDifference<'_> {
         } = self;
         let mut changes = [Change::default(); CHANGES];
         let mut len = 0;
-        let mut gathered = Gathered::new();
+        let mut goes = Gathered::new(slot_of, parted, key);
+        let mut comes = Gathered::new(slot_of, began, key);
         for block in 0..now.blocks() {
             let (mut old, mut new) = (before.of(block), now.of(block));
             while !(old.is_empty() && new.is_empty()) {
@@ -291,44 +288,34 @@ impl Work for TellDifference<'_> {
                 changes[len] = Change { was, is, blocks };
                 len += usize::from(was != is);
                 if len == CHANGES {
-                    flush(&changes, &mut gathered, slot_of, [parted, began]);
+                    gather(&changes, &mut goes, &mut comes);
                     len = 0;
                 }
             }
         }
-        flush(&changes[..len], &mut gathered, slot_of, [parted, began]);
+        gather(&changes[..len], &mut goes, &mut comes);
+        goes.finish();
+        comes.finish();
     }
 }
 
-/// Tells what went and what came.
+/// Gathers what went and what came.
 #[inline(always)]
-fn flush(
+fn gather<F: Fn(u32, u32) -> PairKey>(
     changes: &[Change],
-    gathered: &mut Gathered,
-    slot_of: &[u32],
-    [parted, began]: [&mut Vec<PairKey>; 2],
+    goes: &mut Gathered<'_, PairKey, F>,
+    comes: &mut Gathered<'_, PairKey, F>,
 ) {
     for Change { was, is, blocks } in changes {
-        _ = gathered.put(&minus(was, is), *blocks);
+        goes.put(&minus(was, is), *blocks);
+        comes.put(&minus(is, was), *blocks);
     }
-    tell(gathered, slot_of, parted);
-    for Change { was, is, blocks } in changes {
-        _ = gathered.put(&minus(is, was), *blocks);
-    }
-    tell(gathered, slot_of, began);
 }
 
-/// Tells what is gathered as pairs of bodies.
+/// The pair of two body slots.
 #[inline(always)]
-fn tell(gathered: &mut Gathered, slot_of: &[u32], list: &mut Vec<PairKey>) {
-    let key = |one, other| PairKey::new(BodySlot(one), BodySlot(other));
-    gathered.tell(slot_of, list, PairKey::NOBODY, key);
-}
-
-/// Writes what is gathered down as two body slots each.
-#[inline(always)]
-fn write_down(gathered: &mut Gathered, slot_of: &[u32], carried: &mut Vec<(u32, u32)>) {
-    gathered.tell(slot_of, carried, (0, 0), |one, other| (one, other));
+fn key(one: u32, other: u32) -> PairKey {
+    PairKey::new(BodySlot(one), BodySlot(other))
 }
 
 /// Reports every overlap.
@@ -350,16 +337,14 @@ fn tell_some(
     began: &mut Vec<PairKey>,
     left: impl Fn(&Matrix, usize, usize) -> Matrix,
 ) {
-    let mut gathered = Gathered::new();
+    let mut gathered = Gathered::new(slot_of, began, key);
     for block in 0..met.blocks() {
         for at in met.of(block) {
             let other = met.others[at] as usize;
-            if gathered.put(&left(&met.hits[at], block, other), [block, other]) {
-                tell(&mut gathered, slot_of, began);
-            }
+            gathered.put(&left(&met.hits[at], block, other), [block, other]);
         }
     }
-    tell(&mut gathered, slot_of, began);
+    gathered.finish();
 }
 
 /// The bits that lie neither in some rows nor in some columns.

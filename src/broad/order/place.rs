@@ -250,9 +250,9 @@ impl Order {
             if starts {
                 self.keys.push(key);
                 self.live.push(0);
-                let some = (self.live.len() - 1) / WIDTH + 1;
-                self.homes.resize(some, NO_HOMES);
-                self.quarters.resize(some, NO_BOUND);
+                let quarters = self.live.len().div_ceil(WIDTH);
+                self.homes.resize(quarters, NO_HOMES);
+                self.quarters.resize(quarters, NO_BOUND);
                 self.slot_of.resize(self.live.len() * WIDTH, NONE);
                 self.gaits.resize(self.live.len() * WIDTH, Gait::NEW);
             }
