@@ -15,16 +15,6 @@ pub(super) fn parts(rank: u32) -> (usize, usize) {
     (rank as usize / WIDTH, rank as usize % WIDTH)
 }
 
-/// Bit `lane` of each row, as bits.
-#[inline(always)]
-pub(super) fn column(matrix: &Matrix, lane: usize) -> u16 {
-    let mut bits = 0;
-    for (row, line) in matrix.iter().enumerate() {
-        bits |= (line >> lane & 1) << row;
-    }
-    bits
-}
-
 /// The places of the ones, lowest first.
 #[inline(always)]
 pub(super) fn ones(bits: u16) -> Ones {
@@ -163,15 +153,6 @@ mod tests {
             }
             gathered.finish();
             assert_eq!(told, wanted, "{matrices} matrices");
-        }
-    }
-
-    #[test]
-    fn a_column_has_the_bits_of_its_lane() {
-        let matrix: Matrix = std::array::from_fn(|row| 1 << (row * 7 % WIDTH));
-        for lane in 0..WIDTH {
-            let rows: Vec<usize> = ones(column(&matrix, lane)).collect();
-            assert!(rows.iter().all(|row| row * 7 % WIDTH == lane) && rows.len() == 1);
         }
     }
 }

@@ -8,7 +8,7 @@
 use super::afresh::Afresh;
 use super::gear::FAR;
 use super::mend::Mender;
-use super::{Order, renew};
+use super::{Order, moved, renew};
 
 /// A list of what changes in a tick keeps room for one entry for so many bodies, and up to twice as many: enough for
 /// all scenes of the bench but the fastest and those of tens of pairs a body, where a tick has other things to do for
@@ -50,7 +50,7 @@ impl Order {
         shed(&mut self.ages);
         shed(&mut self.gaits);
         shed(&mut self.former);
-        shed(&mut self.rows);
+        self.gather = moved::Gather::default();
         shed(&mut self.touched_records);
         shed(&mut self.emptied);
         self.give_back_list();

@@ -7,9 +7,7 @@
 
 use super::entry::{Entry, ages};
 use super::links::Matrix;
-use super::{
-    BodySlot, NONE, Order, Proxies, Tick, Work as Done, column, is_thrifty, ones, parts, small,
-};
+use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, is_thrifty, ones, parts, small};
 use crate::ids::PairKey;
 use crate::simd::boxes::{Boxes16, Down, Hold, LANES, Lanes, WIDTH, Work, prefetch, slack};
 
@@ -23,28 +21,6 @@ pub(super) struct Found {
 
 /// Entries ahead whose boxes are asked for.
 const AHEAD: usize = 24;
-/// Moved bodies ahead whose blocks' lists are asked for, and whose matrices.
-const AHEAD_LISTS: usize = 8;
-const AHEAD_BITS: usize = 4;
-
-/// Lanes of a row of a matrix, to be looked at.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Row {
-    record: u32,
-    /// The lower first.
-    blocks: [u32; 2],
-    row: u16,
-    lanes: u16,
-}
-
-impl Row {
-    /// The rank of its body, and of the first lane of the other block.
-    #[inline(always)]
-    fn ranks(self) -> [usize; 2] {
-        let [a, b] = self.blocks.map(|block| block as usize * WIDTH);
-        [a + usize::from(self.row), b]
-    }
-}
 
 impl Order {
     /// Looks at every candidate, by the flat list.
@@ -139,103 +115,6 @@ impl Order {
             }
         }
     }
-
-    /// Looks at the candidates of moved bodies, one by one.
-    pub(super) fn look_at_moved<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
-        self.entries.clear();
-        self.give_back_list();
-        let level = self.level;
-        level.run(LookAtMoved {
-            order: self,
-            tick,
-            done,
-        });
-    }
-
-    /// Asks for what the bodies to come are looked at by: they stand far from one another.
-    #[inline(always)]
-    fn ask_ahead(&self, moved: &[BodySlot]) {
-        let rank = |ahead: usize| moved.get(ahead).and_then(|slot| self.rank(*slot));
-        if let Some(rank) = rank(AHEAD_LISTS) {
-            self.links.ask(small(parts(rank).0));
-        }
-        if let Some(rank) = rank(AHEAD_BITS) {
-            for (_, record) in self.links.of(small(parts(rank).0)) {
-                prefetch(self.links.bits(record));
-            }
-        }
-    }
-
-    /// Looks at the candidates of one body by its f64 box: for so few pairs the list would not pay.
-    #[inline(always)]
-    fn look_at<P: Proxies>(&mut self, rank: u32, tick: &mut Tick<'_, P>, done: &mut Done) {
-        let (block, lane) = parts(rank);
-        let mut rows = std::mem::take(&mut self.rows);
-        rows.clear();
-        let mine = small(block);
-        for (other, record) in self.links.of(mine) {
-            let bits = self.links.bits(record);
-            let blocks = [mine.min(other), mine.max(other)];
-            let mut push = |row: usize, lanes: u16| {
-                prefetch(&self.slot_of[blocks[1] as usize * WIDTH]);
-                #[allow(clippy::cast_possible_truncation, reason = "below 16")]
-                rows.push(Row {
-                    record,
-                    blocks,
-                    row: row as u16,
-                    lanes,
-                });
-            };
-            if mine <= other && bits.cand[lane] != 0 {
-                push(lane, bits.cand[lane]);
-            }
-            if other <= mine {
-                for row in ones(column(&bits.cand, lane)) {
-                    push(row, 1 << lane);
-                }
-            }
-        }
-        for row in &rows {
-            let [a, b] = row.ranks();
-            prefetch(tick.proxies.aabb(BodySlot(self.slot_of[a])));
-            for lane in ones(row.lanes) {
-                prefetch(tick.proxies.aabb(BodySlot(self.slot_of[b + lane])));
-            }
-        }
-        for row in &rows {
-            done.tests += u64::from(row.lanes.count_ones());
-            self.look_at_row(*row, tick);
-        }
-        self.rows = rows;
-    }
-
-    /// Compares the f64 boxes of a row with some lanes; flips the bits that changed and reports their pairs.
-    fn look_at_row<P: Proxies>(&mut self, row: Row, tick: &mut Tick<'_, P>) {
-        let [a, b] = row.ranks();
-        let one = BodySlot(self.slot_of[a]);
-        let mine = tick.proxies.aabb(one);
-        let line = usize::from(row.row);
-        let hit = self.links.bits(row.record).hit[line];
-        let mut flips = 0;
-        for lane in ones(row.lanes) {
-            let other = BodySlot(self.slot_of[b + lane]);
-            let now = mine.overlaps(tick.proxies.aabb(other));
-            if now == (hit >> lane & 1 == 1) {
-                continue;
-            }
-            flips |= 1 << lane;
-            self.hits = if now { self.hits + 1 } else { self.hits - 1 };
-            let key = PairKey::new(one, other);
-            if now {
-                tick.began.push(key);
-            } else {
-                tick.parted.push(key);
-            }
-        }
-        if flips != 0 {
-            self.links.bits_mut(row.record).hit[line] ^= flips;
-        }
-    }
 }
 
 /// What the f64 box of a body that keeps to its hold is sure to hold: the core, less what rounding may have added.
@@ -256,33 +135,6 @@ pub(super) fn sure(hold: &Hold) -> [f32; 6] {
             core[k] - slack
         }
     })
-}
-
-/// See [`Order::look_at_moved`].
-struct LookAtMoved<'a, 'b, P> {
-    order: &'a mut Order,
-    tick: &'a mut Tick<'b, P>,
-    done: &'a mut Done,
-}
-
-impl<P: Proxies> Work for LookAtMoved<'_, '_, P> {
-    type Out = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(self, _: L) {
-        let Self { order, tick, done } = self;
-        let (moved, came) = (tick.moved, order.homeless.len());
-        for at in 0..moved.len() + came {
-            let slot = match moved.get(at) {
-                Some(slot) => *slot,
-                None => order.homeless[at - moved.len()],
-            };
-            order.ask_ahead(moved.get(at..).unwrap_or(&[]));
-            if let Some(rank) = order.rank(slot) {
-                order.look_at(rank, tick, done);
-            }
-        }
-    }
 }
 
 /// Lists every candidate.

@@ -30,7 +30,7 @@
 use super::members::{ASKED, CAME, Members};
 use super::{Proxies, Work};
 use crate::ids::{BodySlot, PairKey, small};
-use crate::simd::boxes::{Boxes16, Down, Hold, Level, WIDTH};
+use crate::simd::boxes::{Boxes16, Down, Hold, Lanes, Level, Portable, WIDTH};
 use crate::wire::{BroadCause, BroadMode};
 
 mod afresh;
@@ -47,6 +47,7 @@ mod load;
 mod look;
 mod mend;
 mod met;
+mod moved;
 mod near;
 mod next;
 mod pace;
@@ -64,7 +65,7 @@ mod validate;
 mod verlet;
 
 use afresh::Afresh;
-use bits::{column, ones, parts};
+use bits::{ones, parts};
 use fatten::Gait;
 pub(super) use idle::{give_back, is_thrifty};
 use links::{Links, spare};
@@ -153,7 +154,7 @@ pub(super) struct Order {
     entries: Vec<entry::Entry>,
     listed: bool,
     found: Vec<look::Found>,
-    rows: Vec<look::Row>,
+    gather: moved::Gather,
     /// Blocks met by queries since the last sort beyond what they met right after it.
     excess: u64,
     /// Blocks met by a query right after the last sort, in sixteenths.
@@ -211,7 +212,7 @@ impl Order {
             entries: Vec::new(),
             listed: false,
             found: Vec::new(),
-            rows: Vec::new(),
+            gather: moved::Gather::default(),
             excess: 0,
             usual: 0,
             lanes_changed: 0,
@@ -348,7 +349,7 @@ impl Order {
             let row = block <= other as usize;
             let mut bits = if row { matrix[lane] } else { 0 };
             if !row || other as usize == block {
-                bits |= column(&matrix, lane);
+                bits |= Portable.column(&matrix, lane);
             }
             for lane in ones(bits) {
                 with(self.slot_of[other as usize * WIDTH + lane]);

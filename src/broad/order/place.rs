@@ -158,7 +158,7 @@ impl Order {
         ] {
             room(list, most);
         }
-        room(&mut self.rows, most);
+        self.gather.reserve(bodies);
         if !idle::is_thrifty(bodies) {
             room(&mut self.homeless, bodies);
             room(&mut self.found, bodies);

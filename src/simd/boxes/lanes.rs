@@ -155,6 +155,9 @@ pub(crate) trait Lanes: Copy {
     /// Whether `inner` lies inside `outer`. The spare lanes are compared too: those of `outer` are to be minus
     /// infinity.
     fn holds(self, outer: &Down, inner: &Down) -> bool;
+
+    /// Bit `lane` of each row of a matrix of bits, as the bits of those rows.
+    fn column(self, matrix: &[u16; WIDTH], lane: usize) -> u16;
 }
 
 /// Plain Rust.
@@ -256,5 +259,10 @@ impl Lanes for Portable {
             holds &= o <= i;
         }
         holds
+    }
+
+    #[inline(always)]
+    fn column(self, matrix: &[u16; WIDTH], lane: usize) -> u16 {
+        mask(&matrix.map(|row| row >> (lane % WIDTH) & 1 == 1))
     }
 }

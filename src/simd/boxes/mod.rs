@@ -1,15 +1,15 @@
 //! Kernels over sixteen boxes at a time.
 //!
 //! In: blocks of sixteen boxes as a structure of arrays (`Boxes16`), single boxes (`Down`). Out: masks of sixteen bits,
-//! one a lane, and plain answers. `Portable` is the safe twin in plain Rust; every other set of `Lanes` gives the same
-//! bits, which tests compare. Which one runs is decided once, by what the processor says (`Level::best`).
+//! one a lane or a row, and plain answers. `Portable` is the safe twin in plain Rust; every other set of `Lanes` gives
+//! the same bits, which tests compare. Which one runs is decided once, by what the processor says (`Level::best`).
 //!
 //! How: a caller writes its loop once as a `Work`, generic over `Lanes`, all of it `#[inline(always)]`;
 //! `Level::run` compiles it once a level inside a function that has the level's instructions switched on, so that
 //! the whole loop, not only a kernel, is built for them. AVX2 is the main path, AVX-512 halves its instructions. On
 //! aarch64 NEON is part of every target, and the compiler builds the twin with it.
 //!
-//! Why `std::arch` and not a crate: three kernels need a compare that ends in a mask of bits, which no portable layer
+//! Why `std::arch` and not a crate: four kernels need a compare that ends in a mask of bits, which no portable layer
 //! gives without a detour on AVX2; everything else here the compiler turns into vector code by itself.
 
 #![allow(
@@ -108,8 +108,9 @@ pub(crate) fn prefetch<T>(place: &T) {
             // SAFETY: a prefetch faults on no address, and this one lies inside `place`; SSE is part of x86-64.
             unsafe { _mm_prefetch::<_MM_HINT_T0>(first.add(at)) };
         }
-        // What is not laid along the lines of the cache ends in another one half of the time.
-        if align_of::<T>() < 64 && size_of::<T>() > 0 {
+        // What is not laid along the lines of the cache ends in another one half of the time, but for what is no longer
+        // than its alignment.
+        if align_of::<T>() < 64 && size_of::<T>() > align_of::<T>() {
             // SAFETY: as above.
             unsafe { _mm_prefetch::<_MM_HINT_T0>(first.add(size_of::<T>() - 1)) };
         }

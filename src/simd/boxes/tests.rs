@@ -72,6 +72,37 @@ fn every_level_gives_the_bits_of_the_safe_twin() {
     }
 }
 
+/// The columns of a matrix.
+struct Columns<'a>(&'a [u16; WIDTH]);
+
+impl Work for Columns<'_> {
+    type Out = [u16; WIDTH];
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> Self::Out {
+        std::array::from_fn(|lane| lanes.column(self.0, lane))
+    }
+}
+
+#[test]
+fn every_level_turns_a_matrix_by_its_columns() {
+    let rounds = if cfg!(miri) { 20 } else { 2000 };
+    for seed in 0..rounds {
+        let state = &mut (seed + 1);
+        #[allow(clippy::cast_possible_truncation, reason = "any bits will do")]
+        let matrix = [(); WIDTH].map(|()| next(state) as u16);
+        for level in Level::available() {
+            let columns = level.run(Columns(&matrix));
+            for (row, line) in matrix.iter().enumerate() {
+                for (lane, column) in columns.iter().enumerate() {
+                    let (wanted, got) = (line >> lane & 1, column >> row & 1);
+                    assert_eq!(got, wanted, "seed {seed}, {level:?}, {row} {lane}");
+                }
+            }
+        }
+    }
+}
+
 /// Takes a box and tells whether it keeps to a hold.
 struct Taken<'a>([&'a [f64; 3]; 2], &'a [f64; 3], &'a Hold);
 

@@ -3,22 +3,24 @@
 
 use std::arch::asm;
 use std::arch::x86_64::{
-    __m256, __m256d, __m512, _CMP_GT_OQ, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ, _mm_cvtss_f32,
-    _mm_max_ps, _mm_max_ss, _mm_movehl_ps, _mm_shuffle_ps, _mm256_add_ps, _mm256_and_ps,
-    _mm256_and_si256, _mm256_andnot_ps, _mm256_blendv_ps, _mm256_castps256_ps128,
-    _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32, _mm256_cvtpd_ps, _mm256_extractf128_ps,
-    _mm256_load_ps, _mm256_loadu_ps, _mm256_maskload_pd, _mm256_max_ps, _mm256_movemask_ps,
-    _mm256_mul_ps, _mm256_or_ps, _mm256_permute2f128_ps, _mm256_set_m128, _mm256_set1_epi32,
-    _mm256_set1_ps, _mm256_setr_epi32, _mm256_setr_epi64x, _mm256_setr_pd, _mm256_setzero_ps,
-    _mm256_slli_epi32, _mm256_store_ps, _mm256_sub_pd, _mm256_sub_ps, _mm256_xor_ps,
-    _mm512_cmp_ps_mask, _mm512_loadu_ps, _mm512_set1_ps,
+    __m256, __m256d, __m256i, __m512, _CMP_GT_OQ, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ,
+    _mm_cvtsi32_si128, _mm_cvtss_f32, _mm_max_ps, _mm_max_ss, _mm_movehl_ps, _mm_shuffle_ps,
+    _mm256_add_ps, _mm256_and_ps, _mm256_and_si256, _mm256_andnot_ps, _mm256_blendv_ps,
+    _mm256_castps256_ps128, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32,
+    _mm256_cvtpd_ps, _mm256_extractf128_ps, _mm256_load_ps, _mm256_loadu_ps, _mm256_loadu_si256,
+    _mm256_maskload_pd, _mm256_max_ps, _mm256_movemask_epi8, _mm256_movemask_ps, _mm256_mul_ps,
+    _mm256_or_ps, _mm256_packs_epi16, _mm256_permute2f128_ps, _mm256_set_m128, _mm256_set1_epi16,
+    _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi32, _mm256_setr_epi64x, _mm256_setr_pd,
+    _mm256_setzero_ps, _mm256_setzero_si256, _mm256_sll_epi16, _mm256_slli_epi32, _mm256_store_ps,
+    _mm256_sub_pd, _mm256_sub_ps, _mm256_test_epi16_mask, _mm256_xor_ps, _mm512_cmp_ps_mask,
+    _mm512_loadu_ps, _mm512_set1_ps,
 };
 
 use super::Work;
 use super::lanes::{Boxes16, Down, Hold, LEAST, Lanes, SLACK_LEAST, SLACK_SHARE, STEP, WIDTH};
 
 /// Two halves of eight lanes or, where `WIDE`, sixteen at once for what gains by it. Only [`run_avx2`] and
-/// [`run_avx512`] make one: where one is, AVX2 is, and where a wide one is, AVX-512 F too.
+/// [`run_avx512`] make one: where one is, AVX2 is, and where a wide one is, AVX-512 F, BW, DQ and VL are too.
 #[derive(Clone, Copy)]
 struct Vectors<const WIDE: bool>(());
 
@@ -180,6 +182,36 @@ fn holds_avx2(outer: &Down, inner: &Down) -> bool {
     _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(one(outer), one(inner))) == 0xFF
 }
 
+#[inline]
+#[target_feature(enable = "avx2")]
+fn rows(matrix: &[u16; WIDTH]) -> __m256i {
+    // SAFETY: the array is as long as the register.
+    unsafe { _mm256_loadu_si256(matrix.as_ptr().cast()) }
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    reason = "a place below sixteen; eight bits above eight bits"
+)]
+fn column_avx2(matrix: &[u16; WIDTH], lane: usize) -> u16 {
+    // The bit to the top of its row, which packing to bytes keeps as the sign.
+    let up = _mm_cvtsi32_si128((WIDTH - 1 - lane % WIDTH) as i32);
+    let top = _mm256_sll_epi16(rows(matrix), up);
+    let bytes = _mm256_packs_epi16(top, _mm256_setzero_si256());
+    let signs = _mm256_movemask_epi8(bytes).cast_unsigned();
+    (signs & 0xFF | signs >> 8) as u16
+}
+
+#[inline]
+#[target_feature(enable = "avx512bw,avx512vl")]
+fn column_avx512(matrix: &[u16; WIDTH], lane: usize) -> u16 {
+    let bit = (1_u16 << (lane % WIDTH)).cast_signed();
+    _mm256_test_epi16_mask(rows(matrix), _mm256_set1_epi16(bit))
+}
+
 /// The greatest of the chosen lanes; minus infinity where there is none. `set` is all ones in those lanes.
 #[inline]
 #[target_feature(enable = "avx2")]
@@ -268,5 +300,16 @@ impl<const WIDE: bool> Lanes for Vectors<WIDE> {
     fn holds(self, outer: &Down, inner: &Down) -> bool {
         // SAFETY: a `Vectors` is made only where AVX2 is.
         unsafe { holds_avx2(outer, inner) }
+    }
+
+    #[inline(always)]
+    fn column(self, matrix: &[u16; WIDTH], lane: usize) -> u16 {
+        if WIDE {
+            // SAFETY: a wide one is made only where AVX-512 BW and VL are.
+            unsafe { column_avx512(matrix, lane) }
+        } else {
+            // SAFETY: a `Vectors` is made only where AVX2 is.
+            unsafe { column_avx2(matrix, lane) }
+        }
     }
 }

@@ -1,0 +1,313 @@
+//! The look at few moved bodies: the candidates of each are looked up in the matrices.
+//!
+//! In: moved bodies, matrices of candidates, boxes by rank. Out: pairs that began and pairs that parted, and their
+//! bits.
+//!
+//! How: in three passes over some bodies at a time, none with a branch that depends on the boxes. Which blocks near a
+//! body hold a candidate of it, how many each holds and whether boxes overlap cannot be guessed, and other bodies move
+//! in each tick: a branch guessed wrong takes longer than a comparison.
+
+use super::idle::{give_back, is_thrifty};
+use super::links::{Bits, Links, Matrix, room};
+use super::{BodySlot, Order, Proxies, Tick, Work as Done, parts, small};
+use crate::ids::PairKey;
+use crate::simd::boxes::{Down, LANES, Lanes, WIDTH, Work, prefetch};
+
+/// Moved bodies ahead whose blocks' lists are asked for, and whose matrices.
+const AHEAD_LISTS: usize = 8;
+const AHEAD_BITS: usize = 4;
+/// Blocks with candidates that are gathered before these are compared: they stay in the first cache.
+const TOGETHER: usize = 64;
+
+/// Candidates of a body in a block.
+#[derive(Clone, Copy, Debug, Default)]
+struct Near {
+    record: u32,
+    /// Of the body, and of the first lane of the block.
+    rank: u32,
+    first: u32,
+    /// Lanes of the block: the candidates, and those of them that overlapped.
+    cand: u16,
+    hit: u16,
+}
+
+/// A candidate.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pair {
+    record: u32,
+    ranks: [u32; 2],
+    hit: bool,
+}
+
+/// A candidate that may have begun or parted.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    record: u32,
+    ranks: [u32; 2],
+    /// Whether the boxes overlap; `None` where rounding leaves it open.
+    now: Option<bool>,
+}
+
+/// Memory of the look, kept over ticks.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Gather {
+    /// One more than are gathered: what follows the last is written, and read, and never kept.
+    near: Vec<Near>,
+    len: usize,
+    pairs: Vec<Pair>,
+    found: Vec<Found>,
+    tests: u64,
+}
+
+impl Gather {
+    /// Room for a tick of so many bodies.
+    pub(super) fn reserve(&mut self, bodies: usize) {
+        self.near.resize(TOGETHER + 1, Near::default());
+        room(&mut self.pairs, TOGETHER * WIDTH);
+        if !is_thrifty(bodies) {
+            room(&mut self.found, bodies);
+        }
+    }
+
+    /// Gathers the candidates of the body at a rank.
+    #[inline(always)]
+    fn put<L: Lanes>(&mut self, lanes: L, links: &Links, exact: &[Down], rank: u32) {
+        let (block, lane) = parts(rank);
+        let mine = small(block);
+        for (other, record) in links.of(mine) {
+            let Bits { cand, hit } = links.bits(record);
+            // Rows are lanes of the lower block; within one block a pair stands in either.
+            let all = |yes: bool| u16::from(yes).wrapping_neg();
+            let (rows, columns) = (all(mine <= other), all(other <= mine));
+            let of =
+                |matrix: &Matrix| (matrix[lane] & rows) | (lanes.column(matrix, lane) & columns);
+            let (cand, hit) = (of(cand), of(hit));
+            self.near[self.len] = Near {
+                record,
+                rank,
+                first: other * LANES,
+                cand,
+                hit,
+            };
+            self.len += usize::from(cand != 0);
+            if self.len == TOGETHER {
+                self.compare(lanes, exact);
+            }
+        }
+    }
+
+    /// Compares what is gathered, and forgets it.
+    #[inline(always)]
+    fn compare<L: Lanes>(&mut self, lanes: L, exact: &[Down]) {
+        let near = &self.near[..=self.len];
+        let candidates: u32 = near[..self.len].iter().map(|n| n.cand.count_ones()).sum();
+        self.tests += u64::from(candidates);
+        let (mut at, mut some) = (0, near[0]);
+        self.pairs.clear();
+        self.pairs.extend((0..candidates).map(|_| {
+            let lane = some.cand.trailing_zeros();
+            let ranks = [some.rank, some.first + lane];
+            prefetch(&exact[ranks[1] as usize]);
+            let pair = Pair {
+                record: some.record,
+                ranks,
+                hit: some.hit >> lane & 1 == 1,
+            };
+            some.cand &= some.cand.wrapping_sub(1);
+            at += usize::from(some.cand == 0);
+            let next = near[at];
+            some = if some.cand == 0 { next } else { some };
+            pair
+        }));
+        self.len = 0;
+        for pair in &self.pairs {
+            let [a, b] = pair.ranks.map(|rank| &exact[rank as usize]);
+            let (apart, sure) = lanes.parts(a, b);
+            let as_before = (pair.hit & sure) | (!pair.hit & apart);
+            if !as_before {
+                self.found.push(Found {
+                    record: pair.record,
+                    ranks: pair.ranks,
+                    now: if apart | sure { Some(sure) } else { None },
+                });
+            }
+        }
+    }
+}
+
+impl Order {
+    /// Looks at the candidates of moved bodies, one by one.
+    pub(super) fn look_at_moved<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
+        self.give_back_list();
+        let mut gather = std::mem::take(&mut self.gather);
+        gather.reserve(0);
+        gather.tests = 0;
+        self.level.run(LookAtMoved {
+            order: self,
+            moved: tick.moved,
+            gather: &mut gather,
+        });
+        done.tests += gather.tests;
+        for found in &gather.found {
+            self.settle_found(*found, tick);
+        }
+        give_back(&mut gather.found, self.len);
+        self.gather = gather;
+    }
+
+    /// Flips the bit of a pair that began or parted, and tells of it.
+    fn settle_found<P: Proxies>(&mut self, found: Found, tick: &mut Tick<'_, P>) {
+        let [one, other] = found
+            .ranks
+            .map(|rank| BodySlot(self.slot_of[rank as usize]));
+        let now = found.now.unwrap_or_else(|| {
+            let [a, b] = [one, other].map(|slot| tick.proxies.aabb(slot));
+            a.overlaps(b)
+        });
+        let [first, second] = found.ranks;
+        let ((_, row), (_, lane)) = (parts(first.min(second)), parts(first.max(second)));
+        let hit = &mut self.links.bits_mut(found.record).hit[row];
+        // Of two bodies that both moved the pair is found twice.
+        if now == (*hit >> lane & 1 == 1) {
+            return;
+        }
+        *hit ^= 1 << lane;
+        self.hits = if now { self.hits + 1 } else { self.hits - 1 };
+        let key = PairKey::new(one, other);
+        if now {
+            tick.began.push(key);
+        } else {
+            tick.parted.push(key);
+        }
+    }
+
+    /// Asks for what the bodies to come are looked at by: they stand far from one another.
+    #[inline(always)]
+    fn ask_ahead(&self, moved: &[BodySlot]) {
+        let rank = |ahead: usize| moved.get(ahead).and_then(|slot| self.rank(*slot));
+        if let Some(rank) = rank(AHEAD_LISTS) {
+            self.links.ask(small(parts(rank).0));
+        }
+        if let Some(rank) = rank(AHEAD_BITS) {
+            for (_, record) in self.links.of(small(parts(rank).0)) {
+                prefetch(self.links.bits(record));
+            }
+        }
+    }
+}
+
+/// See [`Order::look_at_moved`].
+struct LookAtMoved<'a> {
+    order: &'a Order,
+    moved: &'a [BodySlot],
+    gather: &'a mut Gather,
+}
+
+impl Work for LookAtMoved<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let Self {
+            order,
+            moved,
+            gather,
+        } = self;
+        // Out of what is behind a reference, and back: see `sweep`.
+        let mut kept = std::mem::take(gather);
+        for at in 0..moved.len() + order.homeless.len() {
+            let slot = match moved.get(at) {
+                Some(slot) => *slot,
+                None => order.homeless[at - moved.len()],
+            };
+            order.ask_ahead(moved.get(at..).unwrap_or(&[]));
+            if let Some(rank) = order.rank(slot) {
+                kept.put(lanes, &order.links, &order.exact, rank);
+            }
+        }
+        kept.compare(lanes, &order.exact);
+        *gather = kept;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::builtin::Random;
+    use crate::simd::boxes::Level;
+
+    /// Looks at the candidates of some ranks.
+    struct Ask<'a>(&'a Links, &'a [Down], &'a [u32], &'a mut Gather);
+
+    impl Work for Ask<'_> {
+        type Out = ();
+
+        #[inline(always)]
+        fn run<L: Lanes>(self, lanes: L) {
+            for rank in self.2 {
+                self.3.put(lanes, self.0, self.1, *rank);
+            }
+            self.3.compare(lanes, self.1);
+        }
+    }
+
+    #[test]
+    fn what_changed_is_found_in_every_block_on_every_side() {
+        let mut random = Random::new(1);
+        // More blocks than are gathered at a time, half of them before that of the body.
+        let (blocks, mine, lane) = (3 * TOGETHER, TOGETHER + TOGETHER / 2, 5);
+        let rank = small(mine * WIDTH + lane);
+        let mut exact = vec![Down::EMPTY; blocks * WIDTH];
+        exact[rank as usize] = Down::of([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
+        let mut links = Links::default();
+        links.reset(blocks);
+        let (mut wanted, mut candidates) = (Vec::new(), 0);
+        for block in 0..blocks {
+            let mut bits = Bits::default();
+            let cand = [(); 3].map(|()| usize::try_from(random.bits() % 16).unwrap());
+            for other in cand
+                .into_iter()
+                .filter(|other| block != mine || *other != lane)
+            {
+                let theirs = block * WIDTH + other;
+                let [now, before] = [(); 2].map(|()| random.bits().is_multiple_of(2));
+                let x = if now { 0.5 } else { 2.0 };
+                exact[theirs] = Down::of([x, 0.0, 0.0, x + 1.0, 1.0, 1.0]);
+                // The lower rank is the row.
+                let (row, bit) = if small(theirs) < rank {
+                    (other, lane)
+                } else {
+                    (lane, other)
+                };
+                if bits.cand[row] >> bit & 1 == 1 {
+                    bits.hit[row] &= !(1 << bit);
+                    wanted.retain(|(rank, _)| *rank != small(theirs));
+                } else {
+                    candidates += 1;
+                }
+                bits.cand[row] |= 1 << bit;
+                bits.hit[row] |= u16::from(before) << bit;
+                if now != before {
+                    wanted.push((small(theirs), Some(now)));
+                }
+            }
+            links.add(small(mine.min(block)), small(mine.max(block)), bits);
+        }
+        for level in Level::available() {
+            let mut gather = Gather::default();
+            gather.reserve(0);
+            level.run(Ask(&links, &exact, &[rank], &mut gather));
+            let mut found: Vec<(u32, Option<bool>)> = (gather.found.iter())
+                .map(|found| (found.ranks[1], found.now))
+                .collect();
+            found.sort_unstable();
+            wanted.sort_unstable();
+            assert!(gather.found.iter().all(|found| found.ranks[0] == rank));
+            assert_eq!(
+                (found, gather.tests),
+                (wanted.clone(), candidates),
+                "{level:?}"
+            );
+        }
+    }
+}
