@@ -64,6 +64,12 @@ impl Order {
         (turn + HORIZON - self.tick % HORIZON) % HORIZON
     }
 
+    /// Whether it is a quarter's turn. Where there are many, it is its blocks' turn too; of few, whose blocks have
+    /// theirs all the time, each has one of its own.
+    pub(super) fn is_quarter_due(&self, quarter: usize) -> bool {
+        small(quarter) % HORIZON == self.tick % HORIZON
+    }
+
     /// Whether it is a block's turn.
     pub(super) fn is_due(&self, block: usize) -> bool {
         self.until_turn(block) == 0

@@ -73,7 +73,7 @@ impl Order {
     pub(super) fn mend(&mut self) {
         for quarter in 0..self.quarters.len() {
             let first = quarter * WIDTH;
-            if !self.is_due(first) {
+            if !self.is_quarter_due(quarter) {
                 continue;
             }
             self.follow(quarter);
