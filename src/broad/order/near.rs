@@ -2,8 +2,9 @@
 //!
 //! In: boxes by rank, lanes whose entries die. Out: pairs that began and pairs that parted.
 
+use super::idle::give_back;
 use super::verlet::Verlet;
-use super::{BodySlot, NONE, Order, Proxies, Tick};
+use super::{BodySlot, NONE, Order, Proxies, Tick, ones};
 use crate::ids::{PairKey, small};
 use crate::simd::boxes::{Down, Lanes, WIDTH, Work, prefetch};
 
@@ -70,6 +71,12 @@ pub(super) struct Found {
     now: Option<bool>,
 }
 
+/// The ranks of some lanes, by block.
+fn ranks(lanes: &[u16]) -> impl Iterator<Item = usize> {
+    let blocks = lanes.iter().enumerate();
+    blocks.flat_map(|(block, lanes)| ones(*lanes).map(move |lane| block * WIDTH + lane))
+}
+
 /// Whether the lane of a rank is among some.
 #[inline(always)]
 pub(super) fn is_among(lanes: &[u16], rank: usize) -> bool {
@@ -91,21 +98,30 @@ impl Order {
             found,
             out,
             fresh,
+            aside,
             ..
         } = &mut self.afresh.verlet;
         found.clear();
-        let (exact, slot_of) = (&self.exact[..], &self.slot_of[..]);
+        let (exact, slot_of) = (&mut self.exact[..], &self.slot_of[..]);
         let (told, proxies) = (tick.parted.len(), tick.proxies);
+        // Entries that die are found by their boxes, which are nobody's for this look: no other is asked about it.
+        let dying = old.then_some(&out[..]);
+        for rank in ranks(dying.unwrap_or_default()) {
+            aside.push(std::mem::replace(&mut exact[rank], Down::EMPTY));
+        }
         let lost = self.level.run(Look {
             exact,
-            out,
+            out: dying,
             slot_of,
             entries,
             from,
-            old,
             found,
             parted: tick.parted,
         });
+        for (rank, own) in ranks(dying.unwrap_or_default()).zip(&*aside) {
+            exact[rank] = *own;
+        }
+        give_back(aside, self.len);
         self.hits -= lost;
         // What is still there is found again, and told as begun, which of a pair that is stored means nothing.
         let mut kept = told;
@@ -212,11 +228,11 @@ fn ask_ahead(exact: &[Down], entries: &[Near], at: usize) {
 /// have parted.
 struct Look<'a> {
     exact: &'a [Down],
-    out: &'a [u16],
+    /// By block: lanes whose entries die, if any may; they have no boxes.
+    out: Option<&'a [u16]>,
     slot_of: &'a [u32],
     entries: &'a mut Vec<Near>,
     from: usize,
-    old: bool,
     found: &'a mut Vec<Found>,
     parted: &'a mut Vec<PairKey>,
 }
@@ -227,32 +243,35 @@ impl Work for Look<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) -> usize {
         let (mut kept, mut lost) = (self.from, 0);
-        for at in self.from..self.entries.len() {
-            ask_ahead(self.exact, self.entries, at);
-            let entry = self.entries[at];
+        let (exact, entries) = (self.exact, &mut self.entries[..]);
+        for at in self.from..entries.len() {
+            ask_ahead(exact, entries, at);
+            let entry = entries[at];
             let [a, b] = entry.ranks();
-            let alive = !(self.old & entry.any_among(self.out));
-            self.entries[kept] = entry;
-            let (apart, sure) = lanes.parts(&self.exact[a], &self.exact[b]);
+            entries[kept] = entry;
+            let (apart, sure) = lanes.parts(&exact[a], &exact[b]);
             // Without a branch on the state: it is as good as random.
             let hit = entry.is_hit();
             let as_before = (hit & sure) | (!hit & apart);
-            if !as_before | !alive {
-                if alive {
-                    let now = if apart | sure { Some(sure) } else { None };
-                    self.found.push(Found {
-                        at: small(kept),
-                        now,
-                    });
-                } else if hit {
-                    lost += 1;
-                    let slots = [a, b].map(|rank| BodySlot(self.slot_of[rank]));
-                    if slots.iter().all(|slot| slot.0 != NONE) {
-                        self.parted.push(PairKey::new(slots[0], slots[1]));
-                    }
+            kept += 1;
+            if as_before {
+                continue;
+            }
+            let open = !(apart | sure);
+            if !(open && self.out.is_some_and(|out| entry.any_among(out))) {
+                let now = if open { None } else { Some(sure) };
+                let at = small(kept - 1);
+                self.found.push(Found { at, now });
+                continue;
+            }
+            kept -= 1;
+            if hit {
+                lost += 1;
+                let slots = [a, b].map(|rank| BodySlot(self.slot_of[rank]));
+                if slots.iter().all(|slot| slot.0 != NONE) {
+                    self.parted.push(PairKey::new(slots[0], slots[1]));
                 }
             }
-            kept += usize::from(alive);
         }
         self.entries.truncate(kept);
         lost

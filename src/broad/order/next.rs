@@ -80,6 +80,7 @@ impl Order {
         } else {
             spare(&mut verlet.entries, entries, self.len);
             spare(&mut finds.near, entries, self.len);
+            room(&mut verlet.aside, self.len);
         }
         room(&mut verlet.found, self.len);
         room(&mut verlet.strays, self.len);

@@ -37,6 +37,8 @@ pub(super) struct Verlet {
     pub(super) on: bool,
     pub(super) entries: Vec<Near>,
     pub(super) found: Vec<Found>,
+    /// The boxes of those whose entries die, during a look.
+    pub(super) aside: Vec<Down>,
     /// By block: lanes whose entries die in this tick; and lanes whose entries are new in it.
     pub(super) out: Vec<u16>,
     pub(super) fresh: Vec<u16>,
@@ -61,6 +63,7 @@ impl Verlet {
         self.on = false;
         shed(&mut self.entries);
         shed(&mut self.found);
+        shed(&mut self.aside);
         shed(&mut self.strays);
         shed(&mut self.swept);
     }
