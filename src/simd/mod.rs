@@ -1,12 +1,13 @@
 //! Kernels that work on many numbers at once, each beside a scalar twin of equal bits.
 //!
 //! The one room where `unsafe` is lifted, each block with what it relies on: calls of code that is compiled for more
-//! than the least of its processor family, and inside it loads and stores of whole registers (`boxes/x86.rs`,
-//! `aligned.rs`). No kernel multiplies and adds in one rounding, so the same bits come out on every machine.
+//! than the least of its processor family, inside it loads and stores of whole registers, and instructions by name
+//! (`boxes/x86.rs`, `aligned.rs`, `words.rs`). No kernel multiplies and adds in one rounding, so the same bits come out on every machine.
 
 pub mod aligned;
 pub mod boxes;
 pub mod obb;
+pub(crate) mod words;
 
 /// Asks the processor which instructions it has, as the first kernel would: in a virtual machine the first question
 /// takes 0.1 ms, which is better not spent in a tick.
