@@ -2,7 +2,8 @@
 //!
 //! The one room where `unsafe` is lifted, each block with what it relies on: calls of code that is compiled for more
 //! than the least of its processor family, inside it loads and stores of whole registers, and instructions by name
-//! (`boxes/x86.rs`, `aligned.rs`, `words.rs`). No kernel multiplies and adds in one rounding, so the same bits come out on every machine.
+//! (`boxes/x86.rs`, `aligned.rs`, `words.rs`). No kernel multiplies and adds in one rounding, so the same bits come out
+//! on every machine.
 
 pub mod aligned;
 pub mod boxes;
