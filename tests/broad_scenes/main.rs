@@ -342,6 +342,28 @@ fn a_crowd_that_drifts_away_is_listed_and_measured_from_elsewhere_in_time() {
 }
 
 #[test]
+fn bodies_that_wander_are_listed_and_so_are_those_that_go_on_again() {
+    const BODIES: usize = 700;
+    let mut ways = [Kind::Redraw, Kind::Gas].map(|kind| Scene::new(kind, BODIES, 16));
+    let mut rig = Rig::geared("from scratch", &[true], BODIES, false);
+    rig.start(&ways[0].boxes);
+    let mut listed = [0; 2];
+    for frame in 0..1600 {
+        // From one way of going to the other and back; all are elsewhere then.
+        let way = frame / 400 % 2;
+        let scene = &mut ways[way];
+        scene.step();
+        rig.put(&scene.boxes, &scene.moved, &[]);
+        rig.tick(&exact::pairs(&scene.boxes), &format!("frame {frame}"));
+        if frame % 10 == 0 {
+            rig.validate();
+        }
+        listed[way] += usize::from(rig.work().way.is_some_and(|way| way.0 == BroadMode::List));
+    }
+    assert!(listed.iter().all(|ticks| *ticks > 400), "{listed:?}");
+}
+
+#[test]
 fn bodies_that_swerve_jump_come_and_leave_while_the_next_list_is_made_are_exact() {
     const BODIES: usize = 700;
     let mut scene = Scene::new(Kind::Gas, BODIES, 14);

@@ -152,8 +152,8 @@ impl Order {
         }
         let Afresh { verlet, finds, .. } = &mut self.afresh;
         let begins = was && !listed && verlet.pace.begins(self.hits, finds.tests);
-        if begins {
-            self.note_places();
+        if was {
+            self.prepare_list(begins);
         }
         let lanes = if was && !listed {
             self.keep_lanes(tick)
@@ -193,6 +193,7 @@ impl Order {
         std::mem::swap(&mut self.afresh.held, &mut self.afresh.finds.met);
         self.tell_asked_afresh(tick.members, tick.began);
         if begins && stays {
+            self.ask_course(self.afresh.laid > 1);
             let crowding = self.crowding(self.afresh.verlet.pace.first_ticks());
             if (self.afresh.verlet.pace).promises(self.hits, crowding, tests) {
                 self.begin_list(tick, work);

@@ -35,6 +35,7 @@ use crate::wire::{BroadCause, BroadMode};
 
 mod afresh;
 mod bits;
+mod course;
 mod entry;
 mod fatten;
 mod gear;

@@ -83,7 +83,7 @@ impl Default for Pace {
             excess: 0,
             last: 0,
             vain: 0,
-            rest: 0,
+            rest: 2,
             spell: REST_MIN,
         }
     }
@@ -97,6 +97,11 @@ impl Pace {
     pub(super) fn begins(&mut self, hits: usize, plain: u64) -> bool {
         self.rest = self.rest.saturating_sub(1);
         self.rest == 0 && hits as u64 * LOOK < plain * MEET
+    }
+
+    /// Whether one may be in the next tick.
+    pub(super) fn nears(&self) -> bool {
+        self.rest == 1
     }
 
     /// Ticks that the first list is made for.
@@ -337,11 +342,7 @@ mod tests {
             pace.begin(1000);
             let (_, on) = run(&mut pace, 8000, 300, 40);
             assert!(!on);
-            let mut rest = 1;
-            while !pace.begins(0, 1000) {
-                rest += 1;
-            }
-            rests.push(rest);
+            rests.push(1 + (0..).take_while(|_| !pace.begins(0, 1000)).count());
         }
         assert_eq!(rests, [64, 256, 1024, 2048]);
         // One that pays again starts from the beginning.
@@ -354,6 +355,7 @@ mod tests {
     #[test]
     fn a_crowd_of_overlaps_is_not_listed() {
         let mut pace = Pace::default();
+        assert!(!pace.begins(2000, 1000) && pace.nears());
         assert!(!pace.begins(10_000, 1000) && pace.begins(2000, 1000));
         // What turns out to be one is let go in the next tick.
         pace.begin(1000);

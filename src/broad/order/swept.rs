@@ -2,27 +2,21 @@
 //!
 //! In: the boxes of this tick and the last. Out: swept boxes, by rank and in the blocks; and who has left his.
 
+use super::course::{Reach, SAMPLE};
 use super::fatten::outward;
 use super::load::ask_ahead;
 use super::pace::Phase;
+use super::verlet::Verlet;
 use super::{BodySlot, NONE, Order, Proxies, ones};
 use crate::ids::small;
-use crate::simd::boxes::{Down, Lanes, WIDTH, Work, prefetch};
+use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work, prefetch};
 
-/// What a swept box is padded by, in mean sides: what stands still but for its sender's rounding stays in, ...
-const PAD: f32 = 0.01;
-/// ... and in ticks of the body's motion.
-const SWERVE: f32 = 0.25;
-/// Most that a face is swept, in mean sides.
-const SWEEP_MAX: f32 = 2.0;
 /// Bodies ahead whose boxes are asked for.
 const AHEAD: usize = 16;
-/// Of so many blocks one is looked at for how far bodies go.
-const SAMPLE: usize = 8;
 
 impl Order {
     /// Notes where the bodies are, so that the boxes of this tick tell how they move.
-    pub(super) fn note_places(&mut self) {
+    fn note_places(&mut self) {
         for (block, live) in self.live.iter().enumerate() {
             for lane in ones(*live) {
                 self.exact[block * WIDTH + lane] = Down::of(self.fat[block].get(lane));
@@ -30,17 +24,49 @@ impl Order {
         }
     }
 
+    /// Notes where all are where a list is to be begun in this tick, and where some are if it may be in the next.
+    pub(super) fn prepare_list(&mut self, begins: bool) {
+        if begins {
+            self.note_places();
+        } else if self.afresh.verlet.pace.nears() {
+            self.watch_places();
+        }
+    }
+
+    /// Notes where some are, two ticks before a list is begun.
+    fn watch_places(&mut self) {
+        let course = &mut self.afresh.verlet.course;
+        course.open();
+        for block in (0..self.live.len()).step_by(SAMPLE) {
+            course.watch(&boxes_of(&self.fat[block], self.live[block]));
+        }
+    }
+
+    /// Finds whether they go on as they came, once the places noted are those of the last tick and the blocks hold this
+    /// one's.
+    ///
+    /// * `kept` - whether they have their lanes still.
+    pub(super) fn ask_course(&mut self, kept: bool) {
+        let course = &mut self.afresh.verlet.course;
+        for block in (0..self.live.len()).step_by(SAMPLE).filter(|_| kept) {
+            let then = &self.exact.as_chunks().0[block];
+            let now = boxes_of(&self.fat[block], self.live[block]);
+            course.note(block, self.live[block], then, &now);
+        }
+        course.close();
+    }
+
     /// How many times more pairs will be near than overlap, if boxes are swept for some ticks: by how much the boxes
     /// grow, in the mean over some blocks. To be asked once the places noted are those of the last tick and the blocks
     /// hold this one's.
     pub(super) fn crowding(&self, ticks: u32) -> f64 {
         let (mut sum, mut count) = (0.0, 0_u32);
+        let reach = self.afresh.verlet.course.reach(ticks);
         for block in (0..self.live.len()).step_by(SAMPLE) {
             for lane in ones(self.live[block]) {
                 let now = Down::of(self.fat[block].get(lane));
                 let before = &self.exact[block * WIDTH + lane];
-                #[allow(clippy::cast_precision_loss, reason = "a few ticks")]
-                let swept = sweep(before, &now, ticks as f32);
+                let swept = reach.sweep(before, &now);
                 let grown = f64::from(volume(&swept)) / f64::from(volume(&now));
                 if grown.is_finite() {
                     sum += grown;
@@ -56,15 +82,26 @@ impl Order {
     ///
     /// * `span` - ticks to sweep for.
     pub(super) fn take_swept<P: Proxies>(&mut self, proxies: &P, phase: Phase, span: u32) -> usize {
-        self.afresh.verlet.strays.clear();
+        let verlet = &mut self.afresh.verlet;
+        verlet.strays.clear();
+        let reach = verlet.course.reach(span);
+        let opens = phase == Phase::Opens;
+        let asks = !opens && verlet.course.asks();
+        if opens {
+            verlet.course.open();
+        }
         let level = self.level;
-        #[allow(clippy::cast_precision_loss, reason = "a few ticks")]
-        level.run(TakeSwept {
+        let jumps = level.run(TakeSwept {
             order: self,
             proxies,
             phase,
-            ticks: span as f32,
-        })
+            reach,
+            asks,
+        });
+        if asks {
+            self.afresh.verlet.course.close();
+        }
+        jumps
     }
 
     /// Takes every box where it was laid; its swept box stands there.
@@ -75,22 +112,6 @@ impl Order {
             proxies,
         });
     }
-}
-
-/// The box of a body for some ticks, if it goes on as it came.
-#[inline(always)]
-pub(super) fn sweep(before: &Down, now: &Down, ticks: f32) -> Down {
-    let side = now.mean_side();
-    let side = if side.is_finite() { side } else { 0.0 };
-    let (least, most) = (side * PAD, side * SWEEP_MAX);
-    let mut swept = *now;
-    for (face, was) in swept.faces.iter_mut().zip(&before.faces) {
-        let step = *face - *was;
-        let out = if step < 0.0 { -step } else { 0.0 };
-        let by = out * (ticks + SWERVE) + least;
-        *face -= if by < most { by } else { most };
-    }
-    swept
 }
 
 /// What a box holds, cubic metres.
@@ -104,7 +125,8 @@ struct TakeSwept<'a, P> {
     order: &'a mut Order,
     proxies: &'a P,
     phase: Phase,
-    ticks: f32,
+    reach: Reach,
+    asks: bool,
 }
 
 impl<P: Proxies> Work for TakeSwept<'_, P> {
@@ -116,7 +138,8 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
             order,
             proxies,
             phase,
-            ticks,
+            reach,
+            asks,
         } = self;
         let (origin, mut jumps) = (order.origin, 0);
         let opens = phase == Phase::Opens;
@@ -126,32 +149,33 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
             let live = order.live[block];
             let slots = &order.slot_of[block * WIDTH..];
             let exact = &mut order.exact.as_chunks_mut().0[block];
-            let swept = &mut order.afresh.verlet.swept.as_chunks_mut().0[block];
+            let Verlet {
+                swept,
+                course,
+                strays,
+                ..
+            } = &mut order.afresh.verlet;
+            let swept = &mut swept.as_chunks_mut().0[block];
             let fat = &mut order.fat[block];
             let boxes = (proxies, origin);
+            let watched = block.is_multiple_of(SAMPLE);
             let out = take(
                 lanes,
                 boxes,
                 (slots, live),
                 (exact, &mut before),
-                (swept, opens),
+                (swept, opens || asks && watched),
             );
+            if watched && opens {
+                course.watch(&before);
+            } else if watched && asks {
+                course.note(block, live, &before, exact);
+            }
             if phase == Phase::Ends {
-                for lane in ones(live) {
-                    swept[lane] = Down::of(fat.get(lane)).open();
-                }
+                *swept = boxes_of(fat, live).map(Down::open);
             }
             if opens {
-                for lane in ones(live) {
-                    let wide = sweep(&before[lane], &exact[lane], ticks).open();
-                    fat.set(lane, &wide.corners());
-                    // Whoever leaves either has left.
-                    swept[lane] = if out >> lane & 1 == 1 {
-                        wide
-                    } else {
-                        within(&swept[lane], &wide)
-                    };
-                }
+                open(reach, (live, out), (&before, exact), (fat, swept));
             }
             let (mut late, mut jumped) = (0, 0);
             for lane in ones(out) {
@@ -162,13 +186,13 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
                     swept[lane] = if keeps {
                         next
                     } else {
-                        sweep(&before[lane], &exact[lane], ticks).open()
+                        reach.sweep(&before[lane], &exact[lane]).open()
                     };
                     late |= u16::from(!keeps) << lane;
                 }
                 if meets(&exact[lane], order.tree.bound(block)) {
                     let rank = small(block * WIDTH + lane);
-                    order.afresh.verlet.strays.push(rank);
+                    strays.push(rank);
                 } else {
                     // He gets another lane, and is new there.
                     jumped |= 1 << lane;
@@ -189,6 +213,35 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
         order.tree.refit(lanes);
         jumps
     }
+}
+
+/// Sweeps the boxes of some lanes anew, into their block; who has left the old one is held to the new alone.
+#[inline(always)]
+fn open(
+    reach: Reach,
+    (lanes, out): (u16, u16),
+    (before, now): (&[Down; WIDTH], &[Down; WIDTH]),
+    (fat, swept): (&mut Boxes16, &mut [Down; WIDTH]),
+) {
+    for lane in ones(lanes) {
+        let wide = reach.sweep(&before[lane], &now[lane]).open();
+        fat.set(lane, &wide.corners());
+        // Whoever leaves either has left.
+        swept[lane] = if out >> lane & 1 == 1 {
+            wide
+        } else {
+            within(&swept[lane], &wide)
+        };
+    }
+}
+
+/// The boxes of some lanes of a block, as single ones; of the others none.
+fn boxes_of(block: &Boxes16, lanes: u16) -> [Down; WIDTH] {
+    let mut boxes = [Down::EMPTY; WIDTH];
+    for lane in ones(lanes) {
+        boxes[lane] = Down::of(block.get(lane));
+    }
+    boxes
 }
 
 /// Takes the boxes of a block; returns the lanes whose box has left its swept one.

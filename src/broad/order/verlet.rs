@@ -17,6 +17,7 @@
 //! Source: Verlet 1967; swept boxes in place of his spheres, so that a list lasts as long for what flies fast.
 
 use super::afresh::Afresh;
+use super::course::{Course, Reach};
 use super::fatten::outward;
 use super::idle::shed;
 use super::lay::Bound;
@@ -24,7 +25,6 @@ use super::near::{Found, Near, is_among};
 use super::pace::{Pace, Phase};
 use super::presort::SPLIT_TICKS_MAX;
 use super::shares::Shares;
-use super::swept::sweep;
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, Work as Done, parts};
 use crate::ids::{PairKey, small};
 use crate::simd::boxes::{Down, LANES, Lanes, Portable, WIDTH, Work};
@@ -55,6 +55,7 @@ pub(super) struct Verlet {
     /// Memory kept over calls.
     pub(super) blocks: Vec<u32>,
     pub(super) pace: Pace,
+    pub(super) course: Course,
 }
 
 impl Verlet {
@@ -205,7 +206,7 @@ impl Order {
             };
             let (block, lane) = parts(rank);
             let now = self.exact[rank as usize];
-            let swept = sweep(&now, &now, 0.0).open();
+            let swept = Reach::NEW.sweep(&now, &now).open();
             self.fat[block].set(lane, &swept.corners());
             let verlet = &mut self.afresh.verlet;
             verlet.swept[rank as usize] = swept;
