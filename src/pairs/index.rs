@@ -124,8 +124,10 @@ impl Index {
     /// Asks for where a key is looked for first to be brought near.
     #[inline]
     pub(crate) fn prefetch(&self, hash: u64) {
-        if let Some(bucket) = self.buckets.get(self.home(mix(hash))) {
+        let home = self.home(mix(hash));
+        if let (Some(bucket), Some(away)) = (self.buckets.get(home), self.away.get(home)) {
             prefetch(bucket);
+            prefetch(away);
         }
     }
 
@@ -332,8 +334,16 @@ mod tests {
                 }
             }
             assert!(was_away, "{hashes} hashes");
+            if let Some((key, place)) = places.first_key_value() {
+                let is_it = |at: u32| at == *place;
+                assert_eq!(index.vacancy(key % hashes, is_it), None, "it is there");
+            }
             index.clear();
             index.validate(0).unwrap();
+            index.insert(7, 3, 1);
+            assert_eq!(index.find(7, |place| place == 3), Some(3));
+            assert_eq!((index.guess(7), Index::default().guess(7)), (Some(3), None));
+            Index::default().prefetch(7);
         }
     }
 }

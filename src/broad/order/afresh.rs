@@ -152,7 +152,7 @@ impl Order {
         }
         let Afresh { verlet, finds, .. } = &mut self.afresh;
         let begins = was && !listed && verlet.pace.begins(self.hits, finds.tests);
-        if was {
+        if was && !listed {
             self.prepare_list(begins);
         }
         let lanes = if was && !listed {

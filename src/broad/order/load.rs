@@ -64,8 +64,8 @@ impl Order {
         (turn + HORIZON - self.tick % HORIZON) % HORIZON
     }
 
-    /// Whether it is a quarter's turn. Where there are many, it is its blocks' turn too; of few, whose blocks have
-    /// theirs all the time, each has one of its own.
+    /// Whether it is a quarter's turn. Where a stretch is a quarter it is its blocks' turn too; of fewer blocks each
+    /// quarter has a turn of its own, and no tick all of them.
     pub(super) fn is_quarter_due(&self, quarter: usize) -> bool {
         small(quarter) % HORIZON == self.tick % HORIZON
     }

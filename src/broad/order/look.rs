@@ -2,8 +2,8 @@
 //!
 //! When many bodies move, the candidates are gone through as a flat list, in memory order, without a branch that one
 //! could guess wrong; the list is mended as bodies are renewed, by new entries at its end and by ages that tell the old
-//! ones dead. Pairs that are sure for as long as both bodies keep to their holds are not listed. When few move, their
-//! bits in the matrices are looked up, and the list is let go.
+//! ones dead. Pairs that are sure for as long as both bodies keep to their holds are not listed. When few move the list
+//! is let go (`moved`).
 
 use super::entry::{Entry, ages};
 use super::links::Matrix;
@@ -43,32 +43,18 @@ impl Order {
         });
         for one in &found {
             let ranks = self.entries[one.at as usize].ranks();
-            let slots = ranks.map(|rank| BodySlot(self.slot_of[rank as usize]));
-            let now = one.now.unwrap_or_else(|| {
-                let [a, b] = slots.map(|slot| tick.proxies.aabb(slot));
-                a.overlaps(b)
-            });
+            let now = one.now.unwrap_or_else(|| self.overlap(ranks, tick));
             let entry = &mut self.entries[one.at as usize];
             if now == entry.is_hit() {
                 continue;
             }
             entry.set_hit(now);
-            let ((a, row), (b, lane)) = (parts(ranks[0]), parts(ranks[1]));
-            let record = self.links.find(small(a), small(b));
+            let [a, b] = ranks.map(|rank| small(parts(rank).0));
+            let record = self.links.find(a, b);
             debug_assert!(record.is_some(), "what is listed has a record");
-            let Some(record) = record else { continue };
-            let hit = &mut self.links.bits_mut(record).hit[row];
             // The matrix holds the truth: a pair that changed its lanes was restored there.
-            if now == (*hit >> lane & 1 == 1) {
-                continue;
-            }
-            *hit ^= 1 << lane;
-            self.hits = if now { self.hits + 1 } else { self.hits - 1 };
-            let key = PairKey::new(slots[0], slots[1]);
-            if now {
-                tick.began.push(key);
-            } else {
-                tick.parted.push(key);
+            if let Some(record) = record {
+                self.put_hit(record, ranks, now, tick);
             }
         }
         self.found = found;
@@ -77,6 +63,39 @@ impl Order {
         if is_thrifty(self.len) && self.entries.capacity() > 2 * len {
             self.entries.shrink_to(len);
         }
+    }
+
+    /// Whether the f64 boxes of the bodies at two ranks overlap.
+    pub(super) fn overlap<P: Proxies>(&self, ranks: [u32; 2], tick: &Tick<'_, P>) -> bool {
+        let slots = ranks.map(|rank| BodySlot(self.slot_of[rank as usize]));
+        let [a, b] = slots.map(|slot| tick.proxies.aabb(slot));
+        a.overlaps(b)
+    }
+
+    /// Sets whether a candidate overlaps, and tells of it where it did not as now.
+    ///
+    /// * `ranks` - the lower first.
+    pub(super) fn put_hit<P>(
+        &mut self,
+        record: u32,
+        ranks: [u32; 2],
+        now: bool,
+        tick: &mut Tick<'_, P>,
+    ) {
+        let [row, lane] = ranks.map(|rank| parts(rank).1);
+        let hit = &mut self.links.bits_mut(record).hit[row];
+        if now == (*hit >> lane & 1 == 1) {
+            return;
+        }
+        *hit ^= 1 << lane;
+        self.hits = if now { self.hits + 1 } else { self.hits - 1 };
+        let [one, other] = ranks.map(|rank| BodySlot(self.slot_of[rank as usize]));
+        let told = if now {
+            &mut *tick.began
+        } else {
+            &mut *tick.parted
+        };
+        told.push(PairKey::new(one, other));
     }
 
     /// Lists some candidates of a record; those that are sure now overlap, and are told if they did not.

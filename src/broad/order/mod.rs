@@ -10,7 +10,7 @@
 //!   only where a body left its fat box (`renew`), a few blocks in each tick rather than all at once.
 //! * **The look** (`look`): candidates are compared one after the other, and begin and end are differences of bits.
 //!   Pairs whose cores overlap are sure and not compared. Cost in proportion to what moved: few moved bodies are looked
-//!   at one by one.
+//!   at by themselves (`moved`).
 //! * **Mending** (`mend`): while bodies move, a few blocks in each tick are put in order: all are seldom sorted anew.
 //! * **Exact.** Boxes are f32, rounded outward, relative to an f64 origin amid the scene; where rounding could tell
 //!   otherwise than the f64 boxes, those are asked. So the pairs are those of the f64 boxes at any offset.
@@ -74,7 +74,7 @@ use tree::Tree;
 
 /// No index.
 const NONE: u32 = u32::MAX;
-/// One moved body in so many, and they are looked at by blocks: 8 ns a body there, 80 one by one.
+/// One moved body in so many, and they are looked at by blocks, which takes a fraction of the time for each.
 const MANY_MOVED: usize = 10;
 /// ... and so few, that the list of candidates is let go.
 const STILL_MANY: usize = 14;

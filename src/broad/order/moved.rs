@@ -10,7 +10,6 @@
 use super::idle::{give_back, is_thrifty};
 use super::links::{Bits, Links, Matrix, room};
 use super::{BodySlot, Order, Proxies, Tick, Work as Done, parts, small};
-use crate::ids::PairKey;
 use crate::simd::boxes::{Down, LANES, Lanes, WIDTH, Work, prefetch};
 
 /// Moved bodies ahead whose blocks' lists are asked for, and whose matrices.
@@ -21,7 +20,7 @@ const TOGETHER: usize = 64;
 
 /// Candidates of a body in a block.
 #[derive(Clone, Copy, Debug, Default)]
-struct Near {
+struct Row {
     record: u32,
     /// Of the body, and of the first lane of the block.
     rank: u32,
@@ -52,7 +51,7 @@ struct Found {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Gather {
     /// One more than are gathered: what follows the last is written, and read, and never kept.
-    near: Vec<Near>,
+    rows: Vec<Row>,
     len: usize,
     pairs: Vec<Pair>,
     found: Vec<Found>,
@@ -62,7 +61,7 @@ pub(super) struct Gather {
 impl Gather {
     /// Room for a tick of so many bodies.
     pub(super) fn reserve(&mut self, bodies: usize) {
-        self.near.resize(TOGETHER + 1, Near::default());
+        self.rows.resize(TOGETHER + 1, Row::default());
         room(&mut self.pairs, TOGETHER * WIDTH);
         if !is_thrifty(bodies) {
             room(&mut self.found, bodies);
@@ -82,7 +81,7 @@ impl Gather {
             let of =
                 |matrix: &Matrix| (matrix[lane] & rows) | (lanes.column(matrix, lane) & columns);
             let (cand, hit) = (of(cand), of(hit));
-            self.near[self.len] = Near {
+            self.rows[self.len] = Row {
                 record,
                 rank,
                 first: other * LANES,
@@ -99,10 +98,13 @@ impl Gather {
     /// Compares what is gathered, and forgets it.
     #[inline(always)]
     fn compare<L: Lanes>(&mut self, lanes: L, exact: &[Down]) {
-        let near = &self.near[..=self.len];
-        let candidates: u32 = near[..self.len].iter().map(|n| n.cand.count_ones()).sum();
+        let rows = &self.rows[..=self.len];
+        let candidates: u32 = rows[..self.len]
+            .iter()
+            .map(|row| row.cand.count_ones())
+            .sum();
         self.tests += u64::from(candidates);
-        let (mut at, mut some) = (0, near[0]);
+        let (mut at, mut some) = (0, rows[0]);
         self.pairs.clear();
         self.pairs.extend((0..candidates).map(|_| {
             let lane = some.cand.trailing_zeros();
@@ -115,7 +117,7 @@ impl Gather {
             };
             some.cand &= some.cand.wrapping_sub(1);
             at += usize::from(some.cand == 0);
-            let next = near[at];
+            let next = rows[at];
             some = if some.cand == 0 { next } else { some };
             pair
         }));
@@ -149,36 +151,13 @@ impl Order {
         });
         done.tests += gather.tests;
         for found in &gather.found {
-            self.settle_found(*found, tick);
+            let [one, other] = found.ranks;
+            let now = found.now.unwrap_or_else(|| self.overlap(found.ranks, tick));
+            // Of two bodies that both moved the pair is found twice.
+            self.put_hit(found.record, [one.min(other), one.max(other)], now, tick);
         }
         give_back(&mut gather.found, self.len);
         self.gather = gather;
-    }
-
-    /// Flips the bit of a pair that began or parted, and tells of it.
-    fn settle_found<P: Proxies>(&mut self, found: Found, tick: &mut Tick<'_, P>) {
-        let [one, other] = found
-            .ranks
-            .map(|rank| BodySlot(self.slot_of[rank as usize]));
-        let now = found.now.unwrap_or_else(|| {
-            let [a, b] = [one, other].map(|slot| tick.proxies.aabb(slot));
-            a.overlaps(b)
-        });
-        let [first, second] = found.ranks;
-        let ((_, row), (_, lane)) = (parts(first.min(second)), parts(first.max(second)));
-        let hit = &mut self.links.bits_mut(found.record).hit[row];
-        // Of two bodies that both moved the pair is found twice.
-        if now == (*hit >> lane & 1 == 1) {
-            return;
-        }
-        *hit ^= 1 << lane;
-        self.hits = if now { self.hits + 1 } else { self.hits - 1 };
-        let key = PairKey::new(one, other);
-        if now {
-            tick.began.push(key);
-        } else {
-            tick.parted.push(key);
-        }
     }
 
     /// Asks for what the bodies to come are looked at by: they stand far from one another.
@@ -264,6 +243,17 @@ mod tests {
         let (mut wanted, mut candidates) = (Vec::new(), 0);
         for block in 0..blocks {
             let mut bits = Bits::default();
+            // Candidates of others, whatever they are, in rows and lanes that are not the body's; and in each fourth
+            // block none of its own.
+            for row in (0..WIDTH).filter(|row| *row != lane) {
+                #[allow(clippy::cast_possible_truncation, reason = "any bits will do")]
+                let others = random.bits() as u16 & !(1 << lane);
+                (bits.cand[row], bits.hit[row]) = (others, others & others << 1);
+            }
+            if block % 4 == 3 {
+                links.add(small(mine.min(block)), small(mine.max(block)), bits);
+                continue;
+            }
             let cand = [(); 3].map(|()| usize::try_from(random.bits() % 16).unwrap());
             for other in cand
                 .into_iter()
@@ -271,7 +261,13 @@ mod tests {
             {
                 let theirs = block * WIDTH + other;
                 let [now, before] = [(); 2].map(|()| random.bits().is_multiple_of(2));
-                let x = if now { 0.5 } else { 2.0 };
+                // Some touch within what rounding leaves open.
+                let open = random.bits().is_multiple_of(8);
+                let x = match (open, now) {
+                    (true, _) => 1.0,
+                    (_, true) => 0.5,
+                    _ => 2.0,
+                };
                 exact[theirs] = Down::of([x, 0.0, 0.0, x + 1.0, 1.0, 1.0]);
                 // The lower rank is the row.
                 let (row, bit) = if small(theirs) < rank {
@@ -287,8 +283,8 @@ mod tests {
                 }
                 bits.cand[row] |= 1 << bit;
                 bits.hit[row] |= u16::from(before) << bit;
-                if now != before {
-                    wanted.push((small(theirs), Some(now)));
+                if open || now != before {
+                    wanted.push((small(theirs), (!open).then_some(now)));
                 }
             }
             links.add(small(mine.min(block)), small(mine.max(block)), bits);

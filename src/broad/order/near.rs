@@ -106,6 +106,7 @@ impl Order {
         let (told, proxies) = (tick.parted.len(), tick.proxies);
         // Entries that die are found by their boxes, which are nobody's for this look: no other is asked about it.
         let dying = old.then_some(&out[..]);
+        debug_assert!(aside.is_empty(), "nobody's box is aside");
         for rank in ranks(dying.unwrap_or_default()) {
             aside.push(std::mem::replace(&mut exact[rank], Down::EMPTY));
         }

@@ -85,6 +85,7 @@ impl Order {
         room(&mut verlet.found, self.len);
         room(&mut verlet.strays, self.len);
         room(&mut verlet.blocks, blocks);
+        verlet.course.reserve(blocks);
         finds.spare();
         team.reserve(blocks, self.len);
     }

@@ -1,4 +1,4 @@
-//! Boxes for some ticks: where a body will have been if it goes on as it came.
+//! Boxes for some ticks: where a body will have been if it goes on as it came, or wanders (`course`).
 //!
 //! In: the boxes of this tick and the last. Out: swept boxes, by rank and in the blocks; and who has left his.
 
@@ -38,7 +38,8 @@ impl Order {
         let course = &mut self.afresh.verlet.course;
         course.open();
         for block in (0..self.live.len()).step_by(SAMPLE) {
-            course.watch(&boxes_of(&self.fat[block], self.live[block]));
+            let live = self.live[block];
+            course.watch(live, &boxes_of(&self.fat[block], live));
         }
     }
 
@@ -167,7 +168,7 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
                 (swept, opens || asks && watched),
             );
             if watched && opens {
-                course.watch(&before);
+                course.watch(live, &before);
             } else if watched && asks {
                 course.note(block, live, &before, exact);
             }
@@ -175,7 +176,7 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
                 *swept = boxes_of(fat, live).map(Down::open);
             }
             if opens {
-                open(reach, (live, out), (&before, exact), (fat, swept));
+                sweep_anew(reach, (live, out), (&before, exact), (fat, swept));
             }
             let (mut late, mut jumped) = (0, 0);
             for lane in ones(out) {
@@ -217,7 +218,7 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
 
 /// Sweeps the boxes of some lanes anew, into their block; who has left the old one is held to the new alone.
 #[inline(always)]
-fn open(
+fn sweep_anew(
     reach: Reach,
     (lanes, out): (u16, u16),
     (before, now): (&[Down; WIDTH], &[Down; WIDTH]),

@@ -2,11 +2,12 @@
 //!
 //! In: every box. Out: pairs that began and pairs that parted.
 //!
-//! Without candidates (`afresh`) every tick searches all boxes. Where bodies go on as they came, one search serves
-//! several ticks: each box is swept along its motion for so many ticks (`swept`), what meets then is listed, and until
-//! the list is made anew a tick takes the boxes and compares what is listed (`near`). A body that leaves its swept box
-//! strays: its entries die, it gets another swept box and is looked for alone. Unlike candidates that last (`links`)
-//! the list is made for all bodies by one pass of the search, which takes a fraction of what one by one would.
+//! Without candidates (`afresh`) every tick searches all boxes. Where bodies go on as they came, or wander by little
+//! (`course`), one search serves several ticks: each box is swept for so many (`swept`), what meets then is listed, and
+//! until the list is made anew a tick takes the boxes and compares what is listed (`near`). A body that leaves its
+//! swept box strays: its entries die, it gets another swept box and is looked for alone. Unlike candidates that last
+//! (`links`) the list is made for all bodies by one pass of the search, which takes a fraction of what one by one
+//! would.
 //!
 //! The next list is made in the last ticks of the one in use (`next`), so that no tick has a whole search. Between two
 //! lists bodies are laid anew, in an order that was sorted over the ticks before, and the entries with them.
@@ -67,6 +68,7 @@ impl Verlet {
         shed(&mut self.aside);
         shed(&mut self.strays);
         shed(&mut self.swept);
+        self.course.give_back();
     }
 }
 
@@ -104,6 +106,7 @@ impl Order {
     pub(super) fn end_list(&mut self) {
         let verlet = &mut self.afresh.verlet;
         verlet.on = false;
+        verlet.course.open();
         self.carried.reserve(self.hits);
         let overlaps = verlet.entries.drain(..).filter(|entry| entry.is_hit());
         for entry in overlaps {
@@ -210,6 +213,7 @@ impl Order {
             self.fat[block].set(lane, &swept.corners());
             let verlet = &mut self.afresh.verlet;
             verlet.swept[rank as usize] = swept;
+            verlet.course.forget(block, lane);
             verlet.fresh[block] |= 1 << lane;
             verlet.late[block] |= 1 << lane;
             verlet.strays.push(rank);
