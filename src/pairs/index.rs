@@ -19,7 +19,7 @@ use crate::simd::words::{WORDS, same};
 
 /// No place.
 const NONE: u32 = u32::MAX;
-/// Of so many places of the table so many are taken at most: then one key in some twenty is away.
+/// Of so many places of the table so many are taken at most: then one key in some thirty is away.
 const OF: usize = 3;
 const TAKEN: usize = 2;
 

@@ -16,6 +16,7 @@
 
 use super::gear::Gear;
 use super::lay::{LAY_TESTS, TakeLanes};
+use super::look::overlap;
 use super::met::{Met, TellDifference, tell_all, tell_asked};
 use super::presort::{Presort, SPLIT_TICKS_MAX, split_ticks};
 use super::probe::Probe;
@@ -290,8 +291,7 @@ impl Order {
     fn ask_open<P: Proxies>(&mut self, proxies: &P) {
         let Finds { open, met, .. } = &mut self.afresh.finds;
         for ranks in open.drain(..) {
-            let [one, other] = ranks.map(|rank| BodySlot(self.slot_of[rank as usize]));
-            if !proxies.aabb(one).overlaps(proxies.aabb(other)) {
+            if !overlap(&self.slot_of, ranks, proxies) {
                 met.take_out(ranks);
             }
         }

@@ -39,6 +39,32 @@ impl Iterator for Ones {
     }
 }
 
+/// Goes through the bits of some words as if they were one: each word with the place of each of its bits.
+///
+/// * `words` - with one more behind the last that has a bit: it is read, and nothing is made of it.
+/// * `ones` - how many bits they have.
+#[inline(always)]
+pub(super) fn each_bit<W: Copy>(
+    words: &[W],
+    ones: usize,
+    bits: impl Fn(&W) -> u64,
+) -> impl Iterator<Item = (W, u32)> {
+    let (mut at, mut word) = (0, words[0]);
+    let mut left = bits(&word);
+    (0..ones).map(move |_| {
+        let told = (word, left.trailing_zeros());
+        left &= left.wrapping_sub(1);
+        at += usize::from(left == 0);
+        let next = words[at];
+        (word, left) = if left == 0 {
+            (next, bits(&next))
+        } else {
+            (word, left)
+        };
+        told
+    })
+}
+
 /// Rows of a matrix that make a word.
 const ROWS: usize = u64::BITS as usize / WIDTH;
 /// Words of a matrix.
@@ -108,15 +134,10 @@ impl<'a, T, F: Fn(u32, u32) -> T> Gathered<'a, T, F> {
     /// Tells what is gathered, and forgets it.
     #[inline(always)]
     fn tell(&mut self) {
-        let (words, table, pair) = (&self.words, self.table, &self.pair);
-        let (mut at, mut word) = (0, words[0]);
-        self.list.extend((0..self.bits).map(|_| {
-            let bit = word.bits.trailing_zeros();
+        let (table, pair) = (self.table, &self.pair);
+        let bits = each_bit(&self.words, self.bits, |word| word.bits);
+        self.list.extend(bits.map(|(word, bit)| {
             let (row, lane) = (word.row + bit / LANES, word.lane + bit % LANES);
-            word.bits &= word.bits.wrapping_sub(1);
-            at += usize::from(word.bits == 0);
-            let next = words[at];
-            word = if word.bits == 0 { next } else { word };
             pair(table[row as usize], table[lane as usize])
         }));
         (self.len, self.bits) = (0, 0);

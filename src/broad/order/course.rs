@@ -115,8 +115,8 @@ impl Course {
         shed(&mut self.watched);
     }
 
-    /// Nobody is watched; those who are to be follow.
-    pub(super) fn open(&mut self) {
+    /// Nobody is watched.
+    pub(super) fn clear(&mut self) {
         self.watched.clear();
     }
 
@@ -193,7 +193,7 @@ impl Course {
             self.step = self.steps / count;
         }
         (self.alike, self.steps, self.count) = (0.0, 0.0, 0);
-        self.open();
+        self.clear();
     }
 }
 
@@ -233,7 +233,7 @@ mod tests {
         // Who came has no place before, and who has no end none at all.
         before[3] = Down::EMPTY;
         now[7].faces[1] = f32::NEG_INFINITY;
-        course.open();
+        course.clear();
         course.watch(u16::MAX, &before);
         assert!(course.asks());
         course.note(0, u16::MAX, &then, &now);

@@ -59,6 +59,7 @@ impl Order {
     /// Few moved: the list of candidates is let go.
     pub(super) fn give_back_list(&mut self) {
         self.listed = false;
+        self.entries.clear();
         if is_thrifty(self.len) {
             shed(&mut self.entries);
             shed(&mut self.found);

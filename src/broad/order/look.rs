@@ -43,7 +43,9 @@ impl Order {
         });
         for one in &found {
             let ranks = self.entries[one.at as usize].ranks();
-            let now = one.now.unwrap_or_else(|| self.overlap(ranks, tick));
+            let now = one
+                .now
+                .unwrap_or_else(|| overlap(&self.slot_of, ranks, tick.proxies));
             let entry = &mut self.entries[one.at as usize];
             if now == entry.is_hit() {
                 continue;
@@ -63,13 +65,6 @@ impl Order {
         if is_thrifty(self.len) && self.entries.capacity() > 2 * len {
             self.entries.shrink_to(len);
         }
-    }
-
-    /// Whether the f64 boxes of the bodies at two ranks overlap.
-    pub(super) fn overlap<P: Proxies>(&self, ranks: [u32; 2], tick: &Tick<'_, P>) -> bool {
-        let slots = ranks.map(|rank| BodySlot(self.slot_of[rank as usize]));
-        let [a, b] = slots.map(|slot| tick.proxies.aabb(slot));
-        a.overlaps(b)
     }
 
     /// Sets whether a candidate overlaps, and tells of it where it did not as now.
@@ -134,6 +129,26 @@ impl Order {
             }
         }
     }
+}
+
+/// Whether the f64 boxes of the bodies at two ranks overlap.
+pub(super) fn overlap<P: Proxies>(slot_of: &[u32], ranks: [u32; 2], proxies: &P) -> bool {
+    let [a, b] = ranks.map(|rank| proxies.aabb(BodySlot(slot_of[rank as usize])));
+    a.overlaps(b)
+}
+
+/// Whether a pair surely is as it was: without a branch on how that was, which is as good as random.
+///
+/// * `apart`, `sure` - as [`Lanes::parts`] tells.
+#[inline(always)]
+pub(super) fn is_as_before(hit: bool, (apart, sure): (bool, bool)) -> bool {
+    (hit & sure) | (!hit & apart)
+}
+
+/// Whether two boxes overlap; `None` where rounding leaves it open.
+#[inline(always)]
+pub(super) fn verdict((apart, sure): (bool, bool)) -> Option<bool> {
+    if apart | sure { Some(sure) } else { None }
 }
 
 /// What the f64 box of a body that keeps to its hold is sure to hold: the core, less what rounding may have added.
@@ -210,12 +225,9 @@ impl Work for Look<'_> {
             let [a, b] = entry.ranks().map(|rank| rank as usize);
             let alive = ages(self.ages[a], self.ages[b]) == entry.ages();
             self.entries[kept] = entry;
-            let (apart, sure) = lanes.parts(&self.exact[a], &self.exact[b]);
-            // Without a branch on the state: it is as good as random.
-            let hit = entry.is_hit();
-            let as_before = (hit & sure) | (!hit & apart);
-            if alive & !as_before {
-                let now = if apart | sure { Some(sure) } else { None };
+            let parts = lanes.parts(&self.exact[a], &self.exact[b]);
+            if alive & !is_as_before(entry.is_hit(), parts) {
+                let now = verdict(parts);
                 self.found.push(Found {
                     at: small(kept),
                     now,

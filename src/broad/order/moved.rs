@@ -3,12 +3,14 @@
 //! In: moved bodies, matrices of candidates, boxes by rank. Out: pairs that began and pairs that parted, and their
 //! bits.
 //!
-//! How: in three passes over some bodies at a time, none with a branch that depends on the boxes. Which blocks near a
-//! body hold a candidate of it, how many each holds and whether boxes overlap cannot be guessed, and other bodies move
-//! in each tick: a branch guessed wrong takes longer than a comparison.
+//! How: in three passes over some bodies at a time, with no branch on the boxes but for the few pairs that change.
+//! Which blocks near a body hold a candidate of it, how many each holds and whether boxes overlap cannot be guessed,
+//! and other bodies move in each tick: a branch guessed wrong takes longer than a comparison.
 
+use super::bits::each_bit;
 use super::idle::{give_back, is_thrifty};
 use super::links::{Bits, Links, Matrix, room};
+use super::look::{is_as_before, overlap, verdict};
 use super::{BodySlot, Order, Proxies, Tick, Work as Done, parts, small};
 use crate::simd::boxes::{Down, LANES, Lanes, WIDTH, Work, prefetch};
 
@@ -104,33 +106,26 @@ impl Gather {
             .map(|row| row.cand.count_ones())
             .sum();
         self.tests += u64::from(candidates);
-        let (mut at, mut some) = (0, rows[0]);
+        let bits = each_bit(rows, candidates as usize, |row| u64::from(row.cand));
         self.pairs.clear();
-        self.pairs.extend((0..candidates).map(|_| {
-            let lane = some.cand.trailing_zeros();
-            let ranks = [some.rank, some.first + lane];
+        self.pairs.extend(bits.map(|(row, lane)| {
+            let ranks = [row.rank, row.first + lane];
             prefetch(&exact[ranks[1] as usize]);
-            let pair = Pair {
-                record: some.record,
+            Pair {
+                record: row.record,
                 ranks,
-                hit: some.hit >> lane & 1 == 1,
-            };
-            some.cand &= some.cand.wrapping_sub(1);
-            at += usize::from(some.cand == 0);
-            let next = rows[at];
-            some = if some.cand == 0 { next } else { some };
-            pair
+                hit: row.hit >> lane & 1 == 1,
+            }
         }));
         self.len = 0;
         for pair in &self.pairs {
             let [a, b] = pair.ranks.map(|rank| &exact[rank as usize]);
-            let (apart, sure) = lanes.parts(a, b);
-            let as_before = (pair.hit & sure) | (!pair.hit & apart);
-            if !as_before {
+            let parts = lanes.parts(a, b);
+            if !is_as_before(pair.hit, parts) {
                 self.found.push(Found {
                     record: pair.record,
                     ranks: pair.ranks,
-                    now: if apart | sure { Some(sure) } else { None },
+                    now: verdict(parts),
                 });
             }
         }
@@ -142,6 +137,7 @@ impl Order {
     pub(super) fn look_at_moved<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
         self.give_back_list();
         let mut gather = std::mem::take(&mut self.gather);
+        // Where candidates were let go there is none; a sort makes room for what it finds.
         gather.reserve(0);
         gather.tests = 0;
         self.level.run(LookAtMoved {
@@ -152,7 +148,9 @@ impl Order {
         done.tests += gather.tests;
         for found in &gather.found {
             let [one, other] = found.ranks;
-            let now = found.now.unwrap_or_else(|| self.overlap(found.ranks, tick));
+            let now = found
+                .now
+                .unwrap_or_else(|| overlap(&self.slot_of, found.ranks, tick.proxies));
             // Of two bodies that both moved the pair is found twice.
             self.put_hit(found.record, [one.min(other), one.max(other)], now, tick);
         }

@@ -3,6 +3,7 @@
 //! In: boxes by rank, lanes whose entries die. Out: pairs that began and pairs that parted.
 
 use super::idle::give_back;
+use super::look::{is_as_before, overlap, verdict};
 use super::verlet::Verlet;
 use super::{BodySlot, NONE, Order, Proxies, Tick, ones};
 use crate::ids::{PairKey, small};
@@ -135,17 +136,14 @@ impl Order {
         tick.parted.truncate(kept);
         for Found { at, now } in found.iter() {
             let entry = &mut entries[*at as usize];
-            let slots = entry.ranks().map(|rank| BodySlot(slot_of[rank]));
-            let now = now.unwrap_or_else(|| {
-                let [a, b] = slots.map(|slot| tick.proxies.aabb(slot));
-                a.overlaps(b)
-            });
+            let ranks = entry.ranks().map(small);
+            let now = now.unwrap_or_else(|| overlap(slot_of, ranks, proxies));
             if now == entry.is_hit() {
                 continue;
             }
             entry.one ^= HIT;
             self.hits = if now { self.hits + 1 } else { self.hits - 1 };
-            let key = PairKey::new(slots[0], slots[1]);
+            let key = entry.key(slot_of);
             if !now {
                 tick.parted.push(key);
             } else if old || entry.any_among(fresh) {
@@ -166,10 +164,7 @@ impl Order {
         });
         for Found { at, .. } in &verlet.found {
             let entry = &mut verlet.entries[*at as usize];
-            let [a, b] = entry
-                .ranks()
-                .map(|rank| proxies.aabb(BodySlot(slot_of[rank])));
-            if a.overlaps(b) {
+            if overlap(slot_of, entry.ranks().map(small), proxies) {
                 entry.one |= HIT;
                 self.hits += 1;
             }
@@ -250,17 +245,14 @@ impl Work for Look<'_> {
             let entry = entries[at];
             let [a, b] = entry.ranks();
             entries[kept] = entry;
-            let (apart, sure) = lanes.parts(&exact[a], &exact[b]);
-            // Without a branch on the state: it is as good as random.
+            let parts = lanes.parts(&exact[a], &exact[b]);
             let hit = entry.is_hit();
-            let as_before = (hit & sure) | (!hit & apart);
             kept += 1;
-            if as_before {
+            if is_as_before(hit, parts) {
                 continue;
             }
-            let open = !(apart | sure);
-            if !(open && self.out.is_some_and(|out| entry.any_among(out))) {
-                let now = if open { None } else { Some(sure) };
+            let now = verdict(parts);
+            if now.is_some() || !self.out.is_some_and(|out| entry.any_among(out)) {
                 let at = small(kept - 1);
                 self.found.push(Found { at, now });
                 continue;

@@ -36,10 +36,9 @@ impl Order {
     /// Notes where some are, two ticks before a list is begun.
     fn watch_places(&mut self) {
         let course = &mut self.afresh.verlet.course;
-        course.open();
+        course.clear();
         for block in (0..self.live.len()).step_by(SAMPLE) {
-            let live = self.live[block];
-            course.watch(live, &boxes_of(&self.fat[block], live));
+            course.watch(self.live[block], &boxes_of(&self.fat[block]));
         }
     }
 
@@ -51,7 +50,7 @@ impl Order {
         let course = &mut self.afresh.verlet.course;
         for block in (0..self.live.len()).step_by(SAMPLE).filter(|_| kept) {
             let then = &self.exact.as_chunks().0[block];
-            let now = boxes_of(&self.fat[block], self.live[block]);
+            let now = boxes_of(&self.fat[block]);
             course.note(block, self.live[block], then, &now);
         }
         course.close();
@@ -89,7 +88,7 @@ impl Order {
         let opens = phase == Phase::Opens;
         let asks = !opens && verlet.course.asks();
         if opens {
-            verlet.course.open();
+            verlet.course.clear();
         }
         let level = self.level;
         let jumps = level.run(TakeSwept {
@@ -173,7 +172,7 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
                 course.note(block, live, &before, exact);
             }
             if phase == Phase::Ends {
-                *swept = boxes_of(fat, live).map(Down::open);
+                *swept = boxes_of(fat).map(Down::open);
             }
             if opens {
                 sweep_anew(reach, (live, out), (&before, exact), (fat, swept));
@@ -236,13 +235,9 @@ fn sweep_anew(
     }
 }
 
-/// The boxes of some lanes of a block, as single ones; of the others none.
-fn boxes_of(block: &Boxes16, lanes: u16) -> [Down; WIDTH] {
-    let mut boxes = [Down::EMPTY; WIDTH];
-    for lane in ones(lanes) {
-        boxes[lane] = Down::of(block.get(lane));
-    }
-    boxes
+/// The boxes of a block, as single ones.
+fn boxes_of(block: &Boxes16) -> [Down; WIDTH] {
+    std::array::from_fn(|lane| Down::of(block.get(lane)))
 }
 
 /// Takes the boxes of a block; returns the lanes whose box has left its swept one.

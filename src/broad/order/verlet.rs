@@ -106,7 +106,7 @@ impl Order {
     pub(super) fn end_list(&mut self) {
         let verlet = &mut self.afresh.verlet;
         verlet.on = false;
-        verlet.course.open();
+        verlet.course.clear();
         self.carried.reserve(self.hits);
         let overlaps = verlet.entries.drain(..).filter(|entry| entry.is_hit());
         for entry in overlaps {
