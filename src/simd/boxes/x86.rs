@@ -8,8 +8,8 @@ use std::arch::x86_64::{
     _mm256_add_ps, _mm256_and_ps, _mm256_and_si256, _mm256_andnot_ps, _mm256_blendv_ps,
     _mm256_castps256_ps128, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32,
     _mm256_cvtpd_ps, _mm256_extractf128_ps, _mm256_load_ps, _mm256_loadu_ps, _mm256_loadu_si256,
-    _mm256_maskload_pd, _mm256_max_ps, _mm256_movemask_epi8, _mm256_movemask_ps, _mm256_mul_ps,
-    _mm256_or_ps, _mm256_packs_epi16, _mm256_permute2f128_ps, _mm256_set_m128, _mm256_set1_epi16,
+    _mm256_maskload_pd, _mm256_max_ps, _mm256_movemask_epi8, _mm256_mul_ps, _mm256_or_ps,
+    _mm256_packs_epi16, _mm256_permute2f128_ps, _mm256_set_m128, _mm256_set1_epi16,
     _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi32, _mm256_setr_epi64x, _mm256_setr_pd,
     _mm256_setzero_ps, _mm256_setzero_si256, _mm256_sll_epi16, _mm256_slli_epi32, _mm256_store_ps,
     _mm256_sub_pd, _mm256_sub_ps, _mm256_test_epi16_mask, _mm256_xor_ps, _mm512_cmp_ps_mask,
@@ -157,7 +157,7 @@ fn take_avx2(corners: [&[f64; 3]; 2], origin: &[f64; 3], hold: &Hold, place: &mu
     store(faces, place);
     let inside = _mm256_cmp_ps::<_CMP_LE_OQ>(one(&hold.fat), faces);
     let around = _mm256_cmp_ps::<_CMP_LE_OQ>(faces, one(&hold.core));
-    _mm256_movemask_ps(_mm256_and_ps(inside, around)) == 0xFF
+    sign_bits(_mm256_and_ps(inside, around)) == 0xFF
 }
 
 #[inline]
@@ -171,15 +171,15 @@ fn parts_avx2(a: &Down, b: &Down) -> (bool, bool) {
         _mm256_mul_ps(far_down, _mm256_set1_ps(SLACK_SHARE)),
         _mm256_set1_ps(SLACK_LEAST),
     );
-    let apart = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(gap, _mm256_setzero_ps()));
-    let sure = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(gap, least));
+    let apart = sign_bits(_mm256_cmp_ps::<_CMP_GT_OQ>(gap, _mm256_setzero_ps()));
+    let sure = sign_bits(_mm256_cmp_ps::<_CMP_LE_OQ>(gap, least));
     (apart != 0, sure == 0xFF)
 }
 
 #[inline]
 #[target_feature(enable = "avx2")]
 fn holds_avx2(outer: &Down, inner: &Down) -> bool {
-    _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(one(outer), one(inner))) == 0xFF
+    sign_bits(_mm256_cmp_ps::<_CMP_LE_OQ>(one(outer), one(inner))) == 0xFF
 }
 
 #[inline]
