@@ -5,7 +5,8 @@
 //! within a quarter the bodies are dealt to the blocks anew when these have spread.
 
 use super::fatten::Gait;
-use super::home::{far_from, widen};
+use super::glance::{Glance, LookOver};
+use super::home::far_from;
 use super::links::room;
 use super::sort::{Sorter, centre, split};
 use super::tree::NO_BOUND;
@@ -76,34 +77,46 @@ impl Order {
             if !self.is_quarter_due(quarter) {
                 continue;
             }
-            self.follow(quarter);
-            for block in first..(first + WIDTH).min(self.live.len()) {
-                self.drift(block);
+            let mut seen = self.look_over(quarter);
+            self.follow(quarter, &seen);
+            let mut drifted = false;
+            for (block, seen) in (first..self.live.len()).zip(&seen) {
+                let stay =
+                    block < self.sorted && seen.is_within(&self.quarters[quarter], DRIFT_SIDES);
+                drifted |= !stay && self.drift(block);
+            }
+            if drifted {
+                seen = self.look_over(quarter);
             }
             // A quarter on the border of two classes is dealt in part.
             let class = |block: usize| Sorter::class_of(self.keys[block]);
             let blocks = first..(first + WIDTH).min(self.sorted);
             let same = blocks.take_while(|block| class(*block) == class(first));
-            let end = first + same.count();
-            if self.is_mixed(first, end) && !self.is_crowd(first, end) {
+            let count = same.count();
+            let end = first + count;
+            if self.is_mixed(first, &seen[..count]) && !self.is_crowd(first, end) {
                 self.deal(first, end);
             }
         }
     }
 
+    /// What the bodies of each block of a quarter tell together.
+    fn look_over(&self, quarter: usize) -> [Glance; WIDTH] {
+        let first = quarter * WIDTH;
+        let live = &self.live[first..(first + WIDTH).min(self.live.len())];
+        let exact = &self.exact.as_chunks().0[first..];
+        self.level.run(LookOver { live, exact })
+    }
+
     /// Shifts a quarter and its blocks' parts of space along with the middle of its bodies: what all do together mixes
     /// nothing.
-    fn follow(&mut self, quarter: usize) {
-        let blocks = quarter * WIDTH..(quarter * WIDTH + WIDTH).min(self.live.len());
+    fn follow(&mut self, quarter: usize, seen: &[Glance; WIDTH]) {
         let (mut sum, mut bodies) = ([0.0_f32; 3], 0.0_f32);
-        for block in blocks {
-            for lane in ones(self.live[block]) {
-                let middle = centre(&self.exact[block * WIDTH + lane].corners());
-                for k in 0..3 {
-                    sum[k] += middle[k];
-                }
-                bodies += 1.0;
+        for block in seen {
+            for (sum, of_block) in sum.iter_mut().zip(&block.sum) {
+                *sum += of_block;
             }
+            bodies += block.bodies;
         }
         if bodies == 0.0 {
             return;
@@ -128,8 +141,10 @@ impl Order {
         }
     }
 
-    /// Moves the bodies of a block that another, with a free lane, is much nearer to than their quarter.
-    fn drift(&mut self, block: usize) {
+    /// Moves the bodies of a block that another, with a free lane, is much nearer to than their quarter; whether there
+    /// were any.
+    fn drift(&mut self, block: usize) -> bool {
+        let mut drifted = false;
         for lane in ones(self.live[block]) {
             let from = block * WIDTH + lane;
             let boxed = self.exact[from];
@@ -155,27 +170,24 @@ impl Order {
             self.seat(slot, to, boxed);
             let to = to as usize;
             (self.gaits[to], self.held[to]) = (gait, held);
+            drifted = true;
         }
+        drifted
     }
 
     /// Whether the blocks have spread over much more space than when they were dealt.
-    fn is_mixed(&self, from: usize, to: usize) -> bool {
+    ///
+    /// * `seen` - of the blocks from `from` on.
+    fn is_mixed(&self, from: usize, seen: &[Glance]) -> bool {
         let extent = |home: &[f32; 6]| {
             (0..3)
                 .map(|k| (home[k + 3] - home[k]).max(0.0))
                 .sum::<f32>()
         };
         let (mut dealt, mut now) = (0.0, 0.0);
-        for block in from..to {
-            let mut spread = NO_BOUND;
-            for lane in ones(self.live[block]) {
-                widen(
-                    &mut spread,
-                    &centre(&self.exact[block * WIDTH + lane].corners()),
-                );
-            }
+        for (block, seen) in (from..).zip(seen) {
             dealt += extent(&self.home(block));
-            now += extent(&spread);
+            now += extent(&seen.spread());
         }
         now > dealt * MIXED
     }

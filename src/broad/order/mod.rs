@@ -39,6 +39,7 @@ mod course;
 mod entry;
 mod fatten;
 mod gear;
+mod glance;
 mod home;
 mod idle;
 mod jump;

@@ -1,0 +1,158 @@
+//! What the bodies of a block tell together, in one pass over their boxes: enough to know that none of them needs a
+//! look of its own.
+
+use super::ones;
+use crate::simd::boxes::{Down, Lanes, WIDTH, Work};
+
+/// The middles of the bodies of a block; of an infinite box it is the origin.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Glance {
+    /// Their sum, in the first three.
+    pub(super) sum: [f32; 4],
+    pub(super) bodies: f32,
+    /// What they fill; upside down where there are none.
+    low: [f32; 4],
+    high: [f32; 4],
+    /// The least mean side of a box.
+    least_side: f32,
+}
+
+impl Glance {
+    const NOBODY: Self = Self {
+        sum: [0.0; 4],
+        bodies: 0.0,
+        low: [f32::INFINITY; 4],
+        high: [f32::NEG_INFINITY; 4],
+        least_side: f32::INFINITY,
+    };
+
+    #[inline(always)]
+    fn of(exact: &[Down; WIDTH], live: u16) -> Self {
+        let mut seen = Self::NOBODY;
+        for lane in ones(live) {
+            let f = &exact[lane].faces;
+            for k in 0..4 {
+                // Upper faces stand there with their sign turned.
+                let middle = f[k] * 0.5 - f[k + 4] * 0.5;
+                let middle = if middle.is_finite() { middle } else { 0.0 };
+                seen.sum[k] += middle;
+                seen.low[k] = if middle < seen.low[k] {
+                    middle
+                } else {
+                    seen.low[k]
+                };
+                seen.high[k] = if middle > seen.high[k] {
+                    middle
+                } else {
+                    seen.high[k]
+                };
+            }
+            let side = exact[lane].mean_side();
+            seen.least_side = if side < seen.least_side {
+                side
+            } else {
+                seen.least_side
+            };
+            seen.bodies += 1.0;
+        }
+        seen
+    }
+
+    /// The part of space that the middles fill.
+    pub(super) fn spread(&self) -> [f32; 6] {
+        std::array::from_fn(|k| if k < 3 { self.low[k] } else { self.high[k - 3] })
+    }
+
+    /// Whether no middle is farther outside a part of space than so many mean sides of its box.
+    pub(super) fn is_within(&self, part: &[f32; 6], sides: f32) -> bool {
+        let mut far = 0.0;
+        for k in 0..3 {
+            let out = (part[k] - self.low[k])
+                .max(self.high[k] - part[k + 3])
+                .max(0.0);
+            far += out * out;
+        }
+        let least = self.least_side * sides;
+        far <= least * least
+    }
+}
+
+/// Sees the blocks of a quarter; nobody in those that it lacks.
+pub(super) struct LookOver<'a> {
+    pub(super) live: &'a [u16],
+    pub(super) exact: &'a [[Down; WIDTH]],
+}
+
+impl Work for LookOver<'_> {
+    type Out = [Glance; WIDTH];
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, _: L) -> [Glance; WIDTH] {
+        let mut seen = [Glance::NOBODY; WIDTH];
+        for (seen, (live, exact)) in seen.iter_mut().zip(self.live.iter().zip(self.exact)) {
+            *seen = Glance::of(exact, *live);
+        }
+        seen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::home::far_from;
+    use super::super::sort::centre;
+    use super::*;
+    use crate::builtin::Random;
+    use crate::simd::boxes::Level;
+
+    fn around(random: &mut Random) -> f32 {
+        f32::from(u16::try_from(random.bits() % 1000).unwrap()) / 100.0
+    }
+
+    #[test]
+    fn who_is_within_needs_no_look_of_its_own() {
+        let mut random = Random::new(11);
+        let (mut within, mut beyond) = (0, 0);
+        for _ in 0..2000 {
+            let spread = 0.1 + around(&mut random);
+            let live = u16::try_from(random.bits() & 0xFFFF).unwrap();
+            let exact: [Down; WIDTH] = std::array::from_fn(|lane| {
+                let low = [(); 3].map(|()| around(&mut random) / 10.0 * spread);
+                let side = 0.5 + around(&mut random) / 10.0;
+                let one = std::array::from_fn(|k| if k < 3 { low[k] } else { low[k - 3] + side });
+                if live >> lane & 1 == 1 {
+                    Down::of(one)
+                } else {
+                    Down::EMPTY
+                }
+            });
+            let part = [0.5, 0.5, 0.5, 1.5, 1.5, 1.5];
+            let blocks = [exact];
+            let [seen, nobody, ..] = Level::best().run(LookOver {
+                live: &[live],
+                exact: &blocks,
+            });
+            assert!(
+                nobody.is_within(&part, 0.5),
+                "who is not there goes nowhere"
+            );
+            let mut spread = [f32::INFINITY; 3];
+            let mut all_near = true;
+            for lane in ones(live) {
+                let middle = centre(&exact[lane].corners());
+                let side = exact[lane].mean_side();
+                all_near &= far_from(&middle, &part) <= side * side * 0.25;
+                spread = std::array::from_fn(|k| spread[k].min(middle[k]));
+            }
+            assert_eq!(seen.spread()[..3], spread);
+            if seen.is_within(&part, 0.5) {
+                within += 1;
+                assert!(all_near, "a body is farther out");
+            }
+            beyond += usize::from(!all_near);
+        }
+        assert!(
+            within > 100 && beyond > 100,
+            "{within} within, {beyond} beyond"
+        );
+    }
+}
