@@ -3,9 +3,10 @@
 //! In: every box. Out: lanes, the tree over their blocks, and how much more of space the blocks take than they did.
 
 use super::afresh::{Afresh, FRAME_TICKS};
+use super::fatten::outward;
 use super::home::NO_HOMES;
 use super::links::{room, spare};
-use super::load::ask_ahead;
+use super::load::Taking;
 use super::place::{ATTIC, grow, middle};
 use super::sort::{FILL, Frame, Sorter};
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, is_thrifty, ones, parts, small};
@@ -235,9 +236,7 @@ impl<P: Proxies> Work for TakeAll<'_, P> {
             if let Some(ahead) = bodies.get(at + AHEAD) {
                 prefetch(proxies.aabb(*ahead));
             }
-            let aabb = proxies.aabb(*slot);
-            let (min, max) = (aabb.min.coords.as_ref(), aabb.max.coords.as_ref());
-            boxes.push(lanes.outward(min, max, &origin).corners());
+            boxes.push(outward(lanes, proxies.aabb(*slot), &origin).corners());
         }
     }
 }
@@ -258,13 +257,11 @@ impl<P: Proxies> Work for TakeLanes<'_, P> {
         let origin = order.origin;
         let mut jumps = 0;
         for block in 0..order.live.len() {
+            let taking = Taking::of(&order.slot_of, block);
+            let fat = &mut order.fat[block];
             for lane in ones(order.live[block]) {
-                let rank = block * WIDTH + lane;
-                ask_ahead(&order.slot_of, rank, proxies);
-                let aabb = proxies.aabb(BodySlot(order.slot_of[rank]));
-                let (min, max) = (aabb.min.coords.as_ref(), aabb.max.coords.as_ref());
-                let one = lanes.outward(min, max, &origin).corners();
-                order.fat[block].set(lane, &one);
+                let aabb = proxies.aabb(taking.slot(lane, proxies));
+                fat.set(lane, &outward(lanes, aabb, &origin).corners());
             }
             let met = lanes.meets(&order.fat[block], order.tree.bound(block));
             let jumped = order.live[block] & !met;

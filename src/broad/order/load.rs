@@ -14,9 +14,11 @@ const STRETCHES: usize = 3 * HORIZON as usize;
 /// One in so many did not move, and all are taken.
 const NEARLY_ALL: usize = 16;
 
-/// How many ranks ahead boxes are asked for: one takes some 10 ns, memory ten times as long. One with each, for a
-/// processor waits for only so many at a time.
-const AHEAD: usize = 24;
+/// How many blocks ahead boxes are asked for: one box takes some 5 ns, memory ten to thirty times as long. One with
+/// each, for a processor waits for only so many at a time.
+const AHEAD: usize = 2;
+/// Nobody.
+const NOBODY: [u32; WIDTH] = [NONE; WIDTH];
 /// How many bodies ahead, where few moved, what is known of them is.
 const AHEAD_BODIES: usize = 8;
 
@@ -125,11 +127,33 @@ fn take<L: Lanes, P: Proxies>(
     lanes.take(corners, origin, held, exact)
 }
 
-/// Asks for a box to come while another is taken: those of the world stand in another order.
-#[inline(always)]
-pub(super) fn ask_ahead<P: Proxies>(slot_of: &[u32], rank: usize, proxies: &P) {
-    if let Some(slot) = slot_of.get(rank + AHEAD).filter(|slot| **slot != NONE) {
-        prefetch(proxies.aabb(BodySlot(*slot)));
+/// The bodies of a block, and of one some blocks ahead: while a box is taken, another is asked for, since those of the
+/// world stand in another order.
+#[derive(Clone, Copy)]
+pub(super) struct Taking<'a> {
+    slots: &'a [u32; WIDTH],
+    ahead: &'a [u32; WIDTH],
+}
+
+impl<'a> Taking<'a> {
+    /// * `slot_of` - the body slots, by rank.
+    #[inline(always)]
+    pub(super) fn of(slot_of: &'a [u32], block: usize) -> Self {
+        let blocks = slot_of.as_chunks().0;
+        Self {
+            slots: blocks.get(block).unwrap_or(&NOBODY),
+            ahead: blocks.get(block + AHEAD).unwrap_or(&NOBODY),
+        }
+    }
+
+    /// The body of a lane in use; its box is about to be taken.
+    #[inline(always)]
+    pub(super) fn slot<P: Proxies>(self, lane: usize, proxies: &P) -> BodySlot {
+        let ahead = self.ahead[lane];
+        if ahead != NONE {
+            prefetch(proxies.aabb(BodySlot(ahead)));
+        }
+        BodySlot(self.slots[lane])
     }
 }
 
@@ -151,13 +175,13 @@ impl<P: Proxies> Work for LoadBlocks<'_, '_, P> {
             if moved == 0 {
                 continue;
             }
-            let slots = &order.slot_of[block * WIDTH..];
+            let taking = Taking::of(&order.slot_of, block);
             let held = &order.held.as_chunks::<WIDTH>().0[block];
             let exact = &mut order.exact.as_chunks_mut::<WIDTH>().0[block];
             let mut out = 0;
             for lane in ones(moved) {
-                ask_ahead(slots, lane, tick.proxies);
-                let (boxes, slot) = ((tick.proxies, &origin), BodySlot(slots[lane]));
+                let slot = taking.slot(lane, tick.proxies);
+                let boxes = (tick.proxies, &origin);
                 let holds = take(lanes, boxes, slot, &held[lane], &mut exact[lane]);
                 out |= u16::from(!holds) << lane;
             }
@@ -202,5 +226,35 @@ impl<P: Proxies> Work for LoadBodies<'_, '_, P> {
         }
         // Blocks in ascending order: the tree is refitted in it.
         order.worklist.sort_unstable();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn within_a_round_every_block_and_quarter_has_one_turn_and_no_tick_has_all() {
+        for blocks in [20, 160, 700, 9000] {
+            let mut order = Order::default();
+            order.live.resize(blocks, 0);
+            let quarters = blocks.div_ceil(WIDTH);
+            let (mut turns, mut looked_after) = (vec![0; blocks], vec![0; quarters]);
+            for tick in 0..HORIZON {
+                order.tick = 1000 + tick;
+                let due = |block: &usize| order.is_due(*block);
+                (0..blocks).filter(due).for_each(|block| turns[block] += 1);
+                let mine = (0..quarters).filter(|quarter| order.is_quarter_due(*quarter));
+                let mine: Vec<usize> = mine.collect();
+                assert!(mine.len() <= quarters.div_ceil(HORIZON as usize));
+                mine.into_iter()
+                    .for_each(|quarter| looked_after[quarter] += 1);
+            }
+            assert!(turns.iter().all(|turns| *turns == 1), "{blocks} blocks");
+            assert!(
+                looked_after.iter().all(|turns| *turns == 1),
+                "{blocks} blocks"
+            );
+        }
     }
 }

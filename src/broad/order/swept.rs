@@ -4,15 +4,12 @@
 
 use super::course::{Reach, SAMPLE};
 use super::fatten::outward;
-use super::load::ask_ahead;
+use super::load::Taking;
 use super::pace::Phase;
 use super::verlet::Verlet;
-use super::{BodySlot, NONE, Order, Proxies, ones};
+use super::{Order, Proxies, ones};
 use crate::ids::small;
-use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work, prefetch};
-
-/// Bodies ahead whose boxes are asked for.
-const AHEAD: usize = 16;
+use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work};
 
 impl Order {
     /// Notes where the bodies are, so that the boxes of this tick tell how they move.
@@ -147,7 +144,7 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
         let mut before = [Down::EMPTY; WIDTH];
         for block in 0..order.live.len() {
             let live = order.live[block];
-            let slots = &order.slot_of[block * WIDTH..];
+            let taking = Taking::of(&order.slot_of, block);
             let exact = &mut order.exact.as_chunks_mut().0[block];
             let Verlet {
                 swept,
@@ -162,7 +159,7 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
             let out = take(
                 lanes,
                 boxes,
-                (slots, live),
+                (taking, live),
                 (exact, &mut before),
                 (swept, opens || asks && watched),
             );
@@ -247,14 +244,13 @@ fn boxes_of(block: &Boxes16) -> [Down; WIDTH] {
 fn take<L: Lanes, P: Proxies>(
     lanes: L,
     (proxies, origin): (&P, [f64; 3]),
-    (slots, live): (&[u32], u16),
+    (taking, live): (Taking<'_>, u16),
     (exact, before): (&mut [Down; WIDTH], &mut [Down; WIDTH]),
     (swept, all): (&[Down; WIDTH], bool),
 ) -> u16 {
     let mut out = 0;
     for lane in ones(live) {
-        ask_ahead(slots, lane, proxies);
-        let aabb = proxies.aabb(BodySlot(slots[lane]));
+        let aabb = proxies.aabb(taking.slot(lane, proxies));
         let now = outward(lanes, aabb, &origin);
         let stays = lanes.holds(&swept[lane], &now);
         if all | !stays {
@@ -288,20 +284,16 @@ impl<P: Proxies> Work for TakeLaid<'_, P> {
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) {
         let Self { order, proxies } = self;
-        for rank in 0..order.slot_of.len() {
-            if let Some(ahead) = order
-                .slot_of
-                .get(rank + AHEAD)
-                .filter(|slot| **slot != NONE)
-            {
-                prefetch(proxies.aabb(BodySlot(*ahead)));
-            }
-            let slot = order.slot_of[rank];
-            if slot != NONE {
-                let aabb = proxies.aabb(BodySlot(slot));
-                order.exact[rank] = outward(lanes, aabb, &order.origin);
-                let swept = Down::of(order.fat[rank / WIDTH].get(rank % WIDTH));
-                order.afresh.verlet.swept[rank] = swept.open();
+        let verlet = &mut order.afresh.verlet;
+        let swept = verlet.swept.as_chunks_mut::<WIDTH>().0;
+        let exact = order.exact.as_chunks_mut::<WIDTH>().0;
+        let blocks = order.fat.iter().zip(&order.live).zip(swept).zip(exact);
+        for (block, (((fat, live), swept), exact)) in blocks.enumerate() {
+            let taking = Taking::of(&order.slot_of, block);
+            for lane in ones(*live) {
+                let aabb = proxies.aabb(taking.slot(lane, proxies));
+                exact[lane] = outward(lanes, aabb, &order.origin);
+                swept[lane] = Down::of(fat.get(lane)).open();
             }
         }
     }
