@@ -12,6 +12,9 @@ use crate::simd::boxes::{LANES, WIDTH, prefetch};
 /// Bits of lanes by lane.
 pub(super) type Matrix = [u16; WIDTH];
 
+/// No bit.
+pub(super) const EMPTY: Matrix = [0; WIDTH];
+
 /// The two matrices: rows are lanes of the lower block, bits those of the higher. Within one block only bits above
 /// the row's own.
 #[derive(Clone, Copy, Debug, Default)]

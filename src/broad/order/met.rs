@@ -5,7 +5,7 @@
 
 use super::bits::Gathered;
 use super::idle::shed;
-use super::links::{Matrix, room, spare};
+use super::links::{EMPTY, Matrix, room, spare};
 use super::{BodySlot, parts};
 use crate::ids::{PairKey, small};
 use crate::simd::boxes::{Lanes, WIDTH, Work};
@@ -105,11 +105,11 @@ impl Met {
         // Which hold any is a guess that fails: all are written, and those without are written over.
         let mut kept = self.others.len();
         self.others.resize(kept + records.len(), 0);
-        self.hits.resize(kept + records.len(), [0; WIDTH]);
+        self.hits.resize(kept + records.len(), EMPTY);
         for (other, hits) in records {
             self.others[kept] = other;
             self.hits[kept] = *hits;
-            kept += usize::from(hits.iter().fold(0, |all, row| all | row) != 0);
+            kept += usize::from(*hits != EMPTY);
         }
         self.others.truncate(kept);
         self.hits.truncate(kept);
@@ -247,7 +247,6 @@ impl Work for TellDifference<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self, _: L) {
-        const NONE: Matrix = [0; WIDTH];
         let Self {
             before,
             now,
@@ -274,8 +273,8 @@ impl Work for TellDifference<'_> {
                 let other = heads[0].min(heads[1]);
                 let [had, has] = heads.map(|head| usize::from(head == other));
                 let record = |met: &Met, at: usize, there: usize| {
-                    let hits = met.hits.get(at).unwrap_or(&NONE);
-                    *[&NONE, hits][there]
+                    let hits = met.hits.get(at).unwrap_or(&EMPTY);
+                    *[&EMPTY, hits][there]
                 };
                 let mut was = record(before, old.start, had);
                 let is = record(now, new.start, has);

@@ -4,7 +4,7 @@
 //! its renewed lanes, and overwrites their rows and columns. So of two bodies that leave their boxes in one tick each
 //! sees the other's new box, and since a row is written, not added to, no pair is there twice.
 
-use super::links::{Bits, Matrix, room};
+use super::links::{Bits, EMPTY, Matrix, room};
 use super::look::sure;
 use super::{BodySlot, NONE, Order, PairKey, Proxies, Tick, Work as Done, ones, parts, small};
 use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch};
@@ -253,7 +253,7 @@ impl Renew<'_> {
         let (mine, theirs) = (&order.fat[block as usize], &order.fat[other as usize]);
         self.done.tests += u64::from(sifted.count_ones());
         let mut cand: Matrix = if record == NONE {
-            [0; WIDTH]
+            EMPTY
         } else {
             order.links.bits(record).cand
         };
@@ -305,7 +305,7 @@ impl Renew<'_> {
         renewing: u16,
     ) {
         let (a, b) = (block.min(other), block.max(other));
-        let any = cand.iter().fold(0, |all, row| all | row) != 0;
+        let any = *cand != EMPTY;
         let order = &mut *self.order;
         let record = if record == NONE {
             if !any {
@@ -313,7 +313,7 @@ impl Renew<'_> {
             }
             let bits = Bits {
                 cand: *cand,
-                hit: [0; WIDTH],
+                hit: EMPTY,
             };
             order.links.add(a, b, bits)
         } else {
@@ -323,8 +323,7 @@ impl Renew<'_> {
             let gone = zip(&hit, cand, |hit, cand| hit & !cand);
             bits.hit = zip(&hit, cand, |hit, cand| hit & cand);
             bits.cand = *cand;
-            let lost = gone.iter().fold(0, |all, row| all | row);
-            if lost != 0 {
+            if gone != EMPTY {
                 let ones = gone.iter().map(|row| row.count_ones() as usize);
                 order.hits -= ones.sum::<usize>();
                 order.tell_parted([a, b], &gone, self.parted);

@@ -25,32 +25,41 @@ pub(super) struct Tree {
     height: usize,
     /// Nodes of the level at hand whose bounds have changed, ascending.
     dirty: Vec<u32>,
-    /// Nodes still to be looked at in [`Tree::query`]: level, node.
-    stack: Vec<(u8, u32)>,
+    /// Memory of [`Tree::query`].
+    descent: Descent,
+}
+
+/// Memory of a walk down the tree.
+#[derive(Clone, Debug, Default)]
+struct Descent {
+    /// The nodes of a level that are looked at; and those with children that are met: the first child, which.
+    nodes: Vec<u32>,
+    children: Vec<(u32, u16)>,
+}
+
+impl Descent {
+    fn reserve(&mut self, nodes: usize) {
+        room(&mut self.nodes, nodes);
+        room(&mut self.children, nodes + 1);
+    }
 }
 
 /// Memory of the queries for a run of blocks.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Walk {
-    /// Nodes still to be looked at: level, node.
-    stack: Vec<(u8, u32)>,
+    descent: Descent,
     /// Lowest nodes that the blocks of the lowest node at hand may meet; and by node, which of these blocks do.
     nodes: Vec<u32>,
     askers: Vec<u16>,
-    /// The nodes that the block at hand meets; and those with blocks near it, and which.
-    met: Vec<u32>,
-    children: Vec<(u32, u16)>,
 }
 
 impl Walk {
     /// Room for a query that descends into every node above so many blocks.
     pub(super) fn reserve(&mut self, blocks: usize) {
         let nodes = nodes_above(blocks);
-        room(&mut self.stack, nodes);
+        self.descent.reserve(nodes);
         room(&mut self.nodes, nodes);
         room(&mut self.askers, nodes);
-        room(&mut self.met, nodes);
-        room(&mut self.children, nodes);
     }
 }
 
@@ -102,7 +111,7 @@ impl Tree {
     /// Room for a query that descends into every node.
     pub(super) fn reserve(&mut self) {
         let blocks = self.bounds.len();
-        room(&mut self.stack, nodes_above(blocks));
+        self.descent.reserve(nodes_above(blocks));
         room(&mut self.dirty, nodes_above(blocks));
     }
 
@@ -115,6 +124,10 @@ impl Tree {
     /// Sets the bound of a block. To be called in ascending order of blocks, then [`Tree::refit`].
     #[inline(always)]
     pub(super) fn set(&mut self, block: usize, bound: [f32; 6]) {
+        // Of sixteen boxes one that changed has seldom been the outermost.
+        if is_same(&self.bounds[block], &bound) {
+            return;
+        }
         self.bounds[block] = bound;
         let parent = block / WIDTH;
         write(&mut self.levels[0][parent], block % WIDTH, &bound);
@@ -140,7 +153,11 @@ impl Tree {
             for at in 0..self.dirty.len() {
                 let node = self.dirty[at] as usize;
                 let bound = lanes.bound(&below[node], u16::MAX);
-                write(&mut above[node / WIDTH], node % WIDTH, &bound);
+                let (parent, lane) = (&mut above[node / WIDTH], node % WIDTH);
+                if is_same(&parent.get(lane), &bound) {
+                    continue;
+                }
+                write(parent, lane, &bound);
                 let parent = self.dirty[at] / LANES;
                 if kept == 0 || self.dirty[kept - 1] != parent {
                     self.dirty[kept] = parent;
@@ -152,49 +169,64 @@ impl Tree {
         self.dirty.clear();
     }
 
-    /// Appends the blocks whose bound meets a box.
+    /// Appends the blocks whose bound meets a box, ascending.
     #[inline(always)]
     pub(super) fn query<L: Lanes>(&mut self, lanes: L, one: &[f32; 6], found: &mut Vec<u32>) {
-        let mut stack = std::mem::take(&mut self.stack);
-        self.query_from(lanes, one, 0, 0, (&mut stack, found));
-        self.stack = stack;
+        let mut descent = std::mem::take(&mut self.descent);
+        self.query_from(lanes, one, (0, 0), &mut descent, found);
+        self.descent = descent;
     }
 
-    /// As [`Tree::query`], in ascending order.
+    /// As [`Tree::query`].
     ///
     /// * `floor` - the level of the nodes that are looked for: 0 for blocks, 1 for the lowest nodes, below the root.
     /// * `first` - none before this one.
-    /// * `stack`, `found` - memory kept over calls, and what is appended to.
+    /// * `found` - what is appended to.
     #[inline(always)]
     fn query_from<L: Lanes>(
         &self,
         lanes: L,
         one: &[f32; 6],
-        floor: u8,
-        first: u32,
-        (stack, found): (&mut Vec<(u8, u32)>, &mut Vec<u32>),
+        (floor, first): (usize, u32),
+        descent: &mut Descent,
+        found: &mut Vec<u32>,
     ) {
-        stack.clear();
-        #[allow(clippy::cast_possible_truncation, reason = "at most LEVELS_MAX levels")]
-        stack.push(((self.height - 1) as u8, 0));
-        while let Some((level, node)) = stack.pop() {
-            let mut hits = lanes.meets(&self.levels[usize::from(level)][node as usize], one);
-            // Children that hold none but earlier blocks.
-            let early = (first >> (4 * u32::from(level - floor))).saturating_sub(node * LANES);
-            hits &= u16::MAX.checked_shl(early).unwrap_or(0);
-            if level == floor {
-                while hits != 0 {
-                    found.push(node * LANES + hits.trailing_zeros());
-                    hits &= hits - 1;
-                }
-            }
-            // The highest first, so that the lowest is looked at first.
-            while hits != 0 {
-                let child = u16::BITS - 1 - hits.leading_zeros();
-                hits ^= 1 << child;
-                stack.push((level - 1, node * LANES + child));
-            }
+        descent.nodes.clear();
+        descent.nodes.push(0);
+        for level in (floor + 1..self.height).rev() {
+            // None of what holds but earlier ones.
+            let first = first >> (4 * (level - floor));
+            let count = self.meet_children(lanes, one, (level, first), descent);
+            descent.nodes.clear();
+            unfold(&descent.children, count, &mut descent.nodes);
         }
+        let count = self.meet_children(lanes, one, (floor, first), descent);
+        unfold(&descent.children, count, found);
+    }
+
+    /// Notes which children of the nodes at hand, of some level, meet a box; returns how many. None before the first.
+    #[inline(always)]
+    fn meet_children<L: Lanes>(
+        &self,
+        lanes: L,
+        one: &[f32; 6],
+        (level, first): (usize, u32),
+        descent: &mut Descent,
+    ) -> usize {
+        let Descent { nodes, children } = descent;
+        children.clear();
+        // One more: what stands behind the last has none.
+        children.resize(nodes.len() + 1, (0, 0));
+        let (mut kept, mut count) = (0, 0);
+        for node in nodes.iter() {
+            let early = first.saturating_sub(node * LANES);
+            let after = u16::MAX.checked_shl(early).unwrap_or(0);
+            let hits = lanes.meets(&self.levels[level][*node as usize], one) & after;
+            children[kept] = (node * LANES, hits);
+            kept += usize::from(hits != 0);
+            count += hits.count_ones() as usize;
+        }
+        count
     }
 
     /// Notes the lowest nodes from one on that it meets, and which of its blocks meet each, for [`Tree::query_among`]
@@ -202,10 +234,9 @@ impl Tree {
     #[inline(always)]
     pub(super) fn query_nodes<L: Lanes>(&self, lanes: L, node: usize, walk: &mut Walk) {
         let Walk {
-            stack,
+            descent,
             nodes,
             askers,
-            ..
         } = walk;
         nodes.clear();
         askers.clear();
@@ -216,7 +247,7 @@ impl Tree {
                 clippy::cast_possible_truncation,
                 reason = "a node of at most 2^20 / 16"
             )]
-            self.query_from(lanes, &bound, 1, node as u32, (stack, nodes));
+            self.query_from(lanes, &bound, (1, node as u32), descent, nodes);
             let mine = &self.levels[0][node];
             askers.extend(
                 nodes
@@ -240,13 +271,12 @@ impl Tree {
     ) {
         let bound = &self.bounds[block as usize];
         let Walk {
+            descent,
             nodes,
             askers,
-            met,
-            children,
-            ..
         } = walk;
-        // Which nodes are met, and how many blocks one has near, are guesses that fail: no branch is taken on them.
+        // Which nodes are met is a guess that fails: no branch is taken on it.
+        let met = &mut descent.nodes;
         met.clear();
         met.resize(nodes.len(), 0);
         let mut kept = 0;
@@ -255,27 +285,9 @@ impl Tree {
             kept += usize::from(askers >> (block % LANES) & 1);
         }
         met.truncate(kept);
-        children.clear();
-        children.resize(kept + 1, (0, 0));
-        let (mut kept, mut count) = (0, 0);
-        for node in met.iter() {
-            let early = block.saturating_sub(node * LANES);
-            let after = u16::MAX.checked_shl(early).unwrap_or(0);
-            let hits = lanes.meets(&self.levels[0][*node as usize], bound) & after;
-            children[kept] = (node * LANES, hits);
-            kept += usize::from(hits != 0);
-            count += hits.count_ones() as usize;
-        }
+        let count = self.meet_children(lanes, bound, (0, block), descent);
         found.clear();
-        found.resize(count, 0);
-        let (mut at, (mut first, mut left)) = (0, children[0]);
-        for found in found {
-            *found = first + left.trailing_zeros();
-            left &= left.wrapping_sub(1);
-            at += usize::from(left == 0);
-            let next = children[at];
-            (first, left) = if left == 0 { next } else { (first, left) };
-        }
+        unfold(&descent.children, count, found);
     }
 
     /// Checks every node against the blocks' boxes.
@@ -302,6 +314,33 @@ impl Tree {
     }
 }
 
+/// Appends so many children: all that a list names, as the first child of a node and which are meant. It ends with one
+/// that names none.
+///
+/// How many are of one node is a guess that fails: no branch is taken on it.
+#[inline(always)]
+fn unfold(children: &[(u32, u16)], count: usize, found: &mut Vec<u32>) {
+    let before = found.len();
+    found.resize(before + count, 0);
+    let (mut at, (mut first, mut left)) = (0, children[0]);
+    for found in &mut found[before..] {
+        *found = first + left.trailing_zeros();
+        left &= left.wrapping_sub(1);
+        at += usize::from(left == 0);
+        let next = children[at];
+        (first, left) = if left == 0 { next } else { (first, left) };
+    }
+}
+
+/// Whether two bounds are the same; without a branch a face.
+#[inline(always)]
+fn is_same(one: &[f32; 6], other: &[f32; 6]) -> bool {
+    let faces = one.iter().zip(other);
+    faces.fold(true, |same, (one, other)| {
+        same & (one.to_bits() == other.to_bits())
+    })
+}
+
 /// Writes a bound into a node; an empty one becomes an empty lane.
 #[inline(always)]
 fn write(node: &mut Boxes16, lane: usize, bound: &[f32; 6]) {
@@ -317,30 +356,41 @@ mod tests {
     use super::*;
     use crate::ids::small;
 
+    /// Sets bounds that stand along a line, those of some blocks empty; `turn` shifts, stretches and empties others.
+    fn set_some(tree: &mut Tree, blocks: usize, turn: usize) {
+        for block in 0..blocks {
+            let places = [block / 4 + (block + turn) * 7 % 11, (block + turn) % 4];
+            let [low, wide] = places.map(|at| f32::from(u16::try_from(at).unwrap()));
+            let bound = [low, low, 0.0, low + wide, low + wide, 1.0];
+            let there = (block + turn) % 5 != 2;
+            tree.set(block, if there { bound } else { NO_BOUND });
+        }
+        tree.refit(Portable);
+    }
+
     #[test]
-    fn a_block_is_told_every_block_from_it_on_that_it_meets() {
-        for blocks in [1, 16, 17, 300] {
+    fn a_block_is_told_every_block_that_it_meets() {
+        for (blocks, step) in [(1, 1), (16, 1), (17, 1), (300, 1), (4200, 41)] {
             let mut tree = Tree::default();
             tree.reset(blocks);
-            for block in (0..blocks).filter(|block| block % 5 != 2) {
-                let places = [block / 4 + block * 7 % 11, block % 4];
-                let [low, wide] = places.map(|at| f32::from(u16::try_from(at).unwrap()));
-                tree.set(block, [low, low, 0.0, low + wide, low + wide, 1.0]);
-            }
-            tree.refit(Portable);
             let (mut walk, mut found) = (Walk::default(), Vec::new());
-            for block in 0..blocks {
-                if block.is_multiple_of(WIDTH) {
+            for turn in [0, 1, 1, 4] {
+                set_some(&mut tree, blocks, turn);
+                for block in (0..blocks).step_by(step) {
+                    let one = *tree.bound(block);
+                    let meets = |other: &usize| {
+                        let other = tree.bound(*other);
+                        (0..3).all(|k| one[k] <= other[k + 3] && other[k] <= one[k + 3])
+                    };
+                    let all: Vec<u32> = (0..blocks).filter(meets).map(small).collect();
+                    let from = all.partition_point(|other| *other < small(block));
                     tree.query_nodes(Portable, block / WIDTH, &mut walk);
+                    tree.query_among(Portable, small(block), &mut walk, &mut found);
+                    assert_eq!(found, all[from..], "from block {block} of {blocks}");
+                    found.clear();
+                    tree.query(Portable, &one, &mut found);
+                    assert_eq!(found, all, "block {block} of {blocks}");
                 }
-                tree.query_among(Portable, small(block), &mut walk, &mut found);
-                let one = tree.bound(block);
-                let meets = |other: &usize| {
-                    let other = tree.bound(*other);
-                    (0..3).all(|k| one[k] <= other[k + 3] && other[k] <= one[k + 3])
-                };
-                let wanted: Vec<u32> = (block..blocks).filter(meets).map(small).collect();
-                assert_eq!(found, wanted, "block {block} of {blocks}");
             }
         }
     }
