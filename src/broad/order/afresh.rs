@@ -14,6 +14,7 @@
 //!
 //! Exact as the rest: boxes are rounded outward, and where rounding could tell otherwise the f64 boxes are asked.
 
+use super::cost::{list_cost, list_worth, search_cost};
 use super::gear::Gear;
 use super::lay::{LAY_TESTS, TakeLanes};
 use super::look::overlap;
@@ -127,13 +128,13 @@ impl Order {
             finds,
             ..
         } = &mut self.afresh;
-        // Where bodies were laid anew the boxes may have been searched twice.
-        let tests = if verlet.on {
-            verlet.pace.mean().unwrap_or(work.tests)
-        } else {
-            finds.tests
-        };
-        gear.note_scratch(tick.members.bounded().len(), tests);
+        let bodies = tick.members.bounded().len();
+        if !verlet.on {
+            // Where bodies were laid anew the boxes may have been searched twice.
+            gear.note_scratch(bodies, search_cost(bodies, finds.tests));
+        } else if let Some(mean) = verlet.pace.mean() {
+            gear.note_scratch(bodies, list_cost(bodies, mean));
+        }
         self.probe(tick);
     }
 
@@ -152,7 +153,8 @@ impl Order {
             return;
         }
         let Afresh { verlet, finds, .. } = &mut self.afresh;
-        let begins = was && !listed && verlet.pace.begins(self.hits, finds.tests);
+        let worth = list_worth(self.len, finds.tests);
+        let begins = was && !listed && verlet.pace.begins(self.hits, worth);
         if was && !listed {
             self.prepare_list(begins);
         }
@@ -194,11 +196,7 @@ impl Order {
         std::mem::swap(&mut self.afresh.held, &mut self.afresh.finds.met);
         self.tell_asked_afresh(tick.members, tick.began);
         if begins && stays {
-            self.ask_course(self.afresh.laid > 1);
-            let crowding = self.crowding(self.afresh.verlet.pace.first_ticks());
-            if (self.afresh.verlet.pace).promises(self.hits, crowding, tests) {
-                self.begin_list(tick, work);
-            }
+            self.try_list(tests, tick, work);
         }
     }
 

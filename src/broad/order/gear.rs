@@ -1,30 +1,12 @@
 //! Which way of working a tick takes: candidates that last, or none (`afresh`).
 //!
-//! In: counted work, never time, so that a replay chooses alike. Out: a choice, with hysteresis. The weights were
-//! measured once; they decide about cost alone.
+//! In: counted work (`cost`), never time, so that a replay chooses alike. Out: a choice, with hysteresis.
 
+use super::cost::{FAR, candidates_cost, scratch_guess};
 use super::probe::PROBE_TICKS;
 use super::{MANY_MOVED, Work};
 use crate::wire::BroadCause;
 
-/// Weights, in nanoseconds of the machine that they were measured on: a box taken, a candidate compared (or where more
-/// bodies move than the caches hold), a fat box renewed, a lane given up or taken ...
-const TAKE: u64 = 10;
-const TEST: u64 = 15;
-const TEST_FAR: u64 = 25;
-pub(super) const FAR: usize = 1 << 15;
-const RENEW: u64 = 200;
-const LANE: u64 = 1500;
-/// ... and without candidates a body, a box compared with a block.
-const BODY: u64 = 25;
-pub(super) const MEET: u64 = 12;
-/// Boxes compared with a block without candidates, a body, where that is not known yet: so many, and one for so many
-/// blocks that a block's query meets, in sixteenths.
-const MEETS_LEAST: u64 = 2;
-const MEETS_SHARE: u64 = 128;
-/// A Verlet list (`verlet`) takes this share of them in the mean, one for each overlap, and so many for the boxes.
-const LIST_SHARE: u64 = 4;
-const LIST_LEAST: u64 = 3;
 /// Ticks that a mean of the work is taken over ...
 const MEAN_TICKS: u64 = 16;
 /// ... and ticks after a sort of all that do not count: bodies have yet to learn their margins.
@@ -94,8 +76,8 @@ pub(super) struct Gear {
     /// Ticks since the last spell began or ended.
     since: u32,
     calm: u32,
-    /// Boxes compared with a block without candidates, a body, by the last such tick; 0 before the first.
-    meets: u64,
+    /// What a tick without candidates costs, for 1024 bodies, by the last one; 0 before the first.
+    scratch: u64,
     /// Fat boxes renewed in a tick with candidates, of 1024 bodies, in the mean; of the last such ticks while there are
     /// none.
     renewed: u64,
@@ -119,7 +101,7 @@ impl Default for Gear {
             spell: SPELL_MIN,
             since: TRIAL_TICKS,
             calm: 0,
-            meets: 0,
+            scratch: 0,
             renewed: 0,
             first: None,
             last: None,
@@ -177,21 +159,17 @@ impl Gear {
             self.cause = BroadCause::Spell;
             true
         } else {
-            let bodies = bodies as u64;
-            let meets = if self.meets > 0 {
-                self.meets
+            let scratch = if self.scratch > 0 {
+                self.scratch * bodies as u64 / 1024
             } else {
-                let plain = MEETS_LEAST + usual / MEETS_SHARE;
-                let hits = hits as u64 / bodies.max(1);
-                plain.min(plain / LIST_SHARE + hits + LIST_LEAST)
+                scratch_guess(bodies, usual, hits)
             };
-            let scratch = bodies * (BODY + meets * MEET);
             let seen = self.ticks.saturating_sub(self.counted_from());
             hopeless = seen >= EARLY_MEAN && self.mean > scratch * HOPELESS;
             // A fifth more: a change costs as much as some ticks.
             let settled = self.ticks >= SETTLE_TICKS + MEAN_TICKS;
             self.cause = BroadCause::Cost;
-            bodies >= BODIES_MIN && (hopeless || (settled && self.mean * 5 > scratch * 6))
+            bodies as u64 >= BODIES_MIN && (hopeless || (settled && self.mean * 5 > scratch * 6))
         };
         if chosen != on {
             if chosen {
@@ -266,9 +244,9 @@ impl Gear {
         }
     }
 
-    /// Takes the work of a tick without candidates: boxes compared with a block.
-    pub(super) fn note_scratch(&mut self, bodies: usize, tests: u64) {
-        self.meets = tests / (bodies as u64).max(1) + 1;
+    /// Takes what a tick without candidates costs.
+    pub(super) fn note_scratch(&mut self, bodies: usize, cost: u64) {
+        self.scratch = cost * 1024 / (bodies as u64).max(1) + 1;
     }
 
     /// Takes the work of a tick with candidates.
@@ -280,8 +258,7 @@ impl Gear {
             (self.ticks, self.mean) = (0, 0);
             return;
         }
-        let test = if moved > FAR { TEST_FAR } else { TEST };
-        let cost = moved as u64 * TAKE + work.tests * test + work.renewed * RENEW + lanes * LANE;
+        let cost = candidates_cost(moved, lanes, work);
         self.ticks += 1;
         if self.ticks <= EARLY_TICKS {
             return;

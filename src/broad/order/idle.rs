@@ -6,7 +6,7 @@
 //! at that length. Of fewer bodies all of it is kept, so that no tick makes any.
 
 use super::afresh::Afresh;
-use super::gear::FAR;
+use super::cost::FAR;
 use super::mend::Mender;
 use super::{Order, moved, renew};
 

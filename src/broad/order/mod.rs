@@ -35,6 +35,7 @@ use crate::wire::{BroadCause, BroadMode};
 
 mod afresh;
 mod bits;
+mod cost;
 mod course;
 mod entry;
 mod fatten;

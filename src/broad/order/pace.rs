@@ -1,15 +1,12 @@
 //! For how many ticks a Verlet list is made, when the next one is begun, and whether lists pay.
 //!
 //! In: counted work and how far bodies fly, never time, so that a replay chooses alike. Out: when the list is made
-//! anew, for how long, and when it is let go. The weights were measured once; they decide about cost alone.
+//! anew, for how long, and when it is let go.
 
-use super::gear::MEET;
+use super::cost::{LOOK, MEET, entries_cost};
 use super::lay::LAY_TESTS;
 use super::shares::RUNS_MAX;
 
-/// Weights, as those of [`gear`](super::gear): an entry looked at, a body looked for alone.
-const LOOK: u64 = 4;
-const STRAY: u64 = 400;
 /// Ticks that a list is in use, at first, at least and at most.
 const TICKS: u32 = 8;
 const TICKS_MIN: u32 = 4;
@@ -23,6 +20,8 @@ const VAIN: u32 = 3;
 /// ... for so many ticks; four times as many each time that they prove no better.
 const REST_MIN: u32 = 64;
 const REST_MAX: u32 = 2048;
+/// ... and for so many where a list that paid was broken off.
+const REST_BROKEN: u32 = 8;
 /// Ticks before the first: in one of them bodies are watched.
 const FIRST_REST: u32 = 2;
 /// One in so many strays, comes or jumps in a tick, and the next list is begun in the one that follows.
@@ -56,8 +55,8 @@ pub(super) struct Pace {
     /// ... of the one before in the mean, and whether its ticks were more than those of the one before it.
     before: u64,
     longer: bool,
-    /// What a tick would take without: boxes compared with a block.
-    plain: u64,
+    /// What entries and searches may cost a tick, before a search in each costs less.
+    worth: u64,
     /// Boxes compared with a block in the first search since bodies were laid, and those beyond that since; and in the
     /// last one.
     usual: u64,
@@ -80,7 +79,7 @@ impl Default for Pace {
             lasted: 0,
             before: 0,
             longer: true,
-            plain: 0,
+            worth: 0,
             usual: 0,
             excess: 0,
             last: 0,
@@ -95,10 +94,10 @@ impl Pace {
     /// Whether a list is to be begun in a tick without.
     ///
     /// * `hits` - overlaps of the last tick: there will be more entries.
-    /// * `plain` - boxes compared with a block in its search.
-    pub(super) fn begins(&mut self, hits: usize, plain: u64) -> bool {
+    /// * `worth` - what entries and searches may cost ([`list_worth`](super::cost::list_worth)).
+    pub(super) fn begins(&mut self, hits: usize, worth: u64) -> bool {
         self.rest = self.rest.saturating_sub(1);
-        self.rest == 0 && hits as u64 * LOOK < plain * MEET
+        self.rest == 0 && hits as u64 * LOOK < worth
     }
 
     /// Whether one may be in the next tick, if none is in this.
@@ -115,11 +114,11 @@ impl Pace {
     ///
     /// * `hits` - overlaps now.
     /// * `crowding` - times more that will be near.
-    /// * `plain` - boxes compared with a block in a search of all boxes as they are.
-    pub(super) fn promises(&mut self, hits: usize, crowding: f64, plain: u64) -> bool {
+    /// * `worth` - as for [`Pace::begins`], by a search of all boxes as they are.
+    pub(super) fn promises(&mut self, hits: usize, crowding: f64, worth: u64) -> bool {
         #[allow(clippy::cast_precision_loss, reason = "a cost")]
-        let (looks, search) = ((hits as u64 * LOOK) as f64, (plain * MEET) as f64);
-        let promises = looks * crowding <= search;
+        let (looks, worth) = ((hits as u64 * LOOK) as f64, worth as f64);
+        let promises = looks * crowding <= worth;
         if !promises {
             self.fail();
         }
@@ -128,9 +127,9 @@ impl Pace {
 
     /// Lists begin, all at once.
     ///
-    /// * `plain` - boxes compared with a block in a search of all boxes as they are.
-    pub(super) fn begin(&mut self, plain: u64) {
-        (self.plain, self.left, self.making) = (plain, 0, false);
+    /// * `worth` - as for [`Pace::promises`].
+    pub(super) fn begin(&mut self, worth: u64) {
+        (self.worth, self.left, self.making) = (worth, 0, false);
         self.note_laid();
     }
 
@@ -177,9 +176,9 @@ impl Pace {
         self.excess + self.last > u64::from(LAY_TESTS) * bodies as u64
     }
 
-    /// What a tick takes in the mean, in boxes compared with a block; `None` where that is not known yet.
+    /// What entries and searches cost a tick in the mean; `None` where that is not known yet.
     pub(super) fn mean(&self) -> Option<u64> {
-        (self.before > 0).then_some(self.before / MEET)
+        (self.before > 0).then_some(self.before)
     }
 
     /// Bodies were laid anew.
@@ -191,11 +190,12 @@ impl Pace {
     pub(super) fn pays(&mut self) -> bool {
         let left = u64::from(self.left);
         let mean = (self.cost + left * self.tick) / (self.lasted + left).max(1);
-        let pays = mean * 10 < self.plain * MEET * 9;
-        self.vain = if pays { 0 } else { self.vain + 1 };
-        if pays {
+        let pays = mean * 10 < self.worth * 9;
+        if pays && self.vain == 0 && self.before > 0 {
+            // Two in a row.
             self.spell = REST_MIN;
         }
+        self.vain = if pays { 0 } else { self.vain + 1 };
         // Uphill: on in the direction that was better.
         if mean > self.before {
             self.longer = !self.longer;
@@ -224,6 +224,15 @@ impl Pace {
         self.before = 0;
     }
 
+    /// The list is let go, for too much happened in one tick. One that had paid until then is soon tried again.
+    pub(super) fn break_off(&mut self) {
+        let paid = self.before > 0 && self.vain == 0;
+        self.fail();
+        if paid {
+            self.rest = REST_BROKEN;
+        }
+    }
+
     /// A list takes over.
     ///
     /// * `tests` - boxes compared with a block in the search for it.
@@ -240,11 +249,11 @@ impl Pace {
 
     /// A tick with a list is over.
     pub(super) fn note_tick(&mut self, entries: usize, strays: usize, bodies: usize) {
-        self.tick = entries as u64 * LOOK + strays as u64 * STRAY;
+        self.tick = entries_cost(bodies, entries, strays);
         self.lasted += 1;
         self.cost += self.tick;
         self.left -= 1;
-        let hopeless = entries as u64 * LOOK > self.plain * MEET;
+        let hopeless = entries as u64 * LOOK > self.worth;
         if hopeless {
             self.vain = VAIN - 1;
         }
@@ -257,144 +266,4 @@ impl Pace {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const BODIES: usize = 1000;
-
-    /// Lists in turn; a search costs `tests`, and a tick so many entries for each tick that boxes are swept for.
-    /// Returns how long the last ones were in use, and whether lists go on.
-    fn run(pace: &mut Pace, tests: u64, entries: u64, lists: u32) -> (u32, bool) {
-        pace.note_list(tests);
-        for _ in 0..lists {
-            let most = usize::try_from(entries * u64::from(pace.ticks)).unwrap();
-            while pace.phase() == Phase::Lasts {
-                pace.note_tick(most, 0, BODIES);
-            }
-            if !pace.pays() {
-                return (pace.ticks, false);
-            }
-            pace.open();
-            while pace.phase() == Phase::Makes {
-                pace.note_tick(most, 0, BODIES);
-            }
-            assert_eq!(pace.phase(), Phase::Ends);
-            pace.note_list(tests);
-            pace.note_tick(most, 0, BODIES);
-        }
-        (pace.ticks, true)
-    }
-
-    #[test]
-    fn a_list_is_in_use_for_as_many_ticks_as_cost_least() {
-        // A search of 12 000 over n ticks, and 480 n in each: least at five.
-        let mut pace = Pace::default();
-        pace.begin(4000);
-        let (ticks, on) = run(&mut pace, 1000, 120, 40);
-        assert!((4..=8).contains(&ticks) && on, "{ticks}");
-        // With cheaper entries longer.
-        let (ticks, on) = run(&mut pace, 1000, 10, 40);
-        assert!((12..=TICKS_MAX).contains(&ticks) && on, "{ticks}");
-    }
-
-    #[test]
-    fn the_next_list_is_made_in_the_last_ticks_of_the_one_in_use() {
-        let mut pace = Pace::default();
-        pace.begin(1000);
-        assert_eq!(pace.span(true), TICKS);
-        pace.note_list(1000);
-        pace.note_tick(10, 0, BODIES);
-        let mut seen = Vec::new();
-        loop {
-            let phase = pace.phase();
-            if phase == Phase::Opens {
-                assert!(pace.pays());
-                assert_eq!(pace.open(), pace.left);
-            }
-            seen.push((phase, pace.span(false)));
-            if phase == Phase::Ends {
-                break;
-            }
-            pace.note_tick(10, 0, BODIES);
-        }
-        let (lasts, makes) = seen.split_at(3);
-        assert_eq!(
-            pace.ticks,
-            TICKS - 2,
-            "one way is as good as the other at first"
-        );
-        let spans: Vec<u32> = lasts.iter().map(|(_, span)| *span).collect();
-        assert!(lasts.iter().all(|(phase, _)| *phase == Phase::Lasts));
-        assert_eq!(spans, [7, 6, 5]);
-        let made = [9, 8, 7].map(|span| (Phase::Makes, span));
-        assert_eq!(makes[0], (Phase::Opens, 10));
-        assert_eq!(makes[1..4], made);
-        assert_eq!(makes[4..], [(Phase::Ends, 6)]);
-        // Its boxes hold to the end of the list that takes over now.
-        pace.note_list(1000);
-        pace.note_tick(10, 0, BODIES);
-        assert_eq!((pace.phase(), pace.span(false)), (Phase::Lasts, 5));
-    }
-
-    #[test]
-    fn lists_that_do_not_pay_are_tried_ever_more_seldom() {
-        let mut pace = Pace::default();
-        let mut rests = Vec::new();
-        for _ in 0..4 {
-            pace.begin(1000);
-            let (_, on) = run(&mut pace, 8000, 300, 40);
-            assert!(!on);
-            rests.push(1 + (0..).take_while(|_| !pace.begins(0, 1000)).count());
-        }
-        assert_eq!(rests, [64, 256, 1024, 2048]);
-        // One that pays again starts from the beginning.
-        pace.begin(4000);
-        assert!(run(&mut pace, 1000, 10, 4).1);
-        pace.fail();
-        assert_eq!(pace.rest, REST_MIN);
-    }
-
-    #[test]
-    fn a_crowd_of_overlaps_is_not_listed() {
-        let mut pace = Pace::default();
-        assert!(!pace.begins(2000, 1000) && pace.nears());
-        assert!(!pace.begins(10_000, 1000) && pace.begins(2000, 1000));
-        // What turns out to be one is let go in the next tick.
-        pace.begin(1000);
-        pace.note_list(1000);
-        pace.note_tick(100_000, 0, BODIES);
-        assert!(pace.phase() == Phase::Opens && !pace.pays());
-    }
-
-    #[test]
-    fn what_flies_far_beside_its_size_is_not_listed_to_begin_with() {
-        let mut pace = Pace::default();
-        assert!(pace.promises(1000, 2.5, 1000));
-        assert!(!pace.promises(1000, 4.0, 1000));
-        assert!((0..REST_MIN - 1).all(|_| !pace.begins(0, 1000)) && pace.begins(0, 1000));
-    }
-
-    #[test]
-    fn where_many_stray_the_next_list_is_begun() {
-        let mut pace = Pace::default();
-        pace.begin(1000);
-        pace.note_list(1000);
-        pace.note_tick(100, BODIES / 100, BODIES);
-        assert_eq!(pace.phase(), Phase::Lasts);
-        pace.note_tick(100, BODIES / 10, BODIES);
-        assert_eq!(pace.phase(), Phase::Opens);
-    }
-
-    #[test]
-    fn searches_that_have_cost_as_much_as_laying_anew_are_wear() {
-        let mut pace = Pace::default();
-        pace.note_list(1000);
-        for _ in 0..12 {
-            assert!(!pace.is_worn(BODIES));
-            pace.note_list(2000);
-        }
-        assert!(pace.is_worn(BODIES));
-        pace.note_laid();
-        assert!(!pace.is_worn(BODIES));
-    }
-}
+mod tests;

@@ -18,6 +18,7 @@
 //! Source: Verlet 1967; swept boxes in place of his spheres, so that a list lasts as long for what flies fast.
 
 use super::afresh::Afresh;
+use super::cost::list_worth;
 use super::course::{Course, Reach};
 use super::fatten::outward;
 use super::idle::shed;
@@ -76,11 +77,29 @@ impl Verlet {
 const FEW: usize = 300;
 
 impl Order {
+    /// Begins a list where one promises to cost less than a search in each tick.
+    ///
+    /// * `tests` - boxes compared with a block in such a search.
+    pub(super) fn try_list<P: Proxies>(
+        &mut self,
+        tests: u64,
+        tick: &mut Tick<'_, P>,
+        work: &mut Done,
+    ) {
+        self.ask_course(self.afresh.laid > 1);
+        let crowding = self.crowding(self.afresh.verlet.pace.first_ticks());
+        let worth = list_worth(self.len, tests);
+        let pace = &mut self.afresh.verlet.pace;
+        if pace.promises(self.hits, crowding, worth) {
+            pace.begin(worth);
+            self.begin_list(tick, work);
+        }
+    }
+
     /// Lists what is near, from a tick on of which everything is told.
-    pub(super) fn begin_list<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Done) {
+    fn begin_list<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, work: &mut Done) {
         let Afresh {
             verlet,
-            finds,
             presort,
             held,
             ..
@@ -88,7 +107,6 @@ impl Order {
         verlet.on = true;
         presort.stop();
         held.clear();
-        verlet.pace.begin(finds.tests);
         let span = verlet.pace.span(true);
         self.clear_lanes();
         self.take_swept(tick.proxies, Phase::Opens, span);
@@ -138,7 +156,7 @@ impl Order {
         let known = self.afresh.verlet.strays.len() + came;
         self.look_listed(0, true, tick);
         if known * MANY_CAME > bodies || !self.seat_anew(jumped, tick) {
-            self.afresh.verlet.pace.fail();
+            self.afresh.verlet.pace.break_off();
             self.end_list();
             return false;
         }
@@ -154,7 +172,7 @@ impl Order {
             Phase::Ends => self.take_over(tick.proxies),
             Phase::Lasts if self.afresh.presort.is_ready() => {
                 if !self.lay_listed(tick) {
-                    self.afresh.verlet.pace.fail();
+                    self.afresh.verlet.pace.break_off();
                     self.afresh.verlet.on = false;
                     return false;
                 }

@@ -32,7 +32,7 @@ fn motion_that_no_box_holds_is_worked_from_scratch_but_for_ever_rarer_trials() {
     assert_eq!(gear.cause, BroadCause::Spell);
     assert!(run(&mut gear, &mut on, 10_000, &wild) > 9_700);
     // It has calmed: a trial finds that out and stays.
-    let calm = work(2_000, 60);
+    let calm = work(500, 5);
     run(&mut gear, &mut on, SPELL_MAX + 1, &calm);
     assert_eq!(run(&mut gear, &mut on, 1000, &calm), 0);
 }
@@ -125,7 +125,7 @@ fn a_world_that_comes_to_rest_is_left_to_candidates_at_once() {
 #[test]
 fn motion_that_boxes_hold_is_never_worked_from_scratch() {
     let (mut gear, mut on) = (Gear::default(), false);
-    assert_eq!(run(&mut gear, &mut on, 5_000, &work(2_500, 80)), 0);
+    assert_eq!(run(&mut gear, &mut on, 5_000, &work(500, 5)), 0);
 }
 
 /// Ticks of many bodies that all move, from the first; those in a probe are told that so many of 1,024 escape. Returns
