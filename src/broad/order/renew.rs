@@ -260,20 +260,20 @@ impl Renew<'_> {
         if block == other {
             for lane in ones(renewing) {
                 let meets = lanes.meets(mine, &mine.get(lane)) & !(1 << lane);
-                set_column(&mut cand, lane, meets & below(lane));
+                set_column(lanes, &mut cand, lane, meets & below(lane));
                 cand[lane] = meets & !below(lane);
             }
         } else if block < other {
-            clear(&mut cand, renewing, u16::MAX);
+            clear(lanes, &mut cand, renewing, u16::MAX);
             for lane in ones(sifted) {
                 cand[lane] = lanes.meets(theirs, &mine.get(lane));
             }
         } else {
-            clear(&mut cand, u16::MAX, renewing);
+            clear(lanes, &mut cand, u16::MAX, renewing);
             for lane in ones(sifted) {
                 let meets = lanes.meets(theirs, &mine.get(lane));
                 if meets != 0 {
-                    set_column(&mut cand, lane, meets);
+                    set_column(lanes, &mut cand, lane, meets);
                 }
             }
         }
@@ -285,9 +285,9 @@ impl Renew<'_> {
     fn part<L: Lanes>(&mut self, lanes: L, block: u32, other: u32, record: u32, renewing: u16) {
         let mut cand = self.order.links.bits(record).cand;
         if block < other {
-            clear(&mut cand, renewing, u16::MAX);
+            clear(lanes, &mut cand, renewing, u16::MAX);
         } else {
-            clear(&mut cand, u16::MAX, renewing);
+            clear(lanes, &mut cand, u16::MAX, renewing);
         }
         self.write(lanes, block, other, record, &cand, renewing);
     }
@@ -337,14 +337,14 @@ impl Renew<'_> {
         if order.listed {
             let mut chosen = *cand;
             if a == b {
-                keep_either(&mut chosen, renewing);
+                keep_either(lanes, &mut chosen, renewing);
             } else if block < other {
-                clear(&mut chosen, !renewing, u16::MAX);
+                clear(lanes, &mut chosen, !renewing, u16::MAX);
             } else {
                 // Of two lanes that are both renewed the lower block lists the pair.
                 let theirs = order.renewing[other as usize];
-                clear(&mut chosen, theirs, u16::MAX);
-                clear(&mut chosen, u16::MAX, !renewing);
+                clear(lanes, &mut chosen, theirs, u16::MAX);
+                clear(lanes, &mut chosen, u16::MAX, !renewing);
             }
             order.list_bits(lanes, record, &chosen, self.began);
         }
@@ -361,27 +361,20 @@ fn zip(one: &Matrix, other: &Matrix, with: impl Fn(u16, u16) -> u16) -> Matrix {
     out
 }
 
-/// All ones in the rows named by some bits.
-#[inline(always)]
-fn spread(rows: u16) -> Matrix {
-    let mut out = [0; WIDTH];
-    for (row, line) in out.iter_mut().enumerate() {
-        // A compare with a constant a row: wide on every level.
-        *line = if rows & (1 << row) != 0 { u16::MAX } else { 0 };
-    }
-    out
-}
-
 /// Clears the bits that lie in any of some rows and in any of some columns.
 #[inline(always)]
-fn clear(matrix: &mut Matrix, rows: u16, columns: u16) {
-    *matrix = zip(matrix, &spread(rows), |line, row| line & !(row & columns));
+fn clear<L: Lanes>(lanes: L, matrix: &mut Matrix, rows: u16, columns: u16) {
+    *matrix = zip(matrix, &lanes.spread(rows), |line, row| {
+        line & !(row & columns)
+    });
 }
 
 /// Keeps the bits that lie in any of some rows or in any of the same columns.
 #[inline(always)]
-fn keep_either(matrix: &mut Matrix, lanes: u16) {
-    *matrix = zip(matrix, &spread(lanes), |line, row| line & (lanes | row));
+fn keep_either<L: Lanes>(lanes: L, matrix: &mut Matrix, chosen: u16) {
+    *matrix = zip(matrix, &lanes.spread(chosen), |line, row| {
+        line & (chosen | row)
+    });
 }
 
 /// Bits below a lane.
@@ -392,7 +385,9 @@ fn below(lane: usize) -> u16 {
 
 /// Sets bit `lane` of each row.
 #[inline(always)]
-fn set_column(matrix: &mut Matrix, lane: usize, bits: u16) {
+fn set_column<L: Lanes>(lanes: L, matrix: &mut Matrix, lane: usize, bits: u16) {
     let mask = 1 << lane;
-    *matrix = zip(matrix, &spread(bits), |line, row| line & !mask | row & mask);
+    *matrix = zip(matrix, &lanes.spread(bits), |line, row| {
+        line & !mask | row & mask
+    });
 }

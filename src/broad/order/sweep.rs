@@ -11,7 +11,7 @@ use crate::ids::small;
 use std::ops::Range;
 
 use super::idle::shed;
-use super::links::{Matrix, room, spare};
+use super::links::{EMPTY, Matrix, room, spare};
 use super::met::Met;
 use super::near::Near;
 use super::tree::{Tree, Walk};
@@ -288,7 +288,9 @@ impl Scratch {
         open: &mut Vec<[u32; 2]>,
     ) -> usize {
         let mut pairs = 0;
-        self.matrices[..sides].fill([0; WIDTH]);
+        self.matrices[..sides].fill(EMPTY);
+        // What meets a box drawn in by the slack of either surely overlaps it, as `Lanes::parts` tells.
+        let by = slack(farthest(field.tree.bound(block)));
         for hit in &self.hits[..hits] {
             let side = &self.sides[usize::from(hit.side)];
             let (one, other) = (side.block as usize, side.against as usize);
@@ -301,13 +303,9 @@ impl Scratch {
                 (hit.met, lane)
             };
             let matrix = &mut self.matrices[usize::from(hit.side)];
-            for (row, line) in matrix.iter_mut().enumerate() {
-                // The row's bit to the top, and then to all: wide on every level.
-                let all = (rows << (WIDTH - 1 - row)).cast_signed() >> (WIDTH - 1);
-                *line |= columns & all.cast_unsigned();
+            for (line, row) in matrix.iter_mut().zip(lanes.spread(rows)) {
+                *line |= columns & row;
             }
-            // Drawn in by its slack: what meets that surely overlaps it, as `Lanes::parts` tells.
-            let by = slack(farthest(field.tree.bound(one)));
             let [x, y, z, u, v, w] = field.fat[one].get(usize::from(hit.lane));
             let less = [x + by, y + by, z + by, u - by, v - by, w - by];
             let mut doubt = hit.met & !lanes.meets(&field.fat[other], &less);

@@ -158,6 +158,9 @@ pub(crate) trait Lanes: Copy {
 
     /// Bit `lane` of each row of a matrix of bits, as the bits of those rows.
     fn column(self, matrix: &[u16; WIDTH], lane: usize) -> u16;
+
+    /// A matrix with all bits in some rows.
+    fn spread(self, rows: u16) -> [u16; WIDTH];
 }
 
 /// Plain Rust.
@@ -264,5 +267,10 @@ impl Lanes for Portable {
     #[inline(always)]
     fn column(self, matrix: &[u16; WIDTH], lane: usize) -> u16 {
         mask(&matrix.map(|row| row >> (lane % WIDTH) & 1 == 1))
+    }
+
+    #[inline(always)]
+    fn spread(self, rows: u16) -> [u16; WIDTH] {
+        std::array::from_fn(|row| if rows >> row & 1 == 1 { u16::MAX } else { 0 })
     }
 }

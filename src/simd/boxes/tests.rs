@@ -103,6 +103,30 @@ fn every_level_turns_a_matrix_by_its_columns() {
     }
 }
 
+/// The matrix of some rows.
+struct Spread(u16);
+
+impl Work for Spread {
+    type Out = [u16; WIDTH];
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> Self::Out {
+        lanes.spread(self.0)
+    }
+}
+
+#[test]
+fn every_level_fills_the_rows_that_are_named() {
+    for rows in (0..=u16::MAX).step_by(if cfg!(miri) { 4093 } else { 7 }) {
+        for level in Level::available() {
+            for (row, line) in level.run(Spread(rows)).into_iter().enumerate() {
+                let wanted = if rows >> row & 1 == 1 { u16::MAX } else { 0 };
+                assert_eq!(line, wanted, "{rows:x}, {level:?}, {row}");
+            }
+        }
+    }
+}
+
 /// Takes a box and tells whether it keeps to a hold.
 struct Taken<'a>([&'a [f64; 3]; 2], &'a [f64; 3], &'a Hold);
 

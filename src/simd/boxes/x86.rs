@@ -6,14 +6,15 @@ use std::arch::x86_64::{
     __m256, __m256d, __m256i, __m512, _CMP_GT_OQ, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ,
     _mm_cvtsi32_si128, _mm_cvtss_f32, _mm_max_ps, _mm_max_ss, _mm_movehl_ps, _mm_shuffle_ps,
     _mm256_add_ps, _mm256_and_ps, _mm256_and_si256, _mm256_andnot_ps, _mm256_blendv_ps,
-    _mm256_castps256_ps128, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi32,
-    _mm256_cvtpd_ps, _mm256_extractf128_ps, _mm256_load_ps, _mm256_loadu_ps, _mm256_loadu_si256,
-    _mm256_maskload_pd, _mm256_max_ps, _mm256_movemask_epi8, _mm256_mul_ps, _mm256_or_ps,
-    _mm256_packs_epi16, _mm256_permute2f128_ps, _mm256_set_m128, _mm256_set1_epi16,
-    _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi32, _mm256_setr_epi64x, _mm256_setr_pd,
-    _mm256_setzero_ps, _mm256_setzero_si256, _mm256_sll_epi16, _mm256_slli_epi32, _mm256_store_ps,
-    _mm256_sub_pd, _mm256_sub_ps, _mm256_test_epi16_mask, _mm256_xor_ps, _mm512_cmp_ps_mask,
-    _mm512_loadu_ps, _mm512_set1_ps,
+    _mm256_castps256_ps128, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_cmpeq_epi16,
+    _mm256_cmpeq_epi32, _mm256_cvtpd_ps, _mm256_extractf128_ps, _mm256_load_ps, _mm256_loadu_ps,
+    _mm256_loadu_si256, _mm256_maskload_pd, _mm256_max_ps, _mm256_movemask_epi8, _mm256_movm_epi16,
+    _mm256_mul_ps, _mm256_or_ps, _mm256_packs_epi16, _mm256_permute2f128_ps, _mm256_set_m128,
+    _mm256_set1_epi16, _mm256_set1_epi32, _mm256_set1_ps, _mm256_setr_epi16, _mm256_setr_epi32,
+    _mm256_setr_epi64x, _mm256_setr_pd, _mm256_setzero_ps, _mm256_setzero_si256, _mm256_sll_epi16,
+    _mm256_slli_epi32, _mm256_store_ps, _mm256_storeu_si256, _mm256_sub_pd, _mm256_sub_ps,
+    _mm256_test_epi16_mask, _mm256_xor_ps, _mm512_loadu_ps, _mm512_mask_cmp_ps_mask,
+    _mm512_set1_ps,
 };
 
 use super::Work;
@@ -106,9 +107,14 @@ fn meets_avx2(block: &Boxes16, one: &[f32; 6]) -> u16 {
 #[target_feature(enable = "avx512f")]
 fn meets_avx512(block: &Boxes16, one: &[f32; 6]) -> u16 {
     let f = &block.faces;
-    let low = |k: usize| _mm512_cmp_ps_mask::<_CMP_NLT_UQ>(_mm512_set1_ps(one[k + 3]), all(&f[k]));
-    let high = |k: usize| _mm512_cmp_ps_mask::<_CMP_LE_OQ>(_mm512_set1_ps(one[k]), all(&f[k + 3]));
-    (low(0) & high(0)) & (low(1) & high(1)) & (low(2) & high(2))
+    // Each compare within the lanes that another left, which takes no instruction more; in two chains of three.
+    let low = |left, k: usize| {
+        _mm512_mask_cmp_ps_mask::<_CMP_NLT_UQ>(left, _mm512_set1_ps(one[k + 3]), all(&f[k]))
+    };
+    let high = |left, k: usize| {
+        _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(left, _mm512_set1_ps(one[k]), all(&f[k + 3]))
+    };
+    low(high(low(u16::MAX, 0), 0), 1) & high(low(high(u16::MAX, 1), 2), 2)
 }
 
 #[inline]
@@ -212,6 +218,34 @@ fn column_avx512(matrix: &[u16; WIDTH], lane: usize) -> u16 {
     _mm256_test_epi16_mask(rows(matrix), _mm256_set1_epi16(bit))
 }
 
+/// By its own instructions: the compiler treats the row whose bit is the sign apart, and takes four times as many.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn spread_avx2(rows: u16) -> [u16; WIDTH] {
+    #[rustfmt::skip]
+    let places = _mm256_setr_epi16(
+        1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, i16::MIN,
+    );
+    let set = _mm256_and_si256(_mm256_set1_epi16(rows.cast_signed()), places);
+    lines(_mm256_cmpeq_epi16(set, places))
+}
+
+#[inline]
+#[target_feature(enable = "avx512bw,avx512vl")]
+fn spread_avx512(rows: u16) -> [u16; WIDTH] {
+    lines(_mm256_movm_epi16(rows))
+}
+
+/// A register as the rows of a matrix.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn lines(all: __m256i) -> [u16; WIDTH] {
+    let mut matrix = [0; WIDTH];
+    // SAFETY: the array is as long as the register.
+    unsafe { _mm256_storeu_si256(matrix.as_mut_ptr().cast(), all) };
+    matrix
+}
+
 /// The greatest of the chosen lanes; minus infinity where there is none. `set` is all ones in those lanes.
 #[inline]
 #[target_feature(enable = "avx2")]
@@ -310,6 +344,17 @@ impl<const WIDE: bool> Lanes for Vectors<WIDE> {
         } else {
             // SAFETY: a `Vectors` is made only where AVX2 is.
             unsafe { column_avx2(matrix, lane) }
+        }
+    }
+
+    #[inline(always)]
+    fn spread(self, rows: u16) -> [u16; WIDTH] {
+        if WIDE {
+            // SAFETY: a wide one is made only where AVX-512 BW and VL are.
+            unsafe { spread_avx512(rows) }
+        } else {
+            // SAFETY: a `Vectors` is made only where AVX2 is.
+            unsafe { spread_avx2(rows) }
         }
     }
 }
