@@ -69,6 +69,16 @@ pub(super) fn each_bit<W: Copy>(
 const ROWS: usize = u64::BITS as usize / WIDTH;
 /// Words of a matrix.
 const WORDS: usize = WIDTH / ROWS;
+/// The rows of a matrix as words, the first in the lowest bits.
+#[inline(always)]
+pub(super) fn words(matrix: &Matrix) -> [u64; WORDS] {
+    let rows = matrix.as_chunks::<ROWS>().0;
+    std::array::from_fn(|word| {
+        let lines = rows[word].iter().rev().map(|row| u64::from(*row));
+        lines.fold(0, |bits, row| bits << WIDTH | row)
+    })
+}
+
 /// Words that are gathered before they are gone through: they stay in the first cache.
 const TOGETHER: usize = 256;
 
@@ -112,10 +122,14 @@ impl<'a, T, F: Fn(u32, u32) -> T> Gathered<'a, T, F> {
     /// * `blocks` - of its rows, and of its lanes.
     #[inline(always)]
     pub(super) fn put(&mut self, matrix: &Matrix, blocks: [usize; 2]) {
+        self.put_words(words(matrix), blocks);
+    }
+
+    /// ... that has them as words.
+    #[inline(always)]
+    pub(super) fn put_words(&mut self, words: [u64; WORDS], blocks: [usize; 2]) {
         let [row, lane] = blocks.map(|block| small(block * WIDTH));
-        for (row, rows) in (row..).step_by(ROWS).zip(matrix.as_chunks::<ROWS>().0) {
-            let lines = rows.iter().rev().map(|row| u64::from(*row));
-            let bits = lines.fold(0, |bits, row| bits << WIDTH | row);
+        for (row, bits) in (row..).step_by(ROWS).zip(words) {
             self.words[self.len] = Word { bits, row, lane };
             self.len += usize::from(bits != 0);
             self.bits += bits.count_ones() as usize;

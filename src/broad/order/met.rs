@@ -3,7 +3,7 @@
 //! In: boxes in their lanes, the tree over the blocks. Out: the overlaps of a tick in the order of blocks, so that
 //! those of two ticks with the same lanes differ by their bits alone.
 
-use super::bits::Gathered;
+use super::bits::{Gathered, words};
 use super::idle::shed;
 use super::links::{EMPTY, Matrix, room, spare};
 use super::{BodySlot, parts};
@@ -284,7 +284,9 @@ impl Work for TellDifference<'_> {
                 if gone[block] | gone[other as usize] != 0 {
                     was = without(&was, gone[block], gone[other as usize]);
                 }
-                changes[len] = Change { was, is, blocks };
+                // Field by field: a whole one would wait for its parts to be stored.
+                let change = &mut changes[len];
+                (change.was, change.is, change.blocks) = (was, is, blocks);
                 len += usize::from(was != is);
                 if len == CHANGES {
                     gather(&changes, &mut goes, &mut comes);
@@ -306,8 +308,10 @@ fn gather<F: Fn(u32, u32) -> PairKey>(
     comes: &mut Gathered<'_, PairKey, F>,
 ) {
     for Change { was, is, blocks } in changes {
-        goes.put(&minus(was, is), *blocks);
-        comes.put(&minus(is, was), *blocks);
+        // Word by word: row by row each is cut out of a register and put together again.
+        let (was, is) = (words(was), words(is));
+        goes.put_words(std::array::from_fn(|word| was[word] & !is[word]), *blocks);
+        comes.put_words(std::array::from_fn(|word| is[word] & !was[word]), *blocks);
     }
 }
 
