@@ -39,6 +39,15 @@ struct Hit {
     met: u16,
 }
 
+/// What the passes over some near blocks have come to.
+#[derive(Clone, Copy, Debug, Default)]
+struct Count {
+    sides: usize,
+    /// Boxes compared with a block.
+    boxes: usize,
+    hits: usize,
+}
+
 /// Where the boxes stand: what a search reads.
 #[derive(Clone, Copy)]
 pub(super) struct Field<'a> {
@@ -176,15 +185,24 @@ impl Work for Sweep<'_> {
             (field.tree).query_among(lanes, small(block), walk, &mut near);
             tests += near.len() as u64;
             for some in near.chunks(TOGETHER) {
-                let (sides, boxes) = scratch.sift(lanes, field, block, some);
-                let hits = scratch.compare(lanes, field, sides);
+                let mut count = Count::default();
+                let others = match some {
+                    // It is near itself, and the first that is.
+                    [first, others @ ..] if *first == small(block) => {
+                        scratch.within(lanes, field, block, &mut count);
+                        others
+                    }
+                    others => others,
+                };
+                scratch.sift(lanes, field, (block, others), &mut count);
+                scratch.compare(lanes, field, &mut count);
                 if self.search == Search::Near {
-                    scratch.list(hits, &mut listed);
+                    scratch.list(count, &mut listed);
                 } else {
-                    met.add(scratch.enter(lanes, field, (block, sides), hits, &mut open));
-                    scratch.record(block, sides, &mut met);
+                    met.add(scratch.enter(lanes, field, block, count, &mut open));
+                    scratch.record(block, count, &mut met);
                 }
-                tests += boxes as u64;
+                tests += count.boxes as u64;
             }
             scratch.near = near;
         }
@@ -200,24 +218,59 @@ impl Work for Sweep<'_> {
 }
 
 impl Scratch {
+    /// Compares the boxes of a block with one another: each pair once.
+    ///
+    /// All lanes, in use or not: which are is a guess that fails.
+    #[inline(always)]
+    fn within<L: Lanes>(&mut self, lanes: L, field: Field<'_>, block: usize, count: &mut Count) {
+        let boxes = &field.fat[block];
+        // A copy of its own, which no list can change: it stays in registers.
+        let (mine, against) = (*boxes, small(block));
+        self.sides[0] = Side {
+            block: against,
+            against,
+        };
+        // None is left to be compared.
+        self.lanes[0] = 0;
+        for lane in 0..LANES {
+            let behind = (u16::MAX << lane) << 1;
+            let met = lanes.meets(&mine, &boxes.get(lane as usize)) & behind;
+            #[allow(clippy::cast_possible_truncation, reason = "below 16")]
+            let hit = Hit {
+                side: 0,
+                lane: lane as u16,
+                met,
+            };
+            self.hits[count.hits] = hit;
+            count.hits += usize::from(met != 0);
+        }
+        count.sides = 1;
+        count.boxes = field.live[block].count_ones() as usize;
+    }
+
     /// Of two blocks whose bounds meet, the fewer of the lanes that meet the other's bound; nothing where either has
-    /// none. Returns how many sides there are, and how many lanes.
+    /// none.
     #[inline(always)]
     fn sift<L: Lanes>(
         &mut self,
         lanes: L,
         field: Field<'_>,
-        block: usize,
-        near: &[u32],
-    ) -> (usize, usize) {
-        let (mine, bound) = (&field.fat[block], field.tree.bound(block));
-        let (mut kept, mut boxes) = (0, 0);
+        (block, near): (usize, &[u32]),
+        count: &mut Count,
+    ) {
+        // Copies, as above.
+        let (mine, bound) = (field.fat[block], *field.tree.bound(block));
+        let Count {
+            sides: mut kept,
+            mut boxes,
+            ..
+        } = *count;
         for (at, other) in near.iter().enumerate() {
             if let Some(next) = near.get(at + AHEAD) {
                 prefetch(&field.fat[*next as usize]);
             }
-            let rows = lanes.meets(mine, field.tree.bound(*other as usize));
-            let columns = lanes.meets(&field.fat[*other as usize], bound);
+            let rows = lanes.meets(&mine, field.tree.bound(*other as usize));
+            let columns = lanes.meets(&field.fat[*other as usize], &bound);
             let (few, many) = (rows.count_ones(), columns.count_ones());
             let rows_are_fewer = few <= many;
             let (block, against) = (small(block), *other);
@@ -235,14 +288,14 @@ impl Scratch {
             boxes += if any { few.min(many) as usize } else { 0 };
         }
         self.lanes[kept..kept + SIDES].fill(0);
-        (kept, boxes)
+        (count.sides, count.boxes) = (kept, boxes);
     }
 
-    /// Compares each box of the sides with the block that it is near; returns how many met any.
+    /// Compares each box of the sides with the block that it is near.
     #[inline(always)]
-    fn compare<L: Lanes>(&mut self, lanes: L, field: Field<'_>, sides: usize) -> usize {
-        let mut kept = 0;
-        for first in (0..sides).step_by(SIDES) {
+    fn compare<L: Lanes>(&mut self, lanes: L, field: Field<'_>, count: &mut Count) {
+        let mut kept = count.hits;
+        for first in (0..count.sides).step_by(SIDES) {
             // How many lanes a side has is a guess that fails: it is made once for some.
             let some = self.lanes[first..first + SIDES].iter().rev();
             let mut left = some.fold(0, |left, lanes| left << WIDTH | u64::from(*lanes));
@@ -251,19 +304,12 @@ impl Scratch {
                 left &= left - 1;
                 let (at, lane) = (first + bit / WIDTH, bit % WIDTH);
                 let side = &self.sides[at % TOGETHER];
-                // Within a block each pair once, and none of a body with itself.
-                let within = side.block == side.against;
-                let among = if within {
-                    (u16::MAX << lane) << 1
-                } else {
-                    u16::MAX
-                };
                 // Both are at hand before a lane is read: it then goes from memory to all lanes in one step.
                 let (block, against) = (
                     &field.fat[side.block as usize],
                     &field.fat[side.against as usize],
                 );
-                let met = lanes.meets(against, &block.get(lane)) & among;
+                let met = lanes.meets(against, &block.get(lane));
                 #[allow(clippy::cast_possible_truncation, reason = "below 16, below TOGETHER")]
                 let hit = Hit {
                     side: at as u16,
@@ -274,7 +320,7 @@ impl Scratch {
                 kept += usize::from(met != 0);
             }
         }
-        kept
+        count.hits = kept;
     }
 
     /// Enters what was met into the matrices; what is not sure is noted as open. Returns how many pairs met.
@@ -283,8 +329,8 @@ impl Scratch {
         &mut self,
         lanes: L,
         field: Field<'_>,
-        (block, sides): (usize, usize),
-        hits: usize,
+        block: usize,
+        Count { sides, hits, .. }: Count,
         open: &mut Vec<[u32; 2]>,
     ) -> usize {
         let mut pairs = 0;
@@ -320,7 +366,7 @@ impl Scratch {
 
     /// Lists what was met.
     #[inline(always)]
-    fn list(&self, hits: usize, listed: &mut Vec<Near>) {
+    fn list(&self, Count { hits, .. }: Count, listed: &mut Vec<Near>) {
         for hit in &self.hits[..hits] {
             let side = &self.sides[usize::from(hit.side)];
             let one = side.block * LANES + u32::from(hit.lane);
@@ -334,7 +380,7 @@ impl Scratch {
 
     /// Records the matrices that hold any overlap.
     #[inline(always)]
-    fn record(&self, block: usize, sides: usize, met: &mut Met) {
+    fn record(&self, block: usize, Count { sides, .. }: Count, met: &mut Met) {
         let sides = self.sides[..sides].iter().zip(&self.matrices);
         // The other of the two, or itself.
         met.push_all(sides.map(|(side, hits)| (side.block ^ side.against ^ small(block), hits)));

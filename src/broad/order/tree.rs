@@ -214,14 +214,16 @@ impl Tree {
         descent: &mut Descent,
     ) -> usize {
         let Descent { nodes, children } = descent;
+        // A copy, which no list can change: it stays in registers.
+        let one = *one;
         children.clear();
         // One more: what stands behind the last has none.
         children.resize(nodes.len() + 1, (0, 0));
-        let (mut kept, mut count) = (0, 0);
+        let (level, mut kept, mut count) = (&self.levels[level], 0, 0);
         for node in nodes.iter() {
             let early = first.saturating_sub(node * LANES);
             let after = u16::MAX.checked_shl(early).unwrap_or(0);
-            let hits = lanes.meets(&self.levels[level][*node as usize], one) & after;
+            let hits = lanes.meets(&level[*node as usize], &one) & after;
             children[kept] = (node * LANES, hits);
             kept += usize::from(hits != 0);
             count += hits.count_ones() as usize;
