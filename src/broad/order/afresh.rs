@@ -298,7 +298,7 @@ impl Order {
     /// Remembers every overlap of the last tick, but for those of bodies that left since.
     fn carry_held(&mut self) {
         let Afresh { held, gone, .. } = &mut self.afresh;
-        held.drain_into(gone, &self.slot_of, &mut self.carried);
+        held.carry(None, (gone, &self.slot_of), self.level, &mut self.carried);
     }
 
     /// After the bodies were laid anew: of the overlaps found those that are new, of those remembered the others.

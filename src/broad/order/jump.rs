@@ -27,7 +27,12 @@ impl Order {
             let Afresh {
                 held, gone, jumped, ..
             } = &mut self.afresh;
-            held.carry(jumped, gone, &self.slot_of, &mut self.carried);
+            held.carry(
+                Some(jumped),
+                (gone, &self.slot_of),
+                self.level,
+                &mut self.carried,
+            );
             self.unseat();
         }
         let homeless = std::mem::take(&mut self.homeless);

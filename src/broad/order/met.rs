@@ -8,7 +8,7 @@ use super::idle::shed;
 use super::links::{EMPTY, Matrix, room, spare};
 use super::{BodySlot, parts};
 use crate::ids::{PairKey, small};
-use crate::simd::boxes::{Lanes, WIDTH, Work};
+use crate::simd::boxes::{Lanes, Level, Portable, WIDTH, Work};
 
 /// The overlaps of a tick.
 #[derive(Debug, Default)]
@@ -159,59 +159,70 @@ impl Met {
         rows.map(|row| row.count_ones() as usize).sum()
     }
 
-    /// Writes the overlaps of some lanes down as two body slots, and forgets them; not those of lanes that lost their
-    /// body.
+    /// Writes overlaps down as two body slots, and forgets them; not those of lanes that lost their body.
+    ///
+    /// * `lanes` - by block, those whose overlaps go; `None`: all do.
+    /// * `gone` - by block, lanes that lost their body.
+    /// * `slot_of` - by rank, the body slot.
     pub(super) fn carry(
         &mut self,
-        lanes: &[u16],
-        gone: &[u16],
-        slot_of: &[u32],
+        lanes: Option<&[u16]>,
+        (gone, slot_of): (&[u16], &[u32]),
+        level: Level,
         carried: &mut Vec<(u32, u32)>,
     ) {
-        let mut gathered = Gathered::new(slot_of, carried, |one, other| (one, other));
-        for block in 0..self.blocks() {
-            for at in self.of(block) {
-                let other = self.others[at] as usize;
-                if lanes[block] | lanes[other] == 0 {
-                    continue;
-                }
-                let all = self.hits[at];
-                let stays = without(&all, lanes[block], lanes[other]);
-                if stays == all {
-                    continue;
-                }
-                let goes = minus(&all, &stays);
-                let left = without(&goes, gone[block], gone[other]);
-                gathered.put(&left, [block, other]);
-                let lost = goes.iter().map(|row| row.count_ones() as usize);
-                self.count -= lost.sum::<usize>();
-                self.hits[at] = stays;
-            }
-        }
-        gathered.finish();
+        level.run(Carry {
+            met: self,
+            lanes,
+            gone,
+            slot_of,
+            carried,
+        });
     }
+}
 
-    /// Writes every overlap down as two body slots, and forgets it; not those of lanes that lost their body.
-    pub(super) fn drain_into(
-        &mut self,
-        gone: &[u16],
-        slot_of: &[u32],
-        carried: &mut Vec<(u32, u32)>,
-    ) {
-        carried.reserve(self.count);
-        let mut gathered = Gathered::new(slot_of, carried, |one, other| (one, other));
-        for block in 0..self.blocks() {
-            for at in self.of(block) {
-                let other = self.others[at] as usize;
-                let mut left = self.hits[at];
-                if gone[block] | gone[other] != 0 {
-                    left = without(&left, gone[block], gone[other]);
-                }
+/// See [`Met::carry`].
+struct Carry<'a> {
+    met: &'a mut Met,
+    lanes: Option<&'a [u16]>,
+    gone: &'a [u16],
+    slot_of: &'a [u32],
+    carried: &'a mut Vec<(u32, u32)>,
+}
+
+impl Work for Carry<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        let (met, gone) = (self.met, self.gone);
+        if self.lanes.is_none() {
+            self.carried.reserve(met.count);
+        }
+        let mut gathered = Gathered::new(self.slot_of, self.carried, |one, other| (one, other));
+        for block in 0..met.blocks() {
+            for at in met.of(block) {
+                let other = met.others[at] as usize;
+                let all = met.hits[at];
+                let goes = match self.lanes {
+                    None => all,
+                    Some(chosen) if chosen[block] | chosen[other] == 0 => continue,
+                    Some(chosen) => {
+                        let stays = without(lanes, &all, chosen[block], chosen[other]);
+                        met.hits[at] = stays;
+                        minus(&all, &stays)
+                    }
+                };
+                let lost = words(&goes).map(|word| word.count_ones() as usize);
+                met.count -= lost.iter().sum::<usize>();
+                let left = without(lanes, &goes, gone[block], gone[other]);
                 gathered.put(&left, [block, other]);
             }
         }
         gathered.finish();
-        self.clear();
+        if self.lanes.is_none() {
+            met.clear();
+        }
     }
 }
 
@@ -246,7 +257,7 @@ impl Work for TellDifference<'_> {
     type Out = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self, _: L) {
+    fn run<L: Lanes>(self, lanes: L) {
         let Self {
             before,
             now,
@@ -282,7 +293,7 @@ impl Work for TellDifference<'_> {
                 new.start += has;
                 let blocks = [block, other as usize];
                 if gone[block] | gone[other as usize] != 0 {
-                    was = without(&was, gone[block], gone[other as usize]);
+                    was = without(lanes, &was, gone[block], gone[other as usize]);
                 }
                 // Field by field: a whole one would wait for its parts to be stored.
                 let change = &mut changes[len];
@@ -329,7 +340,7 @@ pub(super) fn tell_all(met: &Met, slot_of: &[u32], began: &mut Vec<PairKey>) {
 /// Reports every overlap of some lanes.
 pub(super) fn tell_asked(met: &Met, asked: &[u16], slot_of: &[u32], began: &mut Vec<PairKey>) {
     tell_some(met, slot_of, began, |hits, block, other| {
-        minus(hits, &without(hits, asked[block], asked[other]))
+        minus(hits, &without(Portable, hits, asked[block], asked[other]))
     });
 }
 
@@ -352,11 +363,11 @@ fn tell_some(
 
 /// The bits that lie neither in some rows nor in some columns.
 #[inline(always)]
-fn without(hits: &Matrix, rows: u16, columns: u16) -> Matrix {
+fn without<L: Lanes>(lanes: L, hits: &Matrix, rows: u16, columns: u16) -> Matrix {
+    let goes = lanes.spread(rows);
     let mut left = [0; WIDTH];
-    for (row, line) in hits.iter().enumerate() {
-        let stays = if rows >> row & 1 == 1 { 0 } else { u16::MAX };
-        left[row] = line & !columns & stays;
+    for row in 0..WIDTH {
+        left[row] = hits[row] & !columns & !goes[row];
     }
     left
 }
