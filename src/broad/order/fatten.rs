@@ -15,8 +15,8 @@
 use crate::math::Aabb;
 use crate::simd::boxes::{Down, Hold, Lanes, SPARE};
 
-/// Ticks that a fat box is swept for. Renewing a body costs about 100 ns, each tick of sweep adds candidates that cost
-/// some 3 ns a tick: in the gas of the bench 8 to 16 come out alike.
+/// Ticks that a fat box is swept for. Few mean many renewals, many mean many candidates: in the gas of the bench 8 to
+/// 16 come out alike.
 pub(super) const HORIZON: u32 = 16;
 /// Most that a face is swept, in mean sides of the box: beyond it the candidates grow by the cube.
 const SWEEP_MAX: f32 = 0.75;

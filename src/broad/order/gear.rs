@@ -244,9 +244,15 @@ impl Gear {
         }
     }
 
-    /// Takes what a tick without candidates costs.
+    /// Takes what a tick without candidates costs; of a world that was left by nearly all it says nothing of the next
+    /// bodies.
     pub(super) fn note_scratch(&mut self, bodies: usize, cost: u64) {
-        self.scratch = cost * 1024 / (bodies as u64).max(1) + 1;
+        let bodies = bodies as u64;
+        self.scratch = if bodies < BODIES_MIN {
+            0
+        } else {
+            cost * 1024 / bodies + 1
+        };
     }
 
     /// Takes the work of a tick with candidates.

@@ -15,7 +15,7 @@ use crate::simd::boxes::{Boxes16, Down, Hold, WIDTH};
 
 /// A body farther outside its quarter than so many of its mean sides looks for another block, ...
 const DRIFT_SIDES: f32 = 0.5;
-/// ... which must be so many times nearer, squared: a lane changed costs about a microsecond.
+/// ... which must be so many times nearer, squared: a lane changed costs a microsecond or two.
 const NEARER: f32 = 4.0;
 /// Blocks whose bodies have spread so much over what they were dealt are dealt anew: that costs about as much as
 /// renewing all of them once more, and blocks that are so much longer meet twice as many others.

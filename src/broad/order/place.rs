@@ -11,9 +11,9 @@ use crate::ids::small;
 use crate::math::Aabb;
 use crate::simd::boxes::{Boxes16, Down, Hold, Portable, WIDTH};
 
-/// Blocks met by queries beyond what is usual that cost as much as sorting one body anew: a block met costs about 15
-/// ns, sorting, carrying the overlaps and finding all candidates anew some 300 ns a body. Sorting when the excess has
-/// cost as much as a sort is at most twice as dear as the best plan.
+/// Blocks met by queries beyond what is usual that cost as much as sorting one body anew, carrying its overlaps and
+/// finding its candidates. Sorting when the excess has cost as much as a sort is at most twice as dear as the best
+/// plan.
 const WORN_PER_BODY: u64 = 20;
 /// One block in so many stays empty after a sort, for bodies that find no free lane where they belong.
 pub(super) const ATTIC: usize = 16;

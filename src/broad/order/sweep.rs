@@ -3,9 +3,9 @@
 //! In: boxes in their lanes, the tree over the blocks. Out: a matrix of bits for each two blocks with any overlap
 //! (`met`), and the pairs that rounding leaves open.
 //!
-//! How: in four passes over the blocks near one, each a loop without a branch that depends on the boxes. Which lanes
-//! come near which block, how many they are and what they meet cannot be guessed: with a loop a pair of blocks, a
-//! branch guessed wrong took longer than the comparisons.
+//! How: a block within itself, and then four passes over the others near it, each a loop without a branch that depends
+//! on the boxes. Which lanes come near which block, how many they are and what they meet cannot be guessed: with a loop
+//! a pair of blocks, a branch guessed wrong took longer than the comparisons.
 
 use crate::ids::small;
 use std::ops::Range;
@@ -335,7 +335,8 @@ impl Scratch {
     ) -> usize {
         let mut pairs = 0;
         self.matrices[..sides].fill(EMPTY);
-        // What meets a box drawn in by the slack of either surely overlaps it, as `Lanes::parts` tells.
+        // What meets a box drawn in by the slack of either surely overlaps it, as `Lanes::parts` tells: a face of the
+        // other that is farther out than the slack is made for is passed by more than it was rounded by.
         let by = slack(farthest(field.tree.bound(block)));
         for hit in &self.hits[..hits] {
             let side = &self.sides[usize::from(hit.side)];

@@ -1,6 +1,7 @@
 //! The implicit tree over blocks: each node holds the bounds of its sixteen children, the lowest nodes those of
 //! sixteen blocks. No pointers: child `i` of node `n` is node `16 n + i` one level down.
 
+use super::bits::each_bit;
 use super::links::room;
 use crate::simd::boxes::{Boxes16, LANES, Lanes, Portable, WIDTH};
 
@@ -318,20 +319,10 @@ impl Tree {
 
 /// Appends so many children: all that a list names, as the first child of a node and which are meant. It ends with one
 /// that names none.
-///
-/// How many are of one node is a guess that fails: no branch is taken on it.
 #[inline(always)]
 fn unfold(children: &[(u32, u16)], count: usize, found: &mut Vec<u32>) {
-    let before = found.len();
-    found.resize(before + count, 0);
-    let (mut at, (mut first, mut left)) = (0, children[0]);
-    for found in &mut found[before..] {
-        *found = first + left.trailing_zeros();
-        left &= left.wrapping_sub(1);
-        at += usize::from(left == 0);
-        let next = children[at];
-        (first, left) = if left == 0 { next } else { (first, left) };
-    }
+    let met = each_bit(children, count, |(_, met)| u64::from(*met));
+    found.extend(met.map(|((first, _), child)| first + child));
 }
 
 /// Whether two bounds are the same; without a branch a face.

@@ -52,8 +52,8 @@ fn all(face: &[f32; WIDTH]) -> __m512 {
     unsafe { _mm512_loadu_ps(face.as_ptr()) }
 }
 
-/// The sign bits of eight lanes. By its own instruction: what the compiler makes of two such masks put together is
-/// nearly twice as long.
+/// The sign bits of eight lanes. By its own instruction: what the compiler makes of two such masks put together, or of
+/// one that is compared with all ones where AVX-512 is (by a mask register), is nearly twice as long.
 #[inline]
 #[target_feature(enable = "avx2")]
 fn sign_bits(lanes: __m256) -> u32 {

@@ -123,6 +123,26 @@ fn a_world_that_comes_to_rest_is_left_to_candidates_at_once() {
 }
 
 #[test]
+fn bug_what_a_world_without_bodies_cost_is_no_measure_for_those_that_come() {
+    for cost in [0, 20_000] {
+        let (mut gear, mut on) = (Gear::default(), false);
+        run(&mut gear, &mut on, 40, &work(10_000, 900));
+        for _ in 0..CALM_TICKS {
+            assert!(on);
+            gear.note_scratch(0, cost);
+            on = gear.choose(on, 0, 0, (0, 0));
+        }
+        // Those that tremble are left to candidates, and those that no box holds are not.
+        let mut wild = gear;
+        assert_eq!(run(&mut gear, &mut on, 500, &work(500, 5)), 0, "{cost}");
+        assert!(
+            run(&mut wild, &mut on, 40, &work(10_000, 900)) > 0,
+            "{cost}"
+        );
+    }
+}
+
+#[test]
 fn motion_that_boxes_hold_is_never_worked_from_scratch() {
     let (mut gear, mut on) = (Gear::default(), false);
     assert_eq!(run(&mut gear, &mut on, 5_000, &work(500, 5)), 0);
