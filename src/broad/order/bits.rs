@@ -69,6 +69,7 @@ pub(super) fn each_bit<W: Copy>(
 const ROWS: usize = u64::BITS as usize / WIDTH;
 /// Words of a matrix.
 const WORDS: usize = WIDTH / ROWS;
+
 /// The rows of a matrix as words, the first in the lowest bits.
 #[inline(always)]
 pub(super) fn words(matrix: &Matrix) -> [u64; WORDS] {

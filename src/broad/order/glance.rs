@@ -1,28 +1,28 @@
 //! What the bodies of a block tell together, in one pass over their boxes: enough to know that none of them needs a
 //! look of its own.
 
+use super::home::widen;
 use super::ones;
+use super::sort::centre;
+use super::tree::NO_BOUND;
 use crate::simd::boxes::{Down, Lanes, WIDTH, Work};
 
-/// The middles of the bodies of a block; of an infinite box it is the origin.
+/// The middles of the bodies of a block.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Glance {
-    /// Their sum, in the first three.
-    pub(super) sum: [f32; 4],
+    pub(super) sum: [f32; 3],
     pub(super) bodies: f32,
-    /// What they fill; upside down where there are none.
-    low: [f32; 4],
-    high: [f32; 4],
+    /// The part of space that they fill; upside down where there are none.
+    pub(super) spread: [f32; 6],
     /// The least mean side of a box.
     least_side: f32,
 }
 
 impl Glance {
     const NOBODY: Self = Self {
-        sum: [0.0; 4],
+        sum: [0.0; 3],
         bodies: 0.0,
-        low: [f32::INFINITY; 4],
-        high: [f32::NEG_INFINITY; 4],
+        spread: NO_BOUND,
         least_side: f32::INFINITY,
     };
 
@@ -30,45 +30,23 @@ impl Glance {
     fn of(exact: &[Down; WIDTH], live: u16) -> Self {
         let mut seen = Self::NOBODY;
         for lane in ones(live) {
-            let f = &exact[lane].faces;
-            for k in 0..4 {
-                // Upper faces stand there with their sign turned.
-                let middle = f[k] * 0.5 - f[k + 4] * 0.5;
-                let middle = if middle.is_finite() { middle } else { 0.0 };
-                seen.sum[k] += middle;
-                seen.low[k] = if middle < seen.low[k] {
-                    middle
-                } else {
-                    seen.low[k]
-                };
-                seen.high[k] = if middle > seen.high[k] {
-                    middle
-                } else {
-                    seen.high[k]
-                };
+            let middle = centre(&exact[lane].corners());
+            for (sum, middle) in seen.sum.iter_mut().zip(middle) {
+                *sum += middle;
             }
-            let side = exact[lane].mean_side();
-            seen.least_side = if side < seen.least_side {
-                side
-            } else {
-                seen.least_side
-            };
+            widen(&mut seen.spread, &middle);
+            seen.least_side = seen.least_side.min(exact[lane].mean_side());
             seen.bodies += 1.0;
         }
         seen
-    }
-
-    /// The part of space that the middles fill.
-    pub(super) fn spread(&self) -> [f32; 6] {
-        std::array::from_fn(|k| if k < 3 { self.low[k] } else { self.high[k - 3] })
     }
 
     /// Whether no middle is farther outside a part of space than so many mean sides of its box.
     pub(super) fn is_within(&self, part: &[f32; 6], sides: f32) -> bool {
         let mut far = 0.0;
         for k in 0..3 {
-            let out = (part[k] - self.low[k])
-                .max(self.high[k] - part[k + 3])
+            let out = (part[k] - self.spread[k])
+                .max(self.spread[k + 3] - part[k + 3])
                 .max(0.0);
             far += out * out;
         }
@@ -99,7 +77,6 @@ impl Work for LookOver<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::home::far_from;
-    use super::super::sort::centre;
     use super::*;
     use crate::builtin::Random;
     use crate::simd::boxes::Level;
@@ -143,7 +120,7 @@ mod tests {
                 all_near &= far_from(&middle, &part) <= side * side * 0.25;
                 spread = std::array::from_fn(|k| spread[k].min(middle[k]));
             }
-            assert_eq!(seen.spread()[..3], spread);
+            assert_eq!(seen.spread[..3], spread);
             if seen.is_within(&part, 0.5) {
                 within += 1;
                 assert!(all_near, "a body is farther out");

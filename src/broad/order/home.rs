@@ -135,6 +135,7 @@ impl Order {
 }
 
 /// Makes a part of space hold a place.
+#[inline(always)]
 pub(super) fn widen(home: &mut [f32; 6], place: &[f32; 3]) {
     for k in 0..3 {
         home[k] = home[k].min(place[k]);

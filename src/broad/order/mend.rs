@@ -154,7 +154,7 @@ impl Order {
             } else {
                 f32::INFINITY
             };
-            let side = (0..3).map(|k| one[k + 3] - one[k]).sum::<f32>() / 3.0;
+            let side = boxed.mean_side();
             if far <= side * side * DRIFT_SIDES * DRIFT_SIDES {
                 continue;
             }
@@ -187,7 +187,7 @@ impl Order {
         let (mut dealt, mut now) = (0.0, 0.0);
         for (block, seen) in (from..).zip(seen) {
             dealt += extent(&self.home(block));
-            now += extent(&seen.spread());
+            now += extent(&seen.spread);
         }
         now > dealt * MIXED
     }

@@ -323,6 +323,7 @@ fn octave(one: &[f32; 6]) -> usize {
 }
 
 /// The middle of a box; of an infinite one, anything.
+#[inline(always)]
 pub(super) fn centre(one: &[f32; 6]) -> [f32; 3] {
     std::array::from_fn(|k| {
         let middle = one[k] * 0.5 + one[k + 3] * 0.5;
