@@ -63,8 +63,8 @@ pub(super) fn depth(pair: &Pair<'_>, simplex: &Simplex, warm: Option<Refined>) -
     })
 }
 
-/// The gap of two cores by a polytope that begins around the closest point of an earlier answer; `None` where it does
-/// not hold the origin, or leaves the ends apart.
+/// The gap of two cores by a polytope that begins around the closest point of an earlier answer; `None` where the cores
+/// are apart, or the ends stay apart.
 pub(super) fn depth_around(pair: &Pair<'_>, found: &Refined) -> Option<CoreGap> {
     if found.value >= -pair.tiny() {
         return None;
@@ -75,8 +75,27 @@ pub(super) fn depth_around(pair: &Pair<'_>, found: &Refined) -> Option<CoreGap> 
             return None;
         }
         let gap = polytope.settle(pair, Some(found));
-        let gap = polytope.straight(pair, gap);
-        gap.is_tight(pair).then_some(gap)
+        let within = gap.upper < -pair.tiny();
+        (within && gap.is_tight(pair)).then(|| polytope.straight(pair, gap))
+    })
+}
+
+/// The gap of two cores by a polytope that begins at the face which an earlier one ended at; `None` where there was
+/// none, the cores are apart by now, or the ends stay apart.
+pub(super) fn depth_at(pair: &Pair<'_>, held: &Held, normal: &Vec3) -> Option<CoreGap> {
+    if !held.deep {
+        return None;
+    }
+    let mut recalled = pair.recall(held, normal);
+    let face = [recalled.next()?, recalled.next()?, recalled.next()?];
+    SCRATCH.with(|scratch| {
+        let mut polytope = scratch.try_borrow_mut().ok()?;
+        if !polytope.start_at(pair, face, &-normal) {
+            return None;
+        }
+        let gap = polytope.settle(pair, None);
+        let meets = gap.upper < -pair.tiny() && gap.upper - gap.lower <= 4.0 * pair.tiny();
+        meets.then(|| polytope.straight(pair, gap))
     })
 }
 
@@ -193,6 +212,10 @@ impl Polytope {
             let new = pair.support(&-face.normal);
             let reach = face.normal.dot(&new.w);
             state.best.offer(-reach, &-face.normal, place);
+            // Apart.
+            if reach < 0.0 {
+                break;
+            }
             (state.nearest, state.last) = (place, -reach);
             if reach - face.distance <= tolerance || -state.best.lower - face.distance <= tolerance
             {
@@ -200,7 +223,7 @@ impl Polytope {
             }
             // A first look at the features: the closest point itself becomes a corner, which saves most of the steps.
             if !pair.polytopes && reach - face.distance <= near && state.is_new(&-face.normal) {
-                let corners = face.corners.map(|k| self.vertices[k]);
+                let corners = self.corners(&face);
                 let found = newton::solve(pair, &corners, &self.project(place).2, &-face.normal);
                 if let Some(found) = found.filter(|r| r.value > state.best.lower) {
                     if !self.plant(pair, &found, state) {
@@ -211,7 +234,7 @@ impl Polytope {
                     }
                 }
             }
-            let known = face.corners.iter().any(|&k| self.vertices[k].w == new.w);
+            let known = self.corners(&face).iter().any(|v| v.w == new.w);
             if known || !self.grow(place, new, pair.tiny()) {
                 break;
             }
@@ -256,11 +279,9 @@ impl Polytope {
     /// Witnesses, and Newton where circles take part.
     fn finish(&self, pair: &Pair<'_>, best: &mut Best, nearest: usize, fits: f64) -> CoreGap {
         let (mut point_a, mut point_b, weights) = self.project(nearest);
-        let corners = self
-            .faces
-            .get(nearest)
-            .map(|face| face.corners.map(|k| self.vertices[k]));
+        let corners = self.faces.get(nearest).map(|face| self.corners(face));
         let mut held = corners.map_or_else(Held::default, |c| Held::of(&c, &weights));
+        held.deep = true;
         if !pair.polytopes
             && let Some(corners) = corners
             && let Some(found) = newton::solve(pair, &corners, &weights, &best.normal)
@@ -285,7 +306,7 @@ impl Polytope {
         let Some(face) = self.faces.get(place) else {
             return (Vec3::zeros(), Vec3::zeros(), [1.0, 0.0, 0.0]);
         };
-        let [p, q, r] = face.corners.map(|k| self.vertices[k]);
+        let [p, q, r] = self.corners(face);
         let normal = normal_of(&p.w, &q.w, &r.w);
         let square = normal.norm_squared();
         let to = -p.w;
@@ -305,55 +326,4 @@ impl Polytope {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::{Pose, Quat};
-    use crate::narrow::exact::{Warm, convex_gap};
-    use crate::shape::Convex;
-
-    fn forget() {
-        SCRATCH.with(|scratch| *scratch.borrow_mut() = Polytope::default());
-    }
-
-    fn faces_made() -> usize {
-        SCRATCH.with(|scratch| scratch.borrow().faces.len())
-    }
-
-    /// They took up to 24,000 faces and 20 ms a query, and ended at a width of a thousandth.
-    #[test]
-    fn bug_solids_of_revolution_nearly_on_one_axis_took_milliseconds() {
-        let shapes = [
-            Convex::capsule(0.1, 0.4),
-            Convex::cylinder(0.3, 0.5),
-            Convex::cylinder(0.25, 0.2),
-            Convex::cone(0.4, 0.5),
-        ];
-        let parts = [
-            0.0, 1e-13, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.05, 0.1,
-        ];
-        let (mut asked, mut many, mut loose) = (0, 0, 0);
-        for (a, b) in shapes
-            .iter()
-            .flat_map(|a| shapes.iter().map(move |b| (a, b)))
-        {
-            for (off, lean) in parts
-                .iter()
-                .flat_map(|x| parts.iter().map(move |y| (*x, *y)))
-            {
-                let mut warm = Warm::default();
-                for lift in [0.13, 0.130_01] {
-                    let at = Vec3::new(0.6 * off, 0.8 * off, lift);
-                    let turn = Quat::from_axis_angle(&Vec3::x_axis(), lean);
-                    forget();
-                    let c = convex_gap(a, b, &Pose::from_parts(at.into(), turn), &mut warm);
-                    assert!(faces_made() <= FACES_MAX + 128, "{a:?} {b:?} {at:?} {lean}");
-                    asked += 1;
-                    many += usize::from(faces_made() > 512);
-                    loose += usize::from(!c.finished);
-                }
-            }
-        }
-        assert!(many * 50 <= asked, "{many} of {asked} grew large polytopes");
-        assert!(loose * 1000 <= asked, "{loose} of {asked} are not finished");
-    }
-}
+mod tests;

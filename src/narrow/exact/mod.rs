@@ -145,8 +145,11 @@ fn iterate(pair: &Pair<'_>, warm: &Warm) -> CoreGap {
         Some(sat::Axes::Apart(normal)) => normal,
         None => start,
     };
-    // Where a circle takes part the features of the last answer are mostly those of this one.
+    // The features of the last answer are mostly those of this one.
     let refined = if pair.polytopes {
+        if let Some(gap) = epa::depth_at(pair, &warm.held, &start) {
+            return gap;
+        }
         None
     } else {
         newton::resume(pair, &warm.held, &start)

@@ -21,7 +21,7 @@ const SETS_MAX: usize = 4;
 const STEP_LENGTH_MAX: f64 = 0.5;
 
 /// A pair of elements that takes part, with its weight.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Active {
     of_a: u32,
     of_b: u32,
@@ -37,7 +37,7 @@ struct Active {
 }
 
 /// The elements that take part.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Set {
     actives: [Active; 3],
     count: usize,
@@ -91,7 +91,12 @@ pub(super) fn refine(pair: &Pair<'_>, simplex: &Simplex, normal: &Vec3) -> Optio
 /// A better answer than an earlier one, from the features it rested on.
 pub(super) fn resume(pair: &Pair<'_>, held: &Held, normal: &Vec3) -> Option<Refined> {
     let mut set = Set::default();
-    for ((of_a, of_b), weight) in held.of.iter().zip(&held.weights).take(held.count as usize) {
+    for ((of_a, of_b), weight) in held
+        .of
+        .iter()
+        .zip(&held.weights)
+        .take(usize::from(held.count))
+    {
         set.add(*of_a, *of_b, f64::from(*weight));
     }
     if set.count == 0 {
@@ -270,7 +275,7 @@ fn converge(pair: &Pair<'_>, set: &mut Set, start: &Vec3) -> Option<Refined> {
         let e2 = n.cross(&e1);
         set.evaluate(pair, &n, &e1, &e2)?;
         let (dx, dy, change) = step(set)?;
-        let length = dx.hypot(dy);
+        let length = (dx * dx + dy * dy).sqrt();
         if length > STEP_LENGTH_MAX || !length.is_finite() {
             return None;
         }
@@ -301,60 +306,84 @@ fn converge(pair: &Pair<'_>, set: &mut Set, start: &Vec3) -> Option<Refined> {
 }
 
 /// One Newton step: tangent coordinates and the change of each weight.
+///
+/// The active values are to become equal, which is one line of two coordinates for each member but the first, and the
+/// tangent part of `sum(l_i w_i)` is to become 0. So with three members the lines alone tell where to go, with two they
+/// leave one coordinate to the curvature, with one both.
 fn step(set: &Set) -> Option<(f64, f64, [f64; 3])> {
-    let k = set.count;
-    let actives = &set.actives[..k];
+    let actives = &set.actives[..set.count];
     let first = actives.first()?;
-    let mut m = [[0.0; 5]; 4];
-    let size = k + 1;
+    // What bends, and what is left of the slopes.
+    let (mut bend, mut rest) = ([0.0; 3], [0.0; 2]);
     let mut mean = 0.0;
     for x in actives {
-        for (row, terms) in [[0, 1], [1, 2]].iter().enumerate() {
-            for (column, term) in terms.iter().enumerate() {
-                m[row][column] -= x.weight * x.bend[*term];
-            }
-            m[row][size] -= x.weight * x.slope[row];
+        for (sum, term) in bend.iter_mut().zip(x.bend) {
+            *sum -= x.weight * term;
+        }
+        for (sum, term) in rest.iter_mut().zip(x.slope) {
+            *sum -= x.weight * term;
         }
         mean += x.weight * x.value;
     }
-    m[0][0] -= mean;
-    m[1][1] -= mean;
-    for (j, x) in actives.iter().enumerate().skip(1) {
+    bend[0] -= mean;
+    bend[2] -= mean;
+    let line = |x: &Active| {
         let slope = [x.slope[0] - first.slope[0], x.slope[1] - first.slope[1]];
-        (m[0][j + 1], m[1][j + 1]) = (slope[0], slope[1]);
-        m[j + 1][..2].copy_from_slice(&slope);
-        m[j + 1][size] = first.value - x.value;
-    }
-    let solution = eliminate(&mut m, size)?;
-    let mut change = [0.0; 3];
-    for (weight, value) in change[1..k].iter_mut().zip(&solution[2..]) {
-        *weight = *value;
-    }
-    change[0] = -change[1..k].iter().sum::<f64>();
-    Some((solution[0], solution[1], change))
+        (slope, first.value - x.value)
+    };
+    let bent = |d: [f64; 2]| {
+        [
+            rest[0] - bend[0] * d[0] - bend[1] * d[1],
+            rest[1] - bend[1] * d[0] - bend[2] * d[1],
+        ]
+    };
+    let (d, change) = match actives {
+        [_] => (
+            solve_two([[bend[0], bend[1]], [bend[1], bend[2]]], rest)?,
+            [0.0; 3],
+        ),
+        [_, second] => {
+            let (slope, ahead) = line(second);
+            let square = slope[0] * slope[0] + slope[1] * slope[1];
+            // Along the slope as far as the line says, across it as far as the curvature does.
+            let along = [slope[0] * ahead / square, slope[1] * ahead / square];
+            let across = [-slope[1], slope[0]];
+            let left = bent(along);
+            let curved = across[0] * (bend[0] * across[0] + bend[1] * across[1])
+                + across[1] * (bend[1] * across[0] + bend[2] * across[1]);
+            let aside = (left[0] * across[0] + left[1] * across[1]) / curved;
+            let d = [along[0] + across[0] * aside, along[1] + across[1] * aside];
+            let left = bent(d);
+            let weight = (left[0] * slope[0] + left[1] * slope[1]) / square;
+            (d, [-weight, weight, 0.0])
+        }
+        [_, second, third, ..] => {
+            let ((s, ahead_s), (t, ahead_t)) = (line(second), line(third));
+            let d = solve_two([s, t], [ahead_s, ahead_t])?;
+            let [one, other] = solve_two([[s[0], t[0]], [s[1], t[1]]], bent(d))?;
+            (d, [-(one + other), one, other])
+        }
+        [] => return None,
+    };
+    let finite = d.iter().chain(&change).all(|v| v.is_finite());
+    finite.then_some((d[0], d[1], change))
 }
 
-/// Gauss with row pivots; `None` when singular.
-fn eliminate(m: &mut [[f64; 5]; 4], size: usize) -> Option<[f64; 4]> {
-    for column in 0..size {
-        let pivot =
-            (column..size).max_by(|&i, &j| m[i][column].abs().total_cmp(&m[j][column].abs()))?;
-        m.swap(column, pivot);
-        let lead = m[column];
-        if lead[column] == 0.0 || !lead[column].is_finite() {
-            return None;
-        }
-        for row in m.iter_mut().take(size).skip(column + 1) {
-            let factor = row[column] / lead[column];
-            for (cell, above) in row.iter_mut().zip(lead).take(size + 1).skip(column) {
-                *cell -= factor * above;
-            }
-        }
-    }
-    let mut solution = [0.0; 4];
-    for row in (0..size).rev() {
-        let known: f64 = (row + 1..size).map(|c| m[row][c] * solution[c]).sum();
-        solution[row] = (m[row][size] - known) / m[row][row];
-    }
-    solution.iter().all(|v| v.is_finite()).then_some(solution)
+/// Two lines with two unknowns; `None` when singular.
+fn solve_two(m: [[f64; 2]; 2], right: [f64; 2]) -> Option<[f64; 2]> {
+    let swap = m[0][0].abs() < m[1][0].abs();
+    let ([a, b], [c, d]) = if swap { (m[1], m[0]) } else { (m[0], m[1]) };
+    let (p, q) = if swap {
+        (right[1], right[0])
+    } else {
+        (right[0], right[1])
+    };
+    let factor = c / a;
+    let pivot = d - factor * b;
+    let y = (q - factor * p) / pivot;
+    let x = (p - b * y) / a;
+    (x.is_finite() && y.is_finite()).then_some([x, y])
 }
+
+#[cfg(test)]
+mod tests;

@@ -28,7 +28,9 @@ pub(super) struct Held {
     /// Element of A, element of B.
     pub(super) of: [(u32, u32); 3],
     pub(super) weights: [f32; 3],
-    pub(super) count: u32,
+    pub(super) count: u8,
+    /// A polytope ended at them: the cores overlapped.
+    pub(super) deep: bool,
 }
 
 impl Held {
@@ -42,7 +44,7 @@ impl Held {
     }
 
     pub(super) fn push(&mut self, of_a: u32, of_b: u32, weight: f64) {
-        let place = self.count as usize;
+        let place = usize::from(self.count);
         if place < self.of.len() {
             self.of[place] = (of_a, of_b);
             self.weights[place] = f32_down(weight);
@@ -171,7 +173,7 @@ impl<'a> Pair<'a> {
         let in_b = -self.to_b(normal);
         held.of
             .into_iter()
-            .take(held.count as usize)
+            .take(usize::from(held.count))
             .filter_map(move |(of_a, of_b)| {
                 let a = self.a.core().element(of_a, normal)?;
                 let b = self.rotation * self.b.core().element(of_b, &in_b)? + self.at;

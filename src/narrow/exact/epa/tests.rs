@@ -1,0 +1,108 @@
+//! Polytopes: how many faces they take, and begun at what is known beside anew.
+
+use super::*;
+use crate::math::{Pose, Quat};
+use crate::narrow::exact::{Warm, convex_gap};
+use crate::shape::Convex;
+
+fn forget() {
+    SCRATCH.with(|scratch| *scratch.borrow_mut() = Polytope::default());
+}
+
+fn faces_made() -> usize {
+    SCRATCH.with(|scratch| scratch.borrow().faces.len())
+}
+
+/// They took up to 24,000 faces and 20 ms a query, and ended at a width of a thousandth.
+#[test]
+fn bug_solids_of_revolution_nearly_on_one_axis_took_milliseconds() {
+    let shapes = [
+        Convex::capsule(0.1, 0.4),
+        Convex::cylinder(0.3, 0.5),
+        Convex::cylinder(0.25, 0.2),
+        Convex::cone(0.4, 0.5),
+    ];
+    let parts = [
+        0.0, 1e-13, 1e-9, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.05, 0.1,
+    ];
+    let (mut asked, mut many, mut loose) = (0, 0, 0);
+    for (a, b) in shapes
+        .iter()
+        .flat_map(|a| shapes.iter().map(move |b| (a, b)))
+    {
+        for (off, lean) in parts
+            .iter()
+            .flat_map(|x| parts.iter().map(move |y| (*x, *y)))
+        {
+            let mut warm = Warm::default();
+            for lift in [0.13, 0.130_01] {
+                let at = Vec3::new(0.6 * off, 0.8 * off, lift);
+                let turn = Quat::from_axis_angle(&Vec3::x_axis(), lean);
+                forget();
+                let c = convex_gap(a, b, &Pose::from_parts(at.into(), turn), &mut warm);
+                assert!(faces_made() <= FACES_MAX + 128, "{a:?} {b:?} {at:?} {lean}");
+                asked += 1;
+                many += usize::from(faces_made() > 512);
+                loose += usize::from(!c.finished);
+            }
+        }
+    }
+    assert!(many * 50 <= asked, "{many} of {asked} grew large polytopes");
+    assert!(loose * 1000 <= asked, "{loose} of {asked} are not finished");
+}
+
+/// Deep, shallow, apart and back again: a polytope begun at what the last one ended at says what a new one does.
+#[test]
+fn a_polytope_begun_at_the_last_answer_says_what_one_begun_anew_does() {
+    let mut corners = Vec::new();
+    for k in 0..12 {
+        let (turn, up) = (f64::from(k) * 2.4, f64::from(k) / 6.0 - 0.9);
+        let across = (1.0_f64 - up * up).sqrt();
+        corners.push(
+            Vec3::new(
+                0.4 * across * turn.cos(),
+                0.5 * across * turn.sin(),
+                0.3 * up,
+            )
+            .into(),
+        );
+    }
+    let shapes = [
+        Convex::cuboid(Vec3::new(0.3, 0.4, 0.5)),
+        Convex::hull(&corners).unwrap(),
+        Convex::capsule(0.1, 0.4),
+        Convex::cylinder(0.3, 0.5),
+        Convex::cone(0.4, 0.5),
+    ];
+    let (mut deep, mut apart, mut begun) = (0, 0, 0);
+    for (a, b) in shapes
+        .iter()
+        .flat_map(|a| shapes.iter().map(move |b| (a, b)))
+    {
+        let mut warm = Warm::default();
+        for step in 0..200 {
+            let at = f64::from(step);
+            let out = 0.5 + 0.5 * (at * 0.05).sin();
+            let to = Vec3::new(out, 0.2 * (at * 0.03).cos(), 0.1 * (at * 0.07).sin());
+            let turn = Quat::from_scaled_axis(Vec3::new(0.01, 0.02, -0.015) * at);
+            let pose = Pose::from_parts(to.into(), turn);
+            begun += usize::from(warm.held.deep);
+            let (one, other) = (
+                convex_gap(a, b, &pose, &mut warm),
+                convex_gap(a, b, &pose, &mut Warm::default()),
+            );
+            let (x, y) = (one.gap, other.gap);
+            assert!(
+                x.min <= y.max && y.min <= x.max,
+                "{x:?} {y:?} at {step} of {a:?} {b:?}"
+            );
+            assert!(one.finished && other.finished, "{one:?} {other:?}");
+            deep += usize::from(x.max < 0.0);
+            apart += usize::from(x.min > 0.0);
+        }
+    }
+    assert!(
+        deep > 1000 && apart > 1000 && begun > 500,
+        "{deep} {apart} {begun}"
+    );
+}
