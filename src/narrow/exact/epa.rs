@@ -212,8 +212,8 @@ impl Polytope {
             let new = pair.support(&-face.normal);
             let reach = face.normal.dot(&new.w);
             state.best.offer(-reach, &-face.normal, place);
-            // Apart.
-            if reach < 0.0 {
+            // Apart, and not only by rounding: who touches is grown around.
+            if reach < -pair.tiny() {
                 break;
             }
             (state.nearest, state.last) = (place, -reach);

@@ -28,7 +28,7 @@ const _: () = assert!(size_of::<Face>() == 48, "a query makes some dozens");
 /// Place of a vertex or of a face.
 type Place = u16;
 
-/// The corner, and the edge, behind each one of a triangle.
+/// The corner behind each one of a triangle.
 const NEXT: [usize; 3] = [1, 2, 0];
 
 /// An edge of the hole around a new vertex: from, to, and the face that stays on its far side.
@@ -237,19 +237,19 @@ impl Polytope {
                 continue;
             }
             // The edge is the other's from `to` to `from`.
-            let slot = match other.corners {
+            let slot: u8 = match other.corners {
                 [k, ..] if k == to => 0,
                 [_, k, _] if k == to => 1,
                 _ => 2,
             };
-            if other.corners[slot] != to || other.corners[NEXT[slot]] != from {
+            let k = usize::from(slot);
+            if other.corners[k] != to || other.corners[NEXT[k]] != from {
                 return false;
             }
-            let slot = [0_u8, 1, 2][slot];
             let sees = other.normal.dot(&new.w) - other.distance > -tiny;
             if sees || other.distance == f64::INFINITY {
                 self.bury(usize::from(outside));
-                let [after, before] = [[1, 2], [2, 0], [0, 1]][usize::from(slot)];
+                let [after, before] = [[1, 2], [2, 0], [0, 1]][k];
                 self.stack.extend([(outside, before), (outside, after)]);
             } else {
                 self.hole.push(Edge {
