@@ -3,7 +3,7 @@
 //!
 //! In: a pair. Out: the gap of the cores, or `None` where there is no closed form.
 
-use super::pair::{CoreGap, Held, Pair, across, unit};
+use super::pair::{CoreGap, Held, Pair, frame, unit};
 use crate::math::Vec3;
 use crate::shape::Core;
 
@@ -199,7 +199,7 @@ fn segments(pair: &Pair<'_>, ha: f64, hb: f64) -> CoreGap {
     let crossing = unit(&Vec3::new(-v.y, v.x, 0.0)).filter(|_| flat > 1e-28);
     let straight = unit(&between);
     let mut best = (f64::NEG_INFINITY, Vec3::x());
-    let crossing = crossing.unwrap_or_else(|| across(&v));
+    let crossing = crossing.unwrap_or_else(|| frame(&v).0);
     let crossing = if crossing.dot(&between) < 0.0 {
         -crossing
     } else {

@@ -14,7 +14,7 @@ use std::cell::RefCell;
 
 use super::gjk;
 use super::newton::{self, Refined};
-use super::pair::{CoreGap, Held, Pair, across, unit};
+use super::pair::{CoreGap, Held, Pair, frame, unit};
 use super::polytope::Polytope;
 use super::simplex::{Simplex, normal_of};
 use crate::math::Vec3;
@@ -49,8 +49,8 @@ pub(super) fn depth(pair: &Pair<'_>, simplex: &Simplex, warm: Option<Refined>) -
             if gap.is_tight(pair) || polytope.faces.len() > FACES_MAX {
                 break;
             }
-            let one = across(&gap.normal);
-            let turned = [gap.normal, one, gap.normal.cross(&one)];
+            let (one, other) = frame(&gap.normal);
+            let turned = [gap.normal, one, other];
             let axes = if attempt == 0 { &upright } else { &turned };
             let again = polytope.run(pair, &Simplex::default(), axes, None);
             gap = gjk::better(&gap, &polytope.straight(pair, again));
@@ -71,6 +71,9 @@ pub(super) fn depth_around(pair: &Pair<'_>, found: &Refined) -> Option<CoreGap> 
     }
     SCRATCH.with(|scratch| {
         let mut polytope = scratch.try_borrow_mut().ok()?;
+        if let Some(gap) = polytope.depth_under(pair, found) {
+            return Some(gap);
+        }
         if !polytope.start_below(pair, found.corner(), &-found.normal) {
             return None;
         }
@@ -132,6 +135,21 @@ struct State {
 }
 
 impl State {
+    /// Nothing is known.
+    fn new() -> Self {
+        Self {
+            best: Best {
+                lower: f64::NEG_INFINITY,
+                normal: Vec3::z(),
+                face: 0,
+            },
+            refined: None,
+            nearest: 0,
+            fits: f64::NEG_INFINITY,
+            last: f64::NEG_INFINITY,
+        }
+    }
+
     /// Whether a face belongs to another local optimum than the one that Newton found.
     fn is_new(&self, normal: &Vec3) -> bool {
         self.refined.is_none_or(|r| r.normal.dot(normal) < ANOTHER)
@@ -152,19 +170,31 @@ impl Polytope {
         self.settle(pair, warm.as_ref())
     }
 
+    /// The gap where the features say enough of the directions around the best one for the polytope to begin with a cap
+    /// that stands for them; `None` where they do not, or another direction is better.
+    fn depth_under(&mut self, pair: &Pair<'_>, found: &Refined) -> Option<CoreGap> {
+        let cap = found
+            .cap
+            .filter(|cap| cap.loss_m <= pair.tolerance() / 2.0)?;
+        let depth_m = -found.value - cap.loss_m;
+        self.start_under(pair, &-found.normal, depth_m, &cap);
+        let mut state = State {
+            refined: Some(*found),
+            ..State::new()
+        };
+        state.best.offer(found.value, &found.normal, 0);
+        self.expand(pair, &mut state);
+        let gap = CoreGap {
+            upper: (-state.fits).max(found.value),
+            ..found.apart()
+        };
+        let holds = -gap.upper > depth_m * cap.lift() && gap.is_tight(pair);
+        holds.then_some(gap)
+    }
+
     /// Grows as far as it helps, around what Newton found first; the gap that is known then.
     fn settle(&mut self, pair: &Pair<'_>, warm: Option<&Refined>) -> CoreGap {
-        let mut state = State {
-            best: Best {
-                lower: f64::NEG_INFINITY,
-                normal: Vec3::z(),
-                face: 0,
-            },
-            refined: None,
-            nearest: 0,
-            fits: f64::NEG_INFINITY,
-            last: f64::NEG_INFINITY,
-        };
+        let mut state = State::new();
         let sound = match warm {
             Some(found) => self.plant(pair, found, &mut state),
             None => true,
@@ -247,8 +277,7 @@ impl Polytope {
         state.best.offer(found.value, &found.normal, state.nearest);
         state.refined = Some(*found);
         let tolerance = pair.tolerance();
-        let (one, tiny) = (across(&found.normal), pair.tiny());
-        let other = found.normal.cross(&one);
+        let ((one, other), tiny) = (frame(&found.normal), pair.tiny());
         let lean = (2.0 * (tolerance / found.value.abs().max(tiny)).sqrt()).min(RING_MAX);
         if !self.offer(found.corner(), tiny) {
             return false;

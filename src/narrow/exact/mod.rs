@@ -11,12 +11,14 @@
 //!   (`epa`) gives the least translation, or planes through an axis do, where two axes nearly agree (`revolved`).
 //! * Where a circle takes part both stop early and a Newton method on the features (`newton`) finishes: it finds the
 //!   normal that makes `f` greatest, outside and inside alike. It starts from the features of the last answer, and
-//!   where it says that they overlap the polytope begins around its closest point, without GJK.
+//!   where it says that they overlap the polytope begins around its closest point, without GJK, or under a cap of
+//!   directions that the features themselves say are no better, which takes the place of its finest faces.
 //!
 //! The certificate: for every unit `n`, `f(n) = -(s_A(n) + s_B(-n))` is a lower bound on the gap, so the lower end is
 //! `f` at the best normal found, whoever found it. The upper end is the distance of two points that are convex
 //! combinations of points of the shapes, or minus the radius of a ball that fits into a polytope inscribed in the
-//! Minkowski difference. Both are widened by `Pair::pad`, which takes up every rounding from the quaternion on.
+//! Minkowski difference, or into the difference by what its features say within a cap. Both are widened by `Pair::pad`,
+//! which takes up every rounding from the quaternion on.
 //!
 //! Refused: parry's own queries on this path. Their tolerances are absolute (the answer depends on the unit of
 //! length), coincident shapes come back with depth 0, and curved pairs stop at 1e-7; here every tolerance is a
@@ -113,7 +115,7 @@ const FINISHED: f64 = 1e-6;
 /// * `warm` - kept by the caller for this pair; changes only the time taken (and the last bits).
 /// * returns - see [`Closest`]; `unknown` when `pos12` is not finite.
 ///
-/// Cost: 20 ns (spheres) to some 10 us (overlapping cylinders), bounded by the faces that a polytope may grow; no
+/// Cost: 20 ns (spheres) to some 5 us (overlapping cylinders), bounded by the faces that a polytope may grow; no
 /// allocation after a thread's first calls.
 #[must_use]
 pub fn convex_gap(a: &Convex, b: &Convex, pos12: &Pose, warm: &mut Warm) -> Closest {

@@ -8,43 +8,28 @@
 //! `sum(l_i w_i) = f n` with weights `l_i >= 0` of sum 1. That is a system in the two tangent coordinates of `n` and
 //! the weights; its matrix is the Lagrangian's: minus the circles' curvatures, minus `f`.
 
-use super::pair::{CoreGap, Held, Pair, Vertex, across, unit};
+mod cap;
+mod disc;
+mod set;
+
+use super::pair::{CoreGap, Held, NO_ELEMENT, Pair, Vertex, frame, unit};
 use super::simplex::Simplex;
 use crate::math::Vec3;
-use crate::shape::Core;
+
+pub(super) use cap::Cap;
+use set::{Active, Set};
 
 /// Newton steps of one active set; convergence is quadratic, so more means that it does not converge.
 const STEPS_MAX: usize = 10;
 /// Changes of the active set.
 const SETS_MAX: usize = 4;
+/// A tangent step that is the last one.
+const STEP_LENGTH_MIN: f64 = 3e-9;
 /// A tangent step longer than this leaves the region in which the model is meant.
 const STEP_LENGTH_MAX: f64 = 0.5;
 
-/// A pair of elements that takes part, with its weight.
-#[derive(Clone, Copy, Debug, Default)]
-struct Active {
-    of_a: u32,
-    of_b: u32,
-    weight: f64,
-    /// `f_i` at the current normal.
-    value: f64,
-    a: Vec3,
-    b: Vec3,
-    /// Gradient along the two tangents.
-    slope: [f64; 2],
-    /// Curvature along the two tangents: xx, xy, yy.
-    bend: [f64; 3],
-}
-
-/// The elements that take part.
-#[derive(Clone, Copy, Debug, Default)]
-struct Set {
-    actives: [Active; 3],
-    count: usize,
-}
-
 /// What the method ended at.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Refined {
     /// Unit, A to B.
     pub(super) normal: Vec3,
@@ -56,6 +41,8 @@ pub(super) struct Refined {
     pub(super) point_b: Vec3,
     /// The elements that take part.
     pub(super) held: Held,
+    /// Around the normal of cores that overlap, where the elements say so much.
+    pub(super) cap: Option<Cap>,
 }
 
 impl Refined {
@@ -77,8 +64,8 @@ impl Refined {
             w: self.point_b - self.point_a,
             a: self.point_a,
             b: self.point_b,
-            of_a: u32::MAX >> 1,
-            of_b: u32::MAX >> 1,
+            of_a: NO_ELEMENT,
+            of_b: NO_ELEMENT,
         }
     }
 }
@@ -116,6 +103,9 @@ pub(super) fn solve(
 }
 
 fn climb(pair: &Pair<'_>, mut set: Set, normal: &Vec3) -> Option<Refined> {
+    if let Some(found) = disc::face_on(pair, &set, normal) {
+        return Some(found);
+    }
     let mut normal = *normal;
     let mut best: Option<Refined> = None;
     for _ in 0..SETS_MAX {
@@ -126,7 +116,8 @@ fn climb(pair: &Pair<'_>, mut set: Set, normal: &Vec3) -> Option<Refined> {
         let value = end.normal.dot(&all.w);
         let least = set.least();
         if best.is_none_or(|b| value > b.value) {
-            best = Some(Refined { value, ..end });
+            let cap = Cap::of(&set, value);
+            best = Some(Refined { value, cap, ..end });
         }
         normal = end.normal;
         // An element outside the set that reaches further must join it.
@@ -137,142 +128,12 @@ fn climb(pair: &Pair<'_>, mut set: Set, normal: &Vec3) -> Option<Refined> {
     best
 }
 
-impl Set {
-    /// Vertices on one pair of elements are one: they cluster where a circle is being approached.
-    fn of(vertices: &[Vertex], weights: &[f64]) -> Self {
-        let mut set = Self::default();
-        for (vertex, weight) in vertices.iter().zip(weights) {
-            set.add(vertex.of_a, vertex.of_b, *weight);
-        }
-        set
-    }
-
-    fn add(&mut self, of_a: u32, of_b: u32, weight: f64) {
-        let same = self.actives[..self.count]
-            .iter_mut()
-            .find(|x| x.of_a == of_a && x.of_b == of_b);
-        if let Some(same) = same {
-            same.weight += weight;
-        } else if self.count < 3 {
-            self.actives[self.count] = Active {
-                of_a,
-                of_b,
-                weight,
-                ..Active::default()
-            };
-            self.count += 1;
-        }
-    }
-
-    fn held(&self) -> Held {
-        let mut held = Held::default();
-        for x in &self.actives[..self.count] {
-            held.push(x.of_a, x.of_b, x.weight);
-        }
-        held
-    }
-
-    fn join(&mut self, vertex: &Vertex) -> bool {
-        let known = self.actives[..self.count]
-            .iter()
-            .any(|x| x.of_a == vertex.of_a && x.of_b == vertex.of_b);
-        if known || self.count == 3 {
-            return false;
-        }
-        self.actives[self.count] = Active {
-            of_a: vertex.of_a,
-            of_b: vertex.of_b,
-            ..Active::default()
-        };
-        self.count += 1;
-        true
-    }
-
-    fn least(&self) -> f64 {
-        self.actives[..self.count]
-            .iter()
-            .map(|x| x.value)
-            .fold(f64::INFINITY, f64::min)
-    }
-
-    /// Supports, slopes and curvatures at `n`; `None` where a circle is seen along its axis.
-    fn evaluate(&mut self, pair: &Pair<'_>, n: &Vec3, e1: &Vec3, e2: &Vec3) -> Option<()> {
-        let in_b = -pair.to_b(n);
-        for x in &mut self.actives[..self.count] {
-            let (a, ta, ka) = element(pair.a.core(), x.of_a, n)?;
-            let (b, tb, kb) = element(pair.b.core(), x.of_b, &in_b)?;
-            x.a = a;
-            x.b = pair.rotation * b + pair.at;
-            let tb = pair.rotation * tb;
-            let w = x.b - x.a;
-            x.value = n.dot(&w);
-            x.slope = [w.dot(e1), w.dot(e2)];
-            let (a1, a2, b1, b2) = (ta.dot(e1), ta.dot(e2), tb.dot(e1), tb.dot(e2));
-            x.bend = [
-                ka * a1 * a1 + kb * b1 * b1,
-                ka * a1 * a2 + kb * b1 * b2,
-                ka * a2 * a2 + kb * b2 * b2,
-            ];
-        }
-        Some(())
-    }
-
-    /// Drops the first element with a negative weight, if another is left.
-    fn drop_negative(&mut self) -> bool {
-        let place = self.actives[..self.count]
-            .iter()
-            .position(|x| x.weight < -1e-9);
-        match place {
-            Some(place) if self.count > 1 => {
-                self.actives[place..self.count].rotate_left(1);
-                self.count -= 1;
-                true
-            }
-            _ => false,
-        }
-    }
-
-    fn witnesses(&self) -> (Vec3, Vec3) {
-        let actives = &self.actives[..self.count];
-        let whole: f64 = actives.iter().map(|x| x.weight.max(0.0)).sum();
-        let (mut a, mut b) = (Vec3::zeros(), Vec3::zeros());
-        for x in actives {
-            let weight = if whole > 0.0 {
-                x.weight.max(0.0) / whole
-            } else {
-                f64::from(u8::from(actives.len() == 1))
-            };
-            a += x.a * weight;
-            b += x.b * weight;
-        }
-        (a, b)
-    }
-}
-
-/// Farthest point of an element along `dir`, the tangent it moves along when `dir` turns, and by how much.
-fn element(core: &Core, element: u32, dir: &Vec3) -> Option<(Vec3, Vec3, f64)> {
-    let Some(circle) = core.circle(element) else {
-        return Some((core.vertex(element)?, Vec3::zeros(), 0.0));
-    };
-    let across = (dir.x * dir.x + dir.y * dir.y).sqrt();
-    if across < 1e-12 {
-        return None;
-    }
-    let (x, y) = (dir.x / across, dir.y / across);
-    Some((
-        Vec3::new(x * circle.radius_m, y * circle.radius_m, circle.z_m),
-        Vec3::new(-y, x, 0.0),
-        circle.radius_m / across,
-    ))
-}
-
 /// Newton steps with one active set, which may lose members.
 fn converge(pair: &Pair<'_>, set: &mut Set, start: &Vec3) -> Option<Refined> {
     let mut n = *start;
     let mut last = f64::INFINITY;
     for _ in 0..STEPS_MAX {
-        let e1 = across(&n);
-        let e2 = n.cross(&e1);
+        let (e1, e2) = frame(&n);
         set.evaluate(pair, &n, &e1, &e2)?;
         let (dx, dy, change) = step(set)?;
         let length = (dx * dx + dy * dy).sqrt();
@@ -287,13 +148,13 @@ fn converge(pair: &Pair<'_>, set: &mut Set, start: &Vec3) -> Option<Refined> {
             continue;
         }
         n = unit(&(n + e1 * dx + e2 * dy))?;
-        if length < 1e-15 || (length < 1e-7 && length >= last / 2.0) {
+        // Convergence is quadratic: what is left is the square of this step, or rounding.
+        if length < STEP_LENGTH_MIN || (length < 1e-7 && length >= last / 2.0) {
             break;
         }
         last = length;
     }
-    let e1 = across(&n);
-    let e2 = n.cross(&e1);
+    let (e1, e2) = frame(&n);
     set.evaluate(pair, &n, &e1, &e2)?;
     let (point_a, point_b) = set.witnesses();
     Some(Refined {
@@ -302,6 +163,7 @@ fn converge(pair: &Pair<'_>, set: &mut Set, start: &Vec3) -> Option<Refined> {
         point_a,
         point_b,
         held: set.held(),
+        cap: None,
     })
 }
 
@@ -317,7 +179,7 @@ fn step(set: &Set) -> Option<(f64, f64, [f64; 3])> {
     let (mut bend, mut rest) = ([0.0; 3], [0.0; 2]);
     let mut mean = 0.0;
     for x in actives {
-        for (sum, term) in bend.iter_mut().zip(x.bend) {
+        for (sum, term) in bend.iter_mut().zip(x.bend()) {
             *sum -= x.weight * term;
         }
         for (sum, term) in rest.iter_mut().zip(x.slope) {

@@ -22,6 +22,9 @@ pub(super) struct Vertex {
     pub(super) of_b: u32,
 }
 
+/// The element of a point that lies on no one.
+pub(super) const NO_ELEMENT: u32 = u32::MAX >> 1;
+
 /// Which elements an answer rests on: enough to begin from there the next time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Held {
@@ -215,13 +218,16 @@ pub(super) fn unit(v: &Vec3) -> Option<Vec3> {
     }
 }
 
-/// A unit vector orthogonal to unit `n`.
+/// Two unit vectors that make a right-handed frame with unit `n`, which comes last.
+///
+/// Source: Duff et al. 2017, Building an orthonormal basis, revisited. It takes one division, no root and no branch.
 #[inline]
-pub(super) fn across(n: &Vec3) -> Vec3 {
-    let axis = if n.x.abs() < 0.6 {
-        Vec3::x()
-    } else {
-        Vec3::y()
-    };
-    n.cross(&axis).normalize()
+pub(super) fn frame(n: &Vec3) -> (Vec3, Vec3) {
+    let up = 1.0_f64.copysign(n.z);
+    let part = -1.0 / (up + n.z);
+    let mixed = n.x * n.y * part;
+    (
+        Vec3::new(1.0 + up * n.x * n.x * part, up * mixed, -up * n.x),
+        Vec3::new(mixed, up + n.y * n.y * part, -n.y),
+    )
 }

@@ -1,13 +1,12 @@
-//! A convex polytope that grows: faces with neighbours, a first tetrahedron, and the step that puts a vertex in.
+//! A convex polytope that grows: faces with neighbours, and the step that puts a vertex in.
 //!
 //! In: vertices of the Minkowski difference. Out: a closed surface and its face nearest to the origin.
 
-use super::pair::{CoreGap, Held, Pair, Vertex, across, unit};
+mod first;
+
+use super::pair::{Vertex, unit};
 use super::simplex::{Simplex, normal_of};
 use crate::math::Vec3;
-
-/// Sine of 60 degrees.
-const SIXTY: f64 = 0.866_025_403_784_438_6;
 
 /// A triangle of the polytope; corners counter-clockwise seen from outside.
 #[derive(Clone, Copy)]
@@ -85,121 +84,6 @@ impl Polytope {
         self.faces.clear();
         self.distances.clear();
         self.met.clear();
-    }
-
-    /// A tetrahedron of `top` and three vertices that lie on the other side of the origin, as seen from it; false where
-    /// it is a sliver. Whoever knows the closest point begins with it, and need not ask whether the cores overlap. The
-    /// origin may be outside yet: the faces that it lies in front of are then those nearest to it.
-    ///
-    /// * `out` - unit, from the origin to `top`.
-    pub(super) fn start_below(&mut self, pair: &Pair<'_>, top: Vertex, out: &Vec3) -> bool {
-        self.clear();
-        let one = across(out);
-        let other = out.cross(&one);
-        self.vertices.push(top);
-        for (x, y) in [(1.0, 0.0), (-0.5, SIXTY), (-0.5, -SIXTY)] {
-            // The support is asked for the way it is least along.
-            self.vertices.push(pair.support(&-(one * x + other * y)));
-        }
-        self.close_first()
-    }
-
-    /// A tetrahedron of three vertices and the one that is farthest the other way; false where it is a sliver. It need
-    /// not hold the origin.
-    ///
-    /// * `out` - unit, from the origin to the three.
-    pub(super) fn start_at(&mut self, pair: &Pair<'_>, face: [Vertex; 3], out: &Vec3) -> bool {
-        self.clear();
-        let [p, q, r] = face;
-        let top = pair.support(out);
-        self.vertices.extend_from_slice(&[p, q, r, top]);
-        self.close_first()
-    }
-
-    /// Makes the faces of the first four vertices; false where they are a sliver.
-    fn close_first(&mut self) -> bool {
-        let whole = self.vertices.first_chunk().is_some_and(has_volume);
-        if whole {
-            self.tetrahedron();
-        }
-        whole
-    }
-
-    /// A tetrahedron with a volume, or the gap when the difference is flat.
-    ///
-    /// * `axes` - orthogonal; where the simplex does not do, the tetrahedron begins along one of them.
-    #[allow(clippy::result_large_err, reason = "lives on the stack for one query")]
-    pub(super) fn start(
-        &mut self,
-        pair: &Pair<'_>,
-        simplex: &Simplex,
-        axes: &[Vec3; 3],
-    ) -> Result<(), CoreGap> {
-        self.clear();
-        let flat_below = 2.0 * pair.tiny();
-        if simplex.count == 4 {
-            self.vertices.extend_from_slice(&simplex.vertices);
-            if self.close_first() {
-                return Ok(());
-            }
-            self.vertices.clear();
-        }
-        // Two ends along some axis, then the farthest from the line, then from the plane.
-        let mut ends = axes.map(|axis| (pair.support(&axis), pair.support(&-axis)));
-        ends.sort_by(|s, t| {
-            (t.0.w - t.1.w)
-                .norm_squared()
-                .total_cmp(&(s.0.w - s.1.w).norm_squared())
-        });
-        let (p, q) = ends[0];
-        let Some(along) = unit(&(q.w - p.w)).filter(|_| (q.w - p.w).norm() > flat_below) else {
-            return Err(flat(pair, &Vec3::z(), simplex));
-        };
-        let side = across(&along);
-        let other = along.cross(&side);
-        let candidates = [side, -side, other, -other].map(|d| pair.support(&d));
-        let off = |v: &Vertex| {
-            let d = v.w - p.w;
-            (d - along * d.dot(&along)).norm()
-        };
-        let mut r = candidates[0];
-        for c in candidates {
-            if off(&c) > off(&r) {
-                r = c;
-            }
-        }
-        let normal = normal_of(&p.w, &q.w, &r.w);
-        let Some(normal) = unit(&normal).filter(|_| off(&r) > flat_below) else {
-            return Err(flat(pair, &side, simplex));
-        };
-        let (low, high) = (pair.support(&normal), pair.support(&-normal));
-        let height = |v: &Vertex| normal.dot(&(v.w - p.w)).abs();
-        let s = if height(&low) > height(&high) {
-            low
-        } else {
-            high
-        };
-        if height(&s) <= flat_below {
-            return Err(flat(pair, &normal, simplex));
-        }
-        self.vertices.extend_from_slice(&[p, q, r, s]);
-        self.tetrahedron();
-        Ok(())
-    }
-
-    /// Faces of the first four vertices, turned outward.
-    fn tetrahedron(&mut self) {
-        let w = |k: usize| self.vertices[k].w;
-        if (w(1) - w(0)).cross(&(w(2) - w(0))).dot(&(w(3) - w(0))) > 0.0 {
-            self.vertices.swap(1, 2);
-        }
-        // The face opposite to 3 is 0 1 2, seen from outside; the others share its edges.
-        let corners = [[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]];
-        let beside = [[1, 2, 3], [3, 2, 0], [1, 3, 0], [2, 1, 0]];
-        self.met.resize(self.vertices.len(), 0);
-        for k in 0..4 {
-            self.put_face(corners[k], beside[k]);
-        }
     }
 
     fn put_face(&mut self, corners: [Place; 3], beside: [Place; 3]) {
@@ -339,36 +223,5 @@ impl Polytope {
             }
         }
         best
-    }
-}
-
-/// Whether a tetrahedron is not a sliver.
-fn has_volume(vertices: &[Vertex; 4]) -> bool {
-    let w = vertices.map(|v| v.w);
-    let normal = (w[1] - w[0]).cross(&(w[2] - w[0]));
-    let area = normal.norm();
-    let height = normal.dot(&(w[3] - w[0])).abs();
-    area > 0.0 && height > 1e-3 * area * area.sqrt()
-}
-
-/// The gap when the difference has no thickness along `normal`: 0 but for rounding, separated at once along it.
-fn flat(pair: &Pair<'_>, normal: &Vec3, simplex: &Simplex) -> CoreGap {
-    let (one, other) = (
-        normal.dot(&pair.support(normal).w),
-        -normal.dot(&pair.support(&-normal).w),
-    );
-    let (lower, normal) = if one >= other {
-        (one, *normal)
-    } else {
-        (other, -*normal)
-    };
-    let (point_a, point_b) = simplex.witnesses();
-    CoreGap {
-        lower,
-        upper: (point_b - point_a).norm().max(lower),
-        normal,
-        point_a,
-        point_b,
-        held: Held::default(),
     }
 }

@@ -1,0 +1,62 @@
+//! A disc face on: the best normal is its axis, where Newton's circles have no tangent.
+//!
+//! In: the elements of an earlier answer and its normal. Out: what Newton would end at, in closed form, if the normal
+//! lies near the axis of a disc and the other core touches the disc inside its rim.
+
+use super::super::pair::{Held, Pair};
+use super::Refined;
+use super::cap::Cap;
+use super::set::Set;
+use crate::math::Vec3;
+
+/// Cosine of the angle between a normal and an axis up to which the disc is tried.
+const NEAR: f64 = 0.995;
+
+/// The local greatest `f` at the axis of a disc that takes part; `None` where there is none near `normal`.
+pub(super) fn face_on(pair: &Pair<'_>, set: &Set, normal: &Vec3) -> Option<Refined> {
+    let axis_of_b: Vec3 = pair.rotation.column(2).into_owned();
+    set.actives[..set.count].iter().find_map(|x| {
+        let of_a = pair.a.core().circle(x.of_a).and_then(|circle| {
+            let n = Vec3::z() * circle.z_m.signum();
+            touched(pair, normal, &n, true, circle.radius_m)
+        });
+        of_a.or_else(|| {
+            let circle = pair.b.core().circle(x.of_b)?;
+            let n = axis_of_b * -circle.z_m.signum();
+            touched(pair, normal, &n, false, circle.radius_m)
+        })
+    })
+}
+
+/// What touches a disc whose face is square to `n`.
+///
+/// * `is_a` - whose disc it is.
+fn touched(pair: &Pair<'_>, normal: &Vec3, n: &Vec3, is_a: bool, radius_m: f64) -> Option<Refined> {
+    if normal.dot(n) < NEAR {
+        return None;
+    }
+    let support = pair.support(n);
+    let value = n.dot(&support.w);
+    // The other's point, and the one straight across from it on the disc, seen from the disc's own frame.
+    let (point_a, point_b, seen) = if is_a {
+        let point = support.b - n * value;
+        (point, support.b, point)
+    } else {
+        let point = support.a + n * value;
+        (support.a, point, pair.to_b(&(point - pair.at)))
+    };
+    let inside_m = radius_m - (seen.x * seen.x + seen.y * seen.y).sqrt();
+    if inside_m <= pair.tiny() {
+        return None;
+    }
+    let mut held = Held::default();
+    held.push(support.of_a, support.of_b, 1.0);
+    Some(Refined {
+        normal: *n,
+        value,
+        point_a,
+        point_b,
+        held,
+        cap: Cap::of_face(-value, inside_m, pair.tiny()),
+    })
+}

@@ -1,0 +1,190 @@
+//! The elements that take part: vertices and circles of both cores, with what each says at a normal.
+
+use super::super::pair::{Held, Pair, Vertex};
+use crate::math::Vec3;
+use crate::shape::Core;
+
+/// A pair of elements that takes part, with its weight.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Active {
+    pub(super) of_a: u32,
+    pub(super) of_b: u32,
+    pub(super) weight: f64,
+    /// `f_i` at the current normal.
+    pub(super) value: f64,
+    pub(super) a: Vec3,
+    pub(super) b: Vec3,
+    /// Gradient along the two tangents.
+    pub(super) slope: [f64; 2],
+    /// The circle of A and that of B; a vertex has none and does not bend.
+    pub(super) rims: [Rim; 2],
+}
+
+/// A circle as it is seen along a unit normal.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Rim {
+    /// Sine of the angle between its axis and the normal.
+    pub(super) lean: f64,
+    /// By how much its farthest point moves when the normal turns along it, metres for an angle of 1.
+    pub(super) bend_m: f64,
+    /// The way that point moves, along the two tangents.
+    pub(super) along: [f64; 2],
+}
+
+/// The elements that take part.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Set {
+    pub(super) actives: [Active; 3],
+    pub(super) count: usize,
+}
+
+impl Active {
+    /// Curvature along the two tangents: xx, xy, yy.
+    pub(super) fn bend(&self) -> [f64; 3] {
+        let mut bend = [0.0; 3];
+        for rim in &self.rims {
+            let [x, y] = rim.along;
+            bend[0] += rim.bend_m * x * x;
+            bend[1] += rim.bend_m * x * y;
+            bend[2] += rim.bend_m * y * y;
+        }
+        bend
+    }
+}
+
+impl Set {
+    /// Vertices on one pair of elements are one: they cluster where a circle is being approached.
+    pub(super) fn of(vertices: &[Vertex], weights: &[f64]) -> Self {
+        let mut set = Self::default();
+        for (vertex, weight) in vertices.iter().zip(weights) {
+            set.add(vertex.of_a, vertex.of_b, *weight);
+        }
+        set
+    }
+
+    pub(super) fn add(&mut self, of_a: u32, of_b: u32, weight: f64) {
+        let same = self.actives[..self.count]
+            .iter_mut()
+            .find(|x| x.of_a == of_a && x.of_b == of_b);
+        if let Some(same) = same {
+            same.weight += weight;
+        } else if self.count < 3 {
+            self.actives[self.count] = Active {
+                of_a,
+                of_b,
+                weight,
+                ..Active::default()
+            };
+            self.count += 1;
+        }
+    }
+
+    pub(super) fn held(&self) -> Held {
+        let mut held = Held::default();
+        for x in &self.actives[..self.count] {
+            held.push(x.of_a, x.of_b, x.weight);
+        }
+        held
+    }
+
+    pub(super) fn join(&mut self, vertex: &Vertex) -> bool {
+        let known = self.actives[..self.count]
+            .iter()
+            .any(|x| x.of_a == vertex.of_a && x.of_b == vertex.of_b);
+        if known || self.count == 3 {
+            return false;
+        }
+        self.actives[self.count] = Active {
+            of_a: vertex.of_a,
+            of_b: vertex.of_b,
+            ..Active::default()
+        };
+        self.count += 1;
+        true
+    }
+
+    pub(super) fn least(&self) -> f64 {
+        self.actives[..self.count]
+            .iter()
+            .map(|x| x.value)
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Supports, slopes and curvatures at `n`; `None` where a circle is seen along its axis.
+    pub(super) fn evaluate(
+        &mut self,
+        pair: &Pair<'_>,
+        n: &Vec3,
+        e1: &Vec3,
+        e2: &Vec3,
+    ) -> Option<()> {
+        let in_b = -pair.to_b(n);
+        for x in &mut self.actives[..self.count] {
+            let (a, ta, ra) = element(pair.a.core(), x.of_a, n)?;
+            let (b, tb, rb) = element(pair.b.core(), x.of_b, &in_b)?;
+            x.a = a;
+            x.b = pair.rotation * b + pair.at;
+            let tb = pair.rotation * tb;
+            let w = x.b - x.a;
+            x.value = n.dot(&w);
+            x.slope = [w.dot(e1), w.dot(e2)];
+            x.rims = [(ta, ra), (tb, rb)].map(|(along, rim)| Rim {
+                along: [along.dot(e1), along.dot(e2)],
+                ..rim
+            });
+        }
+        Some(())
+    }
+
+    /// Drops the first element with a negative weight, if another is left.
+    pub(super) fn drop_negative(&mut self) -> bool {
+        let place = self.actives[..self.count]
+            .iter()
+            .position(|x| x.weight < -1e-9);
+        match place {
+            Some(place) if self.count > 1 => {
+                self.actives[place..self.count].rotate_left(1);
+                self.count -= 1;
+                true
+            }
+            _ => false,
+        }
+    }
+
+    pub(super) fn witnesses(&self) -> (Vec3, Vec3) {
+        let actives = &self.actives[..self.count];
+        let whole: f64 = actives.iter().map(|x| x.weight.max(0.0)).sum();
+        let (mut a, mut b) = (Vec3::zeros(), Vec3::zeros());
+        for x in actives {
+            let weight = if whole > 0.0 {
+                x.weight.max(0.0) / whole
+            } else {
+                f64::from(u8::from(actives.len() == 1))
+            };
+            a += x.a * weight;
+            b += x.b * weight;
+        }
+        (a, b)
+    }
+}
+
+/// Farthest point of an element along `dir`, the tangent it moves along when `dir` turns, and how its circle is seen.
+fn element(core: &Core, element: u32, dir: &Vec3) -> Option<(Vec3, Vec3, Rim)> {
+    let Some(circle) = core.circle(element) else {
+        return Some((core.vertex(element)?, Vec3::zeros(), Rim::default()));
+    };
+    let across = (dir.x * dir.x + dir.y * dir.y).sqrt();
+    if across < 1e-12 {
+        return None;
+    }
+    let (x, y) = (dir.x / across, dir.y / across);
+    Some((
+        Vec3::new(x * circle.radius_m, y * circle.radius_m, circle.z_m),
+        Vec3::new(-y, x, 0.0),
+        Rim {
+            lean: across,
+            bend_m: circle.radius_m / across,
+            along: [0.0; 2],
+        },
+    ))
+}
