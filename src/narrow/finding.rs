@@ -67,26 +67,47 @@ impl Narrow {
         })
     }
 
+    /// Pairs whose verdict is not `apart`, in no order that means anything.
+    #[must_use]
+    pub fn active(&self) -> &[PairSlot] {
+        &self.active
+    }
+
+    /// Pairs that have become active since [`Narrow::clear_entered`]; they may have stopped, or be others by now.
+    #[must_use]
+    pub fn entered(&self) -> &[PairSlot] {
+        &self.entered
+    }
+
+    /// What became active was taken down.
+    pub fn clear_entered(&mut self) {
+        self.entered.clear();
+        // How many do differs from tick to tick: room for all of them is made when they are more than ever.
+        self.entered.reserve(self.active.len());
+    }
+
+    /// Whether a pair's verdict is not `apart`.
+    #[must_use]
+    pub fn is_active(&self, slot: PairSlot) -> bool {
+        (self.hot.get(slot.index())).is_some_and(|hot| hot.live && hot.verdict != Verdict::Apart)
+    }
+
+    /// Pairs that were active, in the tick before or after its findings were taken, and are now proved apart.
+    #[must_use]
+    pub fn left(&self) -> &[PairSlot] {
+        &self.left
+    }
+
     /// Whether what there is to say of a pair may have changed since [`Narrow::told`]: it was looked at or worked on, a
     /// body of it moved, or its slot holds another pair.
     #[must_use]
     pub fn is_stirred(&self, slot: PairSlot) -> bool {
-        self.hot.get(slot.index()).is_none_or(|hot| hot.stirred)
+        self.stirred.has(slot)
     }
 
     /// What is known of a pair has been taken down.
     pub fn told(&mut self, slot: PairSlot) {
-        if let Some(hot) = self.hot.get_mut(slot.index()) {
-            hot.stirred = false;
-        }
-    }
-
-    /// Says that [`Narrow::is_stirred`] of a pair is wanted soon.
-    #[inline]
-    pub fn ask_ahead_if_stirred(&self, slot: PairSlot) {
-        if let Some(hot) = self.hot.get(slot.index()) {
-            prefetch(hot);
-        }
+        self.stirred.clear(slot);
     }
 
     /// Says that [`Narrow::finding`] of a pair is wanted soon.

@@ -26,8 +26,6 @@ pub(super) struct Hot {
     pub(super) live: bool,
     /// A shape of either is a mesh.
     pub(super) meshed: bool,
-    /// What [`Narrow::finding`] or the contacts say may differ from what was last told.
-    pub(super) stirred: bool,
 }
 
 const _: () = assert!(
@@ -289,8 +287,8 @@ impl Narrow {
             verdict: Verdict::Apart,
             live: true,
             meshed: meshed(body_a) || meshed(body_b),
-            stirred: true,
         };
+        self.stirred.set(slot);
         self.counts[usize::from(Verdict::Apart.code())] += 1;
         let memo = &mut self.memos[slot.index()];
         *memo = Memo {
@@ -312,7 +310,7 @@ impl Narrow {
         };
         self.counts[usize::from(hot.verdict.code())] -= 1;
         hot.live = false;
-        hot.stirred = true;
+        self.stirred.set(slot);
         hot.verdict = Verdict::Apart;
         self.deactivate(slot);
         let memo = &mut self.memos[slot.index()];
@@ -351,6 +349,7 @@ impl Narrow {
         } else if before == Verdict::Apart {
             memo.active_at = u32::try_from(self.active.len()).unwrap_or(NONE);
             self.active.push(slot);
+            self.entered.push(slot);
         }
     }
 
@@ -376,7 +375,6 @@ impl Hot {
             verdict: Verdict::Apart,
             live: false,
             meshed: false,
-            stirred: true,
         }
     }
 }

@@ -27,6 +27,7 @@ mod contacts;
 mod cover;
 mod cursor;
 mod finding;
+mod flags;
 mod memo;
 mod order;
 mod pass;
@@ -56,6 +57,7 @@ use crate::world::World;
 
 use approx::{Approx, Kept};
 use compound::CompoundFront;
+use flags::Flags;
 use memo::{Hot, Memo};
 use mesh::Search;
 use order::{RankCost, Urgency};
@@ -93,6 +95,10 @@ pub struct Narrow {
     short: Vec<BodySlot>,
     /// Pairs whose verdict is not `apart`.
     active: Vec<PairSlot>,
+    /// Pairs that have become active since this was last cleared; they may have stopped, or be others by now.
+    entered: Vec<PairSlot>,
+    /// By `PairSlot`: what [`Narrow::finding`] or the contacts say may differ from what was last told.
+    stirred: Flags,
     /// Pairs that stopped being active in this tick and still exist.
     left: Vec<PairSlot>,
     /// They stopped after their findings were taken: the next tick is to hear of them.
@@ -240,18 +246,6 @@ impl Narrow {
         self.shelves.store.touch_ahead(meter);
         self.go_on_with_refits(world, meter);
         self.spend_on_verdicts(world, wanted, meter) && self.spend_on_reports(world, wanted, meter)
-    }
-
-    /// Pairs whose verdict is not `apart`, in no order that means anything.
-    #[must_use]
-    pub fn active(&self) -> &[PairSlot] {
-        &self.active
-    }
-
-    /// Pairs that were active, in the tick before or after its findings were taken, and are now proved apart.
-    #[must_use]
-    pub fn left(&self) -> &[PairSlot] {
-        &self.left
     }
 
     /// How many pairs have this verdict (`Apart`: of those that were ever decided).

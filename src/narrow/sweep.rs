@@ -124,7 +124,7 @@ impl Narrow {
         } = &mut self.sweeps;
         for sweep in list.drain(..) {
             places[sweep.slot.index()] = NONE;
-            self.hot[sweep.slot.index()].stirred = true;
+            self.stirred.set(sweep.slot);
         }
         *told = false;
     }
@@ -137,7 +137,7 @@ impl Narrow {
                 continue;
             }
             for pair in pairs.pairs_of(slot) {
-                self.hot[pair.index()].stirred = true;
+                self.stirred.set(pair);
                 let hot = self.hot[pair.index()];
                 let memo = &self.memos[pair.index()];
                 let (Some(a), Some(b)) = (world.body(hot.a), world.body(hot.b)) else {

@@ -116,7 +116,7 @@ impl Narrow {
     pub(super) fn widen_pair(&mut self, slot: PairSlot, world: &World) {
         let hot = &mut self.hot[slot.index()];
         let memo = &mut self.memos[slot.index()];
-        hot.stirred = true;
+        self.stirred.set(slot);
         let (Some(a), Some(b)) = (world.body(hot.a), world.body(hot.b)) else {
             return;
         };

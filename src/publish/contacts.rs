@@ -1,12 +1,13 @@
 //! Rows of `contacts`: manifold points of colliding pairs, closest points of near ones.
 
-use crate::ids::PairSlot;
+use crate::ids::{PairSlot, small};
 use crate::math::{Point, Vec3};
 use crate::narrow::{Contact, Finding, Witness};
 use crate::wire::{ContactKind, ContactRow, Level, MessageHeader, Outbox, Verdict, contact_flags};
 use crate::world::Body;
 
-use super::kept::Span;
+use super::kept::{Kept, Span};
+use super::listing::Mark;
 use super::{AHEAD, Publisher, View};
 
 impl Publisher {
@@ -19,41 +20,48 @@ impl Publisher {
     ) -> u64 {
         if !view.demand.contacts {
             out.contacts.clear();
+            self.whole.1 = false;
             return 0;
         }
         let all = self.survey.contacts();
         debug_assert_eq!(
             all,
-            (self.listing.rows.iter().map(|row| row.contacts as usize)).sum::<usize>(),
+            (self.listing.iter().map(|row| row.contacts as usize)).sum::<usize>(),
             "every row was surveyed once"
         );
         let cut = all > self.limits.contact_rows;
         if cut {
             self.choose_pairs();
         }
+        let whole = std::mem::replace(&mut self.whole.1, !cut) && !cut;
         let mut kept = std::mem::take(&mut self.kept_contacts);
         kept.begin();
-        for at in 0..self.listing.rows.len() {
-            let ahead = self.listing.rows.get(at + AHEAD);
-            if let Some(ahead) = ahead.filter(|row| row.fresh && row.contacts > 0)
-                && let Some(slot) = ahead.slot
+        let mut at = 0;
+        while at < self.listing.len() {
+            if whole && !self.listing.marks[at].fresh {
+                at = self.keep_contacts(at, &mut kept);
+                continue;
+            }
+            if let Some(ahead) = self.listing.marks.get(at + AHEAD)
+                && ahead.fresh
+                && let Some(slot) = self.listing.row(at + AHEAD).slot
             {
                 view.narrow.ask_ahead_for_contacts(slot);
             }
-            let row = &self.listing.rows[at];
-            let sent = !cut || self.chosen.get(at) == Some(&true);
+            let (mark, row) = (self.listing.marks[at], self.listing.row(at));
+            let sent = row.contacts > 0 && (!cut || self.chosen.get(at) == Some(&true));
             let span = match row.slot {
-                Some(slot) if sent && row.contacts > 0 => {
-                    if !row.fresh && row.in_contacts.len == row.contacts {
-                        kept.keep(row.in_contacts)
-                    } else {
-                        view.narrow.name_contacts(slot, &mut self.next_contact);
-                        kept.make(|out| push_rows(view, slot, out))
-                    }
+                Some(_) if sent && !mark.fresh && mark.contacts.len == row.contacts => {
+                    kept.keep(mark.contacts)
                 }
-                _ => Span::default(),
+                Some(slot) if sent => {
+                    view.narrow.name_contacts(slot, &mut self.next_contact);
+                    kept.make(|out| push_rows(view, slot, out))
+                }
+                _ => kept.make(|_| {}),
             };
-            self.listing.rows[at].in_contacts = span;
+            self.listing.marks[at].contacts = span;
+            at += 1;
         }
         kept.finish(&mut out.contacts);
         self.kept_contacts = kept;
@@ -65,12 +73,36 @@ impl Publisher {
         left_out
     }
 
+    /// Keeps the contacts of rows that are not fresh and stood side by side, from a place on; returns the place behind
+    /// them.
+    fn keep_contacts(&mut self, from: usize, kept: &mut Kept<ContactRow>) -> usize {
+        let marks = &mut self.listing.marks[from..];
+        let first = marks.first().map_or(0, |mark| mark.contacts.first);
+        let mut end = first;
+        let stays = |mark: &&Mark| {
+            let side_by_side = !mark.fresh && mark.contacts.first == end;
+            end += if side_by_side { mark.contacts.len } else { 0 };
+            side_by_side
+        };
+        let count = marks.iter().take_while(stays).count();
+        let now = kept.keep(Span {
+            first,
+            len: end - first,
+        });
+        if now.first != first {
+            for mark in &mut marks[..count] {
+                mark.contacts.first = mark.contacts.first - first + now.first;
+            }
+        }
+        from + count
+    }
+
     /// Chooses the pairs whose contacts fit: the deepest, of equally deep ones those with the smaller ids.
     fn choose_pairs(&mut self) {
-        let (by_depth, rows) = (&mut self.contact_pairs, &self.listing.rows);
+        let (by_depth, rows) = (&mut self.contact_pairs, &self.listing);
         by_depth.clear();
         let pairs = rows.iter().enumerate().filter(|(_, row)| row.contacts > 0);
-        by_depth.extend(pairs.map(|(at, row)| (row.best_m, at)));
+        by_depth.extend(pairs.map(|(at, row)| (row.best_m, small(at), row.contacts)));
         // Halves what the limit lies in, until it is one pair; a sort of all would take several times as long.
         let (mut from, mut to, mut room) = (0, by_depth.len(), self.limits.contact_rows);
         while from < to {
@@ -79,10 +111,7 @@ impl Publisher {
             by_depth[from..to]
                 .select_nth_unstable_by(middle, |x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
             let deeper = &by_depth[from..=from + middle];
-            let count: usize = deeper
-                .iter()
-                .map(|&(_, at)| rows[at].contacts as usize)
-                .sum();
+            let count: usize = deeper.iter().map(|&(_, _, count)| count as usize).sum();
             if count <= room {
                 room -= count;
                 from += middle + 1;
@@ -94,7 +123,7 @@ impl Publisher {
         self.chosen.resize(rows.len(), false);
         by_depth[..from]
             .iter()
-            .for_each(|&(_, at)| self.chosen[at] = true);
+            .for_each(|&(_, at, _)| self.chosen[at as usize] = true);
     }
 }
 

@@ -1,18 +1,18 @@
 //! The pairs that are not plainly apart, in the order of their bodies' ids, kept from tick to tick with what the tick
 //! and the messages need of each.
 //!
-//! In: the active pairs, in no order, and of which of them there may be something new to say. Out: rows by ids; of a
-//! pair that nothing happened to, the row of the tick before. A sort of all rows would be a sixth of what publishing
-//! them takes, and to ask what is known of every pair most of it.
+//! In: of which pairs there may be something new to say, and which are no more. Out: rows by ids; of a pair that
+//! nothing happened to, the row of the tick before. A sort of all rows would be a sixth of what publishing them takes,
+//! and to ask what is known of every pair most of it.
+//!
+//! Rows stay where they are once made; what is sorted, and gone through in every tick, are marks of 24 bytes.
 
 use super::kept::Span;
-use crate::ids::{BodyId, PairSlot};
+use crate::ids::{BodyId, PairSlot, small};
 use crate::math::Interval;
 use crate::wire::Verdict;
 
-/// A pair: where it stands by ids and by rank, and where its rows stand in the messages.
-///
-/// Kept small: a sort moves these, and above 96 bytes it branches at each comparison.
+/// A pair: where it stands by ids and by rank.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row {
     pub(super) ids: (BodyId, BodyId),
@@ -26,17 +26,9 @@ pub(super) struct Row {
     pub(super) event: u32,
     /// How many contact rows it has.
     pub(super) contacts: u32,
-    /// Where it stood in `pairs` when they were last filled.
-    pub(super) in_pairs: Span,
-    /// Where its contacts stood in `contacts` when they were last filled.
-    pub(super) in_contacts: Span,
     /// What the pair or its way says, whichever is worse.
     pub(super) verdict: Verdict,
-    /// There is something new to say of it.
-    pub(super) fresh: bool,
 }
-
-const _: () = assert!(size_of::<Row>() <= 96, "larger rows make a sort branch");
 
 /// No event.
 pub(super) const NO_EVENT: u32 = u32::MAX;
@@ -44,7 +36,7 @@ pub(super) const NO_EVENT: u32 = u32::MAX;
 impl Row {
     /// The order of rows: by ids, the smaller first. One number, so that a comparison does not branch.
     pub(super) fn order(&self) -> u128 {
-        u128::from(self.ids.0.0) << 64 | u128::from(self.ids.1.0)
+        order_of(self.ids)
     }
 
     /// Events first, then colliding, possible, near.
@@ -59,110 +51,299 @@ impl Row {
 
     /// Whether it may be taken over from the tick before as it is, unless its pair was stirred. What is undecided ages
     /// by ticks, and an event is over.
-    pub(super) fn may_last(&self) -> bool {
-        self.event == NO_EVENT && matches!(self.verdict, Verdict::Colliding | Verdict::Near)
+    fn may_last(&self) -> bool {
+        self.slot.is_some()
+            && self.event == NO_EVENT
+            && matches!(self.verdict, Verdict::Colliding | Verdict::Near)
     }
 }
+
+fn order_of(ids: (BodyId, BodyId)) -> u128 {
+    u128::from(ids.0.0) << 64 | u128::from(ids.1.0)
+}
+
+/// What is gone through in every tick of a row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Mark {
+    /// Place of the row among all; [`NO_ROW`]: it is dropped.
+    row: u32,
+    /// The pair; of no meaning where the row does not last.
+    slot: PairSlot,
+    /// Where the row stood in the tick before, if it is not fresh.
+    pub(super) was: u32,
+    /// Where its contacts stood in `contacts` when they were last filled.
+    pub(super) contacts: Span,
+    /// There is something new to say of it.
+    pub(super) fresh: bool,
+    /// See [`Row::may_last`].
+    lasts: bool,
+}
+
+const _: () = assert!(
+    size_of::<Mark>() == 24,
+    "all are gone through in every tick"
+);
+
+/// No row.
+const NO_ROW: u32 = u32::MAX;
 
 /// The rows, and memory kept over calls.
 #[derive(Debug, Default)]
 pub(super) struct Listing {
     /// By ids.
-    pub(super) rows: Vec<Row>,
-    /// By pair: the last tick in which it was listed.
-    seen: Vec<u64>,
+    pub(super) marks: Vec<Mark>,
+    /// In no order, with gaps.
+    rows: Vec<Row>,
+    gaps: Vec<u32>,
+    /// By pair: whether it has a row.
+    listed: Vec<bool>,
+    /// Places of marks whose rows are to be looked at again.
+    dirty: Vec<u32>,
     /// Rows that are yet to find their places.
     late: Vec<Row>,
+    /// There are marks without rows.
+    dropped: bool,
+    /// Every active pair has a row, but those that have become so since the last tick.
+    complete: bool,
 }
 
 impl Listing {
-    /// Whether a pair has come in this tick already.
-    pub(super) fn was_seen(&self, slot: PairSlot, tick: u64) -> bool {
-        self.seen.get(slot.index()) == Some(&tick)
+    pub(super) fn len(&self) -> usize {
+        self.marks.len()
     }
 
-    /// Notes that a pair has come.
-    pub(super) fn see(&mut self, slot: PairSlot, tick: u64) {
-        if self.seen.len() <= slot.index() {
-            self.seen.resize(slot.index() + 1, 0);
+    /// The row at a place by ids.
+    pub(super) fn row(&self, at: usize) -> &Row {
+        &self.rows[self.marks[at].row as usize]
+    }
+
+    /// All rows, by ids.
+    pub(super) fn iter(&self) -> impl Iterator<Item = &Row> {
+        self.marks.iter().map(|mark| &self.rows[mark.row as usize])
+    }
+
+    /// Where a pair's row is; where it would be.
+    pub(super) fn find(&self, ids: (BodyId, BodyId)) -> Result<usize, usize> {
+        let order = order_of(ids);
+        (self.marks).binary_search_by(|mark| self.rows[mark.row as usize].order().cmp(&order))
+    }
+
+    /// Whether a pair has a row.
+    pub(super) fn has(&self, slot: PairSlot) -> bool {
+        self.listed.get(slot.index()) == Some(&true)
+    }
+
+    /// Whether every active pair had a row at the end of the last tick, or will have from now on.
+    pub(super) fn take_complete(&mut self) -> bool {
+        std::mem::replace(&mut self.complete, true)
+    }
+
+    /// A pair that is active has no row: all of them are to be gone through in the next tick.
+    pub(super) fn lacks(&mut self) {
+        self.complete = false;
+    }
+
+    /// Begins a tick: nothing is fresh, and what does not last or is stirred is dirty.
+    pub(super) fn begin(&mut self, is_stirred: impl Fn(PairSlot) -> bool) {
+        self.dirty.clear();
+        for (at, mark) in (0..).zip(&mut self.marks) {
+            mark.was = at;
+            mark.fresh = false;
+            if !mark.lasts || is_stirred(mark.slot) {
+                self.dirty.push(at);
+            }
         }
-        self.seen[slot.index()] = tick;
+    }
+
+    /// Place of the n-th dirty row.
+    pub(super) fn dirty(&self, n: usize) -> Option<usize> {
+        self.dirty.get(n).map(|&at| at as usize)
+    }
+
+    /// Puts another row of the same pair in its place.
+    pub(super) fn renew(&mut self, at: usize, row: Row) {
+        let mark = &mut self.marks[at];
+        (mark.fresh, mark.lasts) = (true, row.may_last());
+        self.rows[mark.row as usize] = row;
+    }
+
+    /// Gives a row its event.
+    pub(super) fn set_event(&mut self, at: usize, event: u32) {
+        let row = *self.row(at);
+        self.renew(at, Row { event, ..row });
+    }
+
+    /// Drops a row; [`Listing::close`] closes the gap.
+    pub(super) fn drop(&mut self, at: usize) {
+        let row = std::mem::replace(&mut self.marks[at].row, NO_ROW);
+        if let Some(slot) = self.rows[row as usize].slot
+            && let Some(listed) = self.listed.get_mut(slot.index())
+        {
+            *listed = false;
+        }
+        self.gaps.push(row);
+        self.dropped = true;
+    }
+
+    /// Forgets the marks of what was dropped.
+    pub(super) fn close(&mut self) {
+        if std::mem::take(&mut self.dropped) {
+            self.marks.retain(|mark| mark.row != NO_ROW);
+        }
+        // How many are dirty differs from tick to tick: room for all of them is made when rows are more than ever.
+        self.dirty.clear();
+        self.dirty.reserve(self.marks.len());
     }
 
     /// Takes a row that was not there before; [`Listing::finish`] puts it in its place.
     pub(super) fn add(&mut self, row: Row) {
+        if let Some(slot) = row.slot {
+            if self.listed.len() <= slot.index() {
+                self.listed.resize(slot.index() + 1, false);
+            }
+            self.listed[slot.index()] = true;
+        }
         self.late.push(row);
     }
 
     /// Puts what was added in its place.
     pub(super) fn finish(&mut self) {
-        let Self { rows, late, .. } = self;
+        let mut late = std::mem::take(&mut self.late);
         late.sort_unstable_by_key(Row::order);
-        let (mut to, mut from) = (rows.len() + late.len(), rows.len());
-        rows.extend_from_slice(late);
+        let mut end = self.marks.len();
+        let hole = Mark {
+            row: NO_ROW,
+            slot: PairSlot(0),
+            was: 0,
+            contacts: Span::default(),
+            fresh: true,
+            lasts: false,
+        };
+        self.marks.resize(end + late.len(), hole);
         // From the end: a place is written after what stood there has been moved on.
         while let Some(row) = late.pop() {
-            to -= 1;
-            while from > 0 && rows[from - 1].order() > row.order() {
-                from -= 1;
-                rows[to] = rows[from];
-                to -= 1;
-            }
-            rows[to] = row;
+            let before = late.len();
+            let rows = &self.rows;
+            let at = (self.marks[..end])
+                .partition_point(|mark| rows[mark.row as usize].order() < row.order());
+            self.marks.copy_within(at..end, at + before + 1);
+            self.marks[at + before] = Mark {
+                row: self.put(row),
+                slot: row.slot.unwrap_or(PairSlot(0)),
+                lasts: row.may_last(),
+                ..hole
+            };
+            end = at;
         }
-        // How many are added differs from tick to tick: room for all of them is made when rows are more than ever.
-        late.reserve(rows.len());
+        late.reserve(self.marks.len());
+        self.late = late;
+    }
+
+    fn put(&mut self, row: Row) -> u32 {
+        if let Some(at) = self.gaps.pop() {
+            self.rows[at as usize] = row;
+            return at;
+        }
+        self.rows.push(row);
+        // Room to drop every one of them.
+        self.gaps.reserve(self.rows.capacity());
+        small(self.rows.len() - 1)
     }
 
     /// Nothing of the last tick holds: every row is made anew.
     pub(super) fn forget(&mut self) {
+        self.marks.clear();
         self.rows.clear();
+        self.gaps.clear();
+        self.listed.fill(false);
+        self.complete = false;
     }
 
     /// The slots of all pairs are void.
     pub(super) fn forget_slots(&mut self) {
-        self.rows.clear();
-        self.seen.clear();
+        self.forget();
+        self.listed.clear();
     }
 }
 
 #[cfg(test)]
 mod tests {
+    #![allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "small numbers by chance"
+    )]
+
     use super::*;
     use crate::builtin::Random;
 
-    fn row(id: u64) -> Row {
+    fn row(id: u64, slot: u32, made: u64) -> Row {
         Row {
             ids: (BodyId(id), BodyId(id + 1)),
             gap: Interval::UNKNOWN,
-            best_m: 0.0,
-            slot: Some(PairSlot(u32::try_from(id).unwrap())),
+            best_m: made as f64,
+            slot: Some(PairSlot(slot)),
             event: NO_EVENT,
             contacts: 0,
-            in_pairs: Span::default(),
-            in_contacts: Span::default(),
             verdict: Verdict::Near,
-            fresh: true,
         }
     }
 
+    /// Each pair by its id: the slot it has, and when its row was made.
     #[test]
     fn rows_are_by_ids_whatever_left_or_came() {
         let (mut listing, mut random) = (Listing::default(), Random::new(3));
-        for tick in 0..200 {
-            let mut wanted: Vec<u64> = (0..60).filter(|_| random.unit() < 0.6).collect();
-            listing.rows.retain(|row| wanted.contains(&row.ids.0.0));
-            for row in &listing.rows {
-                wanted.retain(|id| *id != row.ids.0.0);
+        let mut pairs: Vec<(u64, u32, u64)> = Vec::new();
+        for tick in 1..400 {
+            if tick % 97 == 0 {
+                listing.forget();
+                pairs.clear();
             }
-            wanted.sort_unstable_by_key(|id| id * 37 % 61);
-            let mut all: Vec<u64> = listing.rows.iter().map(|row| row.ids.0.0).collect();
-            all.extend(&wanted);
-            wanted.iter().for_each(|id| listing.add(row(*id)));
+            // Some are stirred: of those some are gone, and of these some leave their slots to others.
+            let chance = random.unit();
+            let stirred: Vec<bool> = (0..90).map(|_| random.unit() < chance).collect();
+            let before: Vec<u64> = pairs.iter().map(|pair| pair.0).collect();
+            listing.begin(|slot| stirred[slot.index()]);
+            let mut n = 0;
+            while let Some(at) = listing.dirty(n) {
+                n += 1;
+                let slot = listing.row(at).slot.unwrap().0;
+                let known = pairs.iter_mut().find(|pair| pair.1 == slot).unwrap();
+                if random.unit() < 0.7 {
+                    known.2 = tick;
+                    listing.renew(at, row(known.0, slot, tick));
+                    continue;
+                }
+                listing.drop(at);
+                let free = 100 * tick + u64::from(slot);
+                if random.unit() < 0.3 {
+                    *known = (free, slot, tick);
+                    listing.add(row(free, slot, tick));
+                } else {
+                    pairs.retain(|pair| pair.1 != slot);
+                }
+            }
+            listing.close();
+            for slot in 0..90 {
+                let id = (random.unit() * 1e6) as u64;
+                if !listing.has(PairSlot(slot)) && random.unit() < 0.1 {
+                    pairs.push((id, slot, tick));
+                    listing.add(row(id, slot, tick));
+                }
+            }
             listing.finish();
-            all.sort_unstable();
-            let got: Vec<u64> = listing.rows.iter().map(|row| row.ids.0.0).collect();
-            assert_eq!(got, all, "tick {tick}");
+            pairs.sort_unstable();
+            let wanted: Vec<(u64, u64)> = pairs.iter().map(|pair| (pair.0, pair.2)).collect();
+            let got: Vec<(u64, u64)> = (listing.iter())
+                .map(|row| (row.ids.0.0, row.best_m as u64))
+                .collect();
+            assert_eq!(got, wanted, "tick {tick}");
+            for (at, mark) in listing.marks.iter().enumerate() {
+                let row = listing.row(at);
+                assert_eq!(mark.fresh, row.best_m as u64 == tick);
+                assert_eq!(listing.find(row.ids), Ok(at));
+                assert!(mark.fresh || before[mark.was as usize] == row.ids.0.0);
+            }
         }
     }
 }

@@ -62,12 +62,15 @@ pub struct Publisher {
     heard: (bool, bool),
     kept_pairs: Kept<PairRow>,
     kept_contacts: Kept<ContactRow>,
-    /// Used only when not all contacts fit: depth in metres and place among the rows of the pairs that have some, and
-    /// by row whether they are sent.
-    contact_pairs: Vec<(f64, usize)>,
+    /// Used only when not all contacts fit: of the pairs that have some the depth in metres, the place among the rows
+    /// and how many they are.
+    contact_pairs: Vec<(f64, u32, u32)>,
+    /// Used only when not all rows fit: by place whether it is sent.
     chosen: Vec<bool>,
-    /// Places among the rows of the pairs whose regions are sent.
-    region_pairs: Vec<usize>,
+    /// Whether the last tick's `pairs` and `contacts` had all rows.
+    whole: (bool, bool),
+    /// Places among the rows of the pairs whose regions are sent, or of all by rank.
+    ranked: Vec<usize>,
     verdicts: Vec<u8>,
     next_contact: u64,
 }
@@ -86,7 +89,8 @@ impl Publisher {
             kept_contacts: Kept::default(),
             contact_pairs: Vec::new(),
             chosen: Vec::new(),
-            region_pairs: Vec::new(),
+            whole: (false, false),
+            ranked: Vec::new(),
             verdicts: Vec::new(),
             next_contact: 1,
         }
@@ -96,12 +100,13 @@ impl Publisher {
     pub fn forget_slots(&mut self) {
         self.events.forget_slots();
         self.listing.forget_slots();
+        self.survey = Survey::default();
     }
 
-    /// As if nothing of the last tick held: the twin that rows which are kept are compared with.
-    #[cfg(test)]
+    /// Nothing of the last tick holds: every row is made anew.
     pub(crate) fn forget_rows(&mut self) {
         self.listing.forget();
+        self.survey = Survey::default();
     }
 
     /// Fills every message that is listened to, then the tick's own counts, state and reasons.

@@ -1,6 +1,6 @@
 //! Rows of `pairs`: every pair that is not plainly apart, and every event.
 
-use crate::ids::{BodyId, PairKey, PairSlot};
+use crate::ids::{BodyId, PairKey, PairSlot, small};
 use crate::math::{Interval, Point, Vec3};
 use crate::narrow::{Finding, Passage, Witness};
 use crate::wire::{
@@ -8,8 +8,8 @@ use crate::wire::{
 };
 use crate::world::Body;
 
-use super::kept::Span;
-use super::listing::{NO_EVENT, Row};
+use super::kept::{Kept, Span};
+use super::listing::{Mark, NO_EVENT, Row};
 use super::{AHEAD, Publisher, View};
 
 /// A verdict, or what a way that is news says, whichever is worse.
@@ -31,42 +31,46 @@ impl Publisher {
     ) -> u64 {
         if !view.demand.pairs {
             out.pairs.clear();
+            self.whole.0 = false;
             // Who begins to listen later sees the full state; there is nobody to tell what happened before.
             self.events.sent(|_| false);
             return 0;
         }
         self.add_events(view);
         let left_out = self.rank();
+        let cut = left_out > 0;
+        let whole = std::mem::replace(&mut self.whole.0, !cut) && !cut;
         let mut kept = std::mem::take(&mut self.kept_pairs);
         kept.begin();
-        for at in 0..self.listing.rows.len() {
-            let rows = &self.listing.rows;
-            if let Some(ahead) = rows.get(at + AHEAD).filter(|row| row.fresh)
-                && let Some(slot) = ahead.slot
+        let mut at = 0;
+        while at < self.listing.len() {
+            if whole && !self.listing.marks[at].fresh {
+                at = self.keep_pairs(at, view.tick, &mut kept, &mut out.pairs);
+                continue;
+            }
+            if let Some(ahead) = self.listing.marks.get(at + AHEAD)
+                && ahead.fresh
+                && let Some(slot) = self.listing.row(at + AHEAD).slot
             {
                 view.narrow.ask_ahead(slot);
             }
-            let row = &rows[at];
-            let span = if row.fresh {
-                let make = |out: &mut Vec<PairRow>| out.push(self.pair_row(view, row));
-                kept.make(make)
-            } else {
-                if let Some(sent) = out.pairs.get_mut(row.in_pairs.first as usize) {
-                    grow_older(sent, view.tick);
-                }
-                kept.keep(row.in_pairs)
-            };
-            self.listing.rows[at].in_pairs = span;
+            if !cut || self.chosen.get(at) == Some(&true) {
+                let make = |out: &mut Vec<PairRow>| {
+                    out.push(self.pair_row(view, self.listing.row(at)));
+                };
+                kept.make(make);
+            }
+            at += 1;
         }
         kept.finish(&mut out.pairs);
         self.kept_pairs = kept;
-        let rows = &self.listing.rows;
-        if left_out == 0 {
-            self.events.sent(|_| false);
-        } else {
-            self.events
-                .sent(|ids| rows.binary_search_by_key(&ids, |row| row.ids).is_err());
-        }
+        let (listing, chosen) = (&self.listing, &self.chosen);
+        let is_left_out = |ids| {
+            listing
+                .find(ids)
+                .is_ok_and(|at| chosen.get(at) != Some(&true))
+        };
+        self.events.sent(|ids| cut && is_left_out(ids));
         out.pairs_header = MessageHeader {
             truncated: left_out,
             ..header
@@ -74,16 +78,36 @@ impl Publisher {
         left_out
     }
 
+    /// Keeps the rows that are not fresh and stood side by side, from a place on; returns the place behind them.
+    fn keep_pairs(
+        &self,
+        from: usize,
+        tick: u64,
+        kept: &mut Kept<PairRow>,
+        out: &mut [PairRow],
+    ) -> usize {
+        let marks = &self.listing.marks[from..];
+        let first = marks.first().map_or(0, |mark| mark.was);
+        let side_by_side = |(mark, was): &(&Mark, u32)| !mark.fresh && mark.was == *was;
+        let count = marks.iter().zip(first..).take_while(side_by_side).count();
+        let from_was = first as usize;
+        for row in out.iter_mut().skip(from_was).take(count) {
+            grow_older(row, tick);
+        }
+        kept.keep(Span {
+            first,
+            len: small(count),
+        });
+        from + count
+    }
+
     /// Gives the listed pairs their events, and lists those that are not active any more.
     fn add_events(&mut self, view: &mut View<'_>) {
         let (events, listing) = (&self.events, &mut self.listing);
         for (at, event) in events.waiting().iter().enumerate() {
             let place = u32::try_from(at).unwrap_or(NO_EVENT);
-            match (listing.rows).binary_search_by_key(&event.ids, |row| row.ids) {
-                Ok(at) => {
-                    listing.rows[at].event = place;
-                    listing.rows[at].fresh = true;
-                }
+            match listing.find(event.ids) {
+                Ok(at) => listing.set_event(at, place),
                 Err(_) => {
                     let slot = Self::slot_of(view, event.ids);
                     // Plainly apart: its certificate may hold, and its interval still be that of older poses.
@@ -97,10 +121,7 @@ impl Publisher {
                         slot,
                         event: place,
                         contacts: 0,
-                        in_pairs: Span::default(),
-                        in_contacts: Span::default(),
                         verdict: Verdict::Apart,
-                        fresh: true,
                     });
                 }
             }
@@ -114,18 +135,22 @@ impl Publisher {
         view.pairs.find(PairKey::new(a, b))
     }
 
-    /// Leaves out what does not fit, worst rank first; returns how many were left out.
+    /// Chooses what is sent where not all fit, best rank first; returns how many are left out.
     fn rank(&mut self) -> u64 {
-        let (most, rows) = (self.limits.pair_rows, &mut self.listing.rows);
-        let left_out = rows.len().saturating_sub(most);
+        let (most, listing, ranked) = (self.limits.pair_rows, &self.listing, &mut self.ranked);
+        let left_out = listing.len().saturating_sub(most);
         if left_out > 0 {
-            rows.sort_unstable_by(|x, y| {
+            ranked.clear();
+            ranked.extend(0..listing.len());
+            ranked.sort_unstable_by(|&x, &y| {
+                let (x, y) = (listing.row(x), listing.row(y));
                 (x.class().cmp(&y.class()))
                     .then(x.gap.min.total_cmp(&y.gap.min))
                     .then(x.ids.cmp(&y.ids))
             });
-            rows.truncate(most);
-            rows.sort_unstable_by_key(Row::order);
+            self.chosen.clear();
+            self.chosen.resize(listing.len(), false);
+            ranked[..most].iter().for_each(|&at| self.chosen[at] = true);
         }
         left_out as u64
     }

@@ -24,7 +24,7 @@ impl Publisher {
         if !view.demand.regions {
             return 0;
         }
-        let (chosen, rows) = (&mut self.region_pairs, &self.listing.rows);
+        let (chosen, rows) = (&mut self.ranked, &self.listing);
         chosen.clear();
         let open = rows.iter().enumerate();
         chosen.extend(
@@ -36,7 +36,7 @@ impl Publisher {
         let ranked = chosen.len() * REGIONS_PER_PAIR_MAX > most;
         if ranked {
             chosen.sort_unstable_by(|&x, &y| {
-                let (x, y) = (&rows[x], &rows[y]);
+                let (x, y) = (rows.row(x), rows.row(y));
                 (x.class().cmp(&y.class()))
                     .then(x.gap.min.total_cmp(&y.gap.min))
                     .then(x.order().cmp(&y.order()))
@@ -44,7 +44,9 @@ impl Publisher {
         }
         let mut left_out = 0;
         for &at in &*chosen {
-            let Some(slot) = rows[at].slot else { continue };
+            let Some(slot) = rows.row(at).slot else {
+                continue;
+            };
             if out.regions.len() + REGIONS_PER_PAIR_MAX > most {
                 left_out += 1;
                 continue;

@@ -1,7 +1,7 @@
-//! The review: one walk over the active pairs, for the events, the tick's counts and the rows.
+//! The review: what is new of the active pairs, for the events, the tick's counts and the rows.
 //!
 //! In: the rows of the last tick, the narrow phase's findings. Out: the rows of this one. A pair that nothing happened
-//! to since its row was made is not asked about.
+//! to since its row was made is not asked about, and its row not read.
 
 use crate::ids::PairSlot;
 use crate::narrow::{Finding, Passage};
@@ -9,16 +9,14 @@ use crate::wire::Verdict;
 
 use super::contacts::contacts_of;
 use super::events::Ids;
-use super::kept::Span;
-use super::listing::{Listing, NO_EVENT, Row};
+use super::listing::{NO_EVENT, Row};
 use super::pairs::worst_of;
-use super::state::Survey;
 use super::{AHEAD, Publisher, View};
 
 impl Publisher {
     /// Brings the rows up to this tick.
     pub(super) fn review(&mut self, view: &mut View<'_>) {
-        self.survey = Survey::default();
+        self.survey.begin();
         self.events
             .find_slots(view.tick, view.world, view.pairs, view.narrow);
         self.events
@@ -26,67 +24,70 @@ impl Publisher {
         let heard = (view.demand.pairs, view.demand.contacts);
         if std::mem::replace(&mut self.heard, heard) != heard {
             // What nobody listened to was not made.
-            self.listing.forget();
+            self.forget_rows();
         }
         self.renew_rows(view);
         self.find_rows(view);
         self.review_ways(view);
         self.events.merge();
         self.listing.finish();
+        self.survey.look_again(self.listing.iter());
     }
 
     /// Of the rows of the last tick, those that still are.
     fn renew_rows(&mut self, view: &mut View<'_>) {
-        let mut kept = 0;
-        for at in 0..self.listing.rows.len() {
-            ask_ahead(&self.listing, view, at);
-            let row = &mut self.listing.rows[at];
-            let Some(slot) = row.slot else { continue };
-            if row.may_last() && !view.narrow.is_stirred(slot) {
-                row.fresh = false;
-                self.survey.take(row, None);
-                self.listing.see(slot, view.tick);
-                // Most stay where they are: nothing is copied until one has left.
-                if kept != at {
-                    self.listing.rows[kept] = self.listing.rows[at];
-                }
-            } else {
-                let was = *row;
-                let Some(now) = self.look(view, slot) else {
-                    continue;
-                };
-                if now.ids != was.ids {
-                    // The slot holds another pair now.
-                    self.listing.add(now);
-                    continue;
-                }
-                self.listing.rows[kept] = Row {
-                    in_pairs: was.in_pairs,
-                    in_contacts: was.in_contacts,
-                    ..now
-                };
+        self.listing.begin(|slot| view.narrow.is_stirred(slot));
+        let mut n = 0;
+        while let Some(at) = self.listing.dirty(n) {
+            let ahead = self.listing.dirty(n + AHEAD);
+            if let Some(slot) = ahead.and_then(|at| self.listing.row(at).slot) {
+                view.narrow.ask_ahead(slot);
             }
-            kept += 1;
+            n += 1;
+            let was = *self.listing.row(at);
+            self.survey.leave(&was);
+            match was.slot.and_then(|slot| self.look(view, slot)) {
+                Some(now) if now.ids == was.ids => self.listing.renew(at, now),
+                now => {
+                    self.listing.drop(at);
+                    // The slot holds another pair now.
+                    now.into_iter().for_each(|now| self.listing.add(now));
+                }
+            }
         }
-        self.listing.rows.truncate(kept);
+        self.listing.close();
     }
 
-    /// Rows of pairs that are active and were not in the tick before.
+    /// Rows of pairs that are active and have none.
     fn find_rows(&mut self, view: &mut View<'_>) {
-        for at in 0..view.narrow.active().len() {
-            let active = view.narrow.active();
-            if let Some(&ahead) = active.get(at + AHEAD)
-                && !self.listing.was_seen(ahead, view.tick)
+        let complete = self.listing.take_complete();
+        let count = if complete {
+            view.narrow.entered().len()
+        } else {
+            view.narrow.active().len()
+        };
+        for at in 0..count {
+            let all = if complete {
+                view.narrow.entered()
+            } else {
+                view.narrow.active()
+            };
+            if let Some(&ahead) = all.get(at + AHEAD)
+                && !self.listing.has(ahead)
             {
                 view.narrow.ask_ahead(ahead);
             }
-            let slot = active[at];
-            if !self.listing.was_seen(slot, view.tick)
-                && let Some(row) = self.look(view, slot)
-            {
-                self.listing.add(row);
+            let slot = all[at];
+            if self.listing.has(slot) {
+                continue;
+            }
+            match self.look(view, slot) {
+                Some(row) => self.listing.add(row),
+                None if view.narrow.is_active(slot) => self.listing.lacks(),
+                None => {}
             }
         }
+        view.narrow.clear_entered();
     }
 
     /// Takes down what is known of a pair; `None`: it is plainly apart, or gone.
@@ -101,7 +102,6 @@ impl Publisher {
         let row = row_of(view, slot, ids, &finding, passage);
         self.survey.take(&row, passage);
         self.survey.wait(view.tick, finding.undecided_since);
-        self.listing.see(slot, view.tick);
         view.narrow.told(slot);
         Some(row)
     }
@@ -152,22 +152,6 @@ fn row_of(
         slot: Some(slot),
         event: NO_EVENT,
         contacts: u32::try_from(contacts).unwrap_or(u32::MAX),
-        in_pairs: Span::default(),
-        in_contacts: Span::default(),
         verdict: worst_of(finding.verdict, passage),
-        fresh: true,
-    }
-}
-
-/// Asks memory for what the walk will want of the rows ahead of the one at hand.
-fn ask_ahead(listing: &Listing, view: &View<'_>, at: usize) {
-    let slot_at = |at: usize| listing.rows.get(at).and_then(|row| row.slot);
-    if let Some(far) = slot_at(at + 2 * AHEAD) {
-        view.narrow.ask_ahead_if_stirred(far);
-    }
-    if let Some(near) = slot_at(at + AHEAD)
-        && view.narrow.is_stirred(near)
-    {
-        view.narrow.ask_ahead(near);
     }
 }

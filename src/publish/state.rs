@@ -109,7 +109,7 @@ impl Publisher {
     }
 }
 
-/// What a walk over the active pairs finds out for the tick.
+/// What the rows say for the tick, kept up as they come and go.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Survey {
     worst: Worst,
@@ -122,9 +122,30 @@ pub(super) struct Survey {
     open: u64,
     /// Contacts of all of them.
     contacts: usize,
+    /// The worst pair or the widest interval may be that of a row that went.
+    stale: bool,
 }
 
 impl Survey {
+    /// Begins a tick with the rows of the last one.
+    pub(super) fn begin(&mut self) {
+        (self.oldest_ticks, self.touched, self.open) = (0, 0, 0);
+    }
+
+    /// A row that was taken goes.
+    pub(super) fn leave(&mut self, row: &Row) {
+        self.contacts -= row.contacts as usize;
+        self.stale |= row.ids == self.worst.ids || row.gap.width() >= self.widest_m;
+    }
+
+    /// Looks for the worst pair and the widest interval anew, if they may be gone.
+    pub(super) fn look_again<'a>(&mut self, rows: impl Iterator<Item = &'a Row>) {
+        if std::mem::take(&mut self.stale) {
+            (self.worst, self.widest_m) = (Worst::default(), 0.0);
+            rows.for_each(|row| self.rank(row));
+        }
+    }
+
     /// Takes an active pair.
     ///
     /// * `passage` - what its way says, where that is news.
@@ -135,6 +156,10 @@ impl Survey {
             Some(Passage::Free) | None => {}
         }
         self.contacts += row.contacts as usize;
+        self.rank(row);
+    }
+
+    fn rank(&mut self, row: &Row) {
         self.widest_m = self.widest_m.max(row.gap.width());
         let (ids, worst) = (row.ids, self.worst);
         let rank = (row.verdict.code(), -row.best_m);
