@@ -1,6 +1,7 @@
 //! Polytopes: how many faces they take, and begun at what is known beside anew.
 
 use super::*;
+use crate::builtin::Random;
 use crate::math::{Pose, Quat};
 use crate::narrow::exact::{Warm, convex_gap};
 use crate::shape::Convex;
@@ -105,4 +106,63 @@ fn a_polytope_begun_at_the_last_answer_says_what_one_begun_anew_does() {
         deep > 1000 && apart > 1000 && begun > 500,
         "{deep} {apart} {begun}"
     );
+}
+
+fn direction(random: &mut Random) -> Vec3 {
+    loop {
+        let mut one = || random.range(-1.0, 1.0);
+        let v = Vec3::new(one(), one(), one());
+        if (0.1..1.0).contains(&v.norm()) {
+            return v.normalize();
+        }
+    }
+}
+
+/// Needles, discs and all in between, along ways of small and large steps: both intervals are some 1e-7 wide, so what
+/// is carried along can be wrong by no more.
+#[test]
+fn answers_carried_along_a_way_agree_with_answers_anew_for_all_proportions() {
+    let mut random = Random::new(23);
+    let (mut deep, mut loose, mut asked) = (0, 0, 0);
+    for turn in 0..2000 {
+        let mut shape = |kind: u32| {
+            let mut size = || 10.0_f64.powf(random.range(-2.0, 0.3));
+            let (x, y, z) = (size(), size(), size());
+            match kind % 5 {
+                0 => Convex::cuboid(Vec3::new(x, y, z)),
+                1 => Convex::capsule(x, y),
+                2 => Convex::cone(x, y),
+                3 => Convex::cylinder(x, y),
+                _ => Convex::cylinder(x, 0.3 * x),
+            }
+        };
+        // One of the two has a circle.
+        let (a, b) = (shape(turn), shape(turn / 5 % 3 + 2));
+        let size = 0.5 * (a.reach() + b.reach());
+        let mut at = direction(&mut random) * size * random.unit();
+        // Faces on faces, too.
+        let by = if random.unit() < 0.3 { 0.0 } else { 3.0 };
+        let mut rotation = Quat::from_scaled_axis(direction(&mut random) * by);
+        let step = 10.0_f64.powf(random.range(-6.0, -0.5)) * random.unit();
+        let way = direction(&mut random) * size * step;
+        let spin = Quat::from_scaled_axis(direction(&mut random) * step);
+        let mut warm = Warm::default();
+        for _ in 0..16 {
+            at += way;
+            rotation = Quat::new_normalize((spin * rotation).into_inner());
+            let pose = Pose::from_parts(at.into(), rotation);
+            let carried = convex_gap(&a, &b, &pose, &mut warm);
+            let anew = convex_gap(&a, &b, &pose, &mut Warm::default());
+            let (x, y) = (carried.gap, anew.gap);
+            assert!(
+                x.min <= y.max && y.min <= x.max,
+                "{x:?} {y:?} of {a:?} {b:?} at {pose:?}"
+            );
+            asked += 1;
+            deep += usize::from(x.max < 0.0);
+            loose += usize::from(!carried.finished);
+        }
+    }
+    assert!(deep * 2 > asked, "{deep} of {asked}");
+    assert!(loose * 1000 <= asked, "{loose} of {asked} are not finished");
 }
