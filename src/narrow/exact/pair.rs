@@ -206,7 +206,7 @@ const SQUARE_MAX: f64 = 1e280;
 pub(super) fn unit(v: &Vec3) -> Option<Vec3> {
     let square = v.norm_squared();
     if (SQUARE_MIN..SQUARE_MAX).contains(&square) {
-        return Some(v / square.sqrt());
+        return Some(v * (1.0 / square.sqrt()));
     }
     // Scaled first, so that 1e-170 m does not become 0 when squared.
     let largest = v.amax();

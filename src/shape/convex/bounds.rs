@@ -61,7 +61,7 @@ impl Core {
 }
 
 /// Length of the part of a unit vector that is across z; nothing in it overflows, so `hypot` would only be slow.
-fn across(dir: &Vec3) -> f64 {
+pub(super) fn across(dir: &Vec3) -> f64 {
     (dir.x * dir.x + dir.y * dir.y).sqrt()
 }
 

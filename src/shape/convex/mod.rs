@@ -298,7 +298,7 @@ impl Core {
                 (rim(dir, *radius_m, z), CIRCLE | u32::from(bottom))
             }
             Self::Cone { radius_m, half_m } => {
-                let across = dir.x.hypot(dir.y);
+                let across = bounds::across(dir);
                 if dir.z * half_m >= across * radius_m - dir.z * half_m {
                     (Vec3::new(0.0, 0.0, *half_m), 0)
                 } else {

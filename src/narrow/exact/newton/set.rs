@@ -177,13 +177,14 @@ fn element(core: &Core, element: u32, dir: &Vec3) -> Option<(Vec3, Vec3, Rim)> {
     if across < 1e-12 {
         return None;
     }
-    let (x, y) = (dir.x / across, dir.y / across);
+    let part = 1.0 / across;
+    let (x, y) = (dir.x * part, dir.y * part);
     Some((
         Vec3::new(x * circle.radius_m, y * circle.radius_m, circle.z_m),
         Vec3::new(-y, x, 0.0),
         Rim {
             lean: across,
-            bend_m: circle.radius_m / across,
+            bend_m: circle.radius_m * part,
             along: [0.0; 2],
         },
     ))
