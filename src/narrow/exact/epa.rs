@@ -264,7 +264,7 @@ impl Polytope {
                     }
                 }
             }
-            let known = self.corners(&face).iter().any(|v| v.w == new.w);
+            let known = (face.corners.iter()).any(|&k| self.vertices[usize::from(k)].w == new.w);
             if known || !self.grow(place, new, pair.tiny()) {
                 break;
             }

@@ -5,7 +5,7 @@
 mod first;
 
 use super::pair::{Vertex, unit};
-use super::simplex::{Simplex, normal_of};
+use super::simplex::Simplex;
 use crate::math::Vec3;
 
 /// A triangle of the polytope; corners counter-clockwise seen from outside.
@@ -62,14 +62,10 @@ impl Polytope {
         let (whole, rest) = self.distances.as_chunks::<8>();
         for chunk in whole {
             for (least, distance) in lanes.iter_mut().zip(chunk) {
-                *least = if *distance < *least {
-                    *distance
-                } else {
-                    *least
-                };
+                *least = lesser(*distance, *least);
             }
         }
-        let least = (lanes.iter().chain(rest)).fold(f64::INFINITY, |least, d| least.min(*d));
+        let least = (lanes.iter().chain(rest)).fold(f64::INFINITY, |least, d| lesser(*d, least));
         let place = self.distances.iter().position(|d| *d <= least);
         place.filter(|_| least < f64::INFINITY)
     }
@@ -88,8 +84,14 @@ impl Polytope {
 
     fn put_face(&mut self, corners: [Place; 3], beside: [Place; 3]) {
         let [a, b, c] = corners.map(|k| self.vertices[usize::from(k)].w);
-        let normal = unit(&normal_of(&a, &b, &c));
-        let distance = normal.map_or(f64::INFINITY, |n| n.dot(&a).min(n.dot(&b)).min(n.dot(&c)));
+        // Of the edges to the last corner the shorter one: a sliver keeps its digits.
+        let (from_a, from_b) = (c - a, c - b);
+        let closer = from_a.norm_squared() <= from_b.norm_squared();
+        let edge = if closer { from_a } else { from_b };
+        let normal = unit(&(b - a).cross(&edge));
+        let distance = normal.map_or(f64::INFINITY, |n| {
+            lesser(lesser(n.dot(&a), n.dot(&b)), n.dot(&c))
+        });
         self.distances.push(distance);
         self.faces.push(Face {
             normal: normal.unwrap_or_default(),
@@ -224,4 +226,10 @@ impl Polytope {
         }
         best
     }
+}
+
+/// The lesser of two numbers, or the second: one instruction, where `f64::min` takes five for what is not a number.
+#[inline]
+fn lesser(x: f64, y: f64) -> f64 {
+    if x < y { x } else { y }
 }

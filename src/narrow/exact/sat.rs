@@ -102,7 +102,7 @@ fn least_overlap(pair: &Pair<'_>, ha: &Vec3, hb: &Vec3) -> (Least, f64) {
             let (j1, j2) = ((j + 1) % 3, (j + 2) % 3);
             // e_i x column j, its length, and the extents along it, all from entries of the rotation.
             let (p, q) = (rotation[(i2, j)], rotation[(i1, j)]);
-            let sine = p.hypot(q);
+            let sine = (p * p + q * q).sqrt();
             if sine < PARALLEL {
                 loose = loose.max(sine * pair.scale);
                 continue;

@@ -19,14 +19,16 @@ use super::set::Set;
 /// What the elements say of the directions around the best one.
 #[derive(Clone, Copy, Debug)]
 pub(in super::super) struct Cap {
-    /// Up to this angle from the normal the depth is not less, radians.
-    pub(in super::super) angle: f64,
+    /// Tangent of half the angle from the normal up to which the depth is not less: all that is asked of the angle, and
+    /// known without an arc.
+    half: f64,
     /// By how much it may be less all the same, since Newton ends at what can be told, metres.
     pub(in super::super) loss_m: f64,
 }
 
-/// Angles that are tried. The wider the cap, the less a polytope has left to show.
-const ANGLES: [f64; 6] = [0.8, 0.5, 0.3, 0.2, 0.1, 0.05];
+/// Tangents of half the angles that are tried, from 46 degrees down. The wider the cap, the less a polytope has left to
+/// show.
+const HALVES: [f64; 6] = [0.42, 0.25, 0.15, 0.1, 0.05, 0.025];
 /// Part of the cap that the points which stand for it in a polytope cover.
 const COVERED: f64 = 0.8;
 /// For the rounding of what is compared here, which is 1e-15 of it.
@@ -51,8 +53,10 @@ impl Cap {
         }
         let off = (mean - value).abs() + aside[0].abs() + aside[1].abs();
         let (loss_m, wanted) = (off + above, depth * SAFE);
-        let holds = |&angle: &f64| {
-            let reach = wanted * (angle / 2.0).tan();
+        let holds = |&half: &f64| {
+            // The angle, or a little more.
+            let angle = 2.0 * half;
+            let reach = wanted * half;
             match actives {
                 [_] => least_of(&curvature(set, whole, angle)) >= wanted,
                 [one, other] => {
@@ -71,15 +75,20 @@ impl Cap {
                 _ => false,
             }
         };
-        let angle = ANGLES.iter().copied().find(|angle| holds(angle))?;
-        loss_m.is_finite().then_some(Self { angle, loss_m })
+        let half = HALVES.iter().copied().find(holds)?;
+        loss_m.is_finite().then_some(Self { half, loss_m })
+    }
+
+    #[cfg(test)]
+    pub(super) fn half(&self) -> f64 {
+        self.half
     }
 
     /// * `breadth_m` - how far the face reaches around the point that touches, in every direction.
     /// * `loss_m` - see [`Cap::loss_m`].
     pub(super) fn of_face(depth_m: f64, breadth_m: f64, loss_m: f64) -> Option<Self> {
-        let angle = (2.0 * (breadth_m / (depth_m * SAFE)).atan()).min(ANGLES[0]);
-        (depth_m > 0.0 && angle > 0.0).then_some(Self { angle, loss_m })
+        let half = (breadth_m / (depth_m * SAFE)).min(HALVES[0]);
+        (depth_m > 0.0 && half > 0.0).then_some(Self { half, loss_m })
     }
 
     /// How far aside of the normal, in parts of the depth, points in the plane that touches a ball of that radius may
@@ -88,13 +97,14 @@ impl Cap {
     /// A polytope with such corners shows what the difference reaches all the same: in the cap by the elements, outside
     /// by its other corners, as long as no more is asked of it than [`Cap::lift`].
     pub(in super::super) fn rise(&self) -> f64 {
-        (COVERED * self.angle / 2.0).tan()
+        COVERED * self.half
     }
 
     /// Support of those points in any direction outside the cap, at most, in parts of the depth; below 1.
     pub(in super::super) fn lift(&self) -> f64 {
-        let half = COVERED * self.angle / 2.0;
-        (self.angle - half).cos() / half.cos()
+        // cos(x) + rise * sin(x) at the angle itself; beyond it is less.
+        let square = self.half * self.half;
+        (1.0 - square + 2.0 * self.rise() * self.half) / (1.0 + square)
     }
 }
 

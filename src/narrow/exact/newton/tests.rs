@@ -116,10 +116,11 @@ fn no_direction_within_a_cap_is_better() {
             return;
         };
         caps[usize::from(found.held.count)] += 1;
-        wide += u32::from(cap.angle > 0.2);
+        let angle = 2.0 * cap.half().atan();
+        wide += u32::from(angle > 0.2);
         let (one, other) = frame(&found.normal);
         for _ in 0..100 {
-            let (turn, by) = (random.range(0.0, 6.3), random.unit() * cap.angle);
+            let (turn, by) = (random.range(0.0, 6.3), random.unit() * angle);
             let aside = one * turn.cos() + other * turn.sin();
             let n = found.normal * by.cos() + aside * by.sin();
             let value = n.dot(&pair.support(&n).w);
@@ -136,8 +137,9 @@ fn no_direction_within_a_cap_is_better() {
 /// Else a cap would hide better directions than its own.
 #[test]
 fn what_stands_for_a_cap_is_not_reached_outside_of_it() {
-    for angle in [0.05, 0.1, 0.3, 0.5, 0.8] {
-        let cap = Cap { angle, loss_m: 0.0 };
+    for half in [0.025, 0.05, 0.15, 0.25, 0.42] {
+        let cap = Cap::of_face(1.0, half, 0.0).unwrap();
+        let angle = 2.0 * cap.half().atan();
         assert!(cap.lift() < 1.0);
         for step in 0..=1000 {
             let by = angle + (std::f64::consts::PI - angle) * f64::from(step) / 1000.0;
