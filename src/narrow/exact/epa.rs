@@ -176,7 +176,11 @@ impl Polytope {
         let cap = found
             .cap
             .filter(|cap| cap.loss_m <= pair.tolerance() / 2.0)?;
+        // What the features prove within the cap, and no more is told.
         let depth_m = -found.value - cap.loss_m;
+        if depth_m <= 0.0 {
+            return None;
+        }
         self.start_under(pair, &-found.normal, depth_m, &cap);
         let mut state = State {
             refined: Some(*found),
@@ -185,7 +189,7 @@ impl Polytope {
         state.best.offer(found.value, &found.normal, 0);
         self.expand(pair, &mut state);
         let gap = CoreGap {
-            upper: (-state.fits).max(found.value),
+            upper: (-state.fits.min(depth_m)).max(found.value),
             ..found.apart()
         };
         let holds = -gap.upper > depth_m * cap.lift() && gap.is_tight(pair);

@@ -88,7 +88,7 @@ impl Cap {
     /// * `loss_m` - see [`Cap::loss_m`].
     pub(super) fn of_face(depth_m: f64, breadth_m: f64, loss_m: f64) -> Option<Self> {
         let half = (breadth_m / (depth_m * SAFE)).min(HALVES[0]);
-        (depth_m > 0.0 && half > 0.0).then_some(Self { half, loss_m })
+        (depth_m > 0.0 && half >= HALVES[HALVES.len() - 1]).then_some(Self { half, loss_m })
     }
 
     /// How far aside of the normal, in parts of the depth, points in the plane that touches a ball of that radius may

@@ -46,7 +46,7 @@ fn touched(pair: &Pair<'_>, normal: &Vec3, n: &Vec3, is_a: bool, radius_m: f64) 
         (support.a, point, pair.to_b(&(point - pair.at)))
     };
     let inside_m = radius_m - (seen.x * seen.x + seen.y * seen.y).sqrt();
-    if inside_m <= pair.tiny() {
+    if inside_m.is_nan() || inside_m <= pair.tiny() {
         return None;
     }
     let mut held = Held::default();
