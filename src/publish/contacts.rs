@@ -20,7 +20,7 @@ impl Publisher {
     ) -> u64 {
         if !view.demand.contacts {
             out.contacts.clear();
-            self.whole.1 = false;
+            self.whole.contacts = false;
             return 0;
         }
         let all = self.survey.contacts();
@@ -33,7 +33,7 @@ impl Publisher {
         if cut {
             self.choose_pairs();
         }
-        let whole = std::mem::replace(&mut self.whole.1, !cut) && !cut;
+        let whole = std::mem::replace(&mut self.whole.contacts, !cut) && !cut;
         let mut kept = std::mem::take(&mut self.kept_contacts);
         kept.begin();
         let mut at = 0;

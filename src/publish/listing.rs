@@ -7,6 +7,8 @@
 //!
 //! Rows stay where they are once made; what is sorted, and gone through in every tick, are marks of 24 bytes.
 
+use std::cmp::Ordering;
+
 use super::kept::Span;
 use crate::ids::{BodyId, PairSlot, small};
 use crate::math::Interval;
@@ -47,6 +49,14 @@ impl Row {
             Verdict::Possible => 2,
             Verdict::Near | Verdict::Apart | Verdict::None => 3,
         }
+    }
+
+    /// The order in which rows are left out where not all fit, the last one first: by class, the deepest first, by
+    /// ids.
+    pub(super) fn by_rank(&self, other: &Self) -> Ordering {
+        (self.class().cmp(&other.class()))
+            .then(self.gap.min.total_cmp(&other.gap.min))
+            .then(self.order().cmp(&other.order()))
     }
 
     /// Whether it may be taken over from the tick before as it is, unless its pair was stirred. What is undecided ages

@@ -30,6 +30,13 @@ pub use state::Worst;
 /// twice as long.
 const AHEAD: usize = 8;
 
+/// A word on each of the messages whose rows are kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct OfMessages {
+    pairs: bool,
+    contacts: bool,
+}
+
 /// What a tick hands to the publisher.
 #[derive(Debug)]
 pub struct View<'a> {
@@ -58,8 +65,8 @@ pub struct Publisher {
     events: Events,
     listing: Listing,
     survey: Survey,
-    /// Whether the last tick's `pairs` and `contacts` were listened to.
-    heard: (bool, bool),
+    /// Whether they were listened to in the last tick.
+    heard: OfMessages,
     kept_pairs: Kept<PairRow>,
     kept_contacts: Kept<ContactRow>,
     /// Used only when not all contacts fit: of the pairs that have some the depth in metres, the place among the rows
@@ -67,8 +74,8 @@ pub struct Publisher {
     contact_pairs: Vec<(f64, u32, u32)>,
     /// Used only when not all rows fit: by place whether it is sent.
     chosen: Vec<bool>,
-    /// Whether the last tick's `pairs` and `contacts` had all rows.
-    whole: (bool, bool),
+    /// Whether they had all rows in the last tick.
+    whole: OfMessages,
     /// Places among the rows of the pairs whose regions are sent, or of all by rank.
     ranked: Vec<usize>,
     verdicts: Vec<u8>,
@@ -84,12 +91,12 @@ impl Publisher {
             events: Events::default(),
             listing: Listing::default(),
             survey: Survey::default(),
-            heard: (false, false),
+            heard: OfMessages::default(),
             kept_pairs: Kept::default(),
             kept_contacts: Kept::default(),
             contact_pairs: Vec::new(),
             chosen: Vec::new(),
-            whole: (false, false),
+            whole: OfMessages::default(),
             ranked: Vec::new(),
             verdicts: Vec::new(),
             next_contact: 1,

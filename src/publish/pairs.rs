@@ -31,7 +31,7 @@ impl Publisher {
     ) -> u64 {
         if !view.demand.pairs {
             out.pairs.clear();
-            self.whole.0 = false;
+            self.whole.pairs = false;
             // Who begins to listen later sees the full state; there is nobody to tell what happened before.
             self.events.sent(|_| false);
             return 0;
@@ -39,7 +39,7 @@ impl Publisher {
         self.add_events(view);
         let left_out = self.rank();
         let cut = left_out > 0;
-        let whole = std::mem::replace(&mut self.whole.0, !cut) && !cut;
+        let whole = std::mem::replace(&mut self.whole.pairs, !cut) && !cut;
         let mut kept = std::mem::take(&mut self.kept_pairs);
         kept.begin();
         let mut at = 0;
@@ -142,12 +142,7 @@ impl Publisher {
         if left_out > 0 {
             ranked.clear();
             ranked.extend(0..listing.len());
-            ranked.sort_unstable_by(|&x, &y| {
-                let (x, y) = (listing.row(x), listing.row(y));
-                (x.class().cmp(&y.class()))
-                    .then(x.gap.min.total_cmp(&y.gap.min))
-                    .then(x.ids.cmp(&y.ids))
-            });
+            ranked.sort_unstable_by(|&x, &y| listing.row(x).by_rank(listing.row(y)));
             self.chosen.clear();
             self.chosen.resize(listing.len(), false);
             ranked[..most].iter().for_each(|&at| self.chosen[at] = true);

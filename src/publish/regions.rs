@@ -35,12 +35,7 @@ impl Publisher {
         let most = self.limits.region_rows.max(REGIONS_PER_PAIR_MAX);
         let ranked = chosen.len() * REGIONS_PER_PAIR_MAX > most;
         if ranked {
-            chosen.sort_unstable_by(|&x, &y| {
-                let (x, y) = (rows.row(x), rows.row(y));
-                (x.class().cmp(&y.class()))
-                    .then(x.gap.min.total_cmp(&y.gap.min))
-                    .then(x.order().cmp(&y.order()))
-            });
+            chosen.sort_unstable_by(|&x, &y| rows.row(x).by_rank(rows.row(y)));
         }
         let mut left_out = 0;
         for &at in &*chosen {

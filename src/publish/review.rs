@@ -4,14 +4,14 @@
 //! to since its row was made is not asked about, and its row not read.
 
 use crate::ids::PairSlot;
-use crate::narrow::{Finding, Passage};
+use crate::narrow::{Finding, Narrow, Passage};
 use crate::wire::Verdict;
 
 use super::contacts::contacts_of;
 use super::events::Ids;
 use super::listing::{NO_EVENT, Row};
 use super::pairs::worst_of;
-use super::{AHEAD, Publisher, View};
+use super::{AHEAD, OfMessages, Publisher, View};
 
 impl Publisher {
     /// Brings the rows up to this tick.
@@ -21,7 +21,10 @@ impl Publisher {
             .find_slots(view.tick, view.world, view.pairs, view.narrow);
         self.events
             .begin(view.tick, view.world, view.narrow, view.delta);
-        let heard = (view.demand.pairs, view.demand.contacts);
+        let heard = OfMessages {
+            pairs: view.demand.pairs,
+            contacts: view.demand.contacts,
+        };
         if std::mem::replace(&mut self.heard, heard) != heard {
             // What nobody listened to was not made.
             self.forget_rows();
@@ -48,10 +51,16 @@ impl Publisher {
             self.survey.leave(&was);
             match was.slot.and_then(|slot| self.look(view, slot)) {
                 Some(now) if now.ids == was.ids => self.listing.renew(at, now),
-                now => {
+                // The slot holds another pair now.
+                Some(now) => {
                     self.listing.drop(at);
-                    // The slot holds another pair now.
-                    now.into_iter().for_each(|now| self.listing.add(now));
+                    self.listing.add(now);
+                }
+                None => {
+                    self.listing.drop(at);
+                    if was.slot.is_some_and(|slot| view.narrow.is_active(slot)) {
+                        self.listing.lacks();
+                    }
                 }
             }
         }
@@ -60,18 +69,13 @@ impl Publisher {
 
     /// Rows of pairs that are active and have none.
     fn find_rows(&mut self, view: &mut View<'_>) {
-        let complete = self.listing.take_complete();
-        let count = if complete {
-            view.narrow.entered().len()
+        let those: fn(&Narrow) -> &[PairSlot] = if self.listing.take_complete() {
+            Narrow::entered
         } else {
-            view.narrow.active().len()
+            Narrow::active
         };
-        for at in 0..count {
-            let all = if complete {
-                view.narrow.entered()
-            } else {
-                view.narrow.active()
-            };
+        for at in 0..those(view.narrow).len() {
+            let all = those(view.narrow);
             if let Some(&ahead) = all.get(at + AHEAD)
                 && !self.listing.has(ahead)
             {

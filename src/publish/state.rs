@@ -120,10 +120,12 @@ pub(super) struct Survey {
     /// Pairs that touched on their way, and those that may have.
     touched: u64,
     open: u64,
-    /// Contacts of all of them.
+    /// Contacts of all rows.
     contacts: usize,
-    /// The worst pair or the widest interval may be that of a row that went.
-    stale: bool,
+    /// The worst pair's row went, and none as bad has come since.
+    worst_gone: bool,
+    /// A row with the widest interval went, and none as wide has come since.
+    widest_gone: bool,
 }
 
 impl Survey {
@@ -132,21 +134,24 @@ impl Survey {
         (self.oldest_ticks, self.touched, self.open) = (0, 0, 0);
     }
 
-    /// A row that was taken goes.
+    /// A row of the last tick goes, or is about to be taken anew.
     pub(super) fn leave(&mut self, row: &Row) {
         self.contacts -= row.contacts as usize;
-        self.stale |= row.ids == self.worst.ids || row.gap.width() >= self.widest_m;
+        self.worst_gone |= row.ids == self.worst.ids;
+        self.widest_gone |= row.gap.width() >= self.widest_m;
     }
 
-    /// Looks for the worst pair and the widest interval anew, if they may be gone.
+    /// Looks for the worst pair and the widest interval anew, if they are gone.
     pub(super) fn look_again<'a>(&mut self, rows: impl Iterator<Item = &'a Row>) {
-        if std::mem::take(&mut self.stale) {
+        if self.worst_gone || self.widest_gone {
             (self.worst, self.widest_m) = (Worst::default(), 0.0);
             rows.for_each(|row| self.rank(row));
+            (self.worst_gone, self.widest_gone) = (false, false);
         }
     }
 
-    /// Takes an active pair.
+    /// Takes the row of an active pair, or of one whose way is news. A row that stands for an event alone has nothing
+    /// to survey.
     ///
     /// * `passage` - what its way says, where that is news.
     pub(super) fn take(&mut self, row: &Row, passage: Option<Passage>) {
@@ -160,15 +165,17 @@ impl Survey {
     }
 
     fn rank(&mut self, row: &Row) {
-        self.widest_m = self.widest_m.max(row.gap.width());
+        if row.gap.width() >= self.widest_m {
+            (self.widest_m, self.widest_gone) = (row.gap.width(), false);
+        }
         let (ids, worst) = (row.ids, self.worst);
         let rank = (row.verdict.code(), -row.best_m);
         let order = rank
             .0
             .cmp(&worst.rank.0)
             .then(rank.1.total_cmp(&worst.rank.1));
-        if order.is_gt() || (order.is_eq() && (ids < worst.ids || worst.ids.0 == BodyId(0))) {
-            self.worst = Worst { ids, rank };
+        if order.is_gt() || (order.is_eq() && (ids <= worst.ids || worst.ids.0 == BodyId(0))) {
+            (self.worst, self.worst_gone) = (Worst { ids, rank }, false);
         }
     }
 
