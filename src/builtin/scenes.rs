@@ -34,6 +34,18 @@ impl Random {
         low + (high - low) * self.unit()
     }
 
+    /// A unit vector.
+    #[cfg(test)]
+    pub(crate) fn direction(&mut self) -> crate::math::Vec3 {
+        loop {
+            let mut one = || self.range(-1.0, 1.0);
+            let v = crate::math::Vec3::new(one(), one(), one());
+            if (0.1..1.0).contains(&v.norm()) {
+                return v.normalize();
+            }
+        }
+    }
+
     /// A uniform unit quaternion x, y, z, w (Shoemake 1992, Uniform random rotations).
     pub fn quaternion(&mut self) -> [f64; 4] {
         let (u, v, w) = (self.unit(), self.unit(), self.unit());

@@ -3,10 +3,13 @@
 //! In: a pair and the simplex that GJK ended with. Out: the gap (minus the least translation that separates) with both
 //! certified ends.
 //!
-//! A polytope inscribed in the Minkowski difference grows at its face nearest to the origin. `f` at that face's normal
-//! is the lower end. The upper end is minus the least plane distance over all faces: the polytope is closed and has the
-//! origin inside, so a ball of that radius fits into it, and every point of the ball is a difference of two points of
-//! the cores. Faces that look away from the origin by rounding only make that end looser, never wrong.
+//! A polytope with its corners in the Minkowski difference grows at its face nearest to the origin. `f` at that face's
+//! normal is the lower end. The upper end is minus the least plane distance over all faces: the polytope is closed and
+//! has the origin inside, so a ball of that radius fits into it, and every point of the ball is a difference of two
+//! points of the cores. Faces that look away from the origin by rounding only make that end looser, never wrong.
+//!
+//! Where the features prove a cap of directions by themselves, three corners may stand for it that need not lie in the
+//! difference, see [`Cap::rise`](newton::Cap::rise); the upper end is then no more than the cap and those faces prove.
 //!
 //! Source: van den Bergen 2001, Proximity queries and penetration depth computation on 3D game objects.
 
@@ -14,7 +17,7 @@ use std::cell::RefCell;
 
 use super::gjk;
 use super::newton::{self, Refined};
-use super::pair::{CoreGap, Held, Pair, frame, unit};
+use super::pair::{CoreGap, Held, Pair, Vertex, frame, unit};
 use super::polytope::Polytope;
 use super::simplex::{Simplex, normal_of};
 use crate::math::Vec3;
@@ -172,7 +175,7 @@ impl Polytope {
 
     /// The gap where the features say enough of the directions around the best one for the polytope to begin with a cap
     /// that stands for them; `None` where they do not, or another direction is better.
-    fn depth_under(&mut self, pair: &Pair<'_>, found: &Refined) -> Option<CoreGap> {
+    pub(super) fn depth_under(&mut self, pair: &Pair<'_>, found: &Refined) -> Option<CoreGap> {
         let cap = found
             .cap
             .filter(|cap| cap.loss_m <= pair.tolerance() / 2.0)?;
@@ -256,8 +259,12 @@ impl Polytope {
                 break;
             }
             // A first look at the features: the closest point itself becomes a corner, which saves most of the steps.
-            if !pair.polytopes && reach - face.distance <= near && state.is_new(&-face.normal) {
-                let corners = self.corners(&face);
+            let corners = self.corners(&face);
+            if !pair.polytopes
+                && reach - face.distance <= near
+                && state.is_new(&-face.normal)
+                && corners.iter().all(Vertex::lies_on_elements)
+            {
                 let found = newton::solve(pair, &corners, &self.project(place).2, &-face.normal);
                 if let Some(found) = found.filter(|r| r.value > state.best.lower) {
                     if !self.plant(pair, &found, state) {

@@ -7,7 +7,8 @@ use nalgebra::Matrix3;
 use crate::math::{Pose, Vec3, f32_down};
 use crate::shape::Convex;
 
-/// A point of the Minkowski difference with the points it comes from, A's frame.
+/// A point of the Minkowski difference with the points it comes from, A's frame; or one that stands for what lies
+/// around it, which comes from no points.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Vertex {
     /// `b - a`.
@@ -16,14 +17,22 @@ pub(super) struct Vertex {
     pub(super) a: Vec3,
     /// On the core of B.
     pub(super) b: Vec3,
-    /// Element of A it lies on, see `Core::support`.
+    /// Element of A it lies on, see `Core::support`; [`NO_ELEMENT`]: on no single one.
     pub(super) of_a: u32,
     /// Element of B it lies on.
     pub(super) of_b: u32,
 }
 
-/// The element of a point that lies on no one.
+/// The element of a point that lies on no single one. Not to be asked of a core, which gives some element for any
+/// number.
 pub(super) const NO_ELEMENT: u32 = u32::MAX >> 1;
+
+impl Vertex {
+    /// Whether it is a point of one element of each core.
+    pub(super) fn lies_on_elements(&self) -> bool {
+        self.of_a != NO_ELEMENT && self.of_b != NO_ELEMENT
+    }
+}
 
 /// Which elements an answer rests on: enough to begin from there the next time.
 #[derive(Clone, Copy, Debug, Default)]

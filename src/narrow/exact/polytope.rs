@@ -1,6 +1,7 @@
 //! A convex polytope that grows: faces with neighbours, and the step that puts a vertex in.
 //!
-//! In: vertices of the Minkowski difference. Out: a closed surface and its face nearest to the origin.
+//! In: vertices of the Minkowski difference, or three that stand for a cap of it. Out: a closed surface and its face
+//! nearest to the origin.
 
 mod first;
 

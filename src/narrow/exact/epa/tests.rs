@@ -108,16 +108,6 @@ fn a_polytope_begun_at_the_last_answer_says_what_one_begun_anew_does() {
     );
 }
 
-fn direction(random: &mut Random) -> Vec3 {
-    loop {
-        let mut one = || random.range(-1.0, 1.0);
-        let v = Vec3::new(one(), one(), one());
-        if (0.1..1.0).contains(&v.norm()) {
-            return v.normalize();
-        }
-    }
-}
-
 /// Needles, discs and all in between, along ways of small and large steps: both intervals are some 1e-7 wide, so what
 /// is carried along can be wrong by no more.
 #[test]
@@ -139,13 +129,13 @@ fn answers_carried_along_a_way_agree_with_answers_anew_for_all_proportions() {
         // One of the two has a circle.
         let (a, b) = (shape(turn), shape(turn / 5 % 3 + 2));
         let size = 0.5 * (a.reach() + b.reach());
-        let mut at = direction(&mut random) * size * random.unit();
+        let mut at = random.direction() * size * random.unit();
         // Faces on faces, too.
         let by = if random.unit() < 0.3 { 0.0 } else { 3.0 };
-        let mut rotation = Quat::from_scaled_axis(direction(&mut random) * by);
+        let mut rotation = Quat::from_scaled_axis(random.direction() * by);
         let step = 10.0_f64.powf(random.range(-6.0, -0.5)) * random.unit();
-        let way = direction(&mut random) * size * step;
-        let spin = Quat::from_scaled_axis(direction(&mut random) * step);
+        let way = random.direction() * size * step;
+        let spin = Quat::from_scaled_axis(random.direction() * step);
         let mut warm = Warm::default();
         for _ in 0..16 {
             at += way;

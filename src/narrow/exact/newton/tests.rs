@@ -4,6 +4,7 @@ use super::set::Rim;
 use super::*;
 use crate::builtin::Random;
 use crate::math::{Pose, Quat};
+use crate::narrow::exact::polytope::Polytope;
 use crate::narrow::exact::{Warm, convex_gap};
 use crate::shape::Convex;
 use nalgebra::{DMatrix, DVector};
@@ -82,10 +83,10 @@ fn overlaps(mut each: impl FnMut(&Pair<'_>, &Refined, &mut Random)) {
     {
         for turn in 0..120 {
             let spread = random.range(0.05, 0.5);
-            let at = direction(&mut random) * spread;
+            let at = random.direction() * spread;
             // Every fourth stands upright or lies: faces on faces, rims on faces.
             let upright = turn % 4 == 0;
-            let axis = direction(&mut random);
+            let axis = random.direction();
             let by = if upright { 0.0 } else { random.range(0.0, 3.0) };
             let rotation = Quat::from_scaled_axis(axis * by);
             let pose = Pose::from_parts(at.into(), rotation);
@@ -95,15 +96,6 @@ fn overlaps(mut each: impl FnMut(&Pair<'_>, &Refined, &mut Random)) {
             if let Some(found) = resume(&pair, &warm.held, &warm.normal) {
                 each(&pair, &found, &mut random);
             }
-        }
-    }
-}
-
-fn direction(random: &mut Random) -> Vec3 {
-    loop {
-        let mut one = || random.range(-1.0, 1.0);
-        if let Some(n) = unit(&Vec3::new(one(), one(), one())) {
-            return n;
         }
     }
 }
@@ -132,6 +124,35 @@ fn no_direction_within_a_cap_is_better() {
     });
     assert!(caps[1..].iter().all(|&count| count > 50), "{caps:?}");
     assert!(wide * 2 > caps.iter().sum::<u32>(), "{wide} of {caps:?}");
+}
+
+/// What the features lose by rounding is lost to the answer, too.
+#[test]
+fn an_answer_under_a_cap_is_no_tighter_than_the_cap() {
+    let mut under = 0;
+    overlaps(|pair, found, _| {
+        let loss_m = pair.tolerance() / 4.0;
+        let Some(mut cap) = found.cap.filter(|cap| cap.loss_m < loss_m) else {
+            return;
+        };
+        cap.loss_m = loss_m;
+        let lossy = Refined {
+            cap: Some(cap),
+            ..*found
+        };
+        let Some(gap) = Polytope::default().depth_under(pair, &lossy) else {
+            return;
+        };
+        under += 1;
+        assert!(gap.upper >= found.value + loss_m, "{gap:?} {lossy:?}");
+        // Nor is there an answer where nothing is left of the depth.
+        let shallow = Refined {
+            value: -loss_m / 2.0,
+            ..lossy
+        };
+        assert!(Polytope::default().depth_under(pair, &shallow).is_none());
+    });
+    assert!(under > 500, "{under}");
 }
 
 /// Else a cap would hide better directions than its own.
