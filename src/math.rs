@@ -28,6 +28,13 @@ pub(crate) fn greater<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }
 }
 
+/// Length of the part of a vector that is across z. Of what has at most some hundred kilometres nothing overflows, so
+/// `hypot` would only be slow.
+#[inline]
+pub(crate) fn across_z(v: &Vec3) -> f64 {
+    (v.x * v.x + v.y * v.y).sqrt()
+}
+
 /// The largest f32 not above `x`.
 #[must_use]
 pub fn f32_down(x: f64) -> f32 {

@@ -3,7 +3,7 @@
 //! In: a core and the contact normal. Out: corners in A's frame with ids, and the plane they lie in.
 
 use super::pair::Pair;
-use crate::math::Vec3;
+use crate::math::{Vec3, across_z};
 use crate::shape::Core;
 
 /// Corners of one feature; faces of hulls with more are thinned out (a manifold keeps four points anyway).
@@ -116,7 +116,7 @@ impl Feature {
             }
             Core::Cone { radius_m, half_m } => {
                 let length = radius_m.hypot(2.0 * half_m);
-                let off = (dir.x * dir.x + dir.y * dir.y).sqrt();
+                let off = across_z(dir);
                 let slant = (2.0 * half_m * off + radius_m * dir.z) / length;
                 if -dir.z > slant {
                     self.cap(*radius_m, -half_m, dir, -1.0);
@@ -178,7 +178,7 @@ impl Feature {
 
     /// The regular octagon in a circle, one corner at the circle's deepest point.
     fn cap(&mut self, radius_m: f64, z_m: f64, dir: &Vec3, up: f64) {
-        let off = (dir.x * dir.x + dir.y * dir.y).sqrt();
+        let off = across_z(dir);
         // Lying flat there is no deepest point, and a fixed start keeps the ids still.
         let (x, y) = if off > 1e-3 {
             (radius_m * dir.x / off, radius_m * dir.y / off)

@@ -3,7 +3,7 @@
 //! In: a core and a pose. Out: tight boxes and balls, rounded outward.
 
 use super::{Convex, Core};
-use crate::math::{Aabb, Point, Pose, Vec3};
+use crate::math::{Aabb, Point, Pose, Vec3, across_z};
 
 /// Factor that takes up the roundings of a norm.
 const UP: f64 = 1.0 + 4.0 * f64::EPSILON;
@@ -47,22 +47,17 @@ impl Core {
                 (-half, half)
             }
             Self::Cylinder { radius_m, half_m } => {
-                let half = across(dir) * radius_m + dir.z.abs() * half_m;
+                let half = across_z(dir) * radius_m + dir.z.abs() * half_m;
                 (-half, half)
             }
             Self::Cone { radius_m, half_m } => {
-                let (across, apex) = (across(dir) * radius_m, dir.z * half_m);
+                let (across, apex) = (across_z(dir) * radius_m, dir.z * half_m);
                 (apex.min(-apex - across), apex.max(-apex + across))
             }
             Self::Hull(hull) => span_of(hull.points(), dir),
             Self::Triangle(corners) => span_of(corners, dir),
         }
     }
-}
-
-/// Length of the part of a unit vector that is across z; nothing in it overflows, so `hypot` would only be slow.
-pub(super) fn across(dir: &Vec3) -> f64 {
-    (dir.x * dir.x + dir.y * dir.y).sqrt()
 }
 
 fn span_of(points: &[Vec3], dir: &Vec3) -> (f64, f64) {

@@ -10,7 +10,7 @@ mod hull;
 use std::sync::Arc;
 
 use crate::limits::{EXTENT_MAX_M, EXTENT_MIN_M};
-use crate::math::{Point, Vec3};
+use crate::math::{Point, Vec3, across_z};
 use crate::shape::ShapeError;
 
 pub(crate) use hull::Hull;
@@ -298,7 +298,7 @@ impl Core {
                 (rim(dir, *radius_m, z), CIRCLE | u32::from(bottom))
             }
             Self::Cone { radius_m, half_m } => {
-                let across = bounds::across(dir);
+                let across = across_z(dir);
                 if dir.z * half_m >= across * radius_m - dir.z * half_m {
                     (Vec3::new(0.0, 0.0, *half_m), 0)
                 } else {
@@ -373,7 +373,7 @@ impl Core {
 /// The point of the circle of `radius_m` at height `z_m` that is farthest along `dir`.
 #[inline]
 fn rim(dir: &Vec3, radius_m: f64, z_m: f64) -> Vec3 {
-    let across = (dir.x * dir.x + dir.y * dir.y).sqrt();
+    let across = across_z(dir);
     if across > 0.0 {
         let scale = radius_m / across;
         Vec3::new(dir.x * scale, dir.y * scale, z_m)

@@ -42,10 +42,10 @@ impl Cap {
             return None;
         }
         let actives = &set.actives[..set.count];
-        let whole: f64 = actives.iter().map(|x| x.weight.max(0.0)).sum();
+        let weights: f64 = actives.iter().map(|x| x.weight.max(0.0)).sum();
         let (mut mean, mut aside, mut above) = (0.0, [0.0; 2], 0.0_f64);
         for x in actives {
-            let weight = x.weight.max(0.0) / whole;
+            let weight = x.weight.max(0.0) / weights;
             mean += weight * x.value;
             aside[0] += weight * x.slope[0];
             aside[1] += weight * x.slope[1];
@@ -58,7 +58,7 @@ impl Cap {
             let angle = 2.0 * half;
             let reach = wanted * half;
             match actives {
-                [_] => least_of(&curvature(set, whole, angle)) >= wanted,
+                [_] => least_of(&curvature(set, weights, angle)) >= wanted,
                 [one, other] => {
                     let line = [other.slope[0] - one.slope[0], other.slope[1] - one.slope[1]];
                     let length = (line[0] * line[0] + line[1] * line[1]).sqrt();
@@ -67,7 +67,7 @@ impl Cap {
                     let breadth = (-at(&one.slope)).min(at(&other.slope));
                     // Who leans less from across than by this cosine has no breadth.
                     let narrow = reach / breadth;
-                    let bent = curvature(set, whole, angle);
+                    let bent = curvature(set, weights, angle);
                     let across = across_least(&bent, along, narrow);
                     (breadth > 0.0 && narrow < 1.0 && across >= wanted) || least_of(&bent) >= wanted
                 }
@@ -109,13 +109,13 @@ impl Cap {
 }
 
 /// Lower bounds on the curvature of all elements, each with its weight, up to an angle: xx, xy, yy.
-fn curvature(set: &Set, whole: f64, angle: f64) -> [f64; 3] {
+fn curvature(set: &Set, weights: f64, angle: f64) -> [f64; 3] {
     let mut sum = [0.0; 3];
     for x in &set.actives[..set.count] {
         for rim in &x.rims {
             let [p, q] = rim.along;
             let shown = rim.lean / (rim.lean + angle).min(1.0);
-            let bent = x.weight.max(0.0) / whole * rim.bend_m * shown * shown * shown;
+            let bent = x.weight.max(0.0) / weights * rim.bend_m * shown * shown * shown;
             sum[0] += bent * p * p;
             sum[1] += bent * p * q;
             sum[2] += bent * q * q;

@@ -7,7 +7,7 @@ use super::super::pair::{Held, Pair};
 use super::Refined;
 use super::cap::Cap;
 use super::set::Set;
-use crate::math::Vec3;
+use crate::math::{Vec3, across_z};
 
 /// Cosine of the angle between a normal and an axis up to which the disc is tried.
 const NEAR: f64 = 0.995;
@@ -45,7 +45,7 @@ fn touched(pair: &Pair<'_>, normal: &Vec3, n: &Vec3, is_a: bool, radius_m: f64) 
         let point = support.a + n * value;
         (support.a, point, pair.to_b(&(point - pair.at)))
     };
-    let inside_m = radius_m - (seen.x * seen.x + seen.y * seen.y).sqrt();
+    let inside_m = radius_m - across_z(&seen);
     if inside_m.is_nan() || inside_m <= pair.tiny() {
         return None;
     }

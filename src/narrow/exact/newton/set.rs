@@ -1,7 +1,7 @@
 //! The elements that take part: vertices and circles of both cores, with what each says at a normal.
 
 use super::super::pair::{Held, Pair, Vertex};
-use crate::math::Vec3;
+use crate::math::{Vec3, across_z};
 use crate::shape::Core;
 
 /// A pair of elements that takes part, with its weight.
@@ -63,13 +63,22 @@ impl Set {
     }
 
     pub(super) fn add(&mut self, of_a: u32, of_b: u32, weight: f64) {
-        let same = self.actives[..self.count]
-            .iter_mut()
-            .find(|x| x.of_a == of_a && x.of_b == of_b);
-        if let Some(same) = same {
-            same.weight += weight;
-        } else if self.count < 3 {
-            self.actives[self.count] = Active {
+        match self.place_of(of_a, of_b) {
+            Some(place) => self.actives[place].weight += weight,
+            None => _ = self.push(of_a, of_b, weight),
+        }
+    }
+
+    fn place_of(&self, of_a: u32, of_b: u32) -> Option<usize> {
+        (self.actives[..self.count].iter()).position(|x| x.of_a == of_a && x.of_b == of_b)
+    }
+
+    /// False where there is no room.
+    fn push(&mut self, of_a: u32, of_b: u32, weight: f64) -> bool {
+        let room = self.actives.get_mut(self.count);
+        let fits = room.is_some();
+        if let Some(room) = room {
+            *room = Active {
                 of_a,
                 of_b,
                 weight,
@@ -77,6 +86,7 @@ impl Set {
             };
             self.count += 1;
         }
+        fits
     }
 
     pub(super) fn held(&self) -> Held {
@@ -87,20 +97,10 @@ impl Set {
         held
     }
 
+    /// False where the elements take part already, or there is no room.
     pub(super) fn join(&mut self, vertex: &Vertex) -> bool {
-        let known = self.actives[..self.count]
-            .iter()
-            .any(|x| x.of_a == vertex.of_a && x.of_b == vertex.of_b);
-        if known || self.count == 3 {
-            return false;
-        }
-        self.actives[self.count] = Active {
-            of_a: vertex.of_a,
-            of_b: vertex.of_b,
-            ..Active::default()
-        };
-        self.count += 1;
-        true
+        let (of_a, of_b) = (vertex.of_a, vertex.of_b);
+        self.place_of(of_a, of_b).is_none() && self.push(of_a, of_b, 0.0)
     }
 
     pub(super) fn least(&self) -> f64 {
@@ -153,11 +153,11 @@ impl Set {
 
     pub(super) fn witnesses(&self) -> (Vec3, Vec3) {
         let actives = &self.actives[..self.count];
-        let whole: f64 = actives.iter().map(|x| x.weight.max(0.0)).sum();
+        let weights: f64 = actives.iter().map(|x| x.weight.max(0.0)).sum();
         let (mut a, mut b) = (Vec3::zeros(), Vec3::zeros());
         for x in actives {
-            let weight = if whole > 0.0 {
-                x.weight.max(0.0) / whole
+            let weight = if weights > 0.0 {
+                x.weight.max(0.0) / weights
             } else {
                 f64::from(u8::from(actives.len() == 1))
             };
@@ -173,7 +173,7 @@ fn element(core: &Core, element: u32, dir: &Vec3) -> Option<(Vec3, Vec3, Rim)> {
     let Some(circle) = core.circle(element) else {
         return Some((core.vertex(element)?, Vec3::zeros(), Rim::default()));
     };
-    let across = (dir.x * dir.x + dir.y * dir.y).sqrt();
+    let across = across_z(dir);
     if across < 1e-12 {
         return None;
     }
