@@ -76,6 +76,8 @@ pub(super) struct Memo {
     /// Tick of the poses the contacts belong to.
     pub(super) contacts_tick: u64,
     pub(super) active_at: u32,
+    /// The surface that proved the last depth.
+    pub(super) shell: u32,
     pub(super) cursor: u32,
     pub(super) front: u32,
     pub(super) compound: u32,
@@ -131,6 +133,7 @@ impl Memo {
             query_ns: 0,
             contacts_tick: 0,
             active_at: NONE,
+            shell: NONE,
             cursor: NONE,
             front: NONE,
             compound: NONE,

@@ -91,6 +91,8 @@ impl Narrow {
         }
         if let Some(slot) = next(at + AHEAD).filter(|slot| wants(*slot)) {
             self.ask_ahead_for_contacts(slot);
+            self.shelves
+                .ask_ahead_for_shell(self.memos[slot.index()].shell);
         }
         world.ask_along(at, |step| {
             let slot = next(step).filter(|slot| wants(*slot))?;

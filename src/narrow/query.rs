@@ -7,7 +7,8 @@ use crate::world::{Body, PlacedShape};
 
 use super::contacts::Contact;
 use super::exact::{
-    Closest, Manifold, Warm, convex_gap, gap_to_half_space, half_space_gap, manifold,
+    Closest, Manifold, Shell, Warm, convex_gap, convex_gap_along, gap_to_half_space,
+    half_space_gap, manifold,
 };
 use super::memo::Witness;
 use super::mesh::{LeafContact, retest_witness};
@@ -24,10 +25,24 @@ pub(super) fn shape_pose(a: &PlacedShape, b: &PlacedShape, bodies12: &Pose) -> P
 
 /// One exact query; `None` for a mesh or two half-spaces. The answer is in shape A's frame.
 pub(super) fn shape_gap(a: &Shape, b: &Shape, pos12: &Pose, warm: &mut Warm) -> Option<Closest> {
+    shape_gap_along(a, b, pos12, warm, None)
+}
+
+/// As [`shape_gap`].
+///
+/// * `shell` - see [`convex_gap_along`]; of a pair that is followed.
+pub(super) fn shape_gap_along(
+    a: &Shape,
+    b: &Shape,
+    pos12: &Pose,
+    warm: &mut Warm,
+    shell: Option<&mut Shell>,
+) -> Option<Closest> {
     match (&a.geometry, &b.geometry) {
-        (Geometry::Convex(one), Geometry::Convex(other)) => {
-            Some(convex_gap(one, other, pos12, warm))
-        }
+        (Geometry::Convex(one), Geometry::Convex(other)) => Some(match shell {
+            Some(shell) => convex_gap_along(one, other, pos12, warm, shell),
+            None => convex_gap(one, other, pos12, warm),
+        }),
         (Geometry::HalfSpace { normal, offset }, Geometry::Convex(other)) => {
             Some(half_space_gap(normal, *offset, other, pos12))
         }

@@ -4,6 +4,7 @@ use super::Narrow;
 use super::arena::Arena;
 use super::contacts::Contact;
 use super::cursor::Cursor;
+use super::exact::Shell;
 use super::mesh::{CarriedFront, FrontStore};
 use super::pool::Pool;
 use crate::ids::PairSlot;
@@ -13,6 +14,10 @@ use crate::ids::PairSlot;
 pub(super) struct Shelves {
     /// Of meshes and half-spaces.
     pub(super) cursors: Pool<Cursor>,
+    /// Of pairs of single convex shapes that overlap.
+    shells: Pool<Shell>,
+    /// Of a pair that has none yet.
+    spare: Shell,
     /// What is carried of pairs of shapes of which one is a mesh.
     pub(super) fronts: Pool<CarriedFront>,
     /// The entries of fronts.
@@ -22,6 +27,38 @@ pub(super) struct Shelves {
 }
 
 impl Shelves {
+    /// Says that the shell at a place is wanted soon, if there is one.
+    #[inline]
+    pub(super) fn ask_ahead_for_shell(&self, at: u32) {
+        if let Some(shell) = self.shells.get(at) {
+            shell.ask_ahead();
+        }
+    }
+
+    /// The shell of a pair, or an empty one.
+    pub(super) fn shell(&mut self, at: u32) -> &mut Shell {
+        self.shells.get_mut(at).unwrap_or(&mut self.spare)
+    }
+
+    /// Keeps what a query made of [`Shelves::shell`], if anything.
+    pub(super) fn keep_shell(&mut self, at: &mut u32) {
+        if self.shell(*at).is_empty() {
+            self.shells.give(at);
+        } else if let Some(own) = self.shells.get_or_take(at)
+            && own.is_empty()
+        {
+            std::mem::swap(own, &mut self.spare);
+        }
+    }
+
+    /// Takes a shell back, if `at` is one.
+    pub(super) fn give_shell(&mut self, at: &mut u32) {
+        if let Some(shell) = self.shells.get_mut(*at) {
+            shell.clear();
+        }
+        self.shells.give(at);
+    }
+
     /// Takes a front back, if `at` is one.
     pub(super) fn give_front(&mut self, at: &mut u32) {
         if let Some(front) = self.fronts.get_mut(*at) {
@@ -43,6 +80,7 @@ impl Narrow {
     /// Gives back what work on a pair keeps from turn to turn.
     pub(super) fn give_back(&mut self, slot: PairSlot) {
         let memo = &mut self.memos[slot.index()];
+        self.shelves.give_shell(&mut memo.shell);
         self.shelves.give_cursor(&mut memo.cursor);
         self.shelves.give_front(&mut memo.front);
         if let Some(front) = self.compounds.get_mut(memo.compound) {

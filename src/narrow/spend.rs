@@ -12,11 +12,16 @@ use super::memo::{Witness, bent, changed_since};
 use super::mesh::{Goal, has_front};
 use super::order::Order;
 use super::pass::Pass;
-use super::query::{add_manifold, is_simple, retest, shape_gap, shape_pose, sound, witness_of};
+use super::query::{
+    add_manifold, is_simple, retest, shape_gap_along, shape_pose, sound, witness_of,
+};
 use super::{NONE, Narrow, Wanted};
 
 /// What a query is expected to take at most, nanoseconds: what takes longer was held up.
 const QUERY_NS_MAX: u64 = 100_000;
+
+/// By how much a pair may move between two queries for its shell to save time, in parts of the smaller body's radius.
+const FOLLOWED: f64 = 0.1;
 
 /// What a query found, and when and where it holds.
 struct Answer {
@@ -135,12 +140,16 @@ impl Narrow {
         let rel = relative(&a.pose, &b.pose);
         let pos12 = shape_pose(&a.shapes[0], &b.shapes[0], &rel);
         let memo = &mut self.memos[slot.index()];
-        let Some(closest) = shape_gap(
-            &a.shapes[0].shape,
-            &b.shapes[0].shape,
-            &pos12,
-            &mut memo.warm,
-        ) else {
+        let shell = if memo.widened_m <= FOLLOWED * a.radius.min(b.radius) {
+            Some(self.shelves.shell(memo.shell))
+        } else {
+            self.shelves.give_shell(&mut memo.shell);
+            None
+        };
+        let (one, other) = (&a.shapes[0].shape, &b.shapes[0].shape);
+        let closest = shape_gap_along(one, other, &pos12, &mut memo.warm, shell);
+        self.shelves.keep_shell(&mut memo.shell);
+        let Some(closest) = closest else {
             return;
         };
         self.counters.queries += 1;

@@ -13,6 +13,8 @@
 //!
 //! Source: van den Bergen 2001, Proximity queries and penetration depth computation on 3D game objects.
 
+mod follow;
+
 use std::cell::RefCell;
 
 use super::gjk;
@@ -21,6 +23,8 @@ use super::pair::{CoreGap, Held, Pair, Vertex, frame, unit};
 use super::polytope::Polytope;
 use super::simplex::{Simplex, normal_of};
 use crate::math::Vec3;
+
+pub(super) use follow::{depth_around, depth_at};
 
 /// Growth steps: polytopes end by themselves long before, overlapping curved cores take 40 to 120.
 const STEPS_MAX: usize = 300;
@@ -63,45 +67,6 @@ pub(super) fn depth(pair: &Pair<'_>, simplex: &Simplex, warm: Option<Refined>) -
     SCRATCH.with(|scratch| match scratch.try_borrow_mut() {
         Ok(mut polytope) => run(&mut polytope),
         Err(_) => run(&mut Polytope::default()),
-    })
-}
-
-/// The gap of two cores by a polytope that begins around the closest point of an earlier answer; `None` where the cores
-/// are apart, or the ends stay apart.
-pub(super) fn depth_around(pair: &Pair<'_>, found: &Refined) -> Option<CoreGap> {
-    if found.value >= -pair.tiny() {
-        return None;
-    }
-    SCRATCH.with(|scratch| {
-        let mut polytope = scratch.try_borrow_mut().ok()?;
-        if let Some(gap) = polytope.depth_under(pair, found) {
-            return Some(gap);
-        }
-        if !polytope.start_below(pair, found.corner(), &-found.normal) {
-            return None;
-        }
-        let gap = polytope.settle(pair, Some(found));
-        let within = gap.upper < -pair.tiny();
-        (within && gap.is_tight(pair)).then(|| polytope.straight(pair, gap))
-    })
-}
-
-/// The gap of two cores by a polytope that begins at the face which an earlier one ended at; `None` where there was
-/// none, the cores are apart by now, or the ends stay apart.
-pub(super) fn depth_at(pair: &Pair<'_>, held: &Held, normal: &Vec3) -> Option<CoreGap> {
-    if !held.deep {
-        return None;
-    }
-    let mut recalled = pair.recall(held, normal);
-    let face = [recalled.next()?, recalled.next()?, recalled.next()?];
-    SCRATCH.with(|scratch| {
-        let mut polytope = scratch.try_borrow_mut().ok()?;
-        if !polytope.start_at(pair, face, &-normal) {
-            return None;
-        }
-        let gap = polytope.settle(pair, None);
-        let meets = gap.upper < -pair.tiny() && gap.upper - gap.lower <= 4.0 * pair.tiny();
-        meets.then(|| polytope.straight(pair, gap))
     })
 }
 
@@ -171,32 +136,6 @@ impl Polytope {
             return flat;
         }
         self.settle(pair, warm.as_ref())
-    }
-
-    /// The gap where the features say enough of the directions around the best one for the polytope to begin with a cap
-    /// that stands for them; `None` where they do not, or another direction is better.
-    pub(super) fn depth_under(&mut self, pair: &Pair<'_>, found: &Refined) -> Option<CoreGap> {
-        let cap = found
-            .cap
-            .filter(|cap| cap.loss_m <= pair.tolerance() / 2.0)?;
-        // What the features prove within the cap, and no more is told.
-        let depth_m = -found.value - cap.loss_m;
-        if depth_m <= 0.0 {
-            return None;
-        }
-        self.start_under(pair, &-found.normal, depth_m, &cap);
-        let mut state = State {
-            refined: Some(*found),
-            ..State::new()
-        };
-        state.best.offer(found.value, &found.normal, 0);
-        self.expand(pair, &mut state);
-        let gap = CoreGap {
-            upper: (-state.fits.min(depth_m)).max(found.value),
-            ..found.apart()
-        };
-        let holds = -gap.upper > depth_m * cap.lift() && gap.is_tight(pair);
-        holds.then_some(gap)
     }
 
     /// Grows as far as it helps, around what Newton found first; the gap that is known then.

@@ -13,6 +13,8 @@
 //!   normal that makes `f` greatest, outside and inside alike. It starts from the features of the last answer, and
 //!   where it says that they overlap the polytope begins around its closest point, without GJK, or under a cap of
 //!   directions that the features themselves say are no better, which takes the place of its finest faces.
+//! * Of a pair that is asked in every tick the whole surface of the polytope is kept ([`Shell`]), and at the next poses
+//!   mostly proves the depth as it is.
 //!
 //! The certificate: for every unit `n`, `f(n) = -(s_A(n) + s_B(-n))` is a lower bound on the gap, so the lower end is
 //! `f` at the best normal found, whoever found it. The upper end is the distance of two points that are convex
@@ -44,6 +46,7 @@ pub use manifold::{Manifold, ManifoldPoint, manifold};
 pub(in crate::narrow) use manifold::{shared_by_triangles, shared_points};
 
 use pair::{CoreGap, Held, Pair};
+pub use polytope::Shell;
 
 /// Warm start of one shape pair: the normal found last and the features it rested on. The default knows nothing.
 #[derive(Clone, Copy, Default, Debug)]
@@ -119,6 +122,36 @@ const FINISHED: f64 = 1e-6;
 /// allocation after a thread's first calls.
 #[must_use]
 pub fn convex_gap(a: &Convex, b: &Convex, pos12: &Pose, warm: &mut Warm) -> Closest {
+    gap(a, b, pos12, warm, None)
+}
+
+/// As [`convex_gap`], of a pair that is asked in every tick: half the time where curved cores or hulls overlap.
+///
+/// * `shell` - kept by the caller for this pair, as `warm` is: any is sound, an empty one will do. It is filled where
+///   the pair overlaps and a polytope tells how deep, and emptied where not.
+#[must_use]
+pub fn convex_gap_along(
+    a: &Convex,
+    b: &Convex,
+    pos12: &Pose,
+    warm: &mut Warm,
+    shell: &mut Shell,
+) -> Closest {
+    shell.used = false;
+    let closest = gap(a, b, pos12, warm, Some(shell));
+    if !shell.used {
+        shell.clear();
+    }
+    closest
+}
+
+fn gap(
+    a: &Convex,
+    b: &Convex,
+    pos12: &Pose,
+    warm: &mut Warm,
+    shell: Option<&mut Shell>,
+) -> Closest {
     let pair = Pair::new(a, b, pos12);
     if !pair.scale.is_finite() {
         return Closest::unknown();
@@ -127,7 +160,7 @@ pub fn convex_gap(a: &Convex, b: &Convex, pos12: &Pose, warm: &mut Warm) -> Clos
     if let Some(core) = closed::gap(&pair) {
         return finish(&pair, &core);
     }
-    let core = iterate(&pair, warm);
+    let core = iterate(&pair, warm, shell);
     *warm = Warm {
         normal: core.normal,
         held: core.held,
@@ -136,7 +169,7 @@ pub fn convex_gap(a: &Convex, b: &Convex, pos12: &Pose, warm: &mut Warm) -> Clos
 }
 
 /// GJK, and what follows from its verdict.
-fn iterate(pair: &Pair<'_>, warm: &Warm) -> CoreGap {
+fn iterate(pair: &Pair<'_>, warm: &Warm, mut shell: Option<&mut Shell>) -> CoreGap {
     let start = if warm.normal == Vec3::zeros() {
         pair.guess()
     } else {
@@ -149,7 +182,7 @@ fn iterate(pair: &Pair<'_>, warm: &Warm) -> CoreGap {
     };
     // The features of the last answer are mostly those of this one.
     let refined = if pair.polytopes {
-        if let Some(gap) = epa::depth_at(pair, &warm.held, &start) {
+        if let Some(gap) = epa::depth_at(pair, &warm.held, &start, shell.as_deref_mut()) {
             return gap;
         }
         None
@@ -160,7 +193,7 @@ fn iterate(pair: &Pair<'_>, warm: &Warm) -> CoreGap {
     if let Some(found) = refined.as_ref().filter(|r| r.value < -pair.tiny()) {
         known = revolved::gap(pair, Some(found));
         let told = known.filter(|gap| gap.is_tight(pair));
-        if let Some(gap) = told.or_else(|| epa::depth_around(pair, found)) {
+        if let Some(gap) = told.or_else(|| epa::depth_around(pair, found, shell)) {
             return gap;
         }
     }

@@ -4,10 +4,13 @@
 //! nearest to the origin.
 
 mod first;
+mod shell;
 
 use super::pair::{Vertex, unit};
 use super::simplex::Simplex;
 use crate::math::Vec3;
+
+pub use shell::Shell;
 
 /// A triangle of the polytope; corners counter-clockwise seen from outside.
 #[derive(Clone, Copy)]

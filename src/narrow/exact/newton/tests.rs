@@ -140,7 +140,7 @@ fn an_answer_under_a_cap_is_no_tighter_than_the_cap() {
             cap: Some(cap),
             ..*found
         };
-        let Some(gap) = Polytope::default().depth_under(pair, &lossy) else {
+        let Some(gap) = Polytope::default().depth_under(pair, &lossy, None) else {
             return;
         };
         under += 1;
@@ -150,7 +150,11 @@ fn an_answer_under_a_cap_is_no_tighter_than_the_cap() {
             value: -loss_m / 2.0,
             ..lossy
         };
-        assert!(Polytope::default().depth_under(pair, &shallow).is_none());
+        assert!(
+            Polytope::default()
+                .depth_under(pair, &shallow, None)
+                .is_none()
+        );
     });
     assert!(under > 500, "{under}");
 }

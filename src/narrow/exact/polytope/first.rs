@@ -44,6 +44,20 @@ impl Polytope {
         self.close_first()
     }
 
+    /// Where a point that stands for a cap is to be, on the side of the way out on which one was before; `None`: it was
+    /// on no side.
+    ///
+    /// * `out`, `depth_m` - as in [`Polytope::start_under`].
+    pub(in super::super) fn beside(
+        out: &Vec3,
+        depth_m: f64,
+        cap: &Cap,
+        was: &Vec3,
+    ) -> Option<Vec3> {
+        let side = unit(&(was - out * out.dot(was)))?;
+        Some(standing(out, depth_m, cap, &side))
+    }
+
     /// An antiprism: three points of the plane that the cap says the difference reaches in any case, and three vertices
     /// around the middle. Those points need not lie in the difference, see [`Cap::rise`].
     ///
@@ -58,11 +72,10 @@ impl Polytope {
     ) {
         self.clear();
         let (one, other) = frame(out);
-        let rise = depth_m * cap.rise();
         let around = [(1.0, 0.0), (-0.5, SIXTY), (-0.5, -SIXTY)].map(|(x, y)| one * x + other * y);
         for side in &around {
             self.vertices.push(Vertex {
-                w: out * depth_m + side * rise,
+                w: standing(out, depth_m, cap, side),
                 of_a: NO_ELEMENT,
                 of_b: NO_ELEMENT,
                 ..Vertex::default()
@@ -179,6 +192,11 @@ impl Polytope {
             self.put_face(corners[k], beside[k]);
         }
     }
+}
+
+/// A point that stands for a cap, on a side of the way out.
+fn standing(out: &Vec3, depth_m: f64, cap: &Cap, side: &Vec3) -> Vec3 {
+    out * depth_m + side * (depth_m * cap.rise())
 }
 
 /// Whether a tetrahedron is not a sliver.

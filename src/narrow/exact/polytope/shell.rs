@@ -1,0 +1,204 @@
+//! The shell: the surface that a polytope ends with, kept for the next query of the pair to begin from.
+//!
+//! In: a polytope that holds a ball as deep as the cores overlap. Out, at other poses: the same surface, where it is
+//! one.
+//!
+//! Corners are kept as the elements they lie on, and where on a circle. Put together at any poses, of any two cores,
+//! they are points of the Minkowski difference: a shell may be out of date, and proves no less. A closed surface whose
+//! faces all look away from the origin has it inside, bent or not, so that [`epa`](super::super::epa) goes on as if it
+//! had just made it: while the cores move by little its faces are mostly as far out as is asked for, and each of them
+//! is looked at once; where not, it grows.
+
+use super::super::pair::{NO_ELEMENT, Pair, Vertex};
+use super::{Place, Polytope};
+use crate::math::{Vec3, f32_near};
+use crate::shape::Core;
+use crate::simd::boxes::prefetch;
+
+/// Corners of a shell, at most: overlapping curved cores end with some fourteen, and one in twenty with more than this.
+const CORNERS_MAX: usize = 32;
+/// As many triangles close a surface with so many corners.
+const FACES_MAX: usize = 2 * CORNERS_MAX - 4;
+/// Vertices and faces of a polytope of which a shell can be left, dead ones too.
+const VERTICES_SEEN: usize = 128;
+const FACES_SEEN: usize = 512;
+
+/// The surface that an exact query of a pair ended with, for the next one; see [`convex_gap_along`].
+///
+/// [`convex_gap_along`]: super::super::convex_gap_along
+#[derive(Clone, Debug)]
+// In this order, so that what most of them fill lies side by side.
+#[repr(C)]
+pub struct Shell {
+    corners_len: u8,
+    /// 0: nothing is kept.
+    faces_len: u8,
+    /// It was what the query at hand ended with.
+    pub(in super::super) used: bool,
+    corners: [Corner; CORNERS_MAX],
+    faces: [Triangle; FACES_MAX],
+}
+
+const _: () = assert!(size_of::<Shell>() <= 1152, "every fourth pair has one");
+
+/// A face: its corners, and the faces across each of its edges.
+#[derive(Clone, Copy, Debug, Default)]
+struct Triangle {
+    corners: [u8; 3],
+    beside: [u8; 3],
+}
+
+/// A vertex by what it lies on.
+#[derive(Clone, Copy, Debug, Default)]
+struct Corner {
+    of_a: u32,
+    of_b: u32,
+    /// Where on a circle of A, along x and y of its frame, and where on one of B; of a corner that stands for a cap its
+    /// place in A's frame, metres.
+    at: [f32; 4],
+}
+
+impl Default for Shell {
+    fn default() -> Self {
+        Self {
+            corners_len: 0,
+            faces_len: 0,
+            used: false,
+            corners: [Corner::default(); CORNERS_MAX],
+            faces: [Triangle::default(); FACES_MAX],
+        }
+    }
+}
+
+impl Shell {
+    /// Whether nothing is kept.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.faces_len == 0
+    }
+
+    /// Says that it is wanted soon: as much of it as most fill.
+    #[inline]
+    pub(in crate::narrow) fn ask_ahead(&self) {
+        prefetch(&self.faces_len);
+        if let (Some(corners), Some(faces)) = (
+            self.corners.first_chunk::<14>(),
+            self.faces.first_chunk::<24>(),
+        ) {
+            prefetch(corners);
+            prefetch(faces);
+        }
+    }
+
+    /// Keeps nothing.
+    pub fn clear(&mut self) {
+        (self.corners_len, self.faces_len) = (0, 0);
+    }
+}
+
+impl Corner {
+    fn of(pair: &Pair<'_>, vertex: &Vertex) -> Self {
+        let at = if vertex.lies_on_elements() {
+            let b = pair.to_b(&(vertex.b - pair.at));
+            [vertex.a.x, vertex.a.y, b.x, b.y]
+        } else {
+            [vertex.w.x, vertex.w.y, vertex.w.z, 0.0]
+        };
+        Self {
+            of_a: vertex.of_a,
+            of_b: vertex.of_b,
+            at: at.map(f32_near),
+        }
+    }
+
+    /// The vertex at the poses of a pair; `None` where a core has no such element.
+    ///
+    /// * `aside` - puts a corner in its place that stands for a cap.
+    fn vertex(&self, pair: &Pair<'_>, aside: impl Fn(&Vec3) -> Option<Vec3>) -> Option<Vertex> {
+        let [x, y, z, _] = self.at.map(f64::from);
+        let (a, b) = if self.of_a == NO_ELEMENT {
+            let w = aside(&Vec3::new(x, y, z))?;
+            (Vec3::zeros(), w)
+        } else {
+            let on = |core: &Core, element, x: f32, y: f32| {
+                core.element(element, &Vec3::new(f64::from(x), f64::from(y), 0.0))
+            };
+            let [ax, ay, bx, by] = self.at;
+            let b = on(pair.b.core(), self.of_b, bx, by)?;
+            let a = on(pair.a.core(), self.of_a, ax, ay)?;
+            (a, pair.rotation * b + pair.at)
+        };
+        Some(Vertex {
+            w: b - a,
+            a,
+            b,
+            of_a: self.of_a,
+            of_b: self.of_b,
+        })
+    }
+}
+
+impl Polytope {
+    /// Leaves the surface as a shell, if it is whole and not too large for one.
+    pub(in super::super) fn leave(&self, pair: &Pair<'_>, shell: &mut Shell) {
+        shell.clear();
+        if self.vertices.len() > VERTICES_SEEN || self.faces.len() > FACES_SEEN {
+            return;
+        }
+        let (mut corner_of, mut face_of) = ([u8::MAX; VERTICES_SEEN], [u8::MAX; FACES_SEEN]);
+        let (mut corners, mut faces) = (0, 0);
+        let alive = || self.faces.iter().zip(0..).filter(|(face, _)| face.alive);
+        for (face, at) in alive() {
+            let Some(kept) = shell.faces.get_mut(usize::from(faces)) else {
+                return;
+            };
+            face_of[at] = faces;
+            faces += 1;
+            for (to, corner) in kept.corners.iter_mut().zip(face.corners.map(usize::from)) {
+                let place = &mut corner_of[corner];
+                if *place == u8::MAX {
+                    let Some(kept) = shell.corners.get_mut(usize::from(corners)) else {
+                        return;
+                    };
+                    *kept = Corner::of(pair, &self.vertices[corner]);
+                    *place = corners;
+                    corners += 1;
+                }
+                *to = *place;
+            }
+        }
+        for ((face, _), kept) in alive().zip(&mut shell.faces) {
+            kept.beside = face.beside.map(|at| face_of[usize::from(at)]);
+            // A step that failed has left a hole.
+            if kept.beside.contains(&u8::MAX) {
+                return;
+            }
+        }
+        (shell.corners_len, shell.faces_len) = (corners, faces);
+        shell.used = true;
+    }
+
+    /// Begins with a shell; false where there is none, it is that of other cores, or it does not hold the origin.
+    ///
+    /// * `aside` - puts a corner in its place that stands for a cap.
+    pub(in super::super) fn start_with(
+        &mut self,
+        pair: &Pair<'_>,
+        shell: &Shell,
+        aside: impl Fn(&Vec3) -> Option<Vec3>,
+    ) -> bool {
+        self.clear();
+        for corner in &shell.corners[..usize::from(shell.corners_len)] {
+            let Some(vertex) = corner.vertex(pair, &aside) else {
+                return false;
+            };
+            self.vertices.push(vertex);
+        }
+        self.met.resize(self.vertices.len(), 0);
+        let faces = usize::from(shell.faces_len);
+        for face in &shell.faces[..faces] {
+            self.put_face(face.corners.map(Place::from), face.beside.map(Place::from));
+        }
+        faces > 0 && self.distances.iter().all(|d| *d > 0.0)
+    }
+}
