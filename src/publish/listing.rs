@@ -51,8 +51,7 @@ impl Row {
         }
     }
 
-    /// The order in which rows are left out where not all fit, the last one first: by class, the deepest first, by
-    /// ids.
+    /// The order in which rows are kept where not all fit: by class, in it the deepest first, then by ids.
     pub(super) fn by_rank(&self, other: &Self) -> Ordering {
         (self.class().cmp(&other.class()))
             .then(self.gap.min.total_cmp(&other.gap.min))

@@ -65,7 +65,7 @@ pub struct Publisher {
     events: Events,
     listing: Listing,
     survey: Survey,
-    /// Whether they were listened to in the last tick.
+    /// Which were listened to in the last tick.
     heard: OfMessages,
     kept_pairs: Kept<PairRow>,
     kept_contacts: Kept<ContactRow>,
@@ -74,7 +74,7 @@ pub struct Publisher {
     contact_pairs: Vec<(f64, u32, u32)>,
     /// Used only when not all rows fit: by place whether it is sent.
     chosen: Vec<bool>,
-    /// Whether they had all rows in the last tick.
+    /// Which had all their rows in the last tick.
     whole: OfMessages,
     /// Places among the rows of the pairs whose regions are sent, or of all by rank.
     ranked: Vec<usize>,

@@ -198,10 +198,10 @@ impl Polytope {
                 break;
             }
             // A first look at the features: the closest point itself becomes a corner, which saves most of the steps.
-            let corners = self.corners(&face);
             if !pair.polytopes
                 && reach - face.distance <= near
                 && state.is_new(&-face.normal)
+                && let corners = self.corners(&face)
                 && corners.iter().all(Vertex::lies_on_elements)
             {
                 let found = newton::solve(pair, &corners, &self.project(place).2, &-face.normal);

@@ -125,7 +125,8 @@ pub fn convex_gap(a: &Convex, b: &Convex, pos12: &Pose, warm: &mut Warm) -> Clos
     gap(a, b, pos12, warm, None)
 }
 
-/// As [`convex_gap`], of a pair that is asked in every tick: half the time where curved cores or hulls overlap.
+/// As [`convex_gap`], of a pair that is asked in every tick: where curved cores or hulls overlap and move by 0.1 % of
+/// their size from query to query it takes about half the time, at 1 % three quarters.
 ///
 /// * `shell` - kept by the caller for this pair, as `warm` is: any is sound, an empty one will do. It is filled where
 ///   the pair overlaps and a polytope tells how deep, and emptied where not.
