@@ -43,6 +43,7 @@ from pathlib import Path
 import coal
 import fcl
 import numpy as np
+from provenance import commit, machine
 
 ROOT = Path(__file__).resolve().parent.parent
 TOLERANCE_M = 1e-6
@@ -171,14 +172,6 @@ def command(*words):
     return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
 
 
-def machine():
-    fields = {}
-    for line in Path("/proc/cpuinfo").read_text().splitlines():
-        key, _, value = line.partition(":")
-        fields.setdefault(key.strip(), value.strip())
-    return f"{fields['model name']} family {fields['cpu family']} model {fields['model']}"
-
-
 def install_fcl():
     missing = [] if shutil.which("c++") else ["g++"]
     if not FCL_HEADERS.is_dir():
@@ -277,7 +270,7 @@ def report(csv, rounds, took, answers, calls):
         "machine,commit,compiler,seed,library,job,pairs,rounds,p50_us,p90_us,mean_us,call_us,"
         "contacts_mean,disagree,exempt"
     )
-    head = f"{machine()},{command('git', 'rev-parse', '--short', 'HEAD')}"
+    head = f"{machine()},{commit()}"
     rustc = command("rustc", "--version")
     lines, table = [columns], {}
     for (library, job), pairs in sorted(took.items()):

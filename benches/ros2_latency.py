@@ -32,6 +32,7 @@ from pathlib import Path
 
 import rclpy
 from geometry_msgs.msg import Pose
+from provenance import commit, machine
 from rclpy.executors import SingleThreadedExecutor
 from sweepd_msgs.msg import BodyTransform, BodyTransforms, Pairs, Tick
 
@@ -64,14 +65,6 @@ ON_LOOPBACK = """<CycloneDDS><Domain><General><Interfaces><NetworkInterface name
 def scene(bodies):
     shapes = "".join(f"[[body]]\nname = 'b{n}'\nshape = {{ type = 'sphere', radius = 0.3 }}\n" for n in range(bodies))
     return f"[run]\non_frame = 'sim'\n[[source]]\nname = 'sim'\ntimeout_ms = 5000\n{shapes}"
-
-
-def machine():
-    fields = {}
-    for line in Path("/proc/cpuinfo").read_text().splitlines():
-        key, _, value = line.partition(":")
-        fields.setdefault(key.strip(), value.strip())
-    return f"{fields['model name'].split(' ')[0]} {fields['model name'].split(' ')[1]} family {fields['cpu family']} model {fields['model']} {os.cpu_count()} cores"
 
 
 def percentile(values, share):
@@ -218,8 +211,7 @@ def main():
     lost += cyclone.count(None) + lean["lost"]
     found |= {"lean": lean["through"], "lean_beyond_tick": lean["beyond_tick"], "lean_echo": lean["echo"]}
     found["cyclone"] = [value for value in cyclone if value is not None]
-    commit = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False)
-    row = {"machine": machine(), "commit": commit.stdout.strip(), "compiler": f"Python {platform.python_version()}", "seed": SEED,
+    row = {"machine": machine(), "commit": commit(), "compiler": f"Python {platform.python_version()}", "seed": SEED,
            "bodies": args.bodies, "samples": args.samples, "lost": lost, "pairs_mean": round(pairs, 1)}  # fmt: skip
     for name, values in found.items():
         row[f"{name}_p50_us"] = round(percentile(values, 0.5), 1)
