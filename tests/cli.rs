@@ -14,6 +14,8 @@ mod live;
 mod feed;
 #[path = "cli/monitor.rs"]
 mod monitor;
+#[path = "cli/query.rs"]
+mod query;
 #[path = "cli/report.rs"]
 mod report;
 
@@ -58,7 +60,7 @@ fn head(args: &[&str], lines: usize) -> Output {
 
 #[test]
 fn usage_is_refused_with_code_2_on_stderr_and_help_is_given_with_code_0_on_stdout() {
-    let bad: [&[&str]; 12] = [
+    let bad: [&[&str]; 15] = [
         &[],
         &["fly"],
         &["run"],
@@ -71,6 +73,9 @@ fn usage_is_refused_with_code_2_on_stderr_and_help_is_given_with_code_0_on_stdou
         &["monitor", "--instance", "UPPER"],
         &["feed"],
         &["query"],
+        &["query", "a"],
+        &["query", "a", "b", "--batch", "x.jsonl"],
+        &["query", "--batch", "x.jsonl", "--instance", "cell"],
     ];
     for args in bad {
         let ended = output(args);
@@ -131,7 +136,10 @@ fn help_names_units_and_defaults() {
                 "until a signal",
             ][..],
         ),
-        ("query", &["metres", "[w,x,y,z]"][..]),
+        (
+            "query",
+            &["metres", "[w,x,y,z]", "[default: 5s]", "nanoseconds"][..],
+        ),
         ("list", &["JSON"][..]),
     ] {
         let text = help(command)

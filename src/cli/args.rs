@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 use super::args_report::Report;
+use super::args_tools::{ListArgs, QueryArgs};
 use crate::builtin::Pattern;
 use crate::error::Error;
 
@@ -47,9 +48,9 @@ pub(super) enum Command {
     Feed(FeedArgs),
     /// Watch a running daemon: state, pairs by name, gaps, budget, sources, rejects.
     Monitor(MonitorArgs),
-    /// Answer shape-pair questions offline.
+    /// Ask a running daemon for the gap of two bodies, or answer shape-pair questions offline.
     Query(QueryArgs),
-    /// List running instances.
+    /// List running instances, their sources and readers.
     List(ListArgs),
     /// Measure: error against run time, and numerical stability.
     Report(ReportArgs),
@@ -208,23 +209,6 @@ pub(super) struct MonitorArgs {
     pub(super) contacts: bool,
 }
 
-#[derive(Debug, Args)]
-pub(super) struct QueryArgs {
-    /// A file of cases, one JSON object a line (`-`: standard input); one answer a line, in order.
-    ///
-    /// A case: `{"id", "a": SHAPE, "pose_a": {"t": [x,y,z], "q": [w,x,y,z]}, "b": SHAPE, "pose_b": ...}`, all lengths
-    /// in metres.
-    #[arg(long, value_name = "IN.jsonl")]
-    pub(super) batch: PathBuf,
-}
-
-#[derive(Debug, Args)]
-pub(super) struct ListArgs {
-    /// One JSON object an instance.
-    #[arg(long)]
-    pub(super) json: bool,
-}
-
 /// A limit given by hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Limit {
@@ -252,7 +236,7 @@ pub(super) fn units(text: &str) -> Result<Limit, String> {
 }
 
 /// Nanoseconds of `2ms`, `1.5s`, `500us`, `100ns`, `0`.
-fn nanoseconds(text: &str) -> Result<u64, String> {
+pub(super) fn nanoseconds(text: &str) -> Result<u64, String> {
     let wanted = || format!("`{text}` is no time: write a number and ns, us, ms or s, such as 2ms");
     let split = text
         .find(|c: char| c.is_ascii_alphabetic())

@@ -27,6 +27,16 @@ pub(super) fn number(value: f64, digits: usize) -> String {
     }
 }
 
+/// Metres to the last digit that f64 has: intervals of a proof differ in those.
+pub(super) fn metres(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 || (1e-4..1e9).contains(&size) {
+        format!("{value}")
+    } else {
+        format!("{value:e}")
+    }
+}
+
 /// Nanoseconds as seconds.
 #[allow(clippy::cast_precision_loss, reason = "shown with few digits")]
 pub(super) fn seconds(ns: u64) -> f64 {
@@ -55,6 +65,20 @@ mod tests {
         let long = cut("robot_left_gripper_finger_distal_12", 24);
         assert_eq!(long, "robot_left_g~r_distal_12");
         assert_eq!(cut("a\x1b[2Jb", 24), "a?[2Jb");
+    }
+
+    #[test]
+    fn metres_keep_every_digit_and_stay_short() {
+        let value = 0.1 + 0.2;
+        assert_eq!(metres(value), "0.30000000000000004");
+        assert_eq!(metres(-0.0), "-0");
+        assert_eq!(metres(1.5e-300), "1.5e-300");
+        for value in [value, 1.0 / 3e7, -2.0e300] {
+            assert_eq!(
+                metres(value).parse::<f64>().unwrap().to_bits(),
+                value.to_bits()
+            );
+        }
     }
 
     #[test]

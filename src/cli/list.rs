@@ -5,7 +5,7 @@ use serde_json::json;
 use crate::error::Result;
 use crate::transport::iceoryx::{InstanceInfo, Place, list_instances};
 
-use super::args::ListArgs;
+use super::args_tools::ListArgs;
 use super::out::Out;
 
 /// Lists the instances of this user: daemons, and names that clients wait at for one.

@@ -5,6 +5,7 @@
 
 mod args;
 mod args_report;
+mod args_tools;
 mod check;
 mod feed;
 mod figures;

@@ -1,23 +1,37 @@
-//! `sweepd query --batch`: shape-pair questions answered offline.
+//! `sweepd query`: shape-pair questions answered offline, or the gap of two bodies of a running daemon.
+
+mod live;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
+use std::path::Path;
 
 use crate::error::{Error, Result};
 use crate::query::batch;
 
-use super::args::QueryArgs;
+use super::args_tools::QueryArgs;
 use super::out::Out;
 
-/// Answers a file of cases; `false` when a line could not be read.
+/// Answers what was asked; `false` when a line of a file could not be read.
 pub(super) fn query(args: &QueryArgs, out: &mut Out) -> Result<bool> {
-    let input: Box<dyn BufRead> = if args.batch.as_os_str() == "-" {
+    match (&args.batch, &args.a, &args.b) {
+        (Some(file), ..) => of_file(file, out),
+        // A file is read to its end or the signal's.
+        (None, Some(a), Some(b)) => live::gap(a, b, args, out, super::stop()?.as_ref()),
+        _ => Err(Error::Usage(
+            "name two bodies of a running daemon, or give a file of cases with --batch".to_owned(),
+        )),
+    }
+}
+
+fn of_file(path: &Path, out: &mut Out) -> Result<bool> {
+    let input: Box<dyn BufRead> = if path.as_os_str() == "-" {
         Box::new(BufReader::new(std::io::stdin()))
     } else {
-        let file = File::open(&args.batch).map_err(|e| {
+        let file = File::open(path).map_err(|e| {
             Error::Usage(format!(
                 "{}: {e}; give a file of cases, or - for standard input",
-                args.batch.display()
+                path.display()
             ))
         })?;
         Box::new(BufReader::new(file))

@@ -71,12 +71,20 @@ impl GapQuestion {
     #[must_use]
     pub fn answer(&self, clock: &dyn Clock) -> GapFound {
         let (a, b) = (&self.a, &self.b);
+        let now_ns = clock.boottime_ns();
+        let age_ns = |body: &Body| Some(now_ns.saturating_sub(body.since_ns?));
         let end_ns = clock.monotonic_ns().saturating_add(WORK_NS);
         let mut meter = Meter::new(clock, Some(end_ns), None);
         let asked = gap_between(a, b, self.report_m, &mut meter);
         let finite = |end: f64| end.is_finite().then_some(end);
         let found = GapFound {
             tick_header: self.tick_header,
+            // What does not move has no age.
+            age_ns: [a, b]
+                .into_iter()
+                .filter(|body| body.moves)
+                .filter_map(age_ns)
+                .max(),
             verdict: asked.verdict.code(),
             touching: asked.touching,
             gap_min_m: finite(asked.gap.min),

@@ -58,6 +58,10 @@ pub struct Answer {
 pub struct GapFound {
     /// Header of the tick whose poses were used.
     pub tick_header: MessageHeader,
+    /// Age of the older of the two poses when the work on the answer began, nanoseconds of `CLOCK_BOOTTIME`; `None`:
+    /// neither body is one that moves.
+    #[serde(default)]
+    pub age_ns: Option<u64>,
     /// `Verdict`.
     pub verdict: u8,
     /// Whether the query was finished, with 0 inside its rounding interval.

@@ -26,6 +26,8 @@ fn a_gap_is_answered_with_the_tick_it_belongs_to_and_changes_nothing() {
         let found = answer.gap.unwrap();
         assert_eq!(found.tick_header.boot_id, header.boot_id);
         assert!(found.tick_header.tick >= header.tick);
+        let age_ns = found.age_ns.unwrap();
+        assert!((1..60 * SECOND_NS).contains(&age_ns), "{age_ns}");
         let gap = x - 1.0;
         assert!((found.gap_best_m.unwrap() - gap).abs() < 1e-12, "{found:?}");
         assert!(found.gap_min_m.unwrap() <= gap && found.gap_max_m.unwrap() >= gap);

@@ -292,6 +292,19 @@ impl Client {
     /// # Errors
     /// As [`Client::request`].
     pub fn request_text(&mut self, json: &str, blobs: &[&[u8]], timeout_ns: u64) -> Result<String> {
+        let request = self.ask(json, blobs)?;
+        self.answer_text(request, timeout_ns)?.ok_or_else(|| {
+            Error::TimedOut(format!("no answer within {} ms", timeout_ns / 1_000_000))
+        })
+    }
+
+    /// Sends a request as [`Client::request`] does, and does not wait: [`Client::answer_text`] does.
+    ///
+    /// * returns - its number.
+    ///
+    /// # Errors
+    /// `Error::Io` when it cannot be sent.
+    pub fn ask(&mut self, json: &str, blobs: &[&[u8]]) -> Result<u64> {
         self.requests += 1;
         let header = RequestHeader {
             json_len: json.len() as u64,
@@ -300,21 +313,29 @@ impl Client {
             reserved: 0,
         };
         self.link.request(&header, json.as_bytes(), blobs)?;
+        Ok(header.request)
+    }
+
+    /// Waits for the answer to a request; answers to others are passed over.
+    ///
+    /// * returns - its JSON; `None`: not within the time, it may come yet.
+    ///
+    /// # Errors
+    /// `Error::Io` when it cannot be read.
+    pub fn answer_text(&mut self, request: u64, timeout_ns: u64) -> Result<Option<String>> {
         let until_ns = self.clock.monotonic_ns().saturating_add(timeout_ns);
         let mut text = Vec::new();
         loop {
             if let Some(answer) = self.link.answer(&mut text)?
-                && answer.request == header.request
+                && answer.request == request
             {
                 return String::from_utf8(text)
+                    .map(Some)
                     .map_err(|e| Error::io("the daemon's answer is not UTF-8", e));
             }
             let now_ns = self.clock.monotonic_ns();
             if now_ns >= until_ns {
-                return Err(Error::TimedOut(format!(
-                    "no answer within {} ms",
-                    timeout_ns / 1_000_000
-                )));
+                return Ok(None);
             }
             self.link.wait((until_ns - now_ns).min(LOOK_AGAIN_NS))?;
         }

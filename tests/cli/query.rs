@@ -1,0 +1,159 @@
+//! `sweepd query A B`: the gap of two bodies of a running daemon, as text and as JSON, and why there is none.
+
+use rustix::process::Signal;
+use serde_json::Value;
+
+use super::{code, err, head, out};
+use crate::live::{Desk, TWO_SPHERES, at, output, step, until};
+
+fn ask(desk: &Desk, args: &[&str]) -> std::process::Output {
+    let mut all = vec!["query"];
+    all.extend_from_slice(args);
+    all.extend_from_slice(&["--instance", &desk.instance]);
+    output(&all)
+}
+
+fn json(desk: &Desk, args: &[&str]) -> Value {
+    let ended = ask(desk, args);
+    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+    let text = out(&ended);
+    assert_eq!(text.lines().count(), 1, "{text}");
+    serde_json::from_str(&text).unwrap()
+}
+
+#[test]
+fn a_running_daemon_is_asked_and_says_what_the_batch_says_offline() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    step(&mut client, &[at(1, 0.0), at(2, 3.0)]);
+    let header = client.view().tick().header;
+    let live = json(&desk, &["a", "b", "--json"]);
+    let sphere = r#"{"type": "sphere", "radius": 0.5}"#;
+    let case = format!(
+        r#"{{"id": 1, "a": {sphere}, "pose_a": {{"t": [0,0,0], "q": [1,0,0,0]}}, "b": {sphere}, "pose_b": {{"t": [3,0,0], "q": [1,0,0,0]}}}}"#
+    );
+    let cases = desk.write("case.jsonl", &format!("{case}\n"));
+    let ended = output(&["query", "--batch", cases.to_str().unwrap()]);
+    let offline: Value = serde_json::from_slice(&ended.stdout).unwrap();
+    for key in ["gap_m", "normal", "point_a", "point_b", "colliding"] {
+        assert_eq!(live[key], offline[key], "{key}: {live} {offline}");
+    }
+    let ends = ["gap_min_m", "gap_max_m"].map(|key| live[key].as_f64().unwrap());
+    assert!(ends[0] <= 2.0 && 2.0 <= ends[1] && ends[1] - ends[0] < 1e-9);
+    assert_eq!((&live["a"], &live["b"]), (&"a".into(), &"b".into()));
+    assert_eq!(
+        (&live["verdict"], &live["touching"]),
+        (&"apart".into(), &false.into())
+    );
+    assert!(live["tick"].as_u64().unwrap() >= header.tick);
+    assert_eq!(live["boot_id"], format!("{:016x}", header.boot_id));
+    assert_eq!(live["scene_rev"], header.scene_rev);
+    assert_eq!(live["warnings"], serde_json::json!([]));
+    // The poses were sent before the question was put, and are younger than this test may be.
+    let age_ns = live["age_ns"].as_u64().unwrap();
+    assert!((1..60_000_000_000).contains(&age_ns), "{age_ns}");
+    let turned = json(&desk, &["b", "a", "--json"]);
+    assert_eq!(turned["normal"], serde_json::json!([-1.0, 0.0, 0.0]));
+    assert_eq!(turned["point_a"], live["point_b"]);
+
+    let ended = ask(&desk, &["a", "b"]);
+    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+    let text = out(&ended);
+    for word in ["apart", "gap [m]     2\n", "1.99999", "2.5 0 0", " old"] {
+        assert!(text.contains(word), "`{word}` in {text}");
+    }
+    step(&mut client, &[at(1, 0.0), at(2, 1.0)]);
+    let ended = ask(&desk, &["a", "b"]);
+    assert!(
+        out(&ended).contains("colliding (touching)"),
+        "{}",
+        out(&ended)
+    );
+    for lines in [0, 1] {
+        let args = ["query", "a", "b", "--instance", &desk.instance];
+        assert_eq!(code(&head(&args, lines)), Some(0), "{lines}");
+    }
+}
+
+#[test]
+fn what_has_no_gap_is_refused_with_what_to_change() {
+    let desk = Desk::new();
+    let scene = TWO_SPHERES.replace("\"b\"", "\"arm/hand\"");
+    let _daemon = desk.run(&scene, &[]);
+    let mut client = desk.source("sim");
+    // No pose of either has come.
+    let ended = ask(&desk, &["a", "arm/hand", "--json"]);
+    assert_eq!(code(&ended), Some(4), "{}", err(&ended));
+    assert!(err(&ended).contains("not_received"), "{}", err(&ended));
+    assert!(ended.stdout.is_empty());
+    step(&mut client, &[at(1, 0.0), at(2, 3.0)]);
+    for (a, b, words) in [
+        (
+            "a",
+            "arm/hnad",
+            &["\"arm/hnad\"", "did you mean \"arm/hand\"?"][..],
+        ),
+        ("zeppelin", "a", &["\"zeppelin\"", "2 bodies"]),
+        ("a", "a", &["itself"]),
+    ] {
+        let ended = ask(&desk, &[a, b]);
+        assert_eq!(code(&ended), Some(2), "{a} {b}: {}", err(&ended));
+        let text = err(&ended);
+        assert!(words.iter().all(|word| text.contains(word)), "{text}");
+    }
+}
+
+#[test]
+fn what_does_not_move_has_no_age() {
+    let desk = Desk::new();
+    let still = TWO_SPHERES.replace("shape =", "moves = false\nshape =");
+    let _daemon = desk.run(&still, &[]);
+    let live = json(&desk, &["a", "b", "--json", "--timeout", "30s"]);
+    assert!(live["age_ns"].is_null(), "{live}");
+    assert_eq!(live["verdict"], "colliding");
+    let ended = ask(&desk, &["a", "b"]);
+    assert!(
+        out(&ended).contains("neither body moves"),
+        "{}",
+        out(&ended)
+    );
+}
+
+#[test]
+fn without_a_daemon_that_answers_it_ends_in_time_with_code_3() {
+    let desk = Desk::new();
+    let ended = ask(&desk, &["a", "b", "--timeout", "200ms"]);
+    assert_eq!(code(&ended), Some(3), "{}", err(&ended));
+    let text = err(&ended);
+    assert!(
+        text.contains(&desk.instance) && text.contains("sweepd run"),
+        "{text}"
+    );
+    let daemon = desk.run(TWO_SPHERES, &[]);
+    drop(desk.client(None));
+    daemon.signal(Signal::STOP);
+    let ended = ask(&desk, &["a", "b", "--timeout", "300ms"]);
+    daemon.signal(Signal::CONT);
+    assert_eq!(code(&ended), Some(3), "{}", err(&ended));
+}
+
+#[test]
+fn a_signal_ends_it_before_the_answer_and_that_is_no_success() {
+    let desk = Desk::new();
+    let mut query = desk.start("query", &["a", "b", "--timeout", "600s"]);
+    // It listens for signals before it looks for a daemon; until then a signal ends it, too, without a code.
+    let caught = || {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", query.pid())).unwrap();
+        let line = status
+            .lines()
+            .find(|line| line.starts_with("SigCgt"))
+            .unwrap();
+        u64::from_str_radix(line.split_whitespace().nth(1).unwrap(), 16).unwrap() & 2 != 0
+    };
+    until("it listens for signals", caught);
+    query.signal(Signal::INT);
+    let (status, _) = query.end();
+    assert_eq!(status.code(), Some(3), "{}", query.stderr());
+    assert!(query.stderr().contains("signal"), "{}", query.stderr());
+}
