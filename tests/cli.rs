@@ -10,6 +10,8 @@
 
 mod live;
 
+#[path = "cli/doctor.rs"]
+mod doctor;
 #[path = "cli/feed.rs"]
 mod feed;
 #[path = "cli/monitor.rs"]
@@ -60,7 +62,7 @@ fn head(args: &[&str], lines: usize) -> Output {
 
 #[test]
 fn usage_is_refused_with_code_2_on_stderr_and_help_is_given_with_code_0_on_stdout() {
-    let bad: [&[&str]; 15] = [
+    let bad: [&[&str]; 16] = [
         &[],
         &["fly"],
         &["run"],
@@ -76,6 +78,7 @@ fn usage_is_refused_with_code_2_on_stderr_and_help_is_given_with_code_0_on_stdou
         &["query", "a"],
         &["query", "a", "b", "--batch", "x.jsonl"],
         &["query", "--batch", "x.jsonl", "--instance", "cell"],
+        &["doctor", "--instance", "UPPER"],
     ];
     for args in bad {
         let ended = output(args);
@@ -85,7 +88,9 @@ fn usage_is_refused_with_code_2_on_stderr_and_help_is_given_with_code_0_on_stdou
             "{args:?}"
         );
     }
-    for command in ["run", "check", "feed", "monitor", "query", "list", "report"] {
+    for command in [
+        "run", "check", "feed", "monitor", "query", "list", "doctor", "report",
+    ] {
         let ended = output(&[command, "--help"]);
         assert_eq!(code(&ended), Some(0), "{command}");
         assert!(ended.stderr.is_empty(), "{command}");
@@ -141,6 +146,10 @@ fn help_names_units_and_defaults() {
             &["metres", "[w,x,y,z]", "[default: 5s]", "nanoseconds"][..],
         ),
         ("list", &["JSON"][..]),
+        (
+            "doctor",
+            &["JSON", "a line each", "Never of living ones"][..],
+        ),
     ] {
         let text = help(command)
             .split_whitespace()

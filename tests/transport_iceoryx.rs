@@ -19,7 +19,8 @@ use sweepd::time::{Clock, SystemClock};
 use sweepd::transport::Door;
 use sweepd::transport::client::{ClientOptions, FrameInfo, Heard, Rows, StepError, Topics};
 use sweepd::transport::iceoryx::{
-    Place, Server, ServerOptions, Waker, list_instances, spawn_cleaner,
+    Cleaned, Place, Server, ServerOptions, Waker, clean_leftovers, leftovers, list_instances,
+    spawn_cleaner,
 };
 use sweepd::wire::{FrameHeader, Hello, Inbox, TransformRow};
 use transport_support::{Files, Manners, SECOND_NS, StandIn, poses, until};
@@ -439,4 +440,86 @@ fn a_removed_root_does_not_let_a_second_daemon_in_and_the_first_goes_on() {
     assert_eq!(client.wait_tick(5 * SECOND_NS).unwrap(), Heard::Tick);
     drop(client);
     drop(daemon);
+}
+
+#[test]
+fn what_a_killed_daemon_leaves_is_seen_and_cleaned_on_demand_and_a_living_one_goes_on() {
+    let files = Files::new();
+    let living = files.place.with_instance("living").unwrap();
+    let daemon = StandIn::iceoryx(&living, Manners::default());
+    let child = spawn(&files, "daemon");
+    let pid = child.id();
+    let look = || leftovers(&files.place).unwrap();
+    let names = |nodes: &[sweepd::transport::iceoryx::NodeOwner]| -> Vec<String> {
+        nodes.iter().map(|node| node.name.clone()).collect()
+    };
+    let before = look();
+    assert!(names(&before.alive).contains(&"sweepd/cell/daemon".to_owned()));
+    assert!(before.dead.is_empty() && before.locks.is_empty() && before.unclear == 0);
+    kill_and_reap(child);
+    let left = look();
+    assert_eq!(names(&left.dead), ["sweepd/cell/daemon"]);
+    assert_eq!(left.dead[0].pid, pid);
+    assert_eq!(left.locks.len(), 1);
+    assert_eq!(left.locks[0].instance, "cell");
+    let shared = || {
+        let entries = std::fs::read_dir("/dev/shm").unwrap().flatten();
+        let ours = entries.filter(|entry| {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            name.starts_with(&files.prefix)
+        });
+        ours.map(|entry| entry.path()).collect::<Vec<_>>()
+    };
+    let files_left = shared().len();
+
+    // Nobody who only looks cleans, not even by a client's node that comes and goes, nor does who cleans up elsewhere.
+    let reader = ClientOptions {
+        place: living.clone().looking_only(),
+        ..options(&files, None)
+    };
+    drop(reader.connect().unwrap());
+    list_instances(&living.clone().looking_only()).unwrap();
+    let elsewhere = clean_leftovers(&files.place, Some("living")).unwrap();
+    assert_eq!(elsewhere, Cleaned::default());
+    assert_eq!(
+        (look().dead, look().locks),
+        (left.dead.clone(), left.locks.clone())
+    );
+
+    let done = clean_leftovers(&files.place, Some("cell")).unwrap();
+    assert_eq!((done.nodes, done.locks), (left.dead, left.locks));
+    assert_eq!(done.failed, Vec::<String>::new());
+    let after = look();
+    assert!(after.dead.is_empty() && after.locks.is_empty());
+    assert!(shared().len() < files_left, "{files_left} files were there");
+    assert_eq!(
+        clean_leftovers(&files.place, None).unwrap(),
+        Cleaned::default()
+    );
+
+    let alive = ClientOptions {
+        place: living,
+        ..options(&files, Some("sim"))
+    };
+    let mut client = alive.connect().unwrap();
+    client.subscribe(Topics::ALL).unwrap();
+    let rows = poses(3, 1.0);
+    client
+        .step(&FrameInfo::default(), Rows::Poses(&rows), 2 * SECOND_NS)
+        .unwrap();
+    assert_eq!(client.view().tick().header.boot_id, 7);
+
+    // What nobody has mapped is told, and what the living daemon has is not, however old its files look.
+    let stray = std::path::Path::new("/dev/shm").join(format!("{}stray", files.prefix));
+    std::fs::write(&stray, [0; 8192]).unwrap();
+    for path in shared() {
+        let file = std::fs::File::options().write(true).open(path).unwrap();
+        file.set_modified(std::time::SystemTime::UNIX_EPOCH)
+            .unwrap();
+    }
+    let unmapped = look().unmapped;
+    assert_eq!((unmapped.files, unmapped.example), (1, Some(stray)));
+    assert_eq!(unmapped.bytes, 8192);
+    drop(client);
+    daemon.stop();
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 use super::args_report::Report;
-use super::args_tools::{ListArgs, QueryArgs};
+use super::args_tools::{DoctorArgs, ListArgs, QueryArgs};
 use crate::builtin::Pattern;
 use crate::error::Error;
 
@@ -52,6 +52,11 @@ pub(super) enum Command {
     Query(QueryArgs),
     /// List running instances, their sources and readers.
     List(ListArgs),
+    /// Find what is wrong when nothing works: shared memory, rights, leftovers, daemons, limits; a line a finding.
+    ///
+    /// Each line says ok, warning or wrong, what is so, and what to do. Nothing is changed without --clean. Ends with
+    /// code 1 when something is wrong; warnings alone are no reason.
+    Doctor(DoctorArgs),
     /// Measure: error against run time, and numerical stability.
     Report(ReportArgs),
 }

@@ -1,4 +1,4 @@
-//! Flags and arguments of the commands that ask and look: `query`, `list`.
+//! Flags and arguments of the commands that ask and look: `query`, `list`, `doctor`.
 
 use std::path::PathBuf;
 
@@ -43,4 +43,18 @@ pub(super) struct ListArgs {
     /// One JSON object an instance, a line each, instead of text.
     #[arg(long)]
     pub(super) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct DoctorArgs {
+    /// Look at this instance, and with --clean at its leftovers only; by default at all that there are.
+    #[arg(long, value_name = "NAME")]
+    pub(super) instance: Option<String>,
+    /// One JSON object a finding, a line each, instead of text: `level`, `check`, `what`, `do`.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Remove what dead processes of this user left: nodes of iceoryx2 with their shared memory (also those of its
+    /// programs that are no sweepd, unless --instance is given), and locks that nobody holds. Never of living ones.
+    #[arg(long)]
+    pub(super) clean: bool,
 }

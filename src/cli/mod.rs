@@ -7,6 +7,7 @@ mod args;
 mod args_report;
 mod args_tools;
 mod check;
+mod doctor;
 mod feed;
 mod figures;
 mod list;
@@ -73,6 +74,7 @@ fn dispatch(command: Command, ros_words: Option<&[String]>) -> Result<ExitCode> 
         Command::Monitor(args) => monitor::monitor(&args, &mut out, stop()?.as_ref()),
         Command::Query(args) => query::query(&args, &mut out),
         Command::List(args) => list::list(&args, &mut out),
+        Command::Doctor(args) => doctor::doctor(&args, &mut out),
         Command::Report(args) => report::report(&args, &mut out, stop()?.as_ref()),
     };
     match done {

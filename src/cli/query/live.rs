@@ -44,7 +44,7 @@ pub(super) fn gap(
         }
         if left_ns == 0 {
             return Err(Error::TimedOut(format!(
-                "the daemon `{instance}` gave no answer within {}; give it longer with --timeout",
+                "the daemon `{instance}` gave no answer within {}; give it longer with --timeout, or see `sweepd doctor`",
                 time(args.timeout)
             )));
         }

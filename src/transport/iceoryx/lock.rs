@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 
 /// Shared memory lives here; a lock beside it survives the removal of iceoryx2's root, which would let a second
 /// daemon make a second, silent set of services.
-const LOCK_DIR: &str = "/dev/shm";
+pub(super) const LOCK_DIR: &str = "/dev/shm";
 /// Times to try again when the file was removed between opening and locking, or somebody looks whether it is held.
 const TRIES_MAX: usize = 16;
 /// How long to wait for who looks: that takes some microseconds.
@@ -23,12 +23,28 @@ const LOOK: Duration = Duration::from_millis(10);
 
 /// What the holder of an instance writes into its lock, for people and for clients of another iceoryx2 version.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Holder {
-    pub(super) pid: u32,
-    pub(super) boot_id: u64,
-    pub(super) wire_version: u32,
-    pub(super) sweepd_version: String,
-    pub(super) iceoryx2_version: String,
+pub struct Holder {
+    /// Its process, as its own pid namespace counts.
+    pub pid: u32,
+    /// Random number of this start.
+    pub boot_id: u64,
+    /// The wire version it speaks.
+    pub wire_version: u32,
+    /// Its version.
+    pub sweepd_version: String,
+    /// The iceoryx2 it was built with.
+    pub iceoryx2_version: String,
+}
+
+/// The lock file of an instance.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Lock {
+    /// The instance's name.
+    pub instance: String,
+    /// The file.
+    pub path: PathBuf,
+    /// Who has it; `None`: nobody, a killed daemon left it.
+    pub holder: Option<Holder>,
 }
 
 /// The one holder of an instance. The file goes when it is dropped.
@@ -45,20 +61,64 @@ fn fnv(bytes: &[u8]) -> u64 {
     })
 }
 
-fn lock_path(place: &Place) -> PathBuf {
+/// What stands before and behind the instance in the name of its lock.
+fn around(place: &Place) -> (String, String) {
     let uid = rustix::process::geteuid().as_raw();
     let files = format!("{}|{}", place.root().display(), place.prefix());
-    let name = format!(
-        "sweepd_{uid}_{}_{:016x}.lock",
-        place.instance(),
-        fnv(files.as_bytes())
-    );
-    Path::new(LOCK_DIR).join(name)
+    let end = format!("_{:016x}.lock", fnv(files.as_bytes()));
+    (format!("sweepd_{uid}_"), end)
+}
+
+fn lock_path(place: &Place) -> PathBuf {
+    let (start, end) = around(place);
+    Path::new(LOCK_DIR).join(format!("{start}{}{end}", place.instance()))
+}
+
+/// The locks of all instances under a place's files, by name; the place's own name does not matter.
+///
+/// # Errors
+/// `Error::Io` when their directory cannot be read.
+pub fn locks(place: &Place) -> Result<Vec<Lock>> {
+    let (start, end) = around(place);
+    let entries = std::fs::read_dir(LOCK_DIR)
+        .map_err(|e| Error::io(format!("{LOCK_DIR} cannot be read"), e))?;
+    let mut all = Vec::new();
+    for entry in entries.flatten() {
+        let file = entry.file_name().to_string_lossy().into_owned();
+        let name = file.strip_prefix(&start).and_then(|s| s.strip_suffix(&end));
+        if let Some(instance) = name.filter(|name| place.with_instance(name).is_ok()) {
+            all.push(Lock {
+                instance: instance.to_owned(),
+                holder: holder_of(&entry.path()),
+                path: entry.path(),
+            });
+        }
+    }
+    all.sort_by(|a, b| a.instance.cmp(&b.instance));
+    Ok(all)
+}
+
+/// Removes a lock file that nobody holds; whether it did.
+///
+/// It is locked as one who looks locks it: a daemon that starts meanwhile waits for that, finds the file gone and makes
+/// its own.
+pub(super) fn remove_free(lock: &Path) -> std::io::Result<bool> {
+    let file = File::open(lock)?;
+    let free = flock(&file, FlockOperation::NonBlockingLockShared).is_ok();
+    if free && same_file(&file, lock) {
+        std::fs::remove_file(lock)?;
+        return Ok(true);
+    }
+    Ok(false)
 }
 
 /// Who holds the instance now; `None`: nobody. Text that cannot be read counts as a holder of nothing known.
 pub(super) fn holder(place: &Place) -> Option<Holder> {
-    let mut file = File::open(lock_path(place)).ok()?;
+    holder_of(&lock_path(place))
+}
+
+fn holder_of(lock: &Path) -> Option<Holder> {
+    let mut file = File::open(lock).ok()?;
     // free to take: left behind by a killed daemon
     if flock(&file, FlockOperation::NonBlockingLockShared).is_ok() {
         return None;
@@ -203,6 +263,33 @@ mod tests {
         let taken = InstanceLock::take(&place, &Holder::default());
         looker.join().unwrap();
         taken.unwrap();
+    }
+
+    #[test]
+    fn a_lock_that_is_held_is_listed_and_not_removed_and_a_free_one_goes() {
+        let place = Place::new(&format!("swept_{}", std::process::id())).unwrap();
+        let ours = || {
+            let mut all = locks(&place).unwrap();
+            all.retain(|lock| lock.instance == place.instance());
+            all.pop()
+        };
+        assert_eq!(ours(), None);
+        let us = Holder {
+            pid: 7,
+            ..Holder::default()
+        };
+        let lock = InstanceLock::take(&place, &us).unwrap();
+        let listed = ours().unwrap();
+        assert_eq!(listed.holder, Some(us));
+        assert!(!remove_free(&listed.path).unwrap() && listed.path.exists());
+        drop(lock);
+        std::fs::write(&listed.path, "rubbish").unwrap();
+        assert_eq!(ours().unwrap().holder, None);
+        assert!(remove_free(&listed.path).unwrap() && !listed.path.exists());
+        // The same name under other files is another instance.
+        let other = place.clone().under("/tmp/elsewhere", "p_");
+        let _other = InstanceLock::take(&other, &Holder::default()).unwrap();
+        assert_eq!(ours(), None);
     }
 
     #[test]

@@ -8,6 +8,7 @@
 //! order of [`Server`]); after a kill the next daemon, or any node, cleans up.
 
 mod cleaner;
+mod leftovers;
 mod link;
 mod list;
 mod lock;
@@ -17,8 +18,10 @@ mod server;
 mod waker;
 
 pub use cleaner::{Cleaner, spawn_cleaner};
+pub use leftovers::{Cleaned, Leftovers, NodeOwner, Unmapped, clean_leftovers, leftovers};
 pub use link::IoxLink;
 pub use list::{InstanceInfo, list_instances};
+pub use lock::{Holder, Lock, locks};
 pub use place::Place;
 pub use server::{Server, ServerOptions};
 pub use waker::Waker;

@@ -21,6 +21,7 @@ pub struct Place {
     instance: String,
     root: Option<PathBuf>,
     prefix: Option<String>,
+    looks_only: bool,
 }
 
 impl Place {
@@ -42,6 +43,7 @@ impl Place {
             instance: instance.to_owned(),
             root: None,
             prefix: None,
+            looks_only: false,
         })
     }
 
@@ -53,6 +55,14 @@ impl Place {
         self
     }
 
+    /// The same files for who looks and changes nothing: its nodes leave what dead ones left, where others clean it up
+    /// when they are made, when they open a service and when they go.
+    #[must_use]
+    pub fn looking_only(mut self) -> Self {
+        self.looks_only = true;
+        self
+    }
+
     /// The instance's name.
     #[must_use]
     pub fn instance(&self) -> &str {
@@ -60,10 +70,14 @@ impl Place {
     }
 
     /// The same files, another instance.
-    pub(super) fn with_instance(&self, instance: &str) -> Result<Self> {
+    ///
+    /// # Errors
+    /// As [`Place::new`].
+    pub fn with_instance(&self, instance: &str) -> Result<Self> {
         let mut other = Self::new(instance)?;
         other.root.clone_from(&self.root);
         other.prefix.clone_from(&self.prefix);
+        other.looks_only = self.looks_only;
         Ok(other)
     }
 
@@ -73,7 +87,8 @@ impl Place {
     }
 
     /// The root directory of iceoryx2's files.
-    pub(super) fn root(&self) -> PathBuf {
+    #[must_use]
+    pub fn root(&self) -> PathBuf {
         self.root
             .clone()
             .unwrap_or_else(|| PathBuf::from(Config::default().global.root_path().to_string()))
@@ -100,6 +115,11 @@ impl Place {
         }
         if let Some(prefix) = &self.prefix {
             config.global.prefix = FileName::new(prefix.as_bytes()).map_err(|_| bad(prefix))?;
+        }
+        if self.looks_only {
+            config.global.node.cleanup_dead_nodes_on_creation = false;
+            config.global.node.cleanup_dead_nodes_on_destruction = false;
+            config.global.service.cleanup_dead_nodes_on_open = false;
         }
         Ok(config)
     }

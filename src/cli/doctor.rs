@@ -1,0 +1,192 @@
+//! `sweepd doctor`: what a user needs to know when nothing works. In: the machine, the files of this user, the daemons
+//! that run. Out: a line a finding: ok, warning or wrong; what; what to do.
+
+mod files;
+mod instance;
+mod limits;
+mod memory;
+mod process;
+#[cfg(feature = "ros2")]
+mod ros;
+
+use serde_json::json;
+
+use crate::error::Result;
+use crate::transport::iceoryx::{InstanceInfo, Place, list_instances, locks};
+
+use super::args_tools::DoctorArgs;
+use super::out::Out;
+
+/// How much a finding matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Level {
+    /// As it should be.
+    Ok,
+    /// It may become a trouble, or hinders what not everybody needs.
+    Warning,
+    /// Something does not work because of it.
+    Wrong,
+}
+
+impl Level {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Warning => "warning",
+            Self::Wrong => "wrong",
+        }
+    }
+}
+
+/// One line.
+#[derive(Clone, Debug)]
+struct Finding {
+    level: Level,
+    /// What was looked at.
+    check: &'static str,
+    /// What is so.
+    what: String,
+    /// What to do about it; empty: nothing.
+    mend: String,
+}
+
+impl Finding {
+    fn ok(check: &'static str, what: impl Into<String>) -> Self {
+        Self {
+            level: Level::Ok,
+            check,
+            what: what.into(),
+            mend: String::new(),
+        }
+    }
+
+    fn warning(check: &'static str, what: impl Into<String>, mend: impl Into<String>) -> Self {
+        Self {
+            level: Level::Warning,
+            mend: mend.into(),
+            ..Self::ok(check, what)
+        }
+    }
+
+    fn wrong(check: &'static str, what: impl Into<String>, mend: impl Into<String>) -> Self {
+        Self {
+            level: Level::Wrong,
+            ..Self::warning(check, what, mend)
+        }
+    }
+
+    fn text(&self) -> String {
+        let mend = if self.mend.is_empty() {
+            String::new()
+        } else {
+            format!("; {}", self.mend)
+        };
+        format!(
+            "{:<8} {:<14} {}{mend}",
+            self.level.word(),
+            self.check,
+            self.what
+        )
+    }
+
+    fn json(&self) -> String {
+        let mend = (!self.mend.is_empty()).then_some(&self.mend);
+        json!({ "level": self.level.word(), "check": self.check, "what": self.what, "do": mend })
+            .to_string()
+    }
+}
+
+/// Looks at everything; `false` when something is wrong.
+pub(super) fn doctor(args: &DoctorArgs, out: &mut Out) -> Result<bool> {
+    let name = args.instance.as_deref();
+    let place = Place::new(name.unwrap_or("default"))?.looking_only();
+    let mut nothing_wrong = true;
+    let mut tell = |findings: Vec<Finding>| {
+        for finding in findings {
+            nothing_wrong &= finding.level != Level::Wrong;
+            out.line(&if args.json {
+                finding.json()
+            } else {
+                finding.text()
+            })?;
+        }
+        // An instance that does not answer takes seconds.
+        out.flush()
+    };
+    tell(memory::look())?;
+    tell(limits::look())?;
+    tell(files::look(&place, name, args.clean))?;
+    for instance in instances(&place, name) {
+        tell(instance::look(&place, &instance))?;
+    }
+    #[cfg(feature = "ros2")]
+    tell(ros::look())?;
+    Ok(nothing_wrong)
+}
+
+/// The instances to look at: the one asked for, or all that are held or waited at.
+fn instances(place: &Place, name: Option<&str>) -> Vec<InstanceInfo> {
+    // Where neither can be read, the files have said so.
+    let mut all = list_instances(place).unwrap_or_default();
+    for lock in locks(place).unwrap_or_default() {
+        if let Some(holder) = lock.holder
+            && !all.iter().any(|info| info.instance == lock.instance)
+        {
+            all.push(InstanceInfo {
+                instance: lock.instance,
+                pid: Some(holder.pid),
+                ..InstanceInfo::default()
+            });
+        }
+    }
+    all.retain(|info| match name {
+        Some(name) => info.instance == name,
+        None => info.pid.is_some() || info.sources + info.readers > 0,
+    });
+    if all.is_empty() {
+        all.push(InstanceInfo {
+            instance: place.instance().to_owned(),
+            ..InstanceInfo::default()
+        });
+    }
+    all
+}
+
+/// Bytes for people.
+fn bytes(count: u64) -> String {
+    #[allow(clippy::cast_precision_loss, reason = "shown with four digits")]
+    let size = count as f64;
+    match count {
+        0..1024 => format!("{count} bytes"),
+        1024..1_048_576 => format!("{:.1} KiB", size / 1024.0),
+        1_048_576..1_073_741_824 => format!("{:.1} MiB", size / 1_048_576.0),
+        _ => format!("{:.1} GiB", size / 1_073_741_824.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_finding_is_one_line_that_begins_with_how_bad_it_is() {
+        let finding = Finding::wrong("limits", "too few files", "raise them");
+        assert_eq!(
+            finding.text(),
+            "wrong    limits         too few files; raise them"
+        );
+        let json: serde_json::Value = serde_json::from_str(&finding.json()).unwrap();
+        assert_eq!(json["do"], "raise them");
+        let fine: serde_json::Value =
+            serde_json::from_str(&Finding::ok("limits", "enough").json()).unwrap();
+        assert_eq!((&fine["level"], fine["do"].is_null()), (&"ok".into(), true));
+    }
+
+    #[test]
+    fn bytes_are_told_in_the_unit_that_fits() {
+        assert_eq!(bytes(0), "0 bytes");
+        assert_eq!(bytes(1536), "1.5 KiB");
+        assert_eq!(bytes(64 << 20), "64.0 MiB");
+        assert_eq!(bytes(3 << 30), "3.0 GiB");
+    }
+}

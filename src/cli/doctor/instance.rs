@@ -1,0 +1,312 @@
+//! An instance: is its name held by a living daemon, does it speak the same, does it tick, do its sources send.
+
+use crate::cli::figures::time;
+use crate::error::Error;
+use crate::time::{Clock as _, SystemClock};
+use crate::transport::ICEORYX2_VERSION;
+use crate::transport::client::{ClientOptions, Heard};
+use crate::transport::iceoryx::{Holder, InstanceInfo, Lock, Place, locks};
+use crate::wire::{SourceRow, TickRow, WIRE_VERSION, name_str};
+
+use super::Finding;
+use super::process::{process, shares};
+use crate::cli::monitor::rejects;
+
+const CHECK: &str = "instance";
+/// How long a daemon has to say hello, and then to tick, nanoseconds: many heartbeats, which are 100 ms unless the
+/// scene says otherwise.
+const WAIT_NS: u64 = 2_000_000_000;
+
+pub(super) fn look(place: &Place, info: &InstanceInfo) -> Vec<Finding> {
+    let name = info.instance.as_str();
+    let lock = locks(place)
+        .unwrap_or_default()
+        .into_iter()
+        .find(|lock| lock.instance == name);
+    match lock
+        .as_ref()
+        .and_then(|lock| Some((lock, lock.holder.as_ref()?)))
+    {
+        Some((lock, holder)) => held(place, lock, holder),
+        None => vec![not_held(info)],
+    }
+}
+
+fn not_held(info: &InstanceInfo) -> Finding {
+    let name = &info.instance;
+    let start = format!("start one: `sweepd run SCENE --instance {name}`");
+    match info.sources + info.readers {
+        0 => Finding::warning(CHECK, format!("no daemon runs as `{name}`"), start),
+        waiting => Finding::warning(
+            CHECK,
+            format!("no daemon runs as `{name}`, and {waiting} ports of clients wait for one"),
+            start,
+        ),
+    }
+}
+
+/// Somebody has the name: whether that is a daemon that answers.
+fn held(place: &Place, lock: &Lock, holder: &Holder) -> Vec<Finding> {
+    let who = format!(
+        "`{}` is process {}, sweepd {}",
+        lock.instance, holder.pid, holder.sweepd_version
+    );
+    if holder.pid == 0 {
+        return vec![Finding::wrong(
+            CHECK,
+            format!(
+                "`{}` is held by a process that does not say which it is",
+                lock.instance
+            ),
+            format!("see who by `fuser -v {}`", lock.path.display()),
+        )];
+    }
+    if let Some(other) = version(&who, holder) {
+        return vec![other];
+    }
+    let options = match place.with_instance(&lock.instance) {
+        Ok(place) => ClientOptions {
+            place,
+            source: None,
+            timeout_ns: WAIT_NS,
+        },
+        Err(e) => return vec![Finding::wrong(CHECK, e.to_string(), "")],
+    };
+    let mut client = match options.connect() {
+        Ok(client) => client,
+        Err(why) => return vec![silent(&who, place, lock, holder, &why)],
+    };
+    let mut found: Vec<Finding> = namespace(&who, holder).into_iter().collect();
+    match client.wait_tick(WAIT_NS) {
+        Ok(Heard::Tick) => {
+            let tick = client.view().tick();
+            let age_ns = SystemClock.boottime_ns().saturating_sub(tick.sent_ns);
+            found.push(Finding::ok(
+                CHECK,
+                format!(
+                    "{who}: it answers, tick {} was {} ago",
+                    tick.header.tick,
+                    time(age_ns)
+                ),
+            ));
+            found.extend(sources(&lock.instance, tick));
+        }
+        Ok(_) => found.push(Finding::warning(
+            CHECK,
+            format!(
+                "{who}: it says hello, and no tick came for {}",
+                time(WAIT_NS)
+            ),
+            "`heartbeat_ms` of its scene may be longer; if not, end it and start it again",
+        )),
+        Err(e) => found.push(Finding::wrong(
+            CHECK,
+            format!("{who}: {e}"),
+            "end it and start it again",
+        )),
+    }
+    found
+}
+
+/// What its holder wrote into the lock is true of daemons of any version.
+fn version(who: &str, holder: &Holder) -> Option<Finding> {
+    let same = holder.wire_version == WIRE_VERSION && holder.iceoryx2_version == ICEORYX2_VERSION;
+    (!same).then(|| {
+        Finding::wrong(
+            CHECK,
+            format!(
+                "{who} (wire version {}, iceoryx2 {}), this is sweepd {} (wire version {WIRE_VERSION}, iceoryx2 {ICEORYX2_VERSION})",
+                holder.wire_version,
+                holder.iceoryx2_version,
+                env!("CARGO_PKG_VERSION")
+            ),
+            "use the same version on both sides",
+        )
+    })
+}
+
+/// Why who holds the name does not answer.
+fn silent(who: &str, place: &Place, lock: &Lock, holder: &Holder, why: &Error) -> Finding {
+    let pid = holder.pid;
+    let (what, mend) = match process(pid) {
+        None => (
+            format!("{who}, which is not there, and something still has its lock"),
+            format!(
+                "see who by `fuser -v {}`, and end that",
+                lock.path.display()
+            ),
+        ),
+        Some(process) if matches!(process.state, 'T' | 't') => (
+            format!("{who}, which is stopped"),
+            format!("let it go on: `kill -CONT {pid}`, or end it: `kill -9 {pid}`"),
+        ),
+        Some(_) if !place.root().exists() => (
+            format!(
+                "{who}, and its files in {} have been removed",
+                place.root().display()
+            ),
+            "start it and all its clients again".to_owned(),
+        ),
+        Some(_) if shares(pid, "mnt") == Some(false) => (
+            format!("{who}, which sees other files ({why})"),
+            format!(
+                "it runs in a container, or as a service with PrivateTmp=: let both see the same {} and /dev/shm",
+                place.root().display()
+            ),
+        ),
+        Some(_) => (
+            format!("{who}, which does not answer ({why})"),
+            format!(
+                "wait a little where it has just been started; else end it, `kill {pid}`, and start it again"
+            ),
+        ),
+    };
+    Finding::wrong(CHECK, what, mend)
+}
+
+/// Clocks of another namespace may be shifted: ages are then off by as much.
+fn namespace(who: &str, holder: &Holder) -> Option<Finding> {
+    (shares(holder.pid, "time") == Some(false)).then(|| {
+        Finding::warning(
+            CHECK,
+            format!("{who}, in another time namespace: where its CLOCK_BOOTTIME is shifted, poses from here are too old or too new"),
+            "run daemon and sources in one time namespace",
+        )
+    })
+}
+
+/// Sources that send nothing, and what was refused of those that do.
+fn sources(instance: &str, tick: &TickRow) -> Vec<Finding> {
+    let check = "sources";
+    let mut found = Vec::new();
+    for row in tick.sources.iter().take(usize::from(tick.sources_len)) {
+        found.push(source(instance, row));
+    }
+    let refused: Vec<String> = rejects(tick)
+        .iter()
+        .map(|(why, count)| format!("{why} {count}"))
+        .collect();
+    if !refused.is_empty() {
+        found.push(Finding::warning(
+            check,
+            format!("`{instance}` has refused, since its start: {}", refused.join(", ")),
+            "README and msgs/README.md say what each reason means; `sweepd monitor` shows whether they go on",
+        ));
+    }
+    found
+}
+
+fn source(instance: &str, row: &SourceRow) -> Finding {
+    let check = "sources";
+    let name = name_str(&row.name).unwrap_or("?");
+    match (row.alive, row.age_ns) {
+        (_, u64::MAX) => Finding::warning(
+            check,
+            format!(
+                "`{instance}` has heard nothing of source \"{name}\" yet: its bodies are unknown"
+            ),
+            "start it; it must send under this name, to this instance",
+        ),
+        (1, age_ns) => Finding::ok(
+            check,
+            format!(
+                "`{instance}` hears source \"{name}\", last {} ago",
+                time(age_ns)
+            ),
+        ),
+        (_, age_ns) => Finding::warning(
+            check,
+            format!(
+                "`{instance}` has heard nothing of source \"{name}\" for {}",
+                time(age_ns)
+            ),
+            "see whether it still runs",
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Level;
+    use super::*;
+
+    fn holder() -> Holder {
+        Holder {
+            pid: std::process::id(),
+            boot_id: 7,
+            wire_version: WIRE_VERSION,
+            sweepd_version: "9.9.9".to_owned(),
+            iceoryx2_version: ICEORYX2_VERSION.to_owned(),
+        }
+    }
+
+    #[test]
+    fn another_wire_or_iceoryx2_is_wrong_and_both_are_named() {
+        assert!(
+            version("x", &holder()).is_none(),
+            "another sweepd of the same wire is fine"
+        );
+        let wire = Holder {
+            wire_version: WIRE_VERSION + 1,
+            ..holder()
+        };
+        let iceoryx2 = Holder {
+            iceoryx2_version: "9.0.0".to_owned(),
+            ..holder()
+        };
+        for other in [wire, iceoryx2] {
+            let text = version("x", &other).unwrap();
+            assert_eq!(text.level, Level::Wrong);
+            let both = [&other.iceoryx2_version, ICEORYX2_VERSION];
+            assert!(
+                both.iter().all(|word| text.what.contains(*word)),
+                "{}",
+                text.what
+            );
+        }
+    }
+
+    #[test]
+    fn a_name_that_is_held_without_an_answer_says_by_whom_and_why() {
+        let place = Place::new("x").unwrap().under("/nowhere/at/all", "p_");
+        let lock = Lock {
+            instance: "x".to_owned(),
+            path: "/dev/shm/x.lock".into(),
+            holder: None,
+        };
+        let why = Error::TimedOut("no hello".to_owned());
+        let gone = Holder {
+            pid: u32::MAX,
+            ..holder()
+        };
+        let text = silent("who", &place, &lock, &gone, &why).text();
+        assert!(text.contains("fuser -v /dev/shm/x.lock"), "{text}");
+        let text = silent("who", &place, &lock, &holder(), &why).text();
+        assert!(text.contains("have been removed"), "{text}");
+        let here = Place::new("x").unwrap().under(std::env::temp_dir(), "p_");
+        let text = silent("who", &here, &lock, &holder(), &why).text();
+        assert!(
+            text.contains("no hello") && text.contains("start it again"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn a_source_that_never_came_is_told_with_what_it_must_do() {
+        let silent = SourceRow {
+            age_ns: u64::MAX,
+            ..SourceRow::default()
+        };
+        assert_eq!(source("x", &silent).level, Level::Warning);
+        let alive = SourceRow {
+            alive: 1,
+            age_ns: 5,
+            ..SourceRow::default()
+        };
+        assert_eq!(source("x", &alive).level, Level::Ok);
+        assert_eq!(
+            source("x", &SourceRow { alive: 0, ..alive }).level,
+            Level::Warning
+        );
+    }
+}

@@ -1,0 +1,110 @@
+//! Limits of processes. Nothing of sweepd locks memory, so that limit is not looked at.
+
+use rustix::process::{Resource, getrlimit};
+
+use super::{Finding, bytes};
+
+/// A limit, and what is needed of it.
+struct Need {
+    resource: Resource,
+    what: &'static str,
+    /// The flag of `ulimit`.
+    flag: &'static str,
+    /// What that flag counts in, in units of the limit.
+    unit: u64,
+    /// Below this a daemon does not start.
+    least: u64,
+    /// Below this it does not serve the clients that it could.
+    wished: u64,
+    why: &'static str,
+    show: fn(u64) -> String,
+}
+
+const NEEDS: [Need; 3] = [
+    Need {
+        resource: Resource::Nofile,
+        what: "open files",
+        flag: "-n",
+        unit: 1,
+        least: 96,
+        wished: 1024,
+        why: "a daemon has some 80 open, and some 7 more with each client",
+        show: |count| count.to_string(),
+    },
+    Need {
+        resource: Resource::Fsize,
+        what: "size of a file",
+        flag: "-f",
+        unit: 1024,
+        least: 64 << 20,
+        wished: 1 << 30,
+        why: "shared memory is files, and who makes a larger one is killed (SIGXFSZ)",
+        show: bytes,
+    },
+    Need {
+        resource: Resource::As,
+        what: "address space",
+        flag: "-v",
+        unit: 1024,
+        least: 128 << 20,
+        wished: 1 << 30,
+        why: "a daemon maps some 90 MiB of shared memory at its start, of which it uses little",
+        show: bytes,
+    },
+];
+
+pub(super) fn look() -> Vec<Finding> {
+    let limit = |need: &Need| getrlimit(need.resource).current;
+    NEEDS.iter().map(|need| judge(need, limit(need))).collect()
+}
+
+/// * `limit` - `None`: there is none.
+fn judge(need: &Need, limit: Option<u64>) -> Finding {
+    let check = "limits";
+    let Some(limit) = limit else {
+        return Finding::ok(check, format!("{}: no limit", need.what));
+    };
+    let what = format!("{}: {}", need.what, (need.show)(limit));
+    if limit >= need.wished {
+        return Finding::ok(check, what);
+    }
+    let (what, mend) = (
+        format!("{what}: {}", need.why),
+        format!(
+            "`ulimit {} {}` in the shell that starts it, or in its service's unit",
+            need.flag,
+            need.wished / need.unit
+        ),
+    );
+    if limit < need.least {
+        Finding::wrong(check, what, mend)
+    } else {
+        Finding::warning(check, what, mend)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Level;
+    use super::*;
+
+    #[test]
+    fn a_limit_is_judged_by_what_a_daemon_takes() {
+        for need in &NEEDS {
+            assert!(need.least < need.wished);
+            for (limit, level) in [
+                (None, Level::Ok),
+                (Some(need.wished), Level::Ok),
+                (Some(need.least), Level::Warning),
+                (Some(need.least - 1), Level::Wrong),
+            ] {
+                let found = judge(need, limit);
+                assert_eq!(found.level, level, "{}", found.text());
+            }
+        }
+        let files = judge(&NEEDS[0], Some(256));
+        assert!(files.mend.contains("`ulimit -n 1024`"), "{}", files.mend);
+        let size = judge(&NEEDS[1], Some(1 << 20));
+        assert!(size.mend.contains("`ulimit -f 1048576`"), "{}", size.mend);
+    }
+}
