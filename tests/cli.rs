@@ -14,6 +14,8 @@ mod live;
 mod doctor;
 #[path = "cli/feed.rs"]
 mod feed;
+#[path = "cli/manual.rs"]
+mod manual;
 #[path = "cli/monitor.rs"]
 mod monitor;
 #[path = "cli/query.rs"]
@@ -62,7 +64,7 @@ fn head(args: &[&str], lines: usize) -> Output {
 
 #[test]
 fn usage_is_refused_with_code_2_on_stderr_and_help_is_given_with_code_0_on_stdout() {
-    let bad: [&[&str]; 16] = [
+    let bad: [&[&str]; 18] = [
         &[],
         &["fly"],
         &["run"],
@@ -79,6 +81,8 @@ fn usage_is_refused_with_code_2_on_stderr_and_help_is_given_with_code_0_on_stdou
         &["query", "a", "b", "--batch", "x.jsonl"],
         &["query", "--batch", "x.jsonl", "--instance", "cell"],
         &["doctor", "--instance", "UPPER"],
+        &["completions", "csh"],
+        &["man", "fly"],
     ];
     for args in bad {
         let ended = output(args);
@@ -89,7 +93,16 @@ fn usage_is_refused_with_code_2_on_stderr_and_help_is_given_with_code_0_on_stdou
         );
     }
     for command in [
-        "run", "check", "feed", "monitor", "query", "list", "doctor", "report",
+        "run",
+        "check",
+        "feed",
+        "monitor",
+        "query",
+        "list",
+        "doctor",
+        "report",
+        "completions",
+        "man",
     ] {
         let ended = output(&[command, "--help"]);
         assert_eq!(code(&ended), Some(0), "{command}");
@@ -150,6 +163,7 @@ fn help_names_units_and_defaults() {
             "doctor",
             &["JSON", "a line each", "Never of living ones"][..],
         ),
+        ("completions", &["bash-completion", "$fpath"][..]),
     ] {
         let text = help(command)
             .split_whitespace()

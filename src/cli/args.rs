@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 use super::args_report::Report;
-use super::args_tools::{DoctorArgs, ListArgs, QueryArgs};
+use super::args_tools::{CompletionsArgs, DoctorArgs, ListArgs, ManArgs, QueryArgs};
+use super::manual::after_help;
 use crate::builtin::Pattern;
 use crate::error::Error;
 
 /// A collision server: body poses in over shared memory, colliding pairs and contacts out, within a time budget a tick.
 #[derive(Debug, Parser)]
-#[command(name = "sweepd", version, max_term_width = 100, after_help = AFTER)]
+#[command(name = "sweepd", version, max_term_width = 100, after_help = after_help())]
 pub(super) struct Cli {
     /// Say more on stderr (twice: everything).
     #[arg(short, long, global = true, action = clap::ArgAction::Count)]
@@ -22,21 +23,6 @@ pub(super) struct Cli {
     #[command(subcommand)]
     pub(super) command: Command,
 }
-
-const AFTER: &str = "\
-Try it, in three terminals:
-  sweepd feed --write-scene pool.toml --count 200    make a scene of 200 bodies
-  sweepd run pool.toml                               the daemon
-  sweepd feed pool.toml                              a source that moves them
-  sweepd monitor                                     what touches what
-
-Measure, without a daemon:
-  sweepd report error pool.toml --html error.html    error against run time, over a sweep of budgets
-  sweepd report stability --html stability.html      stiff and extreme cases against known truths
-
-Exit codes: 0 done, 1 a check failed, 2 usage or a bad scene, 3 timed out, 4 refused or could not run,
-5 watchdog, 101 internal error.
-Environment: NO_COLOR switches colours off. With --ros2: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_LOCALHOST_ONLY.";
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
@@ -59,6 +45,10 @@ pub(super) enum Command {
     Doctor(DoctorArgs),
     /// Measure: error against run time, and numerical stability.
     Report(ReportArgs),
+    /// Write completions of commands and flags for a shell to standard output.
+    Completions(CompletionsArgs),
+    /// Write the manual to standard output, or as man pages into a directory.
+    Man(ManArgs),
 }
 
 /// Which report.

@@ -1,8 +1,8 @@
-//! Flags and arguments of the commands that ask and look: `query`, `list`, `doctor`.
+//! Flags and arguments of the commands that ask, look and tell: `query`, `list`, `doctor`, `completions`, `man`.
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::args::{Which, nanoseconds};
 
@@ -57,4 +57,32 @@ pub(super) struct DoctorArgs {
     /// programs that are no sweepd, unless --instance is given), and locks that nobody holds. Never of living ones.
     #[arg(long)]
     pub(super) clean: bool,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct CompletionsArgs {
+    /// The shell to complete for.
+    #[arg(value_name = "SHELL")]
+    pub(super) shell: Shell,
+}
+
+/// A shell, and where it looks for completions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Shell {
+    /// Into `~/.local/share/bash-completion/completions/sweepd`.
+    Bash,
+    /// Into a file `_sweepd` in a directory of `$fpath`.
+    Zsh,
+    /// Into `~/.config/fish/completions/sweepd.fish`.
+    Fish,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct ManArgs {
+    /// Of this command, such as `query` or `report error`; by default of sweepd itself.
+    #[arg(value_name = "COMMAND", conflicts_with = "out")]
+    pub(super) command: Vec<String>,
+    /// Write all pages, each command's too, into this directory (it is made), such as `~/.local/share/man/man1`.
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
 }

@@ -11,6 +11,7 @@ mod doctor;
 mod feed;
 mod figures;
 mod list;
+mod manual;
 mod monitor;
 mod out;
 mod query;
@@ -76,6 +77,8 @@ fn dispatch(command: Command, ros_words: Option<&[String]>) -> Result<ExitCode> 
         Command::List(args) => list::list(&args, &mut out),
         Command::Doctor(args) => doctor::doctor(&args, &mut out),
         Command::Report(args) => report::report(&args, &mut out, stop()?.as_ref()),
+        Command::Completions(args) => manual::completions(&args, &mut out),
+        Command::Man(args) => manual::man(&args, &mut out),
     };
     match done {
         Ok(true) => Ok(ExitCode::SUCCESS),
