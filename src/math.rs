@@ -82,12 +82,18 @@ pub fn relative(pose1: &Pose, pose2: &Pose) -> Pose {
 pub fn pose_from(position: [f64; 3], xyzw: [f64; 4]) -> Option<Pose> {
     let finite = position.iter().chain(&xyzw).all(|v| v.is_finite());
     let quaternion = Quaternion::new(xyzw[3], xyzw[0], xyzw[1], xyzw[2]);
-    // Scaled by its largest part first, so that neither 1e-200 nor 1e200 loses the direction.
     let largest = quaternion.coords.amax();
     if !finite || largest == 0.0 {
         return None;
     }
-    let rotation = UnitQuaternion::new_normalize(quaternion / largest);
+    // Scaled by its largest part first where the squares need it, so that neither 1e-200 nor 1e200 loses the direction.
+    let squares_fit = (1e-100..1e100).contains(&largest);
+    let scaled = if squares_fit {
+        quaternion
+    } else {
+        quaternion / largest
+    };
+    let rotation = UnitQuaternion::new_normalize(scaled);
     Some(Pose::from_parts(
         Translation3::from(Vec3::from(position)),
         rotation,
@@ -109,11 +115,12 @@ pub fn displacement(from: &Pose, to: &Pose, centre: &Point, radius: f64) -> f64 
         .max(to.translation.vector.amax())
         + centre.coords.amax()
         + radius;
-    let exact_zero = from == to;
-    if exact_zero {
+    let way = moved.norm() + turn * radius;
+    // Poses are compared only where that may be: it takes as long as all the rest.
+    if way == 0.0 && from == to {
         0.0
     } else {
-        (moved.norm() + turn * radius) * (1.0 + 8.0 * ROUND) + 16.0 * ROUND * magnitude
+        way * (1.0 + 8.0 * ROUND) + 16.0 * ROUND * magnitude
     }
 }
 
@@ -122,9 +129,8 @@ pub fn displacement(from: &Pose, to: &Pose, centre: &Point, radius: f64) -> f64 
 pub fn chord(from: &Quat, to: &Quat) -> f64 {
     let (a, b) = (from.as_vector(), to.as_vector());
     // |a - b| = 2 sin(theta / 4) for unit quaternions on the same side: stable near zero, where acos is not.
-    let quarter = (a - b).norm().min((a + b).norm()) / 2.0;
-    let cosine = (1.0 - quarter * quarter).max(0.0).sqrt();
-    4.0 * quarter * cosine
+    let square = (a - b).norm_squared().min((a + b).norm_squared()) / 4.0;
+    4.0 * (square * (1.0 - square).max(0.0)).sqrt()
 }
 
 /// A closed interval of metres.
@@ -231,10 +237,17 @@ impl Aabb {
 
     /// Each face moved out by `margin_m`, rounded outward.
     #[must_use]
+    #[inline]
     pub fn widened(&self, margin_m: f64) -> Self {
+        // An ulp or two; as a product, since stepping to the next float costs ten times as much. Where that is not less
+        // there is nothing to round: a sum so small is exact, and an end of the box that holds nothing is infinite.
+        let below = |v: f64| {
+            let less = v - v.abs() * f64::EPSILON;
+            if less < v { less } else { v }
+        };
         Self {
-            min: self.min.map(|v| (v - margin_m).next_down()),
-            max: self.max.map(|v| (v + margin_m).next_up()),
+            min: self.min.map(|v| below(v - margin_m)),
+            max: self.max.map(|v| -below(-(v + margin_m))),
         }
     }
 
@@ -307,6 +320,34 @@ mod tests {
             assert!(f64::from(f32_down(x)) <= x, "{x}");
             assert!(f64::from(f32_up(x)) >= x, "{x}");
         }
+    }
+
+    #[test]
+    fn a_widened_box_is_rounded_outward_and_an_empty_one_stays_empty() {
+        for exponent in -1074..1000 {
+            for (v, margin_m) in [(1.0, 0.0), (1.0, 0.1), (-1.7, 0.3), (0.9, 1.1), (0.0, 1.0)] {
+                let scale =
+                    2.0_f64.powi(exponent.max(-1000)) * 2.0_f64.powi(exponent.min(-1000) + 1000);
+                let (v, margin_m) = (v * scale, margin_m * scale);
+                let at = Point::new(v, v, v);
+                let wide = Aabb { min: at, max: at }.widened(margin_m);
+                // What a sum is off by, exactly (Knuth).
+                let low = v - margin_m;
+                let back = low - v;
+                let off = (v - (low - back)) + (-margin_m - back);
+                assert!(wide.min.x < low || (off.abs() <= 0.0 && wide.min.x <= low));
+                assert!(low - wide.min.x <= 2.1 * (low - low.next_down()));
+                let mirrored = Aabb { min: -at, max: -at }.widened(margin_m);
+                assert!((mirrored.max.x + wide.min.x).abs() <= 0.0);
+            }
+        }
+        let empty = Aabb::empty().widened(1.0);
+        assert!(empty.min.x > empty.max.x);
+        let all = Aabb {
+            min: Aabb::empty().max,
+            max: Aabb::empty().min,
+        };
+        assert_eq!(all.widened(1.0), all);
     }
 
     #[test]

@@ -22,6 +22,7 @@ pub(super) struct Feature {
 }
 
 impl Feature {
+    #[inline]
     fn empty() -> Self {
         Self {
             corners: [Vec3::zeros(); CORNERS_MAX],
@@ -32,6 +33,7 @@ impl Feature {
     }
 
     /// What A shows towards B.
+    #[inline]
     pub(super) fn of_a(pair: &Pair<'_>, normal: &Vec3) -> Self {
         let mut feature = Self::empty();
         feature.fill(pair.a.core(), normal);
@@ -39,6 +41,7 @@ impl Feature {
     }
 
     /// What B shows towards A, in A's frame.
+    #[inline]
     pub(super) fn of_b(pair: &Pair<'_>, normal: &Vec3) -> Self {
         let mut feature = Self::empty();
         feature.fill(pair.b.core(), &-pair.to_b(normal));

@@ -7,7 +7,7 @@
 
 use super::newton::{self, Refined};
 use super::pair::{CoreGap, Held, Pair, Vertex, unit};
-use super::simplex::{Reduced, Simplex};
+use super::simplex::Simplex;
 use crate::math::Vec3;
 
 /// Steps of one run; polytopes of a few hundred vertices take under 20, curved cores that touch up to 60.
@@ -182,22 +182,25 @@ impl Gjk<'_> {
 
     /// Puts a vertex in; `Some` when that ends the run.
     fn add(&mut self, new: Vertex) -> Option<Run> {
-        let before = self.simplex;
+        let tiny = self.pair.tiny() / 4.0;
         self.simplex.push(new);
-        match self.simplex.reduce(self.pair.tiny() / 4.0) {
-            Reduced::Inside => Some(Run::Overlap),
-            Reduced::Closest { point, dir } => {
-                let upper = point.norm();
-                if upper >= self.upper {
-                    self.simplex = before;
-                    return Some(Run::Ended);
-                }
-                self.point = point;
-                self.upper = upper;
-                self.dir = dir;
-                None
-            }
+        let Some(nearest) = self.simplex.nearest() else {
+            return Some(Run::Overlap);
+        };
+        let dir = self.simplex.direction(&nearest);
+        let (Some(dir), true) = (dir, nearest.square > tiny * tiny) else {
+            // Too close to tell.
+            self.simplex.keep(&nearest);
+            return Some(Run::Overlap);
+        };
+        let upper = nearest.square.sqrt();
+        if upper >= self.upper {
+            self.simplex.pop();
+            return Some(Run::Ended);
         }
+        self.simplex.keep(&nearest);
+        (self.point, self.upper, self.dir) = (nearest.point, upper, dir);
+        None
     }
 
     fn gap(&self) -> CoreGap {

@@ -169,6 +169,7 @@ struct Found {
 }
 
 impl Found {
+    #[inline]
     fn new(pair: &Pair<'_>, closest: &Closest, prediction_m: f64) -> Self {
         let (margin_a, margin_b) = (pair.a.margin(), pair.b.margin());
         let witness = ManifoldPoint {
@@ -211,7 +212,7 @@ impl Found {
     }
 
     /// At most four: the deepest, the farthest from it, and the two that span the most area.
-    fn write(mut self, out: &mut Manifold) {
+    fn write(&mut self, out: &mut Manifold) {
         let deepest = self.points[..self.count]
             .iter()
             .map(|p| p.gap_m)
@@ -359,19 +360,24 @@ impl Clipped {
 
     /// Cuts off what lies beyond the plane. Source: Sutherland and Hodgman 1974, Reentrant polygon clipping.
     fn cut(&mut self, on: &Vec3, outward: &Vec3, edge: u32) {
-        let old = self.points;
         let count = self.count;
-        let mut kept = 0;
+        let mut over = [0.0; 2 * CORNERS_MAX];
+        for (over, clip) in over.iter_mut().zip(&self.points[..count]) {
+            *over = outward.dot(&(clip.at - on));
+        }
+        if over[..count].iter().all(|over| *over <= 0.0) {
+            return;
+        }
+        let (old, mut kept) = (self.points, 0);
         let mut put = |clip: Clip| {
             if kept < self.points.len() {
                 self.points[kept] = clip;
                 kept += 1;
             }
         };
-        let over = |k: usize| outward.dot(&(old[k].at - on));
         for k in 0..count {
-            let next = (k + 1) % count;
-            let (here, there) = (over(k), over(next));
+            let next = if k + 1 < count { k + 1 } else { 0 };
+            let (here, there) = (over[k], over[next]);
             if here <= 0.0 {
                 put(old[k]);
             }

@@ -89,7 +89,7 @@ pub(super) fn resume(pair: &Pair<'_>, held: &Held, normal: &Vec3) -> Option<Refi
     if set.count == 0 {
         return None;
     }
-    climb(pair, set, normal)
+    climb(pair, &mut set, normal)
 }
 
 /// The local greatest `f` near `normal`, with the features of the given vertices; `None` when it does not converge.
@@ -99,24 +99,24 @@ pub(super) fn solve(
     weights: &[f64],
     normal: &Vec3,
 ) -> Option<Refined> {
-    climb(pair, Set::of(vertices, weights), normal)
+    climb(pair, &mut Set::of(vertices, weights), normal)
 }
 
-fn climb(pair: &Pair<'_>, mut set: Set, normal: &Vec3) -> Option<Refined> {
-    if let Some(found) = disc::face_on(pair, &set, normal) {
+fn climb(pair: &Pair<'_>, set: &mut Set, normal: &Vec3) -> Option<Refined> {
+    if let Some(found) = disc::face_on(pair, set, normal) {
         return Some(found);
     }
     let mut normal = *normal;
     let mut best: Option<Refined> = None;
     for _ in 0..SETS_MAX {
-        let Some(end) = converge(pair, &mut set, &normal) else {
+        let Some(end) = converge(pair, set, &normal) else {
             break;
         };
         let all = pair.support(&end.normal);
         let value = end.normal.dot(&all.w);
         let least = set.least();
         if best.is_none_or(|b| value > b.value) {
-            let cap = Cap::of(&set, value);
+            let cap = Cap::of(set, value);
             best = Some(Refined { value, cap, ..end });
         }
         normal = end.normal;

@@ -214,13 +214,15 @@ impl Polytope {
                 w: corner.w - target,
                 ..corner
             });
-            // Reducing tries what holds the newest corner: each one is the newest once.
+            // Tried is what holds the newest corner: each one is the newest once.
             for turn in 0..3 {
                 let mut simplex = Simplex::default();
                 for k in 0..3 {
                     simplex.push(corners[(turn + k) % 3]);
                 }
-                let _ = simplex.reduce(0.0);
+                if let Some(nearest) = simplex.nearest() {
+                    simplex.keep(&nearest);
+                }
                 let (a, b) = simplex.witnesses();
                 let off = (b - a - target).norm();
                 if off < best.0 {

@@ -17,28 +17,16 @@ pub(super) struct Simplex {
     pub(super) count: usize,
 }
 
-/// What [`Simplex::reduce`] found.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Reduced {
-    /// The origin is inside, or too close to tell.
-    Inside,
-    /// The closest point and the unit direction to it.
-    Closest {
-        /// Sum of weight times vertex.
-        point: Vec3,
-        /// Unit; orthogonal to the sub-simplex.
-        dir: Vec3,
-    },
-}
-
-/// A candidate: which vertices, with what weights.
+/// A sub-simplex, and its point that is closest to the origin.
 #[derive(Clone, Copy)]
-struct Candidate {
+pub(super) struct Nearest {
+    /// The newest vertex first, the others as they stand.
     places: [usize; 3],
     weights: [f64; 3],
     count: usize,
-    point: Vec3,
-    square: f64,
+    /// Sum of weight times vertex.
+    pub(super) point: Vec3,
+    pub(super) square: f64,
 }
 
 impl Simplex {
@@ -63,16 +51,16 @@ impl Simplex {
         (a, b)
     }
 
-    /// Cuts the simplex down to what holds the point closest to the origin.
-    pub(super) fn reduce(&mut self, tiny: f64) -> Reduced {
-        let Some(new) = self.count.checked_sub(1) else {
-            return Reduced::Inside;
-        };
+    /// The point closest to the origin; `None`: the origin is inside, or there is no vertex.
+    ///
+    /// Sub-simplices with the newest vertex are tried, and no others.
+    pub(super) fn nearest(&self) -> Option<Nearest> {
+        let new = self.count.checked_sub(1)?;
         if self.count == 4 && self.holds_origin() {
-            return Reduced::Inside;
+            return None;
         }
         let w = |k: usize| self.vertices[k].w;
-        let mut best = Candidate {
+        let mut best = Nearest {
             places: [new, 0, 0],
             weights: [1.0, 0.0, 0.0],
             count: 1,
@@ -101,30 +89,35 @@ impl Simplex {
                 }
             }
         }
-        self.keep(&best);
-        match self.direction(&best.point) {
-            Some(dir) if best.square > tiny * tiny => Reduced::Closest {
-                point: best.point,
-                dir,
-            },
-            _ => Reduced::Inside,
-        }
+        Some(best)
     }
 
-    fn keep(&mut self, best: &Candidate) {
-        let old = self.vertices;
-        for k in 0..best.count {
-            self.vertices[k] = old[best.places[k]];
-            self.weights[k] = best.weights[k];
+    /// Cuts the simplex down to what [`Simplex::nearest`] found. The rest moves up: who stands in its place stays.
+    pub(super) fn keep(&mut self, nearest: &Nearest) {
+        let (mut places, mut weights) = (nearest.places, nearest.weights);
+        let count = nearest.count;
+        places[..count].rotate_left(1);
+        weights[..count].rotate_left(1);
+        for (to, from) in places[..count].iter().enumerate() {
+            if to != *from {
+                self.vertices[to] = self.vertices[*from];
+            }
+            self.weights[to] = weights[to];
         }
-        self.count = best.count;
+        self.count = count;
+    }
+
+    /// Takes the newest vertex out again.
+    pub(super) fn pop(&mut self) {
+        self.count = self.count.saturating_sub(1);
     }
 
     /// Unit direction from the origin to the affine hull: for near touching pairs the closest point itself is mostly
     /// rounding, and what is orthogonal to the features is not.
-    pub(super) fn direction(&self, point: &Vec3) -> Option<Vec3> {
-        let w = |k: usize| self.vertices[k].w;
-        match self.count {
+    pub(super) fn direction(&self, nearest: &Nearest) -> Option<Vec3> {
+        let w = |k: usize| self.vertices[nearest.places[k]].w;
+        let point = &nearest.point;
+        match nearest.count {
             2 => {
                 let along = unit(&(w(1) - w(0)))?;
                 let rest = point - along * point.dot(&along);
@@ -160,16 +153,10 @@ impl Simplex {
     }
 }
 
-fn consider(
-    best: &mut Candidate,
-    places: [usize; 3],
-    weights: [f64; 3],
-    count: usize,
-    point: Vec3,
-) {
+fn consider(best: &mut Nearest, places: [usize; 3], weights: [f64; 3], count: usize, point: Vec3) {
     let square = point.norm_squared();
     if square < best.square {
-        *best = Candidate {
+        *best = Nearest {
             places,
             weights,
             count,

@@ -3,7 +3,7 @@
 //! In: a core and a pose. Out: tight boxes and balls, rounded outward.
 
 use super::{Convex, Core};
-use crate::math::{Aabb, Point, Pose, Vec3, across_z};
+use crate::math::{Aabb, Point, Pose, Vec3, across_z, greater, lesser};
 
 /// Factor that takes up the roundings of a norm.
 const UP: f64 = 1.0 + 4.0 * f64::EPSILON;
@@ -61,12 +61,12 @@ impl Core {
 }
 
 fn span_of(points: &[Vec3], dir: &Vec3) -> (f64, f64) {
-    points
-        .iter()
-        .map(|p| p.dot(dir))
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-            (low.min(v), high.max(v))
-        })
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for p in points {
+        let v = p.dot(dir);
+        (low, high) = (lesser(v, low), greater(v, high));
+    }
+    (low, high)
 }
 
 /// Greatest distance of a point of the core from the local origin, rounded up.

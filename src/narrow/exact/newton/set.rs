@@ -5,7 +5,7 @@ use crate::math::{Vec3, across_z};
 use crate::shape::Core;
 
 /// A pair of elements that takes part, with its weight.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Active {
     pub(super) of_a: u32,
     pub(super) of_b: u32,
@@ -32,13 +32,44 @@ pub(super) struct Rim {
 }
 
 /// The elements that take part.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Set {
     pub(super) actives: [Active; 3],
     pub(super) count: usize,
 }
 
+impl Default for Set {
+    // The derived one calls a function for the array, which copies each of its elements.
+    #[inline]
+    fn default() -> Self {
+        Self {
+            actives: [Active::NONE; 3],
+            count: 0,
+        }
+    }
+}
+
+impl Rim {
+    /// A vertex has none.
+    const NONE: Self = Self {
+        lean: 0.0,
+        bend_m: 0.0,
+        along: [0.0; 2],
+    };
+}
+
 impl Active {
+    const NONE: Self = Self {
+        of_a: 0,
+        of_b: 0,
+        weight: 0.0,
+        value: 0.0,
+        a: Vec3::new(0.0, 0.0, 0.0),
+        b: Vec3::new(0.0, 0.0, 0.0),
+        slope: [0.0; 2],
+        rims: [Rim::NONE; 2],
+    };
+
     /// Curvature along the two tangents: xx, xy, yy.
     pub(super) fn bend(&self) -> [f64; 3] {
         let mut bend = [0.0; 3];
@@ -82,7 +113,7 @@ impl Set {
                 of_a,
                 of_b,
                 weight,
-                ..Active::default()
+                ..Active::NONE
             };
             self.count += 1;
         }
