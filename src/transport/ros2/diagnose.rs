@@ -1,9 +1,8 @@
 //! `/diagnostics`: how the daemon fares, once a second, in words. In: the newest tick, counters, faults. Out: one
 //! status for the state, the budget, the sources and the node. Pure.
 
-use super::speak::Counts;
 use crate::wire::ros::diagnostic_level::{ERROR, OK, WARN};
-use crate::wire::ros::{DiagnosticArray, DiagnosticStatus, Header, KeyValue, Time};
+use crate::wire::ros::{Counts, DiagnosticArray, DiagnosticStatus, Header, KeyValue, Time};
 use crate::wire::{Reason, RejectReason, SourceRow, State, TickRow, name_str};
 
 /// Seconds of ticks beyond their budget after which a warning becomes an error: a moment of load is none.

@@ -5,11 +5,10 @@
 use std::collections::BTreeMap;
 
 use super::parcel::Parcel;
-use super::speak::{Book, Speaker};
 use crate::math::{Point as At, Pose, pose_from};
 use crate::wire::ros::marker_kind::{ADD, LINE_LIST, SPHERE_LIST, TEXT_VIEW_FACING};
 use crate::wire::ros::{
-    ColorRgba, Duration, GzContact, GzContacts, GzEntity, Marker, MarkerArray, Point,
+    Book, ColorRgba, Duration, GzContact, GzContacts, GzEntity, Marker, MarkerArray, Point, Speaker,
 };
 use crate::wire::ros::{Header, Quaternion};
 use crate::wire::{BodyRow, BodyStatus, ContactKind, ContactRow, Verdict};
@@ -254,7 +253,7 @@ pub(super) fn collisions(header: Header, book: &Book, parcel: &Parcel) -> (GzCon
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::{ContactRow, PairRow};
+    use crate::wire::{BODY_NAME_LEN, ContactRow, NameRow, PairRow};
 
     fn parcel(bodies: u64) -> Parcel {
         let body = |body| BodyRow {
@@ -358,5 +357,31 @@ mod tests {
         full.contacts_header.truncated = 0;
         let all = markers(&Speaker::default(), &full, &boxes, 1).markers;
         assert_eq!(all.len(), 4, "all of it is drawn");
+    }
+
+    #[test]
+    fn the_largest_collisions_stay_below_128_kilobytes_on_the_wire() {
+        let long = |body| NameRow {
+            body,
+            len: u32::try_from(BODY_NAME_LEN).unwrap(),
+            name: [b'x'; BODY_NAME_LEN],
+            ..NameRow::default()
+        };
+        let rows: Vec<_> = (1..=2001).map(long).collect();
+        let contact = |body_b| ContactRow {
+            body_a: 1,
+            body_b,
+            ..ContactRow::default()
+        };
+        let parcel = Parcel {
+            contacts: (2..2002).map(contact).collect(),
+            ..Parcel::default()
+        };
+        let (message, left_out) = collisions(Header::default(), &Book::of(&rows), &parcel);
+        assert_eq!(left_out, 2000 - CONTACTS_MAX as u64);
+        let bytes = cdr_encoding::to_vec::<_, byteorder::LittleEndian>(&message)
+            .unwrap()
+            .len();
+        assert!((60_000..=128 * 1024).contains(&bytes), "{bytes}");
     }
 }

@@ -31,7 +31,6 @@ mod services;
 mod shared;
 mod shelf;
 mod sockets;
-mod speak;
 mod strangers;
 mod tf;
 mod topics;

@@ -31,11 +31,11 @@ use super::services::{Services, open};
 use super::shared::{Say, Shared};
 use super::shelf::Shelf;
 use super::sockets;
-use super::speak::{Book, Speaker};
 use super::strangers::Strangers;
 use crate::error::{Error, Result};
 use crate::time::Clock;
 use crate::transport::{BodyChange, BodyNote, Door, RequestToken, Setting as Applied, Wake};
+use crate::wire::ros::{Book, Speaker};
 use crate::wire::{
     Answer, BODY_NAME_LEN, Demand, Inbox, NameRow, Outbox, RequestHeader, TickRow, WIRE_VERSION,
 };

@@ -23,13 +23,13 @@ use super::parcel::{Next, Parcel, Parcels};
 use super::readers::Readers;
 use super::services::open;
 use super::shared::{Say, Shared};
-use super::speak::{Counts, Speaker};
 use super::strangers::Strangers;
 use super::wheel::{Sent, Wheel};
 use crate::config::RosKind;
 use crate::error::Error;
 use crate::time::{Clock as _, SystemClock};
 use crate::transport::{BodyChange, BodyNote};
+use crate::wire::ros::{Counts, Speaker};
 use crate::wire::{Demand, NameRow, TickRow};
 
 /// Longest sleep: how soon a new reader is noticed.
@@ -243,12 +243,15 @@ impl Outlet {
         let readers = &mut self.readers;
         let mut pen = Pen::of(&mut self.node, &self.context, &self.shared, readers);
         if parcel.holds.contacts && self.read.contacts {
-            for message in self.speaker.contacts(parcel) {
+            for message in self
+                .speaker
+                .contacts(&parcel.contacts_header, &parcel.contacts)
+            {
                 pen.write(&mut out.contacts, message);
             }
         }
         if parcel.holds.pairs && self.read.pairs {
-            for message in self.speaker.pairs(parcel) {
+            for message in self.speaker.pairs(&parcel.pairs_header, &parcel.pairs) {
                 pen.write(&mut out.pairs, message);
             }
         }

@@ -233,7 +233,7 @@ impl Services {
             let response = Ticked {
                 success: true,
                 message: String::new(),
-                tick_header: super::speak::tick_header(&header),
+                tick_header: wire::ros::tick_header(&header),
                 word: wire::State::from_code(header.state)
                     .map_or("unknown", wire::State::word)
                     .to_owned(),

@@ -11,11 +11,10 @@ use super::lines::Arrival;
 use super::params::{Effect, Own};
 use super::parcel::Caps;
 use super::services::{Desk, open};
-use super::speak::{Book, Counts};
 use crate::time::SystemClock;
 use crate::transport::{BodyChange, Setting};
 use crate::wire::Demand;
-use crate::wire::ros::Time;
+use crate::wire::ros::{Book, Counts, Time};
 
 /// Stands for no value.
 const NONE: u64 = u64::MAX;

@@ -7,6 +7,7 @@ mod collisions;
 mod common;
 mod seen;
 mod services;
+mod speak;
 mod sweepd;
 
 pub use collisions::{GzContact, GzContacts, GzEntity, JointWrench, Wrench};
@@ -22,6 +23,7 @@ pub use services::{
     AttachBody, Edited, EnableBody, Gap, GapTold, Mesh, MeshTriangle, Point32, PutBody, RemoveBody,
     Reset, SetFilter, SolidPrimitive, TickNow, Ticked,
 };
+pub use speak::{Book, Counts, Speaker, tick_header};
 pub use sweepd::{
     BodyTransform, BodyTransforms, Contact, Contacts, Name, Names, Pair, Pairs, Source, State,
     Tick, TickHeader,

@@ -2,10 +2,9 @@
 
 use super::super::RosScene;
 use super::super::poses::{Receipt, off};
-use super::super::speak::Book;
 use super::super::tf::sound;
 use crate::limits::FRAME_ROWS_MAX;
-use crate::wire::ros::{BodyTransform, BodyTransforms, Twist};
+use crate::wire::ros::{BodyTransform, BodyTransforms, Book, Twist};
 use crate::wire::{Frame, FrameHeader, RejectReason, TransformRow, WIRE_VERSION, name_bytes};
 
 /// What is wrong with a frame that is not in the scene's frame.

@@ -1,8 +1,7 @@
 //! From the answer of a question for a gap to the response of `~/gap`. Pure.
 
-use super::super::speak::tick_header;
 use crate::wire::Answer;
-use crate::wire::ros::GapTold;
+use crate::wire::ros::{GapTold, tick_header};
 
 /// The response; what is not known is no number.
 pub(super) fn told(answer: Answer) -> GapTold {

@@ -2,8 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use super::parcel::Parcel;
-use crate::wire::ros::{
+use super::{
     Contact, Contacts, Header, Name, Names, Pair, Pairs, Source, State, Tick, TickHeader, Time,
 };
 use crate::wire::{
@@ -26,7 +25,7 @@ const GONE_MAX: usize = 1024;
 
 /// Names of bodies by id and ids by name, as of one scene revision.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Book {
+pub struct Book {
     by_id: BTreeMap<u64, NameRow>,
     by_name: BTreeMap<String, u64>,
     /// Bodies that have left, the newest last. An id stays with its name for a boot, so none of these is ever wrong.
@@ -35,7 +34,8 @@ pub(super) struct Book {
 
 impl Book {
     /// A book of rows.
-    pub(super) fn of(rows: &[NameRow]) -> Self {
+    #[must_use]
+    pub fn of(rows: &[NameRow]) -> Self {
         let mut book = Self::default();
         for row in rows {
             book.by_name.insert(name_of(row).to_owned(), row.body);
@@ -45,7 +45,8 @@ impl Book {
     }
 
     /// The next revision of this book, which keeps the names of those that have left.
-    pub(super) fn next(&self, rows: &[NameRow]) -> Self {
+    #[must_use]
+    pub fn next(&self, rows: &[NameRow]) -> Self {
         let mut next = Self::of(rows);
         let left = self.gone.iter().chain(self.by_id.values());
         next.gone = left.filter(|row| !next.holds(row.body)).copied().collect();
@@ -55,29 +56,33 @@ impl Book {
     }
 
     /// Whether a body is in the scene.
-    pub(super) fn holds(&self, body: u64) -> bool {
+    #[must_use]
+    pub fn holds(&self, body: u64) -> bool {
         self.by_id.contains_key(&body)
     }
 
     /// The name of a body, in the scene or not long gone; else empty.
-    pub(super) fn name(&self, body: u64) -> &str {
+    #[must_use]
+    pub fn name(&self, body: u64) -> &str {
         let gone = || self.gone.iter().rfind(|row| row.body == body);
         self.by_id.get(&body).or_else(gone).map_or("", name_of)
     }
 
     /// The place of the source that moves a body of the scene; `None`: no such body, or none moves it.
-    pub(super) fn source(&self, body: u64) -> Option<usize> {
+    #[must_use]
+    pub fn source(&self, body: u64) -> Option<usize> {
         let place = self.by_id.get(&body)?.source;
         usize::try_from(place).ok().filter(|_| place != u32::MAX)
     }
 
     /// The id of a name in the scene.
-    pub(super) fn id(&self, name: &str) -> Option<u64> {
+    #[must_use]
+    pub fn id(&self, name: &str) -> Option<u64> {
         self.by_name.get(name).copied()
     }
 
     /// The rows, by id.
-    pub(super) fn rows(&self) -> impl Iterator<Item = &NameRow> {
+    pub fn rows(&self) -> impl Iterator<Item = &NameRow> {
         self.by_id.values()
     }
 }
@@ -92,33 +97,34 @@ fn name_of(row: &NameRow) -> &str {
 
 /// Counters of the node that go out with the tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Counts {
+pub struct Counts {
     /// Messages that were not sent.
-    pub(super) sends_dropped: u64,
+    pub sends_dropped: u64,
     /// Samples that could not be decoded.
-    pub(super) undecodable: u64,
+    pub undecodable: u64,
     /// Datagrams that the kernel dropped before DDS.
-    pub(super) datagrams_dropped: u64,
+    pub datagrams_dropped: u64,
     /// Datagrams that DDS could not read.
-    pub(super) datagrams_unread: u64,
+    pub datagrams_unread: u64,
     /// Samples that were refused.
-    pub(super) refused: u64,
+    pub refused: u64,
     /// Widest skew of a chain, nanoseconds; `None`: no chain.
-    pub(super) skew_ns: Option<u64>,
+    pub skew_ns: Option<u64>,
 }
 
 /// Writes messages in one frame.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Speaker {
+pub struct Speaker {
     /// The scene's frame.
-    pub(super) frame_id: String,
+    pub frame_id: String,
     /// Names in force.
-    pub(super) book: Book,
+    pub book: Book,
 }
 
 impl Speaker {
     /// `header.stamp` is the oldest pose used.
-    pub(super) fn header(&self, stamp_ns: u64) -> Header {
+    #[must_use]
+    pub fn header(&self, stamp_ns: u64) -> Header {
         Header {
             stamp: Time::from_ns(stamp_ns),
             frame_id: self.frame_id.clone(),
@@ -126,7 +132,8 @@ impl Speaker {
     }
 
     /// `~/state`.
-    pub(super) fn state(&self, row: &TickRow) -> State {
+    #[must_use]
+    pub fn state(&self, row: &TickRow) -> State {
         let reasons = Reason::ALL
             .iter()
             .filter(|reason| row.reasons & reason.bit() != 0);
@@ -146,7 +153,8 @@ impl Speaker {
     }
 
     /// `~/tick`.
-    pub(super) fn tick(&self, row: &TickRow, counts: Counts) -> Tick {
+    #[must_use]
+    pub fn tick(&self, row: &TickRow, counts: Counts) -> Tick {
         let sources = row.sources.iter().take(usize::from(row.sources_len));
         Tick {
             header: self.header(row.header.oldest_stamp_ns),
@@ -184,15 +192,15 @@ impl Speaker {
             sends_dropped: counts.sends_dropped,
             receipts_undecodable: counts.undecodable,
             receipts_refused: counts.refused,
-            tf_skew_s: counts.skew_ns.map_or(f64::NAN, super::poses::seconds),
+            tf_skew_s: counts.skew_ns.map_or(f64::NAN, seconds),
         }
     }
 
     /// `~/pairs`, at least one message.
-    pub(super) fn pairs(&self, parcel: &Parcel) -> Vec<Pairs> {
-        let header = &parcel.pairs_header;
+    #[must_use]
+    pub fn pairs(&self, header: &MessageHeader, rows: &[PairRow]) -> Vec<Pairs> {
         let size = |row: &PairRow| self.names_bytes(row.body_a, row.body_b) + PAIR_BYTES;
-        cut(&parcel.pairs, size)
+        cut(rows, size)
             .map(|(rows, chunk_index, chunk_count)| Pairs {
                 header: self.header(header.oldest_stamp_ns),
                 tick_header: tick_header(header),
@@ -205,10 +213,10 @@ impl Speaker {
     }
 
     /// `~/contacts`, at least one message.
-    pub(super) fn contacts(&self, parcel: &Parcel) -> Vec<Contacts> {
-        let header = &parcel.contacts_header;
+    #[must_use]
+    pub fn contacts(&self, header: &MessageHeader, rows: &[ContactRow]) -> Vec<Contacts> {
         let size = |row: &ContactRow| self.names_bytes(row.body_a, row.body_b) + CONTACT_BYTES;
-        cut(&parcel.contacts, size)
+        cut(rows, size)
             .map(|(rows, chunk_index, chunk_count)| Contacts {
                 header: self.header(header.oldest_stamp_ns),
                 tick_header: tick_header(header),
@@ -221,7 +229,8 @@ impl Speaker {
     }
 
     /// `~/names`, at least one message.
-    pub(super) fn names(&self, stamp: Time, boot_id: u64, scene_rev: u64) -> Vec<Names> {
+    #[must_use]
+    pub fn names(&self, stamp: Time, boot_id: u64, scene_rev: u64) -> Vec<Names> {
         let rows: Vec<NameRow> = self.book.rows().copied().collect();
         let size = |row: &NameRow| usize::try_from(row.len).unwrap_or(0) + NAME_BYTES;
         let name = |row: &NameRow| Name {
@@ -302,7 +311,8 @@ impl Speaker {
 }
 
 /// The head of a tick as every message repeats it.
-pub(super) fn tick_header(row: &MessageHeader) -> TickHeader {
+#[must_use]
+pub fn tick_header(row: &MessageHeader) -> TickHeader {
     TickHeader {
         boot_id: row.boot_id,
         tick: row.tick,
@@ -312,6 +322,10 @@ pub(super) fn tick_header(row: &MessageHeader) -> TickHeader {
         truncated: row.truncated,
         state: row.state,
     }
+}
+
+fn seconds(ns: u64) -> f64 {
+    std::time::Duration::from_nanos(ns).as_secs_f64()
 }
 
 fn source(row: &SourceRow) -> Source {
