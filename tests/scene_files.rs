@@ -81,6 +81,71 @@ fn the_example_scene_is_built_and_equal_shapes_are_one() {
 }
 
 #[test]
+fn a_scene_is_built_again_of_its_text_and_the_files_that_were_kept() {
+    let path = Path::new("launch-free-scripts/example_scene.toml");
+    let (scene, mut library) = (example(), Library::keeping());
+    let built = scene.build_shapes(&mut library, |_, _| {}).unwrap();
+    let kept = library.take_kept();
+    let names: Vec<_> = kept.keys().map(String::as_str).collect();
+    assert_eq!(
+        names,
+        [
+            "../tests/data/meshes/wedge.obj",
+            "../tests/data/meshes/wedge.stl"
+        ]
+    );
+    // What was read is not read, and kept, again.
+    scene.build_shapes(&mut library, |_, _| {}).unwrap();
+    assert!(library.take_kept().is_empty());
+    // With a name by which no folder is found.
+    let text = Scene::read_text(path).unwrap();
+    let twin = Scene::parse_kept(&text, "/nowhere/scene.toml").unwrap();
+    assert_eq!(twin.bodies, scene.bodies);
+    let again = twin.build_shapes(&mut Library::of_kept(kept), |_, _| {});
+    let show = |shape: &std::sync::Arc<sweepd::shape::Shape>| format!("{shape:?}");
+    for (one, two) in built.shapes.iter().zip(&again.unwrap().shapes) {
+        let (one, two): (Vec<_>, Vec<_>) = (
+            one.iter().map(show).collect(),
+            two.iter().map(show).collect(),
+        );
+        assert!(one == two);
+    }
+    let error = twin.build_shapes(&mut Library::of_kept(Default::default()), |_, _| {});
+    let error = error.unwrap_err().to_string();
+    assert!(
+        error.contains("not among the files that were kept"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_file_that_has_changed_is_kept_anew_and_takes_the_place_of_the_first() {
+    let dir = std::env::temp_dir().join(format!("sweepd_kept_{}", std::process::id()));
+    std::fs::create_dir_all(&dir).unwrap();
+    let text = |top: &str| format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {top}\nf 1 2 3\nf 1 2 4\n");
+    let spec = ShapeSpec::Trimesh {
+        vertices: vec![],
+        faces: vec![],
+        file: Some("a.obj".to_owned()),
+        scale: None,
+        solid: Some(false),
+    };
+    let high = |library: &mut Library| {
+        let built = library.get(&spec, &dir).unwrap();
+        built.shape.aabb.max.z.round()
+    };
+    let mut library = Library::keeping();
+    let mut twin = Library::of_kept(Default::default());
+    for (top, wanted) in [("1", 1.0), ("22.0", 22.0), ("1", 1.0)] {
+        std::fs::write(dir.join("a.obj"), text(top)).unwrap();
+        assert_eq!(high(&mut library), wanted);
+        twin.add_kept(library.take_kept());
+        assert_eq!(high(&mut twin), wanted);
+    }
+    std::fs::remove_dir_all(&dir).unwrap();
+}
+
+#[test]
 fn the_three_wedges_are_the_same_solid() {
     for file in ["wedge.obj", "wedge.stl", "wedge_text.stl"] {
         let spec = ShapeSpec::Trimesh {

@@ -2,7 +2,6 @@
 //! a million triangles takes a second to build, and no tick waits for it.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -10,15 +9,14 @@ use std::thread::JoinHandle;
 
 use crate::error::{Error, Result};
 use crate::query::GapQuestion;
-use crate::scene::{Edit as Asking, EditRequest, Request, Scene, SourceSpec};
+use crate::scene::{Request, Scene};
 use crate::shape::Library;
 use crate::tick::EditBatch;
+use crate::tick::build::EditBuilder;
 use crate::time::Clock;
 use crate::transport::RequestToken;
 use crate::wire::GapFound;
-use crate::world::{BuiltTree, Edit, WornTree};
-
-use super::shapes::place;
+use crate::world::{BuiltTree, WornTree};
 
 /// The answer to a request whose building broke down; the panic itself is told on stderr.
 const INTERNAL: &str =
@@ -28,7 +26,7 @@ const INTERNAL: &str =
 pub(super) const TREE: RequestToken = RequestToken(u64::MAX);
 
 /// What is on its way to the worker, and who waits for it.
-struct Asked(RequestToken, Work);
+struct Job(RequestToken, Work);
 
 enum Work {
     /// A request to be read: its payload, of which so many bytes are JSON.
@@ -56,7 +54,7 @@ type Built = (RequestToken, std::result::Result<Done, String>);
 
 /// The worker's handle.
 pub(super) struct Builder {
-    asked: Option<Sender<Asked>>,
+    asked: Option<Sender<Job>>,
     built: Receiver<Built>,
     open: usize,
     ended: Arc<AtomicBool>,
@@ -66,18 +64,16 @@ pub(super) struct Builder {
 impl Builder {
     /// Starts the worker with the shapes that are built already.
     pub(super) fn start(library: Library, scene: &Scene, clock: Arc<dyn Clock>) -> Result<Self> {
-        let (asked, requests) = channel::<Asked>();
+        let (asked, requests) = channel::<Job>();
         let (answers, built) = channel::<Built>();
         let mut against = Against {
-            sources: scene.sources.clone(),
-            base: scene.origin.base.clone(),
-            library,
+            edits: EditBuilder::new(scene, library),
             clock,
         };
         let ended = Arc::new(AtomicBool::new(false));
         let told = Arc::clone(&ended);
         let work = move || {
-            for Asked(token, work) in requests {
+            for Job(token, work) in requests {
                 // What still waits at the end is not built any more.
                 if told.load(Ordering::Relaxed) {
                     return;
@@ -120,7 +116,7 @@ impl Builder {
 
     fn hand(&mut self, token: RequestToken, work: Work) {
         let asked = self.asked.as_ref();
-        let sent = asked.is_some_and(|asked| asked.send(Asked(token, work)).is_ok());
+        let sent = asked.is_some_and(|asked| asked.send(Job(token, work)).is_ok());
         self.open += usize::from(sent);
     }
 
@@ -152,9 +148,7 @@ impl Drop for Builder {
 
 /// What a request is read against.
 struct Against {
-    sources: Vec<SourceSpec>,
-    base: PathBuf,
-    library: Library,
+    edits: EditBuilder,
     clock: Arc<dyn Clock>,
 }
 
@@ -171,76 +165,8 @@ impl Against {
         let cut = payload.split_at_checked(json_len);
         let (json, blobs) = cut.ok_or("the request is shorter than its header says")?;
         match Request::parse(json, blobs)? {
-            Request::Edits(asked) => self.build(token, asked).map(Done::Batch),
             Request::Gap { a, b } => Ok(Done::Gap(a, b)),
+            Request::Edits(asked) => self.edits.build(token.0, asked).map(Done::Batch),
         }
-    }
-
-    /// Builds the shapes of a request.
-    fn build(
-        &mut self,
-        token: RequestToken,
-        asked: EditRequest,
-    ) -> std::result::Result<EditBatch, String> {
-        let mut warnings = Vec::new();
-        let mut edits = Vec::with_capacity(asked.edits.len());
-        for edit in asked.edits {
-            edits.push(self.edit(edit, &mut warnings)?);
-        }
-        self.library.prune();
-        Ok(EditBatch {
-            token: token.0,
-            edits,
-            validate: asked.validate,
-            warnings,
-        })
-    }
-
-    fn edit(
-        &mut self,
-        asked: Asking,
-        warnings: &mut Vec<String>,
-    ) -> std::result::Result<Edit, String> {
-        Ok(match asked {
-            Asking::Put(draft) => {
-                let body = draft.settle(&self.sources, &self.base)?;
-                let mut shapes = Vec::with_capacity(body.shapes.len());
-                for (place, spec) in body.shapes.iter().enumerate() {
-                    let built = self.library.get(&spec.shape, &self.base);
-                    let named = |e| format!("body \"{}\": shape {}: {e}", body.name, place + 1);
-                    let built = built.map_err(named)?;
-                    warnings.extend(
-                        built
-                            .warnings
-                            .iter()
-                            .map(|w| format!("body \"{}\": {w}", body.name)),
-                    );
-                    shapes.push(if body.deforms {
-                        Arc::new(built.shape.to_deforming().map_err(named)?)
-                    } else {
-                        built.shape
-                    });
-                }
-                let shapes = place(&body, shapes);
-                Edit::Put {
-                    body: Arc::new(body),
-                    shapes,
-                }
-            }
-            Asking::Remove { name } => Edit::Remove { name },
-            Asking::Enable { name, enabled } => Edit::Enable { name, enabled },
-            Asking::Filter { name, group, mask } => Edit::Filter { name, group, mask },
-            Asking::Margin {
-                name,
-                report_within_m,
-            } => Edit::Margin {
-                name,
-                report_within_m,
-            },
-            Asking::Rule(rule) => Edit::Rule(rule),
-            Asking::DropRules { a, b } => Edit::DropRules { a, b },
-            Asking::Attach { name, to, pose } => Edit::Attach { name, to, pose },
-            Asking::Reset { source } => Edit::Reset { source },
-        })
     }
 }

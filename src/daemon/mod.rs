@@ -3,8 +3,8 @@
 //! In: a scene, a [`Door`], a stop flag. Out: ticks, until told to stop.
 
 mod builder;
+mod notes;
 mod settings;
-mod shapes;
 #[cfg(test)]
 mod tests;
 mod watchdog;
@@ -25,7 +25,8 @@ use crate::world::{Edit, TreeOf};
 
 use builder::{Builder, Done, TREE};
 
-pub use shapes::{Shapes, body_note, build_shapes};
+pub use crate::tick::build::{Shapes, build_shapes};
+pub use notes::body_note;
 pub use watchdog::Watchdog;
 
 /// While a worker builds shapes the loop looks this often whether they are ready, nanoseconds.

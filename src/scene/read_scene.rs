@@ -63,6 +63,14 @@ impl Scene {
     /// # Errors
     /// `Error::Scene` with file, line, body and the mend, at the first mistake, or when the file itself cannot be read.
     pub fn load(path: &Path) -> Result<Self> {
+        Self::parse_at(&Self::read_text(path)?, path)
+    }
+
+    /// The text of a scene file.
+    ///
+    /// # Errors
+    /// `Error::Scene` when it cannot be read, is too large or no text.
+    pub fn read_text(path: &Path) -> Result<String> {
         let shown = path.display().to_string();
         let unreadable = |e: std::io::Error| {
             Error::Scene(format!(
@@ -76,14 +84,29 @@ impl Scene {
             )));
         }
         let bytes = std::fs::read(path).map_err(unreadable)?;
-        let text = String::from_utf8(bytes).map_err(|e| {
+        String::from_utf8(bytes).map_err(|e| {
             let line = line_of(e.as_bytes(), e.utf8_error().valid_up_to());
             Error::Scene(format!(
                 "{shown}:{line}: this is not UTF-8 text: save the file as UTF-8"
             ))
-        })?;
+        })
+    }
+
+    /// As [`Scene::parse`], of the text of the file at `path`.
+    ///
+    /// # Errors
+    /// As [`Scene::parse`].
+    pub fn parse_at(text: &str, path: &Path) -> Result<Self> {
         let base = path.parent().unwrap_or_else(|| Path::new(""));
-        Self::parse(&text, &shown, base)
+        Self::parse(text, &path.display().to_string(), base)
+    }
+
+    /// As [`Scene::parse`], for mesh files that are kept elsewhere: none is looked for on disk.
+    ///
+    /// # Errors
+    /// As [`Scene::parse`].
+    pub fn parse_kept(text: &str, file: &str) -> Result<Self> {
+        Self::parse_by(text, file, None)
     }
 
     /// Reads and checks the text of a scene file.
@@ -94,6 +117,10 @@ impl Scene {
     /// # Errors
     /// `Error::Scene` with file, line, body and the mend, at the first mistake.
     pub fn parse(text: &str, file: &str, base: &Path) -> Result<Self> {
+        Self::parse_by(text, file, Some(base))
+    }
+
+    fn parse_by(text: &str, file: &str, base: Option<&Path>) -> Result<Self> {
         read(text, file, base).map_err(|fault| {
             let line = fault.at.map_or(1, |at| line_of(text.as_bytes(), at));
             let other = fault.other.map_or(String::new(), |at| {
@@ -131,7 +158,7 @@ fn lines_of_shapes(text: &str, drafts: &[BodyDraft]) -> Vec<Vec<u32>> {
         .collect()
 }
 
-fn read(text: &str, file: &str, base: &Path) -> std::result::Result<Scene, Fault> {
+fn read(text: &str, file: &str, base: Option<&Path>) -> std::result::Result<Scene, Fault> {
     let mut table = Table::open(Node::from_toml(text)?, "a scene", KEYS).map_err(|fault| {
         let misplaced = RUN_KEYS
             .iter()
@@ -161,7 +188,7 @@ fn read(text: &str, file: &str, base: &Path) -> std::result::Result<Scene, Fault
     }
     let origin = Origin {
         file: file.to_owned(),
-        base: base.to_owned(),
+        base: base.unwrap_or_else(|| Path::new("")).to_owned(),
         shape_lines: lines_of_shapes(text, &drafts),
     };
     let bodies = resolve(drafts, &sources, &config.limits, base)?;

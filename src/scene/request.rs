@@ -143,14 +143,21 @@ impl BodyDraft {
     /// The body, its source found and its mesh files seen; an id that was not given stays 0.
     ///
     /// * `sources` - of the running scene.
-    /// * `base` - the folder that mesh files are relative to.
+    /// * `base` - the folder that mesh files are relative to; `None`: they are not looked for.
     ///
     /// # Errors
     /// One text that names the body, what is wrong and what to change.
-    pub fn settle(mut self, sources: &[SourceSpec], base: &Path) -> Result<BodySpec, String> {
+    pub fn settle(
+        mut self,
+        sources: &[SourceSpec],
+        base: Option<&Path>,
+    ) -> Result<BodySpec, String> {
         settle_source(&mut self, sources)
             .and_then(|()| check_ros(&self, sources, &mut std::collections::BTreeMap::new()))
-            .and_then(|()| check_files(&self, base, &mut std::collections::BTreeSet::new()))
+            .and_then(|()| match base {
+                Some(base) => check_files(&self, base, &mut std::collections::BTreeSet::new()),
+                None => Ok(()),
+            })
             .map_err(|fault| fault.text)?;
         Ok(self.spec)
     }

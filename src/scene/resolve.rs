@@ -14,12 +14,14 @@ use crate::shape::ShapeSpec;
 
 /// Settles what bodies say of each other and of the sources.
 ///
+/// * `base` - the folder that mesh files are relative to; `None`: they are not looked for.
+///
 /// Cost: O(n log n).
 pub(crate) fn resolve(
     mut drafts: Vec<BodyDraft>,
     sources: &[SourceSpec],
     limits: &Limits,
-    base: &Path,
+    base: Option<&Path>,
 ) -> Result<Vec<BodySpec>, Fault> {
     if let Some(extra) = drafts.get(limits.bodies) {
         let text = format!(
@@ -41,7 +43,9 @@ pub(crate) fn resolve(
     for draft in &mut drafts {
         settle_source(draft, sources)?;
         check_ros(draft, sources, &mut topics)?;
-        check_files(draft, base, &mut seen)?;
+        if let Some(base) = base {
+            check_files(draft, base, &mut seen)?;
+        }
     }
     Ok(drafts.into_iter().map(|draft| draft.spec).collect())
 }

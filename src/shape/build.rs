@@ -3,7 +3,7 @@
 //! In: a checked or unchecked `ShapeSpec` and the folder its files are relative to. Out: an `Arc<Shape>`. Off the tick
 //! path: a large mesh takes seconds.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::math::{Aabb, Point, Pose, Vec3};
@@ -30,6 +30,14 @@ pub struct Built {
 /// # Errors
 /// What cannot be built, and what to change; a panic of a hull builder comes as `ShapeError::Hull`.
 pub fn build(spec: &ShapeSpec, base: &Path) -> Result<Built, ShapeError> {
+    build_by(spec, &mut |file| load::read(base, file))
+}
+
+/// Reads a mesh file of a name: its path, and its bytes.
+pub(super) type Read<'a> = dyn FnMut(&str) -> Result<(PathBuf, Arc<[u8]>), ShapeError> + 'a;
+
+/// As [`build`], with files read by `read`.
+pub(super) fn build_by(spec: &ShapeSpec, read: &mut Read<'_>) -> Result<Built, ShapeError> {
     spec.check()?;
     let mut warnings = Vec::new();
     let shape = match spec {
@@ -43,7 +51,7 @@ pub fn build(spec: &ShapeSpec, base: &Path) -> Result<Built, ShapeError> {
         } => {
             let (vertices, faces) = match file {
                 Some(file) => {
-                    let soup = load::load(base, file, *scale)?;
+                    let soup = load_by(read, file, *scale)?;
                     warnings.extend(soup.warnings);
                     (soup.vertices, soup.faces)
                 }
@@ -60,7 +68,7 @@ pub fn build(spec: &ShapeSpec, base: &Path) -> Result<Built, ShapeError> {
             // That it is a solid needs no warning: it was made as one.
             mesh(vertices, faces, Some(true), &mut Vec::new())?
         }
-        _ => convex(spec, base, &mut warnings)?,
+        _ => convex(spec, read, &mut warnings)?,
     };
     warnings.extend(size_warning(&shape));
     Ok(Built {
@@ -69,7 +77,20 @@ pub fn build(spec: &ShapeSpec, base: &Path) -> Result<Built, ShapeError> {
     })
 }
 
-fn convex(spec: &ShapeSpec, base: &Path, warnings: &mut Vec<String>) -> Result<Shape, ShapeError> {
+fn load_by(
+    read: &mut Read<'_>,
+    file: &str,
+    scale: Option<[f64; 3]>,
+) -> Result<load::Soup, ShapeError> {
+    let (path, bytes) = read(file)?;
+    load::load(&path, &bytes, scale)
+}
+
+fn convex(
+    spec: &ShapeSpec,
+    read: &mut Read<'_>,
+    warnings: &mut Vec<String>,
+) -> Result<Shape, ShapeError> {
     let convex = match spec {
         ShapeSpec::Sphere { radius } => Convex::sphere(*radius),
         ShapeSpec::Box { half_extents } => Convex::cuboid(Vec3::from(*half_extents)),
@@ -92,7 +113,7 @@ fn convex(spec: &ShapeSpec, base: &Path, warnings: &mut Vec<String>) -> Result<S
             scale,
         } => match file {
             Some(file) => {
-                let soup = load::load(base, file, *scale)?;
+                let soup = load_by(read, file, *scale)?;
                 warnings.extend(soup.warnings);
                 hull(&soup.vertices)?
             }

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
-use std::time::SystemTime;
 
-use crate::shape::{Built, ShapeError, ShapeSpec, build};
+use crate::shape::build::build_by;
+use crate::shape::files::{Contents, FileMark, Files};
+use crate::shape::{Built, ShapeError, ShapeSpec};
 
 /// Shapes built so far, found by what was said of them.
 ///
@@ -14,6 +15,7 @@ use crate::shape::{Built, ShapeError, ShapeSpec, build};
 pub struct Library {
     /// By digest; several entries of one digest are told apart by their specs.
     shelves: BTreeMap<u64, Vec<Entry>>,
+    files: Files,
 }
 
 #[derive(Debug)]
@@ -23,14 +25,6 @@ struct Entry {
     built: Built,
 }
 
-/// Which file it was, and in which state.
-#[derive(Debug, PartialEq, Eq)]
-struct FileMark {
-    path: std::path::PathBuf,
-    bytes: u64,
-    changed: Option<SystemTime>,
-}
-
 impl Library {
     /// Nothing is built yet.
     #[must_use]
@@ -38,17 +32,60 @@ impl Library {
         Self::default()
     }
 
+    /// Nothing is built yet; the contents of files that are read are kept until [`Library::take_kept`].
+    #[must_use]
+    pub fn keeping() -> Self {
+        Self {
+            files: Files::Keeping {
+                kept: Contents::new(),
+                marks: BTreeMap::new(),
+            },
+            ..Self::default()
+        }
+    }
+
+    /// Nothing is built yet; files are those that [`Library::take_kept`] yielded elsewhere, and no other is looked at.
+    #[must_use]
+    pub fn of_kept(contents: Contents) -> Self {
+        Self {
+            files: Files::Kept(contents),
+            ..Self::default()
+        }
+    }
+
+    /// Files that were read since the last call, where they are kept.
+    pub fn take_kept(&mut self) -> Contents {
+        match &mut self.files {
+            Files::Keeping { kept, .. } => std::mem::take(kept),
+            _ => Contents::new(),
+        }
+    }
+
+    /// Adds to the contents of a library that is of kept files; shapes of what a name stood for before are forgotten.
+    pub fn add_kept(&mut self, contents: Contents) {
+        let Files::Kept(all) = &mut self.files else {
+            return;
+        };
+        let stays = |entry: &Entry| file_of(&entry.spec).is_none_or(|f| !contents.contains_key(f));
+        (self.shelves.values_mut()).for_each(|shelf| shelf.retain(stays));
+        all.extend(contents);
+    }
+
     /// The shape of a spec: an equal one built before, or a new one.
     ///
     /// # Errors
     /// As [`build`].
     pub fn get(&mut self, spec: &ShapeSpec, base: &Path) -> Result<Built, ShapeError> {
-        let file = mark(spec, base)?;
+        let name = file_of(spec);
+        let file = name.map(|name| self.files.mark(base, name)).transpose()?;
+        let known = (name.zip(file.as_ref())).is_none_or(|(name, m)| self.files.knows(name, m));
         let shelf = self.shelves.entry(digest(spec)).or_default();
-        if let Some(entry) = shelf.iter().find(|e| e.spec == *spec && e.file == file) {
+        let same = |entry: &&Entry| known && entry.spec == *spec && entry.file == file;
+        if let Some(entry) = shelf.iter().find(same) {
             return Ok(entry.built.clone());
         }
-        let built = build(spec, base)?;
+        let files = &mut self.files;
+        let built = build_by(spec, &mut |name| files.read(base, name))?;
         shelf.push(Entry {
             spec: spec.clone(),
             file,
@@ -78,20 +115,12 @@ impl Library {
     }
 }
 
-fn mark(spec: &ShapeSpec, base: &Path) -> Result<Option<FileMark>, ShapeError> {
-    let (ShapeSpec::Convex { file, .. } | ShapeSpec::Trimesh { file, .. }) = spec else {
-        return Ok(None);
-    };
-    let Some(file) = file else {
-        return Ok(None);
-    };
-    let path = super::find_mesh(base, file)?;
-    let meta = std::fs::metadata(&path).ok();
-    Ok(Some(FileMark {
-        bytes: meta.as_ref().map_or(0, std::fs::Metadata::len),
-        changed: meta.and_then(|meta| meta.modified().ok()),
-        path,
-    }))
+/// The mesh file that a spec names.
+fn file_of(spec: &ShapeSpec) -> Option<&str> {
+    match spec {
+        ShapeSpec::Convex { file, .. } | ShapeSpec::Trimesh { file, .. } => file.as_deref(),
+        _ => None,
+    }
 }
 
 /// FNV-1a over the numbers and texts of a spec. Equal specs have equal digests; -0 and 0 are equal, so 0 is added.

@@ -50,6 +50,12 @@ impl Engine {
         self.narrow.counters()
     }
 
+    /// The time of the last tick, nanoseconds of `CLOCK_BOOTTIME`; before the first when the engine was made.
+    #[must_use]
+    pub fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
     /// Ticks so far.
     #[must_use]
     pub fn ticks(&self) -> u64 {

@@ -3,6 +3,7 @@
 //!
 //! In: [`TickInput`] (frames, edits, demand, budget, and why this tick). Out: a filled [`Outbox`].
 
+pub mod build;
 mod end;
 mod floor;
 mod input;
@@ -95,7 +96,8 @@ impl Engine {
         clock: Arc<dyn Clock>,
     ) -> Result<Self> {
         let limits = scene.config.limits;
-        let world = World::new(scene, shapes, clock.boottime_ns())?;
+        let now_ns = clock.boottime_ns();
+        let world = World::new(scene, shapes, now_ns)?;
         let config = Config {
             threads: Some(scene.config.threads_here()),
             ..scene.config.clone()
@@ -123,7 +125,7 @@ impl Engine {
             floor: Floor::default(),
             rest: Rest::default(),
             tick: 0,
-            now_ns: 0,
+            now_ns,
             end: End::default(),
             missed: 0,
             rebuilds: 0,

@@ -40,7 +40,7 @@ fn every_edit_is_read() {
         timeout_ns: 1,
         ros2: None,
     });
-    let spec = draft.settle(&sources, Path::new("")).unwrap();
+    let spec = draft.settle(&sources, Some(Path::new(""))).unwrap();
     assert_eq!((spec.id.0, spec.source), (u64::MAX, Some(1)));
 }
 

@@ -12,6 +12,7 @@ mod weld;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use crate::limits::TRIANGLES_MAX;
 use crate::math::Point;
@@ -123,18 +124,28 @@ pub(crate) fn find_mesh(base: &Path, file: &str) -> Result<PathBuf, ShapeError> 
     Ok(path)
 }
 
-/// Reads a mesh file.
+/// The bytes of a mesh file, and its path.
 ///
+/// * `base` - the folder of the scene file.
+///
+/// # Errors
+/// As [`find_mesh`]; `TooManyTriangles` before such a file is read whole.
+pub(crate) fn read(base: &Path, file: &str) -> Result<(PathBuf, Arc<[u8]>), ShapeError> {
+    let path = find_mesh(base, file)?;
+    let bytes = read_whole(&path, kind(&path)?)?;
+    Ok((path, bytes.into()))
+}
+
+/// Makes sense of a mesh file's bytes.
+///
+/// * `path` - says its kind, and which it is in messages.
 /// * `scale` - factor on each axis of the file's coordinates (after its own unit and up-axis); where an odd number of
 ///   factors is negative it mirrors, and faces are turned so that outside stays outside.
 ///
 /// # Errors
-/// `Unreadable`, `Format` with the line, `TooManyTriangles` before such a file is read whole, `NotFinite`.
-pub(crate) fn load(base: &Path, file: &str, scale: Option<[f64; 3]>) -> Result<Soup, ShapeError> {
-    let path = find_mesh(base, file)?;
-    let kind = kind(&path)?;
-    let bytes = read(&path, kind)?;
-    let mut soup = parse(kind, &bytes).map_err(|flaw| match flaw.error {
+/// `Format` with the line, `TooManyTriangles`, `NotFinite`.
+pub(crate) fn load(path: &Path, bytes: &[u8], scale: Option<[f64; 3]>) -> Result<Soup, ShapeError> {
+    let mut soup = parse(kind(path)?, bytes).map_err(|flaw| match flaw.error {
         FlawKind::Shape(error) => error,
         FlawKind::Format(message) => ShapeError::Format {
             path: path.display().to_string(),
@@ -145,7 +156,7 @@ pub(crate) fn load(base: &Path, file: &str, scale: Option<[f64; 3]>) -> Result<S
     if let Some(scale) = scale {
         scale_by(&mut soup, scale);
     }
-    check_finite(&soup, &path)?;
+    check_finite(&soup, path)?;
     weld::weld(&mut soup);
     Ok(soup)
 }
@@ -192,7 +203,7 @@ fn unreadable(path: &Path, message: String) -> ShapeError {
 }
 
 /// The bytes of a file; one that is too large is refused by its head.
-fn read(path: &Path, kind: Kind) -> Result<Vec<u8>, ShapeError> {
+fn read_whole(path: &Path, kind: Kind) -> Result<Vec<u8>, ShapeError> {
     let failed = |e: std::io::Error| unreadable(path, e.to_string());
     let mut file = File::open(path).map_err(failed)?;
     let size = file.metadata().map_err(failed)?.len();

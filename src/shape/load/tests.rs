@@ -112,7 +112,7 @@ fn too_many_triangles_are_refused_by_the_head_of_the_file() {
     bytes.extend(10_000_000_u32.to_le_bytes());
     bytes.extend([0; 100]);
     std::fs::write(folder.join("huge.stl"), &bytes).unwrap();
-    let error = load(&folder, "huge.stl", None).unwrap_err();
+    let error = read(&folder, "huge.stl").unwrap_err();
     std::fs::remove_dir_all(&folder).unwrap();
     assert_eq!(error, ShapeError::TooManyTriangles { given: 10_000_000 });
 }
@@ -143,7 +143,7 @@ fn a_mirroring_scale_keeps_the_outside_outside() {
         [-2.0, -1.0, 3.0],
         [-1.0, -1.0, -1.0],
     ] {
-        let soup = load(Path::new(DATA), "wedge.stl", Some(scale)).unwrap();
+        let soup = load(Path::new("wedge.stl"), STL, Some(scale)).unwrap();
         let wanted = 1.5 * scale.iter().product::<f64>().abs();
         assert!((volume(&soup) - wanted).abs() < 1e-12, "{scale:?}");
         assert_eq!(soup.vertices.len(), 6);

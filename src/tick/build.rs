@@ -1,0 +1,174 @@
+//! From what users say to what the engine takes: the shapes of a scene, and edits with built shapes. Off the tick.
+//!
+//! In: a checked scene, requests read from JSON. Out: placed shapes, [`EditBatch`]es.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::EditBatch;
+use crate::error::Result;
+use crate::scene::{BodySpec, Edit as Asking, EditRequest, Scene, SourceSpec};
+use crate::shape::{Contents, Library, Shape};
+use crate::world::{Edit, Parts, PlacedShape};
+
+/// The built shapes of a scene.
+#[derive(Debug)]
+pub struct Shapes {
+    /// One list a body, in the scene's order.
+    pub bodies: Vec<Parts>,
+    /// What `check` shows: sizes, open meshes, turned shells.
+    pub warnings: Vec<String>,
+    /// The shapes by spec, for edits that use them again.
+    pub library: Library,
+}
+
+/// Builds every shape of a scene.
+///
+/// # Errors
+/// `Error::Scene` with file, line, body and what to change, for the first shape that cannot be built.
+pub fn build_shapes(scene: &Scene) -> Result<Shapes> {
+    build_shapes_in(scene, Library::new())
+}
+
+/// As [`build_shapes`], with a library of its own: one that keeps the files it reads, or is of kept ones.
+///
+/// # Errors
+/// As [`build_shapes`].
+pub fn build_shapes_in(scene: &Scene, mut library: Library) -> Result<Shapes> {
+    let built = scene.build_shapes(&mut library, |_, _| {})?;
+    let bodies = scene
+        .bodies
+        .iter()
+        .zip(built.shapes)
+        .map(|(body, shapes)| place(body, shapes))
+        .collect();
+    Ok(Shapes {
+        bodies,
+        warnings: built.warnings,
+        library,
+    })
+}
+
+/// Built shapes at their places in a body.
+fn place(body: &BodySpec, shapes: Vec<Arc<Shape>>) -> Parts {
+    let placed = body.shapes.iter().zip(shapes);
+    placed
+        .map(|(spec, shape)| PlacedShape {
+            shape,
+            pose: spec.pose,
+        })
+        .collect()
+}
+
+/// Makes edits of requests.
+#[derive(Debug)]
+pub struct EditBuilder {
+    sources: Vec<SourceSpec>,
+    /// The folder that mesh files are relative to; `None`: the library's files are kept ones.
+    base: Option<PathBuf>,
+    library: Library,
+}
+
+impl EditBuilder {
+    /// For a running scene, with the shapes that are built already.
+    #[must_use]
+    pub fn new(scene: &Scene, library: Library) -> Self {
+        Self {
+            sources: scene.sources.clone(),
+            base: Some(scene.origin.base.clone()),
+            library,
+        }
+    }
+
+    /// As [`EditBuilder::new`], for a library of kept files.
+    #[must_use]
+    pub fn of_kept(scene: &Scene, library: Library) -> Self {
+        Self {
+            base: None,
+            ..Self::new(scene, library)
+        }
+    }
+
+    /// Builds the shapes of a request.
+    ///
+    /// # Errors
+    /// One text that names the body, what is wrong and what to change.
+    pub fn build(
+        &mut self,
+        token: u64,
+        asked: EditRequest,
+    ) -> std::result::Result<EditBatch, String> {
+        let mut warnings = Vec::new();
+        let mut edits = Vec::with_capacity(asked.edits.len());
+        for edit in asked.edits {
+            edits.push(self.edit(edit, &mut warnings)?);
+        }
+        self.library.prune();
+        Ok(EditBatch {
+            token,
+            edits,
+            validate: asked.validate,
+            warnings,
+        })
+    }
+
+    /// The files that were read since the last call, where the library keeps them; to be asked for after a request that
+    /// was built, for the shapes of one that was not may serve the next.
+    pub fn take_kept(&mut self) -> Contents {
+        self.library.take_kept()
+    }
+
+    /// Adds to the files of a library that is of kept ones.
+    pub fn add_kept(&mut self, contents: Contents) {
+        self.library.add_kept(contents);
+    }
+
+    fn edit(
+        &mut self,
+        asked: Asking,
+        warnings: &mut Vec<String>,
+    ) -> std::result::Result<Edit, String> {
+        Ok(match asked {
+            Asking::Put(draft) => {
+                let body = draft.settle(&self.sources, self.base.as_deref())?;
+                let base = self.base.clone().unwrap_or_default();
+                let mut shapes = Vec::with_capacity(body.shapes.len());
+                for (place, spec) in body.shapes.iter().enumerate() {
+                    let built = self.library.get(&spec.shape, &base);
+                    let named = |e| format!("body \"{}\": shape {}: {e}", body.name, place + 1);
+                    let built = built.map_err(named)?;
+                    warnings.extend(
+                        built
+                            .warnings
+                            .iter()
+                            .map(|w| format!("body \"{}\": {w}", body.name)),
+                    );
+                    shapes.push(if body.deforms {
+                        Arc::new(built.shape.to_deforming().map_err(named)?)
+                    } else {
+                        built.shape
+                    });
+                }
+                let shapes = place(&body, shapes);
+                Edit::Put {
+                    body: Arc::new(body),
+                    shapes,
+                }
+            }
+            Asking::Remove { name } => Edit::Remove { name },
+            Asking::Enable { name, enabled } => Edit::Enable { name, enabled },
+            Asking::Filter { name, group, mask } => Edit::Filter { name, group, mask },
+            Asking::Margin {
+                name,
+                report_within_m,
+            } => Edit::Margin {
+                name,
+                report_within_m,
+            },
+            Asking::Rule(rule) => Edit::Rule(rule),
+            Asking::DropRules { a, b } => Edit::DropRules { a, b },
+            Asking::Attach { name, to, pose } => Edit::Attach { name, to, pose },
+            Asking::Reset { source } => Edit::Reset { source },
+        })
+    }
+}
