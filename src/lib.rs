@@ -31,4 +31,5 @@ pub mod builtin;
 pub mod cli;
 pub mod daemon;
 pub mod query;
+pub mod record;
 pub mod report;

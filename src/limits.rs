@@ -88,6 +88,9 @@ pub const TIMEOUT_MS_DEFAULT: u64 = 500;
 pub const REQUEST_BYTES_MAX: usize = 1 << 29;
 /// Remembered sessions that are over, per daemon; beyond it the oldest is forgotten, and its client could come back.
 pub const SESSIONS_OVER_MAX: usize = 1024;
+/// Bytes that wait for the thread that records; beyond it the disk does not follow and the recording ends, the daemon
+/// goes on. A tick of 1,000 bodies takes some 100 kB.
+pub const RECORD_QUEUE_BYTES_MAX: usize = 1 << 26;
 
 const _: () = {
     assert!(BODIES_MAX < u32::MAX as usize);

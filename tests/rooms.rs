@@ -45,6 +45,8 @@ const DOORS: &[(&str, &[&str])] = &[
     ("ros2_client", &["transport/ros2"]),
     ("rustdds", &["transport/ros2"]),
     ("yaml_rust2", &["transport/ros2"]),
+    ("mcap", &["record/file"]),
+    ("cdr_encoding", &["record/file"]),
 ];
 
 fn line_of(room: &str) -> usize {
@@ -143,6 +145,9 @@ fn a_room_names_only_rooms_above_it() {
 fn outside_crates_have_one_door() {
     let mut wrong = Vec::new();
     for (file, _, text) in all() {
+        if file.ends_with("/tests.rs") {
+            continue;
+        }
         let text = code(&text);
         for (name, doors) in DOORS {
             let path = format!("{name}::");

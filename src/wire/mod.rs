@@ -7,7 +7,7 @@ mod frame;
 mod outbox;
 mod region;
 mod request;
-#[cfg(feature = "ros2")]
+#[cfg(any(feature = "ros2", feature = "mcap"))]
 pub mod ros;
 mod rows;
 mod tick;

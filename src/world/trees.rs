@@ -32,6 +32,22 @@ pub struct BuiltTree {
     tree: NewTree,
 }
 
+impl TreeOf {
+    /// The body's id and generation, and how many updates of its vertices there were.
+    #[must_use]
+    pub fn parts(self) -> (BodyId, u32, u64) {
+        (self.body, self.generation, self.updates)
+    }
+}
+
+impl BuiltTree {
+    /// What it is of.
+    #[must_use]
+    pub fn of(&self) -> TreeOf {
+        self.of
+    }
+}
+
 impl WornTree {
     /// What it is of, for [`World::refuse_tree`] when it cannot be built.
     #[must_use]

@@ -143,7 +143,8 @@ fn a_mirroring_scale_keeps_the_outside_outside() {
         [-2.0, -1.0, 3.0],
         [-1.0, -1.0, -1.0],
     ] {
-        let soup = load(Path::new("wedge.stl"), STL, Some(scale)).unwrap();
+        let (path, bytes) = read(Path::new(DATA), "wedge.stl").unwrap();
+        let soup = load(&path, &bytes, Some(scale)).unwrap();
         let wanted = 1.5 * scale.iter().product::<f64>().abs();
         assert!((volume(&soup) - wanted).abs() < 1e-12, "{scale:?}");
         assert_eq!(soup.vertices.len(), 6);

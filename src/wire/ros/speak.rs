@@ -3,10 +3,12 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use super::{
-    Contact, Contacts, Header, Name, Names, Pair, Pairs, Source, State, Tick, TickHeader, Time,
+    BodyTransform, BodyTransforms, Contact, Contacts, Header, Name, Names, Pair, Pairs, Pose,
+    Source, State, Tick, TickHeader, Time,
 };
 use crate::wire::{
-    self, ContactRow, MessageHeader, NameRow, PairRow, Reason, SourceRow, TickRow, name_str,
+    self, BodyRow, BodyStatus, ContactRow, MessageHeader, NameRow, PairRow, Reason, SourceRow,
+    TickRow, frame_flags, name_str,
 };
 
 /// Bytes of one message: bursts beyond a peer's receive buffer (208 KB by default) are lost and slowly repaired, so
@@ -210,6 +212,29 @@ impl Speaker {
                 pairs: rows.iter().map(|row| self.pair(row)).collect(),
             })
             .collect()
+    }
+
+    /// Where bodies are, of which a pose is known: poses as sources send them.
+    #[must_use]
+    pub fn bodies(&self, tick: &TickRow, rows: &[BodyRow]) -> BodyTransforms {
+        let not_received = BodyStatus::NotReceived.code();
+        let placed = rows.iter().filter(|row| row.status != not_received);
+        let transform = |row: &BodyRow| BodyTransform {
+            name: self.book.name(row.body).to_owned(),
+            body: row.body,
+            pose: Pose {
+                position: row.position.into(),
+                orientation: row.orientation.into(),
+            },
+        };
+        BodyTransforms {
+            header: self.header(tick.header.oldest_stamp_ns),
+            seq: tick.header.tick,
+            sent_ns: tick.sent_ns,
+            flags: frame_flags::PARTIAL,
+            transforms: placed.map(transform).collect(),
+            ..BodyTransforms::default()
+        }
     }
 
     /// `~/contacts`, at least one message.

@@ -1,0 +1,160 @@
+//! Numbers as little-endian bytes and back, bit by bit: NaN payloads and -0.0 survive. What is read comes from a file
+//! that may be anything, so that every length is checked before memory is asked for.
+
+/// The bytes end before what they say they hold, or hold what has no meaning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Damaged;
+
+/// Bytes that are read from the front.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Take<'a>(pub(super) &'a [u8]);
+
+impl<'a> Take<'a> {
+    /// The next so many.
+    pub(super) fn bytes(&mut self, len: usize) -> Result<&'a [u8], Damaged> {
+        let (head, tail) = self.0.split_at_checked(len).ok_or(Damaged)?;
+        self.0 = tail;
+        Ok(head)
+    }
+
+    /// A count of things that take `each` bytes at least, as far as they can be there.
+    pub(super) fn count(&mut self, each: usize) -> Result<usize, Damaged> {
+        let count = usize::try_from(u32::take(self)?).map_err(|_| Damaged)?;
+        let bytes = count.checked_mul(each).ok_or(Damaged)?;
+        if bytes > self.0.len() {
+            return Err(Damaged);
+        }
+        Ok(count)
+    }
+
+    /// A text or a run of bytes with its length before it.
+    pub(super) fn run(&mut self) -> Result<&'a [u8], Damaged> {
+        let len = usize::try_from(u64::take(self)?).map_err(|_| Damaged)?;
+        self.bytes(len)
+    }
+
+    /// As [`Take::run`], of UTF-8.
+    pub(super) fn text(&mut self) -> Result<String, Damaged> {
+        let text = std::str::from_utf8(self.run()?);
+        text.map(ToOwned::to_owned).map_err(|_| Damaged)
+    }
+
+    /// That all of it was read.
+    pub(super) fn end(&self) -> Result<(), Damaged> {
+        if self.0.is_empty() {
+            Ok(())
+        } else {
+            Err(Damaged)
+        }
+    }
+}
+
+/// Writes how many follow. Every list of ours is shorter than 2^32 (see `limits`).
+pub(super) fn put_count(len: usize, to: &mut Vec<u8>) {
+    u32::try_from(len).unwrap_or(u32::MAX).put(to);
+}
+
+/// Writes a run of bytes with its length before it.
+pub(super) fn put_run(bytes: &[u8], to: &mut Vec<u8>) {
+    (bytes.len() as u64).put(to);
+    to.extend_from_slice(bytes);
+}
+
+/// Where two values differ first: the path of a field, the one value, the other.
+pub(super) type Differing = (String, String, String);
+
+/// A value of fixed size.
+pub(super) trait Field: Sized {
+    /// Bytes that it takes.
+    const BYTES: usize;
+
+    /// Writes it behind what is there.
+    fn put(&self, to: &mut Vec<u8>);
+
+    /// Reads it from the front.
+    fn take(from: &mut Take<'_>) -> Result<Self, Damaged>;
+
+    /// Where two of them differ first, by their bits.
+    ///
+    /// * `skip` - fields of the outermost row that are not looked at.
+    fn differ(&self, other: &Self, skip: &[&str]) -> Option<Differing>;
+}
+
+macro_rules! number {
+    ($($type:ty => $bits:expr;)+) => { $(
+        impl Field for $type {
+            const BYTES: usize = size_of::<$type>();
+
+            fn put(&self, to: &mut Vec<u8>) {
+                to.extend_from_slice(&self.to_le_bytes());
+            }
+
+            fn take(from: &mut Take<'_>) -> Result<Self, Damaged> {
+                let bytes = from.bytes(Self::BYTES)?;
+                bytes.try_into().map(Self::from_le_bytes).map_err(|_| Damaged)
+            }
+
+            fn differ(&self, other: &Self, _: &[&str]) -> Option<Differing> {
+                let bits: fn(&Self) -> u64 = $bits;
+                (bits(self) != bits(other)).then(|| {
+                    let (mut one, mut two) = (format!("{self:?}"), format!("{other:?}"));
+                    if one == two {
+                        one += &format!(" ({:#x})", bits(self));
+                        two += &format!(" ({:#x})", bits(other));
+                    }
+                    (String::new(), one, two)
+                })
+            }
+        }
+    )+ };
+}
+
+number! {
+    u8 => |x| u64::from(*x);
+    u32 => |x| u64::from(*x);
+    u64 => |x| *x;
+    f32 => |x| u64::from(x.to_bits());
+    f64 => |x| x.to_bits();
+}
+
+impl<T: Field + Copy + Default, const N: usize> Field for [T; N] {
+    const BYTES: usize = N * T::BYTES;
+
+    fn put(&self, to: &mut Vec<u8>) {
+        self.iter().for_each(|one| one.put(to));
+    }
+
+    fn take(from: &mut Take<'_>) -> Result<Self, Damaged> {
+        let mut all = [T::default(); N];
+        for one in &mut all {
+            *one = T::take(from)?;
+        }
+        Ok(all)
+    }
+
+    fn differ(&self, other: &Self, _: &[&str]) -> Option<Differing> {
+        let mut pairs = self.iter().zip(other).enumerate();
+        pairs.find_map(|(at, (one, two))| {
+            let (path, one, two) = one.differ(two, &[])?;
+            Some((format!("[{at}]{path}"), one, two))
+        })
+    }
+}
+
+/// Writes a list of rows behind their count.
+pub(super) fn put_rows<T: Field>(rows: &[T], to: &mut Vec<u8>) {
+    put_count(rows.len(), to);
+    to.reserve(rows.len() * T::BYTES);
+    rows.iter().for_each(|row| row.put(to));
+}
+
+/// Reads such a list into memory that is there.
+pub(super) fn take_rows<T: Field>(from: &mut Take<'_>, into: &mut Vec<T>) -> Result<(), Damaged> {
+    into.clear();
+    let count = from.count(T::BYTES)?;
+    into.reserve(count);
+    for _ in 0..count {
+        into.push(T::take(from)?);
+    }
+    Ok(())
+}

@@ -1,0 +1,155 @@
+//! Files that are whole, cut off, damaged, of others.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::*;
+use crate::record::{Facts, LAYOUT, Sink as _, Start, TickRecord};
+use crate::wire::{Demand, PairRow, WIRE_VERSION};
+
+static NUMBERS: AtomicU64 = AtomicU64::new(0);
+
+/// A file that goes when it is dropped.
+struct Scrap(PathBuf);
+
+impl Scrap {
+    fn new() -> Self {
+        let number = NUMBERS.fetch_add(1, Ordering::Relaxed);
+        let name = format!("sweepd_scrap_{}_{number}.mcap", std::process::id());
+        Self(std::env::temp_dir().join(name))
+    }
+
+    fn of(bytes: &[u8]) -> Self {
+        let scrap = Self::new();
+        std::fs::write(&scrap.0, bytes).unwrap();
+        scrap
+    }
+}
+
+impl Drop for Scrap {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+fn start() -> Start {
+    Start {
+        facts: Facts {
+            layout: LAYOUT,
+            wire_version: WIRE_VERSION,
+            ..Facts::default()
+        },
+        ..Start::default()
+    }
+}
+
+fn record(tick: u64) -> TickRecord {
+    let mut record = TickRecord::default();
+    record.ask.demand = Demand::ALL;
+    record.out.tick.header.tick = tick;
+    record.out.pairs = vec![PairRow::default(); 100];
+    record
+}
+
+/// A recording of so many ticks, a chunk each ten.
+fn written(ticks: u64, why: Option<&str>) -> Scrap {
+    let scrap = Scrap::new();
+    let file = create(&scrap.0, false).unwrap();
+    let mut sink = McapSink::new(file, "scrap", "world", &start()).unwrap();
+    for tick in 1..=ticks {
+        sink.tick(&record(tick), false).unwrap();
+        if tick % 10 == 0 {
+            sink.flush().unwrap();
+        }
+    }
+    if let Some(why) = why {
+        sink.end(why).unwrap();
+    }
+    scrap
+}
+
+/// How many ticks are read, and how it ends.
+fn read(scrap: &Scrap) -> (u64, Ending) {
+    let (mut reader, _) = Reader::open(&scrap.0).unwrap();
+    let mut ticks = 0;
+    loop {
+        match reader.next().unwrap() {
+            Read::Tick(record) => {
+                ticks += 1;
+                assert_eq!(record.out.tick.header.tick, ticks);
+                assert_eq!(record.out.pairs.len(), 100);
+            }
+            Read::End(ending) => return (ticks, ending),
+        }
+    }
+}
+
+#[test]
+fn what_was_written_is_read_and_how_it_ended() {
+    assert_eq!(read(&written(25, Some(""))), (25, Ending::Whole));
+    assert_eq!(read(&written(0, Some(""))), (0, Ending::Whole));
+    let full = "the disk did not follow";
+    let early = Ending::Early(full.to_owned());
+    assert_eq!(read(&written(7, Some(full))), (7, early));
+}
+
+#[test]
+fn a_file_that_is_cut_off_is_read_as_far_as_its_chunks_are_whole() {
+    let whole = std::fs::read(&written(50, Some("")).0).unwrap();
+    let mut most = 0;
+    for part in 1..40 {
+        let len = whole.len() * part / 40;
+        let scrap = Scrap::of(&whole[..len]);
+        if let Ok((_, first)) = Reader::open(&scrap.0) {
+            assert_eq!(first, start());
+            let (ticks, ending) = read(&scrap);
+            assert_eq!(ending, Ending::Cut);
+            assert!(ticks % 10 == 0 && ticks >= most, "{ticks} after {most}");
+            most = ticks;
+        }
+    }
+    assert!(most >= 40, "{most}");
+}
+
+#[test]
+fn a_changed_byte_ends_the_reading_at_its_chunk() {
+    let mut bytes = std::fs::read(&written(50, Some("")).0).unwrap();
+    let at = bytes.len() / 2;
+    bytes[at] ^= 1;
+    let (ticks, ending) = read(&Scrap::of(&bytes));
+    assert!(matches!(ending, Ending::Damaged(_)), "{ending:?}");
+    assert!(ticks % 10 == 0 && (10..40).contains(&ticks), "{ticks}");
+}
+
+#[test]
+fn what_is_no_recording_of_ours_is_refused_by_name() {
+    let error = |scrap: &Scrap| Reader::open(&scrap.0).unwrap_err().to_string();
+    for bytes in [&b""[..], b"[[body]]\nname = \"a\"\n", &[0; 4096]] {
+        let error = error(&Scrap::of(bytes));
+        assert!(
+            error.contains("is no MCAP file") || error.contains("nothing to replay"),
+            "{error}"
+        );
+    }
+    let text = error(&Scrap::of(b"[[body]]\nname = \"some text\"\n"));
+    assert!(text.contains("is no MCAP file"), "{text}");
+    // An MCAP file of others.
+    let scrap = Scrap::new();
+    let mut writer = mcap::Writer::new(create(&scrap.0, false).unwrap()).unwrap();
+    writer.finish().unwrap();
+    drop(writer);
+    let text = error(&scrap);
+    assert!(text.contains("run SCENE --record FILE"), "{text}");
+    assert!(Reader::open(&PathBuf::from("/nowhere/x.mcap")).is_err());
+}
+
+#[test]
+fn a_file_that_is_there_is_not_written_over_unless_asked_for() {
+    let scrap = Scrap::of(b"mine");
+    let error = create(&scrap.0, false).unwrap_err();
+    assert_eq!(error.exit_code(), 4);
+    assert!(error.to_string().contains("--force"), "{error}");
+    assert_eq!(std::fs::read(&scrap.0).unwrap(), b"mine");
+    create(&scrap.0, true).unwrap();
+    assert_eq!(std::fs::read(&scrap.0).unwrap(), b"");
+}
