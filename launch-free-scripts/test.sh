@@ -14,7 +14,8 @@ if [ "${1:-}" != --rust-only ]; then
   # What the Python side needs, in an environment of its own.
   venv=$root/.venv-test
   [ -x "$venv/bin/python" ] || python3 -m venv "$venv"
-  "$venv/bin/pip" install --quiet --disable-pip-version-check pytest pytest-xdist mujoco ./msgs/python
+  "$venv/bin/pip" install --quiet --disable-pip-version-check pytest pytest-xdist mujoco \
+    mcap mcap-ros2-support ./msgs/python
   export SWEEPD_PYTHON=$venv/bin/python
 fi
 

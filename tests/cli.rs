@@ -20,6 +20,9 @@ mod manual;
 mod monitor;
 #[path = "cli/query.rs"]
 mod query;
+#[cfg(feature = "mcap")]
+#[path = "cli/record.rs"]
+mod record;
 #[path = "cli/report.rs"]
 mod report;
 
@@ -100,6 +103,7 @@ fn usage_is_refused_with_code_2_on_stderr_and_help_is_given_with_code_0_on_stdou
         "query",
         "list",
         "doctor",
+        "replay",
         "report",
         "completions",
         "man",

@@ -43,6 +43,8 @@ pub(super) enum Command {
     /// Each line says ok, warning or wrong, what is so, and what to do. Nothing is changed without --clean. Ends with
     /// code 1 when something is wrong; warnings alone are no reason.
     Doctor(DoctorArgs),
+    /// Run the engine again on what `run --record` wrote, and report the first tick that differs.
+    Replay(ReplayArgs),
     /// Measure: error against run time, and numerical stability.
     Report(ReportArgs),
     /// Write completions of commands and flags for a shell to standard output.
@@ -105,6 +107,34 @@ pub(super) struct RunArgs {
     /// DDS domain, 0 to 232; `ROS_DOMAIN_ID` otherwise.
     #[arg(long, value_name = "N")]
     pub(super) ros_domain_id: Option<u16>,
+    /// Record all that the engine is given and says to this file (MCAP), for `sweepd replay` and for people.
+    ///
+    /// The recording listens to pairs and contacts, and ten times a second to bodies: these are then computed.
+    #[arg(long, value_name = "FILE.mcap")]
+    pub(super) record: Option<PathBuf>,
+    /// Write over a recording that is there.
+    #[arg(long, requires = "record")]
+    pub(super) force: bool,
+}
+
+#[derive(Debug, Args)]
+#[cfg_attr(
+    not(feature = "mcap"),
+    allow(dead_code, reason = "this build refuses to replay")
+)]
+pub(super) struct ReplayArgs {
+    /// What `sweepd run SCENE --record FILE` wrote.
+    #[arg(value_name = "FILE.mcap")]
+    pub(super) file: PathBuf,
+    /// One JSON object instead of text.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// Compare from this tick on; those before it are run.
+    #[arg(long, value_name = "TICK")]
+    pub(super) from: Option<u64>,
+    /// End with this tick.
+    #[arg(long, value_name = "TICK")]
+    pub(super) until: Option<u64>,
 }
 
 #[derive(Debug, Args)]

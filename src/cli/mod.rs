@@ -14,7 +14,11 @@ mod list;
 mod manual;
 mod monitor;
 mod out;
+mod progress;
 mod query;
+mod record;
+#[cfg(feature = "mcap")]
+mod replay;
 mod report;
 mod ros;
 mod run;
@@ -76,6 +80,10 @@ fn dispatch(command: Command, ros_words: Option<&[String]>) -> Result<ExitCode> 
         Command::Query(args) => query::query(&args, &mut out),
         Command::List(args) => list::list(&args, &mut out),
         Command::Doctor(args) => doctor::doctor(&args, &mut out),
+        #[cfg(feature = "mcap")]
+        Command::Replay(args) => replay::replay(&args, &mut out, stop()?.as_ref()),
+        #[cfg(not(feature = "mcap"))]
+        Command::Replay(_) => Err(record::unable("replay")),
         Command::Report(args) => report::report(&args, &mut out, stop()?.as_ref()),
         Command::Completions(args) => manual::completions(&args, &mut out),
         Command::Man(args) => manual::man(&args, &mut out),

@@ -5,14 +5,16 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use crate::config::Mode;
-use crate::daemon::{Daemon, Watchdog, build_shapes};
+use crate::daemon::{Daemon, Watchdog};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
+use crate::tick::build::build_shapes_in;
 use crate::time::{Clock, SystemClock};
 use crate::transport::iceoryx::{Place, Server, ServerOptions, spawn_cleaner};
 use crate::transport::{Both, Door};
 
 use super::args::{Limit, RunArgs};
+use super::record::Tape;
 use super::ros;
 
 /// Exit code when the watchdog ends the process.
@@ -25,11 +27,14 @@ const WATCHDOG_BEYOND_NS: u64 = 1_000_000_000;
 pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBool) -> Result<bool> {
     let place = Place::new(&args.which.instance)?;
     let asked = ros::Asked::read(args, ros_words)?;
-    let mut scene = Scene::load(&args.scene)?;
+    let text = Scene::read_text(&args.scene)?;
+    let mut scene = Scene::parse_at(&text, &args.scene)?;
     apply(args, &mut scene)?;
     asked.check(&scene)?;
     check_watchdog(args, &scene)?;
-    let shapes = build_shapes(&scene)?;
+    let tape = Tape::open(args)?;
+    let mut shapes = build_shapes_in(&scene, tape.library())?;
+    let given = (text, shapes.library.take_kept());
     for warning in scene.notes().iter().chain(&shapes.warnings) {
         tracing::warn!("{warning}");
     }
@@ -56,6 +61,7 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     };
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
     let mut daemon = Daemon::new(&scene, shapes, boot_id, clock, door)?;
+    tape.begin(&mut daemon, &scene, given, boot_id)?;
     let watchdog = match args.watchdog {
         Limit::None => None,
         Limit::Of(limit_ns) => Some(Watchdog::start(Duration::from_nanos(limit_ns), give_up)?),
@@ -71,6 +77,8 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
         scene.sources.len()
     );
     daemon.run(stop, args.ticks)?;
+    // That it failed was told when it did; the daemon has done its work.
+    let _told_already = daemon.end_record();
     tracing::info!("ended after {} ticks", daemon.engine().ticks());
     Ok(true)
 }

@@ -9,6 +9,7 @@ use std::thread::JoinHandle;
 
 use crate::error::{Error, Result};
 use crate::query::GapQuestion;
+use crate::record::Asked;
 use crate::scene::{Request, Scene};
 use crate::shape::Library;
 use crate::tick::EditBatch;
@@ -39,8 +40,8 @@ enum Work {
 
 /// What the worker made of a request.
 pub(super) enum Done {
-    /// Edits for the next tick.
-    Batch(EditBatch),
+    /// Edits for the next tick, and what they were made of.
+    Batch(EditBatch, Asked),
     /// The bodies are to be looked up: names of A and B.
     Gap(String, String),
     /// A tree to be put in place.
@@ -166,7 +167,15 @@ impl Against {
         let (json, blobs) = cut.ok_or("the request is shorter than its header says")?;
         match Request::parse(json, blobs)? {
             Request::Gap { a, b } => Ok(Done::Gap(a, b)),
-            Request::Edits(asked) => self.edits.build(token.0, asked).map(Done::Batch),
+            Request::Edits(asked) => {
+                let batch = self.edits.build(token.0, asked)?;
+                let asked = Asked {
+                    json_len,
+                    files: self.edits.take_kept(),
+                    payload,
+                };
+                Ok(Done::Batch(batch, asked))
+            }
         }
     }
 }

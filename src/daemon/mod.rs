@@ -4,6 +4,7 @@
 
 mod builder;
 mod notes;
+mod record;
 mod settings;
 #[cfg(test)]
 mod tests;
@@ -15,6 +16,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use crate::config::Config;
 use crate::error::Result;
 use crate::query::GapQuestion;
+use crate::record::{Ask, Between, Origin, Recorder};
 use crate::scene::Scene;
 use crate::tick::pace::{Due, Pacer};
 use crate::tick::{EditBatch, Engine, TickInput};
@@ -54,6 +56,8 @@ pub struct Daemon<'a> {
     tree_asked: Option<TreeOf>,
     /// Raised each round, and each heartbeat of a long tick.
     progress: Arc<AtomicU64>,
+    /// Who writes down what the engine is given and says.
+    recorder: Option<Recorder>,
 }
 
 impl std::fmt::Debug for Daemon<'_> {
@@ -89,6 +93,7 @@ impl<'a> Daemon<'a> {
             tick_asked: false,
             tree_asked: None,
             progress: Arc::default(),
+            recorder: None,
         };
         daemon.follow();
         Ok(daemon)
@@ -185,7 +190,9 @@ impl<'a> Daemon<'a> {
         if self.tree_asked.is_none()
             && let Some(worn) = self.engine.worn_tree()
         {
-            self.tree_asked = Some(worn.of());
+            let of = worn.of();
+            self.tree_asked = Some(of);
+            self.note(Between::TreeAsked(of.into()));
             self.builder.build_tree(worn);
         }
         while let Some((token, built)) = self.builder.finished() {
@@ -202,8 +209,14 @@ impl<'a> Daemon<'a> {
     fn settle_tree(&mut self, built: std::result::Result<Done, String>) {
         let asked = self.tree_asked.take();
         if let Ok(Done::Tree(tree)) = built {
-            self.engine.take_tree(*tree);
-        } else if let Some(name) = asked.and_then(|of| self.engine.refuse_tree(of)) {
+            let of = tree.of();
+            let taken = self.engine.take_tree(*tree);
+            self.note(Between::TreeBuilt(of.into(), taken));
+            return;
+        }
+        let Some(of) = asked else { return };
+        self.note(Between::TreeRefused(of.into()));
+        if let Some(name) = self.engine.refuse_tree(of) {
             tracing::error!(
                 "the tree of body \"{name}\" could not be built anew: its boxes are refitted as before, and its next \
                  vertices are tried; see the panic above"
@@ -218,8 +231,8 @@ impl<'a> Daemon<'a> {
         built: std::result::Result<Done, String>,
     ) -> Option<Answer> {
         let refusal = match built {
-            Ok(Done::Batch(batch)) => {
-                self.ready.push(batch);
+            Ok(Done::Batch(batch, asked)) => {
+                self.edit(batch, Origin::Asked(asked));
                 return None;
             }
             Ok(Done::Found(gap, warnings)) => {
@@ -254,10 +267,11 @@ impl<'a> Daemon<'a> {
 
     /// Runs one tick and sends what it filled.
     fn tick(&mut self, due: Due, woke_ns: u64) -> Result<()> {
-        let engine = &mut self.engine;
-        self.pacer
-            .drain_passed(|source, frames| engine.note_skipped(source, frames));
-        let demand = self.door.demand();
+        self.tell_passed();
+        let mut demand = self.door.demand();
+        if let Some(recorder) = &mut self.recorder {
+            demand = recorder.listen(demand, self.clock.boottime_ns());
+        }
         let budget = if due.ages_only {
             Budget {
                 units: Some(0),
@@ -284,12 +298,16 @@ impl<'a> Daemon<'a> {
             woke_ns,
             pulse: Some(&mut pulse),
         };
+        let ask = Ask::of(&input);
         let outbox = self.engine.tick(input);
         if let Some(error) = broken {
             return Err(error);
         }
         let start_ns = self.clock.monotonic_ns();
         let lost = self.door.publish(outbox)?;
+        if let Some(recorder) = &mut self.recorder {
+            recorder.tick(&self.due, ask, &self.engine);
+        }
         let send_ns = self.clock.monotonic_ns().saturating_sub(start_ns);
         if lost > 0 {
             tracing::debug!(

@@ -1,5 +1,6 @@
 //! What an operator set while the daemon runs, applied between two ticks.
 
+use crate::record::{Between, Origin};
 use crate::tick::EditBatch;
 use crate::transport::Setting;
 use crate::world::Edit;
@@ -15,6 +16,9 @@ impl Daemon<'_> {
         let mut all = Vec::new();
         self.door.settings(&mut |setting| all.push(setting));
         for setting in all {
+            if let Some(between) = Between::of(&setting) {
+                self.note(between);
+            }
             self.apply(setting);
         }
     }
@@ -35,22 +39,25 @@ impl Daemon<'_> {
                 self.engine.set_timeout(source, timeout_ns);
             }
             Setting::TickNow => self.tick_asked = true,
-            Setting::Margin(report_within_m) => self.edit(Edit::Margin {
-                name: None,
-                report_within_m,
-            }),
-            Setting::Reset => self.edit(Edit::Reset { source: None }),
+            Setting::Margin(report_within_m) => {
+                let edit = Edit::Margin {
+                    name: None,
+                    report_within_m,
+                };
+                self.edit(own(edit), Origin::Margin(report_within_m));
+            }
+            Setting::Reset => self.edit(own(Edit::Reset { source: None }), Origin::Reset),
         }
     }
+}
 
-    /// An edit of the next tick.
-    fn edit(&mut self, edit: Edit) {
-        self.ready.push(EditBatch {
-            token: NOBODY,
-            validate: false,
-            edits: vec![edit],
-            warnings: Vec::new(),
-        });
+/// An edit of the daemon's own.
+fn own(edit: Edit) -> EditBatch {
+    EditBatch {
+        token: NOBODY,
+        validate: false,
+        edits: vec![edit],
+        warnings: Vec::new(),
     }
 }
 

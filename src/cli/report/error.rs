@@ -12,8 +12,8 @@ use crate::report::error::tally::Row;
 use crate::report::error::{Report, Setup, Sweep, run};
 use crate::scene::Scene;
 
-use super::progress::Progress;
 use super::{Page, stopped};
+use crate::cli::progress::Progress;
 
 /// Budgets in one sweep at most: each has an engine of its own.
 const BUDGETS_MAX: usize = 64;

@@ -1,7 +1,6 @@
 //! `sweepd report`: what the library finds out, in tables, as JSON and as pages of HTML.
 
 mod error;
-mod progress;
 mod stability;
 
 use std::path::Path;

@@ -9,8 +9,8 @@ use crate::error::{Error, Result};
 use crate::report::stability::families::{FAMILIES, Family, named};
 use crate::report::stability::{Found, Report, page, run};
 
-use super::progress::Progress;
 use super::{Page, stopped};
+use crate::cli::progress::Progress;
 
 /// Plays the families that were asked for, or lists them; `false` when something is wrong.
 pub(super) fn stability(args: &StabilityArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {

@@ -1,0 +1,134 @@
+//! `sweepd replay FILE`: the engine again on what was recorded, and the first tick that differs.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::args::ReplayArgs;
+use super::out::Out;
+use super::progress::Progress;
+use crate::error::{Error, Result};
+use crate::record::file::{Ending, Read, Reader};
+use crate::record::{Difference, Facts, Replay, TIMES, Tally};
+
+/// What a replay found.
+struct Found {
+    facts: Facts,
+    /// Ticks run, compared or not.
+    ticks: u64,
+    tally: Tally,
+    difference: Option<Difference>,
+    /// How the file ended; `None`: it was not read to its end.
+    ending: Option<Ending>,
+}
+
+/// Replays a recording; `false` when it differs, or the file is damaged.
+pub(super) fn replay(args: &ReplayArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
+    let found = run(args, stop)?;
+    if args.json {
+        out.line(&json(&found).to_string())?;
+    } else {
+        tell(&found, out)?;
+    }
+    out.flush()?;
+    let damaged = matches!(found.ending, Some(Ending::Damaged(_)));
+    Ok(found.difference.is_none() && !damaged)
+}
+
+fn run(args: &ReplayArgs, stop: &AtomicBool) -> Result<Found> {
+    let (mut reader, start) = Reader::open(&args.file)?;
+    let facts = start.facts.clone();
+    if facts.sweepd_version != env!("CARGO_PKG_VERSION") {
+        tracing::warn!(
+            "recorded by sweepd {}, replayed by {}: what differs may be what was changed between them",
+            facts.sweepd_version,
+            env!("CARGO_PKG_VERSION")
+        );
+    }
+    let mut replay = Replay::new(&start)?;
+    drop(start);
+    let mut progress = Progress::new();
+    let (from, until) = (args.from.unwrap_or(0), args.until.unwrap_or(u64::MAX));
+    let (mut ticks, mut difference, mut ending) = (0, None, None);
+    while difference.is_none() && ticks < until {
+        if stop.load(Ordering::Relaxed) {
+            let text = "stopped by a signal before the replay was done; nothing was told";
+            return Err(Error::Refused(text.to_owned()));
+        }
+        let (done, all) = reader.progress();
+        progress.tell(done, all, &format!("bytes, tick {ticks}"));
+        match reader.next()? {
+            Read::End(how) => {
+                ending = Some(how);
+                break;
+            }
+            Read::Tick(record) => {
+                ticks = record.out.tick.header.tick;
+                difference = replay.tick(record, ticks >= from)?;
+            }
+        }
+    }
+    Ok(Found {
+        facts,
+        ticks,
+        tally: replay.tally(),
+        difference,
+        ending,
+    })
+}
+
+fn tell(found: &Found, out: &mut Out) -> Result<()> {
+    let (facts, tally) = (&found.facts, &found.tally);
+    out.line(&format!(
+        "{}, recorded by sweepd {}: {} ticks replayed",
+        facts.scene_file, facts.sweepd_version, found.ticks
+    ))?;
+    if tally.exact > 0 || tally.lawful == 0 {
+        out.line(&format!(
+            "{} ticks compared bit by bit; left out as measured times: {}",
+            tally.exact,
+            TIMES.join(", ")
+        ))?;
+    }
+    if tally.lawful > 0 {
+        let judged = &tally.judged;
+        out.line(&format!(
+            "{} ticks were limited by time, or came after such: replayed without a limit and held against the law; {} \
+             rows, {} collisions, {} of them told as not decided",
+            tally.lawful, judged.rows, judged.collisions, judged.open
+        ))?;
+    }
+    match &found.ending {
+        None | Some(Ending::Whole) => {}
+        Some(ending) => out.line(&ending.to_string())?,
+    }
+    match &found.difference {
+        Some(difference) => out.line(&format!("first difference: {difference}")),
+        None => out.line("no difference"),
+    }
+}
+
+fn json(found: &Found) -> serde_json::Value {
+    let (facts, tally) = (&found.facts, &found.tally);
+    let ending = found.ending.as_ref();
+    let word = ending.map(|ending| match ending {
+        Ending::Whole => "whole",
+        Ending::Early(_) => "early",
+        Ending::Cut => "cut",
+        Ending::Damaged(_) => "damaged",
+    });
+    let why = ending.filter(|ending| **ending != Ending::Whole);
+    serde_json::json!({
+        "scene": facts.scene_file,
+        "sweepd_version": facts.sweepd_version,
+        "boot_id": facts.boot_id,
+        "ticks": found.ticks,
+        "ticks_exact": tally.exact,
+        "ticks_by_law": tally.lawful,
+        "rows_by_law": tally.judged.rows,
+        "collisions_by_law": tally.judged.collisions,
+        "collisions_open": tally.judged.open,
+        "fields_left_out": TIMES,
+        "ending": word,
+        "why": why.map(ToString::to_string),
+        "difference": found.difference,
+    })
+}

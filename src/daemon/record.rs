@@ -1,0 +1,47 @@
+//! What the daemon tells its recorder beside the ticks.
+
+use super::Daemon;
+use crate::error::Result;
+use crate::record::{Between, Origin, Recorder};
+use crate::tick::EditBatch;
+
+impl Daemon<'_> {
+    /// Records everything from now on; to be called before the first tick.
+    pub fn record(&mut self, recorder: Recorder) {
+        self.recorder = Some(recorder);
+    }
+
+    /// Ends the recording, where there is one.
+    ///
+    /// # Errors
+    /// As [`Recorder::finish`].
+    pub fn end_record(&mut self) -> Result<()> {
+        self.recorder.take().map_or(Ok(()), Recorder::finish)
+    }
+
+    pub(super) fn note(&mut self, between: Between) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.note(between);
+        }
+    }
+
+    /// An edit of the next tick, and what it was made of.
+    pub(super) fn edit(&mut self, batch: EditBatch, origin: Origin) {
+        self.ready.push(batch);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.note_edit(origin);
+        }
+    }
+
+    /// Tells the engine of frames that were passed over.
+    pub(super) fn tell_passed(&mut self) {
+        let (engine, recorder) = (&mut self.engine, &mut self.recorder);
+        self.pacer.drain_passed(|source, frames| {
+            engine.note_skipped(source, frames);
+            if let Some(recorder) = recorder {
+                let source = source.map(|slot| slot.0);
+                recorder.note(Between::Skipped { source, frames });
+            }
+        });
+    }
+}

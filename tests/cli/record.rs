@@ -1,0 +1,194 @@
+//! Goal: a run is recorded and replayed as a user does it. Method: the real daemon and the real source; the daemon ends
+//! by SIGTERM, by `kill -9`, or does not begin.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use rustix::process::Signal;
+
+use super::live::{Desk, output, until};
+use super::{code, err, out};
+
+/// A pool of bodies that a source moves; its scene file, and where a recording goes.
+fn pool(desk: &Desk, count: &str) -> (PathBuf, PathBuf) {
+    let scene = desk.dir.join("pool.toml");
+    let made = output(&["feed", "--write-scene", path(&scene), "--count", count]);
+    assert_eq!(code(&made), Some(0), "{}", err(&made));
+    (scene, desk.dir.join("run.mcap"))
+}
+
+fn path(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// A replay's JSON, and its exit code.
+fn replayed(file: &Path, more: &[&str]) -> (serde_json::Value, Option<i32>) {
+    let mut args = vec!["replay", path(file), "--json"];
+    args.extend_from_slice(more);
+    let ended = output(&args);
+    let json = serde_json::from_str(&out(&ended));
+    let json = json.unwrap_or_else(|e| panic!("{e}: {} {}", out(&ended), err(&ended)));
+    (json, code(&ended))
+}
+
+/// Records while a source sends so many frames.
+fn recorded(desk: &Desk, scene: &Path, file: &Path, flags: &[&str], frames: &str, end: Signal) {
+    let mut args = vec![path(scene), "--record", path(file)];
+    args.extend_from_slice(flags);
+    let mut daemon = desk.start("run", &args);
+    let mut feed = desk.start("feed", &[path(scene), "--frames", frames, "--rate", "200"]);
+    let (fed, _) = feed.end();
+    assert!(fed.success(), "{}\n{}", feed.stderr(), daemon.stderr());
+    if end == Signal::KILL {
+        // What was written by now is in the file half a second later.
+        std::thread::sleep(Duration::from_millis(1500));
+        daemon.kill();
+    } else {
+        let (status, _) = daemon.stop();
+        assert_eq!(status.code(), Some(0), "{}", daemon.stderr());
+    }
+}
+
+#[test]
+fn a_recorded_run_replays_bit_by_bit_with_code_0() {
+    let desk = Desk::new();
+    let (scene, file) = pool(&desk, "120");
+    for flags in [
+        &["--budget", "none"][..],
+        &["--budget", "none", "--budget-units", "300", "--force"],
+    ] {
+        recorded(&desk, &scene, &file, flags, "300", Signal::TERM);
+        // Nothing but the file is needed.
+        let kept = std::fs::read(&scene).unwrap();
+        std::fs::remove_file(&scene).unwrap();
+        let (json, code) = replayed(&file, &[]);
+        std::fs::write(&scene, kept).unwrap();
+        assert_eq!(code, Some(0), "{json}");
+        assert_eq!(json["difference"], serde_json::Value::Null);
+        assert_eq!(
+            (&json["ending"], &json["ticks_by_law"]),
+            (&"whole".into(), &0.into())
+        );
+        let ticks = json["ticks"].as_u64().unwrap();
+        assert!(ticks > 200 && json["ticks_exact"] == ticks, "{json}");
+        let (json, _) = replayed(&file, &["--from", "50", "--until", "99"]);
+        assert_eq!(
+            (&json["ticks"], &json["ticks_exact"]),
+            (&99.into(), &50.into())
+        );
+    }
+    let text = out(&output(&["replay", path(&file)]));
+    assert!(
+        text.contains("compared bit by bit") && text.contains("no difference"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_run_with_a_budget_of_time_is_held_against_the_law() {
+    let desk = Desk::new();
+    let (scene, file) = pool(&desk, "200");
+    recorded(
+        &desk,
+        &scene,
+        &file,
+        &["--budget", "300us"],
+        "200",
+        Signal::TERM,
+    );
+    let (json, code) = replayed(&file, &[]);
+    assert_eq!(code, Some(0), "{json}");
+    assert_eq!(json["ticks_exact"], 0);
+    assert!(json["ticks_by_law"].as_u64().unwrap() > 100, "{json}");
+    assert!(json["rows_by_law"].as_u64().unwrap() > 1_000, "{json}");
+}
+
+#[test]
+fn what_a_killed_daemon_has_written_is_replayed() {
+    let desk = Desk::new();
+    let (scene, file) = pool(&desk, "100");
+    recorded(
+        &desk,
+        &scene,
+        &file,
+        &["--budget", "none"],
+        "300",
+        Signal::KILL,
+    );
+    let (json, code) = replayed(&file, &[]);
+    assert_eq!(code, Some(0), "{json}");
+    assert_eq!(json["ending"], "cut");
+    assert!(json["ticks_exact"].as_u64().unwrap() > 200, "{json}");
+    let text = out(&output(&["replay", path(&file)]));
+    assert!(text.contains("the file is cut off"), "{text}");
+}
+
+#[test]
+fn a_file_that_cannot_be_is_refused_before_the_daemon_runs() {
+    let desk = Desk::new();
+    let (scene, file) = pool(&desk, "10");
+    let run = |file: &str, more: &[&str]| {
+        let mut args = vec![
+            "run",
+            path(&scene),
+            "--instance",
+            &desk.instance,
+            "--record",
+            file,
+        ];
+        args.extend_from_slice(more);
+        output(&args)
+    };
+    std::fs::write(&file, "mine").unwrap();
+    let ended = run(path(&file), &[]);
+    assert_eq!(code(&ended), Some(4));
+    assert!(err(&ended).contains("--force"), "{}", err(&ended));
+    assert_eq!(std::fs::read(&file).unwrap(), b"mine");
+    let ended = run("/nowhere/run.mcap", &[]);
+    assert_eq!(code(&ended), Some(4));
+    assert!(err(&ended).contains("/nowhere/run.mcap"), "{}", err(&ended));
+    // A device that is always full.
+    let ended = run("/dev/full", &["--force"]);
+    assert_eq!(code(&ended), Some(4));
+    assert!(err(&ended).contains("is the disk full?"), "{}", err(&ended));
+    let ended = output(&["run", path(&scene), "--force"]);
+    assert_eq!(code(&ended), Some(2), "{}", err(&ended));
+}
+
+#[test]
+fn what_is_no_recording_is_refused_with_code_4() {
+    let desk = Desk::new();
+    let (scene, _) = pool(&desk, "10");
+    for file in [path(&scene), "/nowhere/run.mcap"] {
+        let ended = output(&["replay", file]);
+        assert_eq!(code(&ended), Some(4), "{}", err(&ended));
+        assert!(err(&ended).contains(file), "{}", err(&ended));
+    }
+}
+
+#[test]
+fn edits_of_a_running_scene_are_in_the_recording() {
+    let desk = Desk::new();
+    let file = desk.dir.join("run.mcap");
+    let mut daemon = desk.run(super::TWO_SPHERES, &["--record", path(&file)]);
+    let mut client = desk.source("sim");
+    let rows = [super::live::at(1, 0.0), super::live::at(2, 0.8)];
+    super::live::step(&mut client, &rows);
+    let json = r#"{"edits": [{"put": {"name": "wall", "moves": false,
+        "shape": {"type": "box", "half_extents": [0.1, 2, 2]}}}]}"#;
+    let answer = client
+        .request(json, &[], 30 * super::live::SECOND_NS)
+        .unwrap();
+    assert!(answer.ok, "{answer:?}");
+    super::live::step(&mut client, &rows);
+    assert_eq!(client.view().pairs().unwrap().rows.len(), 2);
+    assert_eq!(daemon.stop().0.code(), Some(0));
+    until("the recording", || file.exists());
+    let (json, code) = replayed(&file, &[]);
+    assert_eq!(
+        (code, &json["difference"]),
+        (Some(0), &serde_json::Value::Null),
+        "{json}"
+    );
+    assert!(json["ticks_exact"].as_u64().unwrap() >= 3, "{json}");
+}
