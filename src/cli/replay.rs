@@ -55,7 +55,7 @@ fn run(args: &ReplayArgs, stop: &AtomicBool) -> Result<Found> {
         }
         let (done, all) = reader.progress();
         progress.tell(done, all, &format!("bytes, tick {ticks}"));
-        match reader.next()? {
+        match reader.next_tick()? {
             Read::End(how) => {
                 ending = Some(how);
                 break;

@@ -9,7 +9,7 @@ use crate::shape::Contents;
 use crate::tick::TickInput;
 use crate::time::{Budget, Clock, SystemClock};
 use crate::transport::Setting;
-use crate::wire::{Demand, Inbox, Outbox, TickCause, TickRow, WIRE_VERSION};
+use crate::wire::{Demand, Inbox, Outbox, TickCause, WIRE_VERSION};
 use crate::world::{Applied, TreeOf};
 
 /// Number of the layout of our messages in a recording; another is not read.
@@ -337,10 +337,4 @@ fn copy_rows<T: Copy>(filled: bool, from: &[T], to: &mut Vec<T>) {
     if filled {
         to.extend_from_slice(from);
     }
-}
-
-/// Whether a tick was limited by time, the budget's or a frame's: what it found then depends on the machine.
-#[cfg(feature = "mcap")]
-pub(super) fn is_timed(row: &TickRow) -> bool {
-    row.budget_ns != u64::MAX
 }

@@ -61,6 +61,10 @@ struct State {
     /// Records to be written, and what they take.
     waiting: VecDeque<Box<TickRecord>>,
     bytes: usize,
+    #[allow(
+        clippy::vec_box,
+        reason = "they go from list to list, and each is kilobytes by itself"
+    )]
     spare: Vec<Box<TickRecord>>,
     /// Nothing follows, and why; empty: the daemon ended.
     ending: Option<String>,

@@ -9,9 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::differ::{self, Spot};
-use super::given::{
-    Between, EditRecord, Origin, Start, TickRecord, TreeMark, copy_outbox, is_timed,
-};
+use super::given::{Between, EditRecord, Origin, Start, TickRecord, TreeMark, copy_outbox};
 use super::law::{self, Judged};
 use crate::config::Mode;
 use crate::error::{Error, Result};
@@ -21,7 +19,7 @@ use crate::shape::Library;
 use crate::tick::build::{EditBuilder, build_shapes_in};
 use crate::tick::{EditBatch, Engine, TickInput};
 use crate::time::{Budget, Clock};
-use crate::wire::{Outbox, name_str};
+use crate::wire::{Outbox, TickRow, name_str};
 use crate::world::{Edit, WornTree};
 
 /// Where a replay first differs from its recording.
@@ -326,4 +324,9 @@ impl Replay {
             replayed: spot.replayed,
         }
     }
+}
+
+/// Whether a tick was limited by time, the budget's or a frame's: what it found then depends on the machine.
+fn is_timed(row: &TickRow) -> bool {
+    row.budget_ns != u64::MAX
 }

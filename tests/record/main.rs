@@ -7,6 +7,7 @@
     clippy::panic,
     clippy::cast_precision_loss,
     clippy::cast_possible_truncation,
+    clippy::float_cmp,
     unreachable_pub,
     reason = "tests"
 )]

@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 use std::sync::{Arc, Mutex};
 
 use sweepd::config::Mode;
-use sweepd::record::{Sink, Start};
 use sweepd::time::ManualClock;
 use sweepd::transport::Setting;
 use sweepd::transport::client::{Client, FrameInfo, Link as _, Part, Rows, Topics};
@@ -27,7 +26,7 @@ pub struct Play<'a> {
     pub units: Option<u64>,
     /// Time of a tick, nanoseconds, where each look at the clock takes so many.
     pub time_ns: Option<(u64, u64)>,
-    pub sink: Option<&'a dyn Fn(&Start) -> Box<dyn Sink>>,
+    pub sink: Option<&'a stage::Make<'a>>,
 }
 
 impl Default for Play<'_> {
@@ -223,7 +222,7 @@ impl Cast {
     fn send_other(&mut self, round: usize) {
         let ids: Vec<_> = (1..=18).filter(|id| id % 3 == 0).collect();
         let mut rows: Vec<_> = ids.iter().map(|id| self.row(*id)).collect();
-        let side = if round % 2 == 0 { 1.2 } else { -1.2 };
+        let side = if round.is_multiple_of(2) { 1.2 } else { -1.2 };
         rows.push(TransformRow {
             body: 40,
             position: [side, 0.0, 0.4],
@@ -296,7 +295,7 @@ impl Cast {
                 r#"{"put": {"name": "b7", "id": 7, "source": "sim", "shape": {"type": "cone", "radius": 0.3, "half_height": 0.2}}}"#
             }
         };
-        let more = if round % 5 == 0 {
+        let more = if round.is_multiple_of(5) {
             ", \"validate\": true"
         } else {
             ""

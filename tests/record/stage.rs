@@ -98,6 +98,9 @@ impl Door for Desk {
     }
 }
 
+/// Makes where a recording goes, of its start.
+pub type Make<'a> = dyn Fn(&Start) -> Box<dyn Sink> + 'a;
+
 /// Runs a recording daemon; returns its ticks.
 ///
 /// * `sink` - where the recording goes; `None`: the folder's file.
@@ -108,7 +111,7 @@ pub fn run(
     hub: &Hub,
     clock: &Arc<ManualClock>,
     panel: Panel,
-    sink: Option<&dyn Fn(&Start) -> Box<dyn Sink>>,
+    sink: Option<&Make<'_>>,
     mut drive: impl FnMut() -> bool,
 ) -> u64 {
     let scene = Scene::parse(text, "rich.toml", folder.dir()).unwrap();
@@ -148,7 +151,7 @@ pub fn ended(path: &Path) -> (Start, Vec<TickRecord>, Ending) {
     let (mut reader, start) = Reader::open(path).unwrap();
     let mut all = Vec::new();
     loop {
-        match reader.next().unwrap() {
+        match reader.next_tick().unwrap() {
             Read::Tick(record) => all.push(record.clone()),
             Read::End(ending) => return (start, all, ending),
         }

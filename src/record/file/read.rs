@@ -129,7 +129,7 @@ impl Reader {
     ///
     /// # Errors
     /// `Error::Io` when the file cannot be read.
-    pub fn next(&mut self) -> Result<Read<'_>> {
+    pub fn next_tick(&mut self) -> Result<Read<'_>> {
         loop {
             match self.step()? {
                 Ok(Step::Tick) => return Ok(Read::Tick(&mut self.record)),

@@ -73,7 +73,7 @@ fn read(scrap: &Scrap) -> (u64, Ending) {
     let (mut reader, _) = Reader::open(&scrap.0).unwrap();
     let mut ticks = 0;
     loop {
-        match reader.next().unwrap() {
+        match reader.next_tick().unwrap() {
             Read::Tick(record) => {
                 ticks += 1;
                 assert_eq!(record.out.tick.header.tick, ticks);
