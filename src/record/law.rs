@@ -2,7 +2,7 @@
 //!
 //! How far a tick came by its deadline depends on the machine, so that no replay says the same. What it said is proved
 //! all the same: a certified verdict must agree, the proved intervals must overlap, and no collision may be missing
-//! where all pairs were told. The upper end of a pair that overlaps is not proved where the row is an estimate.
+//! where all pairs were told.
 
 use std::cmp::Ordering;
 
@@ -109,9 +109,7 @@ fn both(one: &PairRow, two: &PairRow, judged: &mut Judged) -> Option<Spot> {
         judged.collisions += 1;
         judged.open += u64::from(!touches(one));
     }
-    // How deep two bodies overlap is proved from below only, until the query is finished.
-    let estimate = has(one, pair_flags::ESTIMATE) && touches(one) && touches(two);
-    let overlap = one.gap_min_m <= two.gap_max_m && (estimate || two.gap_min_m <= one.gap_max_m);
+    let overlap = one.gap_min_m <= two.gap_max_m && two.gap_min_m <= one.gap_max_m;
     if !overlap {
         let show = |row: &PairRow| format!("{:?} to {:?}", row.gap_min_m, row.gap_max_m);
         return Some(spot(one, "gap interval, metres", &show(one), &show(two)));
@@ -216,10 +214,6 @@ mod tests {
         touch.flags = pair_flags::TOUCHING;
         let near = row(2, Verdict::Near, 1e-17, 2e-16);
         assert_eq!(field(vec![near], vec![touch]), None);
-        // How deep it is was not found out in time.
-        let mut deeper = row(2, Verdict::Colliding, -0.9, -0.3);
-        deeper.flags = pair_flags::ESTIMATE;
-        assert_eq!(field(vec![deeper], vec![deep]), None);
         // The last row of a pair that is gone says nothing of now.
         let mut gone = deep;
         gone.flags = pair_flags::GONE;

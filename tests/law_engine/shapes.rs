@@ -180,3 +180,40 @@ fn law_3_2_a_height_field_has_a_top_walls_and_a_floor() {
         assert_eq!(rig.verdict(1, 2), want, "{place:?}");
     }
 }
+
+#[test]
+fn bug_a_solid_and_a_body_of_several_shapes_were_told_as_deeper_than_any_point_of_them_can_be() {
+    // No point is deeper than a quarter of a metre in the terrain, which is half a metre thick at most, nor deeper than
+    // 0.2 m in the body, where the post and a triangle of the terrain are parted by 0.3 m and more.
+    let terrain = "{ type = \"height_field\", heights = [[0.0, 0.3, 0.0], [0.3, 0.1, 0.2], [0.0, 0.2, 0.0]], size = [2.0, 2.0], base_m = 0.2 }";
+    let knob = "{ type = \"sphere\", radius = 0.2 }";
+    let post = "{ type = \"box\", half_extents = [0.1, 0.1, 0.3], position = [0.2, 0.0, 0.0] }";
+    let several = format!("[{knob}, {post}]");
+    let mut still = body(101, [0.0; 3], terrain, "");
+    still = still.replace("moves = true", "moves = false");
+    let mut rig = Rig::new(&scene("", &[still, body(41, [0.0; 3], &several, "")]));
+    // Steps by which it was seen: xorshift64 (Marsaglia 2003).
+    let mut state = 88_172_645_463_325_252_u64;
+    let mut unit = move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        f64::from(u32::try_from(state >> 32).unwrap()) / f64::from(u32::MAX)
+    };
+    let mut place = [-0.75, 0.3, -0.18];
+    let mut deep = 0;
+    for tick in 1..6000 {
+        for x in &mut place {
+            *x = (*x + (unit() - 0.5) * 0.08_f64).clamp(-0.9, 0.9);
+        }
+        let turn = Quat::from_scaled_axis(Vec3::z() * (0.2 * place[0]));
+        rig.place(41, &Pose::from_parts(Vec3::from(place).into(), turn));
+        rig.send(Budget::units(1));
+        let Some(row) = rig.pair(41, 101) else {
+            continue;
+        };
+        deep += usize::from(row.gap_max_m < 0.0);
+        assert!(row.gap_max_m > -0.25 - 1e-9, "tick {tick}: {row:?}");
+    }
+    assert!(deep > 100, "{deep} ticks");
+}
