@@ -1,10 +1,15 @@
-//! `sweepd run --record FILE`: the file is opened before the daemon, and begins with the engine's start.
+//! `sweepd run --record FILE`: the file is opened once the daemon has its name, and begins with the engine's start.
 //!
 //! A build without the feature `mcap` says so.
 
+#[cfg(feature = "mcap")]
+use std::path::PathBuf;
+
 use super::args::RunArgs;
 use crate::daemon::Daemon;
-use crate::error::{Error, Result};
+#[cfg(not(feature = "mcap"))]
+use crate::error::Error;
+use crate::error::Result;
 use crate::scene::Scene;
 use crate::shape::{Contents, Library};
 
@@ -24,25 +29,24 @@ pub(super) fn unable(what: &str) -> Error {
 /// A recording that was asked for.
 pub(super) struct Tape {
     #[cfg(feature = "mcap")]
-    file: Option<(std::io::BufWriter<std::fs::File>, String)>,
+    file: Option<(PathBuf, bool)>,
 }
 
 impl Tape {
-    /// Opens the file that was asked for.
+    /// What was asked for. Nothing is touched yet: a daemon that may not start leaves no file, and harms none.
     #[cfg(feature = "mcap")]
-    pub(super) fn open(args: &RunArgs) -> Result<Self> {
-        let file = args.record.as_ref().map(|path| {
-            let file = create(path, args.force)?;
-            Ok::<_, Error>((file, path.display().to_string()))
-        });
-        Ok(Self {
-            file: file.transpose()?,
-        })
+    #[allow(
+        clippy::unnecessary_wraps,
+        reason = "without the feature it may be refused"
+    )]
+    pub(super) fn of(args: &RunArgs) -> Result<Self> {
+        let file = args.record.clone().map(|path| (path, args.force));
+        Ok(Self { file })
     }
 
     /// Refuses what this build does not have.
     #[cfg(not(feature = "mcap"))]
-    pub(super) fn open(args: &RunArgs) -> Result<Self> {
+    pub(super) fn of(args: &RunArgs) -> Result<Self> {
         match args.record {
             Some(_) => Err(unable("--record")),
             None => Ok(Self {}),
@@ -69,9 +73,10 @@ impl Tape {
         (text, files): (String, Contents),
         boot_id: u64,
     ) -> Result<()> {
-        let Some((file, name)) = self.file else {
+        let Some((path, over)) = self.file else {
             return Ok(());
         };
+        let (file, name) = (create(&path, over)?, path.display().to_string());
         let start = Start::of(scene, text, files, boot_id, daemon.engine().now_ns());
         let sink = McapSink::new(file, &name, &scene.frame_id, &start)?;
         daemon.record(Recorder::start(Box::new(sink))?);

@@ -32,7 +32,7 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     apply(args, &mut scene)?;
     asked.check(&scene)?;
     check_watchdog(args, &scene)?;
-    let tape = Tape::open(args)?;
+    let tape = Tape::of(args)?;
     let mut shapes = build_shapes_in(&scene, tape.library())?;
     let given = (text, shapes.library.take_kept());
     for warning in scene.notes().iter().chain(&shapes.warnings) {

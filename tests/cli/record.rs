@@ -156,6 +156,35 @@ fn a_file_that_cannot_be_is_refused_before_the_daemon_runs() {
 }
 
 #[test]
+fn a_daemon_whose_name_is_taken_touches_no_recording() {
+    let desk = Desk::new();
+    let (scene, file) = pool(&desk, "10");
+    let mut daemon = desk.start("run", &[path(&scene)]);
+    until("it runs", || daemon.stderr().contains("runs"));
+    std::fs::write(&file, "mine").unwrap();
+    let second = |file: &Path| {
+        let (name, file) = (desk.instance.as_str(), path(file));
+        output(&[
+            "run",
+            path(&scene),
+            "--instance",
+            name,
+            "--record",
+            file,
+            "--force",
+        ])
+    };
+    let ended = second(&file);
+    assert_eq!(code(&ended), Some(4), "{}", err(&ended));
+    assert_eq!(std::fs::read(&file).unwrap(), b"mine");
+    let other = desk.dir.join("other.mcap");
+    assert_eq!(code(&second(&other)), Some(4));
+    assert!(!other.exists());
+    let (status, _) = daemon.stop();
+    assert_eq!(status.code(), Some(0), "{}", daemon.stderr());
+}
+
+#[test]
 fn what_is_no_recording_is_refused_with_code_4() {
     let desk = Desk::new();
     let (scene, _) = pool(&desk, "10");
