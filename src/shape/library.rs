@@ -74,7 +74,7 @@ impl Library {
     /// The shape of a spec: an equal one built before, or a new one.
     ///
     /// # Errors
-    /// As [`build`].
+    /// As [`build`](crate::shape::build).
     pub fn get(&mut self, spec: &ShapeSpec, base: &Path) -> Result<Built, ShapeError> {
         let name = file_of(spec);
         let file = name.map(|name| self.files.mark(base, name)).transpose()?;
