@@ -1,7 +1,7 @@
 //! Queries of shape pairs without meshes, and the change of frames around them.
 
 use crate::math::{Interval, Pose, ROUND, relative};
-use crate::shape::{Geometry, Mesh, Shape};
+use crate::shape::{Geometry, Shape};
 use crate::wire::NO_INDEX;
 use crate::world::{Body, PlacedShape};
 
@@ -143,22 +143,13 @@ pub(super) fn leaf_contact(
     }
 }
 
-/// One exact query of what touched last: two shapes, or two of their triangles. Where one of them is a solid mesh its
-/// interval says of an overlap no more than that it is one: its depth is that of a point, and the translation that
-/// parts two leaves can be more.
+/// One exact query of what touched last: two shapes, or two of their triangles.
 pub(super) fn retest(a: &Shape, b: &Shape, pos12: &Pose, (ta, tb): (u32, u32)) -> Option<Closest> {
     if is_simple(a, b) {
-        return shape_gap(a, b, pos12, &mut Warm::default());
+        shape_gap(a, b, pos12, &mut Warm::default())
+    } else {
+        retest_witness(a, b, pos12, ta, tb)
     }
-    let mut closest = retest_witness(a, b, pos12, ta, tb)?;
-    if is_solid_mesh(a) || is_solid_mesh(b) {
-        closest.gap.max = closest.gap.max.max(0.0);
-    }
-    Some(closest)
-}
-
-fn is_solid_mesh(shape: &Shape) -> bool {
-    shape.mesh().is_some_and(Mesh::is_solid)
 }
 
 /// A lower bound on the gap of two placed shapes from their bounding spheres; minus infinity for a half-space.

@@ -25,6 +25,9 @@ pub(super) fn reach_of(shape: &Shape) -> f64 {
 
 /// Queries the leaf pair of last tick's contact again: one unit. `None` when the two have no such leaves.
 ///
+/// The upper end of its interval holds for the two shapes. Where one of them is solid it says of an overlap no more than
+/// that it is one: the depth of a solid is that of a point, and the translation that parts two leaves can be more.
+///
 /// * `triangle_a`, `triangle_b` - of a [`super::Witness`] or [`super::LeafContact`]; `u32::MAX` for a side that is no
 ///   mesh.
 #[must_use]
@@ -48,5 +51,9 @@ pub fn retest_witness(
         return None;
     }
     let (leaf_a, leaf_b) = ((side_a, triangle_a), (side_b, triangle_b));
-    leaf(leaf_a, leaf_b, &at, f64::INFINITY).ok()
+    let mut closest = leaf(leaf_a, leaf_b, &at, f64::INFINITY).ok()?;
+    if side_a.solid().or(side_b.solid()).is_some() {
+        closest.gap.max = closest.gap.max.max(0.0);
+    }
+    Some(closest)
 }
