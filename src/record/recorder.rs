@@ -1,12 +1,12 @@
 //! The recorder: the tick's thread copies a tick into memory that goes round, another thread writes it.
 //!
 //! In: what the engine was given and what it said, after each tick. Out: records for a [`Sink`], in order. The tick's
-//! thread copies rows and no more: it makes no system call, waits for no disk, and allocates only while records grow.
+//! thread copies rows and no more: it makes no system call, waits for nobody, and allocates only while records grow.
 //! What it takes counts as sending, so it is kept back from the budget. Where the sink cannot follow, what is only for
 //! people is left out; where that is not enough, the recording ends, is told once, and the daemon goes on.
 
 use std::collections::VecDeque;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -76,12 +76,25 @@ impl Desk {
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
+
+    /// `None`: the other thread has it. It may have been put to sleep with it, for which no tick waits.
+    fn try_lock(&self) -> Option<MutexGuard<'_, State>> {
+        match self.state.try_lock() {
+            Ok(state) => Some(state),
+            Err(TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
+            Err(TryLockError::WouldBlock) => None,
+        }
+    }
 }
 
 /// The tick thread's side of a recording.
 pub struct Recorder {
     desk: Arc<Desk>,
     writer: Option<JoinHandle<()>>,
+    /// Memory for the next record.
+    spare: Option<Box<TickRecord>>,
+    /// Records that could not be put on the desk yet.
+    held: VecDeque<Box<TickRecord>>,
     between: Vec<Between>,
     origins: Vec<Origin>,
     /// When bodies were last asked for, nanoseconds of `CLOCK_BOOTTIME`.
@@ -115,6 +128,8 @@ impl Recorder {
         Ok(Self {
             desk,
             writer: Some(writer),
+            spare: None,
+            held: VecDeque::new(),
             between: Vec::new(),
             origins: Vec::new(),
             bodies_ns: 0,
@@ -157,8 +172,7 @@ impl Recorder {
         if self.over {
             return;
         }
-        let spare = self.desk.lock().spare.pop();
-        let mut record = spare.unwrap_or_default();
+        let mut record = self.spare.take().unwrap_or_default();
         record.clear();
         std::mem::swap(&mut record.between, &mut self.between);
         let outcomes = engine.outcomes().iter();
@@ -172,22 +186,36 @@ impl Recorder {
             }));
         record.take_input(inbox, ask, engine.now_ns());
         record.take_output(engine.outbox());
-        let bytes = record.bytes();
-        let mut state = self.desk.lock();
-        if state.failed.is_some() {
-            self.over = true;
-        } else if state.bytes > 0 && state.bytes + bytes > RECORD_QUEUE_BYTES_MAX {
-            self.over = true;
-            let why = format!(
-                "the disk did not follow: {} MB waited to be written before tick {}",
-                state.bytes / 1_000_000,
-                engine.ticks()
-            );
-            tracing::error!(
-                "the recording ends: {why}; the daemon goes on. Record to a faster disk, or fewer ticks"
-            );
-            state.ending = Some(why);
-        } else {
+        self.held.push_back(record);
+        let desk = Arc::clone(&self.desk);
+        if let Some(mut state) = desk.try_lock() {
+            self.hand_over(&mut state);
+        }
+    }
+
+    /// Puts what is held on the desk, and takes memory for the next record from there.
+    fn hand_over(&mut self, state: &mut State) {
+        self.spare = state.spare.pop();
+        while let Some(record) = self.held.pop_front() {
+            let bytes = record.bytes();
+            if state.failed.is_some() {
+                self.over = true;
+            } else if state.bytes > 0 && state.bytes + bytes > RECORD_QUEUE_BYTES_MAX {
+                self.over = true;
+                let why = format!(
+                    "the disk did not follow: {} MB waited to be written before tick {}",
+                    state.bytes / 1_000_000,
+                    record.out.tick.header.tick
+                );
+                tracing::error!(
+                    "the recording ends: {why}; the daemon goes on. Record to a faster disk, or fewer ticks"
+                );
+                state.ending = Some(why);
+            }
+            if self.over {
+                self.held.clear();
+                return;
+            }
             state.bytes += bytes;
             state.waiting.push_back(record);
         }
@@ -206,7 +234,11 @@ impl Recorder {
     }
 
     fn close(&mut self) {
-        self.desk.lock().ending.get_or_insert_default();
+        let desk = Arc::clone(&self.desk);
+        let mut state = desk.lock();
+        self.hand_over(&mut state);
+        state.ending.get_or_insert_default();
+        drop(state);
         self.desk.wake.notify_one();
         if let Some(writer) = self.writer.take() {
             let _told_already = writer.join();
@@ -267,120 +299,4 @@ fn write_all(desk: &Desk, sink: &mut dyn Sink) -> Result<()> {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::path::Path;
-    use std::sync::mpsc::{Receiver, Sender, channel};
-
-    use super::*;
-    use crate::scene::Scene;
-    use crate::tick::TickInput;
-    use crate::tick::build::build_shapes;
-    use crate::time::ManualClock;
-
-    /// Tells what it is handed; takes each tick only when it may.
-    struct Slow {
-        told: Sender<String>,
-        may: Receiver<Result<()>>,
-    }
-
-    impl Sink for Slow {
-        fn tick(&mut self, record: &TickRecord, _: bool) -> Result<()> {
-            let tick = record.out.tick.header.tick;
-            self.told.send(format!("tick {tick}")).unwrap();
-            self.may.recv().unwrap_or(Ok(()))
-        }
-        fn flush(&mut self) -> Result<()> {
-            Ok(())
-        }
-        fn end(&mut self, why: &str) -> Result<()> {
-            self.told.send(format!("end {why}")).unwrap();
-            Ok(())
-        }
-    }
-
-    /// An engine of one ball.
-    fn engine() -> Engine {
-        let text = "[[source]]\nname = \"s\"\n[[body]]\nname = \"a\"\nshape = { type = \"sphere\", radius = 1.0 }\n";
-        let scene = Scene::parse(text, "s.toml", Path::new("")).unwrap();
-        let shapes = build_shapes(&scene).unwrap();
-        let clock = Arc::new(ManualClock::new(1));
-        Engine::new(&scene, shapes.bodies, 7, clock).unwrap()
-    }
-
-    fn run(engine: &mut Engine, recorder: &mut Recorder, inbox: &Inbox) {
-        let ask = Ask::default();
-        engine.tick(TickInput {
-            inbox,
-            edits: &[],
-            demand: ask.demand,
-            budget: ask.budget,
-            cause: ask.cause,
-            cause_source: None,
-            woke_ns: 0,
-            pulse: None,
-        });
-        recorder.tick(inbox, ask, engine);
-    }
-
-    fn slow() -> (Recorder, Receiver<String>, Sender<Result<()>>) {
-        let (told, heard) = channel();
-        let (let_go, may) = channel();
-        let sink = Box::new(Slow { told, may });
-        (Recorder::start(sink).unwrap(), heard, let_go)
-    }
-
-    #[test]
-    fn records_are_written_in_order_and_the_end_comes_last() {
-        let (mut recorder, heard, let_go) = slow();
-        let mut engine = engine();
-        for _ in 0..50 {
-            run(&mut engine, &mut recorder, &Inbox::default());
-            let_go.send(Ok(())).unwrap();
-        }
-        recorder.finish().unwrap();
-        let mut wanted: Vec<_> = (1..=50).map(|tick| format!("tick {tick}")).collect();
-        wanted.push("end ".to_owned());
-        assert_eq!(heard.try_iter().collect::<Vec<_>>(), wanted);
-    }
-
-    #[test]
-    fn a_disk_that_does_not_follow_ends_the_recording_and_nothing_else() {
-        let (mut recorder, heard, let_go) = slow();
-        let mut engine = engine();
-        // Frames of a source that the scene does not have, as large as a fifth of what may wait.
-        let mut inbox = Inbox::default();
-        let rows = RECORD_QUEUE_BYTES_MAX / 5 / size_of::<crate::wire::TransformRow>();
-        inbox.push().transforms = vec![Default::default(); rows];
-        for _ in 0..20 {
-            run(&mut engine, &mut recorder, &inbox);
-        }
-        assert!(recorder.over && engine.ticks() == 20);
-        drop(let_go);
-        recorder.finish().unwrap();
-        let heard: Vec<_> = heard.try_iter().collect();
-        assert_eq!(heard.len(), 5, "{heard:?}");
-        assert!(
-            heard[4].starts_with("end the disk did not follow"),
-            "{heard:?}"
-        );
-    }
-
-    #[test]
-    fn a_sink_that_fails_is_told_once_and_takes_no_more() {
-        let (mut recorder, heard, let_go) = slow();
-        let mut engine = engine();
-        let full = Error::io("cannot write x.mcap", std::io::Error::other("no space"));
-        let_go.send(Err(full)).unwrap();
-        run(&mut engine, &mut recorder, &Inbox::default());
-        while recorder.desk.lock().failed.is_none() {
-            std::thread::yield_now();
-        }
-        for _ in 0..5 {
-            run(&mut engine, &mut recorder, &Inbox::default());
-        }
-        assert!(recorder.over);
-        let error = recorder.finish().unwrap_err();
-        assert!(error.to_string().contains("x.mcap"), "{error}");
-        assert_eq!(heard.try_iter().collect::<Vec<_>>(), ["tick 1"]);
-    }
-}
+mod tests;

@@ -144,6 +144,43 @@ fn what_is_no_recording_of_ours_is_refused_by_name() {
 }
 
 #[test]
+fn in_a_hurry_what_is_for_people_is_left_out_and_counted_and_all_that_is_replayed_is_there() {
+    let scrap = Scrap::new();
+    let file = create(&scrap.0, false).unwrap();
+    let mut sink = McapSink::new(file, "scrap", "world", &start()).unwrap();
+    for tick in 1..=30 {
+        let mut record = record(tick);
+        // Names belong to what follows: they are never left out.
+        record.out.names_changed = tick == 9;
+        sink.tick(&record, tick % 3 == 0).unwrap();
+    }
+    sink.end("").unwrap();
+    drop(sink);
+    assert_eq!(read(&scrap), (30, Ending::Whole));
+    let bytes = std::fs::read(&scrap.0).unwrap();
+    let of = |topic: &str| {
+        let messages = mcap::MessageStream::new(&bytes).unwrap();
+        let ours = messages.filter(|message| message.as_ref().unwrap().channel.topic == topic);
+        ours.count()
+    };
+    assert_eq!((of(INPUT), of(OUTPUT)), (30, 30));
+    assert_eq!(
+        (
+            of("/sweepd/pairs"),
+            of("/sweepd/state"),
+            of("/sweepd/names")
+        ),
+        (21, 21, 1)
+    );
+    let mut records = mcap::read::LinearReader::new(&bytes).unwrap();
+    let left_out = records.find_map(|record| match record.unwrap() {
+        mcap::records::Record::Metadata(note) => note.metadata.get(NOT_SHOWN).cloned(),
+        _ => None,
+    });
+    assert_eq!(left_out.as_deref(), Some("9"));
+}
+
+#[test]
 fn a_file_that_is_there_is_not_written_over_unless_asked_for() {
     let scrap = Scrap::of(b"mine");
     let error = create(&scrap.0, false).unwrap_err();
