@@ -43,7 +43,7 @@ from pathlib import Path
 import coal
 import fcl
 import numpy as np
-from provenance import commit, machine
+from provenance import commit, compiler, machine
 
 ROOT = Path(__file__).resolve().parent.parent
 TOLERANCE_M = 1e-6
@@ -271,7 +271,6 @@ def report(csv, rounds, took, answers, calls):
         "contacts_mean,disagree,exempt"
     )
     head = f"{machine()},{commit()}"
-    rustc = command("rustc", "--version")
     lines, table = [columns], {}
     for (library, job), pairs in sorted(took.items()):
         medians = sorted(statistics.median(each) / 1e3 for each in pairs.values())
@@ -292,9 +291,9 @@ def report(csv, rounds, took, answers, calls):
         p50, p90 = (medians[min(len(medians) - 1, int(share * len(medians)))] for share in (0.5, 0.9))
         mean = statistics.fmean(medians)
         call = calls.get(library, 0.0)
-        compiler = cpp_compiler() if library.startswith("fcl-cpp") else rustc
+        made_by = cpp_compiler() if library.startswith("fcl-cpp") else compiler()
         lines.append(
-            f"{head},{compiler},{SEED},{library},{job},{len(pairs)},{rounds},{p50:.2f},{p90:.2f},{mean:.2f},{call:.2f},"
+            f"{head},{made_by},{SEED},{library},{job},{len(pairs)},{rounds},{p50:.2f},{p90:.2f},{mean:.2f},{call:.2f},"
             f"{contacts / len(pairs):.1f},{disagree},{exempt}"
         )
         table[library, job] = (p50, mean, disagree, exempt, contacts / len(pairs))

@@ -15,7 +15,7 @@ import tempfile
 from pathlib import Path
 
 import matplotlib
-from provenance import commit, machine
+from provenance import commit, compiler, machine
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402
@@ -40,7 +40,8 @@ def make_error_csv() -> None:
         subprocess.run([SWEEPD, "feed", "--write-scene", pool, "--count", "400"], check=True, stdout=subprocess.DEVNULL)
         report = subprocess.run([SWEEPD, "report", "error", pool, "--json"], check=True, capture_output=True)
     told = json.loads(report.stdout)
-    start = {"machine": machine(), "commit": commit(), "seed": told["seed"], "bodies": told["bodies"]}
+    start = {"machine": machine(), "commit": commit(), "compiler": compiler()}
+    start |= {"seed": told["seed"], "bodies": told["bodies"]}
     with open(RESULTS / "error.csv", "w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, [*start, *COLUMNS], extrasaction="ignore", lineterminator="\n")
         table.writeheader()

@@ -18,5 +18,14 @@ def machine() -> str:
 
 def commit() -> str:
     """The commit that is checked out."""
-    command = ["git", "rev-parse", "--short", "HEAD"]
-    return subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False).stdout.strip()
+    return _told("git", "rev-parse", "--short", "HEAD")
+
+
+def compiler() -> str:
+    """The Rust compiler."""
+    return _told("rustc", "--version").replace(",", " ")
+
+
+def _told(*command: str) -> str:
+    told = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False)
+    return told.stdout.strip()

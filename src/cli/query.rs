@@ -15,8 +15,8 @@ use super::out::Out;
 /// Answers what was asked; `false` when a line of a file could not be read.
 pub(super) fn query(args: &QueryArgs, out: &mut Out) -> Result<bool> {
     match (&args.batch, &args.a, &args.b) {
+        // Signals end it as they end any process: nothing waits for it.
         (Some(file), ..) => of_file(file, out),
-        // A file is read to its end or the signal's.
         (None, Some(a), Some(b)) => live::gap(a, b, args, out, super::stop()?.as_ref()),
         _ => Err(Error::Usage(
             "name two bodies of a running daemon, or give a file of cases with --batch".to_owned(),
