@@ -8,11 +8,12 @@ use sweepd::shape::Geometry;
 use sweepd::world::Parts;
 
 use crate::bends::Bend;
+use crate::depth::{Search, search};
 use crate::kinds::{BENDING, HALF_SPACE, NAMES, Solid, any};
 use crate::oracle::meshes::Soup;
 use crate::oracle::rng::Rng;
 use crate::regimes::{Regime, Shares};
-use crate::truth::{Bounds, bounds};
+use crate::truth::{At, Bounds, bounds};
 
 /// Directions that a search of the oracle begins with.
 const SAMPLES: u32 = 240;
@@ -55,9 +56,28 @@ fn least(gaps: &[Bounds]) -> Bounds {
         .fold(Bounds::FAR, |least, gap| least.least(*gap))
 }
 
+/// Whether two bodies overlap by no less than `depth`, metres: whether two of their parts do.
+pub fn depth_of(a: &Body, b: &Body, depth: f64) -> Search {
+    let mut all = Search::Refuted;
+    for (one, other) in placed(a, b) {
+        match search(one, other, depth) {
+            Search::Found => return Search::Found,
+            Search::Open => all = Search::Open,
+            Search::Refuted => {}
+        }
+    }
+    all
+}
+
 /// The truth of each pair of their parts.
 fn gaps_of(a: &Body, b: &Body, samples: u32) -> Vec<Bounds> {
-    let mut gaps = Vec::new();
+    let parts = placed(a, b).into_iter();
+    parts.map(|(a, b)| bounds(a, b, samples)).collect()
+}
+
+/// Each pair of their parts, at places in one frame.
+fn placed<'a>(a: &'a Body, b: &'a Body) -> Vec<(At<'a>, At<'a>)> {
+    let mut pairs = Vec::new();
     // Seen from A's place: far from the origin sums of poses lose what their difference keeps.
     let shift = b.pose.translation.vector - a.pose.translation.vector;
     let pose_a = Pose::from_parts(Vec3::zeros().into(), a.pose.rotation);
@@ -65,10 +85,10 @@ fn gaps_of(a: &Body, b: &Body, samples: u32) -> Vec<Bounds> {
     for one in &a.parts {
         for other in &b.parts {
             let (at_a, at_b) = (pose_a * one.local, pose_b * other.local);
-            gaps.push(bounds((&one.solid, at_a), (&other.solid, at_b), samples));
+            pairs.push(((&one.solid, at_a), (&other.solid, at_b)));
         }
     }
-    gaps
+    pairs
 }
 
 /// A body of a kind; one in four has a second shape. With it what a scene says.

@@ -1,9 +1,9 @@
 //! Goal: whatever is published holds the truth, at any budget, for every kind of shape (laws 1, 3.4). Method: couples
 //! of bodies of all kinds in random motion, driven through four engines at once (work without limit, with a random stop
 //! in each tick, with half of what the first one spent, to a deadline and on after its outbox was taken); each
-//! published verdict and interval against an oracle that shares no code with the narrow phase (`truth.rs`). Beside the
-//! engines go certificate fronts of the meshes, stopped at random, of which every pair of leaves is looked up
-//! (`fronts.rs`).
+//! published verdict and interval against an oracle that shares no code with the narrow phase (`truth.rs`; how deep an
+//! overlap can be at most, where that is said: `depth.rs`). Beside the engines go certificate fronts of the meshes,
+//! stopped at random, of which every pair of leaves is looked up (`fronts.rs`).
 //!
 //! At least a third of the pair-ticks overlap, and at least a third are apart by no more than 1 % of the smaller body's
 //! size, as the oracle proves (`regimes.rs`). Faults are counted to the end; then there must be none.
@@ -29,6 +29,7 @@ mod oracle;
 
 mod bends;
 mod couples;
+mod depth;
 mod directions;
 mod fronts;
 mod kinds;

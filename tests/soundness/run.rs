@@ -13,7 +13,8 @@ use sweepd::wire::{
 use sweepd::world::{BuiltTree, WornTree};
 
 use crate::bends;
-use crate::couples::{Couple, any_scene, gap_of, take_meshes};
+use crate::couples::{Couple, any_scene, depth_of, gap_of, take_meshes};
+use crate::depth::Search;
 use crate::fronts::{Checked, Fronts};
 use crate::kinds::Solid;
 use crate::oracle::rng::Rng;
@@ -31,6 +32,8 @@ pub struct Run {
     pub fronts: Checked,
     pub tally: Tally,
     undecided: [u64; 4],
+    /// What became of overlaps said to be deeper than the oracle's corners: by [`Search`].
+    deeper: [u64; 3],
     /// Ticks after which the last engine went on and was not done.
     went_on: u64,
     /// Trees put in place that were built anew.
@@ -114,7 +117,13 @@ impl Run {
                 said.tell(&what, couple, truth)
             };
             let above = said.low > truth.high + missed;
-            let below = said.high < truth.low - noise;
+            let mut below = said.high < truth.low - noise;
+            if said.high < truth.high.min(0.0) - missed {
+                // No point that the oracle knows of is so deep.
+                let search = depth_of(a, b, -said.high - missed);
+                self.deeper[search as usize] += 1;
+                below |= search == Search::Refuted;
+            }
             let tally = &mut self.tally;
             tally.note(Fault::Interval, u64::from(above), || {
                 tell("above the truth")
@@ -176,6 +185,11 @@ impl Run {
             share(self.undecided[2]),
             share(self.undecided[3]),
             self.went_on
+        );
+        let [found, refuted, open] = self.deeper;
+        println!(
+            "{} were said to be deeper than the corners of the oracle: {found} are, {refuted} are not, {open} were not told",
+            found + refuted + open
         );
         println!("{} trees were built anew", self.trees);
         println!("{}", self.tally);
