@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 use super::args_report::Report;
-use super::args_tools::{CompletionsArgs, DoctorArgs, ListArgs, ManArgs, QueryArgs};
+use super::args_tools::{CompletionsArgs, DoctorArgs, ListArgs, ManArgs, QueryArgs, RecordArgs};
 use super::manual::after_help;
 use crate::builtin::Pattern;
 use crate::error::Error;
@@ -43,6 +43,11 @@ pub(super) enum Command {
     /// Each line says ok, warning or wrong, what is so, and what to do. Nothing is changed without --clean. Ends with
     /// code 1 when something is wrong; warnings alone are no reason.
     Doctor(DoctorArgs),
+    /// Record what a running daemon publishes, as any client hears it, to an MCAP file for Foxglove or `ros2 bag`.
+    ///
+    /// What the daemon was given is not in it: to run its engine again, give `run --record FILE` to the daemon itself.
+    /// A daemon that starts anew is followed.
+    Record(RecordArgs),
     /// Run the engine again on what `run --record` wrote, and report the first tick that differs.
     Replay(ReplayArgs),
     /// Measure: error against run time, and numerical stability.

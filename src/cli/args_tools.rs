@@ -1,4 +1,5 @@
-//! Flags and arguments of the commands that ask, look and tell: `query`, `list`, `doctor`, `completions`, `man`.
+//! Flags and arguments of the commands that ask, look and tell: `query`, `record`, `list`, `doctor`, `completions`,
+//! `man`.
 
 use std::path::PathBuf;
 
@@ -36,6 +37,48 @@ pub(super) struct QueryArgs {
         conflicts_with_all = ["a", "b", "instance", "json", "timeout"]
     )]
     pub(super) batch: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+#[cfg_attr(
+    not(feature = "mcap"),
+    allow(dead_code, reason = "this build refuses to record")
+)]
+pub(super) struct RecordArgs {
+    /// The file to write: MCAP, profile `ros2`.
+    #[arg(value_name = "FILE.mcap")]
+    pub(super) file: PathBuf,
+    #[command(flatten)]
+    pub(super) which: Which,
+    /// Record these only, beside state, tick and names, which always are; the daemon computes contacts for who listens.
+    #[arg(long, value_name = "TOPIC,...", value_delimiter = ',')]
+    pub(super) only: Vec<Recorded>,
+    /// End after so many ticks; until a signal otherwise.
+    #[arg(long, value_name = "N")]
+    pub(super) ticks: Option<u64>,
+    /// End after so long, such as `10s`.
+    #[arg(long = "for", value_name = "TIME", value_parser = nanoseconds)]
+    pub(super) time: Option<u64>,
+    /// End with code 3 when no tick comes for so long; what was heard until then is in the file.
+    #[arg(long, default_value = "10s", value_name = "TIME", value_parser = nanoseconds)]
+    pub(super) wait: u64,
+    /// What messages call the frame of poses and points: the scene's `frame_id`, which clients are not told.
+    #[arg(long, default_value = "world", value_name = "NAME")]
+    pub(super) frame_id: String,
+    /// Write over a file that is there.
+    #[arg(long)]
+    pub(super) force: bool,
+}
+
+/// What can be recorded or left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum Recorded {
+    /// Pairs that are not plainly apart, and last events.
+    Pairs,
+    /// Contacts of colliding pairs.
+    Contacts,
+    /// Where bodies are.
+    Bodies,
 }
 
 #[derive(Debug, Args)]

@@ -81,6 +81,10 @@ fn dispatch(command: Command, ros_words: Option<&[String]>) -> Result<ExitCode> 
         Command::List(args) => list::list(&args, &mut out),
         Command::Doctor(args) => doctor::doctor(&args, &mut out),
         #[cfg(feature = "mcap")]
+        Command::Record(args) => record::record(&args, &mut out, stop()?.as_ref()),
+        #[cfg(not(feature = "mcap"))]
+        Command::Record(_) => Err(record::unable("record")),
+        #[cfg(feature = "mcap")]
         Command::Replay(args) => replay::replay(&args, &mut out, stop()?.as_ref()),
         #[cfg(not(feature = "mcap"))]
         Command::Replay(_) => Err(record::unable("replay")),

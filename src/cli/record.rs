@@ -1,6 +1,13 @@
-//! `sweepd run --record FILE`: the file is opened once the daemon has its name, and begins with the engine's start.
+//! `sweepd run --record FILE`: the file is opened once the daemon has its name, and begins with the engine's start; and
+//! `sweepd record FILE` beside a daemon (`heard`).
 //!
 //! A build without the feature `mcap` says so.
+
+#[cfg(feature = "mcap")]
+mod heard;
+
+#[cfg(feature = "mcap")]
+pub(super) use heard::record;
 
 #[cfg(feature = "mcap")]
 use std::path::PathBuf;

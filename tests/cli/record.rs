@@ -1,5 +1,5 @@
-//! Goal: a run is recorded and replayed as a user does it. Method: the real daemon and the real source; the daemon ends
-//! by SIGTERM, by `kill -9`, or does not begin.
+//! Goal: a run is recorded and replayed as a user does it, and recorded from beside it. Method: the real daemon and the
+//! real source; the daemon ends by SIGTERM, by `kill -9`, or does not begin.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -220,4 +220,102 @@ fn edits_of_a_running_scene_are_in_the_recording() {
         "{json}"
     );
     assert!(json["ticks_exact"].as_u64().unwrap() >= 3, "{json}");
+}
+
+/// How many messages of each topic a file holds.
+fn topics(file: &Path) -> std::collections::BTreeMap<String, usize> {
+    let bytes = std::fs::read(file).unwrap();
+    let mut counts = std::collections::BTreeMap::new();
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        *counts
+            .entry(message.unwrap().channel.topic.clone())
+            .or_default() += 1;
+    }
+    counts
+}
+
+#[test]
+fn a_client_records_what_it_hears_and_follows_a_daemon_that_starts_anew() {
+    let desk = Desk::new();
+    let (scene, file) = pool(&desk, "60");
+    let mut daemon = desk.start("run", &[path(&scene)]);
+    let mut feed = desk.start("feed", &[path(&scene), "--rate", "200"]);
+    let mut recorder = desk.start("record", &[path(&file)]);
+    until("what is heard", || {
+        file.metadata().is_ok_and(|file| file.len() > 1_000_000)
+    });
+    daemon.kill();
+    let mut daemon = desk.start("run", &[path(&scene)]);
+    let before = file.metadata().unwrap().len();
+    until("what the new one says", || {
+        file.metadata().unwrap().len() > before + 1_000_000
+    });
+    assert_eq!(recorder.stop().0.code(), Some(0), "{}", recorder.stderr());
+    let said = recorder.stdout();
+    assert!(said.contains("ticks in"), "{said}");
+    assert_eq!(
+        (feed.stop().0.code(), daemon.stop().0.code()),
+        (Some(0), Some(0))
+    );
+    let counts = topics(&file);
+    let of = |topic: &str| {
+        counts
+            .get(&format!("/sweepd/{topic}"))
+            .copied()
+            .unwrap_or(0)
+    };
+    // Each boot tells its names; from then on each tick has everything.
+    assert!(of("names") >= 2, "{counts:?}");
+    let ticks = of("tick");
+    assert!(ticks > 50 && of("state") == ticks, "{counts:?}");
+    for topic in ["pairs", "contacts", "bodies"] {
+        assert!(of(topic) + 10 >= ticks, "{topic}: {counts:?}");
+    }
+    assert_eq!(of("record/input"), 0);
+    let ended = output(&["replay", path(&file)]);
+    assert_eq!(code(&ended), Some(4));
+    assert!(
+        err(&ended).contains("run SCENE --record"),
+        "{}",
+        err(&ended)
+    );
+}
+
+#[test]
+fn a_client_records_what_it_is_asked_to_and_touches_no_file_in_vain() {
+    let desk = Desk::new();
+    let (scene, file) = pool(&desk, "10");
+    let record = |more: &[&str]| {
+        let mut args = vec!["record", path(&file), "--instance", &desk.instance];
+        args.extend_from_slice(more);
+        output(&args)
+    };
+    let ended = record(&["--wait", "200ms"]);
+    assert_eq!(code(&ended), Some(3), "{}", err(&ended));
+    assert!(!file.exists());
+    let mut daemon = desk.start("run", &[path(&scene)]);
+    until("it runs", || daemon.stderr().contains("runs"));
+    std::fs::write(&file, "mine").unwrap();
+    let ended = record(&["--ticks", "1"]);
+    assert_eq!(code(&ended), Some(4), "{}", err(&ended));
+    assert!(err(&ended).contains("--force"), "{}", err(&ended));
+    assert_eq!(std::fs::read(&file).unwrap(), b"mine");
+    let ended = record(&["--ticks", "7", "--only", "pairs", "--force"]);
+    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+    assert!(out(&ended).starts_with("7 ticks in"), "{}", out(&ended));
+    let counts = topics(&file);
+    assert_eq!(counts["/sweepd/tick"], 7, "{counts:?}");
+    assert!(counts.contains_key("/sweepd/pairs"), "{counts:?}");
+    let unasked = ["contacts", "bodies"].map(|topic| format!("/sweepd/{topic}"));
+    assert!(
+        unasked.iter().all(|topic| !counts.contains_key(topic)),
+        "{counts:?}"
+    );
+    let ended = record(&["--for", "300ms", "--force"]);
+    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+    let ended = record(&["--only", "everything", "--force"]);
+    assert_eq!(code(&ended), Some(2), "{}", err(&ended));
+    daemon.kill();
+    let ended = record(&["--wait", "300ms", "--force"]);
+    assert_eq!(code(&ended), Some(3), "{}", err(&ended));
 }

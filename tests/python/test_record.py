@@ -18,6 +18,7 @@ ros2 = needed("mcap_ros2.decoder")
 SWEEPD = os.environ.get("SWEEPD")
 pytestmark = pytest.mark.skipif(not SWEEPD, reason="SWEEPD names no binary")
 INSTANCE = f"rec_{os.getpid()}"
+SHOWN = {f"/sweepd/{topic}" for topic in ("names", "bodies", "contacts", "pairs", "state", "tick")}
 
 
 def record(tmp_path, end):
@@ -58,11 +59,36 @@ def test_every_topic_decodes_and_tells_one_story(tmp_path):
         assert mcap.get_header().profile == "ros2"
         assert mcap.get_summary().statistics.message_count > 500
     found = topics(file)
-    shown = {"names", "bodies", "contacts", "pairs", "state", "tick", "record/start", "record/input", "record/output"}
-    assert set(found) == {f"/sweepd/{topic}" for topic in shown}
+    assert set(found) == SHOWN | {"/sweepd/record/start", "/sweepd/record/input", "/sweepd/record/output"}
+    numbers = [tick.tick_header.tick for _, tick in found["/sweepd/tick"]]
+    assert numbers == list(range(1, len(numbers) + 1)) and len(numbers) >= 100
+    assert_one_story(found)
+
+
+def test_what_a_client_hears_decodes_and_tells_one_story(tmp_path):
+    scene, file = tmp_path / "pool.toml", tmp_path / "heard.mcap"
+    subprocess.run([SWEEPD, "-q", "feed", "--write-scene", scene, "--count", "60"], check=True)
+    daemon = subprocess.Popen([SWEEPD, "-q", "run", scene, "--instance", INSTANCE])
+    feed = subprocess.Popen([SWEEPD, "-q", "feed", scene, "--instance", INSTANCE, "--rate", "200"])
+    try:
+        hear = [SWEEPD, "-q", "record", file, "--instance", INSTANCE, "--ticks", "200"]
+        subprocess.run(hear, check=True, timeout=60)
+    finally:
+        for process in (feed, daemon):
+            process.kill()
+            process.wait()
+    found = topics(file)
+    assert set(found) == SHOWN
+    # The first ticks come before the daemon knows that somebody listens.
+    whole = {pairs.tick_header.tick for _, pairs in found["/sweepd/pairs"]}
+    found["/sweepd/tick"] = [row for row in found["/sweepd/tick"] if row[1].tick_header.tick in whole]
+    assert len(whole) >= 150
+    assert_one_story(found)
+
+
+def assert_one_story(found):
+    """That what was recorded of each tick belongs together."""
     ticks = [tick for _, tick in found["/sweepd/tick"]]
-    numbers = [tick.tick_header.tick for tick in ticks]
-    assert numbers == list(range(1, len(ticks) + 1)) and len(ticks) >= 100
     times = [time_ns for time_ns, _ in found["/sweepd/tick"]]
     assert times == sorted(times) and abs(times[-1] - time.time_ns()) < 300e9
     names = {name.body: name.name for name in found["/sweepd/names"][0][1].names}

@@ -232,8 +232,8 @@ impl Reader {
 
     fn not_ours(&self) -> Error {
         Error::Refused(format!(
-            "{} holds nothing that an engine was given, so that there is nothing to replay: give a file that \
-             `sweepd run SCENE --record FILE` wrote",
+            "{} holds nothing that an engine was given (what `sweepd record` writes does not), so that there is nothing \
+             to replay: give a file that `sweepd run SCENE --record FILE` wrote",
             self.name
         ))
     }

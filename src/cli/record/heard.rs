@@ -1,0 +1,148 @@
+//! `sweepd record FILE`: what a running daemon publishes, heard as any client hears it, in a file for people.
+//!
+//! In: an instance. Out: an MCAP file of ROS 2 messages. The daemon takes no notice but that it is listened to, so any
+//! daemon can be recorded at any time; what it was given is known to itself alone (`run --record`).
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use crate::cli::args_tools::{RecordArgs, Recorded};
+use crate::cli::connect;
+use crate::cli::out::Out;
+use crate::error::{Error, Result};
+use crate::record::file::{McapLog, Shown, create};
+use crate::time::{Clock, SystemClock};
+use crate::transport::client::{Client, Heard, Message, Restarted, Topics, View};
+use crate::wire::TickRow;
+
+/// Longest wait before a look at the stop flag, nanoseconds.
+const LOOK_NS: u64 = 100_000_000;
+/// Time between two flushes at most, nanoseconds: what a killed recorder loses.
+const FLUSH_NS: u64 = 500_000_000;
+
+/// What was heard so far.
+#[derive(Default)]
+struct Tally {
+    /// Ticks written, and ticks that were overtaken before they were heard.
+    ticks: u64,
+    missed: u64,
+    /// The newest tick of this boot; tick 0: none yet.
+    last: TickRow,
+    /// Boot id and tick of the names that were written last.
+    names: (u64, u64),
+}
+
+/// Records until a signal, or for as long as is asked for.
+pub(in crate::cli) fn record(args: &RecordArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
+    // Without a daemon no file is touched.
+    let Some(mut client) = connect(&args.which.instance, None, args.wait, stop)? else {
+        return Ok(true);
+    };
+    let (clock, name) = (SystemClock, args.file.display().to_string());
+    let file = create(&args.file, args.force)?;
+    let since_1970_ns = clock.realtime_ns().saturating_sub(clock.boottime_ns());
+    let mut log = McapLog::new(file, &name, &args.frame_id, since_1970_ns)?;
+    let only = |topic| args.only.is_empty() || args.only.contains(&topic);
+    client.subscribe(Topics {
+        pairs: only(Recorded::Pairs),
+        contacts: only(Recorded::Contacts),
+        bodies: only(Recorded::Bodies),
+        names: true,
+        ..Topics::default()
+    })?;
+    let mut tally = Tally::default();
+    let done = follow(args, &mut client, &mut log, &mut tally, stop);
+    // Whatever ended it, the file is closed and says so.
+    let why = done.as_ref().err().map_or(String::new(), Error::to_string);
+    let closed = log.end(&why, tally.missed);
+    let (ticks, missed) = (tally.ticks, tally.missed);
+    out.line(&format!("{ticks} ticks in {name}"))?;
+    out.flush()?;
+    if missed > 0 {
+        tracing::warn!(
+            "{missed} ticks were overtaken before they were heard and are not in {name}: record less with --only, or to a \
+             faster disk"
+        );
+    }
+    done.and(closed).map(|()| true)
+}
+
+fn follow<W: std::io::Write + std::io::Seek>(
+    args: &RecordArgs,
+    client: &mut Client,
+    log: &mut McapLog<W>,
+    tally: &mut Tally,
+    stop: &AtomicBool,
+) -> Result<()> {
+    let clock = SystemClock;
+    let start_ns = clock.monotonic_ns();
+    let until_ns = args.time.map(|time| start_ns.saturating_add(time));
+    let (mut heard_ns, mut flushed_ns) = (start_ns, start_ns);
+    while !stop.load(Ordering::Relaxed) && args.ticks.is_none_or(|most| tally.ticks < most) {
+        let now_ns = clock.monotonic_ns();
+        let left_ns = until_ns.map_or(LOOK_NS, |until| until.saturating_sub(now_ns));
+        if left_ns == 0 {
+            break;
+        }
+        match client.wait_tick(left_ns.min(LOOK_NS))? {
+            Heard::Tick => {
+                heard_ns = now_ns;
+                tally.tick(log, client.view())?;
+            }
+            Heard::Restarted(news) => tally.restart(log, &news)?,
+            Heard::Silence if now_ns.saturating_sub(heard_ns) >= args.wait => {
+                return Err(Error::TimedOut(format!(
+                    "no tick for {} ms; is the daemon `{}` still running?",
+                    now_ns.saturating_sub(heard_ns) / 1_000_000,
+                    args.which.instance
+                )));
+            }
+            Heard::Silence => {}
+        }
+        if now_ns.saturating_sub(flushed_ns) >= FLUSH_NS {
+            log.flush()?;
+            flushed_ns = now_ns;
+        }
+    }
+    Ok(())
+}
+
+impl Tally {
+    fn tick<W: std::io::Write + std::io::Seek>(
+        &mut self,
+        log: &mut McapLog<W>,
+        view: &View,
+    ) -> Result<()> {
+        let tick = view.tick();
+        let (last, now) = (self.last.header.tick, tick.header.tick);
+        // A long tick is told of more than once, each time under its number.
+        if last != 0 && now > last {
+            self.missed += now - last - 1;
+        }
+        self.ticks += u64::from(now != last);
+        self.last = *tick;
+        let names = view.names().filter(|names| {
+            let these = (names.header.boot_id, names.header.tick);
+            std::mem::replace(&mut self.names, these) != these
+        });
+        log.tick(&Shown {
+            tick,
+            names: names.map(|names| names.rows.as_slice()),
+            bodies: view.bodies().map(|bodies| bodies.rows.as_slice()),
+            contacts: view.contacts().map(parts),
+            pairs: view.pairs().map(parts),
+        })
+    }
+
+    fn restart<W: std::io::Write + std::io::Seek>(
+        &mut self,
+        log: &mut McapLog<W>,
+        news: &Restarted,
+    ) -> Result<()> {
+        let last = std::mem::take(&mut self.last);
+        log.restart(last.sent_ns, (&last.header, &news.ends))
+    }
+}
+
+fn parts<T>(message: &Message<T>) -> (&crate::wire::MessageHeader, &[T]) {
+    (&message.header, &message.rows)
+}

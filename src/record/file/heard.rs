@@ -1,0 +1,85 @@
+//! What a client heard of a daemon is written: for people alone, and nothing that could be replayed.
+
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+
+use super::shown::{self, Show, Shown};
+use super::tape::Tape;
+use super::{MISSED, WHY};
+use crate::error::Result;
+use crate::wire::{MessageHeader, PairRow};
+
+/// Writes what was heard as MCAP.
+#[derive(Debug)]
+pub struct McapLog<W: Write + Seek> {
+    tape: Tape<W>,
+    show: Show,
+    since_1970_ns: u64,
+}
+
+impl<W: Write + Seek> McapLog<W> {
+    /// A file without ticks.
+    ///
+    /// * `name` - what messages call the file.
+    /// * `frame_id` - the scene's frame.
+    /// * `since_1970_ns` - what `CLOCK_BOOTTIME` is behind the time of day, nanoseconds.
+    ///
+    /// # Errors
+    /// `Error::Io` when it cannot be written.
+    pub fn new(to: W, name: &str, frame_id: &str, since_1970_ns: u64) -> Result<Self> {
+        let mut log = Self {
+            tape: Tape::new(to, name, shown::TOPICS.into_iter())?,
+            show: Show::new(frame_id),
+            since_1970_ns,
+        };
+        log.tape.flush()?;
+        Ok(log)
+    }
+
+    /// Writes a tick.
+    ///
+    /// # Errors
+    /// As [`McapLog::new`].
+    pub fn tick(&mut self, shown: &Shown<'_>) -> Result<()> {
+        let time_ns = shown.tick.sent_ns.saturating_add(self.since_1970_ns);
+        self.show.tick(&mut self.tape, time_ns, shown)
+    }
+
+    /// The daemon has started anew: writes the ends that it means for pairs of the boot that is over.
+    ///
+    /// * `ends` - with the header of the last tick.
+    ///
+    /// # Errors
+    /// As [`McapLog::new`].
+    pub fn restart(&mut self, sent_ns: u64, ends: (&MessageHeader, &[PairRow])) -> Result<()> {
+        let time_ns = sent_ns.saturating_add(self.since_1970_ns);
+        let (header, rows) = ends;
+        if !rows.is_empty() {
+            self.show.pairs(&mut self.tape, time_ns, header, rows)?;
+        }
+        self.show.forget_names();
+        Ok(())
+    }
+
+    /// Hands over what was written: it survives the end of this process.
+    ///
+    /// # Errors
+    /// As [`McapLog::new`].
+    pub fn flush(&mut self) -> Result<()> {
+        self.tape.flush()
+    }
+
+    /// Closes the file.
+    ///
+    /// * `missed` - ticks that were overtaken and are not in it.
+    /// * `why` - nothing follows; empty: it was meant to end.
+    ///
+    /// # Errors
+    /// As [`McapLog::new`].
+    pub fn end(&mut self, why: &str, missed: u64) -> Result<()> {
+        self.tape.end(BTreeMap::from([
+            (WHY.to_owned(), why.to_owned()),
+            (MISSED.to_owned(), missed.to_string()),
+        ]))
+    }
+}

@@ -1,0 +1,109 @@
+//! A tick as people look at it: ROS 2 messages, names beside ids.
+
+use std::io::{Seek, Write};
+
+use super::tape::Tape;
+use crate::error::Result;
+use crate::wire::ros::{Book, Counts, Speaker, Time};
+use crate::wire::{BodyRow, ContactRow, MessageHeader, NameRow, PairRow, TickRow};
+
+const NAMES: &str = "/sweepd/names";
+const BODIES: &str = "/sweepd/bodies";
+const CONTACTS: &str = "/sweepd/contacts";
+const PAIRS: &str = "/sweepd/pairs";
+const STATE: &str = "/sweepd/state";
+const TICK: &str = "/sweepd/tick";
+
+/// Topics and their types. Names come before what names them.
+pub(super) const TOPICS: [(&str, &str); 6] = [
+    (NAMES, "sweepd_msgs/msg/Names"),
+    (BODIES, "sweepd_msgs/msg/BodyTransforms"),
+    (CONTACTS, "sweepd_msgs/msg/Contacts"),
+    (PAIRS, "sweepd_msgs/msg/Pairs"),
+    (STATE, "sweepd_msgs/msg/State"),
+    (TICK, "sweepd_msgs/msg/Tick"),
+];
+
+/// What there is of a tick: nothing of what nobody listened to.
+#[derive(Clone, Copy, Debug)]
+pub struct Shown<'a> {
+    /// The tick.
+    pub tick: &'a TickRow,
+    /// All names, where they are not those of the tick before.
+    pub names: Option<&'a [NameRow]>,
+    /// Bodies.
+    pub bodies: Option<&'a [BodyRow]>,
+    /// Contacts.
+    pub contacts: Option<(&'a MessageHeader, &'a [ContactRow])>,
+    /// Pairs.
+    pub pairs: Option<(&'a MessageHeader, &'a [PairRow])>,
+}
+
+/// Writes what people look at.
+#[derive(Debug)]
+pub(super) struct Show {
+    speaker: Speaker,
+}
+
+impl Show {
+    /// * `frame_id` - the scene's frame.
+    pub(super) fn new(frame_id: &str) -> Self {
+        Self {
+            speaker: Speaker {
+                frame_id: frame_id.to_owned(),
+                book: Book::default(),
+            },
+        }
+    }
+
+    /// Ids are given anew: another boot.
+    pub(super) fn forget_names(&mut self) {
+        self.speaker.book = Book::default();
+    }
+
+    /// A tick.
+    pub(super) fn tick<W: Write + Seek>(
+        &mut self,
+        tape: &mut Tape<W>,
+        time_ns: u64,
+        shown: &Shown<'_>,
+    ) -> Result<()> {
+        if let Some(names) = shown.names {
+            self.speaker.book = self.speaker.book.next(names);
+            let (stamp, header) = (Time::from_ns(time_ns), &shown.tick.header);
+            for names in self.speaker.names(stamp, header.boot_id, header.scene_rev) {
+                tape.write_message(NAMES, time_ns, &names)?;
+            }
+        }
+        if let Some(rows) = shown.bodies {
+            let bodies = self.speaker.bodies(shown.tick, rows);
+            tape.write_message(BODIES, time_ns, &bodies)?;
+        }
+        if let Some((header, rows)) = shown.contacts {
+            for contacts in self.speaker.contacts(header, rows) {
+                tape.write_message(CONTACTS, time_ns, &contacts)?;
+            }
+        }
+        if let Some((header, rows)) = shown.pairs {
+            self.pairs(tape, time_ns, header, rows)?;
+        }
+        let state = self.speaker.state(shown.tick);
+        tape.write_message(STATE, time_ns, &state)?;
+        let tick = self.speaker.tick(shown.tick, Counts::default());
+        tape.write_message(TICK, time_ns, &tick)
+    }
+
+    /// Pairs alone.
+    pub(super) fn pairs<W: Write + Seek>(
+        &self,
+        tape: &mut Tape<W>,
+        time_ns: u64,
+        header: &MessageHeader,
+        rows: &[PairRow],
+    ) -> Result<()> {
+        for pairs in self.speaker.pairs(header, rows) {
+            tape.write_message(PAIRS, time_ns, &pairs)?;
+        }
+        Ok(())
+    }
+}
