@@ -95,17 +95,23 @@ impl Publisher {
             sources_len: u8::try_from(view.world.sources().len()).unwrap_or(u8::MAX),
             ..TickRow::default()
         };
-        for message in [
-            &mut out.pairs_header,
-            &mut out.contacts_header,
-            &mut out.bodies_header,
-        ] {
-            *message = MessageHeader {
-                truncated: message.truncated,
-                state: state.code(),
-                ..header
-            };
-        }
+        repeat(header, state, out);
+    }
+}
+
+/// Has every message say of the tick what all say, and its state.
+fn repeat(header: MessageHeader, state: State, out: &mut Outbox) {
+    for message in [
+        &mut out.pairs_header,
+        &mut out.contacts_header,
+        &mut out.regions_header,
+        &mut out.bodies_header,
+    ] {
+        *message = MessageHeader {
+            truncated: message.truncated,
+            state: state.code(),
+            ..header
+        };
     }
 }
 

@@ -23,6 +23,15 @@ fn law_3_6_the_first_that_applies_of_colliding_unknown_possible_near_clear() {
         "unknown bodies hide no collision"
     );
     assert!(rig.because(Reason::NotReceived));
+    // As does every message of the tick.
+    for message in [
+        &rig.out.pairs_header,
+        &rig.out.contacts_header,
+        &rig.out.regions_header,
+        &rig.out.bodies_header,
+    ] {
+        assert_eq!(message.state, State::Colliding.code());
+    }
     rig.move_x(2, 9.0);
     rig.send(ALL);
     assert_eq!(rig.state(), State::Unknown);
