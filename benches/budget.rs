@@ -124,6 +124,7 @@ fn run(scene: &str, meshes: &[Arc<Shape>], above_us: u64, ticks: usize) -> Strin
         regions: scene == "meshes_regions",
         bodies: false,
         body_verdicts: false,
+        changes: false,
         ..Demand::ALL
     };
     let mut floors = Vec::new();

@@ -117,7 +117,10 @@ impl Rig {
         let out = self.engine.tick(TickInput {
             inbox: &inbox,
             edits: &[],
-            demand: Demand::ALL,
+            demand: Demand {
+                changes: false,
+                ..Demand::ALL
+            },
             budget,
             cause: TickCause::Frame,
             cause_source: Some(0),

@@ -34,6 +34,8 @@ const ASKED: Demand = Demand {
     regions: false,
     bodies: false,
     body_verdicts: false,
+    changes: false,
+    changes_anew: false,
 };
 
 /// Rapier's side of the same scene.

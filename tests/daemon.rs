@@ -15,6 +15,8 @@ mod live;
 mod bad_input;
 #[path = "daemon/bullets.rs"]
 mod bullets;
+#[path = "daemon/changes.rs"]
+mod changes;
 #[path = "daemon/cloths.rs"]
 mod cloths;
 #[path = "daemon/edits.rs"]

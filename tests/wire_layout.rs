@@ -15,11 +15,11 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use sweepd::wire::{
-    AnswerHeader, BodyRow, BodyStatus, BroadCause, BroadMode, ContactKind, ContactRow, EndCause,
-    Event, FrameHeader, Hello, Level, MessageHeader, NameRow, PairRow, Reason, RegionRow,
-    RejectReason, RequestHeader, SourceRow, Stage, State, TickCause, TickRow, TransformRow,
-    TransformVelRow, Verdict, VertexHeader, VertexRow, WIRE_VERSION, contact_flags, frame_flags,
-    pair_flags, region_flags, vertex_flags,
+    AnswerHeader, BodyRow, BodyStatus, BroadCause, BroadMode, ChangesHeader, ContactKind,
+    ContactRow, EndCause, Event, FrameHeader, Hello, Level, MessageHeader, NameRow, PairRow,
+    Reason, RegionRow, RejectReason, RequestHeader, SourceRow, Stage, State, TickCause, TickRow,
+    TransformRow, TransformVelRow, Verdict, VertexHeader, VertexRow, WIRE_VERSION, contact_flags,
+    frame_flags, pair_flags, region_flags, vertex_flags,
 };
 
 struct Layout {
@@ -56,6 +56,7 @@ fn layouts() -> Vec<Layout> {
         VertexRow { position }
         VertexHeader { session epoch seq sent_ns body version base_version source first count total flags schema reserved }
         MessageHeader { boot_id tick scene_rev oldest_stamp_ns newest_stamp_ns truncated state reserved schema }
+        ChangesHeader { message base_tick listed }
         PairRow { body_a body_b gap_min_m gap_max_m gap_best_m closing_mps toi_min toi_max begin_first_tick begin_last_tick end_first_tick end_last_tick certified_tick bound_age_ticks verdict certified_verdict events end_cause level flags reserved }
         ContactRow { id body_a body_b point_a point_b point_a_body point_b_body normal gap_m gap_min_m gap_max_m shape_a shape_b triangle_a triangle_b flags kind reserved }
         RegionRow { body_a body_b centre radius_m cone_axis cone_half_angle_rad point normal depth_m flags index count level reserved }

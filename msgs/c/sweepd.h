@@ -492,6 +492,21 @@ SWEEPD_ASSERT(offsetof(sweepd_message_header, reserved) == 49);
 SWEEPD_ASSERT(offsetof(sweepd_message_header, schema) == 52);
 SWEEPD_ASSERT(sizeof(sweepd_message_header) == 56);
 
+/* Type name "sweepd.v1.ChangesHeader", 72 bytes. User header of changes: what its rows are to be
+ * applied to, and what that makes. */
+typedef struct sweepd_changes_header {
+    /* As in every message. */
+    sweepd_message_header message;
+    /* The tick whose list these rows change; 0: they are the whole list. */
+    uint64_t base_tick;
+    /* How many rows the list has with them. */
+    uint64_t listed;
+} sweepd_changes_header;
+SWEEPD_ASSERT(offsetof(sweepd_changes_header, message) == 0);
+SWEEPD_ASSERT(offsetof(sweepd_changes_header, base_tick) == 56);
+SWEEPD_ASSERT(offsetof(sweepd_changes_header, listed) == 64);
+SWEEPD_ASSERT(sizeof(sweepd_changes_header) == 72);
+
 /* Type name "sweepd.v1.Pair", 120 bytes. One pair that is not plainly apart, or one last event
  * of a pair. */
 typedef struct sweepd_pair_row {

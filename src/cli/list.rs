@@ -36,6 +36,7 @@ fn as_json(i: &InstanceInfo) -> String {
         "sources": i.sources,
         "readers": i.readers,
         "pair_readers": i.pair_readers,
+        "change_readers": i.change_readers,
         "contact_readers": i.contact_readers,
     })
     .to_string()
@@ -47,7 +48,7 @@ fn as_text(i: &InstanceInfo) -> String {
         None => "no daemon".to_owned(),
     };
     format!(
-        "{:<20} {daemon}; {} sources, {} readers ({} of pairs, {} of contacts)",
-        i.instance, i.sources, i.readers, i.pair_readers, i.contact_readers
+        "{:<20} {daemon}; {} sources, {} readers ({} of pairs, {} of changes, {} of contacts)",
+        i.instance, i.sources, i.readers, i.pair_readers, i.change_readers, i.contact_readers
     )
 }

@@ -84,6 +84,8 @@ pub(super) struct Mark {
     pub(super) contacts: Span,
     /// There is something new to say of it.
     pub(super) fresh: bool,
+    /// ... and not only that it is a tick older.
+    news: bool,
     /// See [`Row::may_last`].
     lasts: bool,
 }
@@ -137,6 +139,12 @@ impl Listing {
         (self.marks).binary_search_by(|mark| self.rows[mark.row as usize].order().cmp(&order))
     }
 
+    /// Places of the rows of which more is new than their age, by ids.
+    pub(super) fn news(&self) -> impl Iterator<Item = u32> {
+        let marks = (0..).zip(&self.marks);
+        marks.filter(|(_, mark)| mark.news).map(|(at, _)| at)
+    }
+
     /// Whether a pair has a row.
     pub(super) fn has(&self, slot: PairSlot) -> bool {
         self.listed.get(slot.index()) == Some(&true)
@@ -157,7 +165,7 @@ impl Listing {
         self.dirty.clear();
         for (at, mark) in (0..).zip(&mut self.marks) {
             mark.was = at;
-            mark.fresh = false;
+            (mark.fresh, mark.news) = (false, false);
             if !mark.lasts || is_stirred(mark.slot) {
                 self.dirty.push(at);
             }
@@ -170,16 +178,19 @@ impl Listing {
     }
 
     /// Puts another row of the same pair in its place.
-    pub(super) fn renew(&mut self, at: usize, row: Row) {
+    ///
+    /// * `news` - whether more may be new of it than its age.
+    pub(super) fn renew(&mut self, at: usize, row: Row, news: bool) {
         let mark = &mut self.marks[at];
         (mark.fresh, mark.lasts) = (true, row.may_last());
+        mark.news |= news;
         self.rows[mark.row as usize] = row;
     }
 
     /// Gives a row its event.
     pub(super) fn set_event(&mut self, at: usize, event: u32) {
         let row = *self.row(at);
-        self.renew(at, Row { event, ..row });
+        self.renew(at, Row { event, ..row }, true);
     }
 
     /// Drops a row; [`Listing::close`] closes the gap.
@@ -226,6 +237,7 @@ impl Listing {
             was: 0,
             contacts: Span::default(),
             fresh: true,
+            news: true,
             lasts: false,
         };
         self.marks.resize(end + late.len(), hole);
@@ -320,7 +332,7 @@ mod tests {
                 let known = pairs.iter_mut().find(|pair| pair.1 == slot).unwrap();
                 if random.unit() < 0.7 {
                     known.2 = tick;
-                    listing.renew(at, row(known.0, slot, tick));
+                    listing.renew(at, row(known.0, slot, tick), true);
                     continue;
                 }
                 listing.drop(at);

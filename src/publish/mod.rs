@@ -4,6 +4,7 @@
 //! Rows that do not fit are left out by rank and counted, and the state is then never `clear`.
 
 mod bodies;
+mod changes;
 mod contacts;
 mod events;
 mod kept;
@@ -19,6 +20,7 @@ use crate::pairs::{PairDelta, PairSet};
 use crate::wire::{ContactRow, Demand, MessageHeader, Outbox, PairRow, WIRE_VERSION};
 use crate::world::World;
 
+use changes::Chain;
 use events::Events;
 use kept::Kept;
 use listing::Listing;
@@ -68,6 +70,8 @@ pub struct Publisher {
     /// Which were listened to in the last tick.
     heard: OfMessages,
     kept_pairs: Kept<PairRow>,
+    /// What `changes` build on.
+    chain: Chain,
     kept_contacts: Kept<ContactRow>,
     /// Used only when not all contacts fit: of the pairs that have some the depth in metres, the place among the rows
     /// and how many they are.
@@ -93,6 +97,7 @@ impl Publisher {
             survey: Survey::default(),
             heard: OfMessages::default(),
             kept_pairs: Kept::default(),
+            chain: Chain::default(),
             kept_contacts: Kept::default(),
             contact_pairs: Vec::new(),
             chosen: Vec::new(),
@@ -107,12 +112,14 @@ impl Publisher {
     pub fn forget_slots(&mut self) {
         self.events.forget_slots();
         self.listing.forget_slots();
+        self.chain.break_off();
         self.survey = Survey::default();
     }
 
     /// Nothing of the last tick holds: every row is made anew.
     pub(crate) fn forget_rows(&mut self) {
         self.listing.forget();
+        self.chain.break_off();
         self.survey = Survey::default();
     }
 
@@ -125,7 +132,7 @@ impl Publisher {
         // Before the pairs, which leave out of the list what does not fit.
         let contacts_left = self.fill_contacts(view, header, out);
         let regions_left = self.fill_regions(view, header, out);
-        let pairs_left = self.fill_pairs(view, header, out);
+        let pairs_left = self.fill_list(view, header, out);
         let bodies_left = self.fill_bodies(view, header, out);
         Self::fill_names(view, out);
         let left = pairs_left + contacts_left + regions_left + bodies_left;

@@ -1,6 +1,6 @@
-//! Rows of `pairs`: every pair that is not plainly apart, and every event.
+//! The list of pairs: every one that is not plainly apart, and every event. Rows of `pairs` are all of it.
 
-use crate::ids::{BodyId, PairKey, PairSlot, small};
+use crate::ids::{PairKey, PairSlot, small};
 use crate::math::{Interval, Point, Vec3};
 use crate::narrow::{Finding, Passage, Witness};
 use crate::wire::{
@@ -8,6 +8,7 @@ use crate::wire::{
 };
 use crate::world::Body;
 
+use super::events::Ids;
 use super::kept::{Kept, Span};
 use super::listing::{Mark, NO_EVENT, Row};
 use super::{AHEAD, Publisher, View};
@@ -22,22 +23,45 @@ pub(super) fn worst_of(verdict: Verdict, passage: Option<Passage>) -> Verdict {
 }
 
 impl Publisher {
-    /// Fills `pairs`; returns how many rows did not fit.
-    pub(super) fn fill_pairs(
+    /// Fills `pairs` and `changes`; returns how many rows of the list did not fit.
+    pub(super) fn fill_list(
         &mut self,
         view: &mut View<'_>,
         header: MessageHeader,
         out: &mut Outbox,
     ) -> u64 {
+        let listened = view.demand.pairs || view.demand.changes;
+        let left_out = if listened {
+            self.add_events(view);
+            self.rank()
+        } else {
+            0
+        };
+        self.fill_pairs(view, header, left_out, out);
+        self.fill_changes(view, header, left_out, out);
+        // Who begins to listen later sees the full state; there is nobody to tell what happened before.
+        let (listing, chosen, cut) = (&self.listing, &self.chosen, left_out > 0);
+        let is_left_out = |ids| {
+            listing
+                .find(ids)
+                .is_ok_and(|at| chosen.get(at) != Some(&true))
+        };
+        self.events.sent(|ids| cut && is_left_out(ids));
+        left_out
+    }
+
+    fn fill_pairs(
+        &mut self,
+        view: &mut View<'_>,
+        header: MessageHeader,
+        left_out: u64,
+        out: &mut Outbox,
+    ) {
         if !view.demand.pairs {
             out.pairs.clear();
             self.whole.pairs = false;
-            // Who begins to listen later sees the full state; there is nobody to tell what happened before.
-            self.events.sent(|_| false);
-            return 0;
+            return;
         }
-        self.add_events(view);
-        let left_out = self.rank();
         let cut = left_out > 0;
         let whole = std::mem::replace(&mut self.whole.pairs, !cut) && !cut;
         let mut kept = std::mem::take(&mut self.kept_pairs);
@@ -45,7 +69,7 @@ impl Publisher {
         let mut at = 0;
         while at < self.listing.len() {
             if whole && !self.listing.marks[at].fresh {
-                at = self.keep_pairs(at, view.tick, &mut kept, &mut out.pairs);
+                at = self.keep_pairs(at, &mut kept, &mut out.pairs);
                 continue;
             }
             if let Some(ahead) = self.listing.marks.get(at + AHEAD)
@@ -64,35 +88,21 @@ impl Publisher {
         }
         kept.finish(&mut out.pairs);
         self.kept_pairs = kept;
-        let (listing, chosen) = (&self.listing, &self.chosen);
-        let is_left_out = |ids| {
-            listing
-                .find(ids)
-                .is_ok_and(|at| chosen.get(at) != Some(&true))
-        };
-        self.events.sent(|ids| cut && is_left_out(ids));
         out.pairs_header = MessageHeader {
             truncated: left_out,
             ..header
         };
-        left_out
     }
 
     /// Keeps the rows that are not fresh and stood side by side, from a place on; returns the place behind them.
-    fn keep_pairs(
-        &self,
-        from: usize,
-        tick: u64,
-        kept: &mut Kept<PairRow>,
-        out: &mut [PairRow],
-    ) -> usize {
+    fn keep_pairs(&self, from: usize, kept: &mut Kept<PairRow>, out: &mut [PairRow]) -> usize {
         let marks = &self.listing.marks[from..];
         let first = marks.first().map_or(0, |mark| mark.was);
         let side_by_side = |(mark, was): &(&Mark, u32)| !mark.fresh && mark.was == *was;
         let count = marks.iter().zip(first..).take_while(side_by_side).count();
         let from_was = first as usize;
         for row in out.iter_mut().skip(from_was).take(count) {
-            grow_older(row, tick);
+            row.age(1);
         }
         kept.keep(Span {
             first,
@@ -108,29 +118,32 @@ impl Publisher {
             let place = u32::try_from(at).unwrap_or(NO_EVENT);
             match listing.find(event.ids) {
                 Ok(at) => listing.set_event(at, place),
-                Err(_) => {
-                    let slot = Self::slot_of(view, event.ids);
-                    // Plainly apart: its certificate may hold, and its interval still be that of older poses.
-                    if let Some(slot) = slot {
-                        view.narrow.bring_up(slot, view.world);
-                    }
-                    listing.add(Row {
-                        ids: event.ids,
-                        gap: Interval { min: 0.0, max: 0.0 },
-                        best_m: 0.0,
-                        slot,
-                        event: place,
-                        contacts: 0,
-                        verdict: Verdict::Apart,
-                    });
-                }
+                Err(_) => listing.add(Self::row_of_apart(view, event.ids, place)),
             }
         }
         listing.finish();
     }
 
+    /// The row of a pair that is plainly apart, or gone.
+    pub(super) fn row_of_apart(view: &mut View<'_>, ids: Ids, event: u32) -> Row {
+        let slot = Self::slot_of(view, ids);
+        // Its certificate may hold, and its interval still be that of older poses.
+        if let Some(slot) = slot {
+            view.narrow.bring_up(slot, view.world);
+        }
+        Row {
+            ids,
+            gap: Interval { min: 0.0, max: 0.0 },
+            best_m: 0.0,
+            slot,
+            event,
+            contacts: 0,
+            verdict: Verdict::Apart,
+        }
+    }
+
     /// The slot of a pair that is apart but still a candidate.
-    fn slot_of(view: &View<'_>, ids: (BodyId, BodyId)) -> Option<PairSlot> {
+    fn slot_of(view: &View<'_>, ids: Ids) -> Option<PairSlot> {
         let (a, b) = (view.world.slot_of(ids.0)?, view.world.slot_of(ids.1)?);
         view.pairs.find(PairKey::new(a, b))
     }
@@ -150,7 +163,7 @@ impl Publisher {
         left_out as u64
     }
 
-    fn pair_row(&self, view: &View<'_>, row: &Row) -> PairRow {
+    pub(super) fn pair_row(&self, view: &View<'_>, row: &Row) -> PairRow {
         let mut out = PairRow {
             body_a: row.ids.0.0,
             body_b: row.ids.1.0,
@@ -268,12 +281,6 @@ impl Publisher {
         };
         (out.toi_min, out.toi_max) = (toi.min, toi.max);
     }
-}
-
-/// A row of a pair that nothing happened to since the tick before: what was certified is so again, by an older bound.
-fn grow_older(row: &mut PairRow, tick: u64) {
-    row.bound_age_ticks = row.bound_age_ticks.saturating_add(1);
-    row.certified_tick = tick;
 }
 
 /// How fast the gap shrinks at the witness of two bodies whose velocities are known, metres a second.

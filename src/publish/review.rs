@@ -40,6 +40,7 @@ impl Publisher {
     /// Of the rows of the last tick, those that still are.
     fn renew_rows(&mut self, view: &mut View<'_>) {
         self.listing.begin(|slot| view.narrow.is_stirred(slot));
+        self.chain.begin();
         let mut n = 0;
         while let Some(at) = self.listing.dirty(n) {
             let ahead = self.listing.dirty(n + AHEAD);
@@ -49,14 +50,19 @@ impl Publisher {
             n += 1;
             let was = *self.listing.row(at);
             self.survey.leave(&was);
+            // An event is told once: without it the row is another.
+            let stirred = was.slot.is_none_or(|slot| view.narrow.is_stirred(slot));
+            let news = stirred || was.event != NO_EVENT;
             match was.slot.and_then(|slot| self.look(view, slot)) {
-                Some(now) if now.ids == was.ids => self.listing.renew(at, now),
+                Some(now) if now.ids == was.ids => self.listing.renew(at, now, news),
                 // The slot holds another pair now.
                 Some(now) => {
+                    self.chain.note_dropped(view.demand, was.ids);
                     self.listing.drop(at);
                     self.listing.add(now);
                 }
                 None => {
+                    self.chain.note_dropped(view.demand, was.ids);
                     self.listing.drop(at);
                     if was.slot.is_some_and(|slot| view.narrow.is_active(slot)) {
                         self.listing.lacks();

@@ -103,6 +103,7 @@ impl Publisher {
 fn repeat(header: MessageHeader, state: State, out: &mut Outbox) {
     for message in [
         &mut out.pairs_header,
+        &mut out.changes_header.message,
         &mut out.contacts_header,
         &mut out.regions_header,
         &mut out.bodies_header,

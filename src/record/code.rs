@@ -180,6 +180,8 @@ fn demand_bits(demand: Demand) -> u8 {
         | u8::from(demand.regions) << 2
         | u8::from(demand.bodies) << 3
         | u8::from(demand.body_verdicts) << 4
+        | u8::from(demand.changes) << 5
+        | u8::from(demand.changes_anew) << 6
 }
 
 fn demand_of(bits: u8) -> Demand {
@@ -189,6 +191,8 @@ fn demand_of(bits: u8) -> Demand {
         regions: bits & 4 != 0,
         bodies: bits & 8 != 0,
         body_verdicts: bits & 16 != 0,
+        changes: bits & 32 != 0,
+        changes_anew: bits & 64 != 0,
     }
 }
 

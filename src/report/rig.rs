@@ -25,6 +25,8 @@ const DEMAND: Demand = Demand {
     regions: false,
     bodies: false,
     body_verdicts: false,
+    changes: false,
+    changes_anew: false,
 };
 
 /// What a tick took, nanoseconds of the engine's clock.

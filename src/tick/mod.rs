@@ -260,7 +260,7 @@ impl Engine {
         let demand = input.demand;
         let wanted = Wanted {
             contacts: demand.contacts || demand.regions,
-            bounds: demand.pairs || demand.contacts || demand.regions,
+            bounds: demand.pairs || demand.changes || demand.contacts || demand.regions,
             regions: demand.regions,
             order: self.end.order(budget),
         };

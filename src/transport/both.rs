@@ -45,6 +45,8 @@ impl Door for Both<'_> {
             regions: first.regions || beside.regions,
             bodies: first.bodies || beside.bodies,
             body_verdicts: first.body_verdicts || beside.body_verdicts,
+            changes: first.changes || beside.changes,
+            changes_anew: first.changes_anew || beside.changes_anew,
         }
     }
 

@@ -2,6 +2,7 @@
 //! engine is handed and hands back. `msgs/` holds the same layouts for other languages; `tests/wire_layout.rs`
 //! compares them.
 
+mod changes;
 mod codes;
 mod frame;
 mod outbox;
@@ -13,6 +14,7 @@ mod rows;
 mod tick;
 mod vertices;
 
+pub use changes::ChangesHeader;
 pub use codes::{
     BodyStatus, BroadCause, BroadMode, ContactKind, EndCause, Event, Level, Reason, RejectReason,
     Stage, State, TickCause, Verdict, contact_flags, frame_flags, pair_flags, region_flags,

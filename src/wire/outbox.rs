@@ -1,5 +1,6 @@
 //! The outbox of a tick, and the demand that says which parts of it anybody reads.
 
+use super::changes::ChangesHeader;
 use super::region::RegionRow;
 use super::rows::{BodyRow, ContactRow, MessageHeader, NameRow, PairRow};
 use super::tick::TickRow;
@@ -21,6 +22,10 @@ pub struct Demand {
     pub bodies: bool,
     /// Somebody reads `body_verdicts`.
     pub body_verdicts: bool,
+    /// Somebody reads `changes`.
+    pub changes: bool,
+    /// ... and came since the last message of it, or missed that: the next holds the whole list.
+    pub changes_anew: bool,
 }
 
 impl Demand {
@@ -31,6 +36,8 @@ impl Demand {
         regions: true,
         bodies: true,
         body_verdicts: true,
+        changes: true,
+        changes_anew: false,
     };
 }
 
@@ -43,6 +50,10 @@ pub struct Outbox {
     pub pairs_header: MessageHeader,
     /// Pairs that are not plainly apart and last events, by `(body_a, body_b)`.
     pub pairs: Vec<PairRow>,
+    /// Header of `changes`.
+    pub changes_header: ChangesHeader,
+    /// What is new of `pairs` since the tick before, in the same order; or all of it, by the header.
+    pub changes: Vec<PairRow>,
     /// Header of `contacts`.
     pub contacts_header: MessageHeader,
     /// Contacts, by `(body_a, body_b)`, then by shapes, triangles and id.

@@ -26,6 +26,7 @@ fn law_3_6_the_first_that_applies_of_colliding_unknown_possible_near_clear() {
     // As does every message of the tick.
     for message in [
         &rig.out.pairs_header,
+        &rig.out.changes_header.message,
         &rig.out.contacts_header,
         &rig.out.regions_header,
         &rig.out.bodies_header,

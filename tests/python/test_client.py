@@ -121,6 +121,62 @@ def test_regions_hold_the_contacts_and_say_that_they_are_all(daemon):
         assert len(client.step(poses(1.2), timeout_s=5).regions) == 0
 
 
+MANY = SCENE.replace("timeout_ms = 300", "timeout_ms = 30000") + "".join(
+    f'[[body]]\nname = "b{at}"\nreport_within_m = 0.5\nshape = {{ type = "sphere", radius = 0.5 }}\n' for at in range(60)
+)
+
+
+def crowd(step):
+    """Spheres in a row, some of them a little aside in each step."""
+    places = {f"b{at}": ((20 + 1.1 * at + (0.4 if (at + step) % 20 == 0 else 0.0), 0.0, 0.0), NO_TURN) for at in range(60)}
+    return {**poses(1.2 + 0.5 * math.sin(0.3 * step)), **places}
+
+
+def test_a_list_kept_from_changes_is_what_pairs_says(started):
+    with sweepd.Client(started(MANY), "sim", quat_order="wxyz", listen=("pairs", "changes")) as client:
+        deltas = rows = 0
+        for step in range(150):
+            result = client.step(crowd(step), timeout_s=5)
+            assert result.listed.tobytes() == result.pairs.tobytes(), step
+            deltas += result.changes_header.base_tick != 0
+            rows += len(result.changes)
+        assert deltas > 100 and rows < 150 * len(result.pairs)
+        before = result
+        client.step(crowd(step), timeout_s=5)
+        with pytest.raises(sweepd.SweepdError, match="gone on to another tick"):
+            before.listed
+
+
+def test_a_list_that_missed_a_message_is_not_shown_until_the_whole_of_it_came(started, monkeypatch):
+    with sweepd.Client(started(MANY), "sim", quat_order="wxyz", listen=("changes",)) as client:
+        for step in range(5):
+            assert len(client.step(crowd(step), timeout_s=5).listed) > 0
+        receive = client._ports.message
+        lost = []
+
+        def lose(topic):
+            message = receive(topic)
+            if topic == "changes" and message is not None and not lost:
+                lost.append(message[0].message.tick)
+                return receive(topic)
+            return message
+
+        monkeypatch.setattr(client._ports, "message", lose)
+        result = client.step(crowd(5), timeout_s=5)
+        assert lost and result.changes is None and result.listed is None
+        with pytest.raises(sweepd.SweepdError, match="has not all of them yet"):
+            result.colliding
+        for step in range(6, 12):
+            result = client.step(crowd(step), timeout_s=5)
+            if result.listed is not None:
+                break
+        # the first that it has is the whole list, and the next build on it
+        assert result.changes_header.base_tick == 0
+        assert len(result.listed) == len(result.changes)
+        after = client.step(crowd(12), timeout_s=5)
+        assert after.changes_header.base_tick != 0 and len(after.listed) == after.changes_header.listed
+
+
 def test_a_quaternion_is_read_in_the_order_that_was_said(daemon):
     half = math.sqrt(0.5)
     with sweepd.Client(daemon[0], "sim", quat_order="wxyz") as client:

@@ -36,6 +36,8 @@ const ASKED: Demand = Demand {
     regions: true,
     bodies: false,
     body_verdicts: false,
+    changes: false,
+    changes_anew: false,
 };
 
 fn mesh(rng: &mut Rng) -> Part {

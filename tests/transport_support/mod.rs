@@ -22,9 +22,9 @@ use sweepd::time::{Clock, SystemClock};
 use sweepd::transport::iceoryx::{Place, Server, ServerOptions};
 use sweepd::transport::{Door, RequestToken};
 use sweepd::wire::{
-    ContactRow, Frame, FrameHeader, Inbox, MessageHeader, NameRow, Outbox, PairRow, Reason,
-    RegionRow, RejectReason, State, TickCause, TickRow, TransformRow, Verdict, VertexHeader,
-    WIRE_VERSION,
+    ChangesHeader, ContactRow, Frame, FrameHeader, Inbox, MessageHeader, NameRow, Outbox, PairRow,
+    Reason, RegionRow, RejectReason, State, TickCause, TickRow, TransformRow, Verdict,
+    VertexHeader, WIRE_VERSION,
 };
 
 pub const SECOND_NS: u64 = 1_000_000_000;
@@ -315,17 +315,20 @@ fn tick(door: &mut dyn Door, outbox: &mut Outbox, demand: sweepd::wire::Demand, 
     outbox.contacts.clear();
     outbox.regions.clear();
     // one colliding pair for each body: enough to tell frames apart
+    let pair = |row: &TransformRow| PairRow {
+        body_a: row.body,
+        body_b: row.body + 1,
+        verdict: Verdict::Colliding.code(),
+        certified_verdict: Verdict::Colliding.code(),
+        gap_best_m: row.position[0],
+        ..PairRow::default()
+    };
+    let pairs: Vec<PairRow> = frame.transforms.iter().map(pair).collect();
+    if demand.pairs {
+        outbox.pairs.clone_from(&pairs);
+    }
+    change(outbox, demand, &pairs);
     for row in &frame.transforms {
-        if demand.pairs {
-            outbox.pairs.push(PairRow {
-                body_a: row.body,
-                body_b: row.body + 1,
-                verdict: Verdict::Colliding.code(),
-                certified_verdict: Verdict::Colliding.code(),
-                gap_best_m: row.position[0],
-                ..PairRow::default()
-            });
-        }
         if demand.contacts {
             outbox.contacts.push(ContactRow {
                 body_a: row.body,
@@ -343,6 +346,26 @@ fn tick(door: &mut dyn Door, outbox: &mut Outbox, demand: sweepd::wire::Demand, 
     assert_eq!(door.publish(outbox).unwrap(), 0);
     outbox.names_changed = false;
     outbox.plan_changed = false;
+}
+
+/// What is new of the pairs: all that are there, and those of the tick before that are not.
+fn change(outbox: &mut Outbox, demand: sweepd::wire::Demand, pairs: &[PairRow]) {
+    let header = outbox.tick.header;
+    let before = outbox.changes_header.message.tick;
+    let whole = demand.changes_anew || before + 1 != header.tick;
+    outbox.changes_header = ChangesHeader {
+        message: header,
+        base_tick: if whole { 0 } else { before },
+        listed: pairs.len() as u64,
+    };
+    let there = |gone: &PairRow| pairs.iter().any(|row| row.body_a == gone.body_a);
+    outbox
+        .changes
+        .retain(|row| !whole && !row.has_left() && !there(row));
+    for gone in &mut outbox.changes {
+        gone.verdict = Verdict::Apart.code();
+    }
+    outbox.changes.extend_from_slice(pairs);
 }
 
 /// `n` bodies whose x says which frame they are from.

@@ -9,12 +9,14 @@ import numpy as np
 
 from . import layout
 from .errors import Refused, Restarted, Skipped, SweepdError, TimedOut
+from .pairlist import PairList
 from .ports import Ports
 
 _LOOK_AGAIN_S = 0.05
 _BOOTS_OVER_MAX = 16
 _TOPICS = {
     "pairs": layout.PairRow,
+    "changes": layout.PairRow,
     "contacts": layout.ContactRow,
     "regions": layout.RegionRow,
     "bodies": layout.BodyRow,
@@ -22,6 +24,7 @@ _TOPICS = {
     "names": layout.NameRow,
     "plan": ctypes.c_uint8,
 }
+_HEADERS = {"changes": layout.ChangesHeader}
 _POSE = np.dtype(layout.TransformRow)
 _MOVING = np.dtype(layout.TransformVelRow)
 _VERTEX = np.dtype(layout.VertexRow)
@@ -38,11 +41,14 @@ class Result:
 
     ``tick`` is a structure (see ``msgs/README.md``); ``pairs``, ``contacts``, ``regions`` and ``bodies`` are numpy
     structured arrays over shared memory, None where the client did not listen or a newer one overtook it. Keep at most three
-    results, or copy what you keep.
+    results, or copy what you keep. ``changes`` are the rows that changed since the tick before, under ``changes_header``
+    whose ``base_tick`` is 0 the whole list; None also where the list is not whole (yet, or again).
     """
 
-    def __init__(self, tick, messages):
+    def __init__(self, tick, messages, listing=None):
         self.tick = tick
+        self._list = listing
+        self.changes_header, self.changes = messages.pop("changes", (None, None))
         self.pairs = messages.get("pairs")
         self.contacts = messages.get("contacts")
         self.regions = messages.get("regions")
@@ -55,11 +61,23 @@ class Result:
         return layout.State(self.tick.header.state).name.lower()
 
     @property
+    def listed(self):
+        """What ``pairs`` would hold, kept from ``changes``: an array of its own; None where ``changes`` is.
+
+        Made when it is asked for, which is to be before the client goes on to the next tick.
+        """
+        if self.changes is None:
+            return None
+        if not self._list.is_of(self.tick.header):
+            raise SweepdError("the client has gone on to another tick: ask a result for `listed` before the next step")
+        return self._list.rows()
+
+    @property
     def colliding(self):
         """``(n, 2)`` ids of the pairs certified colliding at the poses of this tick, by id."""
-        if self.pairs is None:
-            raise SweepdError("this client does not listen to pairs")
-        rows = self.pairs
+        rows = self.listed if self.pairs is None else self.pairs
+        if rows is None:
+            raise SweepdError("this client does not listen to pairs or changes, or has not all of them yet")
         gone = rows["flags"] & int(layout.PairFlags.GONE) != 0
         rows = rows[(rows["verdict"] == layout.Verdict.COLLIDING) & ~gone]
         return np.stack([rows["body_a"], rows["body_b"]], axis=1)
@@ -97,9 +115,10 @@ class Client:
         self._ports = Ports(instance, timeout_s, root, prefix)
         self._topics = list(dict.fromkeys([*listen, "names"]))
         for topic in self._topics:
-            self._ports.subscribe(topic, _TOPICS[topic])
+            self._ports.subscribe(topic, _TOPICS[topic], _HEADERS.get(topic, layout.MessageHeader))
         self._ahead = {topic: None for topic in self._topics}
         self._now = {topic: None for topic in self._topics}
+        self._list = PairList()
         #: This client's session, drawn at its start.
         self.session = secrets.randbits(64) or 1
         self._epoch = 0
@@ -385,15 +404,21 @@ class Client:
                 continue
             self._tick = tick
             for topic in self._topics:
-                self._advance(topic, new)
+                if topic == "changes":
+                    self._advance_list(new)
+                else:
+                    self._advance(topic, new)
             return True
 
     def _restart(self, old, tick):
         self._boots_over = [*self._boots_over[1 - _BOOTS_OVER_MAX :], old.boot_id]
         ends = np.empty((0, 2), np.uint64)
-        pairs = self._now.get("pairs")
+        pairs, rows = self._now.get("pairs"), None
         if pairs is not None and pairs[0].boot_id == old.boot_id:
             rows = pairs[1]
+        elif self._list.boot_id == old.boot_id:
+            rows = self._list.rows()
+        if rows is not None:
             there = rows["flags"] & int(layout.PairFlags.GONE) == 0
             rows = rows[there & (rows["certified_verdict"] == layout.Verdict.COLLIDING)]
             ends = np.stack([rows["body_a"], rows["body_b"]], axis=1)
@@ -421,14 +446,35 @@ class Client:
                 return
             ahead = None
 
+    def _advance_list(self, tick):
+        """As ``_advance``, but every message is applied; one that is not for the list has the whole list asked for."""
+        while True:
+            ahead, self._ahead["changes"] = self._ahead["changes"] or self._ports.message("changes"), None
+            if ahead is None:
+                return
+            header = ahead[0].message
+            if header.boot_id in self._boots_over:
+                continue
+            if header.boot_id != tick.boot_id or header.tick > tick.tick:
+                self._ahead["changes"] = ahead
+                return
+            self._now["changes"] = None
+            if self._list.take(*ahead):
+                ahead = None
+                self._ports.renew("changes", layout.PairRow, layout.ChangesHeader)
+            elif self._list.is_whole:
+                self._now["changes"] = ahead
+
     def _result(self):
         tick = self._tick.header
         messages = {
             topic: now[1]
             for topic, now in self._now.items()
-            if now is not None and (now[0].boot_id, now[0].tick) == (tick.boot_id, tick.tick)
+            if topic != "changes" and now is not None and (now[0].boot_id, now[0].tick) == (tick.boot_id, tick.tick)
         }
-        return Result(self._tick, messages)
+        if self._now.get("changes") is not None and self._list.is_of(tick):
+            messages["changes"] = self._now["changes"]
+        return Result(self._tick, messages, self._list)
 
     @staticmethod
     def _is_under_way(tick):

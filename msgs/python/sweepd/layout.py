@@ -168,6 +168,20 @@ class MessageHeader(_Row):
     ]
 
 
+class ChangesHeader(_Row):
+    """User header of changes: what its rows are to be applied to, and what that makes."""
+
+    TYPE_NAME = "sweepd.v1.ChangesHeader"
+    _fields_ = [
+        # As in every message.
+        ("message", MessageHeader),
+        # The tick whose list these rows change; 0: they are the whole list.
+        ("base_tick", ctypes.c_uint64),
+        # How many rows the list has with them.
+        ("listed", ctypes.c_uint64),
+    ]
+
+
 class PairRow(_Row):
     """One pair that is not plainly apart, or one last event of a pair."""
 
@@ -825,6 +839,7 @@ LAYOUTS = {
         VertexRow,
         VertexHeader,
         MessageHeader,
+        ChangesHeader,
         PairRow,
         ContactRow,
         RegionRow,

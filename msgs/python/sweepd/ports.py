@@ -164,13 +164,19 @@ class Ports:
         # iceoryx2 0.10 hands the system whole microseconds, rounded down, and 0 is for ever
         self._ready.timed_wait(iox2.Duration.from_secs_f64(max(timeout_s, 2e-6)))
 
-    def subscribe(self, topic, row):
+    def subscribe(self, topic, row, header=layout.MessageHeader):
         """Listens to a message kind from now on."""
         if topic not in self._readers:
-            service = self._topic(topic).publish_subscribe(iox2.Slice[row]).user_header(layout.MessageHeader).open()
+            service = self._topic(topic).publish_subscribe(iox2.Slice[row]).user_header(header).open()
             kind = np.dtype(row)
-            self._readers[topic] = (service.subscriber_builder().create(), kind)
+            self._readers[topic] = (service.subscriber_builder().create(), kind, header)
             self.wake(14)
+
+    def renew(self, topic, row, header):
+        """Opens the port of a message kind anew: what waits in it is gone, and the daemon sees a new reader."""
+        # first the old one, which takes a reader's place
+        del self._readers[topic]
+        self.subscribe(topic, row, header)
 
     def tick(self):
         """The next tick as a structure of its own, or None."""
@@ -181,7 +187,7 @@ class Ports:
 
     def message(self, topic):
         """The next message of a kind as ``(header, rows)``, or None; the rows lie in shared memory."""
-        reader, kind = self._readers[topic]
+        reader, kind, header = self._readers[topic]
         try:
             sample = reader.receive()
         except Exception as e:
@@ -191,7 +197,7 @@ class Ports:
             ) from e
         if sample is None:
             return None
-        header = layout.MessageHeader.from_buffer_copy(sample.user_header().contents)
+        header = header.from_buffer_copy(sample.user_header().contents)
         return header, _view(sample, kind)
 
     def _sender(self, topic, row, header, count):

@@ -1,6 +1,7 @@
 //! Following the ticks: each message is put with the tick it belongs to; what is older than the newest is dropped.
 
 use super::link::Link;
+use super::list::PairList;
 use super::{BOOTS_OVER_MAX, Heard, Restarted, ends_of};
 use crate::error::Result;
 use crate::wire::{
@@ -9,9 +10,9 @@ use crate::wire::{
 
 /// A message as it was received.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Message<T> {
+pub struct Message<T, H = MessageHeader> {
     /// Its header; boot id 0: none yet.
-    pub header: MessageHeader,
+    pub header: H,
     /// `[n]` rows.
     pub rows: Vec<T>,
 }
@@ -27,6 +28,7 @@ impl<T> Message<T> {
 pub struct View {
     tick: TickRow,
     pairs: Stream<PairRow>,
+    list: PairList,
     contacts: Stream<ContactRow>,
     regions: Stream<RegionRow>,
     bodies: Stream<BodyRow>,
@@ -55,6 +57,13 @@ impl View {
     #[must_use]
     pub fn pairs(&self) -> Option<&Message<PairRow>> {
         self.pairs.of(&self.tick.header)
+    }
+
+    /// The list of pairs at this very tick, kept from `changes`; `None`: not listened to when it began, or not whole
+    /// (yet, or again: the daemon was asked for all of it).
+    #[must_use]
+    pub fn list(&self) -> Option<&PairList> {
+        self.list.of(&self.tick.header)
     }
 
     /// The contacts of this very tick; `None` as for [`View::pairs`].
@@ -188,8 +197,11 @@ impl Follow {
             self.boots_over.remove(0);
         }
         self.boots_over.push(old_boot);
-        let ends = if self.view.pairs.now.header.boot_id == old_boot {
-            ends_of(&self.view.pairs.now)
+        let (pairs, list) = (&self.view.pairs.now, &self.view.list);
+        let ends = if pairs.header.boot_id == old_boot {
+            ends_of(pairs.header.tick, pairs.rows.iter().copied())
+        } else if list.boot_id() == old_boot {
+            ends_of(list.tick(), list.iter())
         } else {
             Vec::new()
         };
@@ -208,6 +220,7 @@ impl Follow {
         view.contacts.advance(tick, over, |m| link.contacts(m))?;
         view.regions.advance(tick, over, |m| link.regions(m))?;
         view.pairs.advance(tick, over, |m| link.pairs(m))?;
+        view.list.advance(tick, over, link)?;
         view.bodies.advance(tick, over, |m| link.bodies(m))?;
         view.body_verdicts
             .advance(tick, over, |m| link.body_verdicts(m))?;

@@ -5,8 +5,8 @@ use std::fmt::Debug;
 use super::follow::Message;
 use crate::error::Result;
 use crate::wire::{
-    AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, NameRow, PairRow, RegionRow,
-    RequestHeader, TickRow, TransformRow, TransformVelRow, VertexHeader, VertexRow,
+    AnswerHeader, BodyRow, ChangesHeader, ContactRow, FrameHeader, Hello, NameRow, PairRow,
+    RegionRow, RequestHeader, TickRow, TransformRow, TransformVelRow, VertexHeader, VertexRow,
 };
 
 /// What to listen to beside ticks.
@@ -18,6 +18,8 @@ use crate::wire::{
 pub struct Topics {
     /// `pairs`.
     pub pairs: bool,
+    /// `changes`.
+    pub changes: bool,
     /// `contacts`.
     pub contacts: bool,
     /// `regions`.
@@ -36,6 +38,7 @@ impl Topics {
     /// Everything.
     pub const ALL: Self = Self {
         pairs: true,
+        changes: true,
         contacts: true,
         regions: true,
         bodies: true,
@@ -88,6 +91,16 @@ pub trait Link: Debug {
     /// # Errors
     /// `Error::Io`.
     fn pairs(&mut self, into: &mut Message<PairRow>) -> Result<bool>;
+    /// The next `changes`.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn changes(&mut self, into: &mut Message<PairRow, ChangesHeader>) -> Result<bool>;
+    /// Opens the port of `changes` anew: what waits in it is gone, and the daemon sends the whole list next.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn renew_changes(&mut self) -> Result<()>;
     /// The next `contacts`.
     ///
     /// # Errors

@@ -6,6 +6,7 @@
 mod connect;
 mod follow;
 mod link;
+mod list;
 mod step;
 mod vertices;
 
@@ -13,6 +14,7 @@ pub use connect::ClientOptions;
 pub(crate) use connect::random_u64;
 pub use follow::{Message, View};
 pub use link::{Link, Rows, Topics};
+pub use list::PairList;
 pub use step::StepError;
 pub use vertices::Part;
 
@@ -343,12 +345,11 @@ impl Client {
 }
 
 /// The ends that a restart means for the pairs certified colliding in the boot that is over.
-fn ends_of(pairs: &Message<PairRow>) -> Vec<PairRow> {
+///
+/// * `tick` - the last tick heard of.
+fn ends_of(tick: u64, pairs: impl Iterator<Item = PairRow>) -> Vec<PairRow> {
     let colliding = Verdict::Colliding.code();
-    let tick = pairs.header.tick;
     pairs
-        .rows
-        .iter()
         .filter(|row| row.flags & pair_flags::GONE == 0)
         .filter(|row| row.certified_verdict == colliding)
         .map(|row| PairRow {
@@ -357,7 +358,7 @@ fn ends_of(pairs: &Message<PairRow>) -> Vec<PairRow> {
             end_first_tick: tick,
             end_last_tick: tick,
             flags: row.flags | pair_flags::GONE,
-            ..*row
+            ..row
         })
         .collect()
 }

@@ -1,5 +1,7 @@
 //! A client's ports over shared memory. It only opens what a daemon has made.
 
+mod read;
+
 use std::time::Duration;
 
 use iceoryx2::pending_response::PendingResponse;
@@ -8,7 +10,9 @@ use iceoryx2::port::listener::{Listener, ListenerWaitError};
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
-use iceoryx2::prelude::{AllocationStrategy, EventId, Node, PayloadHeader, ZeroCopySend};
+use iceoryx2::prelude::{AllocationStrategy, EventId, Node, ZeroCopySend};
+
+use read::{Reader, read};
 
 use super::lock;
 use super::place::Place;
@@ -18,8 +22,9 @@ use crate::limits;
 use crate::time::Clock;
 use crate::transport::client::{Link, Message, Rows, Topics};
 use crate::wire::{
-    AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, MessageHeader, NameRow, PairRow,
-    RegionRow, RequestHeader, TickRow, TransformRow, TransformVelRow, VertexHeader, VertexRow,
+    AnswerHeader, BodyRow, ChangesHeader, ContactRow, FrameHeader, Hello, MessageHeader, NameRow,
+    PairRow, RegionRow, RequestHeader, TickRow, TransformRow, TransformVelRow, VertexHeader,
+    VertexRow,
 };
 
 /// Between two looks for a daemon.
@@ -27,7 +32,6 @@ const RETRY: Duration = Duration::from_millis(50);
 /// A plan longer than this is no plan.
 const PLAN_BYTES_MAX: usize = 1 << 24;
 
-type Reader<T> = Option<Subscriber<Ipc, [T], MessageHeader>>;
 type Sender<T> = Option<Publisher<Ipc, [T], FrameHeader>>;
 type Asker = RequestClient<Ipc, [u8], RequestHeader, [u8], AnswerHeader>;
 type Pending = PendingResponse<Ipc, [u8], RequestHeader, [u8], AnswerHeader>;
@@ -46,6 +50,7 @@ pub struct IoxLink {
     tick: Subscriber<Ipc, TickRow, ()>,
     hello: Subscriber<Ipc, Hello, ()>,
     pairs: Reader<PairRow>,
+    changes: Reader<PairRow, ChangesHeader>,
     contacts: Reader<ContactRow>,
     regions: Reader<RegionRow>,
     bodies: Reader<BodyRow>,
@@ -122,6 +127,7 @@ impl IoxLink {
             tick,
             hello,
             pairs: None,
+            changes: None,
             contacts: None,
             regions: None,
             bodies: None,
@@ -146,6 +152,13 @@ impl IoxLink {
             .subscriber_builder()
             .create()
             .map_err(|e| failed(topic, e))
+    }
+
+    fn open_changes(&mut self) -> Result<()> {
+        let service = qos::changes(&self.node, &self.place, Open::Existing)?;
+        let reader = service.subscriber_builder().create();
+        self.changes = Some(reader.map_err(|e| failed("changes", e))?);
+        Ok(())
     }
 
     fn sender<T: std::fmt::Debug + ZeroCopySend>(
@@ -194,30 +207,13 @@ where
         .map_err(|e| failed("frame", e))
 }
 
-fn read<T>(reader: &Reader<T>, rows_max: usize, into: &mut Message<T>) -> Result<bool>
-where
-    T: std::fmt::Debug + ZeroCopySend + Copy,
-{
-    let Some(reader) = reader else {
-        return Ok(false);
-    };
-    while let Some(sample) = reader.receive().map_err(|e| failed("result", e))? {
-        // the count is the sender's word: checked before it makes a slice
-        let rows = usize::try_from(sample.header().number_of_elements());
-        if rows.is_ok_and(|rows| rows <= rows_max) {
-            into.header = *sample.user_header();
-            into.rows.clear();
-            into.rows.extend_from_slice(sample.payload());
-            return Ok(true);
-        }
-    }
-    Ok(false)
-}
-
 impl Link for IoxLink {
     fn subscribe(&mut self, topics: Topics) -> Result<()> {
         if topics.pairs && self.pairs.is_none() {
             self.pairs = Some(self.reader("pairs")?);
+        }
+        if topics.changes && self.changes.is_none() {
+            self.open_changes()?;
         }
         if topics.contacts && self.contacts.is_none() {
             self.contacts = Some(self.reader("contacts")?);
@@ -298,6 +294,19 @@ impl Link for IoxLink {
 
     fn pairs(&mut self, into: &mut Message<PairRow>) -> Result<bool> {
         read(&self.pairs, limits::PAIRS_DEFAULT, into)
+    }
+
+    fn changes(&mut self, into: &mut Message<PairRow, ChangesHeader>) -> Result<bool> {
+        read(&self.changes, limits::PAIRS_DEFAULT, into)
+    }
+
+    fn renew_changes(&mut self) -> Result<()> {
+        // first the old one, which takes a reader's place
+        if self.changes.take().is_some() {
+            self.open_changes()?;
+            self.wake(events::CREATED);
+        }
+        Ok(())
     }
 
     fn contacts(&mut self, into: &mut Message<ContactRow>) -> Result<bool> {

@@ -27,6 +27,8 @@ pub struct InstanceInfo {
     pub readers: usize,
     /// Readers of pairs.
     pub pair_readers: usize,
+    /// Readers of changes.
+    pub change_readers: usize,
     /// Readers of contacts.
     pub contact_readers: usize,
 }
@@ -74,6 +76,8 @@ fn info(node: &Node<Ipc>, place: &Place) -> InstanceInfo {
         readers: qos::ticks(node, place, Open::Existing)
             .map_or(0, |s| s.dynamic_config().number_of_subscribers()),
         pair_readers: readers::<PairRow>(node, place, "pairs"),
+        change_readers: qos::changes(node, place, Open::Existing)
+            .map_or(0, |s| s.dynamic_config().number_of_subscribers()),
         contact_readers: readers::<ContactRow>(node, place, "contacts"),
     }
 }

@@ -20,7 +20,8 @@ use super::place::Place;
 use crate::error::{Error, Result};
 use crate::limits::SOURCES_MAX;
 use crate::wire::{
-    AnswerHeader, Hello, MessageHeader, RequestHeader, TickRow, VertexHeader, VertexRow,
+    AnswerHeader, ChangesHeader, Hello, MessageHeader, PairRow, RequestHeader, TickRow,
+    VertexHeader, VertexRow,
 };
 
 /// The services of one thread.
@@ -206,6 +207,31 @@ pub(super) fn results<T: Debug + ZeroCopySend>(
             .subscriber_max_buffer_size(RESULT_BUFFER)
             .subscriber_max_borrowed_samples(RESULT_BORROWED)
             .history_size(1)
+            .enable_safe_overflow(true)
+            .max_nodes(NODES_MAX),
+    };
+    open_slice(&name, builder, open)
+}
+
+/// `changes`: rows under a [`ChangesHeader`]. No history: the newest message says nothing without those before it.
+pub(super) fn changes(
+    node: &Node<Ipc>,
+    place: &Place,
+    open: Open,
+) -> Result<PubSub<Ipc, [PairRow], ChangesHeader>> {
+    let name = place.service("changes");
+    let builder = node
+        .service_builder(&service_name(&name)?)
+        .publish_subscribe::<[PairRow]>()
+        .user_header::<ChangesHeader>();
+    let builder = match open {
+        Open::Existing => builder,
+        Open::Create => builder
+            .max_publishers(RESULT_PUBLISHERS_MAX)
+            .max_subscribers(RESULT_SUBSCRIBERS_MAX)
+            .subscriber_max_buffer_size(RESULT_BUFFER)
+            .subscriber_max_borrowed_samples(RESULT_BORROWED)
+            .history_size(0)
             .enable_safe_overflow(true)
             .max_nodes(NODES_MAX),
     };

@@ -2,6 +2,7 @@
 
 mod asked;
 mod frames;
+mod readers;
 mod sent;
 mod waiting;
 
@@ -22,6 +23,7 @@ use iceoryx2::prelude::{
 use iceoryx2::service::port_factory::event::PortFactory as EventFactory;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory as PubSub;
 use iceoryx2::waitset::{WaitSet, WaitSetBuilder};
+use readers::Changes;
 
 use super::lock::{Holder, InstanceLock, RootLock};
 use super::place::Place;
@@ -68,17 +70,27 @@ impl ServerOptions {
 }
 
 /// A result message's service and the daemon's publisher on it. Drop order: the port, then the service.
-struct Out<T>
+struct Out<T, H = MessageHeader>
 where
     T: Debug + ZeroCopySend + 'static,
+    H: Debug + ZeroCopySend + 'static,
 {
-    publisher: Publisher<Ipc, [T], MessageHeader>,
-    service: PubSub<Ipc, [T], MessageHeader>,
+    publisher: Publisher<Ipc, [T], H>,
+    service: PubSub<Ipc, [T], H>,
 }
 
 impl<T: Debug + ZeroCopySend + 'static> Out<T> {
     fn open(node: &Node<Ipc>, place: &Place, topic: &str) -> Result<Self> {
-        let service = qos::results::<T>(node, place, topic, Open::Create)?;
+        Self::of(qos::results::<T>(node, place, topic, Open::Create)?)
+    }
+}
+
+impl<T, H> Out<T, H>
+where
+    T: Debug + ZeroCopySend + 'static,
+    H: Debug + ZeroCopySend + Copy + Default + 'static,
+{
+    fn of(service: PubSub<Ipc, [T], H>) -> Result<Self> {
         let publisher = qos::slice_publisher(&service, qos::SLICE_LEN_START)?;
         Ok(Self { publisher, service })
     }
@@ -107,6 +119,7 @@ pub struct Server {
     contacts: Out<ContactRow>,
     regions: Out<RegionRow>,
     pairs: Out<PairRow>,
+    changes: Changes,
     bodies: Out<BodyRow>,
     body_verdicts: Out<u8>,
     names: Out<NameRow>,
@@ -198,6 +211,10 @@ impl Server {
             contacts: Out::open(&node, place, "contacts").map_err(held)?,
             regions: Out::open(&node, place, "regions").map_err(held)?,
             pairs: Out::open(&node, place, "pairs").map_err(held)?,
+            changes: qos::changes(&node, place, Open::Create)
+                .and_then(Out::of)
+                .map(Changes::new)
+                .map_err(held)?,
             bodies: Out::open(&node, place, "bodies").map_err(held)?,
             body_verdicts: Out::open(&node, place, "body_verdicts").map_err(held)?,
             names: Out::open(&node, place, "names").map_err(held)?,
@@ -252,7 +269,10 @@ impl Door for Server {
     }
 
     fn demand(&mut self) -> Demand {
+        let (changes, changes_anew) = self.changes.look();
         self.demand = Demand {
+            changes,
+            changes_anew,
             pairs: self.pairs.read(),
             contacts: self.contacts.read(),
             regions: self.regions.read(),

@@ -8,8 +8,8 @@ use super::{Peer, Rows as Queued, SOURCE_BUFFER, Shared, VERTEX_BUFFER};
 use crate::error::Result;
 use crate::transport::client::{Link, Message, Rows, Topics};
 use crate::wire::{
-    AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, NameRow, PairRow, RegionRow,
-    RequestHeader, TickRow, VertexHeader, VertexRow,
+    AnswerHeader, BodyRow, ChangesHeader, ContactRow, FrameHeader, Hello, NameRow, PairRow,
+    RegionRow, RequestHeader, TickRow, VertexHeader, VertexRow,
 };
 
 /// A client's ports in memory; a clean leave when dropped.
@@ -48,7 +48,7 @@ impl MemoryLink {
     }
 }
 
-fn pop<T>(queue: &mut VecDeque<Message<T>>, into: &mut Message<T>) -> bool {
+fn pop<M>(queue: &mut VecDeque<M>, into: &mut M) -> bool {
     match queue.pop_front() {
         Some(message) => {
             *into = message;
@@ -75,6 +75,10 @@ impl Link for MemoryLink {
             )+};
         }
         join!(pairs contacts regions bodies body_verdicts names plan);
+        // the newest message says nothing without those before it
+        if topics.changes && !peer.topics.changes {
+            (peer.topics.changes, peer.changes_anew) = (true, true);
+        }
         state.wake.peers_changed = true;
         self.shared.to_server.notify_all();
         Ok(())
@@ -138,6 +142,18 @@ impl Link for MemoryLink {
 
     fn pairs(&mut self, into: &mut Message<PairRow>) -> Result<bool> {
         Ok(self.with(false, |peer| pop(&mut peer.pairs, into)))
+    }
+
+    fn changes(&mut self, into: &mut Message<PairRow, ChangesHeader>) -> Result<bool> {
+        Ok(self.with(false, |peer| pop(&mut peer.changes, into)))
+    }
+
+    fn renew_changes(&mut self) -> Result<()> {
+        self.with((), |peer| {
+            peer.changes.clear();
+            peer.changes_anew = peer.topics.changes;
+        });
+        Ok(())
     }
 
     fn contacts(&mut self, into: &mut Message<ContactRow>) -> Result<bool> {

@@ -15,8 +15,8 @@ pub use server::MemoryServer;
 use crate::transport::client::{Message, Topics};
 use crate::transport::{RequestToken, Wake};
 use crate::wire::{
-    AnswerHeader, BodyRow, ContactRow, FrameHeader, Hello, NameRow, PairRow, RegionRow,
-    RequestHeader, TickRow, TransformRow, TransformVelRow, VertexHeader, VertexRow,
+    AnswerHeader, BodyRow, ChangesHeader, ContactRow, FrameHeader, Hello, NameRow, PairRow,
+    RegionRow, RequestHeader, TickRow, TransformRow, TransformVelRow, VertexHeader, VertexRow,
 };
 
 /// Frames of one source that wait for the daemon; then the oldest goes. As over shared memory.
@@ -64,6 +64,9 @@ struct Peer {
     hello: Option<Hello>,
     tick: VecDeque<TickRow>,
     pairs: VecDeque<Message<PairRow>>,
+    changes: VecDeque<Message<PairRow, ChangesHeader>>,
+    /// It came to `changes`, and has not been seen there yet.
+    changes_anew: bool,
     contacts: VecDeque<Message<ContactRow>>,
     regions: VecDeque<Message<RegionRow>>,
     bodies: VecDeque<Message<BodyRow>>,

@@ -25,6 +25,8 @@ pub struct MemoryServer {
     frame_rows_max: usize,
     drained_ns: Option<u64>,
     demand: Demand,
+    /// Somebody came to `changes` since the whole list was last sent.
+    changes_owed: bool,
     next_token: u64,
 }
 
@@ -58,6 +60,7 @@ impl MemoryServer {
             frame_rows_max: limits::FRAME_ROWS_MAX,
             drained_ns: None,
             demand: Demand::default(),
+            changes_owed: false,
             next_token: 1,
         })
     }
@@ -69,7 +72,7 @@ impl MemoryServer {
         self
     }
 
-    fn send_all(&self, outbox: &Outbox) {
+    fn send_all(&mut self, outbox: &Outbox) {
         let mut state = self.shared.lock();
         let State { newest, peers, .. } = &mut *state;
         macro_rules! send {
@@ -96,6 +99,16 @@ impl MemoryServer {
         }
         if self.demand.pairs {
             send!(pairs, outbox.pairs_header, outbox.pairs);
+        }
+        if self.demand.changes {
+            let message = Message {
+                header: outbox.changes_header,
+                rows: outbox.changes.clone(),
+            };
+            for peer in peers.values_mut().filter(|peer| peer.topics.changes) {
+                queue(&mut peer.changes, message.clone());
+            }
+            self.changes_owed &= outbox.changes_header.base_tick != 0;
         }
         if self.demand.bodies {
             send!(bodies, outbox.bodies_header, outbox.bodies);
@@ -178,15 +191,18 @@ impl Door for MemoryServer {
     }
 
     fn demand(&mut self) -> Demand {
-        let state = self.shared.lock();
+        let mut state = self.shared.lock();
         let mut demand = Demand::default();
-        for peer in state.peers.values().filter(|peer| !peer.left) {
+        for peer in state.peers.values_mut().filter(|peer| !peer.left) {
             demand.pairs |= peer.topics.pairs;
+            demand.changes |= peer.topics.changes;
+            self.changes_owed |= std::mem::take(&mut peer.changes_anew);
             demand.contacts |= peer.topics.contacts;
             demand.regions |= peer.topics.regions;
             demand.bodies |= peer.topics.bodies;
             demand.body_verdicts |= peer.topics.body_verdicts;
         }
+        demand.changes_anew = demand.changes && self.changes_owed;
         self.demand = demand;
         demand
     }

@@ -162,9 +162,8 @@ impl Outlet {
         self.shared.set_demand(Demand {
             pairs: markers || self.read.pairs,
             contacts: markers || collisions || self.read.contacts,
-            regions: false,
             bodies: markers,
-            body_verdicts: false,
+            ..Demand::default()
         });
     }
 

@@ -266,9 +266,8 @@ impl Shared {
         Demand {
             pairs: bits & 1 != 0,
             contacts: bits & 2 != 0,
-            regions: false,
             bodies: bits & 4 != 0,
-            body_verdicts: false,
+            ..Demand::default()
         }
     }
 

@@ -37,6 +37,9 @@ impl Server {
         if demand.pairs {
             failures += send(&self.pairs.publisher, &outbox.pairs_header, &outbox.pairs);
         }
+        if demand.changes {
+            failures += self.send_changes(outbox);
+        }
         if demand.bodies {
             failures += send(
                 &self.bodies.publisher,
@@ -88,13 +91,10 @@ impl Server {
 /// One message.
 ///
 /// * returns - 1 when it could not be handed over.
-fn send<T>(
-    publisher: &Publisher<Ipc, [T], MessageHeader>,
-    header: &MessageHeader,
-    rows: &[T],
-) -> u64
+pub(super) fn send<T, H>(publisher: &Publisher<Ipc, [T], H>, header: &H, rows: &[T]) -> u64
 where
     T: std::fmt::Debug + ZeroCopySend + Copy + 'static,
+    H: std::fmt::Debug + ZeroCopySend + Copy + Default + 'static,
 {
     let Ok(mut sample) = publisher.loan_slice_uninit(rows.len()) else {
         return 1;

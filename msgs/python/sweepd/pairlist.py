@@ -1,0 +1,107 @@
+"""The list of pairs, kept from ``changes``: each message is applied in its order, none to a list that it is not for."""
+
+import numpy as np
+
+from . import layout
+
+#: Messages that are passed over while the whole list is awaited, before the port is opened anew.
+_PATIENCE = 8
+_ROW = np.dtype(layout.PairRow)
+_TOLD = int(layout.PairFlags.SWEPT_HIT | layout.PairFlags.SWEPT_OPEN)
+
+
+def has_left(rows):
+    """Which rows of ``changes`` say that their pair is no longer listed; any other takes the place of the pair's row."""
+    quiet = (rows["events"] == 0) & (rows["flags"] & _TOLD == 0)
+    return quiet & (rows["verdict"] <= layout.Verdict.APART)
+
+
+def _keys(rows):
+    return zip(rows["body_a"].tolist(), rows["body_b"].tolist())
+
+
+class PairList:
+    """The rows of ``pairs`` as ``changes`` make them. To apply a message costs as much as it has rows."""
+
+    def __init__(self):
+        #: Of the newest message that was applied; 0: none was.
+        self.boot_id = self.tick = 0
+        #: Whether nothing is missing.
+        self.is_whole = False
+        self._passed = 0
+        self._replace(np.empty(0, _ROW))
+
+    def __len__(self):
+        return len(self._places)
+
+    def is_of(self, header):
+        """Whether it is whole, and that of a tick."""
+        return self.is_whole and (self.boot_id, self.tick) == (header.boot_id, header.tick)
+
+    def take(self, header, rows):
+        """Applies a message; True when it is not for this list, and the whole list is to be asked for."""
+        message, had = header.message, self.is_whole
+        self.is_whole = True
+        if header.base_tick == 0:
+            self._set_tick(message)
+            self._replace(rows)
+        elif had and (self.boot_id, self.tick) == (message.boot_id, header.base_tick):
+            self._set_tick(message)
+            self._change(rows)
+        else:
+            self.is_whole = False
+        # what the sender says of its list is checked, so that a fault of either side is found and mended
+        self.is_whole = self.is_whole and len(self) == header.listed
+        if self.is_whole:
+            self._passed = 0
+            return False
+        self._passed += 1
+        ask = had or self._passed >= _PATIENCE
+        if ask:
+            self._passed = 0
+        return ask
+
+    def rows(self):
+        """The rows by ids, with the ages of the tick: an array of their own."""
+        places = np.fromiter(self._places.values(), np.intp, len(self._places))
+        rows = self._rows[places]
+        ticks = np.uint64(self.tick) - self._sent[places]
+        age = rows["bound_age_ticks"].astype(np.uint64) + ticks
+        rows["bound_age_ticks"] = np.minimum(age, np.uint64(0xFFFF_FFFF))
+        certified = (rows["verdict"] == layout.Verdict.NEAR) | (rows["verdict"] == layout.Verdict.COLLIDING)
+        rows["certified_tick"][certified] += ticks[certified]
+        return rows[np.lexsort((rows["body_b"], rows["body_a"]))]
+
+    def _set_tick(self, message):
+        self.boot_id, self.tick = message.boot_id, message.tick
+
+    def _replace(self, rows):
+        self._rows = rows.copy()
+        self._sent = np.full(len(rows), self.tick, np.uint64)
+        self._places = {key: place for place, key in enumerate(_keys(rows))}
+        self._free = []
+
+    def _change(self, rows):
+        left = has_left(rows)
+        taken = []
+        for key, gone in zip(_keys(rows), left.tolist()):
+            if gone:
+                place = self._places.pop(key, None)
+                if place is not None:
+                    self._free.append(place)
+                continue
+            place = self._places.get(key)
+            if place is None:
+                if not self._free:
+                    self._grow()
+                place = self._places[key] = self._free.pop()
+            taken.append(place)
+        self._rows[taken] = rows[~left]
+        self._sent[taken] = self.tick
+
+    def _grow(self):
+        had = len(self._rows)
+        more = max(had, 64)
+        self._rows = np.concatenate([self._rows, np.empty(more, _ROW)])
+        self._sent = np.concatenate([self._sent, np.zeros(more, np.uint64)])
+        self._free.extend(range(had + more - 1, had - 1, -1))

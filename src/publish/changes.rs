@@ -1,0 +1,135 @@
+//! Rows of `changes`: what is new in the list of pairs since the tick before, at the cost of what is new.
+//!
+//! In: the list, with what of it is news, and the pairs whose rows were dropped. Out: rows that make the list of the
+//! tick before that of this one; the whole list where its readers have none to build on.
+//!
+//! It is cut off as `pairs` is, so that who keeps a list from it holds the rows that `pairs` has: where not all fit the
+//! message is the whole list, and so is the next. A message that changes the list is therefore never cut off.
+
+use crate::ids::small;
+use crate::wire::{ChangesHeader, Demand, MessageHeader, Outbox, PairRow};
+
+use super::events::Ids;
+use super::listing::NO_EVENT;
+use super::{AHEAD, Publisher, View};
+
+/// What the next message builds on, and memory kept over calls.
+#[derive(Debug, Default)]
+pub(super) struct Chain {
+    /// The tick whose list its readers hold; 0: they hold none, or not all of it.
+    base_tick: u64,
+    /// Pairs whose rows were dropped in this tick, by ids.
+    dropped: Vec<Ids>,
+    /// Places of the rows that are sent, by ids.
+    places: Vec<u32>,
+}
+
+impl Chain {
+    /// Begins a tick.
+    pub(super) fn begin(&mut self) {
+        self.dropped.clear();
+    }
+
+    /// The row of a pair is dropped; it may get another yet.
+    pub(super) fn note_dropped(&mut self, demand: Demand, ids: Ids) {
+        if demand.changes {
+            self.dropped.push(ids);
+        }
+    }
+
+    /// The list is made anew, and nobody knows what is new in it.
+    pub(super) fn break_off(&mut self) {
+        self.base_tick = 0;
+    }
+}
+
+impl Publisher {
+    /// Fills `changes`.
+    ///
+    /// * `left_out` - how many rows of the list do not fit.
+    pub(super) fn fill_changes(
+        &mut self,
+        view: &mut View<'_>,
+        header: MessageHeader,
+        left_out: u64,
+        out: &mut Outbox,
+    ) {
+        out.changes.clear();
+        if !view.demand.changes {
+            self.chain.break_off();
+            return;
+        }
+        let holds = left_out == 0 && !view.demand.changes_anew;
+        let base_tick = self.choose_changes(holds, view.tick);
+        self.push_changes(view, &mut out.changes);
+        out.changes_header = ChangesHeader {
+            message: MessageHeader {
+                truncated: left_out,
+                ..header
+            },
+            base_tick,
+            listed: self.listing.len() as u64 - left_out,
+        };
+        self.chain.base_tick = if left_out == 0 { view.tick } else { 0 };
+        // How many are new differs from tick to tick: room for all is made when they are more than ever.
+        let all = self.listing.len();
+        self.chain.dropped.clear();
+        self.chain.dropped.reserve(all);
+        self.chain.places.clear();
+        self.chain.places.reserve(all);
+        let more = all.saturating_sub(out.changes.len());
+        out.changes.reserve(more);
+    }
+
+    /// Chooses which rows are sent; returns the tick that they build on, 0 where they are the whole list.
+    ///
+    /// * `holds` - whether the list of the tick before may be built on.
+    fn choose_changes(&mut self, holds: bool, tick: u64) -> u64 {
+        let (chain, listing, chosen) = (&mut self.chain, &self.listing, &self.chosen);
+        let all = small(listing.len());
+        let base_tick = chain.base_tick;
+        chain.places.clear();
+        if holds && base_tick != 0 && base_tick + 1 == tick {
+            chain.dropped.retain(|ids| listing.find(*ids).is_err());
+            chain.places.extend(listing.news());
+            if chain.places.len() + chain.dropped.len() <= listing.len() {
+                return base_tick;
+            }
+            chain.places.clear();
+        }
+        chain.dropped.clear();
+        let cut = listing.len() > self.limits.pair_rows;
+        let is_sent = |at: &u32| !cut || chosen.get(*at as usize) == Some(&true);
+        chain.places.extend((0..all).filter(is_sent));
+        0
+    }
+
+    /// Appends the chosen rows, and those that say which pairs have left the list.
+    fn push_changes(&self, view: &mut View<'_>, rows: &mut Vec<PairRow>) {
+        let places = &self.chain.places;
+        let mut dropped = self.chain.dropped.iter().copied().peekable();
+        for (nth, &at) in places.iter().enumerate() {
+            if let Some(&ahead) = places.get(nth + AHEAD)
+                && let Some(slot) = self.listing.row(ahead as usize).slot
+            {
+                view.narrow.ask_ahead(slot);
+            }
+            let row = self.listing.row(at as usize);
+            while let Some(ids) = dropped.next_if(|ids| *ids < row.ids) {
+                rows.push(self.last_row(view, ids));
+            }
+            rows.push(self.pair_row(view, row));
+        }
+        for ids in dropped {
+            rows.push(self.last_row(view, ids));
+        }
+    }
+
+    /// The row of a pair that has left the list.
+    fn last_row(&self, view: &mut View<'_>, ids: Ids) -> PairRow {
+        let row = Self::row_of_apart(view, ids, NO_EVENT);
+        let row = self.pair_row(view, &row);
+        debug_assert!(row.has_left(), "what is new of {ids:?} is listed");
+        row
+    }
+}

@@ -1,0 +1,252 @@
+//! The list of pairs, kept from `changes`: each message is applied in its order, none to a list that it is not for.
+//!
+//! A reader that has missed a message holds a list that is not whole. It does not show it, opens its port anew, and has
+//! the whole list with the daemon's next tick.
+
+use std::collections::BTreeMap;
+
+use super::follow::Message;
+use super::link::Link;
+use crate::error::Result;
+use crate::wire::{ChangesHeader, MessageHeader, PairRow};
+
+/// Messages that are passed over while the whole list is awaited, before the port is opened anew: the daemon sends it
+/// with the first or second tick.
+const PATIENCE: u32 = 8;
+
+/// The rows of `pairs`, as `changes` make them: by ids, with the ages of the tick.
+#[derive(Clone, Debug, Default)]
+pub struct PairList {
+    /// The newest that was taken.
+    news: Message<PairRow, ChangesHeader>,
+    /// One that came early.
+    ahead: Message<PairRow, ChangesHeader>,
+    has_ahead: bool,
+    /// By ids: the tick that sent the row, and the row.
+    rows: BTreeMap<(u64, u64), (u64, PairRow)>,
+    is_whole: bool,
+    /// Messages passed over since the whole list was last asked for.
+    passed: u32,
+}
+
+impl PairList {
+    /// What the tick said: the rows that changed, or under `base_tick` 0 the whole list.
+    #[must_use]
+    pub fn changes(&self) -> &Message<PairRow, ChangesHeader> {
+        &self.news
+    }
+
+    /// How many rows it has.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether it has none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// The row of a pair, the smaller id first; `None`: it is not listed.
+    #[must_use]
+    pub fn get(&self, body_a: u64, body_b: u64) -> Option<PairRow> {
+        let row = self.rows.get(&(body_a, body_b));
+        row.map(|row| self.at_tick(row))
+    }
+
+    /// The rows, by ids.
+    pub fn iter(&self) -> impl Iterator<Item = PairRow> {
+        self.rows.values().map(|row| self.at_tick(row))
+    }
+
+    pub(super) fn boot_id(&self) -> u64 {
+        self.news.header.message.boot_id
+    }
+
+    pub(super) fn tick(&self) -> u64 {
+        self.news.header.message.tick
+    }
+
+    /// The list, where it is whole and of this tick.
+    pub(super) fn of(&self, tick: &MessageHeader) -> Option<&Self> {
+        let is_of = self.boot_id() == tick.boot_id && self.tick() == tick.tick;
+        (self.is_whole && is_of).then_some(self)
+    }
+
+    fn at_tick(&self, (sent, row): &(u64, PairRow)) -> PairRow {
+        let mut row = *row;
+        row.age(self.tick().saturating_sub(*sent));
+        row
+    }
+
+    /// Takes messages up to the tick; one of a later tick or boot is kept for then.
+    pub(super) fn advance(
+        &mut self,
+        tick: &MessageHeader,
+        boots_over: &[u64],
+        link: &mut dyn Link,
+    ) -> Result<()> {
+        loop {
+            if !self.has_ahead {
+                if !link.changes(&mut self.ahead)? {
+                    return Ok(());
+                }
+                self.has_ahead = true;
+            }
+            let header = &self.ahead.header.message;
+            let is_over = boots_over.contains(&header.boot_id);
+            if !is_over && (header.boot_id != tick.boot_id || header.tick > tick.tick) {
+                return Ok(());
+            }
+            self.has_ahead = false;
+            if !is_over && self.take() {
+                link.renew_changes()?;
+            }
+        }
+    }
+
+    /// Applies the message that came; returns whether the whole list is to be asked for.
+    fn take(&mut self) -> bool {
+        let (header, had) = (self.ahead.header, self.is_whole);
+        let (boot_id, tick) = (header.message.boot_id, header.message.tick);
+        if header.base_tick == 0 {
+            self.rows.clear();
+            let rows = self.ahead.rows.iter();
+            self.rows
+                .extend(rows.map(|row| ((row.body_a, row.body_b), (tick, *row))));
+            self.is_whole = true;
+        } else if had && self.boot_id() == boot_id && self.tick() == header.base_tick {
+            for row in &self.ahead.rows {
+                let ids = (row.body_a, row.body_b);
+                if row.has_left() {
+                    self.rows.remove(&ids);
+                } else {
+                    self.rows.insert(ids, (tick, *row));
+                }
+            }
+        } else {
+            self.is_whole = false;
+        }
+        // What the sender says of its list is checked, so that a fault of either side is found and mended.
+        self.is_whole &= self.rows.len() as u64 == header.listed;
+        if self.is_whole {
+            std::mem::swap(&mut self.news, &mut self.ahead);
+            self.passed = 0;
+            return false;
+        }
+        self.passed += 1;
+        let ask = had || self.passed >= PATIENCE;
+        if ask {
+            self.passed = 0;
+        }
+        ask
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::Verdict;
+
+    fn row(body_b: u64, verdict: Verdict) -> PairRow {
+        PairRow {
+            body_a: 1,
+            body_b,
+            verdict: verdict.code(),
+            certified_tick: 90,
+            ..PairRow::default()
+        }
+    }
+
+    /// A message of a tick; returns whether the whole list is asked for.
+    fn hear(list: &mut PairList, tick: u64, base_tick: u64, rows: &[PairRow], listed: u64) -> bool {
+        let message = MessageHeader {
+            boot_id: 7,
+            tick,
+            ..MessageHeader::default()
+        };
+        list.ahead.header = ChangesHeader {
+            message,
+            base_tick,
+            listed,
+        };
+        list.ahead.rows = rows.to_vec();
+        list.take()
+    }
+
+    fn ids(list: &PairList, tick: u64) -> Option<Vec<u64>> {
+        let header = MessageHeader {
+            boot_id: 7,
+            tick,
+            ..MessageHeader::default()
+        };
+        let list = list.of(&header)?;
+        Some(list.iter().map(|row| row.body_b).collect())
+    }
+
+    #[test]
+    fn rows_come_change_age_and_leave() {
+        let mut list = PairList::default();
+        let [near, open] = [row(4, Verdict::Near), row(2, Verdict::Possible)];
+        assert!(!hear(&mut list, 90, 0, &[open, near], 2));
+        assert!(!hear(&mut list, 91, 90, &[row(3, Verdict::Colliding)], 3));
+        assert_eq!(ids(&list, 91), Some(vec![2, 3, 4]));
+        assert_eq!(ids(&list, 92), None, "it is of another tick");
+        let told = |list: &PairList, b| {
+            let row = list.get(1, b).unwrap();
+            (row.bound_age_ticks, row.certified_tick)
+        };
+        assert_eq!(
+            (told(&list, 2), told(&list, 3), told(&list, 4)),
+            ((1, 90), (0, 90), (1, 91))
+        );
+        assert!(!hear(&mut list, 92, 91, &[row(4, Verdict::Apart)], 2));
+        assert_eq!(ids(&list, 92), Some(vec![2, 3]));
+        assert_eq!(told(&list, 3), (1, 91));
+        assert!(!hear(&mut list, 93, 0, &[], 0));
+        assert!(list.is_empty());
+    }
+
+    #[test]
+    fn a_list_that_missed_a_message_or_miscounts_is_not_shown_until_the_whole_of_it_came() {
+        for miscounts in [false, true] {
+            let mut list = PairList::default();
+            assert!(!hear(&mut list, 5, 0, &[row(2, Verdict::Near)], 1));
+            let asked = if miscounts {
+                hear(&mut list, 6, 5, &[row(3, Verdict::Near)], 3)
+            } else {
+                hear(&mut list, 7, 6, &[], 1)
+            };
+            assert!(asked);
+            assert_eq!((ids(&list, 6), ids(&list, 7)), (None, None));
+            // The daemon needs a tick or two; it is not asked in each.
+            let again: Vec<_> = (8..8 + u64::from(PATIENCE))
+                .map(|tick| hear(&mut list, tick, tick - 1, &[], 1))
+                .collect();
+            assert_eq!(again.iter().filter(|asked| **asked).count(), 1);
+            assert_eq!(again.last(), Some(&true));
+            assert!(!hear(&mut list, 30, 0, &[row(9, Verdict::Near)], 1));
+            assert_eq!(ids(&list, 30), Some(vec![9]));
+            assert!(!hear(&mut list, 31, 30, &[], 1));
+            assert_eq!(ids(&list, 31), Some(vec![9]));
+        }
+    }
+
+    #[test]
+    fn a_list_of_another_boot_is_not_built_on() {
+        let mut list = PairList::default();
+        assert!(!hear(&mut list, 5, 0, &[row(2, Verdict::Near)], 1));
+        list.ahead.header = ChangesHeader {
+            base_tick: 5,
+            listed: 1,
+            ..list.news.header
+        };
+        (
+            list.ahead.header.message.boot_id,
+            list.ahead.header.message.tick,
+        ) = (8, 6);
+        assert!(list.take());
+        assert_eq!(ids(&list, 6), None);
+    }
+}
