@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use rustix::fs::{FlockOperation, flock};
 use rustix::process::Signal;
 use serde_json::Value;
+use sweepd::transport::client::Topics;
 
 use super::{code, err, head, out};
 use crate::live::{Desk, TWO_SPHERES, at, output, step};
@@ -91,7 +92,13 @@ fn every_check_says_a_line_and_text_says_the_same_as_json() {
 fn a_killed_daemon_is_seen_and_cleaned_and_one_that_lives_beside_it_is_left_alone() {
     let (dead, alive) = (Desk::new(), Desk::new());
     let living = alive.run(TWO_SPHERES, &[]);
-    let mut client = alive.source("sim");
+    let mut client = alive.client(Some("sim"));
+    // Who has missed messages of `changes` opens its port anew, with other files.
+    let topics = Topics {
+        changes: false,
+        ..Topics::ALL
+    };
+    client.subscribe(topics).unwrap();
     step(&mut client, &[at(1, 0.0), at(2, 3.0)]);
     let (boot_id, shared) = (client.hello().boot_id, living.shared());
     let mut killed = dead.run(TWO_SPHERES, &[]);

@@ -42,6 +42,46 @@ fn law_3_9_events_that_do_not_fit_wait_with_their_range_and_deeper_pairs_go_firs
 }
 
 #[test]
+fn law_3_9_rows_left_out_of_changes_are_those_of_pairs_and_their_events_wait_too() {
+    let mut rig = couples("[limits]\npair_rows = 3", 5, |k| -0.1 * k as f64, "");
+    rig.demand.pairs = false;
+    for (want, begun) in [([3, 4, 5], 3), ([1, 2, 5], 2), ([3, 4, 5], 0)] {
+        rig.send(ALL);
+        let rows = &rig.out.changes;
+        let couples: Vec<u64> = rows.iter().map(|row| row.body_a / 2).collect();
+        assert_eq!(couples, want);
+        let begins = rows.iter().filter(|row| has(row, Event::Begin)).count();
+        assert_eq!(begins, begun);
+        let header = rig.out.changes_header;
+        assert_eq!((header.base_tick, header.listed), (0, 3), "the whole list");
+        assert_eq!(header.message.truncated, 2);
+        assert_eq!(rig.out.tick.header.truncated, 2);
+        assert!(rig.because(Reason::Truncated));
+    }
+    for k in 2..=5 {
+        rig.row(2 * k).position[1] = 50.0;
+    }
+    let mut ended = 0;
+    while ended < 4 {
+        rig.send(ALL);
+        assert_eq!(rig.out.changes_header.base_tick, 0);
+        let rows = rig.out.changes.iter();
+        ended += rows.filter(|row| has(row, Event::End)).count();
+    }
+    // All of it fits again, and the next says what is new in it: the last of the ended has left.
+    assert_eq!(rig.out.changes_header.message.truncated, 0);
+    rig.send(ALL);
+    let header = rig.out.changes_header;
+    assert_eq!((header.base_tick, header.listed), (rig.ticks() - 1, 1));
+    let [left] = rig.out.changes.as_slice() else {
+        panic!("one has left")
+    };
+    assert!(left.has_left());
+    rig.send(ALL);
+    assert!(rig.out.changes.is_empty());
+}
+
+#[test]
 fn law_3_9_an_event_waits_after_its_pair_is_gone_and_begin_and_end_unsent_cancel() {
     let head = "[limits]\npair_rows = 1";
     let mut rig = couples(head, 3, |k| -0.1 * k as f64, "");
