@@ -88,6 +88,11 @@ pub const TIMEOUT_MS_DEFAULT: u64 = 500;
 pub const REQUEST_BYTES_MAX: usize = 1 << 29;
 /// Remembered sessions that are over, per daemon; beyond it the oldest is forgotten, and its client could come back.
 pub const SESSIONS_OVER_MAX: usize = 1024;
+/// Rows of an answer to what touches a body: the bodies are copied between two ticks, and told in some 2 MB of JSON.
+/// Beyond it those with the farthest boxes are left out, counted, and the answer is not complete.
+pub const TOUCHING_ROWS_MAX: usize = 1 << 12;
+/// Names of bodies with unknown places in one answer; the others are counted.
+pub const UNKNOWN_ROWS_MAX: usize = 256;
 /// Bytes that wait for the thread that records; beyond it the disk does not follow and the recording ends, the daemon
 /// goes on. A tick of 1,000 bodies takes some 100 kB.
 pub const RECORD_QUEUE_BYTES_MAX: usize = 1 << 26;

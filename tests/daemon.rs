@@ -29,3 +29,5 @@ mod gaps;
 mod silence;
 #[path = "daemon/steps.rs"]
 mod steps;
+#[path = "daemon/touches.rs"]
+mod touches;

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand};
 
+use super::args_query::QueryArgs;
 use super::args_report::Report;
-use super::args_tools::{CompletionsArgs, DoctorArgs, ListArgs, ManArgs, QueryArgs, RecordArgs};
+use super::args_tools::{CompletionsArgs, DoctorArgs, ListArgs, ManArgs, RecordArgs};
 use super::manual::after_help;
 use crate::builtin::Pattern;
 use crate::error::Error;
@@ -34,7 +35,7 @@ pub(super) enum Command {
     Feed(FeedArgs),
     /// Watch a running daemon: state, pairs by name, gaps, budget, sources, rejects.
     Monitor(MonitorArgs),
-    /// Ask a running daemon for the gap of two bodies, or answer shape-pair questions offline.
+    /// Ask a running daemon for the gap of two bodies or what touches one, or answer shape-pair questions offline.
     Query(QueryArgs),
     /// List running instances, their sources and readers.
     List(ListArgs),

@@ -1,43 +1,10 @@
-//! Flags and arguments of the commands that ask, look and tell: `query`, `record`, `list`, `doctor`, `completions`,
-//! `man`.
+//! Flags and arguments of the commands that look, listen and tell: `record`, `list`, `doctor`, `completions`, `man`.
 
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
 use super::args::{Which, nanoseconds};
-
-#[derive(Debug, Args)]
-pub(super) struct QueryArgs {
-    /// Name of the one body; behind `--` where it begins with a dash.
-    ///
-    /// The daemon works on the answer for a second at most, beside its ticks: the verdict, the proved interval of the
-    /// gap in metres (negative: overlapping), the closest points and the normal, at the poses of its newest tick,
-    /// whatever pair rules and masks say.
-    #[arg(value_name = "A", required_unless_present = "batch", requires = "b")]
-    pub(super) a: Option<String>,
-    /// Name of the other body; the normal points from A to it.
-    #[arg(value_name = "B")]
-    pub(super) b: Option<String>,
-    #[command(flatten)]
-    pub(super) which: Which,
-    /// One JSON object instead of text: lengths in metres, `age_ns` in nanoseconds; what is not known is null.
-    #[arg(long)]
-    pub(super) json: bool,
-    /// How long to wait for the daemon and its answer, such as `500ms`.
-    #[arg(long, default_value = "5s", value_name = "TIME", value_parser = nanoseconds)]
-    pub(super) timeout: u64,
-    /// No daemon: a file of cases, one JSON object a line (`-`: standard input); one answer a line, in order.
-    ///
-    /// A case: `{"id", "a": SHAPE, "pose_a": {"t": [x,y,z], "q": [w,x,y,z]}, "b": SHAPE, "pose_b": ...}`, all lengths
-    /// in metres.
-    #[arg(
-        long,
-        value_name = "IN.jsonl",
-        conflicts_with_all = ["a", "b", "instance", "json", "timeout"]
-    )]
-    pub(super) batch: Option<PathBuf>,
-}
 
 #[derive(Debug, Args)]
 #[cfg_attr(

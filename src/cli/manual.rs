@@ -37,6 +37,10 @@ const EXAMPLES: [(&str, &[(&str, &str)]); 3] = [
         "Ask and look",
         &[
             ("sweepd query A B", "the proved gap of two bodies, by name"),
+            (
+                "sweepd query --touching A --at 1,2,3",
+                "what a body would touch there",
+            ),
             ("sweepd doctor", "what is wrong when nothing works"),
         ],
     ),

@@ -4,6 +4,7 @@
 //! closed pipe is a normal end. Results go to stdout, logs to stderr.
 
 mod args;
+mod args_query;
 mod args_report;
 mod args_tools;
 mod check;

@@ -1,6 +1,8 @@
-//! `sweepd query`: shape-pair questions answered offline, or the gap of two bodies of a running daemon.
+//! `sweepd query`: shape-pair questions answered offline, or questions to a running daemon about its bodies.
 
+mod gap;
 mod live;
+mod touching;
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -9,17 +11,24 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::query::batch;
 
-use super::args_tools::QueryArgs;
+use super::args_query::QueryArgs;
 use super::out::Out;
 
 /// Answers what was asked; `false` when a line of a file could not be read.
 pub(super) fn query(args: &QueryArgs, out: &mut Out) -> Result<bool> {
-    match (&args.batch, &args.a, &args.b) {
-        // Signals end it as they end any process: nothing waits for it.
-        (Some(file), ..) => of_file(file, out),
-        (None, Some(a), Some(b)) => live::gap(a, b, args, out, super::stop()?.as_ref()),
+    // Signals end it as they end any process: nothing waits for it.
+    if let Some(file) = &args.batch {
+        return of_file(file, out);
+    }
+    let stop = super::stop()?;
+    match (&args.a, &args.b) {
+        _ if args.touching.touching.is_some() || args.touching.shape.is_some() => {
+            touching::touching(args, out, stop.as_ref())
+        }
+        (Some(a), Some(b)) => gap::gap(a, b, args, out, stop.as_ref()),
         _ => Err(Error::Usage(
-            "name two bodies of a running daemon, or give a file of cases with --batch".to_owned(),
+            "name two bodies of a running daemon, or one with --touching, or give a file of cases with --batch"
+                .to_owned(),
         )),
     }
 }

@@ -8,16 +8,16 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 use crate::error::{Error, Result};
-use crate::query::GapQuestion;
+use crate::query::Query;
 use crate::record::Asked;
-use crate::scene::{Request, Scene};
+use crate::scene::{Question, Request, Scene};
 use crate::shape::Library;
 use crate::tick::EditBatch;
 use crate::tick::build::EditBuilder;
 use crate::time::Clock;
 use crate::transport::RequestToken;
-use crate::wire::GapFound;
-use crate::world::{BuiltTree, WornTree};
+use crate::wire::Answer;
+use crate::world::{BuiltTree, Parts, WornTree};
 
 /// The answer to a request whose building broke down; the panic itself is told on stderr.
 const INTERNAL: &str =
@@ -33,7 +33,7 @@ enum Work {
     /// A request to be read: its payload, of which so many bytes are JSON.
     Read(usize, Vec<u8>),
     /// A question, with the bodies it is about.
-    Measure(Box<GapQuestion>),
+    Measure(Box<Query>),
     /// A tree that has become loose; nobody waits for an answer.
     Tree(Box<WornTree>),
 }
@@ -42,12 +42,21 @@ enum Work {
 pub(super) enum Done {
     /// Edits for the next tick, and what they were made of.
     Batch(EditBatch, Asked),
-    /// The bodies are to be looked up: names of A and B.
-    Gap(String, String),
+    /// A question, for which the bodies are to be looked up.
+    Ask(Box<Asking>),
     /// A tree to be put in place.
     Tree(Box<BuiltTree>),
-    /// An answer, and what is odd about it.
-    Found(Box<GapFound>, Vec<String>),
+    /// An answer.
+    Found(Box<Answer>),
+}
+
+/// A question that has been read.
+pub(super) struct Asking {
+    pub(super) question: Question,
+    /// Those that it brings along.
+    pub(super) shapes: Option<Parts>,
+    /// What is odd about them.
+    pub(super) warnings: Vec<String>,
 }
 
 /// That, or what to change.
@@ -106,8 +115,8 @@ impl Builder {
     }
 
     /// Hands over a question.
-    pub(super) fn measure(&mut self, token: RequestToken, question: GapQuestion) {
-        self.hand(token, Work::Measure(Box::new(question)));
+    pub(super) fn measure(&mut self, token: RequestToken, query: Query) {
+        self.hand(token, Work::Measure(Box::new(query)));
     }
 
     /// Hands over a tree to be built.
@@ -157,16 +166,15 @@ impl Against {
     fn work(&mut self, token: RequestToken, work: Work) -> std::result::Result<Done, String> {
         let (json_len, payload) = match work {
             Work::Read(json_len, payload) => (json_len, payload),
-            Work::Measure(question) => {
-                let found = Box::new(question.answer(self.clock.as_ref()));
-                return Ok(Done::Found(found, question.warnings));
+            Work::Measure(query) => {
+                return Ok(Done::Found(Box::new(query.answer(self.clock.as_ref()))));
             }
             Work::Tree(worn) => return Ok(Done::Tree(Box::new(worn.build()))),
         };
         let cut = payload.split_at_checked(json_len);
         let (json, blobs) = cut.ok_or("the request is shorter than its header says")?;
         match Request::parse(json, blobs)? {
-            Request::Gap { a, b } => Ok(Done::Gap(a, b)),
+            Request::Ask(question) => self.ask(question),
             Request::Edits(asked) => {
                 let batch = self.edits.build(token.0, asked)?;
                 let asked = Asked {
@@ -177,5 +185,18 @@ impl Against {
                 Ok(Done::Batch(batch, asked))
             }
         }
+    }
+    /// Builds what a question brings along.
+    fn ask(&mut self, question: Question) -> std::result::Result<Done, String> {
+        let built = match question.shapes() {
+            [] => None,
+            specs => Some(self.edits.shapes(specs)?),
+        };
+        let (shapes, warnings) = built.unzip();
+        Ok(Done::Ask(Box::new(Asking {
+            question,
+            shapes,
+            warnings: warnings.unwrap_or_default(),
+        })))
     }
 }

@@ -5,27 +5,28 @@
 mod builder;
 mod notes;
 mod record;
+mod requests;
 mod settings;
 #[cfg(test)]
 mod tests;
 mod watchdog;
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::config::Config;
 use crate::error::Result;
-use crate::query::GapQuestion;
-use crate::record::{Ask, Between, Origin, Recorder};
+use crate::record::{Ask, Between, Recorder};
 use crate::scene::Scene;
 use crate::tick::pace::{Due, Pacer};
 use crate::tick::{EditBatch, Engine, TickInput};
 use crate::time::{Budget, Clock};
-use crate::transport::{BodyChange, Door, RequestToken, Wake};
-use crate::wire::{Answer, Inbox, TickRow};
-use crate::world::{Edit, TreeOf};
+use crate::transport::{Door, RequestToken, Wake};
+use crate::wire::{Inbox, TickRow};
+use crate::world::TreeOf;
 
-use builder::{Builder, Done, TREE};
+use builder::{Asking, Builder, Done, TREE};
 
 pub use crate::tick::build::{Shapes, build_shapes};
 pub use notes::body_note;
@@ -50,6 +51,8 @@ pub struct Daemon<'a> {
     arrived: Inbox,
     due: Inbox,
     ready: Vec<EditBatch>,
+    /// Questions for which the bodies are to be looked up, once no tick is due.
+    asking: VecDeque<(RequestToken, Box<Asking>)>,
     /// A tick is wanted at once.
     tick_asked: bool,
     /// The tree that the worker builds.
@@ -90,6 +93,7 @@ impl<'a> Daemon<'a> {
             arrived: Inbox::default(),
             due: Inbox::default(),
             ready: Vec::new(),
+            asking: VecDeque::new(),
             tick_asked: false,
             tree_asked: None,
             progress: Arc::default(),
@@ -156,6 +160,7 @@ impl<'a> Daemon<'a> {
             Some(due) => self.tick(due, woke_ns)?,
             None => self.door.housekeeping(),
         }
+        self.take_question();
         Ok(ticks.is_some_and(|most| self.engine.ticks() >= most))
     }
 
@@ -171,7 +176,9 @@ impl<'a> Daemon<'a> {
             .pacer
             .wake_ns(now_ns, self.engine.world().next_timeout());
         let wait_ns = next_ns.saturating_sub(now_ns).min(WAIT_MAX_NS);
-        if self.builder.busy() {
+        if !self.asking.is_empty() {
+            0
+        } else if self.builder.busy() {
             wait_ns.min(BUILD_LOOK_NS)
         } else {
             wait_ns
@@ -222,47 +229,6 @@ impl<'a> Daemon<'a> {
                  vertices are tried; see the panic above"
             );
         }
-    }
-
-    /// Takes what the worker made of a request; its answer, where there is one already.
-    fn take_built(
-        &mut self,
-        token: RequestToken,
-        built: std::result::Result<Done, String>,
-    ) -> Option<Answer> {
-        let refusal = match built {
-            Ok(Done::Batch(batch, asked)) => {
-                self.edit(batch, Origin::Asked(asked));
-                return None;
-            }
-            Ok(Done::Found(gap, warnings)) => {
-                return Some(Answer {
-                    ok: true,
-                    scene_rev: gap.tick_header.scene_rev,
-                    warnings,
-                    gap: Some(*gap),
-                    ..Answer::default()
-                });
-            }
-            // Its asker is the daemon.
-            Ok(Done::Tree(_)) => return None,
-            Ok(Done::Gap(a, b)) => {
-                // The bodies as the last tick left them.
-                let header = self.engine.outbox().tick.header;
-                match GapQuestion::new(self.engine.world(), header, &a, &b) {
-                    Ok(question) => {
-                        self.builder.measure(token, question);
-                        return None;
-                    }
-                    Err(why) => why,
-                }
-            }
-            Err(why) => why,
-        };
-        Some(Answer {
-            error: Some(refusal),
-            ..Answer::default()
-        })
     }
 
     /// Runs one tick and sends what it filled.
@@ -318,62 +284,5 @@ impl<'a> Daemon<'a> {
         self.engine.note_sent(send_ns);
         self.settle_edits();
         Ok(())
-    }
-
-    /// Answers the requests whose edits the last tick applied or refused.
-    fn settle_edits(&mut self) {
-        self.tell_bodies();
-        if !self.ready.is_empty() {
-            self.follow();
-        }
-        self.ready.clear();
-        for at in 0..self.engine.outcomes().len() {
-            let outcome = &self.engine.outcomes()[at];
-            let (token, warnings) = (RequestToken(outcome.token), outcome.warnings.clone());
-            let answer = match &outcome.result {
-                Ok(applied) => Answer {
-                    ok: true,
-                    scene_rev: applied.scene_rev,
-                    warnings,
-                    ..Answer::default()
-                },
-                Err(error) => Answer {
-                    error: Some(error.clone()),
-                    warnings,
-                    ..Answer::default()
-                },
-            };
-            self.answer(token, &answer);
-        }
-    }
-
-    /// Tells the doors what the edits of the last tick did to bodies.
-    fn tell_bodies(&mut self) {
-        let world = self.engine.world();
-        let done = self.ready.iter().zip(self.engine.outcomes());
-        let edits = done.filter(|(_, outcome)| outcome.result.is_ok());
-        let change = |edit: &Edit| match edit {
-            Edit::Put { body, shapes } => {
-                // A later edit of the same request may have taken it out again: then that edit speaks for it.
-                let placed = world.body(world.slot_named(&body.name)?)?;
-                Some(BodyChange::Put(body_note(body, placed.id, shapes)))
-            }
-            Edit::Remove { name } => Some(BodyChange::Removed(name.clone())),
-            _ => None,
-        };
-        let changes: Vec<_> = edits
-            .flat_map(|(batch, _)| batch.edits.iter().filter_map(change))
-            .collect();
-        if !changes.is_empty() {
-            self.door.bodies(&changes);
-        }
-    }
-
-    /// An answer that cannot be handed over is its asker's loss; the other clients' daemon goes on.
-    fn answer(&mut self, token: RequestToken, answer: &Answer) {
-        let json = serde_json::to_string(answer).unwrap_or_default();
-        if let Err(error) = self.door.answer(token, answer.ok, &json) {
-            tracing::warn!("{error}");
-        }
     }
 }

@@ -1,14 +1,11 @@
 //! The gap of two bodies of a running daemon. In: names, and the world between two ticks. Out: a question that holds
 //! all it needs, so that a worker answers it while ticks go on; or why there is no answer.
 
-use crate::math::{Point, Vec3};
-use crate::narrow::gap_between;
+use super::measure::{Measured, WORK_NS, age_ns, end, fit};
+use crate::ids::BodySlot;
 use crate::time::{Clock, Meter};
-use crate::wire::{BodyStatus, GapFound, MessageHeader};
+use crate::wire::{GapFound, MessageHeader};
 use crate::world::{Body, World};
-
-/// Longest work on one answer, nanoseconds; then what is proved by then is the answer, an interval that is sound.
-const WORK_NS: u64 = 1_000_000_000;
 
 /// Two bodies as they stood in one tick.
 #[derive(Clone, Debug)]
@@ -35,12 +32,7 @@ impl GapQuestion {
         a: &str,
         b: &str,
     ) -> Result<Self, String> {
-        let slot = |name: &str| {
-            world.slot_named(name).ok_or_else(|| {
-                format!("there is no body \"{name}\" in the scene: the names are those of `names`")
-            })
-        };
-        let (slot_a, slot_b) = (slot(a)?, slot(b)?);
+        let (slot_a, slot_b) = (find(world, a)?, find(world, b)?);
         if slot_a == slot_b {
             return Err(format!(
                 "both are body \"{a}\", which has no gap to itself: name another one"
@@ -59,8 +51,8 @@ impl GapQuestion {
             ));
         }
         Ok(Self {
-            a: one.clone(),
-            b: other.clone(),
+            a: one.still(),
+            b: other.still(),
             report_m: world.report_within(slot_a, slot_b),
             tick_header,
             warnings,
@@ -72,68 +64,27 @@ impl GapQuestion {
     pub fn answer(&self, clock: &dyn Clock) -> GapFound {
         let (a, b) = (&self.a, &self.b);
         let now_ns = clock.boottime_ns();
-        let age_ns = |body: &Body| Some(now_ns.saturating_sub(body.since_ns?));
         let end_ns = clock.monotonic_ns().saturating_add(WORK_NS);
         let mut meter = Meter::new(clock, Some(end_ns), None);
-        let asked = gap_between(a, b, self.report_m, &mut meter);
-        let finite = |end: f64| end.is_finite().then_some(end);
-        let found = GapFound {
-            tick_header: self.tick_header,
-            // What does not move has no age.
-            age_ns: [a, b]
-                .into_iter()
-                .filter(|body| body.moves)
-                .filter_map(age_ns)
-                .max(),
-            verdict: asked.verdict.code(),
-            touching: asked.touching,
-            gap_min_m: finite(asked.gap.min),
-            gap_max_m: finite(asked.gap.max),
-            ..GapFound::default()
-        };
-        let Some(witness) = asked.witness else {
-            return found;
-        };
-        let place = |body: &Body, point: &Point| Some((body.pose * point).coords.into());
-        let normal: Vec3 = a.pose.rotation * witness.normal;
+        let found = Measured::of(a, b, self.report_m, &mut meter);
         GapFound {
-            // An estimate is never outside what is proved.
-            gap_best_m: finite(witness.best_m.max(asked.gap.min).min(asked.gap.max)),
-            point_a: place(a, &witness.point_a),
-            point_b: place(b, &witness.point_b),
-            normal: Some(normal.into()),
-            ..found
+            tick_header: self.tick_header,
+            age_ns: age_ns(a, now_ns).max(age_ns(b, now_ns)),
+            verdict: found.verdict.code(),
+            touching: found.touching,
+            gap_min_m: end(found.gap.min),
+            gap_max_m: end(found.gap.max),
+            gap_best_m: found.gap_best_m,
+            point_a: found.point_a,
+            point_b: found.point_b,
+            normal: found.normal,
         }
     }
 }
 
-/// Whether a body's place is known; what is odd about it, but legal.
-fn fit(body: &Body) -> Result<Option<String>, String> {
-    let name = &body.name;
-    match body.status {
-        BodyStatus::Known | BodyStatus::Truncated => Ok(None),
-        BodyStatus::Held => Ok(Some(format!(
-            "body \"{name}\" is held: its pose is too old, and it may be elsewhere"
-        ))),
-        BodyStatus::NotReceived => Err(format!(
-            "body \"{name}\" is not_received: no pose of it has come yet; ask again when its source sends"
-        )),
-        BodyStatus::Rejected => {
-            let why = body
-                .reject
-                .map_or_else(String::new, |why| format!(" ({why})"));
-            Err(format!(
-                "body \"{name}\" is rejected: its newest pose was refused{why}; ask again after a good one"
-            ))
-        }
-        BodyStatus::Stale => Err(format!(
-            "body \"{name}\" is stale: its pose is older than its time-out; ask again when its source sends"
-        )),
-        BodyStatus::RemovedByAge => Err(format!(
-            "body \"{name}\" is removed_by_age: its pose is too old; ask again when its source sends"
-        )),
-        BodyStatus::Disabled => Err(format!(
-            "body \"{name}\" is disabled: enable it, then ask again"
-        )),
-    }
+/// The slot of a name.
+pub(super) fn find(world: &World, name: &str) -> Result<BodySlot, String> {
+    world.slot_named(name).ok_or_else(|| {
+        format!("there is no body \"{name}\" in the scene: the names are those of `names`")
+    })
 }

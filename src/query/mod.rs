@@ -1,5 +1,78 @@
-//! Queries: offline, of shape pairs; and of a running daemon, of two of its bodies.
+//! Queries: offline, of shape pairs; and of a running daemon, of its bodies as a tick left them.
 pub mod batch;
 mod gap;
+mod measure;
+mod touching;
 
 pub use gap::GapQuestion;
+pub use touching::TouchingQuestion;
+
+use crate::scene::Question;
+use crate::time::Clock;
+use crate::wire::{Answer, MessageHeader};
+use crate::world::{Parts, World};
+
+/// A question with all that it needs, so that a worker answers it while ticks go on.
+#[derive(Clone, Debug)]
+pub enum Query {
+    /// For the gap of two bodies.
+    Gap(Box<GapQuestion>),
+    /// For what a body or a shape touches.
+    Touching(Box<TouchingQuestion>),
+}
+
+impl Query {
+    /// Takes the bodies as they stand.
+    ///
+    /// * `header` - of the tick that left the world so.
+    /// * `shapes` - those of [`Question::shapes`], built.
+    ///
+    /// # Errors
+    /// Why there is no answer, and what to change.
+    pub fn new(
+        world: &World,
+        header: MessageHeader,
+        asked: &Question,
+        shapes: Option<&Parts>,
+    ) -> Result<Self, String> {
+        match asked {
+            Question::Gap { a, b } => {
+                GapQuestion::new(world, header, a, b).map(|it| Self::Gap(Box::new(it)))
+            }
+            Question::Touching(asked) => TouchingQuestion::new(world, header, asked, shapes)
+                .map(|it| Self::Touching(Box::new(it))),
+        }
+    }
+
+    /// With what is odd about the shapes that came with it.
+    #[must_use]
+    pub fn warned(mut self, more: Vec<String>) -> Self {
+        let warnings = match &mut self {
+            Self::Gap(question) => &mut question.warnings,
+            Self::Touching(question) => &mut question.warnings,
+        };
+        warnings.extend(more);
+        self
+    }
+
+    /// Works on the answer, for a second at most.
+    #[must_use]
+    pub fn answer(&self, clock: &dyn Clock) -> Answer {
+        let mut answer = Answer {
+            ok: true,
+            ..Answer::default()
+        };
+        let header = match self {
+            Self::Gap(question) => {
+                answer.warnings.clone_from(&question.warnings);
+                answer.gap.insert(question.answer(clock)).tick_header
+            }
+            Self::Touching(question) => {
+                answer.warnings.clone_from(&question.warnings);
+                answer.touching.insert(question.answer(clock)).tick_header
+            }
+        };
+        answer.scene_rev = header.scene_rev;
+        answer
+    }
+}

@@ -302,7 +302,7 @@ impl Replay {
         let (json, blobs) = cut.unwrap_or_default();
         let built = match Request::parse(json, blobs) {
             Ok(Request::Edits(request)) => self.edits.build(edit.token, request),
-            Ok(Request::Gap { .. }) => Err("it is a question, no edit".to_owned()),
+            Ok(Request::Ask(_)) => Err("it is a question, no edit".to_owned()),
             Err(why) => Err(why),
         };
         built.map_err(|why| Error::Refused(format!("a recorded edit cannot be built again: {why}")))

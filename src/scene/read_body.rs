@@ -211,6 +211,16 @@ fn read_shapes(
     if nodes.is_empty() {
         return Err(Fault::new(at, missing));
     }
+    places.shapes.extend(nodes.iter().map(|node| node.at));
+    read_all_shapes(nodes, at, blobs)
+}
+
+/// Shapes of one body.
+pub(crate) fn read_all_shapes(
+    nodes: Vec<Node>,
+    at: Option<usize>,
+    blobs: Option<&[u8]>,
+) -> Result<Vec<PlacedSpec>, Fault> {
     if nodes.len() > SHAPES_PER_BODY_MAX {
         let text = format!(
             "{} shapes, more than {SHAPES_PER_BODY_MAX}: split the body",
@@ -221,7 +231,6 @@ fn read_shapes(
     let several = nodes.len() > 1;
     let mut shapes = Vec::with_capacity(nodes.len());
     for (place, node) in nodes.into_iter().enumerate() {
-        places.shapes.push(node.at);
         let shape = read_shape(node, blobs).map_err(|fault| {
             if several {
                 fault.within(&format!("shape {}", place + 1))

@@ -23,7 +23,7 @@
 //! `{ "validate": true }`, alone or beside `edits`, has the daemon check every structure before the next tick and build
 //! anew what does not hold; the answer's warnings say what that was.
 //!
-//! `{ "gap": { "a": "box", "b": "part" } }`, alone, asks for the gap of two bodies and changes nothing.
+//! A question, alone, changes nothing: see `question`.
 //!
 //! A blob is `count` rows, `offset` bytes behind the JSON, little-endian: three f64 a vertex, three u32 a face.
 
@@ -32,6 +32,7 @@ use std::path::Path;
 use crate::limits::EXTENT_MAX_M;
 use crate::math::Pose;
 use crate::scene::node::{Fault, Node, Value};
+use crate::scene::question::{QUESTIONS, Question, read_question};
 use crate::scene::read_body::{
     BODY_NAME_BYTES_MAX, BodyDraft, SOURCE_NAME_BYTES_MAX, read_body, title,
 };
@@ -50,13 +51,8 @@ pub const EDITS_MAX: usize = 1 << 17;
 pub enum Request {
     /// To change the scene.
     Edits(EditRequest),
-    /// For the gap of two bodies.
-    Gap {
-        /// Name of the one.
-        a: String,
-        /// Name of the other.
-        b: String,
-    },
+    /// A question that changes nothing.
+    Ask(Question),
 }
 
 /// Several edits that are done together or not at all.
@@ -170,19 +166,24 @@ impl BodyDraft {
 }
 
 fn read(json: &[u8], blobs: &[u8]) -> Result<Request, Fault> {
-    let keys = &["edits", "validate", "gap"];
-    let mut table = Table::open(Node::from_json(json)?, "a request", keys)?;
-    if table.has("gap") {
-        if table.has("edits") || table.has("validate") {
-            let text =
-                "`gap` stands beside `edits` or `validate`: ask for it in a request of its own";
+    let keys = [&["edits", "validate"], QUESTIONS].concat();
+    let mut table = Table::open(Node::from_json(json)?, "a request", &keys)?;
+    if let Some(kind) = QUESTIONS.iter().find(|kind| table.has(kind)) {
+        if table.places().count() > 1 {
+            let text = format!("`{kind}` is not alone: ask for it in a request of its own");
             return Err(Fault::new(None, text));
         }
-        return read_gap(table.need("gap")?).map_err(|fault| fault.within("gap"));
+        let question = read_question(kind, table.need(kind)?, blobs);
+        return question
+            .map(Request::Ask)
+            .map_err(|fault| fault.within(kind));
     }
     let validate = table.flag("validate")?.unwrap_or(false);
     if !table.has("edits") {
-        let text = "a request has none of `edits`, `validate` and `gap`: add one";
+        let text = format!(
+            "a request has none of `edits`, `validate`, `{}`: add one",
+            QUESTIONS.join("`, `")
+        );
         return if validate {
             Ok(Request::Edits(EditRequest {
                 edits: Vec::new(),
@@ -203,14 +204,6 @@ fn read(json: &[u8], blobs: &[u8]) -> Result<Request, Fault> {
         edits.push(edit.map_err(|fault| fault.within(&format!("edit {}", place + 1)))?);
     }
     Ok(Request::Edits(EditRequest { edits, validate }))
-}
-
-fn read_gap(node: Node) -> Result<Request, Fault> {
-    let mut table = Table::open(node, "this question", &["a", "b"])?;
-    Ok(Request::Gap {
-        a: need_name(&mut table, "a")?,
-        b: need_name(&mut table, "b")?,
-    })
 }
 
 const VERBS: &[&str] = &[
@@ -286,7 +279,7 @@ fn plain_name(node: Node) -> Result<String, Fault> {
     Err(Fault::new(None, format!("{text}: {mend}")))
 }
 
-fn need_name(table: &mut Table, key: &str) -> Result<String, Fault> {
+pub(super) fn need_name(table: &mut Table, key: &str) -> Result<String, Fault> {
     let name = table.name(key, BODY_NAME_BYTES_MAX)?;
     name.ok_or_else(|| Fault::new(None, format!("`{key}` is missing: write a body's name")))
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::EditBatch;
 use crate::error::Result;
-use crate::scene::{BodySpec, Edit as Asking, EditRequest, Scene, SourceSpec};
+use crate::scene::{Edit as Asking, EditRequest, PlacedSpec, Scene, SourceSpec};
 use crate::shape::{Contents, Library, Shape};
 use crate::world::{Edit, Parts, PlacedShape};
 
@@ -40,7 +40,7 @@ pub fn build_shapes_in(scene: &Scene, mut library: Library) -> Result<Shapes> {
         .bodies
         .iter()
         .zip(built.shapes)
-        .map(|(body, shapes)| place(body, shapes))
+        .map(|(body, shapes)| place(&body.shapes, shapes))
         .collect();
     Ok(Shapes {
         bodies,
@@ -50,8 +50,8 @@ pub fn build_shapes_in(scene: &Scene, mut library: Library) -> Result<Shapes> {
 }
 
 /// Built shapes at their places in a body.
-fn place(body: &BodySpec, shapes: Vec<Arc<Shape>>) -> Parts {
-    let placed = body.shapes.iter().zip(shapes);
+fn place(specs: &[PlacedSpec], shapes: Vec<Arc<Shape>>) -> Parts {
+    let placed = specs.iter().zip(shapes);
     placed
         .map(|(spec, shape)| PlacedShape {
             shape,
@@ -112,6 +112,28 @@ impl EditBuilder {
         })
     }
 
+    /// Builds shapes that are to be no body, for a question; and what is odd about them.
+    ///
+    /// # Errors
+    /// One text that names the shape, what is wrong and what to change.
+    pub fn shapes(
+        &mut self,
+        specs: &[PlacedSpec],
+    ) -> std::result::Result<(Parts, Vec<String>), String> {
+        let base = self.base.clone().unwrap_or_default();
+        let (mut shapes, mut warnings) = (Vec::with_capacity(specs.len()), Vec::new());
+        for (place, spec) in specs.iter().enumerate() {
+            let named = |what: &dyn std::fmt::Display| format!("shape {}: {what}", place + 1);
+            let built = self.library.get(&spec.shape, &base);
+            let built = built.map_err(|e| named(&e))?;
+            warnings.extend(built.warnings.iter().map(|warning| named(warning)));
+            shapes.push(built.shape);
+        }
+        let parts = place(specs, shapes);
+        self.library.prune();
+        Ok((parts, warnings))
+    }
+
     /// The files that were read since the last call, where the library keeps them; to be asked for after a request that
     /// was built, for the shapes of one that was not may serve the next.
     pub fn take_kept(&mut self) -> Contents {
@@ -149,7 +171,7 @@ impl EditBuilder {
                         built.shape
                     });
                 }
-                let shapes = place(&body, shapes);
+                let shapes = place(&body.shapes, shapes);
                 Edit::Put {
                     body: Arc::new(body),
                     shapes,

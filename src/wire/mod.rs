@@ -2,6 +2,7 @@
 //! engine is handed and hands back. `msgs/` holds the same layouts for other languages; `tests/wire_layout.rs`
 //! compares them.
 
+mod answers;
 mod changes;
 mod codes;
 mod frame;
@@ -14,6 +15,7 @@ mod rows;
 mod tick;
 mod vertices;
 
+pub use answers::{GapFound, TouchingFound, TouchingRow, UnknownBody};
 pub use changes::ChangesHeader;
 pub use codes::{
     BodyStatus, BroadCause, BroadMode, ContactKind, EndCause, Event, Level, Reason, RejectReason,
@@ -23,7 +25,7 @@ pub use codes::{
 pub use frame::{Frame, Inbox, name_bytes, name_str};
 pub use outbox::{Demand, Outbox};
 pub use region::RegionRow;
-pub use request::{Answer, AnswerHeader, GapFound, RequestHeader};
+pub use request::{Answer, AnswerHeader, RequestHeader};
 pub use rows::{
     BODY_NAME_LEN, BodyRow, ContactRow, FrameHeader, Hello, MessageHeader, NameRow, PairRow,
     SOURCE_NAME_LEN, SOURCES_MAX, TransformRow, TransformVelRow,

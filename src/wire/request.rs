@@ -3,7 +3,7 @@
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
-use super::MessageHeader;
+use super::{GapFound, TouchingFound};
 
 /// User header of a request; the payload is `json_len` bytes of JSON, then the blobs it names by offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
@@ -51,31 +51,7 @@ pub struct Answer {
     /// What was asked for, where a gap was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gap: Option<GapFound>,
-}
-
-/// The gap of two bodies that a request asked for. Metres, scene frame; A and B as the request names them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct GapFound {
-    /// Header of the tick whose poses were used.
-    pub tick_header: MessageHeader,
-    /// Age of the older of the two poses when the work on the answer began, nanoseconds of `CLOCK_BOOTTIME`; `None`:
-    /// neither body is one that moves.
-    #[serde(default)]
-    pub age_ns: Option<u64>,
-    /// `Verdict`.
-    pub verdict: u8,
-    /// Whether the query was finished, with 0 inside its rounding interval.
-    pub touching: bool,
-    /// Proved lower end of the gap, signed; `None`: nothing is known.
-    pub gap_min_m: Option<f64>,
-    /// Proved upper end of the gap, signed; `None`: nothing is known.
-    pub gap_max_m: Option<f64>,
-    /// Best estimate of the gap, signed; `None`: none.
-    pub gap_best_m: Option<f64>,
-    /// Closest or deepest point on A; `None`: none.
-    pub point_a: Option<[f64; 3]>,
-    /// Closest or deepest point on B; `None`: none.
-    pub point_b: Option<[f64; 3]>,
-    /// Unit, from A to B; `None`: none.
-    pub normal: Option<[f64; 3]>,
+    /// What was asked for, where it was what a body or a shape touches.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub touching: Option<TouchingFound>,
 }

@@ -160,6 +160,13 @@ impl Filters {
         by_default(hot_a, hot_b)
     }
 
+    /// Whether what is no body of the scene, of this group and mask, is checked with a body: by the masks alone.
+    #[must_use]
+    pub fn allows_stranger(&self, group: u32, mask: u32, slot: BodySlot) -> bool {
+        let hot = self.bodies.get(slot.index()).unwrap_or(&Hot::GONE);
+        hot.has(LIVE) && hot.has(ENABLED) && group & hot.mask != 0 && hot.group & mask != 0
+    }
+
     /// The reason text of the rule that decides a pair; `None` where none does.
     #[must_use]
     pub fn rule_reason(&self, a: BodySlot, b: BodySlot) -> Option<&str> {

@@ -1,4 +1,4 @@
-//! `sweepd query A B`: the gap of two bodies of a running daemon, as text and as JSON, and why there is none.
+//! `sweepd query A B`, `--touching`: bodies of a running daemon, as text and as JSON, and why there is no answer.
 
 use rustix::process::Signal;
 use serde_json::Value;
@@ -118,6 +118,73 @@ fn what_does_not_move_has_no_age() {
         "{}",
         out(&ended)
     );
+}
+
+#[test]
+fn a_body_is_tried_at_a_pose_and_a_shape_anywhere() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    let lost = json(&desk, &["--touching", "a", "--at=0,0,0", "--json"]);
+    assert_eq!(lost["complete"], false);
+    assert_eq!(lost["unknown"][0]["body"], "b");
+    assert_eq!(lost["unknown"][0]["status"], "not_received");
+    step(&mut client, &[at(1, 0.0), at(2, -3.0)]);
+    let there = json(
+        &desk,
+        &["--touching", "a", "--at", "-2.5,0,0,0,0,0,1", "--json"],
+    );
+    let row = &there["rows"][0];
+    assert_eq!((&row["a"], &row["b"]), (&"a".into(), &"b".into()));
+    assert_eq!(row["verdict"], "colliding");
+    assert!(
+        (row["gap_best_m"].as_f64().unwrap() + 0.5).abs() < 1e-12,
+        "{row}"
+    );
+    assert_eq!(there["complete"], true);
+    assert_eq!(there["tick"].as_u64().map(|tick| tick > 0), Some(true));
+    let near = json(&desk, &["--touching", "a", "--within", "2.1m", "--json"]);
+    assert_eq!(near["rows"][0]["verdict"], "near", "{near}");
+    let none = json(&desk, &["--touching", "a", "--within", "199cm", "--json"]);
+    assert_eq!(none["rows"], serde_json::json!([]));
+    let sphere = r#"{"type": "sphere", "radius": 0.25}"#;
+    let shape = json(&desk, &["--shape", sphere, "--at=-3,0,0", "--json"]);
+    assert!(
+        shape["rows"][0]["a"].is_null() && shape["rows"][0]["b"] == "b",
+        "{shape}"
+    );
+    let ended = ask(&desk, &["--touching", "a", "--at=-2,0,0"]);
+    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+    for words in [
+        "colliding   a and b (touching)",
+        "complete    yes",
+        "tick        ",
+    ] {
+        assert!(out(&ended).contains(words), "`{words}` in {}", out(&ended));
+    }
+    for (args, words) in [
+        (
+            &["--touching", "zeppelin"][..],
+            &["\"zeppelin\"", "2 bodies"][..],
+        ),
+        (&["--touching", "a", "--at=1,2"], &["2 numbers", "write 3"]),
+        (&["--touching", "a", "--at=1,x,2"], &["`x`"]),
+        (&["--touching", "a", "--within", "5"], &["no length"]),
+        (&["--touching", "a", "b"], &["cannot be used"]),
+        (&["--shape", "{"], &["no JSON"]),
+        (&["a", "b", "--at=0,0,0"], &["cannot be used"]),
+    ] {
+        let ended = ask(&desk, args);
+        assert_eq!(code(&ended), Some(2), "{args:?}: {}", err(&ended));
+        let text = err(&ended);
+        assert!(
+            words.iter().all(|word| text.contains(word)),
+            "{args:?}: {text}"
+        );
+    }
+    let ended = ask(&desk, &["--shape", r#"{"type": "sphere", "radius": -1}"#]);
+    assert_eq!(code(&ended), Some(4), "{}", err(&ended));
+    assert!(err(&ended).contains("radius is -1"), "{}", err(&ended));
 }
 
 #[test]

@@ -30,5 +30,6 @@ mod search;
 mod shapes;
 mod state;
 mod threads;
+mod touching;
 mod verdicts;
 mod vertices;

@@ -221,6 +221,18 @@ def test_scene_edits_are_done_whole_or_not_at_all(daemon):
         assert result.state == "clear"
 
 
+def test_a_pose_is_tried_before_anything_moves(daemon):
+    with sweepd.Client(daemon[0], "sim", quat_order="wxyz") as client:
+        assert client.step(poses(5.0), timeout_s=5).state == "clear"
+        there = {"body": "left", "position": [4.5, 0.0, 0.0], "within_m": 0.1}
+        touching = client.request({"touching": there})["touching"]
+        assert touching["complete"] and [row["b"] for row in touching["rows"]] == ["right"]
+        np.testing.assert_allclose(touching["rows"][0]["gap_best_m"], -0.5, atol=1e-9)
+        with pytest.raises(sweepd.Refused, match="nobody"):
+            client.request({"touching": {"body": "nobody"}})
+        assert client.step(poses(5.0), timeout_s=5).state == "clear"
+
+
 def test_a_killed_daemon_that_comes_back_is_told_as_a_restart(daemon):
     instance, start, started = daemon
     with sweepd.Client(instance, "sim", quat_order="wxyz") as client:

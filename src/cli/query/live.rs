@@ -1,39 +1,41 @@
-//! `sweepd query A B`: the gap of two bodies, asked of a running daemon. In: names. Out: text, or one JSON object with
-//! the keys of `query --batch` where they mean the same.
+//! Questions to a running daemon: asked, waited for, and why there is no answer. In: JSON. Out: the answer; and how its
+//! parts are told to people.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde_json::{Value, json};
 
-use crate::cli::args_tools::QueryArgs;
+use crate::cli::args_query::QueryArgs;
 use crate::cli::connect;
 use crate::cli::figures::{metres, time};
-use crate::cli::out::Out;
 use crate::error::{Error, Result};
 use crate::scene::nearest;
 use crate::time::{Clock, SystemClock};
 use crate::transport::client::{Client, Topics};
-use crate::wire::{Answer, GapFound, Verdict, name_str};
+use crate::wire::{Answer, MessageHeader, Verdict, name_str};
 
 /// Longest wait before a look at the stop flag, nanoseconds.
 const LOOK_NS: u64 = 100_000_000;
 /// How long to wait for the names of the scene, which only help to say what is wrong, nanoseconds.
 const NAMES_WAIT_NS: u64 = 1_000_000_000;
 
-/// Asks, waits and tells.
-pub(super) fn gap(
-    a: &str,
-    b: &str,
+/// Asks and waits.
+///
+/// * `named` - the names in the question, to tell which is none.
+/// * `found` - what the answer says, where it is one.
+pub(super) fn ask<T>(
+    question: &Value,
+    named: &[&str],
     args: &QueryArgs,
-    out: &mut Out,
     stop: &AtomicBool,
-) -> Result<bool> {
+    found: impl Fn(&mut Answer) -> Option<T>,
+) -> Result<(T, Vec<String>)> {
     let until_ns = SystemClock.monotonic_ns().saturating_add(args.timeout);
     let instance = &args.which.instance;
     let Some(mut client) = connect(instance, None, args.timeout, stop)? else {
         return Err(stopped());
     };
-    let request = client.ask(&json!({ "gap": { "a": a, "b": b } }).to_string(), &[])?;
+    let request = client.ask(&question.to_string(), &[])?;
     let text = loop {
         let left_ns = until_ns.saturating_sub(SystemClock.monotonic_ns());
         if let Some(text) = client.answer_text(request, left_ns.min(LOOK_NS))? {
@@ -49,18 +51,12 @@ pub(super) fn gap(
             )));
         }
     };
-    let answer: Answer = serde_json::from_str(&text)
+    let mut answer: Answer = serde_json::from_str(&text)
         .map_err(|e| Error::io(format!("the daemon's answer is no answer: {text}"), e))?;
-    let Some(found) = &answer.gap else {
-        return Err(refusal(&mut client, [a, b], answer.error, stop));
-    };
-    if args.json {
-        out.line(&as_json(a, b, found, &answer.warnings).to_string())?;
-    } else {
-        out.text(&as_text(a, b, found, &answer.warnings))?;
+    match found(&mut answer) {
+        Some(found) => Ok((found, answer.warnings)),
+        None => Err(refusal(&mut client, named, answer.error, stop)),
     }
-    out.flush()?;
-    Ok(true)
 }
 
 fn stopped() -> Error {
@@ -68,17 +64,17 @@ fn stopped() -> Error {
 }
 
 /// Why there is no gap to tell: a name that no body has is the user's, all else the daemon's word.
-fn refusal(client: &mut Client, asked: [&str; 2], why: Option<String>, stop: &AtomicBool) -> Error {
+fn refusal(client: &mut Client, asked: &[&str], why: Option<String>, stop: &AtomicBool) -> Error {
     let why = why.unwrap_or_else(|| "the daemon refuses, and does not say why".to_owned());
     let Some(names) = names(client, stop) else {
         return Error::Refused(why);
     };
     let known: Vec<&str> = names.iter().map(String::as_str).collect();
-    let missing = asked.into_iter().find(|name| !known.contains(name));
-    match missing {
-        Some(name) => Error::Usage(unknown(name, &known)),
-        None if asked[0] == asked[1] => Error::Usage(why),
-        None => Error::Refused(why),
+    let missing = asked.iter().find(|name| !known.contains(name));
+    match (missing, asked) {
+        (Some(name), _) => Error::Usage(unknown(name, &known)),
+        (None, [a, b]) if a == b => Error::Usage(why),
+        (None, _) => Error::Refused(why),
     }
 }
 
@@ -117,69 +113,48 @@ fn names(client: &mut Client, stop: &AtomicBool) -> Option<Vec<String>> {
     }
 }
 
-fn verdict(found: &GapFound) -> Option<Verdict> {
-    Verdict::from_code(found.verdict)
-}
-
-fn as_json(a: &str, b: &str, found: &GapFound, warnings: &[String]) -> Value {
-    let header = &found.tick_header;
+/// The tick that an answer is of, as keys of JSON.
+pub(super) fn tick_keys(header: &MessageHeader) -> Value {
     json!({
-        "a": a,
-        "b": b,
-        "verdict": verdict(found).map_or("?", Verdict::word),
-        "colliding": verdict(found) == Some(Verdict::Colliding),
-        "touching": found.touching,
-        "gap_m": found.gap_best_m,
-        "gap_min_m": found.gap_min_m,
-        "gap_max_m": found.gap_max_m,
-        "normal": found.normal,
-        "point_a": found.point_a,
-        "point_b": found.point_b,
         "boot_id": format!("{:016x}", header.boot_id),
         "tick": header.tick,
         "scene_rev": header.scene_rev,
-        "age_ns": found.age_ns,
-        "warnings": warnings,
     })
 }
 
-fn as_text(a: &str, b: &str, found: &GapFound, warnings: &[String]) -> String {
-    let word = verdict(found).map_or("?", Verdict::word);
-    let touching = if found.touching { " (touching)" } else { "" };
-    let end = |value: Option<f64>, open: &str| value.map_or_else(|| open.to_owned(), metres);
-    let triple = |values: Option<[f64; 3]>| match values {
+/// Puts the keys of one object behind those of another.
+pub(super) fn joined(mut one: Value, other: Value) -> Value {
+    if let (Value::Object(one), Value::Object(other)) = (&mut one, other) {
+        one.extend(other);
+    }
+    one
+}
+
+/// The word of a verdict's code.
+pub(super) fn word(verdict: u8) -> &'static str {
+    Verdict::from_code(verdict).map_or("?", Verdict::word)
+}
+
+/// An end of an interval, in metres.
+pub(super) fn end(value: Option<f64>, open: &str) -> String {
+    value.map_or_else(|| open.to_owned(), metres)
+}
+
+/// Three coordinates.
+pub(super) fn triple(values: Option<[f64; 3]>) -> String {
+    match values {
         Some([x, y, z]) => format!("{} {} {}", metres(x), metres(y), metres(z)),
         None => "not known".to_owned(),
-    };
-    let header = &found.tick_header;
-    let age = match found.age_ns {
-        Some(age_ns) => format!("poses {} old", time(age_ns)),
-        None => "neither body moves".to_owned(),
-    };
-    let lines = [
-        ("verdict", format!("{word}{touching}")),
-        ("gap [m]", end(found.gap_best_m, "not known")),
-        (
-            "proved [m]",
-            format!(
-                "{} .. {}",
-                end(found.gap_min_m, "no lower end"),
-                end(found.gap_max_m, "no upper end")
-            ),
-        ),
-        ("point on A", triple(found.point_a)),
-        ("point on B", triple(found.point_b)),
-        ("normal", triple(found.normal)),
-        (
-            "tick",
-            format!(
-                "{}, scene revision {}; {age}",
-                header.tick, header.scene_rev
-            ),
-        ),
-    ];
-    let mut text = format!("{:<11} {}\n", "A", clean(a)) + &format!("{:<11} {}\n", "B", clean(b));
-    for (what, value) in lines {
+    }
+}
+
+/// Lines of what is said and of its value, then the warnings.
+pub(super) fn lines<'a>(
+    told: impl IntoIterator<Item = (&'a str, String)>,
+    warnings: &[String],
+) -> String {
+    let mut text = String::new();
+    for (what, value) in told {
         text += &format!("{what:<11} {value}\n");
     }
     for warning in warnings {
@@ -189,7 +164,7 @@ fn as_text(a: &str, b: &str, found: &GapFound, warnings: &[String]) -> String {
 }
 
 /// What would move the cursor is not shown.
-fn clean(text: &str) -> String {
+pub(super) fn clean(text: &str) -> String {
     text.chars()
         .map(|c| if c.is_control() { '?' } else { c })
         .collect()
@@ -209,21 +184,5 @@ mod tests {
             "{text}"
         );
         assert!(unknown("x", &[]).contains("none at all"));
-    }
-
-    #[test]
-    fn what_is_not_known_is_said_and_null() {
-        let nothing = GapFound::default();
-        let text = as_text("a", "b\x1b", &nothing, &["odd".to_owned()]);
-        assert!(text.contains("no lower end .. no upper end"), "{text}");
-        assert!(
-            text.contains("warning     odd") && !text.contains('\x1b'),
-            "{text}"
-        );
-        let json = as_json("a", "b", &nothing, &[]);
-        assert!(
-            json["gap_m"].is_null() && json["age_ns"].is_null(),
-            "{json}"
-        );
     }
 }

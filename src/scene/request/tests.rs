@@ -1,6 +1,7 @@
 //! Tests of requests: every edit, blobs, and what each mistake is answered with.
 
 use super::*;
+use crate::scene::Subject;
 use crate::shape::ShapeSpec;
 
 fn error(json: &str) -> String {
@@ -10,7 +11,7 @@ fn error(json: &str) -> String {
 fn edits(json: &str, blobs: &[u8]) -> Result<EditRequest, String> {
     match Request::parse(json.as_bytes(), blobs)? {
         Request::Edits(edits) => Ok(edits),
-        Request::Gap { .. } => panic!("edits"),
+        Request::Ask(_) => panic!("edits"),
     }
 }
 
@@ -88,7 +89,7 @@ fn blobs_are_read_and_checked_for_their_ends() {
 fn each_mistake_is_one_text_that_names_edit_body_and_mend() {
     for (json, wanted) in [
         ("", "this is not JSON"),
-        ("{}", "a request has none of `edits`, `validate` and `gap`"),
+        ("{}", "a request has none of `edits`, `validate`, `gap`"),
         (r#"{"validate": 1}"#, "validate"),
         (r#"{"gap": {"a": "x"}}"#, "gap: `b` is missing"),
         (r#"{"gap": {"a": "x", "b": ""}}"#, "gap: "),
@@ -96,6 +97,11 @@ fn each_mistake_is_one_text_that_names_edit_body_and_mend() {
             r#"{"gap": {"a": "x", "b": "y"}, "validate": true}"#,
             "a request of its own",
         ),
+        (
+            r#"{"gap": {"a": "x", "b": "y"}, "touching": {"body": "x"}}"#,
+            "`gap` is not alone",
+        ),
+        (r#"{"touch": {"body": "x"}}"#, "did you mean `touching`?"),
         (r#"{"edits": []}"#, "write 1 to"),
         (r#"{"edit": []}"#, "did you mean `edits`?"),
         (r#"{"edits": [{}]}"#, "edit 1: an edit has one key"),
@@ -148,8 +154,34 @@ fn a_request_may_ask_for_a_check_alone() {
 #[test]
 fn a_request_may_ask_for_a_gap() {
     let asked = Request::parse(br#"{"gap": {"a": "x", "b": "y"}}"#, &[]).unwrap();
-    let Request::Gap { a, b } = asked else {
+    let Request::Ask(Question::Gap { a, b }) = asked else {
         panic!("a gap");
     };
     assert_eq!((a.as_str(), b.as_str()), ("x", "y"));
+}
+
+#[test]
+fn a_request_may_ask_what_touches_a_body_or_a_shape() {
+    let asked = |json: &str| match Request::parse(json.as_bytes(), &[]).unwrap() {
+        Request::Ask(Question::Touching(asked)) => asked,
+        other => panic!("{other:?}"),
+    };
+    let body = asked(r#"{"touching": {"body": "x"}}"#);
+    assert_eq!(body.subject, Subject::Body("x".to_owned()));
+    assert!(body.pose.is_none() && body.filters && body.within_m.abs() <= 0.0);
+    let shape = asked(
+        r#"{"touching": {"shape": {"type": "sphere", "radius": 1}, "position": [1, 2, 3],
+            "within_m": 0.5, "filters": false, "mask": 6}}"#,
+    );
+    assert_eq!(shape.pose, Some(Pose::translation(1.0, 2.0, 3.0)));
+    assert!(!shape.filters);
+    let Subject::Shapes {
+        shapes,
+        group,
+        mask,
+    } = shape.subject
+    else {
+        panic!("a shape");
+    };
+    assert_eq!((shapes.len(), group, mask), (1, 1, 6));
 }

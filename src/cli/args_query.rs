@@ -1,0 +1,153 @@
+//! Flags and arguments of `query`, and how lengths and lists of numbers are read.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::args::{Which, nanoseconds};
+
+#[derive(Debug, Args)]
+pub(super) struct QueryArgs {
+    /// Name of the one body; behind `--` where it begins with a dash.
+    ///
+    /// The daemon works on the answer for a second at most, beside its ticks: the verdict, the proved interval of the
+    /// gap in metres (negative: overlapping), the closest points and the normal, at the poses of its newest tick,
+    /// whatever pair rules and masks say.
+    #[arg(
+        value_name = "A",
+        required_unless_present_any = ["batch", "touching", "shape"],
+        requires = "b"
+    )]
+    pub(super) a: Option<String>,
+    /// Name of the other body; the normal points from A to it.
+    #[arg(value_name = "B")]
+    pub(super) b: Option<String>,
+    #[command(flatten)]
+    pub(super) touching: TouchingArgs,
+    #[command(flatten)]
+    pub(super) which: Which,
+    /// One JSON object instead of text: lengths in metres, `age_ns` in nanoseconds; what is not known is null.
+    #[arg(long)]
+    pub(super) json: bool,
+    /// How long to wait for the daemon and its answer, such as `500ms`.
+    #[arg(long, default_value = "5s", value_name = "TIME", value_parser = nanoseconds)]
+    pub(super) timeout: u64,
+    /// No daemon: a file of cases, one JSON object a line (`-`: standard input); one answer a line, in order.
+    ///
+    /// A case: `{"id", "a": SHAPE, "pose_a": {"t": [x,y,z], "q": [w,x,y,z]}, "b": SHAPE, "pose_b": ...}`, all lengths
+    /// in metres.
+    #[arg(
+        long,
+        value_name = "IN.jsonl",
+        conflicts_with_all = ["a", "b", "touching", "shape", "instance", "json", "timeout"]
+    )]
+    pub(super) batch: Option<PathBuf>,
+}
+
+/// What touches a body or a shape.
+#[derive(Debug, Args)]
+pub(super) struct TouchingArgs {
+    /// What this body touches, or would touch --at another pose, with all that hangs on it. Changes nothing.
+    ///
+    /// A line for each body that is not proved farther than --within, worst first. Bodies whose place is not known are
+    /// named: they may be there, too.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["a", "b"])]
+    pub(super) touching: Option<String>,
+    /// The same of a shape that is no body, as in scene files, in JSON: `{"type": "sphere", "radius": 0.5}`.
+    #[arg(long, value_name = "JSON", conflicts_with_all = ["a", "b", "touching"])]
+    pub(super) shape: Option<String>,
+    /// Where it is put, in metres, and how, as a quaternion; by default where the body is, of a shape the scene's
+    /// origin.
+    #[arg(
+        long,
+        value_name = "X,Y,Z[,QX,QY,QZ,QW]",
+        value_parser = numbers,
+        allow_hyphen_values = true,
+        conflicts_with_all = ["a", "b", "batch"]
+    )]
+    pub(super) at: Option<Numbers>,
+    /// Also bodies that are no farther than this, such as `5cm`; by default only what touches or may.
+    #[arg(
+        long,
+        value_name = "LENGTH",
+        default_value = "0",
+        value_parser = length_m,
+        conflicts_with_all = ["a", "b", "batch"]
+    )]
+    pub(super) within: f64,
+    /// Whatever pair rules, neighbours and masks say.
+    #[arg(long, conflicts_with_all = ["a", "b", "batch"])]
+    pub(super) no_filters: bool,
+}
+
+/// A list of numbers, as one value of a flag.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Numbers(pub(super) Vec<f64>);
+
+/// Reads finite numbers with commas between them.
+pub(super) fn numbers(text: &str) -> Result<Numbers, String> {
+    let number = |part: &str| {
+        let value: Option<f64> = part.trim().parse().ok();
+        value
+            .filter(|value| value.is_finite())
+            .ok_or_else(|| format!("`{part}` is no number: write numbers with commas between them"))
+    };
+    text.split(',')
+        .map(number)
+        .collect::<Result<_, _>>()
+        .map(Numbers)
+}
+
+/// Metres of `5cm`, `1.5m`, `2mm`, `300um`, `0`.
+pub(super) fn length_m(text: &str) -> Result<f64, String> {
+    let wanted =
+        || format!("`{text}` is no length: write a number and um, mm, cm, m or km, such as 5cm");
+    let split = text
+        .rfind(|c: char| !c.is_ascii_alphabetic())
+        .map_or(0, |at| at + 1);
+    let (number, unit) = text.split_at_checked(split).ok_or_else(wanted)?;
+    let number: f64 = number.trim().parse().map_err(|_| wanted())?;
+    let in_metres = match unit {
+        "um" => number / 1e6,
+        "mm" => number / 1e3,
+        "cm" => number / 1e2,
+        "m" => number,
+        "km" => number * 1e3,
+        "" if number == 0.0 => number,
+        _ => return Err(wanted()),
+    };
+    if in_metres.is_finite() && in_metres >= 0.0 {
+        Ok(in_metres)
+    } else {
+        Err(wanted())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_are_read_with_their_units() {
+        for (text, metres) in [
+            ("5cm", 0.05),
+            ("1.5m", 1.5),
+            ("2 mm", 0.002),
+            ("0", 0.0),
+            ("3um", 3e-6),
+        ] {
+            assert_eq!(length_m(text), Ok(metres), "{text}");
+        }
+        for bad in ["", "cm", "5", "-1m", "2 furlongs", "1e999m", "nan m", "5é"] {
+            assert!(length_m(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn lists_of_numbers_are_read_and_what_is_none_is_named() {
+        assert_eq!(numbers("1,-2.5, 3e-1"), Ok(Numbers(vec![1.0, -2.5, 0.3])));
+        for (bad, word) in [("1,,2", "``"), ("1,x", "`x`"), ("inf", "`inf`"), ("", "``")] {
+            assert!(numbers(bad).unwrap_err().contains(word), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! `sweepd query --touching NAME`, `--shape JSON`: what a body or a shape touches or would touch. In: flags. Out: text,
+//! or one JSON object.
+
+use std::sync::atomic::AtomicBool;
+
+use serde_json::{Value, json};
+
+use super::live::{ask, clean, end, joined, lines, tick_keys, word};
+use crate::cli::args_query::QueryArgs;
+use crate::cli::out::Out;
+use crate::error::{Error, Result};
+use crate::wire::{TouchingFound, TouchingRow};
+
+/// Asks, waits and tells.
+pub(super) fn touching(args: &QueryArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
+    let asked = question(args)?;
+    let named: Vec<&str> = args.touching.touching.as_deref().into_iter().collect();
+    let taken = |answer: &mut crate::wire::Answer| answer.touching.take();
+    let (found, warnings) = ask(&json!({ "touching": asked }), &named, args, stop, taken)?;
+    if args.json {
+        out.line(&as_json(&found, &warnings).to_string())?;
+    } else {
+        out.text(&as_text(&found, &warnings))?;
+    }
+    out.flush()?;
+    Ok(true)
+}
+
+fn question(args: &QueryArgs) -> Result<Value> {
+    let flags = &args.touching;
+    let mut asked = json!({ "within_m": flags.within, "filters": !flags.no_filters });
+    if let Some(name) = &flags.touching {
+        asked["body"] = json!(name);
+    }
+    if let Some(text) = &flags.shape {
+        asked["shape"] = serde_json::from_str(text).map_err(|e| {
+            Error::Usage(format!(
+                "--shape is no JSON: {e}; write a shape as '{{\"type\": \"sphere\", \"radius\": 0.5}}'"
+            ))
+        })?;
+    }
+    match flags.at.as_ref().map(|at| at.0.as_slice()) {
+        None => {}
+        Some([position @ .., qx, qy, qz, qw]) if position.len() == 3 => {
+            asked["position"] = json!(position);
+            asked["orientation"] = json!([qx, qy, qz, qw]);
+        }
+        Some(position) if position.len() == 3 => asked["position"] = json!(position),
+        Some(other) => {
+            return Err(Error::Usage(format!(
+                "--at has {} numbers: write 3, x,y,z in metres, or 7, with a quaternion in the order x,y,z,w",
+                other.len()
+            )));
+        }
+    }
+    Ok(asked)
+}
+
+fn as_json(found: &TouchingFound, warnings: &[String]) -> Value {
+    let row = |row: &TouchingRow| {
+        let mut told = json!(row);
+        told["verdict"] = json!(word(row.verdict));
+        told
+    };
+    let mut answer = json!(found);
+    answer["rows"] = found.rows.iter().map(row).collect();
+    answer["warnings"] = json!(warnings);
+    if let Value::Object(keys) = &mut answer {
+        keys.remove("tick_header");
+    }
+    joined(answer, tick_keys(&found.tick_header))
+}
+
+fn as_text(found: &TouchingFound, warnings: &[String]) -> String {
+    let header = &found.tick_header;
+    let what = match found.asked.as_slice() {
+        [] => "the shape".to_owned(),
+        [body] => clean(body),
+        [body, with @ ..] => format!("{} with {} that hang on it", clean(body), with.len()),
+    };
+    let mut told = vec![("asked for", what)];
+    told.extend(
+        found
+            .rows
+            .iter()
+            .map(|row| (word(row.verdict), sentence(row))),
+    );
+    if found.rows.is_empty() {
+        told.push(("nothing", "is near by what is known".to_owned()));
+    }
+    let unknown = found.unknown.iter();
+    told.extend(unknown.map(|it| ("unknown", format!("{} ({})", clean(&it.body), it.status))));
+    for (count, what) in [
+        (found.unknown_left_out, "more whose place is not known"),
+        (
+            found.left_out,
+            "pairs with near boxes left out: nothing is known of them",
+        ),
+        (
+            found.ignored,
+            "pairs with near boxes not looked at: filters, or disabled",
+        ),
+    ] {
+        if count > 0 {
+            told.push(("and", format!("{count} {what}")));
+        }
+    }
+    let complete = if found.complete {
+        "yes: all other bodies are proved farther"
+    } else {
+        "no: others may be near, too"
+    };
+    told.push(("complete", complete.to_owned()));
+    told.push((
+        "tick",
+        format!("{}, scene revision {}", header.tick, header.scene_rev),
+    ));
+    lines(told, warnings)
+}
+
+/// A row: who, and the proved gap in metres.
+fn sentence(row: &TouchingRow) -> String {
+    let of = row.a.as_deref().map(|a| format!("{} and ", clean(a)));
+    let touching = if row.touching { " (touching)" } else { "" };
+    format!(
+        "{}{}{touching}: gap {} m, proved {} .. {}",
+        of.unwrap_or_default(),
+        clean(&row.b),
+        end(row.gap_best_m, "not known"),
+        end(row.gap_min_m, "no lower end"),
+        end(row.gap_max_m, "no upper end"),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::{UnknownBody, Verdict};
+
+    #[test]
+    fn what_is_not_known_is_told_and_no_cursor_is_moved() {
+        let found = TouchingFound {
+            rows: vec![TouchingRow {
+                b: "evil\x1b[2J".to_owned(),
+                verdict: Verdict::Possible.code(),
+                ..TouchingRow::default()
+            }],
+            unknown: vec![UnknownBody {
+                body: "arm".to_owned(),
+                status: "stale".to_owned(),
+            }],
+            left_out: 3,
+            ..TouchingFound::default()
+        };
+        let text = as_text(&found, &[]);
+        for words in [
+            "possible    evil?[2J: gap not known m, proved no lower end .. no upper end",
+            "unknown     arm (stale)",
+            "3 pairs",
+            "complete    no",
+        ] {
+            assert!(text.contains(words), "`{words}` in {text}");
+        }
+        let json = as_json(&found, &["odd".to_owned()]);
+        assert_eq!(json["rows"][0]["verdict"], "possible");
+        assert!(json["rows"][0]["gap_min_m"].is_null() && json.get("tick_header").is_none());
+    }
+}

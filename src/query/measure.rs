@@ -1,0 +1,96 @@
+//! Two bodies measured for a question: what answers about a gap have in common. In: bodies as they stand, a [`Meter`].
+//! Out: a sound interval with its verdict and witness, scene frame; and whether a body's place is known at all.
+
+use crate::math::{Interval, Point, Vec3};
+use crate::narrow::gap_between;
+use crate::time::Meter;
+use crate::wire::{BodyStatus, Verdict};
+use crate::world::Body;
+
+/// Longest work on one answer, nanoseconds; then what is proved by then is the answer, an interval that is sound.
+pub(super) const WORK_NS: u64 = 1_000_000_000;
+
+/// What is known of the gap of A and B. Metres, scene frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Measured {
+    pub(super) gap: Interval,
+    pub(super) verdict: Verdict,
+    pub(super) touching: bool,
+    /// Nothing was cut off.
+    pub(super) finished: bool,
+    pub(super) gap_best_m: Option<f64>,
+    pub(super) point_a: Option<[f64; 3]>,
+    pub(super) point_b: Option<[f64; 3]>,
+    /// Unit, from A to B.
+    pub(super) normal: Option<[f64; 3]>,
+}
+
+impl Measured {
+    /// Measures them.
+    ///
+    /// * `report_m` - nearer than this is `near`, metres.
+    pub(super) fn of(a: &Body, b: &Body, report_m: f64, meter: &mut Meter<'_>) -> Self {
+        let asked = gap_between(a, b, report_m, meter);
+        let place = |body: &Body, point: &Point| (body.pose * point).coords.into();
+        let witness = asked.witness;
+        Self {
+            gap: asked.gap,
+            verdict: asked.verdict,
+            touching: asked.touching,
+            finished: asked.finished,
+            // An estimate is never outside what is proved.
+            gap_best_m: witness.and_then(|w| end(w.best_m.max(asked.gap.min).min(asked.gap.max))),
+            point_a: witness.map(|w| place(a, &w.point_a)),
+            point_b: witness.map(|w| place(b, &w.point_b)),
+            normal: witness.map(|w| {
+                let normal: Vec3 = a.pose.rotation * w.normal;
+                normal.into()
+            }),
+        }
+    }
+}
+
+/// An end of an interval, where there is one.
+pub(super) fn end(end: f64) -> Option<f64> {
+    end.is_finite().then_some(end)
+}
+
+/// The age of a body's pose; `None`: it cannot move, or none was received.
+pub(super) fn age_ns(body: &Body, now_ns: u64) -> Option<u64> {
+    let since_ns = body.since_ns.filter(|_| body.moves)?;
+    Some(now_ns.saturating_sub(since_ns))
+}
+
+/// Whether a body's place is known; what is odd about it, but legal.
+///
+/// # Errors
+/// Why it is not, which body, and what to change.
+pub(super) fn fit(body: &Body) -> Result<Option<String>, String> {
+    let name = &body.name;
+    match body.status {
+        BodyStatus::Known | BodyStatus::Truncated => Ok(None),
+        BodyStatus::Held => Ok(Some(format!(
+            "body \"{name}\" is held: its pose is too old, and it may be elsewhere"
+        ))),
+        BodyStatus::NotReceived => Err(format!(
+            "body \"{name}\" is not_received: no pose of it has come yet; ask again when its source sends"
+        )),
+        BodyStatus::Rejected => {
+            let why = body
+                .reject
+                .map_or_else(String::new, |why| format!(" ({why})"));
+            Err(format!(
+                "body \"{name}\" is rejected: its newest pose was refused{why}; ask again after a good one"
+            ))
+        }
+        BodyStatus::Stale => Err(format!(
+            "body \"{name}\" is stale: its pose is older than its time-out; ask again when its source sends"
+        )),
+        BodyStatus::RemovedByAge => Err(format!(
+            "body \"{name}\" is removed_by_age: its pose is too old; ask again when its source sends"
+        )),
+        BodyStatus::Disabled => Err(format!(
+            "body \"{name}\" is disabled: enable it, then ask again"
+        )),
+    }
+}

@@ -1,0 +1,357 @@
+//! What a body or a shape touches, or would touch if it were somewhere. In: the question, and the world between two
+//! ticks. Out: a question that holds all it needs; then a row for each body that is not proved farther than asked for.
+//!
+//! How: one pass over the boxes of all bodies finds who may be near. Those are copied (their shapes are shared), and
+//! the worker asks for each gap in turn, nearest box first: little work for each, then as much as the second allows. A
+//! box that is far is a proof; whoever has no box because its place is not known is named, so that silence is none.
+//!
+//! What hangs on the body goes with it and is asked for too: its pose is the body's. Refused: a search in the broad
+//! phase's own order, which differs by method and is rearranged while it is read.
+
+use std::cmp::Reverse;
+
+use super::gap::find;
+use super::measure::{Measured, WORK_NS, age_ns, end, fit};
+use crate::ids::BodySlot;
+use crate::limits::{TOUCHING_ROWS_MAX, UNKNOWN_ROWS_MAX};
+use crate::math::{Aabb, Pose, ROUND};
+use crate::scene::{Subject, Touching};
+use crate::shape::Geometry;
+use crate::time::{Clock, Meter};
+use crate::wire::{BodyStatus, MessageHeader, TouchingFound, TouchingRow, UnknownBody, Verdict};
+use crate::world::{Body, Parts, World};
+
+/// Units for each pair before any has more: convex pairs and most meshes are done by then.
+const FIRST_UNITS: u64 = 2_000;
+
+/// A body or a shape where it is asked for, and who may be near.
+#[derive(Clone, Debug)]
+pub struct TouchingQuestion {
+    /// What is asked for, where it is asked for: the body first, then what hangs on it.
+    asked: Vec<Body>,
+    /// It is a body; else a shape.
+    is_body: bool,
+    /// Its pose is the one that it has.
+    in_place: bool,
+    within_m: f64,
+    near: Vec<Near>,
+    /// The answer, as far as it needs no work.
+    found: TouchingFound,
+    /// What is odd, but legal.
+    pub warnings: Vec<String>,
+}
+
+/// Another body that may be near.
+#[derive(Clone, Debug)]
+struct Near {
+    /// Place in `asked`.
+    asked: usize,
+    body: Body,
+    /// It is no nearer, where this is above 0, metres.
+    bound_m: f64,
+}
+
+/// A pair that may be near, before it is copied.
+#[derive(Clone, Copy)]
+struct Hit {
+    bound_m: f64,
+    asked: usize,
+    slot: BodySlot,
+}
+
+impl TouchingQuestion {
+    /// Takes the bodies as they stand.
+    ///
+    /// * `tick_header` - of the tick that left the world so.
+    /// * `shapes` - those of the question, built, where it has any.
+    ///
+    /// Cost: O(bodies), and a copy of each that may be near.
+    ///
+    /// # Errors
+    /// Why there is no answer, which body, and what to change: no such body, it is disabled, it is to be asked for
+    /// where it is and that is not known, its vertices are not known.
+    pub fn new(
+        world: &World,
+        tick_header: MessageHeader,
+        asked: &Touching,
+        shapes: Option<&Parts>,
+    ) -> Result<Self, String> {
+        let mut warnings = Vec::new();
+        let (slots, bodies) = match (&asked.subject, shapes) {
+            (Subject::Body(name), _) => parts_of(world, name, asked.pose.as_ref(), &mut warnings)?,
+            (Subject::Shapes { .. }, Some(shapes)) => {
+                let pose = asked.pose.unwrap_or_else(Pose::identity);
+                (Vec::new(), vec![Body::of_shapes(shapes.clone(), &pose)])
+            }
+            (Subject::Shapes { .. }, None) => return Err("its shapes are not built".to_owned()),
+        };
+        let is_body = !slots.is_empty();
+        let pose = bodies.first().map(|body| body.pose).unwrap_or_default();
+        let turn = pose.rotation.as_vector();
+        let mut question = Self {
+            is_body,
+            in_place: is_body && asked.pose.is_none(),
+            within_m: asked.within_m,
+            near: Vec::new(),
+            found: TouchingFound {
+                tick_header,
+                complete: true,
+                asked: bodies
+                    .iter()
+                    .filter(|_| is_body)
+                    .map(|body| body.name.clone())
+                    .collect(),
+                position: pose.translation.vector.into(),
+                orientation: [turn.x, turn.y, turn.z, turn.w],
+                ..TouchingFound::default()
+            },
+            asked: bodies,
+            warnings,
+        };
+        let hits = question.look_around(world, asked, &slots);
+        question.keep(world, hits);
+        Ok(question)
+    }
+
+    /// Finds who may be near by the boxes, and counts who is not to be looked at or cannot be.
+    fn look_around(&mut self, world: &World, asked: &Touching, slots: &[BodySlot]) -> Vec<Hit> {
+        let mut hits = Vec::new();
+        // One box around all: most bodies are far from it.
+        let whole = self
+            .asked
+            .iter()
+            .fold(Aabb::empty(), |all, body| all.merged(&body.proxy));
+        for (slot, other) in world.bodies() {
+            let is_lost = other.reach_m.is_infinite() && other.status != BodyStatus::Disabled;
+            if !is_lost && whole.distance(&other.proxy) > self.within_m || slots.contains(&slot) {
+                continue;
+            }
+            let mut is_unknown = false;
+            for (place, part) in self.asked.iter().enumerate() {
+                let bound_m = bound_m(part, other);
+                if !is_lost && bound_m > self.within_m {
+                    continue;
+                }
+                let by_filter = || match &asked.subject {
+                    _ if !asked.filters => true,
+                    Subject::Body(_) => world.filters().allows(slots[place], slot),
+                    Subject::Shapes { group, mask, .. } => {
+                        world.filters().allows_stranger(*group, *mask, slot)
+                    }
+                };
+                let is_apart_by_law = part.unbounded && other.unbounded;
+                if is_apart_by_law || other.status == BodyStatus::Disabled || !by_filter() {
+                    self.found.ignored += 1;
+                    continue;
+                }
+                is_unknown |= !matches!(other.status, BodyStatus::Known | BodyStatus::Truncated);
+                if fit(other).is_ok() {
+                    hits.push(Hit {
+                        bound_m,
+                        asked: place,
+                        slot,
+                    });
+                }
+            }
+            if is_unknown {
+                self.note_unknown(other);
+            }
+        }
+        hits
+    }
+
+    fn note_unknown(&mut self, body: &Body) {
+        let found = &mut self.found;
+        found.complete = false;
+        if found.unknown.len() < UNKNOWN_ROWS_MAX {
+            found.unknown.push(UnknownBody {
+                body: body.name.clone(),
+                status: body.status.word().to_owned(),
+            });
+        } else {
+            found.unknown_left_out += 1;
+        }
+    }
+
+    /// Copies those there is room for: the nearest, by their boxes.
+    fn keep(&mut self, world: &World, mut hits: Vec<Hit>) {
+        let order = |one: &Hit, other: &Hit| {
+            let tie = || (one.slot, one.asked).cmp(&(other.slot, other.asked));
+            one.bound_m.total_cmp(&other.bound_m).then_with(tie)
+        };
+        if hits.len() > TOUCHING_ROWS_MAX {
+            self.found.left_out = (hits.len() - TOUCHING_ROWS_MAX) as u64;
+            self.found.complete = false;
+            hits.select_nth_unstable_by(TOUCHING_ROWS_MAX, order);
+            hits.truncate(TOUCHING_ROWS_MAX);
+        }
+        hits.sort_unstable_by(order);
+        self.near = hits
+            .iter()
+            .filter_map(|hit| {
+                Some(Near {
+                    asked: hit.asked,
+                    body: world.body(hit.slot)?.still(),
+                    bound_m: hit.bound_m,
+                })
+            })
+            .collect();
+    }
+
+    /// Works on the answer, for a second at most.
+    #[must_use]
+    pub fn answer(&self, clock: &dyn Clock) -> TouchingFound {
+        self.answer_within(clock, None)
+    }
+
+    /// As [`TouchingQuestion::answer`], with so many units of work at most.
+    #[must_use]
+    pub fn answer_within(&self, clock: &dyn Clock, units: Option<u64>) -> TouchingFound {
+        let now_ns = clock.boottime_ns();
+        let end_ns = clock.monotonic_ns().saturating_add(WORK_NS);
+        let mut units_left = units.unwrap_or(u64::MAX);
+        let mut known: Vec<Option<Measured>> = vec![None; self.near.len()];
+        for most in [FIRST_UNITS, u64::MAX] {
+            for (near, known) in self.near.iter().zip(&mut known) {
+                if known.is_some_and(|known| known.finished) {
+                    continue;
+                }
+                let mut meter = Meter::new(clock, Some(end_ns), Some(most.min(units_left)));
+                if known.is_none() || meter.open() {
+                    let newer = near.measure(&self.asked[near.asked], self.within_m, &mut meter);
+                    *known = Some(known.map_or(newer, |older| better(older, newer)));
+                }
+                units_left = units_left.saturating_sub(meter.spent());
+            }
+        }
+        let pairs = self.near.iter().zip(known.into_iter().flatten());
+        let mut rows: Vec<TouchingRow> = pairs
+            .filter(|(_, known)| known.gap.min <= self.within_m)
+            .map(|(near, known)| self.row(near, &known, now_ns))
+            .collect();
+        rows.sort_by(|one, other| {
+            let least = |row: &TouchingRow| row.gap_min_m.unwrap_or(f64::NEG_INFINITY);
+            let rank = |row: &TouchingRow| Reverse(row.verdict);
+            (rank(one).cmp(&rank(other)))
+                .then_with(|| least(one).total_cmp(&least(other)))
+                .then_with(|| (&one.a, &one.b).cmp(&(&other.a, &other.b)))
+        });
+        TouchingFound {
+            rows,
+            ..self.found.clone()
+        }
+    }
+
+    fn row(&self, near: &Near, known: &Measured, now_ns: u64) -> TouchingRow {
+        let asked = &self.asked[near.asked];
+        let own_age_ns = age_ns(asked, now_ns).filter(|_| self.in_place);
+        TouchingRow {
+            a: self.is_body.then(|| asked.name.clone()),
+            b: near.body.name.clone(),
+            verdict: known.verdict.code(),
+            touching: known.touching,
+            gap_min_m: end(known.gap.min),
+            gap_max_m: end(known.gap.max),
+            gap_best_m: known.gap_best_m,
+            point_a: known.point_a,
+            point_b: known.point_b,
+            normal: known.normal,
+            age_ns: age_ns(&near.body, now_ns).max(own_age_ns),
+        }
+    }
+}
+
+impl Near {
+    fn measure(&self, asked: &Body, within_m: f64, meter: &mut Meter<'_>) -> Measured {
+        // What is exactly as far as asked for is near.
+        let mut known = Measured::of(asked, &self.body, within_m.next_up(), meter);
+        if self.bound_m > known.gap.min && self.bound_m > 0.0 {
+            known.gap.min = self.bound_m.min(known.gap.max);
+            if known.verdict == Verdict::Possible && known.gap.min > 0.0 {
+                known.verdict = Verdict::Near;
+            }
+        }
+        known
+    }
+}
+
+/// The one that says more.
+fn better(one: Measured, other: Measured) -> Measured {
+    if other.finished || other.gap.width() < one.gap.width() {
+        other
+    } else {
+        one
+    }
+}
+
+type Asked = (Vec<BodySlot>, Vec<Body>);
+
+/// A body and what hangs on it, where they are asked for.
+fn parts_of(
+    world: &World,
+    name: &str,
+    pose: Option<&Pose>,
+    warnings: &mut Vec<String>,
+) -> Result<Asked, String> {
+    let slot = find(world, name)?;
+    let body = world.body(slot);
+    let body = body.ok_or_else(|| "a body has just been taken out: ask again".to_owned())?;
+    let has_vertices = |v: &crate::world::Vertices| v.version.is_some() && v.refused.is_none();
+    match pose {
+        None => warnings.extend(fit(body)?),
+        Some(_) if body.status == BodyStatus::Disabled => {
+            return Err(format!(
+                "body \"{name}\" is disabled: enable it, or ask for its `shape`"
+            ));
+        }
+        Some(_) if !body.vertices.as_deref().is_none_or(has_vertices) => {
+            return Err(format!(
+                "body \"{name}\" deforms, and its vertices are not known: ask again when its source has sent them"
+            ));
+        }
+        Some(_) => {}
+    }
+    let (mut slots, mut bodies) = (vec![slot], vec![body.at(pose.unwrap_or(&body.pose))]);
+    for (slot, local) in world.hanging_on(slot) {
+        let Some(other) = world.body(slot) else {
+            continue;
+        };
+        // A body that does not take part, or whose own shape is not known, is asked for by nobody.
+        if other.status == BodyStatus::Disabled {
+            continue;
+        }
+        slots.push(slot);
+        bodies.push(match pose {
+            Some(pose) => other.at(&(pose * local)),
+            None => other.at(&other.pose),
+        });
+    }
+    Ok((slots, bodies))
+}
+
+/// No point of the one is nearer to any of the other than this, metres; 0 or less says nothing.
+fn bound_m(one: &Body, other: &Body) -> f64 {
+    match (one.unbounded, other.unbounded) {
+        (false, false) => one.proxy.distance(&other.proxy),
+        (true, false) => above_m(one, other),
+        (false, true) => above_m(other, one),
+        (true, true) => 0.0,
+    }
+}
+
+/// How far above the half-spaces of the one the ball around the other is at least, metres; 0 where it has other shapes.
+fn above_m(planes: &Body, ball: &Body) -> f64 {
+    let centre = ball.pose * ball.centre;
+    let mut least_m = f64::INFINITY;
+    for placed in planes.shapes.iter() {
+        let Geometry::HalfSpace { normal, offset } = &placed.shape.geometry else {
+            return 0.0;
+        };
+        let at = planes.pose * placed.pose;
+        let (up, from) = (at.rotation * normal, at.translation.vector);
+        let height = (centre.coords - from).dot(&up) - offset;
+        let size = centre.coords.amax() + from.amax() + offset.abs() + ball.radius;
+        least_m = least_m.min(height - ball.radius - ball.reach_m - 32.0 * ROUND * size);
+    }
+    least_m
+}

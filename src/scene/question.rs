@@ -1,0 +1,160 @@
+//! Questions to a running daemon, each the one key of a request; none changes anything.
+//!
+//! In: JSON in the words of scene files. Out: a checked [`Question`]; whether its names are those of bodies is seen
+//! where it is answered.
+//!
+//! ```json
+//! { "gap": { "a": "box", "b": "part" } }
+//! { "touching": { "body": "box", "position": [0, 0, 1], "orientation": [0, 0, 0, 1], "within_m": 0.05 } }
+//! { "touching": { "shape": { "type": "sphere", "radius": 0.5 }, "position": [0, 0, 1], "group": 1, "mask": 6 } }
+//! ```
+
+use crate::limits::EXTENT_MAX_M;
+use crate::math::Pose;
+use crate::scene::PlacedSpec;
+use crate::scene::node::{Fault, Node, Value};
+use crate::scene::read_body::{BODY_NAME_BYTES_MAX, read_all_shapes};
+use crate::scene::read_shape::read_pose;
+use crate::scene::request::need_name;
+use crate::scene::table::Table;
+
+/// The keys that ask.
+pub(super) const QUESTIONS: &[&str] = &["gap", "touching"];
+
+/// What is asked of a running daemon.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Question {
+    /// The gap of two bodies.
+    Gap {
+        /// Name of the one.
+        a: String,
+        /// Name of the other.
+        b: String,
+    },
+    /// What a body or a shape touches, or would touch.
+    Touching(Touching),
+}
+
+/// What touches a body or a shape, or would if it were at a pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Touching {
+    /// What is put there.
+    pub subject: Subject,
+    /// Where, in the scene's frame; `None`: where the body is, or the scene's frame itself for a shape.
+    pub pose: Option<Pose>,
+    /// What is nearer than this is told, too, metres.
+    pub within_m: f64,
+    /// Whether the scene's filters hold.
+    pub filters: bool,
+}
+
+/// What is put somewhere.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Subject {
+    /// A body of the scene, by name, with what hangs on it.
+    Body(String),
+    /// What is no body.
+    Shapes {
+        /// At least one.
+        shapes: Vec<PlacedSpec>,
+        /// Groups it belongs to.
+        group: u32,
+        /// Groups it collides with.
+        mask: u32,
+    },
+}
+
+impl Question {
+    /// The shapes that are to be built before it can be answered.
+    #[must_use]
+    pub fn shapes(&self) -> &[PlacedSpec] {
+        match self {
+            Self::Touching(Touching {
+                subject: Subject::Shapes { shapes, .. },
+                ..
+            }) => shapes,
+            _ => &[],
+        }
+    }
+}
+
+/// Reads the value of a question's key.
+///
+/// * `blobs` - the bytes behind the JSON of the request.
+pub(super) fn read_question(kind: &str, node: Node, blobs: &[u8]) -> Result<Question, Fault> {
+    match kind {
+        "touching" => read_touching(node, blobs).map(Question::Touching),
+        _ => read_gap(node),
+    }
+}
+
+fn read_gap(node: Node) -> Result<Question, Fault> {
+    let mut table = Table::open(node, "this question", &["a", "b"])?;
+    Ok(Question::Gap {
+        a: need_name(&mut table, "a")?,
+        b: need_name(&mut table, "b")?,
+    })
+}
+
+fn read_touching(node: Node, blobs: &[u8]) -> Result<Touching, Fault> {
+    let keys = &[
+        "body",
+        "shape",
+        "position",
+        "orientation",
+        "within_m",
+        "filters",
+        "group",
+        "mask",
+    ];
+    let mut table = Table::open(node, "this question", keys)?;
+    let has_pose = table.has("position") || table.has("orientation");
+    if table.has("body") && table.has("orientation") && !table.has("position") {
+        let text = "`orientation` without `position`: say where the body is to be";
+        return Err(Fault::new(None, text));
+    }
+    let subject = read_subject(&mut table, blobs)?;
+    let pose = read_pose(&mut table)?;
+    Ok(Touching {
+        subject,
+        pose: has_pose.then_some(pose),
+        within_m: table
+            .number_within("within_m", 0.0, EXTENT_MAX_M)?
+            .unwrap_or_default(),
+        filters: table.flag("filters")?.unwrap_or(true),
+    })
+}
+
+fn read_subject(table: &mut Table, blobs: &[u8]) -> Result<Subject, Fault> {
+    let (group, mask) = (table.bits("group")?, table.bits("mask")?);
+    let name = table.name("body", BODY_NAME_BYTES_MAX)?;
+    match (name, table.take("shape")) {
+        (Some(_), None) if group.is_some() || mask.is_some() => Err(Fault::new(
+            None,
+            "`group` and `mask` are for a `shape`: a body has its own",
+        )),
+        (Some(name), None) => Ok(Subject::Body(name)),
+        (None, Some(Node { at, value })) => {
+            let nodes = match value {
+                Value::List(nodes) => nodes,
+                value => vec![Node { at, value }],
+            };
+            if nodes.is_empty() {
+                return Err(Fault::new(at, "`shape` is an empty list: write a shape"));
+            }
+            Ok(Subject::Shapes {
+                shapes: read_all_shapes(nodes, at, Some(blobs))?,
+                group: group.unwrap_or(1),
+                mask: mask.unwrap_or(u32::MAX),
+            })
+        }
+        (Some(_), Some(_)) => Err(Fault::new(
+            None,
+            "`body` and `shape` are both given: keep one",
+        )),
+        (None, None) => Err(Fault::new(
+            None,
+            "neither `body` nor `shape` is given: name a body, or write a shape",
+        )),
+    }
+}

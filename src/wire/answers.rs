@@ -1,0 +1,97 @@
+//! Answers to questions on demand, as JSON: what the daemon found, with the tick whose poses it used. Metres, scene
+//! frame.
+
+use serde::{Deserialize, Serialize};
+
+use super::MessageHeader;
+
+/// The gap of two bodies that a request asked for. Metres, scene frame; A and B as the request names them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GapFound {
+    /// Header of the tick whose poses were used.
+    pub tick_header: MessageHeader,
+    /// Age of the older of the two poses when the work on the answer began, nanoseconds of `CLOCK_BOOTTIME`; `None`:
+    /// neither body is one that moves.
+    #[serde(default)]
+    pub age_ns: Option<u64>,
+    /// `Verdict`.
+    pub verdict: u8,
+    /// Whether the query was finished, with 0 inside its rounding interval.
+    pub touching: bool,
+    /// Proved lower end of the gap, signed; `None`: nothing is known.
+    pub gap_min_m: Option<f64>,
+    /// Proved upper end of the gap, signed; `None`: nothing is known.
+    pub gap_max_m: Option<f64>,
+    /// Best estimate of the gap, signed; `None`: none.
+    pub gap_best_m: Option<f64>,
+    /// Closest or deepest point on A; `None`: none.
+    pub point_a: Option<[f64; 3]>,
+    /// Closest or deepest point on B; `None`: none.
+    pub point_b: Option<[f64; 3]>,
+    /// Unit, from A to B; `None`: none.
+    pub normal: Option<[f64; 3]>,
+}
+
+/// Which bodies a body, or a shape that is none, touches or would touch at a pose.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TouchingFound {
+    /// Header of the tick whose poses were used.
+    pub tick_header: MessageHeader,
+    /// Whether every body that has no row, and that no filter leaves out, was proved farther away than asked for: none
+    /// is unknown, none left out.
+    pub complete: bool,
+    /// The body asked for, then those that hang on it and go with it; empty: a shape was asked for.
+    pub asked: Vec<String>,
+    /// Where it was put.
+    pub position: [f64; 3],
+    /// How it was put: x, y, z, w.
+    pub orientation: [f64; 4],
+    /// One for each pair of an asked one and another body that is not proved farther apart than asked for; worst first.
+    pub rows: Vec<TouchingRow>,
+    /// Pairs near enough by their boxes for which there was no room: nothing is known of them.
+    pub left_out: u64,
+    /// Pairs near enough by their boxes that are not looked at: a filter leaves them out, or the other is disabled.
+    pub ignored: u64,
+    /// Bodies whose place is not known, so that they may be near; one held at an old pose has a row, too, where that is
+    /// near.
+    pub unknown: Vec<UnknownBody>,
+    /// Such bodies for whose names there was no room.
+    pub unknown_left_out: u64,
+}
+
+/// A body that is near an asked one, or may be.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TouchingRow {
+    /// Name of the asked body; `None`: a shape was asked for.
+    pub a: Option<String>,
+    /// Name of the other.
+    pub b: String,
+    /// `Verdict`; `near` is what is apart and no farther than asked for.
+    pub verdict: u8,
+    /// Whether the query was finished, with 0 inside its rounding interval.
+    pub touching: bool,
+    /// Proved lower end of the gap, signed; `None`: nothing is known.
+    pub gap_min_m: Option<f64>,
+    /// Proved upper end of the gap, signed; `None`: nothing is known.
+    pub gap_max_m: Option<f64>,
+    /// Best estimate of the gap, signed; `None`: none.
+    pub gap_best_m: Option<f64>,
+    /// Closest or deepest point on A; `None`: none.
+    pub point_a: Option<[f64; 3]>,
+    /// Closest or deepest point on B; `None`: none.
+    pub point_b: Option<[f64; 3]>,
+    /// Unit, from A to B; `None`: none.
+    pub normal: Option<[f64; 3]>,
+    /// Age of the oldest received pose that it rests on when the work began, nanoseconds of `CLOCK_BOOTTIME`; `None`:
+    /// it rests on none.
+    pub age_ns: Option<u64>,
+}
+
+/// A body whose place is not known.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct UnknownBody {
+    /// Its name.
+    pub body: String,
+    /// Word of its `BodyStatus`.
+    pub status: String,
+}

@@ -1,0 +1,87 @@
+//! Bodies as they would stand elsewhere, for questions: nothing of the world changes.
+//!
+//! In: a body, a pose. Out: a body at rest there, and what goes with it.
+
+use super::World;
+use super::body::{Body, Motion};
+use super::parts::Parts;
+use super::place::{new_body, tight_box};
+use crate::ids::{BodyId, BodySlot};
+use crate::math::Pose;
+use crate::scene::BodySpec;
+use crate::wire::BodyStatus;
+
+impl Body {
+    /// A copy without its way since the last tick: a few pointers and numbers, whatever its shapes are.
+    #[must_use]
+    pub fn still(&self) -> Self {
+        Self {
+            path: None,
+            name: self.name.clone(),
+            shapes: self.shapes.clone(),
+            vertices: self.vertices.clone(),
+            ..*self
+        }
+    }
+
+    /// As it would stand at a pose: its place beyond doubt, its box tight.
+    #[must_use]
+    pub fn at(&self, pose: &Pose) -> Self {
+        Self {
+            pose: *pose,
+            proxy: tight_box(&self.shapes, pose),
+            motion: Motion {
+                bent_m: self.motion.bent_m,
+                ..Motion::at(pose)
+            },
+            status: BodyStatus::Known,
+            reach_m: 0.0,
+            reject: None,
+            ..self.still()
+        }
+    }
+
+    /// Shapes that are no body of the scene, as one.
+    #[must_use]
+    pub fn of_shapes(shapes: Parts, pose: &Pose) -> Self {
+        let spec = BodySpec {
+            moves: false,
+            ..BodySpec::new(String::new(), BodyId(0), Vec::new())
+        };
+        new_body(&spec, shapes, 0).0.at(pose)
+    }
+}
+
+impl World {
+    /// The bodies that hang on one, also over others, each with its pose seen from that one; by slot.
+    ///
+    /// Cost: O(attached bodies).
+    #[must_use]
+    pub fn hanging_on(&self, slot: BodySlot) -> Vec<(BodySlot, Pose)> {
+        let Some(entry) = self.entries.get(slot.index()) else {
+            return Vec::new();
+        };
+        let kin = |other: &BodySlot| self.entries[other.index()].root == entry.root;
+        let attached = self.attached.iter().copied().filter(kin);
+        let mut found: Vec<_> = attached
+            .filter_map(|other| Some((other, self.seen_from(other, slot)?)))
+            .collect();
+        found.sort_unstable_by_key(|(other, _)| *other);
+        found
+    }
+
+    /// The pose of a body seen from one that it hangs on; `None`: it does not.
+    fn seen_from(&self, slot: BodySlot, above: BodySlot) -> Option<Pose> {
+        let (mut at, mut pose) = (slot, Pose::identity());
+        // No longer than the longest chain there can be.
+        for _ in 0..self.bodies.len() {
+            let (to, local) = self.entries[at.index()].attach?;
+            at = self.names.get(to).slot?;
+            pose = local * pose;
+            if at == above {
+                return Some(pose);
+            }
+        }
+        None
+    }
+}
