@@ -91,6 +91,9 @@ pub const SESSIONS_OVER_MAX: usize = 1024;
 /// Rows of an answer to what touches a body: the bodies are copied between two ticks, and told in some 2 MB of JSON.
 /// Beyond it those with the farthest boxes are left out, counted, and the answer is not complete.
 pub const TOUCHING_ROWS_MAX: usize = 1 << 12;
+/// Bodies whose boxes one ray passes; beyond it those that begin farthest are left out, which is told where the ray is
+/// not stopped before.
+pub const RAY_BODIES_MAX: usize = 1 << 12;
 /// Names of bodies with unknown places in one answer; the others are counted.
 pub const UNKNOWN_ROWS_MAX: usize = 256;
 /// Bytes that wait for the thread that records; beyond it the disk does not follow and the recording ends, the daemon

@@ -15,7 +15,7 @@ pub(super) struct QueryArgs {
     /// whatever pair rules and masks say.
     #[arg(
         value_name = "A",
-        required_unless_present_any = ["batch", "touching", "shape"],
+        required_unless_present_any = ["batch", "touching", "shape", "ray"],
         requires = "b"
     )]
     pub(super) a: Option<String>,
@@ -24,6 +24,8 @@ pub(super) struct QueryArgs {
     pub(super) b: Option<String>,
     #[command(flatten)]
     pub(super) touching: TouchingArgs,
+    #[command(flatten)]
+    pub(super) ray: RayArgs,
     #[command(flatten)]
     pub(super) which: Which,
     /// One JSON object instead of text: lengths in metres, `age_ns` in nanoseconds; what is not known is null.
@@ -39,7 +41,7 @@ pub(super) struct QueryArgs {
     #[arg(
         long,
         value_name = "IN.jsonl",
-        conflicts_with_all = ["a", "b", "touching", "shape", "instance", "json", "timeout"]
+        conflicts_with_all = ["a", "b", "touching", "shape", "ray", "instance", "json", "timeout"]
     )]
     pub(super) batch: Option<PathBuf>,
 }
@@ -63,7 +65,7 @@ pub(super) struct TouchingArgs {
         value_name = "X,Y,Z[,QX,QY,QZ,QW]",
         value_parser = numbers,
         allow_hyphen_values = true,
-        conflicts_with_all = ["a", "b", "batch"]
+        conflicts_with_all = ["a", "b", "batch", "ray"]
     )]
     pub(super) at: Option<Numbers>,
     /// Also bodies that are no farther than this, such as `5cm`; by default only what touches or may.
@@ -72,12 +74,46 @@ pub(super) struct TouchingArgs {
         value_name = "LENGTH",
         default_value = "0",
         value_parser = length_m,
-        conflicts_with_all = ["a", "b", "batch"]
+        conflicts_with_all = ["a", "b", "batch", "ray"]
     )]
     pub(super) within: f64,
     /// Whatever pair rules, neighbours and masks say.
-    #[arg(long, conflicts_with_all = ["a", "b", "batch"])]
+    #[arg(long, conflicts_with_all = ["a", "b", "batch", "ray"])]
     pub(super) no_filters: bool,
+}
+
+/// What a ray hits.
+#[derive(Debug, Args)]
+pub(super) struct RayArgs {
+    /// What is hit first from X,Y,Z (metres) along DX,DY,DZ (of any length): the body, and the proved distance.
+    ///
+    /// A ray that begins within a solid hits it there. Bodies whose place is not known are named: they may be in the
+    /// way.
+    #[arg(
+        long,
+        value_name = "X,Y,Z,DX,DY,DZ",
+        value_parser = numbers,
+        allow_hyphen_values = true,
+        conflicts_with_all = ["a", "b", "touching", "shape"]
+    )]
+    pub(super) ray: Option<Numbers>,
+    /// How far the ray goes, such as `10m`; by default as far as there may be anything.
+    #[arg(
+        long,
+        value_name = "LENGTH",
+        value_parser = length_m,
+        requires = "ray",
+        conflicts_with_all = ["a", "b", "batch", "touching", "shape"]
+    )]
+    pub(super) max: Option<f64>,
+    /// Only bodies of these groups, one bit each; by default all.
+    #[arg(
+        long,
+        value_name = "BITS",
+        requires = "ray",
+        conflicts_with_all = ["a", "b", "batch", "touching", "shape"]
+    )]
+    pub(super) mask: Option<u32>,
 }
 
 /// A list of numbers, as one value of a flag.

@@ -2,6 +2,7 @@
 
 mod gap;
 mod live;
+mod ray;
 mod touching;
 
 use std::fs::File;
@@ -25,6 +26,7 @@ pub(super) fn query(args: &QueryArgs, out: &mut Out) -> Result<bool> {
         _ if args.touching.touching.is_some() || args.touching.shape.is_some() => {
             touching::touching(args, out, stop.as_ref())
         }
+        _ if args.ray.ray.is_some() => ray::ray(args, out, stop.as_ref()),
         (Some(a), Some(b)) => gap::gap(a, b, args, out, stop.as_ref()),
         _ => Err(Error::Usage(
             "name two bodies of a running daemon, or one with --touching, or give a file of cases with --batch"

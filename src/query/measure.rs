@@ -23,6 +23,8 @@ pub(super) struct Measured {
     pub(super) point_b: Option<[f64; 3]>,
     /// Unit, from A to B.
     pub(super) normal: Option<[f64; 3]>,
+    /// Place of B's shape there, and its triangle or `NO_INDEX`.
+    pub(super) place_b: Option<(u32, u32)>,
 }
 
 impl Measured {
@@ -46,6 +48,7 @@ impl Measured {
                 let normal: Vec3 = a.pose.rotation * w.normal;
                 normal.into()
             }),
+            place_b: witness.map(|w| (w.shape_b, w.triangle_b)),
         }
     }
 }

@@ -2,9 +2,12 @@
 pub mod batch;
 mod gap;
 mod measure;
+mod ray;
 mod touching;
+mod unknown;
 
 pub use gap::GapQuestion;
+pub use ray::RayQuestion;
 pub use touching::TouchingQuestion;
 
 use crate::scene::Question;
@@ -19,6 +22,8 @@ pub enum Query {
     Gap(Box<GapQuestion>),
     /// For what a body or a shape touches.
     Touching(Box<TouchingQuestion>),
+    /// For what a ray hits.
+    Ray(Box<RayQuestion>),
 }
 
 impl Query {
@@ -41,6 +46,7 @@ impl Query {
             }
             Question::Touching(asked) => TouchingQuestion::new(world, header, asked, shapes)
                 .map(|it| Self::Touching(Box::new(it))),
+            Question::Ray(ray) => Ok(Self::Ray(Box::new(RayQuestion::new(world, header, ray)))),
         }
     }
 
@@ -50,6 +56,7 @@ impl Query {
         let warnings = match &mut self {
             Self::Gap(question) => &mut question.warnings,
             Self::Touching(question) => &mut question.warnings,
+            Self::Ray(question) => &mut question.warnings,
         };
         warnings.extend(more);
         self
@@ -70,6 +77,10 @@ impl Query {
             Self::Touching(question) => {
                 answer.warnings.clone_from(&question.warnings);
                 answer.touching.insert(question.answer(clock)).tick_header
+            }
+            Self::Ray(question) => {
+                answer.warnings.clone_from(&question.warnings);
+                answer.ray.insert(question.answer(clock)).tick_header
             }
         };
         answer.scene_rev = header.scene_rev;

@@ -12,13 +12,14 @@ use std::cmp::Reverse;
 
 use super::gap::find;
 use super::measure::{Measured, WORK_NS, age_ns, end, fit};
+use super::unknown::Unknown;
 use crate::ids::BodySlot;
-use crate::limits::{TOUCHING_ROWS_MAX, UNKNOWN_ROWS_MAX};
+use crate::limits::TOUCHING_ROWS_MAX;
 use crate::math::{Aabb, Pose, ROUND};
 use crate::scene::{Subject, Touching};
 use crate::shape::Geometry;
 use crate::time::{Clock, Meter};
-use crate::wire::{BodyStatus, MessageHeader, TouchingFound, TouchingRow, UnknownBody, Verdict};
+use crate::wire::{BodyStatus, MessageHeader, TouchingFound, TouchingRow, Verdict};
 use crate::world::{Body, Parts, World};
 
 /// Units for each pair before any has more: convex pairs and most meshes are done by then.
@@ -115,7 +116,7 @@ impl TouchingQuestion {
 
     /// Finds who may be near by the boxes, and counts who is not to be looked at or cannot be.
     fn look_around(&mut self, world: &World, asked: &Touching, slots: &[BodySlot]) -> Vec<Hit> {
-        let mut hits = Vec::new();
+        let (mut hits, mut unknown) = (Vec::new(), Unknown::default());
         // One box around all: most bodies are far from it.
         let whole = self
             .asked
@@ -126,7 +127,7 @@ impl TouchingQuestion {
             if !is_lost && whole.distance(&other.proxy) > self.within_m || slots.contains(&slot) {
                 continue;
             }
-            let mut is_unknown = false;
+            let mut is_asked = false;
             for (place, part) in self.asked.iter().enumerate() {
                 let bound_m = bound_m(part, other);
                 if !is_lost && bound_m > self.within_m {
@@ -144,7 +145,7 @@ impl TouchingQuestion {
                     self.found.ignored += 1;
                     continue;
                 }
-                is_unknown |= !matches!(other.status, BodyStatus::Known | BodyStatus::Truncated);
+                is_asked = true;
                 if fit(other).is_ok() {
                     hits.push(Hit {
                         bound_m,
@@ -153,24 +154,13 @@ impl TouchingQuestion {
                     });
                 }
             }
-            if is_unknown {
-                self.note_unknown(other);
+            if is_asked {
+                unknown.note(other);
             }
         }
+        self.found.complete = unknown.is_none();
+        (self.found.unknown, self.found.unknown_left_out) = unknown.take();
         hits
-    }
-
-    fn note_unknown(&mut self, body: &Body) {
-        let found = &mut self.found;
-        found.complete = false;
-        if found.unknown.len() < UNKNOWN_ROWS_MAX {
-            found.unknown.push(UnknownBody {
-                body: body.name.clone(),
-                status: body.status.word().to_owned(),
-            });
-        } else {
-            found.unknown_left_out += 1;
-        }
     }
 
     /// Copies those there is room for: the nearest, by their boxes.

@@ -6,10 +6,11 @@
 //! ```json
 //! { "gap": { "a": "box", "b": "part" } }
 //! { "touching": { "body": "box", "position": [0, 0, 1], "orientation": [0, 0, 0, 1], "within_m": 0.05 } }
+//! { "ray": { "from": [0, 0, 1], "direction": [1, 0, 0], "max_m": 10, "mask": 1 } }
 //! { "touching": { "shape": { "type": "sphere", "radius": 0.5 }, "position": [0, 0, 1], "group": 1, "mask": 6 } }
 //! ```
 
-use crate::limits::EXTENT_MAX_M;
+use crate::limits::{COORDINATE_MAX_M, EXTENT_MAX_M};
 use crate::math::Pose;
 use crate::scene::PlacedSpec;
 use crate::scene::node::{Fault, Node, Value};
@@ -19,7 +20,7 @@ use crate::scene::request::need_name;
 use crate::scene::table::Table;
 
 /// The keys that ask.
-pub(super) const QUESTIONS: &[&str] = &["gap", "touching"];
+pub(super) const QUESTIONS: &[&str] = &["gap", "touching", "ray"];
 
 /// What is asked of a running daemon.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +34,21 @@ pub enum Question {
     },
     /// What a body or a shape touches, or would touch.
     Touching(Touching),
+    /// What a ray hits first.
+    Ray(Ray),
+}
+
+/// A ray.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ray {
+    /// Where it begins, scene frame, metres.
+    pub from: [f64; 3],
+    /// Where it goes, scene frame; of any length but 0.
+    pub direction: [f64; 3],
+    /// How far it goes, metres.
+    pub max_m: f64,
+    /// Bodies of one of these groups are looked at.
+    pub mask: u32,
 }
 
 /// What touches a body or a shape, or would if it were at a pose.
@@ -84,6 +100,7 @@ impl Question {
 pub(super) fn read_question(kind: &str, node: Node, blobs: &[u8]) -> Result<Question, Fault> {
     match kind {
         "touching" => read_touching(node, blobs).map(Question::Touching),
+        "ray" => read_ray(node).map(Question::Ray),
         _ => read_gap(node),
     }
 }
@@ -122,6 +139,32 @@ fn read_touching(node: Node, blobs: &[u8]) -> Result<Touching, Fault> {
             .number_within("within_m", 0.0, EXTENT_MAX_M)?
             .unwrap_or_default(),
         filters: table.flag("filters")?.unwrap_or(true),
+    })
+}
+
+fn read_ray(node: Node) -> Result<Ray, Fault> {
+    let keys = &["from", "direction", "max_m", "mask"];
+    let mut table = Table::open(node, "this question", keys)?;
+    let mut need = |key: &str| {
+        let triple = table.triple(key)?;
+        triple.ok_or_else(|| Fault::new(None, format!("`{key}` is missing: write [x, y, z]")))
+    };
+    let (from, direction) = (need("from")?, need("direction")?);
+    if let Some(far) = from.iter().find(|x| x.abs() > COORDINATE_MAX_M) {
+        let text = format!("from holds {far} m: stay within {COORDINATE_MAX_M:e} m");
+        return Err(Fault::new(None, text));
+    }
+    if direction.iter().all(|x| *x == 0.0) {
+        let text = "direction is all 0: write where the ray goes";
+        return Err(Fault::new(None, text));
+    }
+    Ok(Ray {
+        from,
+        direction,
+        max_m: table
+            .number_within("max_m", 0.0, EXTENT_MAX_M)?
+            .unwrap_or(EXTENT_MAX_M),
+        mask: table.bits("mask")?.unwrap_or(u32::MAX),
     })
 }
 

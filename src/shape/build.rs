@@ -123,13 +123,7 @@ fn convex(
             return Err(ShapeError::Setting("this shape is not convex".to_owned()));
         }
     };
-    let convex = convex.checked()?;
-    Ok(Shape {
-        aabb: convex.aabb_at(&Pose::identity()),
-        centre: convex.centre(),
-        radius: convex.radius(),
-        geometry: Geometry::Convex(convex),
-    })
+    Ok(Shape::of_convex(convex.checked()?))
 }
 
 /// The hull of points; hull builders are known to panic on odd input, and a user's file must not end the daemon.

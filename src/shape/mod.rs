@@ -62,6 +62,16 @@ pub enum Geometry {
 }
 
 impl Shape {
+    /// Of a convex solid or a triangle, whatever its sizes are: a segment or a point, too.
+    pub(crate) fn of_convex(convex: Convex) -> Self {
+        Self {
+            aabb: convex.aabb_at(&Pose::identity()),
+            centre: convex.centre(),
+            radius: convex.radius(),
+            geometry: Geometry::Convex(convex),
+        }
+    }
+
     /// Its tight box at `pose`, rounded outward; infinite for a half-space.
     #[must_use]
     pub fn aabb_at(&self, pose: &Pose) -> Aabb {

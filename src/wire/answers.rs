@@ -87,6 +87,48 @@ pub struct TouchingRow {
     pub age_ns: Option<u64>,
 }
 
+/// What a ray hits first. Metres, scene frame.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RayFound {
+    /// Header of the tick whose poses were used.
+    pub tick_header: MessageHeader,
+    /// `Verdict`: colliding, where a hit is certified; apart, where it is proved that there is none; else possible.
+    pub verdict: u8,
+    /// Whether no body can be hit sooner than told: none is unknown, left out or `possible`.
+    pub complete: bool,
+    /// Name of the body that is hit; `None`: none is certified.
+    pub body: Option<String>,
+    /// The ray was proved free of the bodies whose places are known up to here.
+    pub t_min_m: f64,
+    /// It has hit the body by here; `None`: no hit is certified.
+    pub t_max_m: Option<f64>,
+    /// Best estimate of the distance to the hit.
+    pub t_best_m: Option<f64>,
+    /// The hit.
+    pub point: Option<[f64; 3]>,
+    /// Of the body's surface there, unit, outward or against the ray; `None`: no hit, or the ray begins within the
+    /// body.
+    pub normal: Option<[f64; 3]>,
+    /// Whether the ray begins within the body.
+    pub inside: bool,
+    /// Place of the shape that is hit in the body.
+    pub shape: Option<u32>,
+    /// Its triangle; `None`: it has none.
+    pub triangle: Option<u32>,
+    /// Age of the body's pose when the work began, nanoseconds of `CLOCK_BOOTTIME`; `None`: it cannot move.
+    pub age_ns: Option<u64>,
+    /// Names of bodies that may be hit sooner: rounding, or the end of the work, leaves it open.
+    pub possible: Vec<String>,
+    /// Bodies whose boxes the ray passes that are not looked at: of none of the groups, or disabled.
+    pub ignored: u64,
+    /// Bodies whose boxes it passes for which there was no room, and which may be hit sooner.
+    pub left_out: u64,
+    /// Bodies whose place is not known: they may be hit sooner.
+    pub unknown: Vec<UnknownBody>,
+    /// Such bodies for whose names there was no room.
+    pub unknown_left_out: u64,
+}
+
 /// A body whose place is not known.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct UnknownBody {

@@ -167,6 +167,13 @@ impl Filters {
         hot.has(LIVE) && hot.has(ENABLED) && group & hot.mask != 0 && hot.group & mask != 0
     }
 
+    /// Whether a body is of one of these groups.
+    #[must_use]
+    pub fn is_of(&self, groups: u32, slot: BodySlot) -> bool {
+        let hot = self.bodies.get(slot.index()).unwrap_or(&Hot::GONE);
+        hot.has(LIVE) && hot.group & groups != 0
+    }
+
     /// The reason text of the rule that decides a pair; `None` where none does.
     #[must_use]
     pub fn rule_reason(&self, a: BodySlot, b: BodySlot) -> Option<&str> {

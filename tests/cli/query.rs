@@ -188,6 +188,59 @@ fn a_body_is_tried_at_a_pose_and_a_shape_anywhere() {
 }
 
 #[test]
+fn a_ray_is_followed_to_what_it_hits() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    step(&mut client, &[at(1, 0.0), at(2, -3.0)]);
+    let hit = json(&desk, &["--ray", "-9,0,0,2,0,0", "--json"]);
+    assert_eq!(
+        (&hit["body"], &hit["verdict"]),
+        (&"b".into(), &"colliding".into())
+    );
+    assert!(
+        (hit["t_best_m"].as_f64().unwrap() - 5.5).abs() < 1e-9,
+        "{hit}"
+    );
+    assert_eq!(
+        (&hit["complete"], &hit["inside"]),
+        (&true.into(), &false.into())
+    );
+    let none = json(&desk, &["--ray=-9,0,0,2,0,0", "--max", "5.4m", "--json"]);
+    assert_eq!(
+        (&none["body"], &none["verdict"]),
+        (&Value::Null, &"apart".into())
+    );
+    let masked = json(&desk, &["--ray=-9,0,0,2,0,0", "--mask", "2", "--json"]);
+    assert_eq!(
+        (&masked["body"], &masked["ignored"]),
+        (&Value::Null, &2.into())
+    );
+    let ended = ask(&desk, &["--ray=0,0,0,0,0,1"]);
+    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+    for words in [
+        "hits        a\n",
+        "begins within",
+        "complete    yes",
+        " old",
+    ] {
+        assert!(out(&ended).contains(words), "`{words}` in {}", out(&ended));
+    }
+    for (args, words) in [
+        (&["--ray", "1,2,3"][..], "3 numbers"),
+        (&["--ray", "1,2,3,4,5,6", "a", "b"], "cannot be used"),
+        (&["--mask", "1", "a", "b"], "cannot be used"),
+    ] {
+        let ended = ask(&desk, args);
+        assert_eq!(code(&ended), Some(2), "{args:?}: {}", err(&ended));
+        assert!(err(&ended).contains(words), "{args:?}: {}", err(&ended));
+    }
+    let ended = ask(&desk, &["--ray", "1,2,3,0,0,0"]);
+    assert_eq!(code(&ended), Some(4), "{}", err(&ended));
+    assert!(err(&ended).contains("all 0"), "{}", err(&ended));
+}
+
+#[test]
 fn without_a_daemon_that_answers_it_ends_in_time_with_code_3() {
     let desk = Desk::new();
     let ended = ask(&desk, &["a", "b", "--timeout", "200ms"]);

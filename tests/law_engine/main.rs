@@ -23,6 +23,7 @@ mod limits;
 mod motion;
 mod order;
 mod pulse;
+mod rays;
 mod rest;
 mod rig;
 mod schedule;

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::scene::nearest;
 use crate::time::{Clock, SystemClock};
 use crate::transport::client::{Client, Topics};
-use crate::wire::{Answer, MessageHeader, Verdict, name_str};
+use crate::wire::{Answer, MessageHeader, UnknownBody, Verdict, name_str};
 
 /// Longest wait before a look at the stop flag, nanoseconds.
 const LOOK_NS: u64 = 100_000_000;
@@ -128,6 +128,40 @@ pub(super) fn joined(mut one: Value, other: Value) -> Value {
         one.extend(other);
     }
     one
+}
+
+/// An answer as JSON for people: its verdict as a word, the tick's keys in place of its header.
+pub(super) fn told_json(
+    mut answer: Value,
+    verdict: u8,
+    header: &MessageHeader,
+    warnings: &[String],
+) -> Value {
+    if let Value::Object(keys) = &mut answer {
+        keys.remove("tick_header");
+    }
+    answer["verdict"] = json!(word(verdict));
+    answer["warnings"] = json!(warnings);
+    joined(answer, tick_keys(header))
+}
+
+/// Adds lines of bodies whose place is not known, and of how many were left out for what.
+pub(super) fn strangers(
+    told: &mut Vec<(&str, String)>,
+    (unknown, more): (&[UnknownBody], u64),
+    counts: &[(u64, &str)],
+) {
+    let unknown = unknown.iter();
+    told.extend(unknown.map(|it| ("unknown", format!("{} ({})", clean(&it.body), it.status))));
+    let counts = counts.iter().copied();
+    for (count, what) in [(more, "more whose place is not known")]
+        .into_iter()
+        .chain(counts)
+    {
+        if count > 0 {
+            told.push(("and", format!("{count} {what}")));
+        }
+    }
 }
 
 /// The word of a verdict's code.

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde_json::{Value, json};
 
-use super::live::{ask, clean, end, joined, lines, tick_keys, word};
+use super::live::{ask, clean, end, joined, lines, strangers, tick_keys, word};
 use crate::cli::args_query::QueryArgs;
 use crate::cli::out::Out;
 use crate::error::{Error, Result};
@@ -88,23 +88,20 @@ fn as_text(found: &TouchingFound, warnings: &[String]) -> String {
     if found.rows.is_empty() {
         told.push(("nothing", "is near by what is known".to_owned()));
     }
-    let unknown = found.unknown.iter();
-    told.extend(unknown.map(|it| ("unknown", format!("{} ({})", clean(&it.body), it.status))));
-    for (count, what) in [
-        (found.unknown_left_out, "more whose place is not known"),
-        (
-            found.left_out,
-            "pairs with near boxes left out: nothing is known of them",
-        ),
-        (
-            found.ignored,
-            "pairs with near boxes not looked at: filters, or disabled",
-        ),
-    ] {
-        if count > 0 {
-            told.push(("and", format!("{count} {what}")));
-        }
-    }
+    strangers(
+        &mut told,
+        (&found.unknown, found.unknown_left_out),
+        &[
+            (
+                found.left_out,
+                "pairs with near boxes left out: nothing is known of them",
+            ),
+            (
+                found.ignored,
+                "pairs with near boxes not looked at: filters, or disabled",
+            ),
+        ],
+    );
     let complete = if found.complete {
         "yes: all other bodies are proved farther"
     } else {

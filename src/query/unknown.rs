@@ -1,0 +1,40 @@
+//! Bodies whose place is not known, for an answer: named while there is room, then counted. In: bodies. Out: names and
+//! what is known of each.
+
+use crate::limits::UNKNOWN_ROWS_MAX;
+use crate::wire::{BodyStatus, UnknownBody};
+use crate::world::Body;
+
+/// Those that were met.
+#[derive(Debug, Default)]
+pub(super) struct Unknown {
+    named: Vec<UnknownBody>,
+    left_out: u64,
+}
+
+impl Unknown {
+    /// Takes a body, unless its place is known.
+    pub(super) fn note(&mut self, body: &Body) {
+        if matches!(body.status, BodyStatus::Known | BodyStatus::Truncated) {
+            return;
+        }
+        if self.named.len() < UNKNOWN_ROWS_MAX {
+            self.named.push(UnknownBody {
+                body: body.name.clone(),
+                status: body.status.word().to_owned(),
+            });
+        } else {
+            self.left_out += 1;
+        }
+    }
+
+    /// Whether every body's place is known.
+    pub(super) fn is_none(&self) -> bool {
+        self.named.is_empty()
+    }
+
+    /// The names, and how many more there are.
+    pub(super) fn take(self) -> (Vec<UnknownBody>, u64) {
+        (self.named, self.left_out)
+    }
+}
