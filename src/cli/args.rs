@@ -35,7 +35,7 @@ pub(super) enum Command {
     Feed(FeedArgs),
     /// Watch a running daemon: state, pairs by name, gaps, budget, sources, rejects.
     Monitor(MonitorArgs),
-    /// Ask a running daemon: gaps, what touches, rays; or answer shape-pair questions offline.
+    /// Ask a running daemon: gaps, what touches, rays, times of impact; or answer shape-pair questions offline.
     Query(QueryArgs),
     /// List running instances, their sources and readers.
     List(ListArgs),

@@ -27,6 +27,8 @@ pub(super) struct QueryArgs {
     #[command(flatten)]
     pub(super) ray: RayArgs,
     #[command(flatten)]
+    pub(super) impact: ImpactArgs,
+    #[command(flatten)]
     pub(super) which: Which,
     /// One JSON object instead of text: lengths in metres, `age_ns` in nanoseconds; what is not known is null.
     #[arg(long)]
@@ -114,6 +116,58 @@ pub(super) struct RayArgs {
         conflicts_with_all = ["a", "b", "batch", "touching", "shape"]
     )]
     pub(super) mask: Option<u32>,
+}
+
+/// When two bodies touch.
+#[derive(Debug, Args)]
+pub(super) struct ImpactArgs {
+    /// When A and B touch first within this time, such as `2s`, if they go on as their source says, or as is said here.
+    ///
+    /// The centre of each goes straight, its turn is about one axis at a constant rate.
+    #[arg(
+        long,
+        value_name = "TIME",
+        value_parser = nanoseconds,
+        requires = "b",
+        conflicts_with_all = ["batch", "touching", "shape", "ray"]
+    )]
+    pub(super) impact: Option<u64>,
+    /// Velocity of A's frame, metres a second in the scene's frame; by default what its source sent.
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_parser = numbers,
+        allow_hyphen_values = true,
+        requires = "impact"
+    )]
+    pub(super) linear_a: Option<Numbers>,
+    /// Angular velocity of A, radians a second in the scene's frame; by default what its source sent.
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_parser = numbers,
+        allow_hyphen_values = true,
+        requires = "impact"
+    )]
+    pub(super) angular_a: Option<Numbers>,
+    /// Velocity of B's frame, metres a second in the scene's frame; by default what its source sent.
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_parser = numbers,
+        allow_hyphen_values = true,
+        requires = "impact"
+    )]
+    pub(super) linear_b: Option<Numbers>,
+    /// Angular velocity of B, radians a second in the scene's frame; by default what its source sent.
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        value_parser = numbers,
+        allow_hyphen_values = true,
+        requires = "impact"
+    )]
+    pub(super) angular_b: Option<Numbers>,
 }
 
 /// A list of numbers, as one value of a flag.

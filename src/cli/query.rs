@@ -1,6 +1,7 @@
 //! `sweepd query`: shape-pair questions answered offline, or questions to a running daemon about its bodies.
 
 mod gap;
+mod impact;
 mod live;
 mod ray;
 mod touching;
@@ -27,6 +28,9 @@ pub(super) fn query(args: &QueryArgs, out: &mut Out) -> Result<bool> {
             touching::touching(args, out, stop.as_ref())
         }
         _ if args.ray.ray.is_some() => ray::ray(args, out, stop.as_ref()),
+        (Some(a), Some(b)) if args.impact.impact.is_some() => {
+            impact::impact(a, b, args, out, stop.as_ref())
+        }
         (Some(a), Some(b)) => gap::gap(a, b, args, out, stop.as_ref()),
         _ => Err(Error::Usage(
             "name two bodies of a running daemon, or one with --touching, or give a file of cases with --batch"

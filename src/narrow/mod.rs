@@ -46,7 +46,7 @@ pub use contacts::{Contact, ContactSet};
 pub use finding::Finding;
 pub use memo::Witness;
 pub use order::Order;
-pub use sweep::{Passage, Swept};
+pub use sweep::{Passage, Swept, touch_on_way};
 
 use crate::ids::{BodySlot, PairSlot};
 use crate::pairs::{PairDelta, PairSet};

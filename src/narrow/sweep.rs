@@ -16,7 +16,10 @@
 //! ends behind the wall is apart at both ends); keeping an undecided sweep for later (nobody asks for it any more).
 
 mod advance;
+mod asked;
 mod motion;
+
+pub use asked::touch_on_way;
 
 use crate::ids::{BodySlot, PairSlot};
 use crate::math::Interval;
@@ -234,18 +237,8 @@ impl Sweep {
         let paths = || [a, b].into_iter().filter_map(way);
         let jumped = paths().any(crate::world::Path::has_jumped);
         let mut sweep = Self {
-            slot,
-            a: at_a,
-            b: at_b,
-            done: false,
             jumped,
-            free: 0.0,
-            hit: f64::INFINITY,
-            looks: 0,
-            probes: 0,
-            last: (f64::NAN, f64::NAN),
-            slope: 0.0,
-            warm: memo.warm,
+            ..Self::fresh((slot, at_a, at_b), memo.warm)
         };
         let start = Moment::of((a, b), 0.0);
         let change = changed_since(a, b, (&memo.rel, memo.bent_m), &start.rel);
@@ -261,6 +254,24 @@ impl Sweep {
             }
         }
         sweep
+    }
+
+    /// One of which nothing is known.
+    fn fresh((slot, a, b): (PairSlot, BodySlot, BodySlot), warm: Warm) -> Self {
+        Self {
+            slot,
+            a,
+            b,
+            done: false,
+            jumped: false,
+            free: 0.0,
+            hit: f64::INFINITY,
+            looks: 0,
+            probes: 0,
+            last: (f64::NAN, f64::NAN),
+            slope: 0.0,
+            warm,
+        }
     }
 
     fn outcome(&self) -> Swept {

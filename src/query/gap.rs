@@ -32,24 +32,7 @@ impl GapQuestion {
         a: &str,
         b: &str,
     ) -> Result<Self, String> {
-        let (slot_a, slot_b) = (find(world, a)?, find(world, b)?);
-        if slot_a == slot_b {
-            return Err(format!(
-                "both are body \"{a}\", which has no gap to itself: name another one"
-            ));
-        }
-        let (Some(one), Some(other)) = (world.body(slot_a), world.body(slot_b)) else {
-            return Err("a body has just been taken out: ask again".to_owned());
-        };
-        let mut warnings = Vec::new();
-        for body in [one, other] {
-            warnings.extend(fit(body)?);
-        }
-        if one.unbounded && other.unbounded {
-            return Err(format!(
-                "\"{a}\" and \"{b}\" both have a half-space, and two half-spaces have no gap: ask of bodies of which one at least is bounded"
-            ));
-        }
+        let ((slot_a, one), (slot_b, other), warnings) = both(world, a, b)?;
         Ok(Self {
             a: one.still(),
             b: other.still(),
@@ -87,4 +70,37 @@ pub(super) fn find(world: &World, name: &str) -> Result<BodySlot, String> {
     world.slot_named(name).ok_or_else(|| {
         format!("there is no body \"{name}\" in the scene: the names are those of `names`")
     })
+}
+
+/// A body and its slot.
+type Found<'w> = (BodySlot, &'w Body);
+
+/// Two bodies of which a gap can be told, and what is odd about them.
+///
+/// # Errors
+/// Why there is none, which body, and what to change.
+pub(super) fn both<'w>(
+    world: &'w World,
+    a: &str,
+    b: &str,
+) -> Result<(Found<'w>, Found<'w>, Vec<String>), String> {
+    let (slot_a, slot_b) = (find(world, a)?, find(world, b)?);
+    if slot_a == slot_b {
+        return Err(format!(
+            "both are body \"{a}\", which has no gap to itself: name another one"
+        ));
+    }
+    let (Some(one), Some(other)) = (world.body(slot_a), world.body(slot_b)) else {
+        return Err("a body has just been taken out: ask again".to_owned());
+    };
+    let mut warnings = Vec::new();
+    for body in [one, other] {
+        warnings.extend(fit(body)?);
+    }
+    if one.unbounded && other.unbounded {
+        return Err(format!(
+            "\"{a}\" and \"{b}\" both have a half-space, and two half-spaces have no gap: ask of bodies of which one at least is bounded"
+        ));
+    }
+    Ok(((slot_a, one), (slot_b, other), warnings))
 }

@@ -1,12 +1,14 @@
 //! Queries: offline, of shape pairs; and of a running daemon, of its bodies as a tick left them.
 pub mod batch;
 mod gap;
+mod impact;
 mod measure;
 mod ray;
 mod touching;
 mod unknown;
 
 pub use gap::GapQuestion;
+pub use impact::ImpactQuestion;
 pub use ray::RayQuestion;
 pub use touching::TouchingQuestion;
 
@@ -24,6 +26,8 @@ pub enum Query {
     Touching(Box<TouchingQuestion>),
     /// For what a ray hits.
     Ray(Box<RayQuestion>),
+    /// For when two bodies touch.
+    Impact(Box<ImpactQuestion>),
 }
 
 impl Query {
@@ -46,6 +50,9 @@ impl Query {
             }
             Question::Touching(asked) => TouchingQuestion::new(world, header, asked, shapes)
                 .map(|it| Self::Touching(Box::new(it))),
+            Question::Impact(asked) => {
+                ImpactQuestion::new(world, header, asked).map(|it| Self::Impact(Box::new(it)))
+            }
             Question::Ray(ray) => Ok(Self::Ray(Box::new(RayQuestion::new(world, header, ray)))),
         }
     }
@@ -57,6 +64,7 @@ impl Query {
             Self::Gap(question) => &mut question.warnings,
             Self::Touching(question) => &mut question.warnings,
             Self::Ray(question) => &mut question.warnings,
+            Self::Impact(question) => &mut question.warnings,
         };
         warnings.extend(more);
         self
@@ -81,6 +89,10 @@ impl Query {
             Self::Ray(question) => {
                 answer.warnings.clone_from(&question.warnings);
                 answer.ray.insert(question.answer(clock)).tick_header
+            }
+            Self::Impact(question) => {
+                answer.warnings.clone_from(&question.warnings);
+                answer.impact.insert(question.answer(clock)).tick_header
             }
         };
         answer.scene_rev = header.scene_rev;

@@ -22,7 +22,7 @@ mod table;
 pub use build::BuiltShapes;
 pub use model::{BodySpec, Origin, PairAction, PairRule, PlacedSpec, Scene, SourceSpec};
 pub use pattern::{is_pattern, pattern_matches};
-pub use question::{Question, Ray, Subject, Touching};
+pub use question::{Impact, Question, Ray, Subject, Touching, Velocity};
 pub use read_body::{BODY_NAME_BYTES_MAX, BodyDraft, SOURCE_NAME_BYTES_MAX};
 pub(crate) use read_ros::no_lockstep;
 pub use request::{EDITS_MAX, Edit, EditRequest, Request};

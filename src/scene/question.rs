@@ -6,6 +6,7 @@
 //! ```json
 //! { "gap": { "a": "box", "b": "part" } }
 //! { "touching": { "body": "box", "position": [0, 0, 1], "orientation": [0, 0, 0, 1], "within_m": 0.05 } }
+//! { "impact": { "a": "box", "b": "part", "linear_a": [1, 0, 0], "angular_b": [0, 0, 3], "within_s": 2 } }
 //! { "ray": { "from": [0, 0, 1], "direction": [1, 0, 0], "max_m": 10, "mask": 1 } }
 //! { "touching": { "shape": { "type": "sphere", "radius": 0.5 }, "position": [0, 0, 1], "group": 1, "mask": 6 } }
 //! ```
@@ -19,8 +20,15 @@ use crate::scene::read_shape::read_pose;
 use crate::scene::request::need_name;
 use crate::scene::table::Table;
 
+/// Of a question: beyond it nothing that flies is meant, metres a second; ...
+const SPEED_MAX_MPS: f64 = 1e6;
+/// ... nothing that turns, radians a second; ...
+const SPIN_MAX_RADPS: f64 = 1e6;
+/// ... and nothing is known of a motion for so long, seconds.
+const WITHIN_MAX_S: f64 = 1e5;
+
 /// The keys that ask.
-pub(super) const QUESTIONS: &[&str] = &["gap", "touching", "ray"];
+pub(super) const QUESTIONS: &[&str] = &["gap", "touching", "ray", "impact"];
 
 /// What is asked of a running daemon.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,6 +44,32 @@ pub enum Question {
     Touching(Touching),
     /// What a ray hits first.
     Ray(Ray),
+    /// When two bodies touch first.
+    Impact(Impact),
+}
+
+/// Two bodies on their way.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Impact {
+    /// Name of the one.
+    pub a: String,
+    /// Name of the other.
+    pub b: String,
+    /// How the one moves.
+    pub velocity_a: Velocity,
+    /// How the other moves.
+    pub velocity_b: Velocity,
+    /// How far ahead it is looked, seconds.
+    pub within_s: f64,
+}
+
+/// How a body moves; where nothing is said, as its source says.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Velocity {
+    /// Of its frame's origin, scene frame, metres a second.
+    pub linear: Option<[f64; 3]>,
+    /// Scene frame, radians a second.
+    pub angular: Option<[f64; 3]>,
 }
 
 /// A ray.
@@ -101,6 +135,7 @@ pub(super) fn read_question(kind: &str, node: Node, blobs: &[u8]) -> Result<Ques
     match kind {
         "touching" => read_touching(node, blobs).map(Question::Touching),
         "ray" => read_ray(node).map(Question::Ray),
+        "impact" => read_impact(node).map(Question::Impact),
         _ => read_gap(node),
     }
 }
@@ -165,6 +200,46 @@ fn read_ray(node: Node) -> Result<Ray, Fault> {
             .number_within("max_m", 0.0, EXTENT_MAX_M)?
             .unwrap_or(EXTENT_MAX_M),
         mask: table.bits("mask")?.unwrap_or(u32::MAX),
+    })
+}
+
+fn read_impact(node: Node) -> Result<Impact, Fault> {
+    let keys = &[
+        "a",
+        "b",
+        "linear_a",
+        "angular_a",
+        "linear_b",
+        "angular_b",
+        "within_s",
+    ];
+    let mut table = Table::open(node, "this question", keys)?;
+    let mut velocity = |key: &str, most: f64| {
+        let triple = table.triple(key)?;
+        let far = triple.and_then(|v| v.into_iter().find(|x| x.abs() > most));
+        match far {
+            Some(far) => {
+                let text = format!("{key} holds {far}: stay within {most:e}");
+                Err(Fault::new(None, text))
+            }
+            None => Ok(triple),
+        }
+    };
+    let velocity_a = Velocity {
+        linear: velocity("linear_a", SPEED_MAX_MPS)?,
+        angular: velocity("angular_a", SPIN_MAX_RADPS)?,
+    };
+    let velocity_b = Velocity {
+        linear: velocity("linear_b", SPEED_MAX_MPS)?,
+        angular: velocity("angular_b", SPIN_MAX_RADPS)?,
+    };
+    let within_s = table.number_within("within_s", 1e-9, WITHIN_MAX_S)?;
+    Ok(Impact {
+        a: need_name(&mut table, "a")?,
+        b: need_name(&mut table, "b")?,
+        velocity_a,
+        velocity_b,
+        within_s: within_s.unwrap_or(1.0),
     })
 }
 

@@ -129,6 +129,31 @@ pub struct RayFound {
     pub unknown_left_out: u64,
 }
 
+/// When two bodies touch first. Seconds from the tick's poses; velocities in the scene's frame, metres and radians a
+/// second, as they were taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ImpactFound {
+    /// Header of the tick whose poses were used.
+    pub tick_header: MessageHeader,
+    /// Age of the older of the two poses when the work began, nanoseconds of `CLOCK_BOOTTIME`; `None`: neither moves.
+    pub age_ns: Option<u64>,
+    /// `Verdict`: colliding, where a touch on the way is certified; apart, where it is proved that there is none; else
+    /// possible.
+    pub verdict: u8,
+    /// They were proved apart until here.
+    pub t_min_s: f64,
+    /// They have touched by here; `None`: no touch is certified.
+    pub t_max_s: Option<f64>,
+    /// Of the origin of A's frame.
+    pub linear_a: [f64; 3],
+    /// Of A.
+    pub angular_a: [f64; 3],
+    /// Of the origin of B's frame.
+    pub linear_b: [f64; 3],
+    /// Of B.
+    pub angular_b: [f64; 3],
+}
+
 /// A body whose place is not known.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct UnknownBody {

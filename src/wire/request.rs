@@ -3,7 +3,7 @@
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};
 
-use super::{GapFound, RayFound, TouchingFound};
+use super::{GapFound, ImpactFound, RayFound, TouchingFound};
 
 /// User header of a request; the payload is `json_len` bytes of JSON, then the blobs it names by offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
@@ -57,4 +57,7 @@ pub struct Answer {
     /// What was asked for, where it was what a ray hits.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ray: Option<RayFound>,
+    /// What was asked for, where it was when two bodies touch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub impact: Option<ImpactFound>,
 }

@@ -5,9 +5,10 @@
 use super::World;
 use super::body::{Body, Motion};
 use super::parts::Parts;
+use super::path::{Leg, Path};
 use super::place::{new_body, tight_box};
 use crate::ids::{BodyId, BodySlot};
-use crate::math::Pose;
+use crate::math::{Pose, Quat, Vec3};
 use crate::scene::BodySpec;
 use crate::wire::BodyStatus;
 
@@ -37,6 +38,32 @@ impl Body {
             status: BodyStatus::Known,
             reach_m: 0.0,
             reject: None,
+            ..self.still()
+        }
+    }
+
+    /// On its way from where it is: the centre of its geometry straight, its turn at a constant rate.
+    ///
+    /// * `linear` - of its frame's origin now, scene frame, metres a second.
+    /// * `angular` - scene frame, radians a second.
+    #[must_use]
+    pub fn on_way(&self, linear: Vec3, angular: Vec3, seconds: f64) -> Self {
+        let arm = self.pose.rotation * self.centre.coords;
+        let (travel, spin) = ((linear + angular.cross(&arm)) * seconds, angular * seconds);
+        let at = self.pose * self.centre;
+        let turned = Quat::from_scaled_axis(spin) * self.pose.rotation;
+        let end = at + travel - turned * self.centre.coords;
+        let leg = Leg {
+            from: self.pose,
+            to: Pose::from_parts(end.coords.into(), turned),
+            pivot: at,
+            travel,
+            spin,
+            extra: Vec3::zeros(),
+            jump: false,
+        };
+        Self {
+            path: Some(Box::new(Path::of_leg(leg, self.centre, self.radius))),
             ..self.still()
         }
     }

@@ -106,6 +106,14 @@ impl Path {
         }
     }
 
+    /// Of one leg, of a body that is asked for.
+    pub(super) fn of_leg(leg: Leg, pivot: Point, radius: f64) -> Self {
+        Self {
+            legs: vec![leg],
+            ..Self::new(pivot, radius, None, true)
+        }
+    }
+
     /// The legs since the last tick, oldest first.
     #[must_use]
     pub fn legs(&self) -> &[Leg] {

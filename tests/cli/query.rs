@@ -241,6 +241,48 @@ fn a_ray_is_followed_to_what_it_hits() {
 }
 
 #[test]
+fn a_time_of_impact_is_told_for_velocities_that_are_said() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    step(&mut client, &[at(1, 0.0), at(2, 3.0)]);
+    let args = ["a", "b", "--impact", "5s", "--linear-b", "-1,0,0", "--json"];
+    let told = json(&desk, &args);
+    assert_eq!(
+        (&told["verdict"], &told["a"]),
+        (&"colliding".into(), &"a".into())
+    );
+    let ends = ["t_min_s", "t_max_s"].map(|key| told[key].as_f64().unwrap());
+    assert!(
+        ends[0] <= 2.0 && 2.0 <= ends[1] && ends[1] - ends[0] < 1e-6,
+        "{told}"
+    );
+    assert_eq!(told["linear_b"], serde_json::json!([-1.0, 0.0, 0.0]));
+    let ended = ask(&desk, &["a", "b", "--impact", "500ms"]);
+    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+    for words in [
+        "touch [s]   never within 0.5",
+        "verdict     apart",
+        "taken to be at rest",
+    ] {
+        assert!(out(&ended).contains(words), "`{words}` in {}", out(&ended));
+    }
+    for (args, words) in [
+        (
+            &["a", "b", "--impact", "1s", "--linear-a", "1,2"][..],
+            "2 numbers",
+        ),
+        (&["a", "b", "--linear-a", "1,2,3"], "--impact"),
+        (&["--touching", "a", "--impact", "1s"], "cannot be used"),
+        (&["a", "zeppelin", "--impact", "1s"], "zeppelin"),
+    ] {
+        let ended = ask(&desk, args);
+        assert_eq!(code(&ended), Some(2), "{args:?}: {}", err(&ended));
+        assert!(err(&ended).contains(words), "{args:?}: {}", err(&ended));
+    }
+}
+
+#[test]
 fn without_a_daemon_that_answers_it_ends_in_time_with_code_3() {
     let desk = Desk::new();
     let ended = ask(&desk, &["a", "b", "--timeout", "200ms"]);

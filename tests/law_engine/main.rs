@@ -19,6 +19,7 @@ mod deadline;
 mod degrade;
 mod edits;
 mod events;
+mod impacts;
 mod limits;
 mod motion;
 mod order;

@@ -1,0 +1,100 @@
+//! `sweepd query A B --impact TIME`: when two bodies touch first. In: flags. Out: text, or one JSON object.
+
+use std::sync::atomic::AtomicBool;
+
+use serde_json::json;
+
+use super::live::{ask, clean, joined, lines, told_json, triple, word};
+use crate::cli::args_query::{Numbers, QueryArgs};
+use crate::cli::figures::{metres, seconds, time};
+use crate::cli::out::Out;
+use crate::error::{Error, Result};
+use crate::wire::ImpactFound;
+
+/// Asks, waits and tells.
+pub(super) fn impact(
+    a: &str,
+    b: &str,
+    args: &QueryArgs,
+    out: &mut Out,
+    stop: &AtomicBool,
+) -> Result<bool> {
+    let flags = &args.impact;
+    let within_s = seconds(flags.impact.unwrap_or_default());
+    let mut asked = json!({ "a": a, "b": b, "within_s": within_s });
+    for (key, value) in [
+        ("linear_a", &flags.linear_a),
+        ("angular_a", &flags.angular_a),
+        ("linear_b", &flags.linear_b),
+        ("angular_b", &flags.angular_b),
+    ] {
+        let Some(Numbers(value)) = value else {
+            continue;
+        };
+        if value.len() != 3 {
+            let (flag, count) = (key.replace('_', "-"), value.len());
+            return Err(Error::Usage(format!(
+                "--{flag} has {count} numbers: write 3"
+            )));
+        }
+        asked[key] = json!(value);
+    }
+    let taken = |answer: &mut crate::wire::Answer| answer.impact.take();
+    let (found, warnings) = ask(&json!({ "impact": asked }), &[a, b], args, stop, taken)?;
+    if args.json {
+        let names = json!({ "a": a, "b": b });
+        let header = &found.tick_header;
+        let told = told_json(
+            joined(names, json!(found)),
+            found.verdict,
+            header,
+            &warnings,
+        );
+        out.line(&told.to_string())?;
+    } else {
+        out.text(&as_text((a, b), within_s, &found, &warnings))?;
+    }
+    out.flush()?;
+    Ok(true)
+}
+
+fn as_text(
+    (a, b): (&str, &str),
+    within_s: f64,
+    found: &ImpactFound,
+    warnings: &[String],
+) -> String {
+    let header = &found.tick_header;
+    let when = match found.t_max_s {
+        Some(end_s) => format!("{} .. {}", metres(found.t_min_s), metres(end_s)),
+        None if found.t_min_s >= within_s => format!("never within {}", metres(within_s)),
+        None => format!("{} .. not known", metres(found.t_min_s)),
+    };
+    let of = |linear, angular| {
+        format!(
+            "{} m/s, {} rad/s",
+            triple(Some(linear)),
+            triple(Some(angular))
+        )
+    };
+    let age = match found.age_ns {
+        Some(age_ns) => format!("poses {} old", time(age_ns)),
+        None => "neither body moves".to_owned(),
+    };
+    let told = [
+        ("A", clean(a)),
+        ("B", clean(b)),
+        ("A goes", of(found.linear_a, found.angular_a)),
+        ("B goes", of(found.linear_b, found.angular_b)),
+        ("verdict", word(found.verdict).to_owned()),
+        ("touch [s]", when),
+        (
+            "tick",
+            format!(
+                "{}, scene revision {}; {age}",
+                header.tick, header.scene_rev
+            ),
+        ),
+    ];
+    lines(told, warnings)
+}

@@ -1,0 +1,123 @@
+//! When two bodies touch first if they go on as they do, or as a question says. In: the question, and the world between
+//! two ticks. Out: a question that holds all it needs; then a proved interval of the time, or a proof that they do not.
+//!
+//! The way is that of continuous bodies: the centre of a body's geometry straight, its turn about one axis at a
+//! constant rate; and so is the method, conservative advancement.
+
+use super::gap::both;
+use super::measure::{WORK_NS, age_ns};
+use crate::limits::LEG_TURNS_MAX;
+use crate::math::Vec3;
+use crate::narrow::{Passage, touch_on_way};
+use crate::scene::{Impact, Velocity};
+use crate::time::{Clock, Meter};
+use crate::wire::{ImpactFound, MessageHeader, Verdict};
+use crate::world::{Body, World};
+
+/// Two bodies as they stood in one tick, on their way from there.
+#[derive(Clone, Debug)]
+pub struct ImpactQuestion {
+    a: Body,
+    b: Body,
+    within_s: f64,
+    /// The answer, as far as it needs no work.
+    found: ImpactFound,
+    /// What is odd, but legal.
+    pub warnings: Vec<String>,
+}
+
+impl ImpactQuestion {
+    /// Takes the bodies as they stand.
+    ///
+    /// * `tick_header` - of the tick that left the world so.
+    ///
+    /// # Errors
+    /// As of a gap; and a half-space that is to move, a turn that is too far to be followed.
+    pub fn new(world: &World, tick_header: MessageHeader, asked: &Impact) -> Result<Self, String> {
+        let ((_, a), (_, b), mut warnings) = both(world, &asked.a, &asked.b)?;
+        let (of_a, of_b) = (
+            velocity(a, &asked.velocity_a, &mut warnings),
+            velocity(b, &asked.velocity_b, &mut warnings),
+        );
+        Ok(Self {
+            a: on_way(a, of_a, asked.within_s)?,
+            b: on_way(b, of_b, asked.within_s)?,
+            within_s: asked.within_s,
+            found: ImpactFound {
+                tick_header,
+                linear_a: of_a.0.into(),
+                angular_a: of_a.1.into(),
+                linear_b: of_b.0.into(),
+                angular_b: of_b.1.into(),
+                ..ImpactFound::default()
+            },
+            warnings,
+        })
+    }
+
+    /// Works on the answer, for a second at most.
+    #[must_use]
+    pub fn answer(&self, clock: &dyn Clock) -> ImpactFound {
+        self.answer_within(clock, None)
+    }
+
+    /// As [`ImpactQuestion::answer`], with so many units of work at most.
+    #[must_use]
+    pub fn answer_within(&self, clock: &dyn Clock, units: Option<u64>) -> ImpactFound {
+        let now_ns = clock.boottime_ns();
+        let end_ns = clock.monotonic_ns().saturating_add(WORK_NS);
+        let mut meter = Meter::new(clock, Some(end_ns), units);
+        let (verdict, from, until) = match touch_on_way(&self.a, &self.b, &mut meter) {
+            Passage::Free => (Verdict::Apart, 1.0, None),
+            Passage::Touched(shares) => (Verdict::Colliding, shares.min, Some(shares.max)),
+            Passage::Open(shares) => (Verdict::Possible, shares.min, None),
+        };
+        let earliest_s = (from * self.within_s).next_down();
+        ImpactFound {
+            age_ns: age_ns(&self.a, now_ns).max(age_ns(&self.b, now_ns)),
+            verdict: verdict.code(),
+            t_min_s: if from >= 1.0 {
+                self.within_s
+            } else {
+                earliest_s.max(0.0)
+            },
+            t_max_s: until.map(|share| (share * self.within_s).next_up().min(self.within_s)),
+            ..self.found
+        }
+    }
+}
+
+/// Linear and angular velocity: as asked, else as sent, else none.
+fn velocity(body: &Body, asked: &Velocity, warnings: &mut Vec<String>) -> (Vec3, Vec3) {
+    let told = asked.linear.is_some() || asked.angular.is_some();
+    if !told && body.velocity.is_none() && body.moves {
+        warnings.push(format!(
+            "body \"{}\" is taken to be at rest: its source sends no velocity, and the question says none",
+            body.name
+        ));
+    }
+    // What the question says of a body is all that holds of it.
+    let [x, y, z, rx, ry, rz] = body.velocity.filter(|_| !told).unwrap_or_default();
+    (
+        asked.linear.map_or(Vec3::new(x, y, z), Vec3::from),
+        asked.angular.map_or(Vec3::new(rx, ry, rz), Vec3::from),
+    )
+}
+
+fn on_way(body: &Body, (linear, angular): (Vec3, Vec3), within_s: f64) -> Result<Body, String> {
+    let name = &body.name;
+    if linear == Vec3::zeros() && angular == Vec3::zeros() {
+        return Ok(body.still());
+    }
+    if body.unbounded {
+        return Err(format!(
+            "body \"{name}\" has a half-space, which is not followed on a way: let the other body move"
+        ));
+    }
+    if angular.norm() * within_s > LEG_TURNS_MAX * std::f64::consts::TAU {
+        return Err(format!(
+            "body \"{name}\" turns more than {LEG_TURNS_MAX} times in {within_s} s: ask for a shorter time"
+        ));
+    }
+    Ok(body.on_way(linear, angular, within_s))
+}
