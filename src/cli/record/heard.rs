@@ -19,6 +19,10 @@ const LOOK_NS: u64 = 100_000_000;
 /// Time between two flushes at most, nanoseconds: what a killed recorder loses.
 const FLUSH_NS: u64 = 500_000_000;
 
+/// The names of a boot come with the first ticks that are heard of it: for so long ticks without are passed over,
+/// nanoseconds. Their rows would be without names.
+const NAMES_WAIT_NS: u64 = 1_000_000_000;
+
 /// What was heard so far.
 #[derive(Default)]
 struct Tally {
@@ -77,6 +81,7 @@ fn follow<W: std::io::Write + std::io::Seek>(
     let start_ns = clock.monotonic_ns();
     let until_ns = args.time.map(|time| start_ns.saturating_add(time));
     let (mut heard_ns, mut flushed_ns) = (start_ns, start_ns);
+    let mut named_by_ns = start_ns.saturating_add(NAMES_WAIT_NS);
     while !stop.load(Ordering::Relaxed) && args.ticks.is_none_or(|most| tally.ticks < most) {
         let now_ns = clock.monotonic_ns();
         let left_ns = until_ns.map_or(LOOK_NS, |until| until.saturating_sub(now_ns));
@@ -86,9 +91,14 @@ fn follow<W: std::io::Write + std::io::Seek>(
         match client.wait_tick(left_ns.min(LOOK_NS))? {
             Heard::Tick => {
                 heard_ns = now_ns;
-                tally.tick(log, client.view())?;
+                if client.view().names().is_some() || now_ns >= named_by_ns {
+                    tally.tick(log, client.view())?;
+                }
             }
-            Heard::Restarted(news) => tally.restart(log, &news)?,
+            Heard::Restarted(news) => {
+                named_by_ns = now_ns.saturating_add(NAMES_WAIT_NS);
+                tally.restart(log, &news)?;
+            }
             Heard::Silence if now_ns.saturating_sub(heard_ns) >= args.wait => {
                 return Err(Error::TimedOut(format!(
                     "no tick for {} ms; is the daemon `{}` still running?",
