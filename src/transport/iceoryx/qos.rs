@@ -194,23 +194,7 @@ pub(super) fn results<T: Debug + ZeroCopySend>(
     topic: &str,
     open: Open,
 ) -> Result<PubSub<Ipc, [T], MessageHeader>> {
-    let name = place.service(topic);
-    let builder = node
-        .service_builder(&service_name(&name)?)
-        .publish_subscribe::<[T]>()
-        .user_header::<MessageHeader>();
-    let builder = match open {
-        Open::Existing => builder,
-        Open::Create => builder
-            .max_publishers(RESULT_PUBLISHERS_MAX)
-            .max_subscribers(RESULT_SUBSCRIBERS_MAX)
-            .subscriber_max_buffer_size(RESULT_BUFFER)
-            .subscriber_max_borrowed_samples(RESULT_BORROWED)
-            .history_size(1)
-            .enable_safe_overflow(true)
-            .max_nodes(NODES_MAX),
-    };
-    open_slice(&name, builder, open)
+    results_under(node, place, (topic, 1), open)
 }
 
 /// `changes`: rows under a [`ChangesHeader`]. No history: the newest message says nothing without those before it.
@@ -219,11 +203,25 @@ pub(super) fn changes(
     place: &Place,
     open: Open,
 ) -> Result<PubSub<Ipc, [PairRow], ChangesHeader>> {
-    let name = place.service("changes");
+    results_under(node, place, ("changes", 0), open)
+}
+
+/// Rows under a header; with the topic how many of the newest messages late joiners get.
+fn results_under<T, H>(
+    node: &Node<Ipc>,
+    place: &Place,
+    (topic, history): (&str, usize),
+    open: Open,
+) -> Result<PubSub<Ipc, [T], H>>
+where
+    T: Debug + ZeroCopySend,
+    H: Debug + ZeroCopySend,
+{
+    let name = place.service(topic);
     let builder = node
         .service_builder(&service_name(&name)?)
-        .publish_subscribe::<[PairRow]>()
-        .user_header::<ChangesHeader>();
+        .publish_subscribe::<[T]>()
+        .user_header::<H>();
     let builder = match open {
         Open::Existing => builder,
         Open::Create => builder
@@ -231,7 +229,7 @@ pub(super) fn changes(
             .max_subscribers(RESULT_SUBSCRIBERS_MAX)
             .subscriber_max_buffer_size(RESULT_BUFFER)
             .subscriber_max_borrowed_samples(RESULT_BORROWED)
-            .history_size(0)
+            .history_size(history)
             .enable_safe_overflow(true)
             .max_nodes(NODES_MAX),
     };

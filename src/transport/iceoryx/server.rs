@@ -81,7 +81,7 @@ where
 
 impl<T: Debug + ZeroCopySend + 'static> Out<T> {
     fn open(node: &Node<Ipc>, place: &Place, topic: &str) -> Result<Self> {
-        Self::of(qos::results::<T>(node, place, topic, Open::Create)?)
+        Self::of(qos::results(node, place, topic, Open::Create)?)
     }
 }
 
