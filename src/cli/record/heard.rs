@@ -3,6 +3,8 @@
 //! In: an instance. Out: an MCAP file of ROS 2 messages. The daemon takes no notice but that it is listened to, so any
 //! daemon can be recorded at any time; what it was given is known to itself alone (`run --record`).
 
+use std::fs::File;
+use std::io::BufWriter;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::cli::args_tools::{RecordArgs, Recorded};
@@ -12,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::record::file::{McapLog, Shown, create};
 use crate::time::{Clock, SystemClock};
 use crate::transport::client::{Client, Heard, Message, Restarted, Topics, View};
-use crate::wire::TickRow;
+use crate::wire::{MessageHeader, TickRow};
 
 /// Longest wait before a look at the stop flag, nanoseconds.
 const LOOK_NS: u64 = 100_000_000;
@@ -22,6 +24,8 @@ const FLUSH_NS: u64 = 500_000_000;
 /// The names of a boot come with the first ticks that are heard of it: for so long ticks without are passed over,
 /// nanoseconds. Their rows would be without names.
 const NAMES_WAIT_NS: u64 = 1_000_000_000;
+
+type Log = McapLog<BufWriter<File>>;
 
 /// What was heard so far.
 #[derive(Default)]
@@ -70,10 +74,10 @@ pub(in crate::cli) fn record(args: &RecordArgs, out: &mut Out, stop: &AtomicBool
     done.and(closed).map(|()| true)
 }
 
-fn follow<W: std::io::Write + std::io::Seek>(
+fn follow(
     args: &RecordArgs,
     client: &mut Client,
-    log: &mut McapLog<W>,
+    log: &mut Log,
     tally: &mut Tally,
     stop: &AtomicBool,
 ) -> Result<()> {
@@ -117,11 +121,7 @@ fn follow<W: std::io::Write + std::io::Seek>(
 }
 
 impl Tally {
-    fn tick<W: std::io::Write + std::io::Seek>(
-        &mut self,
-        log: &mut McapLog<W>,
-        view: &View,
-    ) -> Result<()> {
+    fn tick(&mut self, log: &mut Log, view: &View) -> Result<()> {
         let tick = view.tick();
         let (last, now) = (self.last.header.tick, tick.header.tick);
         // A long tick is told of more than once, each time under its number.
@@ -143,16 +143,12 @@ impl Tally {
         })
     }
 
-    fn restart<W: std::io::Write + std::io::Seek>(
-        &mut self,
-        log: &mut McapLog<W>,
-        news: &Restarted,
-    ) -> Result<()> {
+    fn restart(&mut self, log: &mut Log, news: &Restarted) -> Result<()> {
         let last = std::mem::take(&mut self.last);
-        log.restart(last.sent_ns, (&last.header, &news.ends))
+        log.restart(&last, &news.ends)
     }
 }
 
-fn parts<T>(message: &Message<T>) -> (&crate::wire::MessageHeader, &[T]) {
+fn parts<T>(message: &Message<T>) -> (&MessageHeader, &[T]) {
     (&message.header, &message.rows)
 }

@@ -7,7 +7,7 @@ use super::shown::{self, Show, Shown};
 use super::tape::Tape;
 use super::{MISSED, WHY};
 use crate::error::Result;
-use crate::wire::{MessageHeader, PairRow};
+use crate::wire::{PairRow, TickRow};
 
 /// Writes what was heard as MCAP.
 #[derive(Debug)]
@@ -47,15 +47,15 @@ impl<W: Write + Seek> McapLog<W> {
 
     /// The daemon has started anew: writes the ends that it means for pairs of the boot that is over.
     ///
-    /// * `ends` - with the header of the last tick.
+    /// * `last` - the newest tick of it.
     ///
     /// # Errors
     /// As [`McapLog::new`].
-    pub fn restart(&mut self, sent_ns: u64, ends: (&MessageHeader, &[PairRow])) -> Result<()> {
-        let time_ns = sent_ns.saturating_add(self.since_1970_ns);
-        let (header, rows) = ends;
-        if !rows.is_empty() {
-            self.show.pairs(&mut self.tape, time_ns, header, rows)?;
+    pub fn restart(&mut self, last: &TickRow, ends: &[PairRow]) -> Result<()> {
+        let time_ns = last.sent_ns.saturating_add(self.since_1970_ns);
+        if !ends.is_empty() {
+            self.show
+                .pairs(&mut self.tape, time_ns, &last.header, ends)?;
         }
         self.show.forget_names();
         Ok(())
