@@ -36,7 +36,7 @@ pub(super) enum Command {
     /// Watch a running daemon: state, pairs by name, gaps, budget, sources, rejects.
     Monitor(MonitorArgs),
     /// Ask a running daemon: gaps, what touches, rays, times of impact; or answer shape-pair questions offline.
-    Query(QueryArgs),
+    Query(Box<QueryArgs>),
     /// List running instances, their sources and readers.
     List(ListArgs),
     /// Find what is wrong when nothing works: shared memory, rights, leftovers, daemons, limits; a line a finding.

@@ -1,6 +1,7 @@
 //! Flags and arguments of `query`, and how lengths and lists of numbers are read.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use clap::Args;
 
@@ -65,11 +66,10 @@ pub(super) struct TouchingArgs {
     #[arg(
         long,
         value_name = "X,Y,Z[,QX,QY,QZ,QW]",
-        value_parser = numbers,
         allow_hyphen_values = true,
         conflicts_with_all = ["a", "b", "batch", "ray"]
     )]
-    pub(super) at: Option<Numbers>,
+    pub(super) at: Option<Place>,
     /// Also bodies that are no farther than this, such as `5cm`; by default only what touches or may.
     #[arg(
         long,
@@ -94,11 +94,10 @@ pub(super) struct RayArgs {
     #[arg(
         long,
         value_name = "X,Y,Z,DX,DY,DZ",
-        value_parser = numbers,
         allow_hyphen_values = true,
         conflicts_with_all = ["a", "b", "touching", "shape"]
     )]
-    pub(super) ray: Option<Numbers>,
+    pub(super) ray: Option<Numbers<6>>,
     /// How far the ray goes, such as `10m`; by default as far as there may be anything.
     #[arg(
         long,
@@ -136,56 +135,87 @@ pub(super) struct ImpactArgs {
     #[arg(
         long,
         value_name = "X,Y,Z",
-        value_parser = numbers,
         allow_hyphen_values = true,
         requires = "impact"
     )]
-    pub(super) linear_a: Option<Numbers>,
+    pub(super) linear_a: Option<Numbers<3>>,
     /// Angular velocity of A, radians a second in the scene's frame; by default what its source sent.
     #[arg(
         long,
         value_name = "X,Y,Z",
-        value_parser = numbers,
         allow_hyphen_values = true,
         requires = "impact"
     )]
-    pub(super) angular_a: Option<Numbers>,
+    pub(super) angular_a: Option<Numbers<3>>,
     /// Velocity of B's frame, metres a second in the scene's frame; by default what its source sent.
     #[arg(
         long,
         value_name = "X,Y,Z",
-        value_parser = numbers,
         allow_hyphen_values = true,
         requires = "impact"
     )]
-    pub(super) linear_b: Option<Numbers>,
+    pub(super) linear_b: Option<Numbers<3>>,
     /// Angular velocity of B, radians a second in the scene's frame; by default what its source sent.
     #[arg(
         long,
         value_name = "X,Y,Z",
-        value_parser = numbers,
         allow_hyphen_values = true,
         requires = "impact"
     )]
-    pub(super) angular_b: Option<Numbers>,
+    pub(super) angular_b: Option<Numbers<3>>,
 }
 
-/// A list of numbers, as one value of a flag.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Numbers(pub(super) Vec<f64>);
+/// So many numbers, as one value of a flag.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Numbers<const N: usize>(pub(super) [f64; N]);
+
+impl<const N: usize> FromStr for Numbers<N> {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = <[f64; N]>::try_from(numbers(text)?);
+        let all = |other: Vec<f64>| format!("it has {} numbers: write {N}", other.len());
+        numbers.map(Self).map_err(all)
+    }
+}
+
+/// Where something is put, as one value of a flag: a position in metres, and a quaternion in the order x, y, z, w.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Place {
+    pub(super) position: [f64; 3],
+    pub(super) orientation: Option<[f64; 4]>,
+}
+
+impl FromStr for Place {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match numbers(text)?[..] {
+            [x, y, z] => Ok(Self {
+                position: [x, y, z],
+                orientation: None,
+            }),
+            [x, y, z, qx, qy, qz, qw] => Ok(Self {
+                position: [x, y, z],
+                orientation: Some([qx, qy, qz, qw]),
+            }),
+            ref other => Err(format!(
+                "it has {} numbers: write 3, x,y,z in metres, or 7, with a quaternion in the order x,y,z,w",
+                other.len()
+            )),
+        }
+    }
+}
 
 /// Reads finite numbers with commas between them.
-pub(super) fn numbers(text: &str) -> Result<Numbers, String> {
+fn numbers(text: &str) -> Result<Vec<f64>, String> {
     let number = |part: &str| {
         let value: Option<f64> = part.trim().parse().ok();
         value
             .filter(|value| value.is_finite())
             .ok_or_else(|| format!("`{part}` is no number: write numbers with commas between them"))
     };
-    text.split(',')
-        .map(number)
-        .collect::<Result<_, _>>()
-        .map(Numbers)
+    text.split(',').map(number).collect()
 }
 
 /// Metres of `5cm`, `1.5m`, `2mm`, `300um`, `0`.
@@ -235,9 +265,28 @@ mod tests {
 
     #[test]
     fn lists_of_numbers_are_read_and_what_is_none_is_named() {
-        assert_eq!(numbers("1,-2.5, 3e-1"), Ok(Numbers(vec![1.0, -2.5, 0.3])));
-        for (bad, word) in [("1,,2", "``"), ("1,x", "`x`"), ("inf", "`inf`"), ("", "``")] {
-            assert!(numbers(bad).unwrap_err().contains(word), "{bad}");
+        assert_eq!("1,-2.5, 3e-1".parse(), Ok(Numbers([1.0, -2.5, 0.3])));
+        for (bad, word) in [
+            ("1,,2", "``"),
+            ("1,x", "`x`"),
+            ("inf", "`inf`"),
+            ("", "``"),
+            ("1,2", "2 numbers: write 3"),
+        ] {
+            let told = bad.parse::<Numbers<3>>().unwrap_err();
+            assert!(told.contains(word), "{bad}: {told}");
         }
+        let place: Place = "1,2,3,0,0,0,1".parse().unwrap();
+        assert_eq!(place.orientation, Some([0.0, 0.0, 0.0, 1.0]));
+        assert_eq!(
+            "1,2,3".parse::<Place>().map(|place| place.orientation),
+            Ok(None)
+        );
+        assert!(
+            "1,2,3,4"
+                .parse::<Place>()
+                .unwrap_err()
+                .contains("4 numbers")
+        );
     }
 }

@@ -23,11 +23,13 @@ pub(super) fn query(args: &QueryArgs, out: &mut Out) -> Result<bool> {
         return of_file(file, out);
     }
     let stop = super::stop()?;
+    if let Some(numbers) = args.ray.ray {
+        return ray::ray(numbers, args, out, stop.as_ref());
+    }
     match (&args.a, &args.b) {
         _ if args.touching.touching.is_some() || args.touching.shape.is_some() => {
             touching::touching(args, out, stop.as_ref())
         }
-        _ if args.ray.ray.is_some() => ray::ray(args, out, stop.as_ref()),
         (Some(a), Some(b)) if args.impact.impact.is_some() => {
             impact::impact(a, b, args, out, stop.as_ref())
         }

@@ -186,6 +186,7 @@ impl Against {
             }
         }
     }
+
     /// Builds what a question brings along.
     fn ask(&mut self, question: Question) -> std::result::Result<Done, String> {
         let built = match question.shapes() {

@@ -40,7 +40,10 @@ impl Daemon<'_> {
         let shapes = asking.shapes.as_ref();
         let query = Query::new(self.engine.world(), header, &asking.question, shapes);
         match query {
-            Ok(query) => self.builder.measure(token, query.warned(asking.warnings)),
+            Ok(mut query) => {
+                query.warnings().extend(asking.warnings);
+                self.builder.measure(token, query);
+            }
             Err(why) => self.answer(token, &refusal(why)),
         }
     }

@@ -1,7 +1,7 @@
 //! The gap of two bodies of a running daemon. In: names, and the world between two ticks. Out: a question that holds
 //! all it needs, so that a worker answers it while ticks go on; or why there is no answer.
 
-use super::measure::{Measured, WORK_NS, age_ns, end, fit};
+use super::measure::{Measured, WORK_NS, age_ns, fit};
 use crate::ids::BodySlot;
 use crate::time::{Clock, Meter};
 use crate::wire::{GapFound, MessageHeader};
@@ -53,14 +53,7 @@ impl GapQuestion {
         GapFound {
             tick_header: self.tick_header,
             age_ns: age_ns(a, now_ns).max(age_ns(b, now_ns)),
-            verdict: found.verdict.code(),
-            touching: found.touching,
-            gap_min_m: end(found.gap.min),
-            gap_max_m: end(found.gap.max),
-            gap_best_m: found.gap_best_m,
-            point_a: found.point_a,
-            point_b: found.point_b,
-            normal: found.normal,
+            known: found.told(),
         }
     }
 }

@@ -4,7 +4,7 @@
 use crate::math::{Interval, Point, Vec3};
 use crate::narrow::gap_between;
 use crate::time::Meter;
-use crate::wire::{BodyStatus, Verdict};
+use crate::wire::{BodyStatus, GapKnown, Verdict};
 use crate::world::Body;
 
 /// Longest work on one answer, nanoseconds; then what is proved by then is the answer, an interval that is sound.
@@ -18,9 +18,9 @@ pub(super) struct Measured {
     pub(super) touching: bool,
     /// Nothing was cut off.
     pub(super) finished: bool,
-    pub(super) gap_best_m: Option<f64>,
-    pub(super) point_a: Option<[f64; 3]>,
-    pub(super) point_b: Option<[f64; 3]>,
+    best_m: Option<f64>,
+    point_a: Option<[f64; 3]>,
+    point_b: Option<[f64; 3]>,
     /// Unit, from A to B.
     pub(super) normal: Option<[f64; 3]>,
     /// Place of B's shape there, and its triangle or `NO_INDEX`.
@@ -40,8 +40,7 @@ impl Measured {
             verdict: asked.verdict,
             touching: asked.touching,
             finished: asked.finished,
-            // An estimate is never outside what is proved.
-            gap_best_m: witness.and_then(|w| end(w.best_m.max(asked.gap.min).min(asked.gap.max))),
+            best_m: witness.map(|w| w.best_m),
             point_a: witness.map(|w| place(a, &w.point_a)),
             point_b: witness.map(|w| place(b, &w.point_b)),
             normal: witness.map(|w| {
@@ -51,11 +50,23 @@ impl Measured {
             place_b: witness.map(|w| (w.shape_b, w.triangle_b)),
         }
     }
-}
 
-/// An end of an interval, where there is one.
-pub(super) fn end(end: f64) -> Option<f64> {
-    end.is_finite().then_some(end)
+    /// As it is told.
+    pub(super) fn told(&self) -> GapKnown {
+        let finite = |end: f64| end.is_finite().then_some(end);
+        let Interval { min, max } = self.gap;
+        GapKnown {
+            verdict: self.verdict.code(),
+            touching: self.touching,
+            gap_min_m: finite(min),
+            gap_max_m: finite(max),
+            // An estimate is never outside what is proved.
+            gap_best_m: self.best_m.and_then(|best| finite(best.max(min).min(max))),
+            point_a: self.point_a,
+            point_b: self.point_b,
+            normal: self.normal,
+        }
+    }
 }
 
 /// The age of a body's pose; `None`: it cannot move, or none was received.
@@ -95,5 +106,34 @@ pub(super) fn fit(body: &Body) -> Result<Option<String>, String> {
         BodyStatus::Disabled => Err(format!(
             "body \"{name}\" is disabled: enable it, then ask again"
         )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_estimate_is_not_told_outside_of_what_was_proved_since() {
+        let measured = |min, max, best| Measured {
+            gap: Interval { min, max },
+            verdict: Verdict::Near,
+            touching: false,
+            finished: false,
+            best_m: Some(best),
+            point_a: None,
+            point_b: None,
+            normal: None,
+            place_b: None,
+        };
+        for (known, told) in [
+            (measured(1.0, 2.0, 0.5), Some(1.0)),
+            (measured(1.0, 2.0, 2.5), Some(2.0)),
+            (measured(f64::NEG_INFINITY, 2.0, 0.5), Some(0.5)),
+            (measured(f64::NEG_INFINITY, 2.0, f64::NEG_INFINITY), None),
+        ] {
+            assert_eq!(known.told().gap_best_m, told);
+        }
+        assert_eq!(measured(f64::NEG_INFINITY, 1.0, 0.0).told().gap_min_m, None);
     }
 }

@@ -57,43 +57,29 @@ impl Query {
         }
     }
 
-    /// With what is odd about the shapes that came with it.
-    #[must_use]
-    pub fn warned(mut self, more: Vec<String>) -> Self {
-        let warnings = match &mut self {
+    /// What is odd, but legal.
+    pub fn warnings(&mut self) -> &mut Vec<String> {
+        match self {
             Self::Gap(question) => &mut question.warnings,
             Self::Touching(question) => &mut question.warnings,
             Self::Ray(question) => &mut question.warnings,
             Self::Impact(question) => &mut question.warnings,
-        };
-        warnings.extend(more);
-        self
+        }
     }
 
     /// Works on the answer, for a second at most.
     #[must_use]
-    pub fn answer(&self, clock: &dyn Clock) -> Answer {
+    pub fn answer(mut self, clock: &dyn Clock) -> Answer {
         let mut answer = Answer {
             ok: true,
+            warnings: std::mem::take(self.warnings()),
             ..Answer::default()
         };
         let header = match self {
-            Self::Gap(question) => {
-                answer.warnings.clone_from(&question.warnings);
-                answer.gap.insert(question.answer(clock)).tick_header
-            }
-            Self::Touching(question) => {
-                answer.warnings.clone_from(&question.warnings);
-                answer.touching.insert(question.answer(clock)).tick_header
-            }
-            Self::Ray(question) => {
-                answer.warnings.clone_from(&question.warnings);
-                answer.ray.insert(question.answer(clock)).tick_header
-            }
-            Self::Impact(question) => {
-                answer.warnings.clone_from(&question.warnings);
-                answer.impact.insert(question.answer(clock)).tick_header
-            }
+            Self::Gap(question) => answer.gap.insert(question.answer(clock)).tick_header,
+            Self::Touching(question) => answer.touching.insert(question.answer(clock)).tick_header,
+            Self::Ray(question) => answer.ray.insert(question.answer(clock)).tick_header,
+            Self::Impact(question) => answer.impact.insert(question.answer(clock)).tick_header,
         };
         answer.scene_rev = header.scene_rev;
         answer

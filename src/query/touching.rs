@@ -11,7 +11,7 @@
 use std::cmp::Reverse;
 
 use super::gap::find;
-use super::measure::{Measured, WORK_NS, age_ns, end, fit};
+use super::measure::{Measured, WORK_NS, age_ns, fit};
 use super::unknown::Unknown;
 use crate::ids::BodySlot;
 use crate::limits::TOUCHING_ROWS_MAX;
@@ -220,8 +220,8 @@ impl TouchingQuestion {
             .map(|(near, known)| self.row(near, &known, now_ns))
             .collect();
         rows.sort_by(|one, other| {
-            let least = |row: &TouchingRow| row.gap_min_m.unwrap_or(f64::NEG_INFINITY);
-            let rank = |row: &TouchingRow| Reverse(row.verdict);
+            let least = |row: &TouchingRow| row.known.gap_min_m.unwrap_or(f64::NEG_INFINITY);
+            let rank = |row: &TouchingRow| Reverse(row.known.verdict);
             (rank(one).cmp(&rank(other)))
                 .then_with(|| least(one).total_cmp(&least(other)))
                 .then_with(|| (&one.a, &one.b).cmp(&(&other.a, &other.b)))
@@ -238,14 +238,7 @@ impl TouchingQuestion {
         TouchingRow {
             a: self.is_body.then(|| asked.name.clone()),
             b: near.body.name.clone(),
-            verdict: known.verdict.code(),
-            touching: known.touching,
-            gap_min_m: end(known.gap.min),
-            gap_max_m: end(known.gap.max),
-            gap_best_m: known.gap_best_m,
-            point_a: known.point_a,
-            point_b: known.point_b,
-            normal: known.normal,
+            known: known.told(),
             age_ns: age_ns(&near.body, now_ns).max(own_age_ns),
         }
     }

@@ -5,15 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use super::MessageHeader;
 
-/// The gap of two bodies that a request asked for. Metres, scene frame; A and B as the request names them.
+/// What is known of the gap of A and B. Metres, scene frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct GapFound {
-    /// Header of the tick whose poses were used.
-    pub tick_header: MessageHeader,
-    /// Age of the older of the two poses when the work on the answer began, nanoseconds of `CLOCK_BOOTTIME`; `None`:
-    /// neither body is one that moves.
-    #[serde(default)]
-    pub age_ns: Option<u64>,
+pub struct GapKnown {
     /// `Verdict`.
     pub verdict: u8,
     /// Whether the query was finished, with 0 inside its rounding interval.
@@ -30,6 +24,20 @@ pub struct GapFound {
     pub point_b: Option<[f64; 3]>,
     /// Unit, from A to B; `None`: none.
     pub normal: Option<[f64; 3]>,
+}
+
+/// The gap of two bodies that a request asked for. Metres, scene frame; A and B as the request names them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GapFound {
+    /// Header of the tick whose poses were used.
+    pub tick_header: MessageHeader,
+    /// Age of the older of the two poses when the work on the answer began, nanoseconds of `CLOCK_BOOTTIME`; `None`:
+    /// neither body is one that moves.
+    #[serde(default)]
+    pub age_ns: Option<u64>,
+    /// What is known of it.
+    #[serde(flatten)]
+    pub known: GapKnown,
 }
 
 /// Which bodies a body, or a shape that is none, touches or would touch at a pose.
@@ -66,22 +74,9 @@ pub struct TouchingRow {
     pub a: Option<String>,
     /// Name of the other.
     pub b: String,
-    /// `Verdict`; `near` is what is apart and no farther than asked for.
-    pub verdict: u8,
-    /// Whether the query was finished, with 0 inside its rounding interval.
-    pub touching: bool,
-    /// Proved lower end of the gap, signed; `None`: nothing is known.
-    pub gap_min_m: Option<f64>,
-    /// Proved upper end of the gap, signed; `None`: nothing is known.
-    pub gap_max_m: Option<f64>,
-    /// Best estimate of the gap, signed; `None`: none.
-    pub gap_best_m: Option<f64>,
-    /// Closest or deepest point on A; `None`: none.
-    pub point_a: Option<[f64; 3]>,
-    /// Closest or deepest point on B; `None`: none.
-    pub point_b: Option<[f64; 3]>,
-    /// Unit, from A to B; `None`: none.
-    pub normal: Option<[f64; 3]>,
+    /// What is known of their gap; `near` is what is apart and no farther than asked for.
+    #[serde(flatten)]
+    pub known: GapKnown,
     /// Age of the oldest received pose that it rests on when the work began, nanoseconds of `CLOCK_BOOTTIME`; `None`:
     /// it rests on none.
     pub age_ns: Option<u64>,

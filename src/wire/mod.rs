@@ -15,7 +15,9 @@ mod rows;
 mod tick;
 mod vertices;
 
-pub use answers::{GapFound, ImpactFound, RayFound, TouchingFound, TouchingRow, UnknownBody};
+pub use answers::{
+    GapFound, GapKnown, ImpactFound, RayFound, TouchingFound, TouchingRow, UnknownBody,
+};
 pub use changes::ChangesHeader;
 pub use codes::{
     BodyStatus, BroadCause, BroadMode, ContactKind, EndCause, Event, Level, Reason, RejectReason,

@@ -29,16 +29,19 @@ fn a_gap_is_answered_with_the_tick_it_belongs_to_and_changes_nothing() {
         let age_ns = found.age_ns.unwrap();
         assert!((1..60 * SECOND_NS).contains(&age_ns), "{age_ns}");
         let gap = x - 1.0;
-        assert!((found.gap_best_m.unwrap() - gap).abs() < 1e-12, "{found:?}");
-        assert!(found.gap_min_m.unwrap() <= gap && found.gap_max_m.unwrap() >= gap);
+        assert!(
+            (found.known.gap_best_m.unwrap() - gap).abs() < 1e-12,
+            "{found:?}"
+        );
+        assert!(found.known.gap_min_m.unwrap() <= gap && found.known.gap_max_m.unwrap() >= gap);
         let verdict = if gap > 0.0 {
             Verdict::Apart
         } else {
             Verdict::Colliding
         };
-        assert_eq!(found.verdict, verdict.code(), "{found:?}");
-        assert_eq!(found.touching, x == 1.0, "{found:?}");
-        let normal = found.normal.unwrap();
+        assert_eq!(found.known.verdict, verdict.code(), "{found:?}");
+        assert_eq!(found.known.touching, x == 1.0, "{found:?}");
+        let normal = found.known.normal.unwrap();
         assert!((normal[0] + 1.0).abs() < 1e-9, "from B to A: {normal:?}");
     }
     for (a, b, word) in [

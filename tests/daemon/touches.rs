@@ -38,9 +38,12 @@ fn a_pose_is_tried_and_nothing_changes() {
         panic!("{there:?}");
     };
     assert_eq!((row.a.as_deref(), row.b.as_str()), (Some("a"), "b"));
-    assert_eq!(row.verdict, Verdict::Colliding.code());
-    assert!((row.gap_best_m.unwrap() + 0.5).abs() < 1e-12, "{row:?}");
-    assert!((row.normal.unwrap()[0] - 1.0).abs() < 1e-9, "{row:?}");
+    assert_eq!(row.known.verdict, Verdict::Colliding.code());
+    assert!(
+        (row.known.gap_best_m.unwrap() + 0.5).abs() < 1e-12,
+        "{row:?}"
+    );
+    assert!((row.known.normal.unwrap()[0] - 1.0).abs() < 1e-9, "{row:?}");
     assert!((1..60 * SECOND_NS).contains(&row.age_ns.unwrap()));
     assert_eq!(found(&mut client, r#"{"body": "a"}"#).rows, []);
     step(&mut client, &[at(1, 0.0), at(2, 3.0)]);

@@ -89,18 +89,22 @@ fn an_answer_is_that_of_the_pair_at_the_tick_s_poses() {
         let row = rig.out.pairs.iter().find(|row| row.body_a == 1).copied();
         let verdict = row.map_or(Verdict::Apart.code(), |row| row.verdict);
         assert_eq!(
-            (found.verdict, found.tick_header),
+            (found.known.verdict, found.tick_header),
             (verdict, header),
             "z {z}"
         );
         let Some(row) = row.filter(|row| row.gap_min_m > 0.0) else {
             continue;
         };
-        let (low, high) = (found.gap_min_m.unwrap(), found.gap_max_m.unwrap());
+        let (low, high) = (
+            found.known.gap_min_m.unwrap(),
+            found.known.gap_max_m.unwrap(),
+        );
         assert!((low - row.gap_min_m).abs() < 1e-9 && (high - row.gap_max_m).abs() < 1e-9);
         // The other way round: from the dumbbell down to the pyramid.
         assert!(
-            found.normal.unwrap()[2] < 0.0 && found.point_a.unwrap()[2] > found.point_b.unwrap()[2]
+            found.known.normal.unwrap()[2] < 0.0
+                && found.known.point_a.unwrap()[2] > found.known.point_b.unwrap()[2]
         );
     }
 }

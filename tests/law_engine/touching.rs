@@ -144,7 +144,7 @@ fn rows_are_those_of_brute_force_and_of_the_body_that_was_moved_there() {
             for row in &found.rows {
                 let (low, high) = truth[&row.b];
                 assert!(
-                    row.gap_min_m.unwrap() <= high && row.gap_max_m.unwrap() >= low,
+                    row.known.gap_min_m.unwrap() <= high && row.known.gap_max_m.unwrap() >= low,
                     "{what}"
                 );
             }
@@ -169,7 +169,10 @@ fn rows_are_those_of_brute_force_and_of_the_body_that_was_moved_there() {
                     }
                 })
                 .collect();
-            let told = found.rows.iter().filter(|row| row.verdict == colliding);
+            let told = found
+                .rows
+                .iter()
+                .filter(|row| row.known.verdict == colliding);
             let told: BTreeSet<String> = told.map(|row| row.b.clone()).collect();
             if filters {
                 assert_eq!(told, touched, "{what}");
@@ -259,11 +262,11 @@ fn cut_off_after_any_unit_nothing_that_is_near_is_missing() {
                 assert!(row.is_some() || *high > 0.3, "{name}: {what}");
                 let Some(row) = row else { continue };
                 assert!(
-                    row.gap_min_m.is_none_or(|min| min <= *high),
+                    row.known.gap_min_m.is_none_or(|min| min <= *high),
                     "{name}: {what}"
                 );
                 assert!(
-                    row.gap_max_m.is_none_or(|max| max >= *low),
+                    row.known.gap_max_m.is_none_or(|max| max >= *low),
                     "{name}: {what}"
                 );
                 let wrong = if *low > 0.0 {
@@ -272,10 +275,10 @@ fn cut_off_after_any_unit_nothing_that_is_near_is_missing() {
                     Verdict::Near
                 };
                 assert!(
-                    row.verdict != wrong.code() || *high > 0.0 && *low <= 0.0,
+                    row.known.verdict != wrong.code() || *high > 0.0 && *low <= 0.0,
                     "{what}"
                 );
-                cut += usize::from(row.verdict == Verdict::Possible.code());
+                cut += usize::from(row.known.verdict == Verdict::Possible.code());
             }
         }
     }

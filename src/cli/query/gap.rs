@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde_json::{Value, json};
 
-use super::live::{ask, clean, end, joined, lines, tick_keys, triple, word};
+use super::live::{ask, clean, end, lines, tell, told_json, triple, word};
 use crate::cli::args_query::QueryArgs;
 use crate::cli::figures::time;
 use crate::cli::out::Out;
@@ -22,36 +22,35 @@ pub(super) fn gap(
 ) -> Result<bool> {
     let question = json!({ "gap": { "a": a, "b": b } });
     let (found, warnings) = ask(&question, &[a, b], args, stop, |answer| answer.gap)?;
-    if args.json {
-        out.line(&as_json(a, b, &found, &warnings).to_string())?;
-    } else {
-        out.text(&as_text(a, b, &found, &warnings))?;
-    }
-    out.flush()?;
-    Ok(true)
+    tell(
+        (args, out),
+        || as_json(a, b, &found, &warnings),
+        || as_text(a, b, &found, &warnings),
+    )
 }
 
 fn as_json(a: &str, b: &str, found: &GapFound, warnings: &[String]) -> Value {
+    let known = &found.known;
     let answer = json!({
         "a": a,
         "b": b,
-        "verdict": word(found.verdict),
-        "colliding": found.verdict == Verdict::Colliding.code(),
-        "touching": found.touching,
-        "gap_m": found.gap_best_m,
-        "gap_min_m": found.gap_min_m,
-        "gap_max_m": found.gap_max_m,
-        "normal": found.normal,
-        "point_a": found.point_a,
-        "point_b": found.point_b,
+        "verdict": word(known.verdict),
+        "colliding": known.verdict == Verdict::Colliding.code(),
+        "touching": known.touching,
+        "gap_m": known.gap_best_m,
+        "gap_min_m": known.gap_min_m,
+        "gap_max_m": known.gap_max_m,
+        "normal": known.normal,
+        "point_a": known.point_a,
+        "point_b": known.point_b,
         "age_ns": found.age_ns,
-        "warnings": warnings,
     });
-    joined(answer, tick_keys(&found.tick_header))
+    told_json(answer, &found.tick_header, warnings)
 }
 
 fn as_text(a: &str, b: &str, found: &GapFound, warnings: &[String]) -> String {
-    let touching = if found.touching { " (touching)" } else { "" };
+    let known = &found.known;
+    let touching = if known.touching { " (touching)" } else { "" };
     let header = &found.tick_header;
     let age = match found.age_ns {
         Some(age_ns) => format!("poses {} old", time(age_ns)),
@@ -59,18 +58,18 @@ fn as_text(a: &str, b: &str, found: &GapFound, warnings: &[String]) -> String {
     };
     let proved = format!(
         "{} .. {}",
-        end(found.gap_min_m, "no lower end"),
-        end(found.gap_max_m, "no upper end")
+        end(known.gap_min_m, "no lower end"),
+        end(known.gap_max_m, "no upper end")
     );
     let told = [
         ("A", clean(a)),
         ("B", clean(b)),
-        ("verdict", format!("{}{touching}", word(found.verdict))),
-        ("gap [m]", end(found.gap_best_m, "not known")),
+        ("verdict", format!("{}{touching}", word(known.verdict))),
+        ("gap [m]", end(known.gap_best_m, "not known")),
         ("proved [m]", proved),
-        ("point on A", triple(found.point_a)),
-        ("point on B", triple(found.point_b)),
-        ("normal", triple(found.normal)),
+        ("point on A", triple(known.point_a)),
+        ("point on B", triple(known.point_b)),
+        ("normal", triple(known.normal)),
         (
             "tick",
             format!(

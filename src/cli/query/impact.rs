@@ -4,11 +4,11 @@ use std::sync::atomic::AtomicBool;
 
 use serde_json::json;
 
-use super::live::{ask, clean, joined, lines, told_json, triple, word};
-use crate::cli::args_query::{Numbers, QueryArgs};
+use super::live::{ask, clean, lines, tell, told_json, triple, word, worded};
+use crate::cli::args_query::QueryArgs;
 use crate::cli::figures::{metres, seconds, time};
 use crate::cli::out::Out;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::wire::ImpactFound;
 
 /// Asks, waits and tells.
@@ -28,34 +28,19 @@ pub(super) fn impact(
         ("linear_b", &flags.linear_b),
         ("angular_b", &flags.angular_b),
     ] {
-        let Some(Numbers(value)) = value else {
-            continue;
-        };
-        if value.len() != 3 {
-            let (flag, count) = (key.replace('_', "-"), value.len());
-            return Err(Error::Usage(format!(
-                "--{flag} has {count} numbers: write 3"
-            )));
+        if let Some(value) = value {
+            asked[key] = json!(value.0);
         }
-        asked[key] = json!(value);
     }
     let taken = |answer: &mut crate::wire::Answer| answer.impact.take();
     let (found, warnings) = ask(&json!({ "impact": asked }), &[a, b], args, stop, taken)?;
-    if args.json {
-        let names = json!({ "a": a, "b": b });
-        let header = &found.tick_header;
-        let told = told_json(
-            joined(names, json!(found)),
-            found.verdict,
-            header,
-            &warnings,
-        );
-        out.line(&told.to_string())?;
-    } else {
-        out.text(&as_text((a, b), within_s, &found, &warnings))?;
-    }
-    out.flush()?;
-    Ok(true)
+    let as_json = || {
+        let mut answer = worded(&found, found.verdict);
+        (answer["a"], answer["b"]) = (json!(a), json!(b));
+        told_json(answer, &found.tick_header, &warnings)
+    };
+    let as_text = || as_text((a, b), within_s, &found, &warnings);
+    tell((args, out), as_json, as_text)
 }
 
 fn as_text(

@@ -3,11 +3,13 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::cli::args_query::QueryArgs;
 use crate::cli::connect;
 use crate::cli::figures::{metres, time};
+use crate::cli::out::Out;
 use crate::error::{Error, Result};
 use crate::scene::nearest;
 use crate::time::{Clock, SystemClock};
@@ -57,6 +59,21 @@ pub(super) fn ask<T>(
         Some(found) => Ok((found, answer.warnings)),
         None => Err(refusal(&mut client, named, answer.error, stop)),
     }
+}
+
+/// Tells an answer, as one JSON object or as text.
+pub(super) fn tell(
+    (args, out): (&QueryArgs, &mut Out),
+    as_json: impl FnOnce() -> Value,
+    as_text: impl FnOnce() -> String,
+) -> Result<bool> {
+    if args.json {
+        out.line(&as_json().to_string())?;
+    } else {
+        out.text(&as_text())?;
+    }
+    out.flush()?;
+    Ok(true)
 }
 
 fn stopped() -> Error {
@@ -113,36 +130,23 @@ fn names(client: &mut Client, stop: &AtomicBool) -> Option<Vec<String>> {
     }
 }
 
-/// The tick that an answer is of, as keys of JSON.
-pub(super) fn tick_keys(header: &MessageHeader) -> Value {
-    json!({
-        "boot_id": format!("{:016x}", header.boot_id),
-        "tick": header.tick,
-        "scene_rev": header.scene_rev,
-    })
-}
-
-/// Puts the keys of one object behind those of another.
-pub(super) fn joined(mut one: Value, other: Value) -> Value {
-    if let (Value::Object(one), Value::Object(other)) = (&mut one, other) {
-        one.extend(other);
-    }
-    one
-}
-
-/// An answer as JSON for people: its verdict as a word, the tick's keys in place of its header.
-pub(super) fn told_json(
-    mut answer: Value,
-    verdict: u8,
-    header: &MessageHeader,
-    warnings: &[String],
-) -> Value {
+/// An answer as JSON for people: the tick's keys in place of its header.
+pub(super) fn told_json(mut answer: Value, header: &MessageHeader, warnings: &[String]) -> Value {
     if let Value::Object(keys) = &mut answer {
         keys.remove("tick_header");
     }
-    answer["verdict"] = json!(word(verdict));
+    answer["boot_id"] = json!(format!("{:016x}", header.boot_id));
+    answer["tick"] = json!(header.tick);
+    answer["scene_rev"] = json!(header.scene_rev);
     answer["warnings"] = json!(warnings);
-    joined(answer, tick_keys(header))
+    answer
+}
+
+/// What holds a verdict, with its word in place of the code.
+pub(super) fn worded(what: &impl Serialize, verdict: u8) -> Value {
+    let mut told = json!(what);
+    told["verdict"] = json!(word(verdict));
+    told
 }
 
 /// Adds lines of bodies whose place is not known, and of how many were left out for what.

@@ -2,48 +2,40 @@
 
 use std::sync::atomic::AtomicBool;
 
-use serde_json::{Value, json};
+use serde_json::json;
 
-use super::live::{ask, clean, end, lines, strangers, told_json, triple, word};
-use crate::cli::args_query::QueryArgs;
+use super::live::{ask, clean, end, lines, strangers, tell, told_json, triple, word, worded};
+use crate::cli::args_query::{Numbers, QueryArgs};
 use crate::cli::figures::{metres, time};
 use crate::cli::out::Out;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::wire::RayFound;
 
 /// Asks, waits and tells.
-pub(super) fn ray(args: &QueryArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
-    let asked = json!({ "ray": question(args)? });
-    let taken = |answer: &mut crate::wire::Answer| answer.ray.take();
-    let (found, warnings) = ask(&asked, &[], args, stop, taken)?;
-    if args.json {
-        let header = &found.tick_header;
-        let told = told_json(json!(found), found.verdict, header, &warnings);
-        out.line(&told.to_string())?;
-    } else {
-        out.text(&as_text(&found, &warnings))?;
-    }
-    out.flush()?;
-    Ok(true)
-}
-
-fn question(args: &QueryArgs) -> Result<Value> {
-    let flags = &args.ray;
-    let numbers = flags.ray.as_ref().map_or(&[][..], |ray| &ray.0);
-    let Some((from, direction)) = numbers.split_at_checked(3).filter(|(_, d)| d.len() == 3) else {
-        return Err(Error::Usage(format!(
-            "--ray has {} numbers: write 6, where it begins and where it goes",
-            numbers.len()
-        )));
-    };
-    let mut asked = json!({ "from": from, "direction": direction });
-    if let Some(max_m) = flags.max {
+///
+/// * `ray` - where it begins, metres, and where it goes.
+pub(super) fn ray(
+    ray: Numbers<6>,
+    args: &QueryArgs,
+    out: &mut Out,
+    stop: &AtomicBool,
+) -> Result<bool> {
+    let Numbers([x, y, z, dx, dy, dz]) = ray;
+    let mut asked = json!({ "from": [x, y, z], "direction": [dx, dy, dz] });
+    if let Some(max_m) = args.ray.max {
         asked["max_m"] = json!(max_m);
     }
-    if let Some(mask) = flags.mask {
+    if let Some(mask) = args.ray.mask {
         asked["mask"] = json!(mask);
     }
-    Ok(asked)
+    let taken = |answer: &mut crate::wire::Answer| answer.ray.take();
+    let (found, warnings) = ask(&json!({ "ray": asked }), &[], args, stop, taken)?;
+    let worded = worded(&found, found.verdict);
+    tell(
+        (args, out),
+        || told_json(worded, &found.tick_header, &warnings),
+        || as_text(&found, &warnings),
+    )
 }
 
 fn as_text(found: &RayFound, warnings: &[String]) -> String {

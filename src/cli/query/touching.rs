@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde_json::{Value, json};
 
-use super::live::{ask, clean, end, joined, lines, strangers, tick_keys, word};
+use super::live::{ask, clean, end, lines, strangers, tell, told_json, word, worded};
 use crate::cli::args_query::QueryArgs;
 use crate::cli::out::Out;
 use crate::error::{Error, Result};
@@ -17,13 +17,11 @@ pub(super) fn touching(args: &QueryArgs, out: &mut Out, stop: &AtomicBool) -> Re
     let named: Vec<&str> = args.touching.touching.as_deref().into_iter().collect();
     let taken = |answer: &mut crate::wire::Answer| answer.touching.take();
     let (found, warnings) = ask(&json!({ "touching": asked }), &named, args, stop, taken)?;
-    if args.json {
-        out.line(&as_json(&found, &warnings).to_string())?;
-    } else {
-        out.text(&as_text(&found, &warnings))?;
-    }
-    out.flush()?;
-    Ok(true)
+    tell(
+        (args, out),
+        || as_json(&found, &warnings),
+        || as_text(&found, &warnings),
+    )
 }
 
 fn question(args: &QueryArgs) -> Result<Value> {
@@ -39,36 +37,20 @@ fn question(args: &QueryArgs) -> Result<Value> {
             ))
         })?;
     }
-    match flags.at.as_ref().map(|at| at.0.as_slice()) {
-        None => {}
-        Some([position @ .., qx, qy, qz, qw]) if position.len() == 3 => {
-            asked["position"] = json!(position);
-            asked["orientation"] = json!([qx, qy, qz, qw]);
-        }
-        Some(position) if position.len() == 3 => asked["position"] = json!(position),
-        Some(other) => {
-            return Err(Error::Usage(format!(
-                "--at has {} numbers: write 3, x,y,z in metres, or 7, with a quaternion in the order x,y,z,w",
-                other.len()
-            )));
+    if let Some(at) = flags.at {
+        asked["position"] = json!(at.position);
+        if let Some(orientation) = at.orientation {
+            asked["orientation"] = json!(orientation);
         }
     }
     Ok(asked)
 }
 
 fn as_json(found: &TouchingFound, warnings: &[String]) -> Value {
-    let row = |row: &TouchingRow| {
-        let mut told = json!(row);
-        told["verdict"] = json!(word(row.verdict));
-        told
-    };
     let mut answer = json!(found);
-    answer["rows"] = found.rows.iter().map(row).collect();
-    answer["warnings"] = json!(warnings);
-    if let Value::Object(keys) = &mut answer {
-        keys.remove("tick_header");
-    }
-    joined(answer, tick_keys(&found.tick_header))
+    let rows = found.rows.iter();
+    answer["rows"] = rows.map(|row| worded(row, row.known.verdict)).collect();
+    told_json(answer, &found.tick_header, warnings)
 }
 
 fn as_text(found: &TouchingFound, warnings: &[String]) -> String {
@@ -83,7 +65,7 @@ fn as_text(found: &TouchingFound, warnings: &[String]) -> String {
         found
             .rows
             .iter()
-            .map(|row| (word(row.verdict), sentence(row))),
+            .map(|row| (word(row.known.verdict), sentence(row))),
     );
     if found.rows.is_empty() {
         told.push(("nothing", "is near by what is known".to_owned()));
@@ -118,28 +100,35 @@ fn as_text(found: &TouchingFound, warnings: &[String]) -> String {
 /// A row: who, and the proved gap in metres.
 fn sentence(row: &TouchingRow) -> String {
     let of = row.a.as_deref().map(|a| format!("{} and ", clean(a)));
-    let touching = if row.touching { " (touching)" } else { "" };
+    let touching = if row.known.touching {
+        " (touching)"
+    } else {
+        ""
+    };
     format!(
         "{}{}{touching}: gap {} m, proved {} .. {}",
         of.unwrap_or_default(),
         clean(&row.b),
-        end(row.gap_best_m, "not known"),
-        end(row.gap_min_m, "no lower end"),
-        end(row.gap_max_m, "no upper end"),
+        end(row.known.gap_best_m, "not known"),
+        end(row.known.gap_min_m, "no lower end"),
+        end(row.known.gap_max_m, "no upper end"),
     )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::{UnknownBody, Verdict};
+    use crate::wire::{GapKnown, UnknownBody, Verdict};
 
     #[test]
     fn what_is_not_known_is_told_and_no_cursor_is_moved() {
         let found = TouchingFound {
             rows: vec![TouchingRow {
                 b: "evil\x1b[2J".to_owned(),
-                verdict: Verdict::Possible.code(),
+                known: GapKnown {
+                    verdict: Verdict::Possible.code(),
+                    ..GapKnown::default()
+                },
                 ..TouchingRow::default()
             }],
             unknown: vec![UnknownBody {

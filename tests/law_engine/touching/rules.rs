@@ -145,7 +145,7 @@ fn what_there_is_no_room_for_is_counted_and_nothing_is_complete() {
     let found = ask(rig.engine.world(), sphere);
     assert_eq!((found.rows.len(), found.left_out), (TOUCHING_ROWS_MAX, 50));
     assert!(!found.complete && found.unknown.is_empty());
-    let deepest = found.rows.iter().map(|row| row.gap_min_m.unwrap());
+    let deepest = found.rows.iter().map(|row| row.known.gap_min_m.unwrap());
     assert!(deepest.is_sorted(), "worst first");
     // Of a half-space those that are above it have no boxes to tell, and need no room.
     let above = ask(

@@ -18,17 +18,18 @@ pub(super) fn told(answer: Answer) -> GapTold {
             ..GapTold::default()
         };
     };
+    let known = gap.known;
     GapTold {
         success: answer.ok,
         message: answer.warnings.join("; "),
         tick_header: tick_header(&gap.tick_header),
-        verdict: gap.verdict,
-        touching: gap.touching,
-        gap_min_m: gap.gap_min_m.unwrap_or(f64::NEG_INFINITY),
-        gap_max_m: gap.gap_max_m.unwrap_or(f64::INFINITY),
-        gap_best_m: gap.gap_best_m.unwrap_or(f64::NAN),
-        point_a: gap.point_a.unwrap_or(none).into(),
-        point_b: gap.point_b.unwrap_or(none).into(),
-        normal: gap.normal.unwrap_or(none).into(),
+        verdict: known.verdict,
+        touching: known.touching,
+        gap_min_m: known.gap_min_m.unwrap_or(f64::NEG_INFINITY),
+        gap_max_m: known.gap_max_m.unwrap_or(f64::INFINITY),
+        gap_best_m: known.gap_best_m.unwrap_or(f64::NAN),
+        point_a: known.point_a.unwrap_or(none).into(),
+        point_b: known.point_b.unwrap_or(none).into(),
+        normal: known.normal.unwrap_or(none).into(),
     }
 }
