@@ -104,7 +104,7 @@ impl RayQuestion {
     fn look_along(&mut self, world: &World, mask: u32) {
         let mut unknown = Unknown::default();
         let mut hits: Vec<(f64, f64, BodySlot)> = Vec::new();
-        for (slot, body) in world.bodies() {
+        for (slot, body) in world.bodies_ahead() {
             let is_lost = body.reach_m.is_infinite() && body.status != BodyStatus::Disabled;
             let passed = if is_lost {
                 None

@@ -122,7 +122,7 @@ impl TouchingQuestion {
             .asked
             .iter()
             .fold(Aabb::empty(), |all, body| all.merged(&body.proxy));
-        for (slot, other) in world.bodies() {
+        for (slot, other) in world.bodies_ahead() {
             let is_lost = other.reach_m.is_infinite() && other.status != BodyStatus::Disabled;
             if !is_lost && whole.distance(&other.proxy) > self.within_m || slots.contains(&slot) {
                 continue;

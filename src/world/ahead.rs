@@ -4,7 +4,7 @@
 //! walks over many bodies asks for each of them [`AHEAD`] steps before, then for its list, then for its shape. Hints,
 //! without effect on what is computed.
 
-use super::World;
+use super::{Body, World};
 use crate::ids::BodySlot;
 use crate::simd::boxes::prefetch;
 
@@ -22,6 +22,18 @@ impl World {
         if let Some(body) = self.bodies.get(slot.index()) {
             prefetch(body);
         }
+    }
+
+    /// All bodies with their slots, by id, each asked for some steps ahead: for a pass over bodies that lie far away.
+    pub fn bodies_ahead(&self) -> impl Iterator<Item = (BodySlot, &Body)> {
+        let ahead = self.order.iter().skip(AHEAD).map(|&(_, slot)| Some(slot));
+        let ahead = ahead.chain(std::iter::repeat(None));
+        self.bodies().zip(ahead).map(|(body, ahead)| {
+            if let Some(slot) = ahead {
+                self.ask_ahead(slot);
+            }
+            body
+        })
     }
 
     /// At step `at` of a loop: asks for the bodies and shapes of the steps to come.
