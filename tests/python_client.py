@@ -26,10 +26,13 @@ if part == "alone":
     raises(sweepd.TimedOut, "sweepd run", lambda: sweepd.Client("cell", timeout_s=0.2, **where))
     raises(sweepd.Refused, "instance name", lambda: sweepd.Client("Cell", **where))
     raises(sweepd.SweepdError, "quat_order", lambda: sweepd.Client("cell", **{**where, "quat_order": "?"}))
+    raises(sweepd.SweepdError, "1 to 31 bytes", lambda: sweepd.Client("cell", 32 * "s", **where))
+    raises(sweepd.TimedOut, "sweepd run", lambda: sweepd.Client("cell", 31 * "s", timeout_s=0.2, **where))
     sys.exit()
 
 client = sweepd.Client("cell", "sim", timeout_s=5, **where)
 assert client.names == {"box": 1}, client.names
+assert client.name_of(1) == "box" and client.name_of(2) is None
 
 if part == "long":
     # each tick is told of twice, alone, before it is there
@@ -43,6 +46,8 @@ if part == "long":
             if seen.state == "unknown":
                 told += 1
                 assert seen.tick.sources_len == 0
+                why = reader._why_no_result(x, None, 5)
+                assert "still under way" in why and "no such source" not in why, why
             else:
                 last = seen.tick.header.tick
     assert told == 40, told

@@ -658,6 +658,19 @@ fn a_step_without_a_daemon_times_out_and_says_why<B: Backend>() {
     assert!(late.to_string().contains("no tick came"), "{late}");
 }
 
+#[test]
+fn a_source_name_that_fits_no_frame_is_refused_at_once() {
+    for name in [String::new(), "s".repeat(32)] {
+        let client = ClientOptions {
+            place: Files::new().place.clone(),
+            source: Some(name),
+            timeout_ns: 0,
+        };
+        let refused = client.connect().unwrap_err();
+        assert!(matches!(refused, Error::Usage(_)), "{refused}");
+    }
+}
+
 macro_rules! both {
     ($($name:ident)+) => {
         mod shared_memory {

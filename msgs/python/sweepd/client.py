@@ -1,6 +1,7 @@
 """The client: poses out, the result of exactly that frame in."""
 
 import ctypes
+import difflib
 import json
 import secrets
 import time
@@ -14,6 +15,7 @@ from .ports import Ports
 
 _LOOK_AGAIN_S = 0.05
 _BOOTS_OVER_MAX = 16
+_NAMES_TOLD = 5
 _TOPICS = {
     "pairs": layout.PairRow,
     "changes": layout.PairRow,
@@ -107,8 +109,8 @@ class Client:
             raise SweepdError(f'quat_order={quat_order!r}: say "xyzw" or "wxyz"')
         self._wxyz = quat_order == "wxyz"
         self._source = source
-        if source is not None and not 1 <= len(source.encode()) <= layout.SOURCE_NAME_LEN:
-            raise SweepdError(f"source name {source!r}: 1 to {layout.SOURCE_NAME_LEN} bytes")
+        if source is not None and not 1 <= len(source.encode()) < layout.SOURCE_NAME_LEN:
+            raise SweepdError(f"source name {source!r}: 1 to {layout.SOURCE_NAME_LEN - 1} bytes")
         unknown = set(listen) - set(_TOPICS)
         if unknown:
             raise SweepdError(f"listen={sorted(unknown)}: there are {', '.join(_TOPICS)}")
@@ -129,6 +131,7 @@ class Client:
         self._held = None
         self._boots_over = []
         self._names = (None, {})
+        self._named = (None, {})
         self._wait_names(timeout_s)
 
     def __enter__(self):
@@ -159,6 +162,13 @@ class Client:
             ids = {bytes(row["name"])[: row["len"]].decode(): int(row["body"]) for row in rows}
             self._names = (key, ids)
         return self._names[1]
+
+    def name_of(self, body):
+        """The name of a body by its id, as rows have it; None where the scene has none (any more)."""
+        names = self.names
+        if self._named[0] != self._names[0]:
+            self._named = (self._names[0], {id_: name for name, id_ in names.items()})
+        return self._named[1].get(int(body))
 
     def send(
         self, poses, *, stamp_ns=0, clock_id=0, scene_rev=0, deadline_ns=0, time_left_ns=0, partial=False
@@ -286,7 +296,10 @@ class Client:
                 return answer
             left = until - time.monotonic()
             if left <= 0:
-                raise TimedOut(f"no answer within {timeout_s} s")
+                raise TimedOut(
+                    f"no answer within {timeout_s} s: is the daemon running (`sweepd list`)? A large request may take"
+                    " longer: give it more by timeout_s"
+                )
             self._ports.wait(min(left, _LOOK_AGAIN_S))
 
     def rows(self, poses):
@@ -337,7 +350,11 @@ class Client:
         try:
             return [names[name] for name in poses]
         except KeyError as e:
-            raise SweepdError(f"the scene has no body {e}; it has {', '.join(sorted(names)) or 'none'}") from None
+            name = e.args[0]
+            near = difflib.get_close_matches(str(name), names, _NAMES_TOLD) or sorted(names)[:_NAMES_TOLD]
+            told = ", ".join(near) or "none"
+            more = f" and {len(names) - len(near)} more" if len(near) < len(names) else ""
+            raise SweepdError(f"the scene has no body {name!r}; it has {told}{more}") from None
 
     def _send(self, rows, flags, fields):
         header = layout.FrameHeader(
@@ -479,7 +496,7 @@ class Client:
     @staticmethod
     def _is_under_way(tick):
         # no tick that has ended says so: undecided pairs alone are no reason for unknown
-        return tick.header.state == layout.State.UNKNOWN and tick.reasons == layout.Reason.UNDECIDED
+        return tick.header.state == layout.State.UNKNOWN and tick.reasons == 1 << layout.Reason.UNDECIDED
 
     def _why_no_result(self, seq, before, timeout_s):
         text = f"no result of frame {seq} of `{self._source}` within {timeout_s} s"

@@ -28,5 +28,8 @@ class Skipped(SweepdError):
     """A tick used a newer frame of this source; this one has no result of its own."""
 
     def __init__(self, seq):
-        super().__init__(f"frame {seq} was passed over: a newer frame of the source was used")
+        super().__init__(
+            f"frame {seq} was passed over: a tick used a newer frame of the source."
+            ' For a result of each frame, send one when that of the last is there, or write on_frame = "SOURCE" into [run] of the scene'
+        )
         self.seq = seq

@@ -220,7 +220,7 @@ class PairRow(_Row):
         ("verdict", ctypes.c_uint8),
         # Last certified Verdict: apart, near or colliding.
         ("certified_verdict", ctypes.c_uint8),
-        # Bits of Event.
+        # Bits of Event, by number.
         ("events", ctypes.c_uint8),
         # EndCause of the end in this row.
         ("end_cause", ctypes.c_uint8),
@@ -384,7 +384,7 @@ class SourceRow(_Row):
         ("age_ns", ctypes.c_uint64),
         # Frames admitted in this boot.
         ("frames", ctypes.c_uint64),
-        # Frames passed over because a newer one was there.
+        # Frames passed over because a newer one was there, or lost on their way (gaps in seq).
         ("skipped", ctypes.c_uint64),
         # Frames refused.
         ("refused", ctypes.c_uint64),
@@ -448,7 +448,7 @@ class TickRow(_Row):
         ("widest_m", ctypes.c_double),
         # Ticks for which the oldest undecided pair has been so.
         ("oldest_undecided_ticks", ctypes.c_uint64),
-        # Bits of Reason.
+        # Bits of Reason, by number.
         ("reasons", ctypes.c_uint32),
         # TickCause.
         ("cause", ctypes.c_uint8),
@@ -560,7 +560,7 @@ class State(IntEnum):
 
 
 class Reason(IntEnum):
-    """Why a tick is unknown or not clear; bit numbers of TickRow::reasons."""
+    """Why a tick is unknown or not clear; bit numbers of TickRow::reasons: test ``tick.reasons & (1 << CODE)``."""
 
     # A moving body has had no admitted pose in this boot.
     NOT_RECEIVED = 0
@@ -638,7 +638,10 @@ class BroadCause(IntEnum):
 
 
 class Event(IntEnum):
-    """Bits of PairRow::events; a row may carry an end and a begin, in that order but where PASSED says otherwise."""
+    """Bit numbers of PairRow::events: test ``row["events"] & (1 << Event.BEGIN)``.
+
+    A row may carry an end and a begin, in that order but where PASSED says otherwise.
+    """
 
     # First tick in which the pair is certified colliding.
     BEGIN = 0
@@ -797,7 +800,7 @@ class PairFlags(IntFlag):
     TOUCHING = 1
     # gap_best_m, gap_max_m or the contacts are estimates, not proved.
     ESTIMATE = 2
-    # A body of the pair is unknown, stale or truncated.
+    # A body of the pair is unknown or stale.
     UNKNOWN_BODY = 4
     # A body of the pair is held at an old pose.
     HELD_BODY = 8

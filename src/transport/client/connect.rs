@@ -6,7 +6,7 @@ use super::{Client, LOOK_AGAIN_NS, system_clock};
 use crate::error::{Error, Result};
 use crate::transport::ICEORYX2_VERSION;
 use crate::transport::iceoryx::{IoxLink, Place};
-use crate::wire::{Hello, WIRE_VERSION, name_str};
+use crate::wire::{Hello, SOURCE_NAME_LEN, WIRE_VERSION, name_str};
 
 /// How a client connects over shared memory.
 #[derive(Clone, Debug)]
@@ -23,9 +23,10 @@ impl ClientOptions {
     /// Opens the daemon's services, again and again until it is there, and waits for its hello.
     ///
     /// # Errors
-    /// `Error::TimedOut` without a daemon in time; `Error::Refused` when its files are another user's, its version
-    /// does not fit, or no port is free.
+    /// `Error::Usage` when the source's name is empty or longer than 31 bytes; `Error::TimedOut` without a daemon in
+    /// time; `Error::Refused` when its files are another user's, its version does not fit, or no port is free.
     pub fn connect(&self) -> Result<Client> {
+        check_source(self.source.as_deref())?;
         let clock = system_clock();
         let until_ns = clock.monotonic_ns().saturating_add(self.timeout_ns);
         let link = IoxLink::open(&self.place, clock.as_ref(), until_ns)?;
@@ -33,6 +34,17 @@ impl ClientOptions {
         let mut client = Client::over(Box::new(link), clock, self.source.as_deref(), left_ns)?;
         client.set_spin_ns(crate::transport::spin_default_ns());
         Ok(client)
+    }
+}
+
+/// A source's name goes into a field of each frame, with a zero behind it.
+pub(super) fn check_source(name: Option<&str>) -> Result<()> {
+    match name {
+        Some(name) if !(1..SOURCE_NAME_LEN).contains(&name.len()) => Err(Error::Usage(format!(
+            "source name \"{name}\": 1 to {} bytes",
+            SOURCE_NAME_LEN - 1
+        ))),
+        _ => Ok(()),
     }
 }
 

@@ -112,13 +112,15 @@ impl Client {
     /// Connects through a link; see [`ClientOptions::connect`] for shared memory.
     ///
     /// # Errors
-    /// `Error::TimedOut` when no daemon says hello in time, `Error::Refused` when it speaks another wire version.
+    /// `Error::Usage` when the source's name is empty or longer than 31 bytes, `Error::TimedOut` when no daemon says
+    /// hello in time, `Error::Refused` when it speaks another wire version.
     pub fn over(
         link: Box<dyn Link>,
         clock: Arc<dyn Clock>,
         source: Option<&str>,
         timeout_ns: u64,
     ) -> Result<Self> {
+        connect::check_source(source)?;
         let mut client = Self {
             link,
             clock,
@@ -277,7 +279,7 @@ impl Client {
 
     /// Asks the daemon and waits for its answer.
     ///
-    /// * `json` - the scene's own serde types (edits), or a query.
+    /// * `json` - edits or a question, as `msgs/README.md` has them.
     /// * `blobs` - vertex and index bytes the JSON names by offset from the first of them, little-endian.
     /// * returns - the answer; `ok = false` when the daemon refused.
     ///
@@ -296,7 +298,10 @@ impl Client {
     pub fn request_text(&mut self, json: &str, blobs: &[&[u8]], timeout_ns: u64) -> Result<String> {
         let request = self.ask(json, blobs)?;
         self.answer_text(request, timeout_ns)?.ok_or_else(|| {
-            Error::TimedOut(format!("no answer within {} ms", timeout_ns / 1_000_000))
+            Error::TimedOut(format!(
+                "no answer within {} ms: is the daemon running (`sweepd list`)? A large request may take longer",
+                timeout_ns / 1_000_000
+            ))
         })
     }
 

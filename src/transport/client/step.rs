@@ -15,7 +15,11 @@ pub enum StepError {
     #[error("the daemon restarted (boot {:x} is over, {:x} began)", .0.old_boot, .0.new_boot)]
     Restarted(Restarted),
     /// A tick used a newer frame of this source; this one has no result of its own.
-    #[error("frame {seq} was passed over: a newer frame of the source was used", seq = .0.seq)]
+    #[error(
+        "frame {seq} was passed over: a tick used a newer frame of the source. For a result of each frame, send one when \
+         that of the last is there, or write on_frame = \"SOURCE\" into [run] of the scene",
+        seq = .0.seq
+    )]
     Skipped(FrameId),
     /// The transport failed, or the client is no source.
     #[error(transparent)]
