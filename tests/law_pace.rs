@@ -322,6 +322,34 @@ fn law_4_4_a_paused_frame_counts_as_a_frame_in_every_mode() {
 }
 
 #[test]
+fn law_4_4_frames_that_were_lost_on_their_way_are_counted() {
+    for mode in modes() {
+        let mut daemon = Daemon::of(mode.clone());
+        let again = |seq, epoch, session| {
+            let mut frame = sim(seq);
+            (frame.header.epoch, frame.header.session) = (epoch, session);
+            frame
+        };
+        let session = sim(1).header.session;
+        let frames = vec![
+            // A client that was there before: what it sent earlier is no loss of ours.
+            (600.0, sim(7)),
+            (1200.0, sim(8)),
+            (1800.0, sim(11)),
+            (2400.0, sim(12)),
+            // An old number, an epoch and a session with numbers of their own: nothing is missing.
+            (3000.0, sim(2)),
+            (3600.0, sim(13)),
+            (4200.0, again(1, 1, session)),
+            (9000.0, again(90, 0, session + 1)),
+        ];
+        daemon.run(9600.0, frames);
+        assert_eq!(daemon.passed_of(0), 2, "{mode:?}");
+        assert_eq!(daemon.passed_of(1), 0);
+    }
+}
+
+#[test]
 fn law_4_4_a_round_takes_the_newest_frame_of_each_live_source() {
     let mut daemon = Daemon::of(Mode::OnAll);
     let frames = vec![

@@ -15,7 +15,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use crate::config::Config;
+use crate::config::{Config, Mode};
 use crate::error::Result;
 use crate::record::{Ask, Between, Recorder};
 use crate::scene::Scene;
@@ -231,6 +231,15 @@ impl<'a> Daemon<'a> {
         }
     }
 
+    /// Whether these edits are what a frame of the leading source waits for: their tick is that frame's, too.
+    fn takes_the_leads_frame(&self) -> bool {
+        let Mode::OnFrame(lead) = &self.config.mode else {
+            return false;
+        };
+        let sources = self.engine.world().sources();
+        !self.ready.is_empty() && sources.iter().any(|s| s.name == *lead && s.waits())
+    }
+
     /// Runs one tick and sends what it filled.
     fn tick(&mut self, due: Due, woke_ns: u64) -> Result<()> {
         self.tell_passed();
@@ -238,7 +247,7 @@ impl<'a> Daemon<'a> {
         if let Some(recorder) = &mut self.recorder {
             demand = recorder.listen(demand, self.clock.boottime_ns());
         }
-        let budget = if due.ages_only {
+        let budget = if due.ages_only && !self.takes_the_leads_frame() {
             Budget {
                 units: Some(0),
                 ..self.config.budget

@@ -10,8 +10,10 @@
 //! rate every tick takes the newest state. Of a source that moves continuous bodies all frames are taken, in each mode.
 
 mod held;
+mod source;
 
 use held::{Held, Queue, Vertices};
+use source::Source;
 
 use crate::config::{Config, Mode};
 use crate::error::{Error, Result};
@@ -28,23 +30,6 @@ pub struct Due {
     pub source: Option<SourceSlot>,
     /// It judges ages (and applies edits) only and spends no work units.
     pub ages_only: bool,
-}
-
-/// What the pacer knows of a source.
-#[derive(Clone, Debug)]
-struct Source {
-    name: [u8; crate::wire::SOURCE_NAME_LEN],
-    timeout_ns: u64,
-    /// Receipt of its newest frame; `None`: none yet, or its session ended.
-    heard_ns: Option<u64>,
-    session: u64,
-    /// In this round it has sent.
-    sent: bool,
-    /// It was late for a round and is not waited for until its next frame.
-    late: bool,
-    /// Each of its frames counts: none is passed over for a newer one.
-    followed: bool,
-    passed: u64,
 }
 
 /// What makes a tick.
@@ -83,20 +68,10 @@ impl Pacer {
     pub fn new(config: &Config, sources: &[SourceSpec]) -> Result<Self> {
         let names: Vec<&str> = sources.iter().map(|s| &*s.name).collect();
         let beat = beat_of(config, &names)?;
-        let source = |spec: &SourceSpec| Source {
-            name: name_bytes(&spec.name),
-            timeout_ns: spec.timeout_ns,
-            heard_ns: None,
-            session: 0,
-            sent: false,
-            late: false,
-            followed: false,
-            passed: 0,
-        };
         Ok(Self {
             beat,
             heartbeat_ns: config.heartbeat_ns.max(1),
-            sources: sources.iter().map(source).collect(),
+            sources: sources.iter().map(Source::new).collect(),
             queue: Queue::default(),
             vertices: Vertices::default(),
             ended: Vec::new(),
@@ -141,6 +116,8 @@ impl Pacer {
             };
             if let Some(source) = place.and_then(|p| self.sources.get_mut(p)) {
                 source.heard_ns = Some(source.heard_ns.unwrap_or(0).max(received_ns));
+                let lost = source.lost_before(&frame.header);
+                source.passed = source.passed.saturating_add(lost);
                 source.session = frame.header.session;
                 source.sent = true;
                 source.late = false;

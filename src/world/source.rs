@@ -131,6 +131,14 @@ impl super::World {
     }
 }
 
+impl SourceState {
+    /// Whether a frame of it waits for a later revision of the scene.
+    #[must_use]
+    pub fn waits(&self) -> bool {
+        self.waiting.until_ns.is_some()
+    }
+}
+
 /// What a frame's session and number mean for its source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Standing {

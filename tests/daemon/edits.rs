@@ -3,8 +3,10 @@
 use std::fmt::Write as _;
 use std::time::Instant;
 
-use sweepd::transport::client::{Client, Heard};
-use sweepd::wire::{Answer, BodyStatus, EndCause, Event, PairRow, Reason, State, TickCause};
+use sweepd::transport::client::{Client, FrameInfo, Heard, Rows};
+use sweepd::wire::{
+    Answer, BodyStatus, EndCause, Event, PairRow, Reason, State, TickCause, TickRow,
+};
 
 use crate::live::{Desk, SECOND_NS, TWO_SPHERES, at, send, state, step, tick_until, words};
 
@@ -85,6 +87,30 @@ fn each_edit_is_done_in_a_tick_of_its_own_cause_and_ends_pairs_by_its_cause() {
         State::Colliding,
         "all is as before"
     );
+}
+
+/// In lockstep ticks of edits do no work; this one is the result of a frame.
+#[test]
+fn a_frame_that_waited_for_an_edit_has_its_result_worked_out() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    step(&mut client, &[at(1, 0.0), at(2, 5.0)]);
+    let info = FrameInfo {
+        scene_rev: client.view().tick().header.scene_rev + 1,
+        ..FrameInfo::default()
+    };
+    let frame = client
+        .send(&info, Rows::Poses(&[at(1, 0.0), at(2, 0.5)]))
+        .unwrap();
+    done(
+        &mut client,
+        r#"{"margin": {"body": "b", "report_within_m": 0.1}}"#,
+    );
+    let is_its_result = |tick: &TickRow| tick.sources[0].seq == frame.seq;
+    let result = tick_until(&mut client, "its result", is_its_result);
+    assert_eq!(result.cause, TickCause::Edit.code(), "{}", words(&result));
+    assert_eq!(state(&result), State::Colliding, "{}", words(&result));
 }
 
 #[test]
