@@ -81,4 +81,20 @@ impl Shape {
             Geometry::HalfSpace { .. } => self.aabb,
         }
     }
+
+    /// Whether two shapes of equal specs are equal: where these name a file, it may have changed.
+    ///
+    /// * `deforms` - then where its vertices are says nothing, as its sender moves them.
+    pub(crate) fn is_built_alike(&self, other: &Self, deforms: bool) -> bool {
+        match (&self.geometry, &other.geometry) {
+            (Geometry::Convex(a), Geometry::Convex(b)) => a.vertices() == b.vertices(),
+            (Geometry::Mesh(a), Geometry::Mesh(b)) => {
+                a.is_solid() == b.is_solid()
+                    && a.faces() == b.faces()
+                    && a.vertices().len() == b.vertices().len()
+                    && (deforms || a.vertices() == b.vertices())
+            }
+            _ => true,
+        }
+    }
 }

@@ -238,6 +238,8 @@ impl World {
                 self.forget_pose(slot);
             }
         }
+        // Their pairs end with those of the bodies that they hang on, which may come back in this very tick.
+        self.settle_attached();
     }
 
     /// One body is not received again.

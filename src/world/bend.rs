@@ -149,7 +149,13 @@ impl World {
         let state = &mut self.sources[source.index()];
         match stand_beside(state, source, &mut self.over, header, received_ns) {
             Standing::Refused(reason) => return refused(reason),
-            Standing::Afresh => self.forget_poses(source),
+            Standing::Afresh => {
+                // A frame that still waits is of before.
+                if state.waiting.until_ns.take().is_some() {
+                    state.skipped += 1;
+                }
+                self.forget_poses(source);
+            }
             Standing::Next => {}
         }
         let Some(slot) = self.slot_of(BodyId(header.body)) else {

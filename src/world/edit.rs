@@ -228,7 +228,7 @@ impl World {
         true
     }
 
-    /// Whether a put would change nothing: the same words, shapes of the same measures, and no edit in between.
+    /// Whether a put would change nothing: the same words, the same shapes, and no edit in between.
     fn is_same(&self, slot: BodySlot, spec: &BodySpec, shapes: &[PlacedShape]) -> bool {
         let entry = &self.entries[slot.index()];
         let (Some(old), Some(body)) = (&entry.spec, self.body(slot)) else {
@@ -252,7 +252,10 @@ impl World {
         let same_shapes = body.shapes.len() == shapes.len()
             && body.shapes.iter().zip(shapes).all(|(a, b)| {
                 let (aabb, radius) = measures(a);
-                aabb == b.shape.aabb && radius.to_bits() == b.shape.radius.to_bits()
+                Arc::ptr_eq(&a.shape, &b.shape)
+                    || aabb == b.shape.aabb
+                        && radius.to_bits() == b.shape.radius.to_bits()
+                        && a.shape.is_built_alike(&b.shape, body.vertices.is_some())
             });
         !entry.edited && same_words && same_shapes
     }

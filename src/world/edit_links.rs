@@ -92,6 +92,10 @@ impl World {
                     self.settle(slot, false);
                 }
                 self.requery(slot);
+                if moves_changed && self.body(slot).is_some_and(|body| body.unbounded) {
+                    // What its certificates say of its motion was said by another rule.
+                    self.begin_anew(slot);
+                }
             }
         }
         self.link_paths();

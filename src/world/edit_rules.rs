@@ -94,11 +94,18 @@ impl World {
             };
             if body.moves {
                 self.forget_pose(slot);
-            } else if body.in_broad {
-                // It stays where it is, but its pairs end and begin anew.
-                self.lists.remove(slot, EndCause::Reset);
-                self.lists.insert(slot);
+            } else {
+                self.begin_anew(slot);
             }
+        }
+        self.settle_attached();
+    }
+
+    /// Ends the pairs of a body that stays in the broad phase, and has them begin anew.
+    pub(super) fn begin_anew(&mut self, slot: BodySlot) {
+        if self.body(slot).is_some_and(|body| body.in_broad) {
+            self.lists.remove(slot, EndCause::Reset);
+            self.lists.insert(slot);
         }
     }
 

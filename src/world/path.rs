@@ -78,6 +78,8 @@ pub struct Path {
     teleport_m: f64,
     /// Whether the body itself is swept; else its path is kept for what hangs on it.
     swept: bool,
+    /// The body is not in the broad phase now: its way counts for what hangs on it alone.
+    aside: bool,
     /// Not every pose found room: only the box knows of the rest.
     blurred: bool,
     /// Holds the body at the newest pose.
@@ -99,6 +101,7 @@ impl Path {
             reach: radius,
             teleport_m: teleport_m.unwrap_or(f64::INFINITY),
             swept,
+            aside: false,
             blurred: false,
             end: Aabb::empty(),
             hull: Aabb::empty(),
@@ -141,7 +144,7 @@ impl Path {
     /// Whether the body is to be asked for on the way: it is continuous and did not stand still.
     #[must_use]
     pub fn is_swept(&self) -> bool {
-        self.swept && (self.blurred || self.legs.iter().any(|leg| !leg.is_still()))
+        self.counts() && (self.blurred || self.legs.iter().any(|leg| !leg.is_still()))
     }
 
     /// Whether the body is continuous; else its path is kept for what hangs on it.
@@ -153,7 +156,20 @@ impl Path {
     /// Whether a step of it was beyond its `teleport_m`.
     #[must_use]
     pub fn has_jumped(&self) -> bool {
-        self.swept && self.legs.iter().any(|leg| leg.jump)
+        self.counts() && self.legs.iter().any(|leg| leg.jump)
+    }
+
+    /// Whether it is the way of a body that is continuous and takes part.
+    fn counts(&self) -> bool {
+        self.swept && !self.aside
+    }
+
+    /// Says whether the body is out of the broad phase: what it went meanwhile is no motion of its own.
+    pub(super) fn set_aside(&mut self, aside: bool) {
+        if self.aside && !aside {
+            self.restart(self.end);
+        }
+        self.aside = aside;
     }
 
     /// A box that holds the body all the way.
@@ -223,13 +239,13 @@ impl Path {
     /// Adds a leg; whether the hull grew.
     fn add(&mut self, leg: Leg, end: Aabb, blurred: bool) -> bool {
         let before = self.hull;
-        self.hull = if leg.jump || !self.swept {
+        self.hull = if leg.jump || !self.counts() {
             self.hull.merged(&end)
         } else {
             let swept = swept_box(&leg, &self.pivot, self.reach, (&self.end, &end));
             self.hull.merged(&swept)
         };
-        if !self.swept {
+        if !self.counts() {
             self.hull = end;
         }
         self.end = end;

@@ -87,12 +87,21 @@ impl World {
     pub(super) fn judge(&self, slot: BodySlot, body: &Body) -> Judgement {
         let entry = &self.entries[slot.index()];
         let root = &self.entries[entry.root.index()];
-        let has_vertices = body.vertices.as_ref().is_none_or(|v| v.version.is_some());
+        let of_root = if entry.root == slot {
+            None
+        } else {
+            self.body(entry.root)
+        };
+        let vertices = || {
+            let bodies = std::iter::once(body).chain(of_root);
+            bodies.filter_map(|body| body.vertices.as_deref())
+        };
+        let has_vertices = vertices().all(|v| v.version.is_some());
         let (status, reach_m) = if !entry.enabled {
             (BodyStatus::Disabled, 0.0)
         } else if !body.moves {
             (BodyStatus::Known, 0.0)
-        } else if root.refused || body.vertices.as_ref().is_some_and(|v| v.refused.is_some()) {
+        } else if root.refused || vertices().any(|v| v.refused.is_some()) {
             (BodyStatus::Rejected, f64::INFINITY)
         } else if !(root.has_pose && has_vertices) {
             (BodyStatus::NotReceived, f64::INFINITY)
@@ -147,6 +156,9 @@ impl World {
 
     /// Puts a body at a pose and takes its motion and tight box with it.
     ///
+    /// No length tells how far a half-space has moved: the pairs of one that cannot move, and whose certificates
+    /// therefore count its motion as none, begin anew where an edit moves it.
+    ///
     /// * returns - whether that changed anything, bit by bit.
     pub(super) fn place(&mut self, slot: BodySlot, pose: &Pose) -> bool {
         let Some(body) = self.bodies[slot.index()].as_mut() else {
@@ -159,7 +171,11 @@ impl World {
         if !body.unbounded {
             body.motion.advance(pose, &body.centre, body.radius);
         }
+        let is_base = body.unbounded && !body.moves;
         self.entries[slot.index()].tight = tight_box(&body.shapes, pose);
+        if is_base {
+            self.begin_anew(slot);
+        }
         true
     }
 

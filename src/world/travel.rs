@@ -2,8 +2,8 @@
 //! again.
 //!
 //! In: admitted poses, and what the sender says of the spin. Out: paths of bodies and of what hangs on them. A body
-//! that was not in the broad phase in the last pose has no path: a first pose, one after a reset, an edit are no
-//! motion.
+//! that was not in the broad phase in the last pose has no path of its own: a first pose, one after a reset, an edit
+//! are no motion. What hangs on it may take part all the same, and goes its way.
 
 use super::World;
 use super::census::slot_at;
@@ -110,7 +110,9 @@ impl World {
         };
         // Where it was placed, its box is new and tight.
         let end = if moved { entry.tight } else { *path.end() };
-        let grown = if body.in_broad {
+        path.set_aside(!body.in_broad);
+        let was_placed = body.in_broad || entry.root == slot && entry.has_pose;
+        let grown = if was_placed {
             let was_empty = path.is_empty();
             let grown = go(&mut path, end);
             if was_empty && !path.is_empty() {
@@ -151,7 +153,7 @@ impl World {
             let Some(body) = self.body(slot).filter(|body| body.path.is_some()) else {
                 continue;
             };
-            let Some(root_body) = self.body(root).filter(|root| !root.unbounded) else {
+            let Some(root_body) = self.body(root) else {
                 continue;
             };
             let pivot = local.inverse_transform_point(&root_body.centre);

@@ -250,3 +250,63 @@ fn law_3_3_a_margin_set_at_run_time_is_that_of_a_body_put_with_it() {
         assert_eq!(rig.out.tick.header.scene_rev, before, "nothing changed");
     }
 }
+
+/// A body that does not move by itself.
+fn fixed(id: u64, at: [f64; 3], shape: &str, more: &str) -> String {
+    crate::rig::body(id, at, shape, more).replace("moves = true", "moves = false")
+}
+
+const BASE: &str = "{ type = \"box\", half_extents = [0.5, 0.5, 0.5] }";
+const FLOOR: &str = "{ type = \"half_space\", normal = [0, 0, 1], offset = 0.0 }";
+
+/// Its certificates count its motion as none: it cannot move.
+#[test]
+fn bug_a_half_space_that_an_edit_moves_is_asked_anew() {
+    let floor = fixed(3, [-50.0, 0.0, 0.0], FLOOR, "attached_to = \"b2\"");
+    let at = |z| {
+        let base = fixed(2, [50.0, 0.0, z], BASE, "");
+        [ball(1, 0.0, ""), floor.clone(), base]
+    };
+    for by_put in [true, false] {
+        let mut rig = Rig::new(&scene("", &at(0.0)));
+        rig.row(1).position[2] = 2.0;
+        rig.send(ALL);
+        assert_eq!(rig.verdict(1, 3), Verdict::Apart);
+        let edit = if by_put {
+            put(&at(2.0))
+        } else {
+            Edit::Attach {
+                name: "b3".to_owned(),
+                to: Some("b2".to_owned()),
+                pose: Some(Pose::translation(-50.0, 0.0, 2.0)),
+            }
+        };
+        rig.edit(vec![edit], ALL);
+        assert_eq!(rig.verdict(1, 3), Verdict::Colliding, "by put: {by_put}");
+        assert_eq!(rig.state(), State::Colliding);
+    }
+}
+
+/// While it hung on a body that moves, no length told how far it had moved.
+#[test]
+fn bug_a_half_space_that_was_let_go_has_no_certificate_from_when_it_moved() {
+    let floor = fixed(3, [-50.0, 0.0, 0.0], FLOOR, "attached_to = \"b2\"");
+    let bodies = [ball(1, 0.0, ""), ball(2, 50.0, ""), floor];
+    let mut rig = Rig::new(&scene("", &bodies));
+    rig.row(1).position[2] = 2.0;
+    rig.row(2).position[2] = 0.0;
+    rig.send(ALL);
+    rig.row(2).position[2] = 0.4;
+    rig.send(ALL);
+    assert_eq!(rig.verdict(1, 3), Verdict::Apart);
+    let detach = Edit::Attach {
+        name: "b3".to_owned(),
+        to: None,
+        pose: None,
+    };
+    rig.edit(vec![detach], ALL);
+    assert_eq!(rig.verdict(1, 3), Verdict::Apart);
+    rig.row(1).position[2] = 1.3;
+    rig.send(ALL);
+    assert_eq!(rig.verdict(1, 3), Verdict::Colliding, "by 0.1 m");
+}

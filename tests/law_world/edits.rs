@@ -1,14 +1,16 @@
 //! Scene edits and attached bodies: DESIGN 3.1, 3.5, 3.10, 6.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use sweepd::ids::BodyId;
 use sweepd::math::{Pose, Vec3};
 use sweepd::scene::{BodySpec, PairAction};
+use sweepd::shape::{ShapeSpec, build};
 use sweepd::wire::{BodyStatus, EndCause, Reason, RejectReason};
-use sweepd::world::Edit;
+use sweepd::world::{Edit, Parts, PlacedShape};
 
-use crate::support::{Bench, MS, TIMEOUT_NS, admitted, cube, fixed, moving, row, rule};
+use crate::support::{Bench, MS, TIMEOUT_NS, admitted, cube, fixed, frame, moving, row, rule};
 
 fn put(spec: BodySpec) -> Edit {
     Edit::Put {
@@ -90,6 +92,43 @@ fn law_6_a_put_of_the_same_content_changes_nothing() {
     assert_eq!(bench.world.scene_rev(), rev + 1);
     bench.edit(put(moving("a", 1)));
     assert_eq!(bench.world.scene_rev(), rev + 2);
+}
+
+/// The words are the same, and so are box and radius: a file changed behind them.
+#[test]
+fn law_6_a_put_of_a_file_that_has_changed_takes_the_place_of_the_body() {
+    let mesh = |last: [u32; 3]| {
+        let corners = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, 0.0, 1.0],
+        ];
+        let spec = ShapeSpec::Trimesh {
+            vertices: corners.to_vec(),
+            faces: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], last],
+            file: None,
+            scale: None,
+            solid: None,
+        };
+        Parts::from([PlacedShape {
+            shape: build(&spec, Path::new("")).unwrap().shape,
+            pose: Pose::identity(),
+        }])
+    };
+    let put = |shapes| Edit::Put {
+        body: Arc::new(moving("a", 1)),
+        shapes,
+    };
+    let mut bench = Bench::of(vec![moving("a", 1)]);
+    let (open, closed) = ([0, 2, 1], [0, 3, 2]);
+    bench.edit(put(mesh(open)));
+    let rev = bench.world.scene_rev();
+    bench.edit(put(mesh(open)));
+    assert_eq!(bench.world.scene_rev(), rev);
+    bench.edit(put(mesh(closed)));
+    assert_eq!(bench.world.scene_rev(), rev + 1);
+    assert_eq!(bench.body("a").generation, 3);
 }
 
 #[test]
@@ -243,6 +282,35 @@ fn law_3_5_a_reset_ends_all_pairs_and_forgets_all_poses() {
     assert_eq!(bench.removed("wall"), Some(EndCause::Reset));
     assert!(bench.inserted("wall") && !bench.inserted("b"));
     assert_eq!(bench.status("wall"), BodyStatus::Known);
+}
+
+/// What hangs on a body ends its pairs with it, also where the body comes back in the same tick.
+#[test]
+fn law_4_2_what_hangs_on_a_body_is_forgotten_with_it() {
+    let tool = BodySpec {
+        attached_to: Some(named("arm")),
+        pose: Pose::translation(0.0, 3.0, 0.0),
+        ..moving("tool", 1)
+    };
+    // The tool has the lower slot: it is looked at before what it hangs on.
+    let mut bench = Bench::of(vec![tool, moving("arm", 2)]);
+    bench.send(MS, "sim", 1, &[row(2, 0.0)]);
+    assert_eq!(bench.status("tool"), BodyStatus::Known);
+    let mut next = frame("sim", 1, bench.now_ns + MS, &[row(2, 0.0)]);
+    next.header.epoch = 1;
+    bench.tick_at(bench.now_ns + MS, &[], &[next]);
+    for name in ["arm", "tool"] {
+        assert_eq!(bench.removed(name), Some(EndCause::Reset), "{name}");
+        assert!(bench.inserted(name), "{name}");
+    }
+    let mut next = frame("sim", 2, bench.now_ns + MS, &[row(2, 0.0)]);
+    next.header.epoch = 1;
+    let reset = Edit::Reset { source: None };
+    bench.tick_at(bench.now_ns + MS, &[reset], &[next]);
+    for name in ["arm", "tool"] {
+        assert_eq!(bench.removed(name), Some(EndCause::Reset), "{name}");
+        assert!(bench.inserted(name), "{name}");
+    }
 }
 
 #[test]

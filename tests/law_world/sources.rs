@@ -2,7 +2,8 @@
 
 use sweepd::ids::SourceSlot;
 use sweepd::wire::{
-    BodyStatus, EndCause, Frame, RejectReason, TransformRow, frame_flags, name_bytes,
+    BodyStatus, EndCause, Frame, RejectReason, TransformRow, VertexFrame, VertexHeader,
+    WIRE_VERSION, frame_flags, name_bytes, vertex_flags,
 };
 use sweepd::world::{Admission, Edit};
 
@@ -340,4 +341,36 @@ fn rows_in_any_order_and_number_find_their_bodies() {
             assert_eq!(x, (id * seq) as f64);
         }
     }
+}
+
+/// Vertices may be the first that is heard of a new epoch.
+#[test]
+fn bug_a_frame_that_waits_is_void_once_vertices_of_a_later_epoch_have_come() {
+    let mut bench = Bench::of(vec![moving("a", 1)]);
+    send_with(&mut bench, MS, |f| {
+        f.header.scene_rev = 2;
+        f.header.epoch = 1;
+    });
+    let mut vertices = VertexFrame {
+        header: VertexHeader {
+            session: 1,
+            epoch: 2,
+            body: 1,
+            version: 1,
+            source: name_bytes("sim"),
+            flags: vertex_flags::FULL,
+            schema: WIRE_VERSION,
+            ..VertexHeader::default()
+        },
+        ..VertexFrame::default()
+    };
+    vertices.received_ns = bench.now_ns;
+    bench.world.admit_vertices(&vertices, bench.now_ns);
+    bench.edit(Edit::Put {
+        body: std::sync::Arc::new(fixed("wall", 0, 9.0)),
+        shapes: crate::support::cube(),
+    });
+    assert_eq!(bench.world.scene_rev(), 2);
+    assert_eq!(bench.status("a"), BodyStatus::NotReceived);
+    assert_eq!(bench.world.sources()[0].to_row(bench.now_ns).skipped, 1);
 }

@@ -263,6 +263,42 @@ fn a_body_that_hangs_on_one_with_more_poses_than_are_kept_is_open_too() {
     assert!(open(rig.pair(1, 3).unwrap()), "{:?}", rig.pair(1, 3));
 }
 
+/// What it hangs on takes no part, or is a plane: it goes the same way all the same.
+#[test]
+fn bug_a_body_that_hangs_on_one_that_is_disabled_or_a_half_space_goes_its_way() {
+    let bullet = "name = \"b3\"\nid = 3\nattached_to = \"b2\"\nposition = [0.0, 0.0, 0.1]\ncontinuous = true\n\
+               shape = { type = \"sphere\", radius = 0.05 }";
+    let plane = "{ type = \"half_space\", normal = [0.0, 1.0, 0.0], offset = -50.0 }";
+    for (shape, more) in [
+        (SHOT, "enabled = false"),
+        (SHOT, "enabled = false\ncontinuous = true"),
+        (plane, ""),
+    ] {
+        let mut rig = Rig::new(&scene(
+            "",
+            &[
+                body(1, [0.0; 3], PLATE, ""),
+                body(2, [0.0; 3], shape, more),
+                bullet.to_owned(),
+            ],
+        ));
+        // The first pose is no motion, from wherever the scene had it.
+        rig.place(2, &at(0.0, 0.0, -1.1));
+        rig.send(ALL);
+        assert!(rig.pair(1, 3).is_none(), "{:?}", rig.pair(1, 3));
+        rig.place(2, &at(0.0, 0.0, 0.9));
+        rig.send(ALL);
+        let row = rig
+            .pair(1, 3)
+            .unwrap_or_else(|| panic!("{shape} {more}: no row"));
+        is_near(row, (1.0 - 0.0505) / 2.0, 1e-9);
+        assert!(has(row, Event::Passed), "{row:?}");
+        assert_eq!(rig.state(), State::Colliding);
+        rig.send(ALL);
+        assert!(rig.pair(1, 3).is_none(), "{:?}", rig.pair(1, 3));
+    }
+}
+
 /// A rod of 2 m through the origin, which turns about x, and a small ball on the y axis.
 fn rod(more: &str) -> Rig {
     let rod = "{ type = \"capsule\", radius = 0.001, half_height = 1.0 }";
