@@ -9,6 +9,7 @@ use crate::wire::Verdict;
 use crate::world::{Body, PlacedShape};
 
 use super::Counters;
+use super::around::whole_bounds;
 use super::carry::Told;
 use super::compound::{CompoundFront, Tools};
 use super::contacts::Contact;
@@ -143,22 +144,5 @@ impl Bench {
             search: Search::default(),
             tick: 0,
         }
-    }
-}
-
-/// Bounds on the gap from the balls around the two bodies: what holds before any work is done.
-///
-/// The lower end holds for overlapping bodies, too: a translation by the balls' overlap separates convex pieces, and no
-/// point of the one lies deeper under the surface of the other.
-fn whole_bounds(a: &Body, b: &Body) -> Interval {
-    if a.unbounded || b.unbounded {
-        return Interval::UNKNOWN;
-    }
-    let (from, to) = (a.pose * a.centre, b.pose * b.centre);
-    let (between, radii) = ((to - from).norm(), a.radius + b.radius);
-    let rounding = 16.0 * f64::EPSILON * (from.coords.amax() + to.coords.amax() + radii);
-    Interval {
-        min: (between - radii - rounding).next_down(),
-        max: (between + radii + rounding).next_up(),
     }
 }

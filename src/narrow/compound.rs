@@ -111,6 +111,7 @@ impl CompoundFront {
         }
         let moved = self.at.pos12 != *rel || bent_m.to_bits() != self.bent_m.to_bits();
         self.at = at;
+        self.take_floor([a.radius, b.radius]);
         if !moved {
             return;
         }
@@ -221,9 +222,7 @@ impl CompoundFront {
         self.known = Known::default();
         self.found.clear();
         self.wear = Wear::default();
-        // Pieces part when moved by both radii, and a point within a solid is no deeper than it is large.
-        let size_m = a.body.radius + b.body.radius;
-        self.floor_m = -size_m * (1.0 + 8.0 * f64::EPSILON) - self.at.slop;
+        self.take_floor([a.body.radius, b.body.radius]);
         // Of pairs of shapes that were not asked since the last fresh start nothing is kept.
         self.inner.retain_mut(|inner| {
             let asked = std::mem::take(&mut inner.asked);
@@ -232,6 +231,13 @@ impl CompoundFront {
             }
             asked
         });
+    }
+
+    /// Pieces part when moved by both radii, and a point within a solid is no deeper than it is large. Radii change
+    /// where a body deforms.
+    fn take_floor(&mut self, radii_m: [f64; 2]) {
+        let size_m: f64 = radii_m.iter().sum();
+        self.floor_m = -size_m * (1.0 + 8.0 * f64::EPSILON) - self.at.slop;
     }
 
     fn reached(&self, asked: &Asked) -> bool {

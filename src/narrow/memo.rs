@@ -7,6 +7,7 @@ use crate::shape::Geometry;
 use crate::wire::{NO_INDEX, Verdict};
 use crate::world::{Body, World};
 
+use super::around::box_bounds;
 use super::exact::Warm;
 use super::order::Urgency;
 use super::{NONE, Narrow};
@@ -20,7 +21,7 @@ pub(super) struct Hot {
     pub(super) b: BodySlot,
     /// The pair is proved apart (and not near) while `S + d` of both sum to less, metres; minus infinity: look closer.
     pub(super) expiry_m: f64,
-    /// Tick of the last visit, cut to 32 bits: only "this tick or not" is asked.
+    /// Stamp of the tick of the last visit; 0: none.
     pub(super) visited: u32,
     pub(super) verdict: Verdict,
     pub(super) live: bool,
@@ -159,25 +160,6 @@ impl Memo {
         } else {
             Verdict::Apart
         }
-    }
-}
-
-/// Bounds on the gap of two bodies from their boxes (or a half-space's plane) alone.
-///
-/// Lower: along each axis, what separates the boxes, or how deep they overlap. It holds for every gap of DESIGN 3.2:
-/// a translation by the overlap separates convex pieces, and a point of the one under the surface of the other leaves
-/// the other's box within the overlap. Upper: any two points of the two are no farther apart than this.
-pub(super) fn box_bounds(a: &Body, b: &Body) -> Interval {
-    if a.unbounded || b.unbounded {
-        return Interval::UNKNOWN;
-    }
-    let least = |k: usize| (b.proxy.min[k] - a.proxy.max[k]).max(a.proxy.min[k] - b.proxy.max[k]);
-    let low = least(0).max(least(1)).max(least(2));
-    let centres = (a.pose * a.centre - b.pose * b.centre).norm();
-    let high = (centres + a.radius + b.radius) * (1.0 + 8.0 * f64::EPSILON);
-    Interval {
-        min: low.next_down().min(high),
-        max: high,
     }
 }
 

@@ -20,6 +20,7 @@ pub mod mesh;
 
 mod approx;
 mod arena;
+mod around;
 mod ask;
 mod carry;
 mod compound;
@@ -136,6 +137,8 @@ pub struct Narrow {
     /// Pairs that lack what is worked on.
     level: Vec<PairSlot>,
     tick: u64,
+    /// Of this tick, in [`Hot::visited`]; never 0.
+    stamp: u32,
 }
 
 /// What the narrow phase is asked for in this tick.
@@ -193,6 +196,7 @@ impl Narrow {
     /// Lets the memories follow the pair set: ended pairs are forgotten, begun ones start from their boxes.
     pub fn begin(&mut self, tick: u64, world: &World, pairs: &PairSet, delta: &PairDelta) {
         self.tick = tick;
+        self.next_stamp();
         self.counters = Counters::default();
         if !std::mem::take(&mut self.left_is_news) {
             self.left.clear();

@@ -162,8 +162,14 @@ pub(super) fn sphere_bound(a: &PlacedShape, b: &PlacedShape, bodies12: &Pose) ->
         a.pose * a.shape.centre,
         bodies12 * (b.pose * b.shape.centre),
     );
-    let magnitude = ca.coords.amax() + cb.coords.amax() + ra + rb;
-    (cb - ca).norm() - ra - rb - 16.0 * f64::EPSILON * magnitude
+    // The centres are sums of numbers that may be far larger than they are.
+    let far = |placed: &PlacedShape| {
+        placed.pose.translation.vector.amax()
+            + placed.shape.centre.coords.amax()
+            + placed.shape.radius
+    };
+    let magnitude = bodies12.translation.vector.amax() + far(a) + far(b);
+    (cb - ca).norm() - ra - rb - 32.0 * f64::EPSILON * magnitude
 }
 
 /// The certificate of a shape pair's answer for the bodies: its ends in order, and wider by what composing the poses
@@ -189,5 +195,40 @@ pub(super) fn sound(gap: Interval, a: &PlacedShape, b: &PlacedShape, bodies12: &
         } else {
             wide.max
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::math::pose_from;
+    use crate::shape::Convex;
+
+    /// Two balls that overlap by 0.5 nm; the one's centre is where two numbers a million times larger cancel.
+    #[test]
+    fn bug_balls_are_not_farther_apart_than_rounding_lets_their_centres_be_known() {
+        let ball = |at: [f64; 3]| PlacedShape {
+            shape: Arc::new(Shape::of_convex(Convex::sphere(0.5))),
+            pose: pose_from(at, [0.0, 0.0, 0.0, 1.0]).unwrap(),
+        };
+        let turn = [
+            -0.321_370_151_461_328_8,
+            -0.321_595_790_057_600_6,
+            -0.855_836_712_590_430_6,
+            0.246_659_471_639_252_56,
+        ];
+        let away = [
+            671_759.856_526_740_4,
+            215_497.413_553_353_43,
+            -708_729.686_063_419_6,
+        ];
+        let bodies12 = pose_from(away, turn).unwrap();
+        let bound = sphere_bound(&ball([0.0; 3]), &ball([1e6, 0.0, 0.0]), &bodies12);
+        assert!(bound <= -5.2e-10, "{bound}");
+        // And they say something all the same.
+        let near = sphere_bound(&ball([0.0; 3]), &ball([3.0, 0.0, 0.0]), &Pose::identity());
+        assert!((near - 2.0).abs() < 1e-12, "{near}");
     }
 }

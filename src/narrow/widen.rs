@@ -60,18 +60,28 @@ impl Narrow {
         self.visit(slot, world);
     }
 
+    /// The stamp of this tick. After 2^32 ticks they begin anew, with no pair visited.
+    pub(super) fn next_stamp(&mut self) {
+        self.stamp = self.stamp.wrapping_add(1);
+        if self.stamp == 0 {
+            self.hot.iter_mut().for_each(|hot| hot.visited = 0);
+            self.stamp = 1;
+        }
+    }
+
+    /// As after very many ticks.
+    #[cfg(test)]
+    pub(crate) fn set_stamp(&mut self, stamp: u32) {
+        self.stamp = stamp;
+    }
+
     /// Visits a pair once in a tick: one comparison while its certificate holds.
     fn visit(&mut self, slot: PairSlot, world: &World) {
         let hot = &mut self.hot[slot.index()];
-        #[allow(
-            clippy::cast_possible_truncation,
-            reason = "only equality with this tick is asked"
-        )]
-        let stamp = self.tick as u32;
-        if hot.visited == stamp {
+        if hot.visited == self.stamp {
             return;
         }
-        hot.visited = stamp;
+        hot.visited = self.stamp;
         self.counters.visited += 1;
         let spent_m = self.spent_m[hot.a.index()] + self.spent_m[hot.b.index()];
         if spent_m.next_up() < hot.expiry_m {

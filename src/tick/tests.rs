@@ -242,3 +242,32 @@ fn a_tick_says_the_same_whether_its_rows_are_kept_or_made_anew() {
         "{rows} rows, {cut} messages cut"
     );
 }
+
+/// Pairs that were visited when the stamps had these numbers before are visited all the same.
+#[test]
+fn bug_after_as_many_ticks_as_there_are_stamps_each_pair_is_looked_at_as_before() {
+    let clock = Arc::new(ManualClock::new(1_000_000_000));
+    let (mut young, mut old) = (engine(&clock), engine(&clock));
+    let mut world = World::new(9);
+    for tick in 1..=200 {
+        clock.advance(10_000_000);
+        let inbox = world.frames(clock.boottime_ns());
+        if tick == 100 {
+            old.narrow.set_stamp(u32::MAX - 3);
+        }
+        let told = [&mut young, &mut old].map(|engine| {
+            let input = TickInput {
+                inbox: &inbox,
+                edits: &[],
+                demand: Demand::ALL,
+                budget: Budget::UNLIMITED,
+                cause: TickCause::Frame,
+                cause_source: Some(0),
+                woke_ns: clock.monotonic_ns(),
+                pulse: None,
+            };
+            format!("{:?}", engine.tick(input))
+        });
+        assert!(told[0] == told[1], "tick {tick}");
+    }
+}

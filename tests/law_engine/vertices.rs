@@ -264,3 +264,37 @@ fn law_4_6_a_sheet_that_goes_there_and_back_has_gone_both_ways() {
     let gone = path(&rig) - before;
     assert!((0.03125..0.031_251).contains(&gone), "{gone}");
 }
+
+/// A solid that grows around a body of several shapes: the depth grows with it, and the bound must.
+#[test]
+fn bug_how_deep_a_compound_can_be_in_a_solid_grows_with_the_solid() {
+    let corners = |half: f32| -> Vec<[f32; 3]> {
+        (0..8)
+            .map(|k| [1, 2, 4].map(|bit| if k & bit == 0 { -half } else { half }))
+            .collect()
+    };
+    let cube = format!(
+        "{{ type = \"trimesh\", solid = true, vertices = {:?}, faces = [[0, 2, 1], [1, 2, 3], [4, 5, 6], \
+         [5, 7, 6], [0, 1, 4], [1, 5, 4], [2, 6, 3], [3, 6, 7], [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5]] }}",
+        corners(1.2)
+    );
+    let balls = "[{ type = \"sphere\", radius = 0.5, position = [-0.5, 0, 0] }, \
+         { type = \"sphere\", radius = 0.5, position = [0.5, 0, 0] }]";
+    let bodies = [
+        body(1, [0.0; 3], &cube, "deforms = true"),
+        body(2, [0.0; 3], balls, ""),
+    ];
+    let mut rig = Rig::new(&scene("", &bodies));
+    for step in 0..60_u8 {
+        let half = 1.2 + 0.05 * f32::from(step);
+        send(&mut rig, vec![full(u64::from(step) + 1, corners(half))]);
+        let row = rig.pair(1, 2).unwrap();
+        // The middle of the cube belongs to a ball.
+        let depth = -f64::from(half);
+        assert!(
+            row.gap_min_m <= depth && depth <= row.gap_max_m + 0.5,
+            "{half}: {row:?}"
+        );
+        assert!(row.gap_max_m <= 0.0, "{half}: {row:?}");
+    }
+}

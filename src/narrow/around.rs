@@ -1,0 +1,48 @@
+//! Bounds on the gap of two bodies from what lies around them, boxes and balls: what holds before any work is done.
+
+use crate::math::Interval;
+use crate::world::Body;
+
+/// Bounds on the gap of two bodies from their boxes (or a half-space's plane) alone.
+///
+/// Lower: along each axis, what separates the boxes, or how deep they overlap. It holds for every gap of DESIGN 3.2:
+/// a translation by the overlap separates convex pieces, and a point of the one under the surface of the other leaves
+/// the other's box within the overlap. Upper: any two points of the two are no farther apart than this.
+pub(super) fn box_bounds(a: &Body, b: &Body) -> Interval {
+    if a.unbounded || b.unbounded {
+        return Interval::UNKNOWN;
+    }
+    let least = |k: usize| (b.proxy.min[k] - a.proxy.max[k]).max(a.proxy.min[k] - b.proxy.max[k]);
+    let low = least(0).max(least(1)).max(least(2));
+    let (between, rounding) = between_centres(a, b);
+    let high = (between + a.radius + b.radius + rounding).next_up();
+    Interval {
+        min: low.next_down().min(high),
+        max: high,
+    }
+}
+
+/// Bounds on the gap from the balls around the two bodies: what holds before any work is done.
+///
+/// The lower end holds for overlapping bodies, too: a translation by the balls' overlap separates convex pieces, and no
+/// point of the one lies deeper under the surface of the other.
+pub(super) fn whole_bounds(a: &Body, b: &Body) -> Interval {
+    if a.unbounded || b.unbounded {
+        return Interval::UNKNOWN;
+    }
+    let ((between, rounding), radii) = (between_centres(a, b), a.radius + b.radius);
+    Interval {
+        min: (between - radii - rounding).next_down(),
+        max: (between + radii + rounding).next_up(),
+    }
+}
+
+/// Distance of the centres of two bodies, and by how much that and a sum with their radii may be off, metres.
+///
+/// A centre is the sum of two numbers that may both be far larger than it.
+fn between_centres(a: &Body, b: &Body) -> (f64, f64) {
+    let far =
+        |body: &Body| body.pose.translation.vector.amax() + body.centre.coords.amax() + body.radius;
+    let between = (b.pose * b.centre - a.pose * a.centre).norm();
+    (between, 32.0 * f64::EPSILON * (far(a) + far(b)))
+}
