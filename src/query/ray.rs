@@ -9,6 +9,8 @@
 
 use std::sync::Arc;
 
+use nalgebra::Quaternion;
+
 use super::measure::{Measured, WORK_NS, age_ns, fit};
 use super::unknown::Unknown;
 use crate::ids::BodySlot;
@@ -81,12 +83,10 @@ impl RayQuestion {
         let direction = Vec3::from(ray.direction);
         // Scaled by its largest part first, so that neither 1e-200 nor 1e200 loses it.
         let direction = (direction / direction.amax()).normalize();
-        let turn = Quat::rotation_between(&Vec3::z(), &direction);
         let mut question = Self {
             from: Point::from(ray.from),
             direction,
-            turn: turn
-                .unwrap_or_else(|| Quat::from_axis_angle(&Vec3::x_axis(), std::f64::consts::PI)),
+            turn: turn_of_axis(&direction),
             max_m: ray.max_m,
             near: Vec::new(),
             left_out_from_m: f64::INFINITY,
@@ -212,9 +212,9 @@ impl RayQuestion {
         }
         let mut found = self.found.clone();
         let hit_m = best.map_or(f64::INFINITY, |(_, cast)| cast.hit_m);
-        open.retain(|(_, cast)| cast.free_m < hit_m - 8.0 * self.slop_m(hit_m.min(self.max_m)));
         let open_m = open.iter().map(|(_, cast)| cast.free_m);
         let open_m = open_m.fold(tied_m, f64::min);
+        open.retain(|(_, cast)| cast.free_m < hit_m - 8.0 * self.slop_m(hit_m.min(self.max_m)));
         if hit_m < self.left_out_from_m {
             found.left_out = 0;
         }
@@ -224,7 +224,8 @@ impl RayQuestion {
             .collect();
         found.complete &= found.left_out == 0 && open.is_empty();
         found.t_min_m = self.max_m.min(open_m).min(self.left_out_from_m);
-        found.verdict = match (&best, open.is_empty() && found.left_out == 0) {
+        let none_left = open.is_empty() && found.left_out == 0 && found.unknown.is_empty();
+        found.verdict = match (&best, none_left) {
             (Some(_), _) => Verdict::Colliding,
             (None, true) => Verdict::Apart,
             (None, false) => Verdict::Possible,
@@ -359,4 +360,12 @@ impl RayQuestion {
         }]);
         Body::of_shapes(parts, &Pose::from_parts(centre.coords.into(), self.turn))
     }
+}
+
+/// A turn that lays the z axis along a line, either way: a piece of a ray has no front.
+///
+/// By the half angle: an angle found from a cosine is lost near 0 and near pi.
+fn turn_of_axis(line: &Vec3) -> Quat {
+    let up = if line.z < 0.0 { -line } else { *line };
+    Quat::new_normalize(Quaternion::new(1.0 + up.z, -up.y, up.x, 0.0))
 }

@@ -334,7 +334,8 @@ fn above_m(planes: &Body, ball: &Body) -> f64 {
         let (up, from) = (at.rotation * normal, at.translation.vector);
         let height = (centre.coords - from).dot(&up) - offset;
         let size = centre.coords.amax() + from.amax() + offset.abs() + ball.radius;
-        least_m = least_m.min(height - ball.radius - ball.reach_m - 32.0 * ROUND * size);
+        let reach_m = planes.reach_m + ball.reach_m;
+        least_m = least_m.min(height - ball.radius - reach_m - 32.0 * ROUND * size);
     }
     least_m
 }

@@ -275,6 +275,7 @@ fn bodies_that_may_be_in_the_way_are_named_and_too_many_are_told() {
         !lost.complete && lost.body.is_none() && !lost.unknown.is_empty(),
         "{lost:?}"
     );
+    assert_eq!(lost.verdict, Verdict::Possible.code(), "{lost:?}");
     rig.send(NONE);
     let found = ask(rig.engine.world(), &along);
     // Those that found no room begin behind the hit.
@@ -315,5 +316,34 @@ fn bodies_that_may_be_in_the_way_are_named_and_too_many_are_told() {
     ] {
         let error = question(rig.engine.world(), bad).unwrap_err();
         assert!(error.contains(wanted), "{bad}: {error}");
+    }
+}
+
+/// An angle found from a cosine is lost there; a piece of the ray then lies beside it.
+#[test]
+fn bug_a_ray_near_the_z_axis_is_asked_along_its_own_direction() {
+    let wall = "{ type = \"half_space\", normal = [-1, 0, 0], offset = -7e-6 }";
+    let rig = Rig::new(&scene(
+        "",
+        &[body(1, [0.0; 3], wall, "").replace("moves = true", "moves = false")],
+    ));
+    for tilt in [7.1e-9, 1e-8, 1.4e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3] {
+        for up in [1.0, -1.0] {
+            let direction = Vec3::new(tilt, 0.0, up);
+            let found = ask(
+                rig.engine.world(),
+                &json(&Vec3::zeros(), &direction, ", \"max_m\": 1000"),
+            );
+            let truth = 7e-6 / tilt * direction.norm();
+            assert_eq!(
+                found.verdict,
+                Verdict::Colliding.code(),
+                "{tilt}: {found:?}"
+            );
+            let (least, most) = (found.t_min_m, found.t_max_m.unwrap());
+            assert!(least <= truth && truth <= most, "{tilt}: {found:?}");
+            let off = (found.t_best_m.unwrap() - truth).abs();
+            assert!(off <= 1e-9 / tilt, "{tilt}: {found:?}");
+        }
     }
 }

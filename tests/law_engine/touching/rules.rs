@@ -205,3 +205,25 @@ fn what_cannot_be_asked_is_answered_with_what_to_change() {
         "{found:?}"
     );
 }
+
+/// Not only the body that is looked for, the plane too may be nearer than where it was last.
+#[test]
+fn bug_a_half_space_that_is_stale_is_named_where_it_may_reach() {
+    let gate = "{ type = \"half_space\", normal = [0, 0, 1], offset = 0.0 }";
+    let mut rig = Rig::new(&scene(
+        "",
+        &[body(1, [0.0; 3], gate, "max_speed_mps = 0.5")],
+    ));
+    rig.send(ALL);
+    rig.idle(1_600_000_000, ALL);
+    let at = |z: f64| {
+        let shape = "{\"type\": \"sphere\", \"radius\": 0.1}";
+        format!(
+            "{{\"shape\": {shape}, \"position\": [0, 0, {z:?}], \"orientation\": [0, 0, 0, 1]}}"
+        )
+    };
+    let found = ask(rig.engine.world(), &at(0.5));
+    assert!(!found.complete && found.unknown.len() == 1, "{found:?}");
+    let found = ask(rig.engine.world(), &at(1.0));
+    assert!(found.complete && found.unknown.is_empty(), "{found:?}");
+}
