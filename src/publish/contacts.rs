@@ -97,7 +97,8 @@ impl Publisher {
         from + count
     }
 
-    /// Chooses the pairs whose contacts fit: the deepest, of equally deep ones those with the smaller ids.
+    /// Chooses the pairs whose contacts fit: the deepest, of equally deep ones those with the smaller ids. The first is
+    /// told, whatever the limit is.
     fn choose_pairs(&mut self) {
         let (by_depth, rows) = (&mut self.contact_pairs, &self.listing);
         by_depth.clear();
@@ -119,6 +120,7 @@ impl Publisher {
                 to = from + middle;
             }
         }
+        from = from.max(usize::from(!by_depth.is_empty()));
         self.chosen.clear();
         self.chosen.resize(rows.len(), false);
         by_depth[..from]

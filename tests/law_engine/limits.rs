@@ -2,7 +2,7 @@
 
 use sweepd::wire::{BodyStatus, Event, Reason, State, Verdict};
 
-use crate::rig::{ALL, FRAME_NS, NONE, Rig, ball, has, scene};
+use crate::rig::{ALL, FRAME_NS, NONE, Rig, ball, body, has, scene};
 
 /// `n` couples of balls, ids 2k and 2k + 1, the k-th `gap(k)` metres apart; 100 m between couples.
 fn couples(head: &str, n: u64, gap: impl Fn(u64) -> f64, more: &str) -> Rig {
@@ -164,6 +164,20 @@ fn law_3_9_contact_rows_that_do_not_fit_are_the_shallowest() {
     assert_eq!(rig.out.contacts_header.truncated, 2);
     assert_eq!(rig.out.pairs.len(), 4);
     assert!(rig.because(Reason::Truncated));
+}
+
+#[test]
+fn law_3_9_contacts_of_the_deepest_pair_fit_whatever_the_limit_is() {
+    let cube = "{ type = \"box\", half_extents = [1.0, 1.0, 1.0] }";
+    let bodies: Vec<String> = (1..=2)
+        .flat_map(|k| [(2 * k, 0.0), (2 * k + 1, 2.0 - 0.1 * k as f64)])
+        .map(|(id, x)| body(id, [100.0 * (id / 2) as f64 + x, 0.0, 0.0], cube, ""))
+        .collect();
+    let mut rig = Rig::new(&scene("[limits]\ncontact_rows = 3", &bodies));
+    rig.send(ALL);
+    let told: Vec<u64> = rig.out.contacts.iter().map(|row| row.body_a / 2).collect();
+    assert_eq!(told, [2; 4]);
+    assert_eq!(rig.out.contacts_header.truncated, 4);
 }
 
 #[test]
