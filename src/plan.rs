@@ -108,7 +108,7 @@ impl Plan {
             shapes: facts.shapes,
             triangles: facts.triangles,
             choices: choices(&facts, method, config),
-            left_out: left_out(&facts, method, world),
+            left_out: left_out(&facts, method),
         }
     }
 
@@ -287,7 +287,7 @@ fn shared(facts: &Facts, method: Method, config: &Config) -> Option<Choice> {
     })
 }
 
-fn left_out(facts: &Facts, method: Method, world: &World) -> Vec<LeftOut> {
+fn left_out(facts: &Facts, method: Method) -> Vec<LeftOut> {
     let mut left_out = Vec::new();
     let mut out = |part, why: String, saved_bytes| {
         left_out.push(LeftOut {
@@ -329,15 +329,9 @@ fn left_out(facts: &Facts, method: Method, world: &World) -> Vec<LeftOut> {
         // What such a mesh has beside a rigid one: a row of 16 bytes a vertex.
         out("vertex updates and refits", "no body deforms".to_owned(), 0);
     }
-    if world.ignored_pairs_count() == 0 {
-        out("filter tables", "no pair is ignored".to_owned(), 0);
-    }
     if facts.moving == 0 {
-        out(
-            "motion pass",
-            "nothing can move".to_owned(),
-            facts.bodies * 8,
-        );
+        // The two numbers a body are there all the same.
+        out("motion pass", "nothing can move".to_owned(), 0);
     }
     if facts.stale_by_speed == 0 {
         out(

@@ -9,11 +9,12 @@
     reason = "tests stop at the first surprise, and compare numbers that are copied, not computed"
 )]
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use sweepd::config::Mode;
 use sweepd::ids::BodyId;
-use sweepd::scene::Scene;
+use sweepd::scene::{Request, Scene};
 use sweepd::shape::{Geometry, Library, ShapeSpec, build};
 
 fn example() -> Scene {
@@ -54,6 +55,72 @@ fn the_example_scene_is_read_with_every_key() {
     assert!(scene.bodies[12].deforms && !scene.bodies[11].deforms);
     assert_eq!(scene.rules.len(), 2);
     assert_eq!(scene.rules[1].report_within_m, Some(0.1));
+}
+
+/// A reader of each table tells all its keys when it meets one that is like none of them.
+#[test]
+fn the_example_scene_names_every_key_there_is() {
+    let example = std::fs::read_to_string("launch-free-scripts/example_scene.toml").unwrap();
+    let is_word_char = |c: char| c.is_alphanumeric() || c == '_';
+    let words: BTreeSet<&str> = example.split(|c| !is_word_char(c)).collect();
+    let shapes = [
+        "sphere",
+        "box",
+        "capsule",
+        "cylinder",
+        "cone",
+        "convex",
+        "triangle",
+        "trimesh",
+        "half_space",
+        "height_field",
+    ];
+    let of_shape = |kind| format!("[[body]]\nname='b'\nshape={{type='{kind}',qqqqqqqq=1}}");
+    let mut scenes: Vec<String> = shapes.map(of_shape).to_vec();
+    scenes.extend(
+        [
+            "qqqqqqqq=1",
+            "[run]\nqqqqqqqq=1",
+            "[limits]\nqqqqqqqq=1",
+            "[viewpoint]\nqqqqqqqq=1",
+            "[[source]]\nqqqqqqqq=1",
+            "[[source]]\nname='s'\nros2={type='tf',qqqqqqqq=1}",
+            "[[body]]\nqqqqqqqq=1",
+            "[[rule]]\nqqqqqqqq=1",
+        ]
+        .map(str::to_owned),
+    );
+    for text in scenes {
+        let error = Scene::parse(&text, "keys.toml", Path::new("")).unwrap_err();
+        let error = error.to_string();
+        let (_, keys) = error.split_once("known keys are ").expect(&error);
+        for key in keys.trim().split(", ") {
+            assert!(words.contains(key), "{key} of {error}");
+        }
+    }
+}
+
+#[test]
+fn the_edits_that_the_message_contract_shows_are_edits() {
+    let contract = std::fs::read_to_string("msgs/README.md").unwrap();
+    let (_, edits) = contract.split_once("## Edits").unwrap();
+    let (_, json) = edits.split_once("```json\n").unwrap();
+    let (json, _) = json.split_once("```").unwrap();
+    let corners: Vec<u8> = (0..8_u8)
+        .flat_map(|corner| [0, 1, 2].map(|axis| f64::from((corner >> axis) & 1)))
+        .flat_map(f64::to_le_bytes)
+        .collect();
+    let faces = [[0_u32, 1, 3], [0, 3, 2]].concat();
+    let faces = faces
+        .iter()
+        .cycle()
+        .take(36)
+        .flat_map(|at| at.to_le_bytes());
+    let blobs: Vec<u8> = corners.into_iter().chain(faces).collect();
+    let Request::Edits(request) = Request::parse(json.as_bytes(), &blobs).unwrap() else {
+        panic!("a question");
+    };
+    assert_eq!(request.edits.len(), 11);
 }
 
 #[test]

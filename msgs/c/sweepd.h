@@ -57,7 +57,7 @@ enum {
     SWEEPD_STATE_COLLIDING = 4,
 };
 
-/* Why a tick is unknown or not clear; bit numbers of TickRow::reasons. */
+/* Why a tick is unknown or not clear; bit numbers of TickRow::reasons: test `tick.reasons & (1 << CODE)`. */
 enum {
     /* A moving body has had no admitted pose in this boot. */
     SWEEPD_REASON_NOT_RECEIVED = 0,
@@ -91,7 +91,7 @@ enum {
     SWEEPD_TICK_CAUSE_TIMEOUT = 1,
     /* Nothing else happened for a heartbeat. */
     SWEEPD_TICK_CAUSE_HEARTBEAT = 2,
-    /* A scene edit was applied. */
+    /* A scene edit was applied, or a tick was asked for. */
     SWEEPD_TICK_CAUSE_EDIT = 3,
 };
 
@@ -133,8 +133,8 @@ enum {
     SWEEPD_BROAD_CAUSE_FORCED = 9,
 };
 
-/* Bits of PairRow::events; a row may carry an end and a begin, in that order but where passed says
- * otherwise. */
+/* Bit numbers of PairRow::events: test `row.events & (1 << SWEEPD_EVENT_BEGIN)`. A row may carry an end and a
+ * begin, in that order but where passed says otherwise. */
 enum {
     /* First tick in which the pair is certified colliding. */
     SWEEPD_EVENT_BEGIN = 0,
@@ -287,7 +287,7 @@ enum {
     SWEEPD_PAIR_FLAGS_TOUCHING = 1,
     /* gap_best_m, gap_max_m or the contacts are estimates, not proved. */
     SWEEPD_PAIR_FLAGS_ESTIMATE = 2,
-    /* A body of the pair is unknown, stale or truncated. */
+    /* A body of the pair is unknown or stale. */
     SWEEPD_PAIR_FLAGS_UNKNOWN_BODY = 4,
     /* A body of the pair is held at an old pose. */
     SWEEPD_PAIR_FLAGS_HELD_BODY = 8,
@@ -544,7 +544,7 @@ typedef struct sweepd_pair_row {
     uint8_t verdict;
     /* Last certified Verdict: apart, near or colliding. */
     uint8_t certified_verdict;
-    /* Bits of Event. */
+    /* Bits of Event, by number. */
     uint8_t events;
     /* EndCause of the end in this row. */
     uint8_t end_cause;
@@ -766,7 +766,7 @@ typedef struct sweepd_source_row {
     uint64_t age_ns;
     /* Frames admitted in this boot. */
     uint64_t frames;
-    /* Frames passed over because a newer one was there. */
+    /* Frames passed over because a newer one was there, or lost on their way (gaps in seq). */
     uint64_t skipped;
     /* Frames refused. */
     uint64_t refused;
@@ -841,7 +841,7 @@ typedef struct sweepd_tick_row {
     double widest_m;
     /* Ticks for which the oldest undecided pair has been so. */
     uint64_t oldest_undecided_ticks;
-    /* Bits of Reason. */
+    /* Bits of Reason, by number. */
     uint32_t reasons;
     /* TickCause. */
     uint8_t cause;

@@ -68,8 +68,15 @@ pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
         world.ignored_pairs_count()
     ))?;
     if args.ignored {
-        for (a, b, why) in ignored(&world) {
+        let listed = ignored(&world);
+        let is_cut = listed.len() == IGNORED_SHOWN;
+        for (a, b, why) in listed {
             out.line(&format!("    {a} - {b}: {why}"))?;
+        }
+        if is_cut {
+            out.line(&format!(
+                "    .. and no more than {IGNORED_SHOWN} are listed"
+            ))?;
         }
     }
     for warning in &warnings {

@@ -115,8 +115,8 @@ pub trait Door {
     /// that was not filled is never sent as "nothing touches".
     fn demand(&mut self) -> Demand;
 
-    /// Sends contacts, pairs, changes, bodies, body verdicts, names and plan (where new), then the tick, then one
-    /// `ready` event; never waits for a reader.
+    /// Sends contacts, regions, pairs, changes, bodies, body verdicts, names and plan (where new), then the tick, then
+    /// one `ready` event; never waits for a reader.
     ///
     /// * returns - messages that could not be handed over.
     ///

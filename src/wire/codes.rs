@@ -103,7 +103,7 @@ code! {
         Timeout = 1 => "timeout",
         /// Nothing else happened for a heartbeat.
         Heartbeat = 2 => "heartbeat",
-        /// A scene edit was applied.
+        /// A scene edit was applied, or a tick was asked for.
         Edit = 3 => "edit",
     }
 }
@@ -151,7 +151,8 @@ code! {
 }
 
 code! {
-    /// Bits of `PairRow::events`; a row may carry an end and a begin, in that order but where `Passed` says otherwise.
+    /// Bit numbers of `PairRow::events`, see [`Event::bit`]: a row may carry an end and a begin, in that order but
+    /// where `Passed` says otherwise.
     Event {
         /// First tick in which the pair is certified colliding.
         Begin = 0 => "begin",
@@ -314,7 +315,7 @@ pub mod pair_flags {
     pub const TOUCHING: u8 = 1;
     /// `gap_best_m`, `gap_max_m` or the contacts are estimates, not proved.
     pub const ESTIMATE: u8 = 2;
-    /// A body of the pair is unknown, stale or truncated.
+    /// A body of the pair is unknown or stale.
     pub const UNKNOWN_BODY: u8 = 4;
     /// A body of the pair is held at an old pose.
     pub const HELD_BODY: u8 = 8;

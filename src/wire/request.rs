@@ -1,4 +1,4 @@
-//! Requests: a JSON header in the scene's own serde types, then vertex and index blobs, little-endian.
+//! Requests: JSON in the words of scene files, then vertex and index blobs, little-endian.
 
 use iceoryx2::prelude::ZeroCopySend;
 use serde::{Deserialize, Serialize};

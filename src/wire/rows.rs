@@ -138,7 +138,7 @@ pub struct PairRow {
     pub verdict: u8,
     /// Last certified `Verdict`: apart, near or colliding.
     pub certified_verdict: u8,
-    /// Bits of `Event`.
+    /// Bits of `Event`, by number.
     pub events: u8,
     /// `EndCause` of the end in this row.
     pub end_cause: u8,

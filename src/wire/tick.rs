@@ -30,7 +30,7 @@ pub struct SourceRow {
     pub age_ns: u64,
     /// Frames admitted in this boot.
     pub frames: u64,
-    /// Frames passed over because a newer one was there.
+    /// Frames passed over because a newer one was there, or lost on their way (gaps in `seq`).
     pub skipped: u64,
     /// Frames refused.
     pub refused: u64,
@@ -93,7 +93,7 @@ pub struct TickRow {
     pub widest_m: f64,
     /// Ticks for which the oldest undecided pair has been so.
     pub oldest_undecided_ticks: u64,
-    /// Bits of `Reason`.
+    /// Bits of `Reason`, by number.
     pub reasons: u32,
     /// `TickCause`.
     pub cause: u8,

@@ -358,10 +358,10 @@ impl World {
         }
     }
 
-    /// Counts frames that were passed over because a newer one of their source was there.
+    /// Counts frames that were passed over because a newer one of their source was there, or that never came.
     pub fn note_skipped(&mut self, source: SourceSlot, frames: u64) {
         if let Some(source) = self.sources.get_mut(source.index()) {
-            source.skipped += frames;
+            source.skipped = source.skipped.saturating_add(frames);
         }
     }
 

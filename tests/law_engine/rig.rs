@@ -274,8 +274,26 @@ impl Rig {
         self.out.clone_from(self.engine.tick(input));
         if self.checked {
             self.engine.validate().unwrap();
+            self.check_widest();
         }
         &self.out
+    }
+
+    /// The widest interval is kept from tick to tick: here it is looked for among all rows.
+    fn check_widest(&self) {
+        if !self.demand.pairs || self.out.pairs_header.truncated > 0 {
+            return;
+        }
+        // A row of a pair that is apart is there for its event, or its way.
+        let counts = |row: &&PairRow| {
+            let way = pair_flags::SWEPT_HIT | pair_flags::SWEPT_OPEN;
+            row.verdict > Verdict::Apart.code() || row.flags & way != 0
+        };
+        let rows = self.out.pairs.iter().filter(counts);
+        let widest_m = rows
+            .map(|row| row.gap_max_m - row.gap_min_m)
+            .fold(0.0, f64::max);
+        assert_eq!(self.out.tick.widest_m, widest_m, "{:?}", self.out.pairs);
     }
 
     pub(crate) fn pair(&self, a: u64, b: u64) -> Option<&PairRow> {

@@ -138,3 +138,48 @@ fn law_3_11_output_is_ordered_by_ids() {
             .is_sorted_by_key(|row| (row.body_a, row.body_b))
     );
 }
+
+/// Positive while they come nearer; of points on turning bodies, and of a partner that cannot move.
+#[test]
+fn law_6_how_fast_a_gap_shrinks_is_told_where_velocities_are() {
+    let near = "report_within_m = 3.0";
+    let wall = "name = \"wall\"\nid = 3\nmoves = false\nposition = [0.0, 3.0, 0.0]\n\
+        shape = { type = \"sphere\", radius = 1.0 }\nreport_within_m = 3.0";
+    let bodies = [ball(1, 0.0, near), ball(2, 3.0, near), wall.to_owned()];
+    let mut rig = Rig::new(&scene("", &bodies));
+    rig.send(ALL);
+    let closing = |rig: &Rig, b| rig.pair(1, b).unwrap().closing_mps;
+    assert!(closing(&rig, 2).is_nan() && closing(&rig, 3).is_nan());
+    let still = [0.0; 6];
+    for (velocities, toward_ball, toward_wall) in [
+        (
+            [
+                [1.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+                [-0.5, 0.0, 0.0, 0.0, 0.0, 0.0],
+            ],
+            1.5,
+            0.0,
+        ),
+        ([[-1.0, 0.5, 0.0, 0.0, 0.0, 0.0], still], -1.0, 0.5),
+        // Balls that turn about their own centres do not come nearer.
+        (
+            [
+                [0.0, -2.0, 0.0, 0.0, 0.0, 9.0],
+                [0.0, 0.0, 0.0, 0.0, 7.0, 0.0],
+            ],
+            0.0,
+            -2.0,
+        ),
+    ] {
+        rig.velocities = velocities.to_vec();
+        rig.send(ALL);
+        assert!(
+            (closing(&rig, 2) - toward_ball).abs() < 1e-12,
+            "{velocities:?}"
+        );
+        assert!(
+            (closing(&rig, 3) - toward_wall).abs() < 1e-12,
+            "{velocities:?}"
+        );
+    }
+}

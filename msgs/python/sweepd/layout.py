@@ -593,7 +593,7 @@ class TickCause(IntEnum):
     TIMEOUT = 1
     # Nothing else happened for a heartbeat.
     HEARTBEAT = 2
-    # A scene edit was applied.
+    # A scene edit was applied, or a tick was asked for.
     EDIT = 3
 
 

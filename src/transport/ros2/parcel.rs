@@ -6,8 +6,8 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use crate::wire::{
-    BodyRow, ContactRow, Demand, Event, MessageHeader, NameRow, Outbox, PairRow, TickRow, Verdict,
-    pair_flags,
+    BodyRow, ContactRow, Demand, Event, MessageHeader, NameRow, Outbox, PairRow, Reason, TickRow,
+    Verdict, pair_flags,
 };
 
 /// Parcels that wait: one being sent and one behind it; more would only be older.
@@ -79,12 +79,16 @@ impl Picker {
     }
 }
 
+/// Whether it tells of a begin or an end.
+fn has_event(row: &PairRow) -> bool {
+    row.events & !Event::Persist.bit() != 0
+}
+
 /// Rows with events first, then colliding, possible, near; deepest first.
 fn pair_rank(row: &PairRow) -> (u8, f64) {
-    let told = row.events & !Event::Persist.bit() != 0;
     let has = |flag: u8| row.flags & flag != 0;
     let class = match Verdict::from_code(row.verdict) {
-        _ if told => 0,
+        _ if has_event(row) => 0,
         Some(Verdict::Colliding) => 1,
         _ if has(pair_flags::SWEPT_HIT) => 1,
         Some(Verdict::Possible) => 2,
@@ -95,16 +99,32 @@ fn pair_rank(row: &PairRow) -> (u8, f64) {
 }
 
 impl Parcel {
+    /// Rows that do not go out are told in the tick, too. It is not clear then: what would be clear has no such rows.
+    fn note_cut(&mut self, left_out: u64) {
+        if left_out > 0 {
+            self.tick.header.truncated += left_out;
+            self.tick.reasons |= Reason::Truncated.bit();
+        }
+    }
+
     /// Takes what a tick filled.
     fn fill(&mut self, outbox: &Outbox, demand: Demand, caps: Caps) {
         self.tick = outbox.tick;
         self.holds = demand;
         if demand.pairs {
+            // An event is told once: none is left out.
+            let events = outbox.pairs.iter().filter(|row| has_event(row)).count();
+            let most = if caps.pairs == 0 {
+                0
+            } else {
+                caps.pairs.max(events)
+            };
             let left_out = self
                 .picker
-                .pick(&outbox.pairs, caps.pairs, pair_rank, &mut self.pairs);
+                .pick(&outbox.pairs, most, pair_rank, &mut self.pairs);
             self.pairs_header = outbox.pairs_header;
             self.pairs_header.truncated += left_out;
+            self.note_cut(left_out);
         }
         if demand.contacts {
             let depth = |row: &ContactRow| (row.kind, row.gap_m);
@@ -113,6 +133,7 @@ impl Parcel {
                     .pick(&outbox.contacts, caps.contacts, depth, &mut self.contacts);
             self.contacts_header = outbox.contacts_header;
             self.contacts_header.truncated += left_out;
+            self.note_cut(left_out);
         }
         if demand.bodies {
             self.bodies.clear();
@@ -288,6 +309,26 @@ mod tests {
             (contacts, parcel.contacts_header.truncated),
             (vec![2, 3], 6)
         );
+    }
+
+    #[test]
+    fn no_event_is_left_out_and_what_is_cut_is_told_in_the_tick() {
+        let parcels = Parcels::default();
+        let mut all = outbox(1);
+        all.pairs
+            .iter_mut()
+            .take(4)
+            .for_each(|row| row.events = Event::End.bit());
+        all.tick.header.truncated = 5;
+        parcels.put(&all, Demand::ALL, CAPS);
+        let parcel = next(&parcels);
+        let pairs: Vec<_> = parcel.pairs.iter().map(|row| row.body_a).collect();
+        assert_eq!(
+            (pairs, parcel.pairs_header.truncated),
+            (vec![1, 2, 3, 4], 1)
+        );
+        assert_eq!(parcel.tick.header.truncated, 5 + 1 + 1);
+        assert_eq!(parcel.tick.reasons, Reason::Truncated.bit());
     }
 
     #[test]
