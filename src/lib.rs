@@ -1,8 +1,8 @@
 //! sweepd: a collision server. Body transforms come in over shared memory, colliding pairs and contacts go out
 //! within a time budget per tick; every answer is a sound interval that motion widens and work narrows.
 //!
-//! Promised to users of the library: [`scene`], [`wire`] and [`tick`]. Data flows down this list; a room names
-//! only rooms above it (`tests/rooms.rs` checks it).
+//! Promised to users of the library: [`scene`], [`wire`], [`tick`] and [`transport::client`]. Data flows down this
+//! list; a room names only rooms above it (`tests/rooms.rs` checks it).
 
 // foundation
 pub mod error;

@@ -2,15 +2,16 @@
 
 use serde_json::json;
 
-use crate::daemon::build_shapes;
 use crate::error::Result;
 use crate::plan::Plan;
 use crate::scene::Scene;
+use crate::shape::Library;
 use crate::time::{Clock, SystemClock};
 use crate::world::{Body, World};
 
 use super::args::CheckArgs;
 use super::out::Out;
+use super::progress::shapes_of;
 
 /// Ignored pairs listed at most.
 const IGNORED_SHOWN: usize = 10_000;
@@ -18,7 +19,7 @@ const IGNORED_SHOWN: usize = 10_000;
 /// Prints the plan, what was left out, ignored pairs and warnings.
 pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
     let scene = Scene::load(&args.scene)?;
-    let shapes = build_shapes(&scene)?;
+    let shapes = shapes_of(&scene, Library::new())?;
     let mut warnings = scene.notes();
     warnings.extend(shapes.warnings);
     let world = World::new(&scene, shapes.bodies, SystemClock.boottime_ns())?;

@@ -2,6 +2,10 @@
 
 use std::io::{IsTerminal as _, Write as _};
 
+use crate::error::Result;
+use crate::scene::Scene;
+use crate::shape::Library;
+use crate::tick::build::{Shapes, build_shapes_in};
 use crate::time::{Clock as _, SystemClock};
 
 /// Time between two lines, nanoseconds.
@@ -40,6 +44,17 @@ impl Progress {
             .collect();
         let _ = write!(std::io::stderr(), "\r{line:<COLUMNS$}");
     }
+}
+
+/// The shapes of a scene, and how far they are: meshes may take a while.
+///
+/// # Errors
+/// As [`build_shapes_in`].
+pub(super) fn shapes_of(scene: &Scene, library: Library) -> Result<Shapes> {
+    let mut progress = Progress::new();
+    build_shapes_in(scene, library, |done, all| {
+        progress.tell(done as u64, all as u64, "bodies built");
+    })
 }
 
 impl Drop for Progress {

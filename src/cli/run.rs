@@ -8,12 +8,12 @@ use crate::config::Mode;
 use crate::daemon::{Daemon, Watchdog};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
-use crate::tick::build::build_shapes_in;
 use crate::time::{Clock, SystemClock};
 use crate::transport::iceoryx::{Place, Server, ServerOptions, spawn_cleaner};
 use crate::transport::{Both, Door};
 
 use super::args::{Limit, RunArgs};
+use super::progress::shapes_of;
 use super::record::Tape;
 use super::ros;
 
@@ -33,7 +33,7 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     asked.check(&scene)?;
     check_watchdog(args, &scene)?;
     let tape = Tape::of(args)?;
-    let mut shapes = build_shapes_in(&scene, tape.library())?;
+    let mut shapes = shapes_of(&scene, tape.library())?;
     let given = (text, shapes.library.take_kept());
     for warning in scene.notes().iter().chain(&shapes.warnings) {
         tracing::warn!("{warning}");

@@ -127,7 +127,7 @@ impl Replay {
             units: facts.budget_units,
         };
         scene.config.threads = Some(facts.threads);
-        let shapes = build_shapes_in(&scene, Library::of_kept(start.files.clone()))?;
+        let shapes = build_shapes_in(&scene, Library::of_kept(start.files.clone()), |_, _| {})?;
         let clock = Arc::new(Shown::default());
         clock.boottime_ns.store(facts.started_ns, Ordering::Relaxed);
         let shown = Arc::clone(&clock) as Arc<dyn Clock>;

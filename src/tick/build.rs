@@ -27,15 +27,21 @@ pub struct Shapes {
 /// # Errors
 /// `Error::Scene` with file, line, body and what to change, for the first shape that cannot be built.
 pub fn build_shapes(scene: &Scene) -> Result<Shapes> {
-    build_shapes_in(scene, Library::new())
+    build_shapes_in(scene, Library::new(), |_, _| {})
 }
 
 /// As [`build_shapes`], with a library of its own: one that keeps the files it reads, or is of kept ones.
 ///
+/// * `progress` - told after each body: how many are done, of how many.
+///
 /// # Errors
 /// As [`build_shapes`].
-pub fn build_shapes_in(scene: &Scene, mut library: Library) -> Result<Shapes> {
-    let built = scene.build_shapes(&mut library, |_, _| {})?;
+pub fn build_shapes_in(
+    scene: &Scene,
+    mut library: Library,
+    progress: impl FnMut(usize, usize),
+) -> Result<Shapes> {
+    let built = scene.build_shapes(&mut library, progress)?;
     let bodies = scene
         .bodies
         .iter()

@@ -310,3 +310,31 @@ fn bug_a_half_space_that_was_let_go_has_no_certificate_from_when_it_moved() {
     rig.send(ALL);
     assert_eq!(rig.verdict(1, 3), Verdict::Colliding, "by 0.1 m");
 }
+
+/// Few boxes are compared pair by pair; that stays while there are a few more, and comes back where there are few again.
+#[test]
+fn the_plan_follows_the_scene_and_says_so_in_the_tick_of_the_edit() {
+    let bodies: Vec<String> = (1..=33).map(|id| ball(id, 10.0 * id as f64, "")).collect();
+    let mut rig = Rig::new(&scene("", &bodies[..20]));
+    let method = |rig: &Rig| {
+        let plan: serde_json::Value = serde_json::from_str(&rig.engine.outbox().plan).unwrap();
+        let chosen = plan["choices"][0]["chosen"].as_str().unwrap().to_owned();
+        (chosen.starts_with("every pair"), plan["bodies"].as_u64())
+    };
+    rig.send(ALL);
+    assert_eq!(method(&rig), (true, Some(20)));
+    let grown = |upto: usize| (21..=upto).map(|n| put(&bodies[..n])).collect::<Vec<_>>();
+    rig.edit(grown(32), ALL);
+    assert_eq!(method(&rig), (true, Some(32)), "it stays a little longer");
+    rig.edit(vec![put(&bodies[..33])], ALL);
+    assert_eq!(method(&rig), (false, Some(33)));
+    let remove = |id: usize| Edit::Remove {
+        name: format!("b{id}"),
+    };
+    rig.edit((25..=33).map(remove).collect(), ALL);
+    assert_eq!(method(&rig), (true, Some(24)));
+    // Whatever was chosen meanwhile, pairs are found.
+    rig.move_x(2, 11.0);
+    rig.send(ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+}

@@ -115,7 +115,7 @@ pub fn run(
     mut drive: impl FnMut() -> bool,
 ) -> u64 {
     let scene = Scene::parse(text, "rich.toml", folder.dir()).unwrap();
-    let mut shapes = build_shapes_in(&scene, Library::keeping()).unwrap();
+    let mut shapes = build_shapes_in(&scene, Library::keeping(), |_, _| {}).unwrap();
     let files = shapes.library.take_kept();
     let inner = MemoryServer::open(hub, 7, scene.config.heartbeat_ns).unwrap();
     let mut door = Desk { inner, panel };

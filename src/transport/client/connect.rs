@@ -51,6 +51,35 @@ pub(super) fn check_source(name: Option<&str>) -> Result<()> {
 impl Client {
     /// Connects to an instance under the default root: [`ClientOptions::connect`] in one line.
     ///
+    /// ```no_run
+    /// use sweepd::transport::client::{Client, FrameInfo, Rows, Topics};
+    /// use sweepd::wire::{TransformRow, name_str};
+    ///
+    /// const SECOND_NS: u64 = 1_000_000_000;
+    /// let mut client = Client::connect("default", Some("sim"), 5 * SECOND_NS)?;
+    /// client.subscribe(Topics {
+    ///     pairs: true,
+    ///     names: true,
+    ///     ..Topics::default()
+    /// })?;
+    /// while client.view().names().is_none() {
+    ///     client.wait_tick(SECOND_NS)?;
+    /// }
+    /// let names = client.view().names().expect("they have come");
+    /// let cart = names.rows.iter().find(|row| name_str(&row.name) == Some("cart"));
+    /// let pose = TransformRow {
+    ///     body: cart.expect("the scene has a cart").body,
+    ///     position: [0.1, 0.0, 0.0],
+    ///     orientation: [0.0, 0.0, 0.0, 1.0],
+    ///     ..TransformRow::default()
+    /// };
+    /// client.step(&FrameInfo::default(), Rows::Poses(&[pose]), SECOND_NS)?;
+    /// for pair in &client.view().pairs().expect("listened to").rows {
+    ///     println!("{} {}: {} to {} m", pair.body_a, pair.body_b, pair.gap_min_m, pair.gap_max_m);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
     /// # Errors
     /// As [`ClientOptions::connect`].
     pub fn connect(instance: &str, source: Option<&str>, timeout_ns: u64) -> Result<Self> {
