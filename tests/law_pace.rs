@@ -346,6 +346,14 @@ fn law_4_4_frames_that_were_lost_on_their_way_are_counted() {
         daemon.run(9600.0, frames);
         assert_eq!(daemon.passed_of(0), 2, "{mode:?}");
         assert_eq!(daemon.passed_of(1), 0);
+        // A number out of all proportion overflows no count.
+        let absurd = (1..=4_u32).flat_map(|epoch| {
+            let at_ms = 10_000.0 + 10.0 * f64::from(epoch);
+            let frame = |seq| again(seq, epoch.into(), session + 1);
+            [(at_ms, frame(1)), (at_ms + 1.0, frame(u64::MAX))]
+        });
+        daemon.run(11_000.0, absurd.collect());
+        assert!(daemon.passed_of(0) < u64::MAX / 2, "{mode:?}");
     }
 }
 

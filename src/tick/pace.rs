@@ -116,8 +116,7 @@ impl Pacer {
             };
             if let Some(source) = place.and_then(|p| self.sources.get_mut(p)) {
                 source.heard_ns = Some(source.heard_ns.unwrap_or(0).max(received_ns));
-                let lost = source.lost_before(&frame.header);
-                source.passed = source.passed.saturating_add(lost);
+                source.passed += source.lost_before(&frame.header);
                 source.session = frame.header.session;
                 source.sent = true;
                 source.late = false;

@@ -111,9 +111,7 @@ impl World {
         }
         // An older frame that still waits has nothing to say any more.
         let state = &mut self.sources[source.index()];
-        if state.waiting.until_ns.take().is_some() {
-            state.skipped += 1;
-        }
+        state.pass_over_waiting();
         if frame.waited && header.sent_ns == 0 {
             return Err(RejectReason::TooOld);
         }

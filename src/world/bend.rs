@@ -151,9 +151,7 @@ impl World {
             Standing::Refused(reason) => return refused(reason),
             Standing::Afresh => {
                 // A frame that still waits is of before.
-                if state.waiting.until_ns.take().is_some() {
-                    state.skipped += 1;
-                }
+                state.pass_over_waiting();
                 self.forget_poses(source);
             }
             Standing::Next => {}

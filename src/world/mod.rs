@@ -361,7 +361,7 @@ impl World {
     /// Counts frames that were passed over because a newer one of their source was there, or that never came.
     pub fn note_skipped(&mut self, source: SourceSlot, frames: u64) {
         if let Some(source) = self.sources.get_mut(source.index()) {
-            source.skipped = source.skipped.saturating_add(frames);
+            source.skipped += frames;
         }
     }
 
@@ -378,9 +378,7 @@ impl World {
             self.over.put(source, state.session);
             state.session = 0;
             state.order = None;
-            if state.waiting.until_ns.take().is_some() {
-                state.skipped += 1;
-            }
+            state.pass_over_waiting();
         }
     }
 

@@ -137,6 +137,13 @@ impl SourceState {
     pub fn waits(&self) -> bool {
         self.waiting.until_ns.is_some()
     }
+
+    /// What waits has nothing to say any more: it is passed over.
+    pub(super) fn pass_over_waiting(&mut self) {
+        if self.waiting.until_ns.take().is_some() {
+            self.skipped += 1;
+        }
+    }
 }
 
 /// What a frame's session and number mean for its source.

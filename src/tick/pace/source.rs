@@ -39,7 +39,7 @@ impl Source {
     }
 
     /// Frames of the session that never came, as the number of the next one tells: its queue in shared memory holds
-    /// four, and DDS drops what it must.
+    /// four, and DDS drops what it must. No more than 2^32, whatever a sender counts by: sums of them do not overflow.
     pub(super) fn lost_before(&mut self, next: &FrameHeader) -> u64 {
         let (before, now) = (self.newest, (next.epoch, next.seq));
         if self.session != next.session {
@@ -48,7 +48,8 @@ impl Source {
         }
         self.newest = before.max(now);
         if before.0 == now.0 {
-            now.1.saturating_sub(before.1).saturating_sub(1)
+            let lost = now.1.saturating_sub(before.1).saturating_sub(1);
+            lost.min(u64::from(u32::MAX))
         } else {
             0
         }
