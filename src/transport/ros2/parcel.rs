@@ -6,8 +6,8 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use crate::wire::{
-    BodyRow, ContactRow, Demand, Event, MessageHeader, NameRow, Outbox, PairRow, Reason, TickRow,
-    Verdict, pair_flags,
+    BodyRow, ContactRow, Demand, Event, MessageHeader, NameRow, Outbox, PairRow, Reason, State,
+    TickRow, Verdict, pair_flags,
 };
 
 /// Parcels that wait: one being sent and one behind it; more would only be older.
@@ -20,6 +20,17 @@ pub(super) struct Caps {
     pub(super) pairs: usize,
     /// Rows of `~/contacts` a tick.
     pub(super) contacts: usize,
+}
+
+impl Caps {
+    /// How many of these rows go out: an event is told once, so none is left out where there are any rows.
+    fn pairs_of(self, rows: &[PairRow]) -> usize {
+        if self.pairs == 0 || rows.len() <= self.pairs {
+            return self.pairs;
+        }
+        let events = rows.iter().filter(|row| has_event(row)).count();
+        self.pairs.max(events)
+    }
 }
 
 /// One tick on its way out.
@@ -99,10 +110,14 @@ fn pair_rank(row: &PairRow) -> (u8, f64) {
 }
 
 impl Parcel {
-    /// Rows that do not go out are told in the tick, too. It is not clear then: what would be clear has no such rows.
+    /// Rows that do not go out are told in the tick, too; it is not clear then.
     fn note_cut(&mut self, left_out: u64) {
         if left_out > 0 {
-            self.tick.header.truncated += left_out;
+            let header = &mut self.tick.header;
+            header.truncated += left_out;
+            if header.state == State::Clear.code() {
+                header.state = State::Unknown.code();
+            }
             self.tick.reasons |= Reason::Truncated.bit();
         }
     }
@@ -112,13 +127,7 @@ impl Parcel {
         self.tick = outbox.tick;
         self.holds = demand;
         if demand.pairs {
-            // An event is told once: none is left out.
-            let events = outbox.pairs.iter().filter(|row| has_event(row)).count();
-            let most = if caps.pairs == 0 {
-                0
-            } else {
-                caps.pairs.max(events)
-            };
+            let most = caps.pairs_of(&outbox.pairs);
             let left_out = self
                 .picker
                 .pick(&outbox.pairs, most, pair_rank, &mut self.pairs);
@@ -338,9 +347,12 @@ mod tests {
             pairs: 0,
             contacts: 0,
         };
-        parcels.put(&outbox(1), Demand::ALL, caps);
+        let mut clear = outbox(1);
+        clear.tick.header.state = State::Clear.code();
+        parcels.put(&clear, Demand::ALL, caps);
         let parcel = next(&parcels);
         assert_eq!((parcel.pairs.len(), parcel.pairs_header.truncated), (0, 5));
+        assert_eq!(parcel.tick.header.state, State::Unknown.code());
     }
 
     #[test]
