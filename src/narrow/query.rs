@@ -163,12 +163,7 @@ pub(super) fn sphere_bound(a: &PlacedShape, b: &PlacedShape, bodies12: &Pose) ->
         bodies12 * (b.pose * b.shape.centre),
     );
     // The centres are sums of numbers that may be far larger than they are.
-    let far = |placed: &PlacedShape| {
-        placed.pose.translation.vector.amax()
-            + placed.shape.centre.coords.amax()
-            + placed.shape.radius
-    };
-    let magnitude = bodies12.translation.vector.amax() + far(a) + far(b);
+    let magnitude = bodies12.translation.vector.amax() + a.reach_m() + b.reach_m();
     (cb - ca).norm() - ra - rb - 32.0 * f64::EPSILON * magnitude
 }
 

@@ -185,10 +185,7 @@ pub(super) fn balls(one: &PlacedShape, other: &PlacedShape, moment: &Moment, bou
     let off = 16.0 * ROUND * (velocity.amax() + turned);
     let closing = -velocity.dot(&direction) + turned + off;
     // A slab between two balls along one direction: as wide as they are apart.
-    let far = |placed: &PlacedShape, pose: &Pose| {
-        let of = |pose: &Pose| pose.translation.vector.amax();
-        of(pose) + of(&placed.pose) + placed.shape.centre.coords.amax() + placed.shape.radius
-    };
+    let far = |placed: &PlacedShape, pose: &Pose| pose.translation.vector.amax() + placed.reach_m();
     let slack = 64.0 * ROUND * (far(one, &moment.a.pose) + far(other, &moment.b.pose));
     time_of(bound_m - slack, closing)
 }
