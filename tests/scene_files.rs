@@ -63,20 +63,17 @@ fn the_example_scene_names_every_key_there_is() {
     let example = std::fs::read_to_string("launch-free-scripts/example_scene.toml").unwrap();
     let is_word_char = |c: char| c.is_alphanumeric() || c == '_';
     let words: BTreeSet<&str> = example.split(|c| !is_word_char(c)).collect();
-    let shapes = [
-        "sphere",
-        "box",
-        "capsule",
-        "cylinder",
-        "cone",
-        "convex",
-        "triangle",
-        "trimesh",
-        "half_space",
-        "height_field",
-    ];
-    let of_shape = |kind| format!("[[body]]\nname='b'\nshape={{type='{kind}',qqqqqqqq=1}}");
-    let mut scenes: Vec<String> = shapes.map(of_shape).to_vec();
+    let told = |text: &str, lead: &str| -> Vec<String> {
+        let error = Scene::parse(text, "keys.toml", Path::new(""))
+            .unwrap_err()
+            .to_string();
+        let (_, words) = error.split_once(lead).expect(&error);
+        words.trim().split(", ").map(str::to_owned).collect()
+    };
+    let of_shape = |kind: &str| format!("[[body]]\nname='b'\nshape={{type='{kind}',qqqqqqqq=1}}");
+    let kinds = told(&of_shape("qqqqqqqq"), "write one of ");
+    assert_eq!(kinds.len(), 10, "{kinds:?}");
+    let mut scenes: Vec<String> = kinds.iter().map(|kind| of_shape(kind)).collect();
     scenes.extend(
         [
             "qqqqqqqq=1",
@@ -91,11 +88,8 @@ fn the_example_scene_names_every_key_there_is() {
         .map(str::to_owned),
     );
     for text in scenes {
-        let error = Scene::parse(&text, "keys.toml", Path::new("")).unwrap_err();
-        let error = error.to_string();
-        let (_, keys) = error.split_once("known keys are ").expect(&error);
-        for key in keys.trim().split(", ") {
-            assert!(words.contains(key), "{key} of {error}");
+        for key in told(&text, "known keys are ") {
+            assert!(words.contains(&*key), "{key} of {text}");
         }
     }
 }
