@@ -52,7 +52,21 @@ pub(super) struct Judge<'a, X, P> {
     pub(super) policy: &'a P,
 }
 
-impl<X: Proxies, P: PairPolicy> Judge<'_, X, P> {
+impl<'a, X: Proxies, P: PairPolicy> Judge<'a, X, P> {
+    pub(super) fn of(
+        members: &'a Members,
+        forced: &'a Forced,
+        proxies: &'a X,
+        policy: &'a P,
+    ) -> Self {
+        Self {
+            members,
+            proxies,
+            forced,
+            policy,
+        }
+    }
+
     /// Whether something else than the boxes keeps the pair a candidate: a rule, or a body without a box.
     fn is_unconditional(&self, key: PairKey) -> bool {
         let (low, high) = key.slots();

@@ -193,39 +193,59 @@ impl BroadPhase {
         self.leave(changes, pairs);
         self.enter(changes, proxies);
         self.mark(changes, proxies, pairs);
-        let judge = Judge {
-            members: &self.members,
-            proxies,
-            forced: &self.forced,
-            policy,
-        };
+        let is_brute = matches!(self.engine, Engine::Brute);
+        if !is_brute {
+            let judge = Judge::of(&self.members, &self.forced, proxies, policy);
+            touched::end(&judge, pairs, &mut self.found);
+            self.search(&changes.moved, proxies);
+        }
+        let judge = Judge::of(&self.members, &self.forced, proxies, policy);
+        if is_brute {
+            brute::update(&judge, pairs, &mut self.found);
+        } else {
+            self.found.part(&mut self.parted, &judge, pairs);
+            touched::begin(&judge, &mut self.found);
+        }
+        self.found.commit(&judge, pairs, delta);
+        self.close_tick();
+    }
+
+    /// Takes over from another method, whose update of this tick has brought the pair set up to date: it builds what
+    /// it keeps of the bodies that are in, and finds the pairs that are stored. Where the set was full, what is not
+    /// stored is looked for by the next update.
+    ///
+    /// * `inside` - the slots of all bodies that are in.
+    pub fn take_over(&mut self, inside: &[BodySlot], proxies: &impl Proxies) {
+        self.members.open_tick();
+        for slot in inside {
+            self.members.enter(*slot, proxies);
+        }
+        self.search(&[], proxies);
+        self.close_tick();
+    }
+
+    /// Lets the method find what has begun, or may have, and what has parted.
+    fn search(&mut self, moved: &[BodySlot], proxies: &impl Proxies) {
         match &mut self.engine {
-            Engine::Brute => brute::update(&judge, pairs, &mut self.found),
-            Engine::Sap(sap) => {
-                touched::end(&judge, pairs, &mut self.found);
-                sap.update(&self.members, &mut self.found.maybe, &mut self.work);
-                touched::begin(&judge, &mut self.found);
-            }
+            Engine::Brute => {}
+            Engine::Sap(sap) => sap.update(&self.members, &mut self.found.maybe, &mut self.work),
             Engine::Grid(grid) => {
-                touched::end(&judge, pairs, &mut self.found);
                 grid.update(&self.members, &mut self.found.maybe, &mut self.work);
-                touched::begin(&judge, &mut self.found);
             }
             Engine::Order(order) => {
-                touched::end(&judge, pairs, &mut self.found);
                 let tick = Tick {
                     members: &self.members,
                     proxies,
-                    moved: &changes.moved,
+                    moved,
                     began: &mut self.found.began,
                     parted: &mut self.parted,
                 };
                 order.update(tick, &mut self.work);
-                self.found.part(&mut self.parted, &judge, pairs);
-                touched::begin(&judge, &mut self.found);
             }
         }
-        self.found.commit(&judge, pairs, delta);
+    }
+
+    fn close_tick(&mut self) {
         self.forced.settle();
         let bodies = self.len();
         self.found.close_tick(bodies);

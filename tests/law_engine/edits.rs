@@ -338,3 +338,58 @@ fn the_plan_follows_the_scene_and_says_so_in_the_tick_of_the_edit() {
     rig.send(ALL);
     assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
 }
+
+/// The tick in which the plan takes another broad phase is an edit's: what that edit ends, begins and replaces is told
+/// as in any other tick.
+#[test]
+fn bug_the_tick_in_which_the_broad_phase_changed_forgot_what_else_had_changed() {
+    // All touch their neighbours; the last but one is kept from its neighbours later.
+    let bodies: Vec<String> = (1..=40).map(|id| ball(id, 1.5 * id as f64, "")).collect();
+    let remove = |id: usize| Edit::Remove {
+        name: format!("b{id}"),
+    };
+    let ignore = rule(PairAction::Ignore, "b3", "b4", None);
+    let disable = Edit::Enable {
+        name: "b6".to_owned(),
+        enabled: false,
+    };
+    // In place of a ball that touched nobody's middle: one that holds the next one's.
+    let larger = ball(9, 13.5, "").replace("radius = 1.0", "radius = 2.9");
+    for method in ["auto", "order", "brute"] {
+        let head = format!("[run]\nbroad_phase = \"{method}\"\n");
+        let mut rig = Rig::new(&scene(&head, &bodies[..25]));
+        rig.send(ALL);
+        assert_eq!(rig.verdict(24, 25), Verdict::Colliding);
+        let edits = vec![
+            remove(25),
+            ignore.clone(),
+            disable.clone(),
+            put(std::slice::from_ref(&larger)),
+        ];
+        rig.send_with(edits, ALL);
+        let end = |rig: &Rig, a, b| {
+            rig.pair(a, b)
+                .map(|row| (has(row, Event::End), row.end_cause))
+        };
+        let ended = |cause: EndCause| Some((true, cause.code()));
+        assert_eq!(end(&rig, 24, 25), ended(EndCause::Removed), "{method}");
+        assert_eq!(end(&rig, 3, 4), ended(EndCause::Filtered), "{method}");
+        assert_eq!(end(&rig, 5, 6), ended(EndCause::Disabled), "{method}");
+        assert_eq!(
+            rig.verdict(9, 11),
+            Verdict::Colliding,
+            "{method}: as it is now"
+        );
+        // And back: as many as the method takes, and one that goes.
+        let grow: Vec<Edit> = (26..=40).map(|n| put(&bodies[..n])).collect();
+        rig.edit(grow.into_iter().chain([remove(1)]).collect(), ALL);
+        assert_eq!(end(&rig, 1, 2), ended(EndCause::Removed), "{method}");
+        rig.edit(vec![put(&bodies[..1])], ALL);
+        assert_eq!(
+            rig.verdict(1, 2),
+            Verdict::Apart,
+            "{method}: not received yet"
+        );
+        rig.engine.validate().unwrap();
+    }
+}
