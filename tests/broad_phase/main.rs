@@ -15,6 +15,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod outliers;
 mod world;
 
 use sweepd::wire::EndCause;

@@ -1,9 +1,9 @@
 //! What the bodies of a block tell together, in one pass over their boxes: enough to know that none of them needs a
 //! look of its own.
 
+use super::curve::centre;
 use super::home::widen;
 use super::ones;
-use super::sort::centre;
 use super::tree::NO_BOUND;
 use crate::simd::boxes::{Down, Lanes, WIDTH, Work};
 

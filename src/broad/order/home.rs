@@ -2,8 +2,9 @@
 //!
 //! In: a box, the blocks' parts of space. Out: a free lane.
 
+use super::curve::centre;
 use super::fatten::outward;
-use super::sort::{Sorter, centre};
+use super::sort::Sorter;
 use super::tree::NO_BOUND;
 use super::{BodySlot, Order, Proxies};
 use crate::ids::small;
@@ -159,8 +160,8 @@ pub(super) fn far_from(place: &[f32; 3], home: &[f32; 6]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::broad::order::curve::Frame;
     use crate::broad::order::parts;
-    use crate::broad::order::sort::Frame;
     use crate::builtin::Random;
     use crate::simd::boxes::Level;
 

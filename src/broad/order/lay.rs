@@ -3,12 +3,13 @@
 //! In: every box. Out: lanes, the tree over their blocks, and how much more of space the blocks take than they did.
 
 use super::afresh::{Afresh, FRAME_TICKS};
+use super::curve::Frame;
 use super::fatten::outward;
 use super::home::NO_HOMES;
 use super::links::{room, spare};
 use super::load::Taking;
 use super::place::{ATTIC, grow, middle};
-use super::sort::{FILL, Frame, Sorter};
+use super::sort::{FILL, Sorter};
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, is_thrifty, ones, parts, small};
 use crate::simd::boxes::{Boxes16, Down, Lanes, WIDTH, Work, prefetch};
 
@@ -38,7 +39,7 @@ impl Order {
         let bodies = tick.members.bounded();
         let look_again = self.afresh.framed >= FRAME_TICKS;
         if look_again {
-            self.origin = middle(bodies.iter().map(|slot| tick.proxies.aabb(*slot)));
+            self.origin = middle(bodies, tick.proxies);
             self.afresh.framed = 0;
         }
         let mut boxes = std::mem::take(&mut self.boxes);

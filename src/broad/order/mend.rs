@@ -4,11 +4,12 @@
 //! sort of all. It follows what its bodies do together. A body that has left its quarter moves to a lane in another;
 //! within a quarter the bodies are dealt to the blocks anew when these have spread.
 
+use super::curve::centre;
 use super::fatten::Gait;
 use super::glance::{Glance, LookOver};
 use super::home::far_from;
 use super::links::room;
-use super::sort::{Sorter, centre, split};
+use super::sort::{Sorter, split};
 use super::tree::NO_BOUND;
 use super::{BodySlot, NONE, Order, ones, small};
 use crate::simd::boxes::{Boxes16, Down, Hold, WIDTH};

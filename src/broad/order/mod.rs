@@ -37,6 +37,7 @@ mod afresh;
 mod bits;
 mod cost;
 mod course;
+mod curve;
 mod entry;
 mod fatten;
 mod gear;

@@ -1,14 +1,14 @@
 //! Who stands where: lanes are given up and taken, and from time to time everything is sorted anew.
 
+use super::curve::{CLASSES_MAX, Frame, SAMPLE, centre, fill, sampled};
 use super::fatten::{Gait, outward};
 use super::home::{NO_HOMES, widen};
 use super::idle;
 use super::links::{room, spare};
-use super::sort::{CLASSES_MAX, FILL, Frame, Sorter, centre};
+use super::sort::{FILL, Sorter};
 use super::tree::NO_BOUND;
 use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, ones, parts};
 use crate::ids::small;
-use crate::math::Aabb;
 use crate::simd::boxes::{Boxes16, Down, Hold, Portable, WIDTH};
 
 /// Blocks met by queries beyond what is usual that cost as much as sorting one body anew, carrying its overlaps and
@@ -117,7 +117,7 @@ impl Order {
         done.rebuilds += 1;
         self.carry_all();
         let bodies = tick.members.bounded();
-        self.origin = middle(bodies.iter().map(|slot| tick.proxies.aabb(*slot)));
+        self.origin = middle(bodies, tick.proxies);
         let mut boxes = std::mem::take(&mut self.boxes);
         boxes.clear();
         boxes.extend(
@@ -305,21 +305,20 @@ pub(super) fn grow<T: Clone>(list: &mut Vec<T>, index: usize, value: T) {
     }
 }
 
-/// The middle of the boxes' finite corners.
-pub(super) fn middle<'a>(boxes: impl Iterator<Item = &'a Aabb>) -> [f64; 3] {
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for aabb in boxes {
-        for k in 0..3 {
-            for face in [aabb.min[k], aabb.max[k]] {
-                if face.is_finite() {
-                    low[k] = low[k].min(face);
-                    high[k] = high[k].max(face);
-                }
-            }
-        }
-    }
+/// Amid the boxes: as many on either side of it, on each axis. A few that are far away have no say, for what is far
+/// from here is told coarsely: by some ten millionths of how far.
+pub(super) fn middle<P: Proxies>(bodies: &[BodySlot], proxies: &P) -> [f64; 3] {
+    let mut sample = [0.0; SAMPLE];
     std::array::from_fn(|k| {
-        let middle = low[k] * 0.5 + high[k] * 0.5;
-        if middle.is_finite() { middle } else { 0.0 }
+        let middles = sampled(bodies.len()).map(|at| {
+            let aabb = proxies.aabb(bodies[at]);
+            aabb.min[k] * 0.5 + aabb.max[k] * 0.5
+        });
+        let sample = fill(&mut sample, middles.filter(|middle| middle.is_finite()));
+        let half = sample.len() / 2;
+        if half == sample.len() {
+            return 0.0;
+        }
+        *sample.select_nth_unstable_by(half, f64::total_cmp).1
     })
 }

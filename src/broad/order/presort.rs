@@ -6,11 +6,12 @@
 //! Who comes or jumps away in between belongs elsewhere than it was sorted to, and is seated behind the others.
 
 use super::afresh::FRAME_TICKS;
+use super::curve::Frame;
 use super::idle::shed;
 use super::lay::TakeLanes;
 use super::links::room;
 use super::place::middle;
-use super::sort::{FILL, Frame, Sorter};
+use super::sort::{FILL, Sorter};
 use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, ones, parts};
 use crate::broad::members::Members;
 use crate::simd::boxes::WIDTH;
@@ -198,8 +199,7 @@ impl Order {
 
     /// Measures everything from the middle of the boxes: they are taken once more.
     fn look_from_the_middle<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
-        let bodies = tick.members.bounded().iter();
-        let now = middle(bodies.map(|slot| tick.proxies.aabb(*slot)));
+        let now = middle(tick.members.bounded(), tick.proxies);
         let by = std::array::from_fn(|k| now[k] - self.origin[k]);
         self.sorter.frame.shift(by);
         self.origin = now;

@@ -1,37 +1,16 @@
-//! The order: classes of size, largest first, and within a class the Morton curve.
+//! The sort: bodies along the curve, and split into blocks.
 
+use super::curve::{CLASSES_MAX, CURVE_BITS, Cells, Frame, centre};
 use super::idle::shed;
-use crate::math::morton_bits;
 use crate::simd::boxes::WIDTH;
 
-/// Bits of the curve on each axis. A cell is then an eighth of a block's side at a million bodies.
-const AXIS_BITS: u32 = 10;
-/// Bits of a place on the curve.
-const CURVE_BITS: u32 = 3 * AXIS_BITS;
 /// Bits of a body's index in the sorted words: `limits::BODIES_MAX` and some.
 const INDEX_BITS: u32 = 28;
-/// Octaves of size: the longest sides from 2^-32 to 2^31 metres, all others at the ends.
-const OCTAVES: usize = 64;
-/// Those below a metre.
-const OCTAVES_BELOW_ONE: i32 = 32;
-/// Cells of the curve along the side of a small body, at most: finer ones put nobody in a better place.
-const CELLS_A_SIDE: f64 = 8.0;
-/// Octaves that share a class. Boxes of a block then differ by a factor of 4 at most, and scenes whose sizes lie about
-/// a power of two are not torn in two.
-const OCTAVES_A_CLASS: usize = 2;
-/// Most classes: the bits left in a sorted word.
-pub(super) const CLASSES_MAX: usize = 1 << (64 - CURVE_BITS - INDEX_BITS);
 /// Bits that one pass of the radix sort takes.
 const DIGIT_BITS: u32 = 11;
-
-/// The frame of the curve: where a box belongs.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Frame {
-    low: [f32; 3],
-    scale: [f32; 3],
-    /// By octave: its class.
-    classes: [u8; OCTAVES],
-}
+const _: () = assert!(CLASSES_MAX.ilog2() + CURVE_BITS + INDEX_BITS <= u64::BITS);
+/// Times that cells are made finer where bodies crowd in one: from any two to the finest.
+const FINER: u32 = 8;
 
 /// A frame of the curve and the memory of the sort.
 #[derive(Clone, Debug, Default)]
@@ -42,115 +21,6 @@ pub(super) struct Sorter {
     spare: Vec<u64>,
     counts: Vec<u32>,
     middles: Vec<([f32; 3], u32)>,
-}
-
-impl Default for Frame {
-    fn default() -> Self {
-        Self {
-            low: [0.0; 3],
-            scale: [0.0; 3],
-            classes: [0; OCTAVES],
-        }
-    }
-}
-
-impl Frame {
-    /// The one that suits these boxes.
-    pub(super) fn of(boxes: &[[f32; 6]]) -> Self {
-        let mut frame = Self::default();
-        let mut seen = [0_u32; OCTAVES];
-        let (mut count, mut sum, mut squares) = (0_u32, [0.0_f64; 3], [0.0_f64; 3]);
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for one in boxes {
-            seen[octave(one)] += 1;
-            let centre = centre(one).map(f64::from);
-            count += 1;
-            for k in 0..3 {
-                sum[k] += centre[k];
-                squares[k] += centre[k] * centre[k];
-                low[k] = low[k].min(centre[k]);
-                high[k] = high[k].max(centre[k]);
-            }
-        }
-        // Few bodies far away must not make the cells coarse for all: four deviations, the rest at the edge.
-        let cells = f64::from(1_u32 << AXIS_BITS);
-        let finest = cells_a_metre(&seen, count);
-        for k in 0..3 {
-            let mean = sum[k] / f64::from(count.max(1));
-            let reach = 4.0
-                * (squares[k] / f64::from(count.max(1)) - mean * mean)
-                    .max(0.0)
-                    .sqrt();
-            let (from, to) = (low[k].max(mean - reach), high[k].min(mean + reach));
-            #[allow(
-                clippy::cast_possible_truncation,
-                reason = "a place on a curve, not a bound"
-            )]
-            {
-                frame.low[k] = from as f32;
-                let even = cells / (to - from).max(f64::from(f32::MIN_POSITIVE));
-                frame.scale[k] = even.min(finest) as f32;
-            }
-        }
-        frame.lay_classes(&seen);
-        frame
-    }
-
-    /// Whether the origin is so near that rounding moves no face by more than a thousandth of a cell.
-    pub(super) fn is_near_origin(&self) -> bool {
-        let cells = f32::from(1_u16 << AXIS_BITS);
-        let near = |(low, scale): (&f32, &f32)| low.abs() <= 2.0 * cells / scale;
-        self.low.iter().zip(&self.scale).all(near)
-    }
-
-    /// From the largest size down, each class begins at the next octave that has any body.
-    fn lay_classes(&mut self, seen: &[u32; OCTAVES]) {
-        let (mut class, mut left) = (0_usize, 0);
-        let mut begun = false;
-        for octave in (0..OCTAVES).rev() {
-            if left == 0 && seen[octave] != 0 {
-                class += usize::from(begun);
-                begun = true;
-                left = OCTAVES_A_CLASS;
-            }
-            left = left.saturating_sub(1);
-            #[allow(clippy::cast_possible_truncation, reason = "at most CLASSES_MAX")]
-            let name = class.min(CLASSES_MAX - 1) as u8;
-            self.classes[octave] = name;
-        }
-    }
-
-    /// Where a box belongs: its class above its place on the curve.
-    pub(super) fn key(&self, one: &[f32; 6]) -> u64 {
-        let class = self.classes[octave(one)];
-        let centre = centre(one);
-        let mut key = u64::from(class) << CURVE_BITS;
-        for (k, centre) in centre.into_iter().enumerate() {
-            let cell = (centre - self.low[k]) * self.scale[k];
-            #[allow(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "the cast saturates, NaN becomes 0: a place on a curve, not a bound"
-            )]
-            let cell = (cell as u32).min((1 << AXIS_BITS) - 1);
-            key |= u64::from(morton_bits(cell)) << k;
-        }
-        key
-    }
-
-    /// The same frame, told by another origin.
-    ///
-    /// * `by` - the new origin less the old one.
-    pub(super) fn shift(&mut self, by: [f64; 3]) {
-        for (low, by) in self.low.iter_mut().zip(by) {
-            #[allow(
-                clippy::cast_possible_truncation,
-                reason = "a place on a curve, not a bound"
-            )]
-            let by = by as f32;
-            *low -= by;
-        }
-    }
 }
 
 impl Sorter {
@@ -192,6 +62,9 @@ impl Sorter {
         while shift < top {
             self.pass(shift);
             shift += DIGIT_BITS;
+        }
+        if let Some(finest) = self.frame.finer() {
+            refine(&mut self.words, boxes, finest, FINER);
         }
     }
 
@@ -248,6 +121,46 @@ impl Sorter {
     }
 }
 
+/// Puts those that share a cell, where they are more than a stretch, in the order of finer cells: a scene of two groups
+/// far from each other would have two cells.
+///
+/// * `words` - sorted by their keys, which stay.
+/// * `finest` - cells a metre, at most.
+fn refine(words: &mut [u64], boxes: &[[f32; 6]], finest: f64, deeper: u32) {
+    let Some(deeper) = deeper.checked_sub(1) else {
+        return;
+    };
+    let mut from = 0;
+    // Whoever are more than a stretch hold two places that are half a stretch apart.
+    while let Some(ahead) = words.get(from + STRETCH / 2) {
+        let (key, _) = unpacked(words[from]);
+        if unpacked(*ahead).0 != key {
+            from += STRETCH / 2;
+            continue;
+        }
+        let first = words[..from].partition_point(|word| unpacked(*word).0 < key);
+        let end = from + words[from..].partition_point(|word| unpacked(*word).0 == key);
+        let cell = &mut words[first..end];
+        from = end;
+        if cell.len() <= STRETCH {
+            continue;
+        }
+        let index = |word: &u64| unpacked(*word).1;
+        let middle = |word: &u64| centre(&boxes[index(word) as usize]);
+        let cells = Cells::of(cell.len(), |at| middle(&cell[at]), finest);
+        for one in &mut *cell {
+            *one = word(cells.place(middle(one)), u64::from(index(one)));
+        }
+        cell.sort_unstable();
+        if cells.are_coarse(finest) {
+            refine(cell, boxes, finest, deeper);
+        }
+        for one in cell {
+            *one = word(key, u64::from(index(one)));
+        }
+    }
+}
+
 /// A key above an index.
 fn word(key: u64, index: u64) -> u64 {
     key << INDEX_BITS | index
@@ -296,39 +209,6 @@ pub(super) fn split(middles: &mut [([f32; 3], u32)], fill: usize) {
     let (one, other) = middles.split_at_mut(half);
     split(one, fill);
     split(other, fill);
-}
-
-/// Most cells of the curve a metre: where bodies lie in a sheet or a line, finer cells across it would part neighbours
-/// by what is less than their size.
-///
-/// * `seen` - how many of `count` boxes have their longest side in each octave.
-fn cells_a_metre(seen: &[u32; OCTAVES], count: u32) -> f64 {
-    let mut left = count / 4;
-    for (octave, bodies) in seen.iter().enumerate() {
-        if *bodies > left {
-            let exponent = i32::try_from(octave).unwrap_or(0) - OCTAVES_BELOW_ONE;
-            return CELLS_A_SIDE / f64::from(exponent).exp2();
-        }
-        left -= bodies;
-    }
-    f64::INFINITY
-}
-
-/// The octave of the longest side.
-fn octave(one: &[f32; 6]) -> usize {
-    let side = (one[3] - one[0]).max(one[4] - one[1]).max(one[5] - one[2]);
-    // The exponent of an f32 is its upper bits; NaN and what is beyond the octaves go to the ends.
-    let exponent = (side.to_bits() >> 23) & 0xFF;
-    (exponent.clamp(127 - 32, 127 + 31) - (127 - 32)) as usize
-}
-
-/// The middle of a box; of an infinite one, anything.
-#[inline(always)]
-pub(super) fn centre(one: &[f32; 6]) -> [f32; 3] {
-    std::array::from_fn(|k| {
-        let middle = one[k] * 0.5 + one[k + 3] * 0.5;
-        if middle.is_finite() { middle } else { 0.0 }
-    })
 }
 
 #[cfg(test)]
