@@ -180,7 +180,8 @@ enum {
     SWEEPD_REJECT_REASON_UNKNOWN_SOURCE = 4,
     /* Another session of this source is alive. */
     SWEEPD_REJECT_REASON_SOURCE_TAKEN = 5,
-    /* The session has ended; the client must open a new one. */
+    /* The session has ended; the client must open a new one. Or what came has ids of another run of the
+     * daemon. */
     SWEEPD_REJECT_REASON_SESSION_OVER = 6,
     /* A frame that is not newer than the newest of its session. */
     SWEEPD_REJECT_REASON_OLD_FRAME = 7,
@@ -384,8 +385,9 @@ typedef struct sweepd_frame_header {
     uint32_t clock_id;
     /* WIRE_VERSION of the sender. */
     uint32_t schema;
-    /* Zero. */
-    uint32_t reserved;
+    /* Low half of the boot_id whose body ids the rows have; 0: not said. What is of another boot is
+     * refused. */
+    uint32_t boot;
 } sweepd_frame_header;
 SWEEPD_ASSERT(offsetof(sweepd_frame_header, session) == 0);
 SWEEPD_ASSERT(offsetof(sweepd_frame_header, epoch) == 8);
@@ -399,7 +401,7 @@ SWEEPD_ASSERT(offsetof(sweepd_frame_header, source) == 64);
 SWEEPD_ASSERT(offsetof(sweepd_frame_header, flags) == 96);
 SWEEPD_ASSERT(offsetof(sweepd_frame_header, clock_id) == 100);
 SWEEPD_ASSERT(offsetof(sweepd_frame_header, schema) == 104);
-SWEEPD_ASSERT(offsetof(sweepd_frame_header, reserved) == 108);
+SWEEPD_ASSERT(offsetof(sweepd_frame_header, boot) == 108);
 SWEEPD_ASSERT(sizeof(sweepd_frame_header) == 112);
 
 /* Type name "sweepd.v1.Vertex", 12 bytes. One vertex. */
@@ -440,8 +442,9 @@ typedef struct sweepd_vertex_header {
     uint32_t flags;
     /* WIRE_VERSION of the sender. */
     uint32_t schema;
-    /* Zero. */
-    uint32_t reserved;
+    /* Low half of the boot_id whose body ids the rows have; 0: not said. What is of another boot is
+     * refused. */
+    uint32_t boot;
 } sweepd_vertex_header;
 SWEEPD_ASSERT(offsetof(sweepd_vertex_header, session) == 0);
 SWEEPD_ASSERT(offsetof(sweepd_vertex_header, epoch) == 8);
@@ -456,7 +459,7 @@ SWEEPD_ASSERT(offsetof(sweepd_vertex_header, count) == 92);
 SWEEPD_ASSERT(offsetof(sweepd_vertex_header, total) == 96);
 SWEEPD_ASSERT(offsetof(sweepd_vertex_header, flags) == 100);
 SWEEPD_ASSERT(offsetof(sweepd_vertex_header, schema) == 104);
-SWEEPD_ASSERT(offsetof(sweepd_vertex_header, reserved) == 108);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, boot) == 108);
 SWEEPD_ASSERT(sizeof(sweepd_vertex_header) == 112);
 
 /* Type name "sweepd.v1.MessageHeader", 56 bytes. User header of every message the daemon

@@ -97,7 +97,8 @@ impl Engine {
     ) -> Result<Self> {
         let limits = scene.config.limits;
         let now_ns = clock.boottime_ns();
-        let world = World::new(scene, shapes, now_ns)?;
+        let mut world = World::new(scene, shapes, now_ns)?;
+        world.set_boot(boot_id);
         let config = Config {
             threads: Some(scene.config.threads_here()),
             ..scene.config.clone()

@@ -202,7 +202,7 @@ code! {
         UnknownSource = 4 => "unknown_source",
         /// Another session of this source is alive.
         SourceTaken = 5 => "source_taken",
-        /// The session has ended; the client must open a new one.
+        /// The session has ended; the client must open a new one. Or what came has ids of another run of the daemon.
         SessionOver = 6 => "session_over",
         /// A frame that is not newer than the newest of its session.
         OldFrame = 7 => "old_frame",

@@ -39,8 +39,8 @@ pub struct FrameHeader {
     pub clock_id: u32,
     /// `WIRE_VERSION` of the sender.
     pub schema: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// Low half of the `boot_id` whose body ids the rows have; 0: not said. What is of another boot is refused.
+    pub boot: u32,
 }
 
 /// One body's pose.

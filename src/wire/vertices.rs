@@ -46,8 +46,8 @@ pub struct VertexHeader {
     pub flags: u32,
     /// `WIRE_VERSION` of the sender.
     pub schema: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// Low half of the `boot_id` whose body ids the rows have; 0: not said. What is of another boot is refused.
+    pub boot: u32,
 }
 
 /// Vertices of one body, copied out of the transport, not yet checked.

@@ -86,6 +86,9 @@ impl World {
         if let Some(reason) = frame.refused {
             return Err((Some(source), reason));
         }
+        if self.is_of_other_boot(header.boot) {
+            return Err((Some(source), RejectReason::SessionOver));
+        }
         let rows = frame.transforms.len();
         let paused = header.flags == frame_flags::PAUSED;
         let has_poses = matches!(header.flags, frame_flags::FULL | frame_flags::PARTIAL);
@@ -97,6 +100,17 @@ impl World {
             return Err((Some(source), RejectReason::OverLimit));
         }
         Ok(source)
+    }
+
+    /// Tells which run of the daemon this is: frames that say another are refused.
+    #[allow(clippy::cast_possible_truncation, reason = "the low half is meant")]
+    pub fn set_boot(&mut self, boot_id: u64) {
+        self.boot = boot_id as u32;
+    }
+
+    /// Whether ids are those of another run of the daemon, where they may be other bodies'.
+    pub(super) fn is_of_other_boot(&self, boot: u32) -> bool {
+        boot != 0 && self.boot != 0 && boot != self.boot
     }
 
     /// Session, order, age, scene revision; then the rows.

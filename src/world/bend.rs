@@ -142,6 +142,9 @@ impl World {
             return Err((None, RejectReason::UnknownSource));
         };
         let refused = |reason| Err((Some(source), reason));
+        if self.is_of_other_boot(header.boot) {
+            return refused(RejectReason::SessionOver);
+        }
         let received_ns = match frame.received_ns {
             0 => self.now_ns,
             received_ns => received_ns.min(self.now_ns),

@@ -89,6 +89,8 @@ pub struct World {
     rigid_groups: Names,
     sources: Vec<SourceState>,
     over: SessionsOver,
+    /// Low half of the boot id; 0: not said.
+    boot: u32,
     /// Slots free for another body.
     free: Vec<BodySlot>,
     /// Slots freed in this tick.
@@ -183,6 +185,7 @@ impl World {
             rigid_groups: Names::default(),
             sources: Vec::new(),
             over: SessionsOver::new(),
+            boot: 0,
             free: Vec::new(),
             resting: Vec::new(),
             attached: Vec::new(),

@@ -53,6 +53,25 @@ fn law_4_1_a_frame_that_does_not_fit_is_refused_as_a_whole_and_counted() {
 }
 
 #[test]
+fn bug_ids_of_another_run_of_the_daemon_moved_other_bodies() {
+    let mut bench = Bench::of(vec![moving("a", 1)]);
+    bench.world.set_boot(0x1_0000_0007);
+    let of_boot = |boot: u32| move |f: &mut Frame| f.header.boot = boot;
+    let over = refused(0, RejectReason::SessionOver);
+    assert_eq!(send_with(&mut bench, MS, of_boot(8)), over);
+    assert_eq!(bench.status("a"), BodyStatus::NotReceived);
+    // It ends no session: the client may go on with the new names. Who does not say is believed.
+    assert_eq!(send_with(&mut bench, MS, of_boot(7)), admitted(0, 1, 0));
+    assert_eq!(
+        send_with(&mut bench, MS, |f| {
+            f.header.seq = 2;
+            f.header.boot = 0;
+        }),
+        admitted(0, 1, 0)
+    );
+}
+
+#[test]
 fn law_4_2_two_clients_of_one_source_the_second_is_refused_and_counted() {
     let mut bench = Bench::of(vec![moving("a", 1)]);
     bench.send(MS, "sim", 1, &[row(1, 0.0)]);

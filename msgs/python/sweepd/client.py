@@ -10,6 +10,7 @@ import numpy as np
 
 from . import layout
 from .errors import Refused, Restarted, Skipped, SweepdError, TimedOut
+from .frames import MOVING, POSE, columns_of, rows_of, time_left, whole
 from .pairlist import PairList
 from .ports import Ports
 
@@ -27,8 +28,6 @@ _TOPICS = {
     "plan": ctypes.c_uint8,
 }
 _HEADERS = {"changes": layout.ChangesHeader}
-_POSE = np.dtype(layout.TransformRow)
-_MOVING = np.dtype(layout.TransformVelRow)
 _VERTEX = np.dtype(layout.VertexRow)
 _POSES = ("transforms", layout.TransformRow)
 _MOTION = ("transforms_vel", layout.TransformVelRow)
@@ -114,10 +113,16 @@ class Client:
         unknown = set(listen) - set(_TOPICS)
         if unknown:
             raise SweepdError(f"listen={sorted(unknown)}: there are {', '.join(_TOPICS)}")
+        until = time.monotonic() + timeout_s
         self._ports = Ports(instance, timeout_s, root, prefix)
         self._topics = list(dict.fromkeys([*listen, "names"]))
-        for topic in self._topics:
-            self._ports.subscribe(topic, _TOPICS[topic], _HEADERS.get(topic, layout.MessageHeader))
+        try:
+            for topic in self._topics:
+                self._ports.subscribe(topic, _TOPICS[topic], _HEADERS.get(topic, layout.MessageHeader), until)
+        except SweepdError:
+            # who keeps the error keeps this object, which would keep the places of its ports
+            self._ports.close()
+            raise
         self._ahead = {topic: None for topic in self._topics}
         self._now = {topic: None for topic in self._topics}
         self._list = PairList()
@@ -125,10 +130,14 @@ class Client:
         self.session = secrets.randbits(64) or 1
         self._epoch = 0
         self._seq = 0
+        # of the last frame with rows: its number and its topic; and the newest that a tick is known to have used
+        self._posed, self._kind, self._used = 0, None, 0
         self._versions = {}
         self._requests = 0
         self._tick = None
         self._held = None
+        # of the daemon whose ids the names are
+        self._boot = self._ports.hello.boot_id
         self._boots_over = []
         self._names = (None, {})
         self._named = (None, {})
@@ -152,9 +161,9 @@ class Client:
 
     @property
     def names(self):
-        """Name to id of every body in the scene, as of the newest tick heard."""
+        """Name to id of every body in the scene, as of the newest tick heard. Ids are those of one start of the daemon."""
         message = self._now.get("names")
-        if message is None:
+        if message is None or message[0].boot_id != self._boot:
             return {}
         header, rows = message
         key = (header.boot_id, header.tick)
@@ -181,26 +190,43 @@ class Client:
           and radians a second, in the scene's frame. An array made by ``rows()`` is copied once, as it is; one made by
           ``loan()`` lies where it is read, and goes out without a copy.
         * ``partial``: these are some bodies of the source only.
+        * ``time_left_ns``: of the tick, from receipt; 0 says nothing, and less than 0, too late already, leaves it nothing.
+
+        Raises Restarted where another daemon is there than that of the ids, TimedOut where it has not said its own yet;
+        rows made before that are refused. Frames are to have velocities all or none: one of the other kind is refused
+        until the last one has its result, for it could overtake it.
         """
+        self._settle(0.0)
         flags = layout.FrameFlags.PARTIAL if partial else layout.FrameFlags.FULL
         fields = dict(
-            stamp_ns=stamp_ns,
-            clock_id=clock_id,
-            scene_rev=scene_rev,
-            deadline_ns=deadline_ns,
-            time_left_ns=time_left_ns,
+            stamp_ns=whole("stamp_ns", stamp_ns),
+            clock_id=whole("clock_id", clock_id, 32),
+            scene_rev=whole("scene_rev", scene_rev),
+            deadline_ns=whole("deadline_ns", deadline_ns),
+            time_left_ns=time_left(time_left_ns),
         )
-        return self._send(self.rows(poses), flags, fields)
+        rows = self.rows(poses)
+        if getattr(rows, "boot_id", 0) not in (0, self._boot):
+            raise SweepdError(
+                "these rows were made before the daemon restarted, and their ids may be other bodies' now: make them"
+                " anew with rows() or loan()"
+            )
+        self._keep_order(rows)
+        self._posed = self._send(rows, flags, fields)
+        return self._posed
 
     def pause(self):
         """Says that the world stands still: the ages of its bodies are renewed for one time-out."""
-        return self._send(np.empty(0, _POSE), layout.FrameFlags.PAUSED, {})
+        # behind the last frame, by the same queue
+        rows = np.empty(0, MOVING if self._kind == _MOTION else POSE)
+        return self._send(rows, layout.FrameFlags.PAUSED, {})
 
     def reset_epoch(self):
         """Says that the world was reset: with the next frame every pair of the source's bodies ends."""
         self._epoch += 1
-        # what the daemon had of vertices is void with it
+        # what the daemon had of vertices is void with it, and frames that still wait
         self._versions = {}
+        self._kind = None
 
     def send_vertices(self, body, vertices, *, first=None, total=None):
         """Sends vertices of a body that deforms; they belong with the frame that is sent next. Returns their version.
@@ -218,7 +244,8 @@ class Client:
         vertices = np.ascontiguousarray(vertices, dtype=np.float32)
         if vertices.ndim != 2 or vertices.shape[1] != 3:
             raise SweepdError(f"vertices of shape {vertices.shape}: give (n, 3)")
-        body = self._ids([body])[0] if isinstance(body, str) else int(body)
+        self._settle(0.0)
+        body = self._ids([body])[0] if isinstance(body, str) else whole("body", body)
         base = self._versions.get(body)
         if first is not None and base is None:
             raise SweepdError("a range of vertices changes those sent before: send all of them first")
@@ -232,9 +259,9 @@ class Client:
             body=body,
             version=base + 1,
             base_version=base,
-            first=first or 0,
+            first=whole("first", first or 0, 32),
             count=len(vertices),
-            total=len(vertices) if total is None else total,
+            total=len(vertices) if total is None else whole("total", total, 32),
             flags=flags,
             schema=layout.WIRE_VERSION,
         )
@@ -249,19 +276,21 @@ class Client:
 
         Raises TimedOut (with what was refused meanwhile), Restarted or Skipped.
         """
+        until = time.monotonic() + timeout_s
         self._drain()
+        self._settle(until)
         before = self._tick
         seq = self.send(poses, **fields)
-        until = time.monotonic() + timeout_s
         while True:
             if not self._next(until):
                 raise TimedOut(self._why_no_result(seq, before, timeout_s))
             row = self._row(self._tick)
             if row is None or row.session != self.session:
                 continue
-            if (row.epoch, row.seq) == (self._epoch, seq):
-                return self._result()
-            if (row.epoch, row.seq) > (self._epoch, seq):
+            if (row.epoch, row.seq) >= (self._epoch, seq):
+                self._used = row.seq
+                if row.seq == seq:
+                    return self._result()
                 raise Skipped(seq)
 
     def latest(self):
@@ -278,7 +307,8 @@ class Client:
     def request(self, edits, blobs=(), timeout_s=5.0):
         """Sends a scene edit or a query (anything ``json`` can write) and returns the daemon's answer as a dict.
 
-        Raises Refused with the daemon's words when it refused, TimedOut when it is silent.
+        Raises Refused with the daemon's words when it refused, TimedOut when it is silent. After an edit ``names`` are
+        those of the scene as it is then: as ``latest()`` does, the client goes on to the newest tick.
         """
         text = json.dumps(edits).encode()
         self._requests += 1
@@ -293,6 +323,9 @@ class Client:
                 answer = json.loads(answered[1])
                 if not answered[0].ok:
                     raise Refused(answer.get("error", "refused"))
+                # an edit is answered after its tick, with which new names came
+                if isinstance(edits, dict) and "edits" in edits:
+                    self._drain()
                 return answer
             left = until - time.monotonic()
             if left <= 0:
@@ -307,25 +340,14 @@ class Client:
 
         With velocities (see ``send``) of TransformVelRow, whose field ``transform`` is the pose.
         """
-        if isinstance(poses, np.ndarray) and poses.dtype in (_POSE, _MOVING):
+        if isinstance(poses, np.ndarray) and poses.dtype in (POSE, MOVING):
             return poses
         if isinstance(poses, dict):
-            ids = self._ids(poses)
-            columns = self._columns(poses)
+            ids, columns = self._ids(poses), columns_of(poses)
         else:
             ids, *columns = poses
-        if len(columns) not in (2, 4):
-            raise SweepdError("a pose is a position and a quaternion, or these, a linear and an angular velocity")
-        moving = len(columns) == 4
-        rows = np.zeros(len(ids), _MOVING if moving else _POSE)
-        pose = rows["transform"] if moving else rows
-        pose["body"] = ids
-        if len(ids):
-            quaternions = np.asarray(columns[1], dtype=np.float64)
-            pose["position"] = columns[0]
-            pose["orientation"] = np.roll(quaternions, -1, axis=-1) if self._wxyz else quaternions
-            if moving:
-                rows["linear"], rows["angular"] = columns[2:]
+        rows = rows_of(ids, columns, self._wxyz)
+        rows.boot_id = self._boot
         return rows
 
     def loan(self, count, *, velocities=False):
@@ -336,21 +358,24 @@ class Client:
         takes the place of one that was not sent.
         """
         topic, row = _MOTION if velocities else _POSES
-        return self._ports.loan(topic, row, layout.FrameHeader, count)
-
-    @staticmethod
-    def _columns(poses):
-        kinds = {len(pose) for pose in poses.values()} or {2}
-        if len(kinds) > 1:
-            raise SweepdError("a frame has velocities of all its bodies, or of none")
-        return [[pose[at] for pose in poses.values()] for at in range(kinds.pop())]
+        rows = self._ports.loan(topic, row, layout.FrameHeader, count)
+        rows.boot_id = self._boot
+        return rows
 
     def _ids(self, poses):
         names = self.names
         try:
             return [names[name] for name in poses]
+        except KeyError:
+            # somebody may have put it since this client last looked
+            self._drain()
+        names = self.names
+        try:
+            return [names[name] for name in poses]
         except KeyError as e:
             name = e.args[0]
+            if not names:
+                raise TimedOut("the daemon has not said the names of its bodies yet: send again in a moment") from None
             near = difflib.get_close_matches(str(name), names, _NAMES_TOLD) or sorted(names)[:_NAMES_TOLD]
             told = ", ".join(near) or "none"
             more = f" and {len(names) - len(near)} more" if len(near) < len(names) else ""
@@ -367,16 +392,42 @@ class Client:
             **fields,
         )
         self._name(header)
-        topic, row = _MOTION if rows.dtype == _MOVING else _POSES
+        topic, row = _MOTION if rows.dtype == MOVING else _POSES
         self._ports.send(topic, row, header, rows)
         self._seq += 1
         return self._seq
+
+    def _settle(self, until):
+        """Sees to it that ids are those of the daemon that is there: raises Restarted, or TimedOut where it is silent."""
+        while self._ports.boot() not in (self._boot, *self._boots_over):
+            if not self._next(until):
+                raise TimedOut(
+                    "a daemon has just started, and has not said the ids of its bodies yet: step, or send again in a"
+                    " moment"
+                )
+
+    def _keep_order(self, rows):
+        """Refuses a frame that could overtake the last one: the two kinds have a queue each, and one is read first."""
+        kind = _MOTION if rows.dtype == MOVING else _POSES
+        if kind != self._kind and self._kind is not None and self._used < self._posed:
+            self._drain()
+            row = self._row(self._tick) if self._tick else None
+            if row is not None and (row.session, row.epoch) == (self.session, self._epoch):
+                self._used = row.seq
+            if self._used < self._posed:
+                with_or_without = "without" if kind == _MOTION else "with"
+                raise SweepdError(
+                    f"frame {self._posed} went {with_or_without} velocities, and one of the other kind could overtake"
+                    " it: send them always or never, or wait for its result first (step, wait)"
+                )
+        self._kind = kind
 
     def _name(self, header):
         if self._source is None:
             raise SweepdError("this client was opened as a reader; name a source to send frames")
         name = self._source.encode()
         header.source[: len(name)] = name
+        header.boot = self._boot & 0xFFFFFFFF
 
     def _row(self, tick):
         for row in tick.sources[: tick.sources_len]:
@@ -419,7 +470,7 @@ class Client:
             # a tick that takes longer than a heartbeat is told of under its own number before it is there itself
             if old and (new.tick, tick.sent_ns) <= (old.tick, self._tick.sent_ns):
                 continue
-            self._tick = tick
+            self._tick, self._boot = tick, new.boot_id
             for topic in self._topics:
                 if topic == "changes":
                     self._advance_list(new)
@@ -439,7 +490,11 @@ class Client:
             there = rows["flags"] & int(layout.PairFlags.GONE) == 0
             rows = rows[there & (rows["certified_verdict"] == layout.Verdict.COLLIDING)]
             ends = np.stack([rows["body_a"], rows["body_b"]], axis=1)
-        self._tick, self._held = None, tick
+        self._tick, self._held, self._boot = None, tick, tick.header.boot_id
+        # the new one has no vertices, and no frame of before
+        self._versions, self._kind = {}, None
+        # so that names are new from here on
+        self._advance("names", tick.header)
         raise Restarted(old.boot_id, tick.header.boot_id, ends)
 
     def _advance(self, topic, tick):

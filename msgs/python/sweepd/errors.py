@@ -10,11 +10,15 @@ class TimedOut(SweepdError):
 
 
 class Refused(SweepdError):
-    """The daemon, its version or its files do not fit this client."""
+    """The daemon, its version or its files do not fit this client, or no place is left for it; or it said no."""
 
 
 class Restarted(SweepdError):
-    """The daemon restarted: every pair has ended. The next step goes on with the new one."""
+    """The daemon restarted: every pair has ended, and so have the ids of bodies.
+
+    ``names`` are those of the new one now, and the next step or send goes on with it. Make ``rows()`` anew, look up ids
+    that you keep, and send all vertices of bodies that deform.
+    """
 
     def __init__(self, old_boot, new_boot, ends):
         super().__init__(f"the daemon restarted (boot {old_boot:x} is over, {new_boot:x} began)")

@@ -90,8 +90,8 @@ class FrameHeader(_Row):
         ("clock_id", ctypes.c_uint32),
         # WIRE_VERSION of the sender.
         ("schema", ctypes.c_uint32),
-        # Zero.
-        ("reserved", ctypes.c_uint32),
+        # Low half of the boot_id whose body ids the rows have; 0: not said. What is of another boot is refused.
+        ("boot", ctypes.c_uint32),
     ]
 
 
@@ -137,8 +137,8 @@ class VertexHeader(_Row):
         ("flags", ctypes.c_uint32),
         # WIRE_VERSION of the sender.
         ("schema", ctypes.c_uint32),
-        # Zero.
-        ("reserved", ctypes.c_uint32),
+        # Low half of the boot_id whose body ids the rows have; 0: not said. What is of another boot is refused.
+        ("boot", ctypes.c_uint32),
     ]
 
 
@@ -689,7 +689,7 @@ class RejectReason(IntEnum):
     UNKNOWN_SOURCE = 4
     # Another session of this source is alive.
     SOURCE_TAKEN = 5
-    # The session has ended; the client must open a new one.
+    # The session has ended; the client must open a new one. Or what came has ids of another run of the daemon.
     SESSION_OVER = 6
     # A frame that is not newer than the newest of its session.
     OLD_FRAME = 7

@@ -5,6 +5,7 @@ four messages of a kind, so copy what you keep.
 """
 
 import ctypes
+import functools
 import os
 import time
 
@@ -13,6 +14,7 @@ import numpy as np
 
 from . import layout
 from .errors import Refused, SweepdError, TimedOut
+from .frames import Rows
 
 #: Event ids of ``wake`` and ``ready``.
 SENT, ASKED = 1, 2
@@ -20,6 +22,7 @@ _RETRY_S = 0.05
 _SLICE_LEN_START = 256
 _REQUEST_LEN_START = 1 << 14
 _ROWS_MAX = 1 << 26
+_FOREIGN = tuple(kind for kind in vars(iox2).values() if isinstance(kind, type) and issubclass(kind, Exception))
 
 
 def dtype(row):
@@ -55,6 +58,43 @@ def _fill(address, kind, rows):
     if len(rows):
         memory = (ctypes.c_uint8 * (len(rows) * kind.itemsize)).from_address(address)
         np.frombuffer(memory, dtype=kind)[:] = rows
+
+
+def _ours(what):
+    """What iceoryx2 raises within a method, one type for each port, as an error of this package."""
+
+    def wrap(method):
+        @functools.wraps(method)
+        def call(*args, **kwargs):
+            try:
+                return method(*args, **kwargs)
+            except _FOREIGN as e:
+                raise SweepdError(f"{what}: {_why(e)}") from e
+
+        return call
+
+    return wrap
+
+
+def _why(e):
+    why = str(e)
+    if why.startswith("ExceedsMax") and type(e).__name__.endswith(("CreateError", "OpenError")):
+        return (
+            f"every place is taken ({why}); end a client that is not needed (`sweepd list` counts them, msgs/README.md has"
+            " the limits). One that was killed gives its place back within two seconds"
+        )
+    return why
+
+
+def _patiently(act, until):
+    """Tries again until it succeeds or the time is up."""
+    while True:
+        try:
+            return act()
+        except (FileNotFoundError, *_FOREIGN):
+            if time.monotonic() >= until:
+                raise
+        time.sleep(_RETRY_S)
 
 
 def check_name(instance):
@@ -105,25 +145,30 @@ class Ports:
         self._pending = []
         self._loaned = None
         until = time.monotonic() + timeout_s
-        while True:
-            why = "its files are missing"
-            if _check_owner(self._config):
-                try:
-                    self._open()
-                    break
-                except SweepdError:
-                    raise
-                except Exception as e:  # iceoryx2 has one exception type for each port
-                    why = str(e)
-            if time.monotonic() >= until:
-                raise TimedOut(
-                    f"no daemon runs as instance `{instance}` ({why}); start one with `sweepd run`, "
-                    "`sweepd list` shows who is there"
-                )
-            time.sleep(_RETRY_S)
-        self.hello = self._greet(until)
+        try:
+            _patiently(self._open, until)
+            self.hello = self._greet(until)
+        except FileNotFoundError as e:
+            raise TimedOut(self._nobody("its files are missing")) from e
+        except _FOREIGN as e:
+            self.close()
+            if str(e) == "DoesNotExist":
+                raise TimedOut(self._nobody(e)) from e
+            raise Refused(f"instance `{instance}` cannot be opened: {_why(e)}") from e
+        except SweepdError:
+            self.close()
+            raise
+        self._boot = self.hello.boot_id
+
+    def _nobody(self, why):
+        return (
+            f"no daemon runs as instance `{self._instance}` ({why}); start one with `sweepd run`, "
+            "`sweepd list` shows who is there"
+        )
 
     def _open(self):
+        if not _check_owner(self._config):
+            raise FileNotFoundError
         self._node = (
             iox2.NodeBuilder.new()
             .config(self._config)
@@ -146,31 +191,59 @@ class Ports:
 
     def _greet(self, until):
         while True:
-            sample = self._hello.receive()
-            if sample is not None:
-                hello = layout.Hello.from_buffer_copy(sample.payload().contents)
+            hello = self._newest_hello()
+            if hello is not None:
                 _check_hello(hello)
                 return hello
             if time.monotonic() >= until:
                 raise TimedOut("the instance's services are there, but no daemon says hello; is it running?")
             self.wait(0.005)
 
+    def _newest_hello(self):
+        newest = None
+        while (sample := self._hello.receive()) is not None:
+            newest = layout.Hello.from_buffer_copy(sample.payload().contents)
+        return newest
+
+    @_ours("`hello` cannot be received")
+    def boot(self):
+        """Boot id of the newest daemon that has said hello."""
+        hello = self._newest_hello()
+        if hello is not None:
+            self._boot = hello.boot_id
+        return self._boot
+
     def wake(self, event):
         """Tells the daemon; one that is away finds what was sent when it is back."""
-        self._wake.notify_with_custom_event_id(iox2.EventId.new(event))
+        try:
+            self._wake.notify_with_custom_event_id(iox2.EventId.new(event))
+        except iox2.NotifierNotifyError:
+            pass
 
     def wait(self, timeout_s):
-        """Sleeps until the daemon has sent something, or the time is up."""
-        # iceoryx2 0.10 hands the system whole microseconds, rounded down, and 0 is for ever
-        self._ready.timed_wait(iox2.Duration.from_secs_f64(max(timeout_s, 2e-6)))
+        """Sleeps until the daemon has sent something, a signal came, or the time is up."""
+        try:
+            # iceoryx2 0.10 hands the system whole microseconds, rounded down, and 0 is for ever
+            self._ready.timed_wait(iox2.Duration.from_secs_f64(max(timeout_s, 2e-6)))
+        except iox2.ListenerWaitError as e:
+            # Python runs the signal's handler once we are back: for Ctrl-C that raises KeyboardInterrupt
+            if str(e) != "InterruptSignal":
+                raise SweepdError(f"`ready` cannot be waited for: {e}") from e
 
-    def subscribe(self, topic, row, header=layout.MessageHeader):
-        """Listens to a message kind from now on."""
-        if topic not in self._readers:
+    def subscribe(self, topic, row, header=layout.MessageHeader, until=0.0):
+        """Listens to a message kind from now on; ``until`` when to wait for a place where all are taken."""
+        if topic in self._readers:
+            return
+
+        def port():
             service = self._topic(topic).publish_subscribe(iox2.Slice[row]).user_header(header).open()
-            kind = np.dtype(row)
-            self._readers[topic] = (service.subscriber_builder().create(), kind, header)
-            self.wake(14)
+            return service.subscriber_builder().create()
+
+        try:
+            self._readers[topic] = (_patiently(port, until), np.dtype(row), header)
+        except _FOREIGN as e:
+            raise Refused(f"`{topic}` of instance `{self._instance}` cannot be read: {_why(e)}") from e
+        self.wake(14)
 
     def renew(self, topic, row, header):
         """Opens the port of a message kind anew: what waits in it is gone, and the daemon sees a new reader."""
@@ -178,6 +251,7 @@ class Ports:
         del self._readers[topic]
         self.subscribe(topic, row, header)
 
+    @_ours("`tick` cannot be received")
     def tick(self):
         """The next tick as a structure of its own, or None."""
         sample = self._tick.receive()
@@ -213,16 +287,18 @@ class Ports:
             )
         return self._senders[topic]
 
+    @_ours("a frame cannot be made")
     def loan(self, topic, row, header, count):
         """Rows in shared memory that :meth:`send` hands over as they are; the loan before is given back."""
         self._loaned = None
         sample = self._sender(topic, row, header, count).loan_slice_uninit(count)
         kind = np.dtype(row)
         memory = (ctypes.c_uint8 * (count * kind.itemsize)).from_address(sample.payload_ptr) if count else b""
-        rows = np.frombuffer(memory, dtype=kind)
+        rows = np.frombuffer(memory, dtype=kind).view(Rows)
         self._loaned = (rows, sample)
         return rows
 
+    @_ours("a frame cannot be sent")
     def send(self, topic, row, header, rows, wake=True):
         """Hands rows over and, where said, wakes the daemon."""
         if self._loaned is not None and rows is self._loaned[0]:
@@ -236,6 +312,7 @@ class Ports:
         if wake:
             self.wake(SENT)
 
+    @_ours("a request cannot be sent")
     def request(self, header, payload):
         """Sends a request; the answer comes with :meth:`answer`."""
         if self._client is None:
@@ -259,6 +336,7 @@ class Ports:
         self._pending.append(request.assume_init().send())
         self.wake(ASKED)
 
+    @_ours("an answer cannot be received")
     def answer(self):
         """The next answer as ``(header, bytes)``, or None."""
         for pending in self._pending:

@@ -201,6 +201,12 @@ impl Client {
         self.versions.clear();
     }
 
+    /// Low half of the boot id of the last tick taken, whose ids the caller knows; 0: of none.
+    #[allow(clippy::cast_possible_truncation, reason = "the low half is meant")]
+    fn boot(&self) -> u32 {
+        self.follow.view.tick().header.boot_id as u32
+    }
+
     fn send_flagged(&mut self, info: &FrameInfo, rows: Rows<'_>, flags: u32) -> Result<FrameId> {
         let source = self.source.as_deref().ok_or_else(|| {
             Error::Usage("this client was opened as a reader; name a source to send frames".into())
@@ -222,7 +228,7 @@ impl Client {
             flags,
             clock_id: info.clock_id,
             schema: WIRE_VERSION,
-            reserved: 0,
+            boot: self.boot(),
         };
         self.link.send(&header, rows)?;
         self.frame = id;

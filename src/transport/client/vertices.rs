@@ -63,7 +63,7 @@ impl Client {
             total,
             flags,
             schema: WIRE_VERSION,
-            reserved: 0,
+            boot: self.boot(),
         };
         self.link.send_vertices(&header, rows)?;
         self.versions.insert(body, header.version);

@@ -103,7 +103,7 @@ pub(super) fn fill(frame: &mut Frame, message: &BodyTransforms, book: &Book, rec
         flags: message.flags,
         clock_id: message.clock_id,
         schema: WIRE_VERSION,
-        reserved: 0,
+        boot: 0,
     };
     frame.received_ns = receipt.now_ns;
     frame.waited = receipt.waited;

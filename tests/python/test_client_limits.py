@@ -1,0 +1,188 @@
+"""What a user of the Python client may do at its limits, and what is told there; against a live daemon.
+
+Needs `SWEEPD=path/to/sweepd` and the package of msgs/python with its wheels.
+"""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from needed import needed
+
+sweepd = needed("sweepd")
+
+from sweepd import layout, ports  # noqa: E402
+
+SWEEPD = os.environ.get("SWEEPD")
+pytestmark = pytest.mark.skipif(not SWEEPD, reason="SWEEPD names no binary")
+ROOT = Path(__file__).resolve().parents[2]
+NO_TURN = (1.0, 0.0, 0.0, 0.0)
+STILL = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+# The first scene of README.md.
+SCENE = """
+[[source]]
+name = "sim"
+[[body]]
+name = "cart"
+shape = { type = "box", half_extents = [0.3, 0.2, 0.1] }
+[[body]]
+name = "post"
+shape = { type = "capsule", radius = 0.1, half_height = 0.5 }
+"""
+PLACES = {"cart": (0.0, 0.0, 0.0), "post": (5.0, 0.0, 0.0)}
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Starts a daemon with a scene; the name of its instance."""
+    processes = []
+
+    def started(text=SCENE):
+        path = tmp_path / f"scene_{len(processes)}.toml"
+        path.write_text(text)
+        name = f"lim_{os.getpid()}_{len(processes)}_{time.monotonic_ns() % 1_000_000}"
+        processes.append(subprocess.Popen([SWEEPD, "--quiet", "run", str(path), "--instance", name]))
+        return name
+
+    yield started
+    for process in processes:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=10) == 0
+
+
+def poses(velocities=False, only=tuple(PLACES), x=0.0):
+    return {name: ((PLACES[name][0] + x, 0.0, 0.0), NO_TURN, *(STILL if velocities else ())) for name in only}
+
+
+@contextlib.contextmanager
+def alarm(handler, after_s, every_s=0.0):
+    """A signal once or every so often, while a client sleeps for the most part."""
+    before = signal.signal(signal.SIGALRM, handler)
+    signal.setitimer(signal.ITIMER_REAL, after_s, every_s)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def test_a_signal_that_is_handled_does_not_end_a_wait(start):
+    came = []
+    with sweepd.Client(start(), "sim", quat_order="wxyz") as client:
+        with alarm(lambda *_: came.append(1), 0.003, 0.003):
+            for _ in range(5):
+                assert client.step(poses(), timeout_s=5).state == "clear"
+                client.wait(timeout_s=5)
+                client.request({"gap": {"a": "cart", "b": "post"}})
+            with pytest.raises(sweepd.TimedOut):
+                sweepd.Client("nobody_here", None, quat_order="wxyz", timeout_s=0.1)
+        assert len(came) > 20
+
+
+def test_ctrl_c_in_a_wait_is_a_keyboard_interrupt(start):
+    with sweepd.Client(start(), "sim", quat_order="wxyz") as client:
+        for _ in range(10):
+            # the handler that Python has for Ctrl-C
+            with alarm(signal.default_int_handler, 0.05), pytest.raises(KeyboardInterrupt):
+                while True:
+                    client.wait(timeout_s=5)
+        assert client.step(poses(), timeout_s=5).state == "clear"
+
+
+def test_clients_beyond_the_limit_are_told_that_every_place_is_taken(start):
+    instance = start()
+    with contextlib.ExitStack() as there:
+        readers = [there.enter_context(sweepd.Client(instance, None, quat_order="wxyz", listen=())) for _ in range(32)]
+        with pytest.raises(sweepd.Refused, match="`names` of instance .* every place is taken") as kept:
+            sweepd.Client(instance, None, quat_order="wxyz", listen=(), timeout_s=0.2)
+        # who keeps the error keeps no place
+        onlookers = [ports.Ports(instance, 1.0) for _ in range(16)]
+        for onlooker in onlookers:
+            there.callback(onlooker.close)
+        with pytest.raises(sweepd.Refused, match="every place is taken"):
+            sweepd.Client(instance, None, quat_order="wxyz", timeout_s=0.2)
+        onlookers[0].close()
+        # one waits for a place as long as for a daemon
+        with alarm(lambda *_: readers[0].close(), 0.3):
+            there.enter_context(sweepd.Client(instance, "sim", quat_order="wxyz", timeout_s=5))
+        assert kept.type is sweepd.Refused
+    with pytest.raises(sweepd.TimedOut, match="no daemon runs as instance"):
+        sweepd.Client("nobody_here", None, quat_order="wxyz", timeout_s=0.1)
+
+
+def test_a_frame_that_is_late_has_the_least_time_and_not_all_of_it(start, monkeypatch):
+    sent = []
+    with sweepd.Client(start(), "sim", quat_order="wxyz") as client:
+        send = client._ports.send
+
+        def keep(topic, row, header, rows, **more):
+            sent.append((header.time_left_ns, header.stamp_ns))
+            send(topic, row, header, rows, **more)
+
+        monkeypatch.setattr(client._ports, "send", keep)
+        for left in (-5, -(10**20), 0, 7, 10**9):
+            client.step(poses(), timeout_s=5, time_left_ns=left, stamp_ns=3)
+        assert sent == [(1, 3), (1, 3), (0, 3), (7, 3), (10**9, 3)]
+        for name in ("stamp_ns", "clock_id", "scene_rev", "deadline_ns"):
+            for wrong in (-1, 2**64, 0.5):
+                with pytest.raises(sweepd.SweepdError, match=f"{name}="):
+                    client.send(poses(), **{name: wrong})
+        with pytest.raises(sweepd.SweepdError, match=r"clock_id=4294967296: give 0 to 2\^32 - 1"):
+            client.send(poses(), clock_id=2**32)
+        with pytest.raises(sweepd.SweepdError, match="time_left_ns="):
+            client.send(poses(), time_left_ns=2**64)
+        for more in ({"first": -1, "total": 9}, {"first": 0, "total": -9}):
+            client._versions[1] = 1
+            with pytest.raises(sweepd.SweepdError, match="give 0 to"):
+                client.send_vertices(1, [[0, 0, 0]], **more)
+        assert len(sent) == 5, "nothing that was refused went out"
+
+
+def test_a_frame_of_the_other_kind_waits_for_the_result_of_the_last(start):
+    # few ticks: the daemon finds several frames at once
+    instance = start("[run]\nrate = 10\n" + SCENE)
+    with sweepd.Client(instance, "sim", quat_order="wxyz") as client:
+        for moving in (True, False, True):
+            client.step(poses(moving), timeout_s=5)
+        for moving in (True, False):
+            client.step(poses(moving), timeout_s=5)
+            client.send(poses(moving, ["cart"], 0.1), partial=True)
+            with pytest.raises(sweepd.SweepdError, match="wait for its result first"):
+                client.send(poses(not moving, ["post"], 0.1), partial=True)
+            client.send(poses(moving, ["post"], 0.1), partial=True)
+            until = time.monotonic() + 5
+            while client._row(client.wait(timeout_s=5).tick).seq < client._seq:
+                assert time.monotonic() < until
+            client.send(poses(not moving), partial=True)
+            # what was before a reset is void, and may be overtaken
+            client.reset_epoch()
+            result = client.step(poses(moving), timeout_s=5)
+            assert result.state == "clear"
+
+
+def test_a_pause_does_not_overtake_a_frame_with_velocities(start):
+    instance = start("[run]\nrate = 10\n" + SCENE)
+    with sweepd.Client(instance, "sim", quat_order="wxyz", listen=("bodies",)) as client:
+        for x in range(1, 9):
+            client.send(poses(True, x=float(x)))
+            client.pause()
+            until = time.monotonic() + 5
+            while client._row(client.wait(timeout_s=5).tick).seq < client._seq:
+                assert time.monotonic() < until
+            result = client.latest()
+            assert result.tick.rejects[layout.RejectReason.OLD_FRAME] == 0
+            assert result.bodies["position"][0][0] == x
+
+
+def test_the_smallest_example_prints_what_touches_in_the_first_scene(start):
+    example = ROOT / "msgs/python/examples/minimal.py"
+    command = [sys.executable, str(example), "cart", "post", "--instance", start()]
+    lines = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout.splitlines()
+    assert lines[0] == "0 clear []"
+    assert lines[-1] == "99 colliding [('cart', 'post')]"
