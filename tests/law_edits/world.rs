@@ -1,0 +1,239 @@
+//! The world as the test sees it: what each body is, what was last said of it, and on what it hangs.
+
+use std::collections::BTreeMap;
+
+use sweepd::config::OnStale;
+use sweepd::math::{Pose, relative};
+use sweepd::scene::PairAction;
+use sweepd::wire::BodyStatus;
+use sweepd::world::Edit;
+
+use crate::solids::Solid;
+
+/// Of the source, as the scene says.
+const TIMEOUT_NS: u64 = 500_000_000;
+/// What may have got farther is as good as anywhere: the default of scenes.
+const STALE_REACH_M: f64 = 1.0;
+
+pub struct Thing {
+    pub solid: Solid,
+    pub enabled: bool,
+    pub group: u32,
+    pub mask: u32,
+    /// The body it hangs on, and its pose there.
+    pub hangs: Option<(u64, Pose)>,
+    /// Where it is, where it hangs on none.
+    pub pose: Pose,
+    pub placed: bool,
+    pub refused: bool,
+    pub since_ns: u64,
+}
+
+/// Where a body was in the last tick.
+#[derive(Clone, Copy)]
+pub struct Before {
+    pub pose: Pose,
+    pub status: BodyStatus,
+}
+
+#[derive(Default)]
+pub struct World {
+    pub things: BTreeMap<u64, Thing>,
+    /// Check or not, and the two; the last that matches wins.
+    rules: Vec<(bool, u64, u64)>,
+    pub now_ns: u64,
+    pub before: BTreeMap<u64, Before>,
+    /// Since the last tick something else than frames changed it.
+    pub edited: bool,
+}
+
+/// The number in `bN`.
+fn id_of(name: &str) -> u64 {
+    name[1..].parse().unwrap()
+}
+
+impl World {
+    /// As the engine is after its last tick.
+    pub fn end_tick(&mut self) {
+        let now = |id: &u64| Before {
+            pose: self.pose(*id),
+            status: self.status(*id),
+        };
+        self.before = self.things.keys().map(|id| (*id, now(id))).collect();
+        self.edited = false;
+    }
+
+    /// The body it hangs on in the end, and its pose there.
+    pub fn root(&self, id: u64) -> (u64, Pose) {
+        let (mut at, mut pose) = (id, Pose::identity());
+        while let Some((to, local)) = self.things[&at].hangs {
+            pose = local * pose;
+            at = to;
+        }
+        (at, pose)
+    }
+
+    pub fn pose(&self, id: u64) -> Pose {
+        let (root, local) = self.root(id);
+        self.things[&root].pose * local
+    }
+
+    pub fn moves(&self, id: u64) -> bool {
+        self.things[&self.root(id).0].solid.spec.moves
+    }
+
+    pub fn status(&self, id: u64) -> BodyStatus {
+        let root = &self.things[&self.root(id).0];
+        let age_ns = self.now_ns - root.since_ns;
+        if !self.things[&id].enabled {
+            BodyStatus::Disabled
+        } else if !root.solid.spec.moves {
+            BodyStatus::Known
+        } else if root.refused {
+            BodyStatus::Rejected
+        } else if !root.placed {
+            BodyStatus::NotReceived
+        } else if age_ns < TIMEOUT_NS {
+            BodyStatus::Known
+        } else {
+            match root.solid.spec.on_stale {
+                OnStale::Hold => BodyStatus::Held,
+                OnStale::Remove => BodyStatus::RemovedByAge,
+                OnStale::Unknown => BodyStatus::Stale,
+            }
+        }
+    }
+
+    /// How far it may be from where it was last seen, metres.
+    pub fn reach_m(&self, id: u64) -> f64 {
+        let age_ns = self.now_ns - self.things[&self.root(id).0].since_ns;
+        match (self.status(id), self.things[&id].solid.spec.max_speed_mps) {
+            (BodyStatus::Known | BodyStatus::Held, _) => 0.0,
+            (BodyStatus::Stale, Some(speed_mps)) => Some(speed_mps * age_ns as f64 * 1e-9)
+                .filter(|reach_m| *reach_m <= STALE_REACH_M)
+                .unwrap_or(f64::INFINITY),
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// Whether a pair of bodies that are there is to be checked, whatever is known of their places.
+    pub fn is_checked(&self, a: u64, b: u64) -> bool {
+        let (one, other) = (&self.things[&a], &self.things[&b]);
+        if !(one.enabled && other.enabled)
+            || !(self.moves(a) || self.moves(b))
+            || (one.solid.is_half_space && other.solid.is_half_space)
+        {
+            return false;
+        }
+        let named =
+            |rule: &&(bool, u64, u64)| (rule.1, rule.2) == (a, b) || (rule.1, rule.2) == (b, a);
+        if let Some((check, ..)) = self.rules.iter().rev().find(named) {
+            return *check;
+        }
+        self.root(a).0 != self.root(b).0
+            && one.group & other.mask != 0
+            && other.group & one.mask != 0
+    }
+
+    /// What an edit that an engine took makes of it.
+    pub fn apply(&mut self, edit: &Edit, solid: Option<Solid>) {
+        self.edited = true;
+        match edit {
+            Edit::Put { body, .. } => {
+                let solid = solid.unwrap();
+                let to = body.attached_to.as_deref().map(id_of);
+                let thing = Thing {
+                    enabled: body.enabled,
+                    group: body.group,
+                    mask: body.mask,
+                    hangs: to.map(|to| (to, body.pose)),
+                    pose: body.pose,
+                    placed: !body.moves,
+                    refused: false,
+                    since_ns: 0,
+                    solid,
+                };
+                self.things.insert(body.id.0, thing);
+            }
+            Edit::Remove { name } => {
+                self.things.remove(&id_of(name));
+            }
+            Edit::Enable { name, enabled } => self.named(name).enabled = *enabled,
+            Edit::Filter { name, group, mask } => {
+                let thing = self.named(name);
+                thing.group = group.unwrap_or(thing.group);
+                thing.mask = mask.unwrap_or(thing.mask);
+            }
+            Edit::Rule(rule) => {
+                let check = rule.action == PairAction::Check;
+                self.rules.push((check, id_of(&rule.a), id_of(&rule.b)));
+            }
+            Edit::DropRules { a, b } => {
+                let (a, b) = (id_of(a), id_of(b));
+                let is_of = |x: u64, y: u64| (x, y) == (a, b) || (x, y) == (b, a);
+                self.rules.retain(|rule| !is_of(rule.1, rule.2));
+            }
+            Edit::Attach { name, to, pose } => match to {
+                Some(to) => {
+                    let (id, to) = (id_of(name), id_of(to));
+                    let local = pose.unwrap_or_else(|| relative(&self.pose(to), &self.pose(id)));
+                    self.named(name).hangs = Some((to, local));
+                }
+                None => self.detach(name, pose.as_ref()),
+            },
+            Edit::Reset { .. } => self.reset(),
+            Edit::Margin { .. } => {}
+        }
+    }
+
+    fn named(&mut self, name: &str) -> &mut Thing {
+        self.things.get_mut(&id_of(name)).unwrap()
+    }
+
+    fn detach(&mut self, name: &str, pose: Option<&Pose>) {
+        let id = id_of(name);
+        let (now_ns, at, (root, _)) = (self.now_ns, self.pose(id), self.root(id));
+        if root == id {
+            return;
+        }
+        let root = &self.things[&root];
+        let (placed, refused) = (root.placed, root.refused);
+        let since_ns = if root.solid.spec.moves {
+            root.since_ns
+        } else {
+            now_ns
+        };
+        let thing = self.named(name);
+        thing.hangs = None;
+        let fixed = !thing.solid.spec.moves;
+        thing.pose = pose.copied().filter(|_| fixed).unwrap_or(at);
+        thing.placed = placed || fixed;
+        thing.refused = refused && !fixed;
+        thing.since_ns = since_ns;
+    }
+
+    /// All poses of frames are forgotten.
+    pub fn reset(&mut self) {
+        self.edited = true;
+        for thing in self.things.values_mut() {
+            if thing.solid.spec.moves {
+                (thing.placed, thing.refused) = (false, false);
+            }
+        }
+    }
+
+    /// A row of a frame; `None`: one that holds no numbers.
+    pub fn take_row(&mut self, id: u64, pose: Option<&Pose>) {
+        let now_ns = self.now_ns;
+        let Some(thing) = self.things.get_mut(&id) else {
+            return;
+        };
+        if thing.hangs.is_some() || !thing.solid.spec.moves {
+            return;
+        }
+        thing.refused = pose.is_none();
+        if let Some(pose) = pose {
+            (thing.pose, thing.placed, thing.since_ns) = (*pose, true, now_ns);
+        }
+    }
+}
