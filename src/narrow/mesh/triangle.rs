@@ -343,10 +343,11 @@ fn corner(
 ) {
     let square = normal.norm_squared();
     if square > f64::MIN_POSITIVE {
-        // Weights from areas: each is the share of the part opposite its corner.
+        // Weights from areas: each is the share of the part opposite its corner. The third is what the others leave of
+        // 1: so this is a point of the triangle, also of one whose normal is noise.
         let weight = |k: usize| edges[k].cross(&(p - t[k])).dot(normal) / square;
-        let (w2, w0, w1) = (weight(0), weight(1), weight(2));
-        if w0 >= 0.0 && w1 >= 0.0 && w2 >= 0.0 {
+        let (w2, w1) = (weight(0), weight(2));
+        if w1 >= 0.0 && w2 >= 0.0 && w1 + w2 <= 1.0 {
             let on = t[0] + edges[0] * w1 - edges[2] * w2;
             offer(on, [edges[0], edges[1]]);
         }

@@ -64,3 +64,53 @@ fn what_surely_crosses_is_found_crossing() {
     }
     assert!(crossed > 1_000, "{crossed}");
 }
+
+/// Faces whose corners are in one line but for rounding have a normal of noise, and with it weights of a point anywhere.
+#[test]
+fn bug_a_face_that_is_flat_by_rounding_reaches_no_farther_than_its_edges() {
+    let face = |corners: [[f64; 3]; 3]| corners.map(Point::from);
+    let cases = [
+        (
+            face([[0.0; 3], [0.1, 0.3, 0.0], [0.06, 0.18, 0.0]]),
+            face([[0.4, 1.2, 0.0], [-5.5, 2.4, 0.0], [-2.8, 0.4, 0.0]]),
+        ),
+        (
+            face([[0.0; 3], [0.1, 1.1, 0.0], [0.07, 0.77, 0.0]]),
+            face([
+                [3.0 * 0.1, 3.0 * 1.1, 0.5],
+                [0.4, 3.3, 1.0],
+                [0.3, 3.4, 1.2],
+            ]),
+        ),
+    ];
+    for (flat, other) in cases {
+        // Its longest edge is all of it.
+        let line = [flat[0], flat[1], flat[1]];
+        let truth = gap(&line, &other, 1e-15, f64::INFINITY).unwrap().gap;
+        assert!(truth.width() < 1e-12, "{truth:?}");
+        for found in [
+            gap(&flat, &other, 1e-15, f64::INFINITY).unwrap(),
+            gap(&other, &flat, 1e-15, f64::INFINITY).unwrap(),
+        ] {
+            let told = found.gap.widened(1e-13);
+            assert!(told.contains(truth.min), "{found:?} {truth:?}");
+            assert!(found.gap.width() < 1e-12, "{found:?}");
+        }
+    }
+    // And in any direction.
+    for seed in 0..20_000 {
+        let mut next = numbers(seed);
+        let mut vector = || Vec3::new(next(), next(), next());
+        let (along, share) = (vector(), vector().x);
+        let flat = [0.0, 1.0, share].map(|k| Point::from(along * k));
+        let shares = [share.min(0.0), share.max(1.0)];
+        let line = [shares[0], shares[1], shares[1]].map(|k| Point::from(along * k));
+        let other = [(); 3].map(|()| Point::from(vector() * 3.0));
+        let truth = gap(&line, &other, 1e-15, f64::INFINITY).unwrap().gap;
+        let found = gap(&flat, &other, 1e-15, f64::INFINITY).unwrap().gap;
+        assert!(
+            found.max >= truth.min - 1e-13 && found.min <= truth.max + 1e-13,
+            "seed {seed}: {found:?} {truth:?}"
+        );
+    }
+}
