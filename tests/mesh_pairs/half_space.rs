@@ -1,8 +1,9 @@
 //! Meshes against half-spaces: the oracle is the least height over all vertices.
 
+use crate::oracle::meshes::Soup;
 use crate::oracle::rng::Rng;
-use crate::support::{CASES, KINDS, any_mesh, mesh_of};
-use sweepd::math::{Aabb, Interval, Point, Vec3, relative};
+use crate::support::{CASES, KINDS, any_mesh, mesh_of, shape};
+use sweepd::math::{Aabb, Interval, Point, Pose, Vec3, relative};
 use sweepd::narrow::mesh::{FrontStore, Goal, MeshQuery};
 use sweepd::shape::{Geometry, Shape};
 use sweepd::time::{ManualClock, Meter};
@@ -67,6 +68,60 @@ fn half_spaces_meet_the_lowest_vertex() {
                 "{name}"
             );
             assert!(query.interval().min >= end.min);
+        }
+    }
+}
+
+/// Of a mesh that deforms heights are sums of its vertices' own coordinates, however near to the plane these are.
+#[test]
+fn bug_a_deforming_mesh_far_from_its_frame_is_known_no_better_than_its_vertices() {
+    let low = Vec3::new(3_763_678.5, -657_891.75, -925_613.625);
+    let corners = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.5, 0.75],
+        [-0.25, 1.0, 1.25],
+        [0.5, -0.25, 1.5],
+    ];
+    let soup = Soup {
+        vertices: corners.map(|c| Point::from(low + Vec3::from(c))).to_vec(),
+        faces: vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]],
+    };
+    let (normal, offset) = (Vec3::new(2.0, 3.0, 6.0) / 7.0, 1e-10);
+    let plane = Shape {
+        geometry: Geometry::HalfSpace { normal, offset },
+        aabb: Aabb::empty(),
+        centre: Point::origin(),
+        radius: f64::INFINITY,
+    };
+    // Exact: coordinates are eighths, and the normal's numbers multiples of 2^-55.
+    let wanted = {
+        let whole = |x: f64, unit: f64| {
+            #[allow(clippy::cast_possible_truncation, reason = "whole numbers")]
+            let n = (x * unit) as i128;
+            n
+        };
+        let unit = 2.0_f64.powi(55);
+        let sum: i128 = (0..3)
+            .map(|k| whole(low[k], 8.0) * whole(normal[k], unit))
+            .sum();
+        #[allow(clippy::cast_precision_loss, reason = "far less than the offset")]
+        let height = sum as f64 / (8.0 * unit);
+        height - offset
+    };
+    for solid in [Some(false), None] {
+        let mesh = shape(&soup, solid).to_deforming().unwrap();
+        for (a, b) in [(&plane, &mesh), (&mesh, &plane)] {
+            let clock = ManualClock::new(0);
+            let mut meter = Meter::unlimited(&clock);
+            let (mut store, mut query) = (FrontStore::default(), MeshQuery::default());
+            query.start(&mut store, a, b, &Pose::identity());
+            assert!(query.advance(&mut store, (a, b), Goal::Gap, u64::MAX, &mut meter));
+            let told = query.interval();
+            assert!(
+                told.contains(wanted) && told.contains(-1e-10),
+                "{told:?} {wanted}"
+            );
+            assert!(told.width() < 1e-6, "{told:?}");
         }
     }
 }

@@ -96,10 +96,9 @@ impl HalfSpaceWalk {
         self.down = self.pose.rotation.inverse() * self.down_there;
         let origin = mesh.places_origin();
         self.origin_height_m = normal.dot(&(self.pose * origin).coords) - offset;
-        let size = self.pose.translation.vector.norm()
-            + offset.abs()
-            + origin.coords.norm()
-            + mesh.radius();
+        // Of a mesh that deforms the origin is its frame's, and the vertices may be far from there.
+        let far = origin.coords.norm().max(mesh.centre().coords.norm());
+        let size = self.pose.translation.vector.norm() + offset.abs() + far + mesh.radius();
         self.slop = 32.0 * ROUND * size;
         self.near_m = self.slop.max(PREDICTION * mesh.radius());
         self.lowest = None;
