@@ -11,7 +11,7 @@
 use std::cmp::Ordering;
 
 use super::Closest;
-use crate::math::{Interval, Point, Vec3, greater, lesser};
+use crate::math::{Interval, Point, ROUND, Vec3, greater, lesser};
 use crate::shape::side;
 
 /// What is rounded where the squares of two separations are compared, as a share of them: far more than it is.
@@ -94,40 +94,47 @@ pub(super) fn gap(a: &Triangle, b: &Triangle, slop: f64, beyond_m: f64) -> Resul
     })
 }
 
-/// Whether an edge of the one passes through the other well within both, whatever rounding did to the corners.
+/// Whether an edge of the one passes through the other, whatever rounding did to the corners.
+///
+/// * `slop` - no corner is farther from where it should be, metres.
 ///
 /// False says nothing. Some ten times cheaper than the whole answer.
 pub(super) fn surely_crosses(a: &Triangle, b: &Triangle, slop: f64) -> bool {
     surely_pierces(a, b, slop) || surely_pierces(b, a, slop)
 }
 
-/// Whether an edge of `b` surely passes through `a`.
+/// Whether an edge of `b` surely passes through `a`: its ends on either side of the plane, and all edges of `a` on one
+/// side of it. Five volumes, the signs of which nothing can change; no normal is normalised, for that of a needle is
+/// noise.
 fn surely_pierces(a: &Triangle, b: &Triangle, slop: f64) -> bool {
     let edges_a = edges(a);
     let normal = edges_a[0].cross(&edges_a[1]);
-    let Some(normal) = normal.try_normalize(f64::MIN_POSITIVE) else {
-        return false;
+    let from = b.map(|p| p - a[0]);
+    let longest = |v: &[Vec3; 3]| {
+        let squares = v.map(|v| v.norm_squared());
+        squares[0].max(squares[1]).max(squares[2]).sqrt() + 2.0 * slop
     };
-    let size = edges_a[0].norm() + edges_a[1].norm() + (b[1] - b[0]).norm() + (b[2] - b[0]).norm();
-    let margin = 1e-9 * size + 8.0 * slop;
-    let height = b.map(|p| normal.dot(&(p - a[0])));
+    let (edge, far) = (longest(&edges_a), longest(&from));
+    let over = from.map(|p| normal.dot(&p));
+    let least = unsure(edge, edge, far, slop);
     (0..3).any(|k| {
         let (p, q) = (k, (k + 1) % 3);
-        let through = (height[p] > margin && height[q] < -margin)
-            || (height[p] < -margin && height[q] > margin);
-        if !through {
+        if !(over[p] > least && over[q] < -least || over[p] < -least && over[q] > least) {
             return false;
         }
         let along = b[q] - b[p];
-        let fall = height[p] - height[q];
-        let at = b[p] + along * (height[p] / fall);
-        // How far the place shifts when the heights are off by the slop.
-        let inside = margin + along.norm() * (4.0 * slop / fall.abs());
-        (0..3).all(|i| {
-            let inward = normal.cross(&edges_a[i]);
-            inward.dot(&(at - a[i])) > inside * inward.norm()
-        })
+        let least = unsure(edge, along.norm() + 2.0 * slop, far + edge, slop);
+        let beside = |i: usize| along.dot(&edges_a[i].cross(&(b[p] - a[i])));
+        let sides = [beside(0), beside(1), beside(2)];
+        sides.iter().all(|s| *s > least) || sides.iter().all(|s| *s < -least)
     })
+}
+
+/// A volume of three vectors no longer than these has its sign beyond this, whatever is rounded: the corners by `slop`,
+/// and the products (Shewchuk 1997, as `shape::side`; their absolute values sum to less than 1.5 times the product of
+/// the lengths).
+fn unsure(u: f64, v: f64, w: f64, slop: f64) -> f64 {
+    16.0 * ROUND * (u * v * w) + 2.5 * slop * (u * v + v * w + w * u) + f64::MIN_POSITIVE
 }
 
 pub(super) fn edges(t: &Triangle) -> [Vec3; 3] {

@@ -114,3 +114,60 @@ fn bug_a_face_that_is_flat_by_rounding_reaches_no_farther_than_its_edges() {
         );
     }
 }
+
+/// A needle 1.5e-8 m wide has a normal that is off by more than a billionth.
+#[test]
+fn bug_what_is_all_on_one_side_of_a_needle_does_not_surely_cross_it() {
+    let needle = [
+        [0.0; 3],
+        [0.572025131883096, 0.4852362573120345, 0.6613115930360935],
+        [
+            0.28579295599098065,
+            0.24243184046799168,
+            0.33040191551755255,
+        ],
+    ]
+    .map(Point::from);
+    let other = [
+        [0.2857929603454697, 0.2424318358773694, 0.33040191511934264],
+        [0.28579295852794606, 0.24243183931214218, 0.3304019141712161],
+        [0.2857930057835601, 0.24243175000805015, 0.3304019388225059],
+    ]
+    .map(Point::from);
+    assert!(!crossing(&needle, &other));
+    assert!(!surely_crosses(&needle, &other, 0.0));
+}
+
+/// Whatever the corners are off by: needles of all widths, met near their edges by triangles of all sizes.
+#[test]
+fn what_surely_crosses_does_so_wherever_rounding_puts_the_corners() {
+    let (mut sure, mut crossed) = (0, 0);
+    for seed in 0..200_000 {
+        let mut next = numbers(seed);
+        let mut vector = |size: f64| Vec3::new(next(), next(), next()) * size;
+        let exponents = vector(5.0) - Vec3::repeat(5.0);
+        let [width, size, near] = [0, 1, 2].map(|k| 10.0_f64.powf(exponents[k]));
+        let (along, share) = (vector(1.0), vector(1.0).x);
+        let needle = [
+            Point::origin(),
+            Point::from(along),
+            Point::from(along * share + vector(width)),
+        ];
+        let middle = along * (0.5 * share) + vector(near);
+        let other = [(); 3].map(|()| Point::from(middle + vector(size)));
+        let slop = near * 1e-3;
+        crossed += i32::from(crossing(&needle, &other));
+        if surely_crosses(&needle, &other, 0.0) {
+            assert!(crossing(&needle, &other), "seed {seed}");
+        }
+        if surely_crosses(&needle, &other, slop) {
+            sure += 1;
+            for _ in 0..4 {
+                let mut off = |t: &Triangle| t.map(|p| p + vector(1.0).normalize() * slop);
+                let moved = (off(&needle), off(&other));
+                assert!(crossing(&moved.0, &moved.1), "seed {seed}");
+            }
+        }
+    }
+    assert!(crossed > 1_000 && sure > crossed / 4, "{sure} of {crossed}");
+}
