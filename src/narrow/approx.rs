@@ -44,9 +44,9 @@ use crate::wire::{BodyStatus, Level, Verdict};
 use crate::world::{Body, World};
 
 use super::Narrow;
+use super::bent::Bent;
 use super::compound::Waiting;
 use super::finding::Finding;
-use super::memo::bent;
 use super::sweep::Passage;
 
 use gather::{Ball, SPOTS_MAX, cut, gather};
@@ -122,7 +122,7 @@ struct Standing<'a> {
 #[derive(Clone, Copy, Debug)]
 struct Place {
     rel: Pose,
-    bent_m: f64,
+    bent: Bent,
     complete: bool,
 }
 
@@ -130,7 +130,7 @@ impl Standing<'_> {
     fn place(&self) -> Place {
         Place {
             rel: relative(&self.a.pose, &self.b.pose),
-            bent_m: bent(self.a, self.b),
+            bent: Bent::of_bodies(self.a, self.b),
             complete: self.complete,
         }
     }

@@ -10,11 +10,12 @@ use crate::world::{Body, PlacedShape};
 
 use super::Counters;
 use super::around::whole_bounds;
+use super::bent::Bent;
 use super::carry::Told;
 use super::compound::{CompoundFront, Tools};
 use super::contacts::Contact;
 use super::cursor::{Cursor, Room, Turn};
-use super::memo::{Witness, bent};
+use super::memo::Witness;
 use super::mesh::{Goal, Search};
 use super::shelves::Shelves;
 
@@ -90,7 +91,7 @@ fn of_shapes(
 ) -> Told {
     let (mut bench, mut cursor) = (Bench::default(), Cursor::default());
     let rel = relative(&a.pose, &b.pose);
-    cursor.start((0, 0), (rel, bent(a, b)), 0.0, 0, Goal::Gap);
+    cursor.start((0, 0), (rel, Bent::of_bodies(a, b)), 0.0, 0, Goal::Gap);
     let Shelves {
         store, contacts, ..
     } = &mut bench.shelves;

@@ -12,8 +12,9 @@ use crate::time::Meter;
 use crate::world::{Body, PlacedShape};
 
 use super::Narrow;
+use super::bent::Bent;
 use super::cursor::SLICE_UNITS;
-use super::memo::{Memo, Witness, bent};
+use super::memo::{Memo, Witness};
 use super::mesh::{CarriedFront, FrontStore, Goal, LeafContact, Search, numbered};
 use super::query::{leaf_contact, shape_pose, sound, witness_of};
 
@@ -127,7 +128,7 @@ impl Memo {
     pub(super) fn note_asked(&mut self, (a, b): (&Body, &Body), rel: &Pose, tick: u64) {
         self.rel = *rel;
         self.credit_m = a.motion.credit_m() + b.motion.credit_m();
-        (self.bent_m, self.tested) = (bent(a, b), tick);
+        (self.bent, self.tested) = (Bent::of_bodies(a, b), tick);
     }
 
     /// Takes over what a turn towards a goal told; false: it told nothing new.

@@ -32,8 +32,9 @@ use crate::time::Meter;
 use crate::world::Body;
 
 use super::arena::Run;
+use super::bent::Bent;
 use super::cover::{Cover, Group, Open, Wear};
-use super::memo::{Witness, bent, relative_motion};
+use super::memo::{Witness, relative_motion};
 use super::mesh::{CarriedFront, Goal, Placed, Search};
 use super::shelves::Shelves;
 
@@ -55,8 +56,8 @@ pub(super) struct CompoundFront {
     inner: Vec<Inner>,
     /// Least gap that the two can have, metres.
     floor_m: f64,
-    /// Sum of what the two have deformed, when they were last looked at, metres.
-    bent_m: f64,
+    /// What the two had deformed when they were last looked at.
+    bent: Bent,
     /// Settled: a goal was reached.
     wear: Wear,
 }
@@ -101,15 +102,15 @@ impl CompoundFront {
     /// it holds. The first time it starts there.
     pub(super) fn move_to(&mut self, tools: &mut Tools<'_>, (a, b): (&Body, &Body), rel: &Pose) {
         let sides = (Side::of(a), Side::of(b));
-        let bent_m = bent(a, b);
+        let bent = Bent::of_bodies(a, b);
         let at = placed(&sides.0, &sides.1, rel);
         if !self.started {
-            (self.started, self.at, self.bent_m) = (true, at, bent_m);
+            (self.started, self.at, self.bent) = (true, at, bent);
             self.search = tools.search;
             self.start_over(tools, (&sides.0, &sides.1));
             return;
         }
-        let moved = self.at.pos12 != *rel || bent_m.to_bits() != self.bent_m.to_bits();
+        let moved = self.at.pos12 != *rel || bent != self.bent;
         self.at = at;
         self.take_floor([a.radius, b.radius]);
         if !moved {
@@ -117,9 +118,10 @@ impl CompoundFront {
         }
         let drift = &mut self.cover.drift;
         drift.follow(rel, |from, to| relative_motion(a, b, from, to));
-        if bent_m > self.bent_m {
-            drift.add(bent_m - self.bent_m, bent_m);
-            self.bent_m = bent_m;
+        let bent_m = bent.since_m(&self.bent);
+        if bent_m > 0.0 {
+            drift.add(bent_m);
+            self.bent = bent;
         }
         let entries = &tools.shelves.store.entries;
         let worn = (self.wear).is_worn_out(&self.cover, entries, [a.radius, b.radius]);

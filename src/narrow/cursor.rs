@@ -11,6 +11,7 @@ use crate::world::PlacedShape;
 
 use super::Counters;
 use super::arena::{Arena, Run};
+use super::bent::Bent;
 use super::contacts::Contact;
 use super::exact::Warm;
 use super::memo::Witness;
@@ -27,9 +28,9 @@ pub(super) const SLICE_UNITS: u64 = 32;
 pub(super) struct Cursor {
     /// Pose of B's body seen from A's, at the start.
     pub(super) rel: Pose,
-    /// What both bodies had deformed by at the start, metres. What is found later is of the vertices of then: it holds
+    /// What both bodies had deformed by at the start. What is found later is of the vertices of then: it holds
     /// for those of any other moment since the start when it is widened by what was deformed since the start.
-    pub(super) bent_m: f64,
+    pub(super) bent: Bent,
     /// Sum of both bodies' `S - d` at the start.
     pub(super) credit_m: f64,
     /// Tick of the start.
@@ -66,7 +67,7 @@ impl Default for Cursor {
     fn default() -> Self {
         Self {
             rel: Pose::identity(),
-            bent_m: 0.0,
+            bent: Bent::default(),
             credit_m: 0.0,
             tick: 0,
             goal: Goal::Verdict,
@@ -96,13 +97,13 @@ impl Cursor {
     pub(super) fn start(
         &mut self,
         places: (u32, u32),
-        (rel, bent_m): (Pose, f64),
+        (rel, bent): (Pose, Bent),
         credit_m: f64,
         tick: u64,
         goal: Goal,
     ) {
         self.places = places;
-        (self.rel, self.bent_m) = (rel, bent_m);
+        (self.rel, self.bent) = (rel, bent);
         self.credit_m = credit_m;
         self.tick = tick;
         self.goal = goal;

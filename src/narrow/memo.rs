@@ -8,6 +8,7 @@ use crate::wire::{NO_INDEX, Verdict};
 use crate::world::{Body, World};
 
 use super::around::box_bounds;
+use super::bent::Bent;
 use super::exact::Warm;
 use super::order::Urgency;
 use super::{NONE, Narrow};
@@ -41,8 +42,8 @@ pub(super) struct Memo {
     pub(super) gap: Interval,
     /// Sum of both bodies' `S - d` at the test, metres.
     pub(super) credit_m: f64,
-    /// Sum of what both bodies had deformed at the test, metres.
-    pub(super) bent_m: f64,
+    /// What both bodies had deformed at the test.
+    pub(super) bent: Bent,
     /// Pose of B's body seen from A's at the test.
     pub(super) rel: Pose,
     /// Tick of the test's poses; 0: never tested, `gap` comes from the boxes.
@@ -115,7 +116,7 @@ impl Memo {
         Self {
             gap: Interval::UNKNOWN,
             credit_m: 0.0,
-            bent_m: 0.0,
+            bent: Bent::default(),
             rel: Pose::identity(),
             tested: 0,
             finished: false,
@@ -163,18 +164,13 @@ impl Memo {
     }
 }
 
-/// Sum of what two bodies have deformed since they were put, metres.
-pub(super) fn bent(a: &Body, b: &Body) -> f64 {
-    a.motion.bent_m + b.motion.bent_m
-}
-
 /// An upper bound on how much the gap of two bodies changed since a test, by their relative pose then and by how much
 /// they had deformed then, metres.
-pub(super) fn changed_since(a: &Body, b: &Body, (then, bent_m): (&Pose, f64), now: &Pose) -> f64 {
-    let sum_m = bent(a, b);
+pub(super) fn changed_since(a: &Body, b: &Body, (then, bent): (&Pose, Bent), now: &Pose) -> f64 {
+    let bent_m = Bent::of_bodies(a, b).since_m(&bent);
     let moved_m = relative_motion(a, b, then, now);
-    if sum_m > bent_m {
-        moved_m + (sum_m - bent_m) + 4.0 * ROUND * (sum_m + moved_m)
+    if bent_m > 0.0 {
+        (moved_m + bent_m) * (1.0 + 2.0 * ROUND)
     } else {
         moved_m
     }
@@ -279,7 +275,7 @@ impl Narrow {
         *memo = Memo {
             gap: box_bounds(body_a, body_b),
             credit_m: body_a.motion.credit_m() + body_b.motion.credit_m(),
-            bent_m: bent(body_a, body_b),
+            bent: Bent::of_bodies(body_a, body_b),
             rel: relative(&body_a.pose, &body_b.pose),
             report_m: world.report_within(one, other),
             born: self.tick,

@@ -22,6 +22,7 @@ mod approx;
 mod arena;
 mod around;
 mod ask;
+mod bent;
 mod carry;
 mod compound;
 mod contacts;

@@ -6,9 +6,10 @@ use crate::time::Meter;
 use crate::wire::Verdict;
 use crate::world::{Body, PlacedShape, World};
 
+use super::bent::Bent;
 use super::contacts::ContactSet;
 use super::cursor::{Room, Turn};
-use super::memo::{Witness, bent, changed_since};
+use super::memo::{Witness, changed_since};
 use super::mesh::{Goal, has_front};
 use super::order::Order;
 use super::pass::Pass;
@@ -187,7 +188,13 @@ impl Narrow {
         if fresh || (cursor.goal == Goal::Verdict && goal != Goal::Verdict) {
             let credit_m = a.motion.credit_m() + b.motion.credit_m();
             let rel = relative(&a.pose, &b.pose);
-            cursor.start((0, 0), (rel, bent(a, b)), credit_m, self.tick, goal);
+            cursor.start(
+                (0, 0),
+                (rel, Bent::of_bodies(a, b)),
+                credit_m,
+                self.tick,
+                goal,
+            );
         }
         let mut room = Room {
             search: self.search,
@@ -201,7 +208,7 @@ impl Narrow {
             return Turn::Open;
         }
         // What was known before holds at this tick's poses; carried back to the cursor's, it loses the motion between.
-        let then = (&cursor.rel, cursor.bent_m);
+        let then = (&cursor.rel, cursor.bent);
         let since = changed_since(a, b, then, &relative(&a.pose, &b.pose));
         let known_low = (memo.now.min - since).next_down();
         let whole =
@@ -209,7 +216,7 @@ impl Narrow {
         let low = if whole { cursor.gap.min } else { known_low };
         memo.rel = cursor.rel;
         memo.credit_m = cursor.credit_m;
-        memo.bent_m = cursor.bent_m;
+        memo.bent = cursor.bent;
         memo.tested = cursor.tick;
         memo.tight = whole && cursor.goal != Goal::Verdict;
         let answer = Answer {

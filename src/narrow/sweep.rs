@@ -241,7 +241,7 @@ impl Sweep {
             ..Self::fresh((slot, at_a, at_b), memo.warm)
         };
         let start = Moment::of((a, b), 0.0);
-        let change = changed_since(a, b, (&memo.rel, memo.bent_m), &start.rel);
+        let change = changed_since(a, b, (&memo.rel, memo.bent), &start.rel);
         let touching = change == 0.0 && memo.finished && memo.gap.contains(0.0);
         if start.certain && (touching || memo.gap.max + change <= 0.0) {
             (sweep.hit, sweep.done) = (0.0, true);

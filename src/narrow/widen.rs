@@ -139,7 +139,7 @@ impl Narrow {
             // Rounded up by what the sums of long paths may have lost, not by an ulp of their small difference.
             (spent - memo.credit_m) + 4.0 * ROUND * (spent.abs() + memo.credit_m.abs())
         };
-        let by_pose = changed_since(a, b, (&memo.rel, memo.bent_m), &rel);
+        let by_pose = changed_since(a, b, (&memo.rel, memo.bent), &rel);
         let motion_m = by_path.min(by_pose).max(0.0);
         memo.rest = motion_m == 0.0;
         memo.widened_m = motion_m + reach_m;

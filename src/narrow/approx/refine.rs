@@ -12,6 +12,7 @@
 use crate::ids::PairSlot;
 use crate::limits::REGIONS_PER_PAIR_MAX;
 use crate::math::Pose;
+use crate::narrow::bent::Bent;
 use crate::narrow::order::Line;
 use crate::narrow::{NONE, Narrow, Order, Wanted};
 use crate::time::{Meter, Reserve};
@@ -30,7 +31,7 @@ const KEPT_PARTS: u64 = 8;
 #[derive(Debug)]
 pub(in crate::narrow) struct Kept {
     rel: Pose,
-    bent_m: f64,
+    bent: Bent,
     /// Turns of work that the pair had had.
     turns: u32,
     contacts_tick: u64,
@@ -49,7 +50,7 @@ impl Default for Kept {
     fn default() -> Self {
         Self {
             rel: Pose::identity(),
-            bent_m: 0.0,
+            bent: Bent::default(),
             turns: 0,
             contacts_tick: 0,
             asked: 0,
@@ -66,7 +67,7 @@ impl Kept {
     /// Whether they hold all that the two share here.
     fn holds(&self, here: &Place, contacts_tick: u64) -> bool {
         !self.all.is_empty()
-            && self.bent_m.to_bits() == here.bent_m.to_bits()
+            && self.bent == here.bent
             && self.rel == here.rel
             && (!self.complete || self.contacts_tick == contacts_tick)
     }
@@ -169,7 +170,7 @@ impl Narrow {
         if as_well || pace.is_some_and(|pace| pace.cut) {
             return;
         }
-        (kept.rel, kept.bent_m) = (here.rel, here.bent_m);
+        (kept.rel, kept.bent) = (here.rel, here.bent);
         (kept.turns, kept.contacts_tick) = (turns, contacts_tick);
         (kept.tests, kept.whole) = (tests, pace.is_some_and(|pace| !pace.stopped));
         (kept.complete, kept.clipped) = (here.complete, approx.clipped);

@@ -4,12 +4,13 @@
 use crate::math::{Interval, Pose};
 use crate::narrow::Counters;
 use crate::narrow::arena::Arena;
+use crate::narrow::bent::Bent;
 use crate::narrow::carry::{found_on, glance, seen_at};
 use crate::narrow::contacts::Contact;
 use crate::narrow::cover::{Group, Open};
 use crate::narrow::cursor::{Room, Turn};
 use crate::narrow::exact::Warm;
-use crate::narrow::memo::{Witness, bent, changed_since};
+use crate::narrow::memo::{Witness, changed_since};
 use crate::narrow::mesh::{Goal, LeafContact, Search, has_front};
 use crate::narrow::pool::NONE;
 use crate::narrow::query::{
@@ -262,7 +263,7 @@ impl CompoundFront {
     ) -> Option<Answer> {
         let margin_m = self.margin_m(self.known.goal, asked);
         let (a, b) = pair.bodies;
-        let (goal, now) = (self.known.goal, (pair.rel, bent(a, b)));
+        let (goal, now) = (self.known.goal, (pair.rel, Bent::of_bodies(a, b)));
         let inner = self.inner_at(pair.places);
         let Shelves {
             cursors,
@@ -282,7 +283,7 @@ impl CompoundFront {
             search: tools.search,
         };
         let turn = cursor.turn(&mut room, shapes, asked.report_m, meter, tools.counters);
-        let since_m = changed_since(a, b, (&cursor.rel, cursor.bent_m), &pair.rel);
+        let since_m = changed_since(a, b, (&cursor.rel, cursor.bent), &pair.rel);
         let whole = turn == Turn::Finished;
         let low = if whole {
             cursor.gap.min

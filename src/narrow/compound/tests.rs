@@ -80,7 +80,7 @@ fn twin((a, b): (&Body, &Body), rel: &Pose) -> (Interval, Vec<(u32, u32)>) {
     for (i, one) in (0..).zip(a.shapes.iter()) {
         for (j, other) in (0..).zip(b.shapes.iter()) {
             let mut cursor = Cursor::default();
-            cursor.start((i, j), (*rel, 0.0), 0.0, 0, Goal::Gap);
+            cursor.start((i, j), (*rel, Bent::default()), 0.0, 0, Goal::Gap);
             let mut room = Room {
                 fronts: &mut shelves.store,
                 contacts: &mut shelves.contacts,

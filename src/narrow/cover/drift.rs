@@ -48,11 +48,9 @@ impl Drift {
         }
     }
 
-    /// Adds what the two deformed by, metres.
-    ///
-    /// * `sum_m` - of which size the numbers were whose difference it is.
-    pub(in crate::narrow) fn add(&mut self, bent_m: f64, sum_m: f64) {
-        let path_m = self.path_m + bent_m + 2.0 * ROUND * sum_m;
+    /// Adds what the two deformed by, metres, rounded up.
+    pub(in crate::narrow) fn add(&mut self, bent_m: f64) {
+        let path_m = self.path_m + bent_m;
         self.path_m = path_m + 2.0 * ROUND * path_m;
         self.last_m += bent_m;
     }

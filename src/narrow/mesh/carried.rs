@@ -33,6 +33,7 @@ use super::query::Goal;
 use super::retest::{reach_of, tree_of};
 use super::side::{self, Side};
 use crate::math::{Pose, ROUND};
+use crate::narrow::bent::Bent;
 pub use crate::narrow::cover::Search;
 use crate::narrow::cover::{Cover, Wear};
 use crate::shape::{BoxId, Obb, Shape};
@@ -83,8 +84,8 @@ pub struct CarriedFront {
     parting: Parting,
     deep: Deep,
     contacts: Patches,
-    /// Sum of what the two have deformed, when they were last looked at, metres.
-    bent_m: f64,
+    /// What the two had deformed when they were last looked at.
+    bent: Bent,
     /// Which trees the boxes are of.
     trees: [u32; 2],
 }
@@ -129,9 +130,9 @@ impl CarriedFront {
 
     /// Takes the pair to another pose, and to the vertices of now; what was proved is carried over as far as it holds.
     pub fn move_to(&mut self, store: &mut FrontStore, a: &Shape, b: &Shape, pos12: &Pose) {
-        let bent_m = bent_of(a, b);
+        let bent = Bent::of_shapes(a, b);
         let other_trees = self.trees != trees_of(a, b);
-        if self.at.pos12 == *pos12 && bent_m.to_bits() == self.bent_m.to_bits() && !other_trees {
+        if self.at.pos12 == *pos12 && bent == self.bent && !other_trees {
             // A refit since can only have brought boxes nearer to what they hold.
             self.at.lag_m = lag_of(a, b);
             return;
@@ -143,9 +144,10 @@ impl CarriedFront {
             return;
         }
         (self.cover.drift).follow(pos12, |from, to| moved(a, b, from, to));
-        if bent_m > self.bent_m {
-            self.cover.drift.add(bent_m - self.bent_m, bent_m);
-            self.bent_m = bent_m;
+        let bent_m = bent.since_m(&self.bent);
+        if bent_m > 0.0 {
+            self.cover.drift.add(bent_m);
+            self.bent = bent;
             self.shells.drop_test();
             self.measure_depth(a, b);
         }
@@ -169,9 +171,9 @@ impl CarriedFront {
     /// A mesh has other vertices than when this was last asked, and the front is to stay at its pose: what is found
     /// from now on is of the new ones, and its user allows for what moved meanwhile.
     pub(super) fn note_bend(&mut self, a: &Shape, b: &Shape) {
-        let bent_m = bent_of(a, b);
-        if bent_m > self.bent_m {
-            self.bent_m = bent_m;
+        let bent = Bent::of_shapes(a, b);
+        if bent.since_m(&self.bent) > 0.0 {
+            self.bent = bent;
             self.shells.drop_test();
             self.known.walks = None;
         }
@@ -250,7 +252,7 @@ impl CarriedFront {
         self.witness = None;
         self.whole = [(a, side_a), (b, side_b)].map(|(shape, side)| side.whole(shape));
         self.solids = side_a.solid().or(side_b.solid()).is_some();
-        (self.bent_m, self.trees) = (bent_of(a, b), trees_of(a, b));
+        (self.bent, self.trees) = (Bent::of_shapes(a, b), trees_of(a, b));
         self.measure_depth(a, b);
         self.shells.forget();
         self.shells.start(self.solids);
@@ -283,11 +285,6 @@ impl CarriedFront {
         let wholes = side::low((a.1, &origin_a), (b.1, &origin_b), &frame);
         self.known.floor_m = frame.low(&root_a, &root_b).max(wholes);
     }
-}
-
-/// Sum of what two shapes have deformed, metres.
-fn bent_of(a: &Shape, b: &Shape) -> f64 {
-    a.bent_m() + b.bent_m()
 }
 
 fn trees_of(a: &Shape, b: &Shape) -> [u32; 2] {

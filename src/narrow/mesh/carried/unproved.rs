@@ -1,7 +1,8 @@
 //! What a front has not proved apart, at whatever pose: where a pair may still touch.
 
-use super::{CarriedFront, Containment, FrontStore, LeafContact, bent_of, trees_of};
-use crate::math::{Pose, ROUND};
+use super::{CarriedFront, Containment, FrontStore, LeafContact, trees_of};
+use crate::math::Pose;
+use crate::narrow::bent::Bent;
 use crate::narrow::mesh::PATCH_POINTS;
 use crate::narrow::mesh::placed::moved;
 use crate::shape::{BoxId, Shape};
@@ -14,10 +15,9 @@ impl CarriedFront {
         } else {
             moved(a, b, &self.at.pos12, pos12)
         };
-        let bent_m = bent_of(a, b);
-        if bent_m > self.bent_m {
-            // A sum of two, less one of them: each is rounded.
-            (by_pose + (bent_m - self.bent_m)).next_up() + 4.0 * ROUND * bent_m
+        let bent_m = Bent::of_shapes(a, b).since_m(&self.bent);
+        if bent_m > 0.0 {
+            (by_pose + bent_m).next_up()
         } else {
             by_pose
         }
