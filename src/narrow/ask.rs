@@ -104,7 +104,7 @@ fn of_shapes(
     while turn == Turn::Open && meter.open() {
         turn = cursor.turn(&mut room, shapes, report_m, meter, &mut bench.counters);
     }
-    let max = cursor.upper();
+    let max = cursor.upper(shapes);
     Told {
         gap: Interval::new(cursor.gap.min.min(max), max),
         done: turn == Turn::Finished,

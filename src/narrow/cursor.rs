@@ -125,10 +125,12 @@ impl Cursor {
         contacts.all(&self.found)
     }
 
-    /// An upper bound on the gap at the start's pose, from whatever is done by now.
-    pub(super) fn upper(&self) -> f64 {
+    /// An upper bound on the gap of the bodies at the start's pose, from whatever is done by now.
+    ///
+    /// `one` and `other` are those of [`Cursor::turn`].
+    pub(super) fn upper(&self, (one, other): (&PlacedShape, &PlacedShape)) -> f64 {
         if self.under_way && !self.finished {
-            self.meshes.interval().max
+            sound(self.meshes.interval(), one, other, &self.rel).max
         } else {
             self.gap.max
         }

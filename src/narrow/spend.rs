@@ -203,7 +203,8 @@ impl Narrow {
         };
         let (report_m, counters) = (memo.report_m, &mut self.counters);
         let turn = cursor.turn(&mut room, shapes, report_m, meter, counters);
-        let certified = cursor.upper() <= 0.0 && memo.now.max > 0.0;
+        let high = cursor.upper(shapes);
+        let certified = high <= 0.0 && memo.now.max > 0.0;
         if turn == Turn::Open && !certified {
             return Turn::Open;
         }
@@ -221,8 +222,8 @@ impl Narrow {
         memo.tight = whole && cursor.goal != Goal::Verdict;
         let answer = Answer {
             gap: Interval {
-                min: low.min(cursor.upper()),
-                max: cursor.upper(),
+                min: low.min(high),
+                max: high,
             },
             finished: whole && cursor.certain,
             witness: cursor.witness,
@@ -273,9 +274,10 @@ impl Narrow {
             return;
         }
         // A certified touch at these very poses; the lower end is what motion left of the old one.
+        let high = sound(closest.gap, one, other, &rel).max;
         memo.gap = Interval {
-            min: memo.now.min.min(closest.gap.max),
-            max: closest.gap.max,
+            min: memo.now.min.min(high),
+            max: high,
         };
         memo.note_asked((a, b), &rel, self.tick);
         memo.finished = false;

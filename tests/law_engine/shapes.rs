@@ -217,3 +217,45 @@ fn bug_a_solid_and_a_body_of_several_shapes_were_told_as_deeper_than_any_point_o
     }
     assert!(deep > 100, "{deep} ticks");
 }
+
+/// A ball and the ball of another body, a thousand kilometres from that body's origin; they are deep by some nanometres.
+#[test]
+fn bug_what_touched_last_was_known_better_than_the_place_of_a_part_far_from_its_bodys_origin() {
+    let ball = "{ type = \"sphere\", radius = 0.5 }";
+    let several = "[{ type = \"sphere\", radius = 0.5, position = [1e6, 0.0, 0.0] }, \
+                    { type = \"sphere\", radius = 0.5, position = [1e6, 50.0, 0.0] }]";
+    let turn = Quat::new_unchecked(nalgebra::Quaternion::new(
+        -0.146_920_825_131_206_4,
+        0.014_011_738_308_423_79,
+        -0.196_567_592_238_371_67,
+        -0.969_318_896_965_261_6,
+    ));
+    let place = Vec3::new(
+        956_436.768_841_630_5,
+        -279_317.292_460_612_55,
+        84_923.480_565_664_36,
+    );
+    let at = |off: Vec3| Pose::from_parts((place + off).into(), turn);
+    let between = (at(Vec3::zeros()) * nalgebra::Point3::new(1e6, 0.0, 0.0)).coords;
+    let across = between.cross(&Vec3::z());
+    for units in 0..8 {
+        let bodies = [
+            body(1, [0.0; 3], ball, ""),
+            body(2, place.into(), several, ""),
+        ];
+        let mut rig = Rig::new(&scene("", &bodies));
+        rig.place(2, &at(across * 0.02 - between * 0.01));
+        rig.send(ALL);
+        assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+        rig.place(2, &at(Vec3::zeros()));
+        rig.send(Budget::units(units));
+        let row = rig.pair(1, 2).unwrap();
+        // No number as large as that place is known any better.
+        let off = 1e6 * f64::EPSILON;
+        assert!(row.gap_best_m < 0.0, "after {units}: {row:?}");
+        assert!(
+            row.gap_max_m >= row.gap_best_m + off,
+            "after {units}: {row:?}"
+        );
+    }
+}

@@ -290,7 +290,8 @@ impl CompoundFront {
         } else {
             f64::NEG_INFINITY
         };
-        let gap = Interval::new(low.min(cursor.upper()), cursor.upper()).widened(since_m);
+        let high = cursor.upper(shapes);
+        let gap = Interval::new(low.min(high), high).widened(since_m);
         self.known.high = self.known.high.min(gap.max);
         let here = whole && since_m == 0.0;
         let decided = goal == Goal::Verdict && (gap.max <= 0.0 || gap.min > margin_m);
