@@ -7,7 +7,8 @@
 //! How: what the pair's certificate says of the last tick's poses, less the length of the way, is free. Else
 //! conservative advancement (see `advance`): from a share that is reached without touch, the pair surely goes on for a
 //! while; so the touch is approached from before it and never passed over. That there is one is certified by a pose at
-//! which the two are known to collide, sought just behind the share reached, by the slope of the gap.
+//! which the two are known to collide whatever rounding did to the way, sought just behind the share reached, by the
+//! slope of the gap. What comes as near as rounding and no nearer is open.
 //!
 //! Sweeps come before the verdicts, because another tick has other poses: what is undecided at the end of this one is
 //! told as open. They take half of what the budget leaves, so that verdicts do not starve, and what verdicts leave.
@@ -17,6 +18,7 @@
 
 mod advance;
 mod asked;
+mod close;
 mod motion;
 
 pub use asked::touch_on_way;
@@ -33,18 +35,12 @@ use super::order::Order;
 use super::{NONE, Narrow, Wanted};
 
 use advance::{Ahead, Tools, Work};
-use motion::{Moment, reach_of, way};
+use motion::{Moment, length, way};
 
 /// Looks at a pair before the next one has its turn.
 const SLICE_LOOKS: u32 = 8;
 /// Looks at a pair in all: what grazes, or turns about itself near a mesh, must end. A touch takes 5 to 40.
 const LOOKS_MAX: u32 = 160;
-/// A touch is bracketed by shares as near as this: a thousandth of what is promised.
-const CLOSE_ENOUGH: f64 = 1e-9;
-/// A sweep that has not come nearer than this in so many looks is asked for a touch ahead of it.
-const PATIENCE_LOOKS: u32 = 8;
-/// An advance by less has all but met the touch.
-const CREEP: f64 = 1e-10;
 /// Products of shares and times are off by some units of roundoff.
 const SHORT: f64 = 1.0 - 1e-12;
 
@@ -82,6 +78,10 @@ struct Sweep {
     free: f64,
     /// A share at which they are known to touch; infinite: none is known.
     hit: f64,
+    /// Rounding hides at `free` whether they touch: it goes no farther.
+    stuck: bool,
+    /// The share asked last at which no touch was found, behind `free` and before `hit`.
+    missed: f64,
     looks: u32,
     probes: u32,
     /// Share and gap at the last look.
@@ -243,7 +243,7 @@ impl Sweep {
         let start = Moment::of((a, b), 0.0);
         let change = changed_since(a, b, (&memo.rel, memo.bent), &start.rel);
         let touching = change == 0.0 && memo.finished && memo.gap.contains(0.0);
-        if start.certain && (touching || memo.gap.max + change <= 0.0) {
+        if start.told && (touching || memo.gap.max + change <= 0.0) {
             (sweep.hit, sweep.done) = (0.0, true);
         } else if paths().any(crate::world::Path::is_blurred) {
             sweep.done = true;
@@ -266,6 +266,8 @@ impl Sweep {
             jumped: false,
             free: 0.0,
             hit: f64::INFINITY,
+            stuck: false,
+            missed: 0.0,
             looks: 0,
             probes: 0,
             last: (f64::NAN, f64::NAN),
@@ -301,6 +303,10 @@ impl Sweep {
                 self.done = true;
                 return;
             }
+            if self.stuck {
+                self.close_in(bodies, 0.0, work);
+                continue;
+            }
             let moment = Moment::of(bodies, self.free);
             if moment.jumps() {
                 self.free = moment.until;
@@ -311,13 +317,15 @@ impl Sweep {
             let ahead = work.look(bodies, &moment, f64::INFINITY, &mut self.warm);
             let step = match ahead {
                 Ahead::Cut => return,
-                Ahead::Touch { within_rounding } => {
-                    let ahead = if within_rounding { CLOSE_ENOUGH } else { 0.0 };
-                    self.hit = self.hit.min((self.free + ahead).min(1.0));
+                Ahead::Touch => {
+                    self.hit = self.hit.min(self.free);
                     self.done = true;
                     return;
                 }
-                Ahead::Unsure => 0.0,
+                Ahead::Unsure => {
+                    (self.stuck, self.missed) = (true, self.free);
+                    0.0
+                }
                 Ahead::Free { time, gap_m } => self.go_on(&moment, time, gap_m),
             };
             self.close_in(bodies, step, work);
@@ -335,55 +343,4 @@ impl Sweep {
         self.free = (here + time * SHORT).min(moment.until).max(here);
         self.free - here
     }
-
-    /// Looks for a pose behind the share reached at which they surely touch, or one nearer than the one known.
-    fn close_in(&mut self, bodies: (&Body, &Body), step: f64, work: &mut Work<'_, '_>) {
-        let known = self.hit.is_finite();
-        if known && self.hit - self.free <= CLOSE_ENOUGH {
-            self.done = true;
-            return;
-        }
-        let creeps = step < CREEP || self.looks.is_multiple_of(PATIENCE_LOOKS);
-        let near = known && step < 0.1 * (self.hit - self.free);
-        if !(creeps && !known || near) || self.free >= 1.0 || !work.meter.open() {
-            return;
-        }
-        let behind = if known {
-            0.3 * (self.hit - self.free)
-        } else {
-            let gap_m = self.last.1.max(0.0);
-            let ahead = if self.slope > 0.0 {
-                gap_m / self.slope
-            } else {
-                step
-            };
-            // Each one that finds nothing goes farther.
-            let factor = 4.0_f64.powi(i32::try_from(self.probes.min(12)).unwrap_or(12));
-            let missing = if ahead.is_finite() { ahead } else { 0.0 };
-            1.05 * (missing - step).max(0.0) + factor * 0.4 * CREEP
-        };
-        let at = (self.free + behind).min(1.0);
-        let moment = Moment::of(bodies, at);
-        self.probes += 1;
-        self.looks += 1;
-        if moment.jumps() {
-            return;
-        }
-        let mut warm = self.warm;
-        if let Ahead::Touch { .. } = work.look(bodies, &moment, 0.0, &mut warm) {
-            (self.hit, self.probes) = (at, 0);
-        }
-    }
-}
-
-/// No point of the one goes farther than this seen from the other, metres.
-fn length(bodies: (&Body, &Body)) -> f64 {
-    let (mut s, mut sum) = (0.0, 0.0);
-    while s < 1.0 {
-        let moment = Moment::of(bodies, s);
-        sum += moment.speed(reach_of(bodies.0), reach_of(bodies.1)) * (moment.until - s);
-        sum += 2.0 * moment.slop;
-        s = moment.until;
-    }
-    sum * (1.0 + 1e-12)
 }

@@ -78,6 +78,8 @@ pub struct Path {
     teleport_m: f64,
     /// Whether the body itself is swept; else its path is kept for what hangs on it.
     swept: bool,
+    /// Its end is where a velocity leads, and no pose that was sent.
+    ahead: bool,
     /// The body is not in the broad phase now: its way counts for what hangs on it alone.
     aside: bool,
     /// Not every pose found room: only the box knows of the rest.
@@ -101,6 +103,7 @@ impl Path {
             reach: radius,
             teleport_m: teleport_m.unwrap_or(f64::INFINITY),
             swept,
+            ahead: false,
             aside: false,
             blurred: false,
             end: Aabb::empty(),
@@ -113,6 +116,7 @@ impl Path {
     pub(super) fn of_leg(leg: Leg, pivot: Point, radius: f64) -> Self {
         Self {
             legs: vec![leg],
+            ahead: true,
             ..Self::new(pivot, radius, None, true)
         }
     }
@@ -133,6 +137,12 @@ impl Path {
     #[must_use]
     pub fn reach(&self) -> f64 {
         self.reach
+    }
+
+    /// Whether the body was told to be where a share of a leg puts it: at its ends, but for one that was worked out.
+    #[must_use]
+    pub fn is_told_at(&self, share: f64) -> bool {
+        share <= 0.0 || (share >= 1.0 && !self.ahead)
     }
 
     /// Whether more poses came than are kept: the legs do not tell the whole way.

@@ -267,3 +267,53 @@ fn what_cannot_be_followed_is_answered_with_what_to_change() {
         assert!(error.contains(wanted), "{json}: {error}");
     }
 }
+
+/// A thousand kilometres out a way is known to some nanometres, which here take thousandths of a second.
+#[test]
+fn bug_a_touch_that_rounding_alone_tells_is_no_time_of_impact() {
+    let shape = "{ type = \"sphere\", radius = 0.5 }";
+    let far = 1_000_001.000_001;
+    let bodies = |far: f64| {
+        [
+            body(1, [1e6, 0.0, 0.0], shape, ""),
+            body(2, [far, 0.0, 0.0], shape, ""),
+        ]
+    };
+    for (speed, within_s) in [(1e-6, 10.0), (1e-3, 10.0), (1.0, 3.0), (1e-6, 1.001)] {
+        let rig = rig(&bodies(far));
+        let json = format!(
+            "{{\"a\": \"b1\", \"b\": \"b2\", \"linear_a\": [{speed:?}, 0, 0], \"within_s\": {within_s:?}}}"
+        );
+        let found = ask(rig.engine.world(), &json);
+        let truth = (far - 1e6 - 1.0) / speed;
+        assert!(found.t_min_s <= truth, "{truth} {found:?}");
+        if let Some(until) = found.t_max_s {
+            assert_eq!(found.verdict, Verdict::Colliding.code());
+            assert!(
+                truth <= until && until - found.t_min_s <= 2e-8 / speed,
+                "{truth} {found:?}"
+            );
+        } else {
+            assert_eq!(found.verdict, Verdict::Possible.code(), "{found:?}");
+            assert!(within_s < 1.01, "{found:?}");
+        }
+    }
+    // It comes as near as rounding, and never touches.
+    let rig = rig(&bodies(far));
+    let json = r#"{"a": "b1", "b": "b2", "linear_a": [9.99e-7, 0, 0], "within_s": 1}"#;
+    let found = ask(rig.engine.world(), json);
+    assert_ne!(found.verdict, Verdict::Colliding.code(), "{found:?}");
+}
+
+#[test]
+fn what_touches_to_the_last_digit_where_it_is_touches_at_once() {
+    let rig = rig(&[ball(1, 0.0, ""), ball(2, 2.0, "")]);
+    for json in [
+        r#"{"a": "b1", "b": "b2"}"#,
+        r#"{"a": "b1", "b": "b2", "linear_a": [1, 0, 0]}"#,
+        r#"{"a": "b1", "b": "b2", "linear_a": [-1, 0, 0], "within_s": 3}"#,
+        r#"{"a": "b1", "b": "b2", "linear_a": [0, 1, 0], "within_s": 3}"#,
+    ] {
+        at(&ask(rig.engine.world(), json), 0.0);
+    }
+}

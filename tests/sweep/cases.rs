@@ -450,3 +450,42 @@ fn a_touch_on_the_way_of_an_undecided_pair_is_a_begin() {
     let row = rig.pair(1, 2).unwrap();
     assert!(hit(row) && has(row, Event::Begin), "{row:?}");
 }
+
+/// A thousand kilometres out a way is known to some nanometres; the poses at its ends are known to the last digit.
+#[test]
+fn bug_a_ball_that_stops_a_nanometre_before_another_never_touched_it() {
+    let shape = "{ type = \"sphere\", radius = 0.5 }";
+    let far = 1_000_001.000_001;
+    for (end, touches) in [(far - 1.0 - 1e-9, false), (far - 1.0, true)] {
+        let mut rig = Rig::new(&scene(
+            "",
+            &[
+                body(1, [far, 0.0, 0.0], shape, ""),
+                body(2, [1e6, 0.0, 0.0], shape, SWEPT),
+            ],
+        ));
+        rig.send(ALL);
+        assert_eq!(rig.state(), State::Clear);
+        rig.place(2, &at(end, 0.0, 0.0));
+        rig.send(ALL);
+        let row = *rig.pair(1, 2).unwrap();
+        assert_eq!(rig.verdict(1, 2) == Verdict::Colliding, touches, "{row:?}");
+        if touches {
+            assert!(has(&row, Event::Begin), "{row:?}");
+            assert!(hit(&row) && row.toi_max == 1.0 || open(&row), "{row:?}");
+        } else {
+            assert!(!hit(&row) && row.events == 0, "{row:?}");
+        }
+        // And away again.
+        rig.place(2, &at(1e6 - 1.0, 0.0, 0.0));
+        rig.send(ALL);
+        let row = rig.pair(1, 2).copied();
+        if touches {
+            assert!(row.is_some_and(|row| has(&row, Event::End)), "{row:?}");
+        }
+        assert!(
+            row.is_none_or(|row| !hit(&row) && !has(&row, Event::Begin)),
+            "{row:?}"
+        );
+    }
+}

@@ -146,6 +146,12 @@ impl MeshQuery {
         self.kind == Kind::HalfSpace || self.front.is_certain()
     }
 
+    /// Whether what was found touches also where no point is farther than `off_m` from its place; false says nothing.
+    pub(in crate::narrow) fn touches_despite(&self, off_m: f64) -> bool {
+        self.gap.max + off_m < 0.0
+            || (self.kind == Kind::Surfaces && self.front.touches_despite(off_m))
+    }
+
     /// The leaves with the least gap met so far; where one shape is within the other, with the normal that leads out.
     #[must_use]
     pub fn witness(&self) -> Option<LeafContact> {

@@ -36,8 +36,8 @@ const MESH_UNITS: u64 = 16;
 pub(super) enum Ahead {
     /// They do not touch for so long (in shares of the motion); where they are nearest they are apart by `gap_m`.
     Free { time: f64, gap_m: f64 },
-    /// They touch here; `within_rounding`: nothing tells their gap from 0, but it may still be ahead of them.
-    Touch { within_rounding: bool },
+    /// They touch here: whatever rounding did to the way, or at poses that were sent.
+    Touch,
     /// Rounding leaves open whether they touch here.
     Unsure,
     /// The meter closed.
@@ -147,7 +147,8 @@ impl Work<'_, '_> {
         };
         self.counters.queries += 1;
         self.meter.charge_dear(1);
-        let gap = widened(sound(closest.gap, one, other, &moment.rel), moment.slop);
+        let here = sound(closest.gap, one, other, &moment.rel);
+        let gap = widened(here, moment.slop);
         if gap.min > 0.0 {
             let normal = moment.a.pose.rotation * (one.pose.rotation * closest.normal);
             let slab = Slab::new((one, other), moment, normal, gap.min);
@@ -157,7 +158,7 @@ impl Work<'_, '_> {
                 gap_m: closest.best_m,
             };
         }
-        touch(gap, closest.finished && moment.certain)
+        touch(gap.max <= 0.0, here, closest.finished, moment)
     }
 
     /// As [`Work::shapes`], where one of the two is a mesh.
@@ -175,19 +176,16 @@ impl Work<'_, '_> {
         self.counters.slices += 1;
         loop {
             let done = meshes.advance(fronts, shapes, Goal::Gap, MESH_UNITS, self.meter);
-            let gap = widened(
-                sound(meshes.interval(), one, other, &moment.rel),
-                moment.slop,
-            );
+            let here = sound(meshes.interval(), one, other, &moment.rel);
+            let gap = widened(here, moment.slop);
             let time = (gap.min / speed).max(0.0);
             let good = gap.min > 0.0 && (time >= enough || gap.min >= BOUND_ENOUGH * gap.max);
             if gap.max <= 0.0 {
-                return Ahead::Touch {
-                    within_rounding: false,
-                };
+                return Ahead::Touch;
             }
             if done && gap.min <= 0.0 {
-                return touch(gap, meshes.is_certain() && moment.certain);
+                let sure = meshes.touches_despite(moment.slop);
+                return touch(sure, here, meshes.is_certain(), moment);
             }
             if done || good {
                 return Ahead::Free {
@@ -208,11 +206,14 @@ impl Work<'_, '_> {
     }
 }
 
-/// What an interval that holds 0 says.
-fn touch(gap: Interval, finished: bool) -> Ahead {
-    let within_rounding = gap.max > 0.0;
-    if finished || !within_rounding {
-        Ahead::Touch { within_rounding }
+/// What is told of two shapes that the way may bring to touch here.
+///
+/// * `sure` - they do whatever rounding did to the way.
+/// * `here` - their gap at the poses as they are.
+fn touch(sure: bool, here: Interval, finished: bool, moment: &Moment) -> Ahead {
+    let touching = here.max <= 0.0 || (finished && here.min <= 0.0);
+    if sure || (moment.told && touching) {
+        Ahead::Touch
     } else {
         Ahead::Unsure
     }

@@ -27,6 +27,8 @@ pub(super) struct Span {
     pub(super) jump: bool,
     /// How far rounding may put a point of the body off the way, metres.
     pub(super) slop: f64,
+    /// The pose is one that was sent: there it is off by nothing.
+    pub(super) told: bool,
 }
 
 /// The path of a body, where it is to be followed.
@@ -61,6 +63,7 @@ impl Span {
             jump: leg.jump,
             // Two sums of coordinates that far out; all else is of the size of the body and its way.
             slop: 16.0 * ROUND * far + 64.0 * ROUND * (size + per_share * leg.travel.amax()),
+            told: path.is_told_at(share),
         }
     }
 
@@ -76,6 +79,7 @@ impl Span {
             mixed: false,
             jump: false,
             slop: 0.0,
+            told: true,
         }
     }
 
@@ -117,8 +121,9 @@ pub(super) struct Moment {
     pub(super) until: f64,
     /// Rounding and reach of both: the gap may differ by as much, metres.
     pub(super) slop: f64,
-    /// Their places are beyond doubt but for rounding.
-    pub(super) certain: bool,
+    /// Their places are beyond doubt, and off by no rounding of the way: a touch here is one as any verdict tells it
+    /// (law 3.4).
+    pub(super) told: bool,
 }
 
 impl Moment {
@@ -140,7 +145,7 @@ impl Moment {
             share: s,
             until: of_a.until.min(of_b.until),
             slop: of_a.slop + of_b.slop + reach_m,
-            certain: reach_m == 0.0,
+            told: reach_m == 0.0 && of_a.told && of_b.told,
         }
     }
 
@@ -158,6 +163,18 @@ impl Moment {
         let speed = self.closing_velocity().norm() + self.a.swing(reach_a) + self.b.swing(reach_b);
         speed * (1.0 + 16.0 * ROUND)
     }
+}
+
+/// No point of the one goes farther than this seen from the other, all the way, metres.
+pub(super) fn length(bodies: (&Body, &Body)) -> f64 {
+    let (mut s, mut sum) = (0.0, 0.0);
+    while s < 1.0 {
+        let moment = Moment::of(bodies, s);
+        sum += moment.speed(reach_of(bodies.0), reach_of(bodies.1)) * (moment.until - s);
+        sum += 2.0 * moment.slop;
+        s = moment.until;
+    }
+    sum * (1.0 + 1e-12)
 }
 
 /// How far a body's surface is from its pivot.

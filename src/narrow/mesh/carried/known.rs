@@ -65,6 +65,20 @@ impl CarriedFront {
         self.known.touches || (self.cover.holds_lumped() && !self.known.blurred)
     }
 
+    /// Whether the deepest of the leaves that touch does so also where no point is farther than `off_m` from its place;
+    /// false says nothing.
+    pub(in crate::narrow::mesh) fn touches_despite(&self, off_m: f64) -> bool {
+        let Some(leaf) = self.witness.filter(|_| self.known.touches) else {
+            return false;
+        };
+        let found = leaf.closest;
+        if leaf.triangle_a == u32::MAX || leaf.triangle_b == u32::MAX {
+            return found.gap.max + off_m < 0.0;
+        }
+        // Of triangles that cross the depth is known, and no upper end tells it.
+        -found.best_m > 4.0 * (off_m + self.at.slop)
+    }
+
     /// The leaves with the least gap met at this pose; where one shape is within the other, with the normal that leads
     /// out.
     #[must_use]

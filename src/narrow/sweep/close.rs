@@ -1,0 +1,72 @@
+//! The end of a sweep: a pose at which the two surely touch, near behind the share that they reach without.
+//!
+//! In: a sweep that creeps, or that rounding has brought to a stop. Out: a share at which they touch, or none up to the
+//! end of the way.
+
+use crate::world::Body;
+
+use super::Sweep;
+use super::advance::{Ahead, Work};
+use super::motion::Moment;
+
+/// A touch is bracketed by shares as near as this: a thousandth of what is promised.
+const CLOSE_ENOUGH: f64 = 1e-9;
+/// Where rounding hides the touch, the share where it is plain is sought to this part of how far it is ahead.
+const PLAIN_ENOUGH: f64 = 0.1;
+/// A sweep that has not come nearer than this in so many looks is asked for a touch ahead of it.
+const PATIENCE_LOOKS: u32 = 8;
+/// An advance by less has all but met the touch.
+const CREEP: f64 = 1e-10;
+
+impl Sweep {
+    /// Looks for a pose behind the share reached at which they surely touch, or one nearer than the one known.
+    pub(super) fn close_in(&mut self, bodies: (&Body, &Body), step: f64, work: &mut Work<'_, '_>) {
+        let (known, left) = (self.hit.is_finite(), self.hit - self.free);
+        let plain = self.stuck && self.hit - self.missed <= PLAIN_ENOUGH * left;
+        let in_vain = self.stuck && !known && self.missed >= 1.0;
+        if known && (left <= CLOSE_ENOUGH || plain) || in_vain {
+            self.done = true;
+            return;
+        }
+        let creeps = step < CREEP || self.looks.is_multiple_of(PATIENCE_LOOKS);
+        let near = known && (self.stuck || step < 0.1 * left);
+        if !(creeps && !known || near) || self.free >= 1.0 || !work.meter.open() {
+            return;
+        }
+        let at = match (known, self.stuck) {
+            (true, true) => f64::midpoint(self.missed, self.hit),
+            (true, false) => self.free + 0.3 * left,
+            (false, _) => self.free + self.behind(step),
+        };
+        let at = at.min(1.0);
+        let moment = Moment::of(bodies, at);
+        self.probes += 1;
+        self.looks += 1;
+        let mut warm = self.warm;
+        if moment.jumps() {
+            self.missed = at;
+            return;
+        }
+        match work.look(bodies, &moment, 0.0, &mut warm) {
+            Ahead::Touch => (self.hit, self.probes) = (at, 0),
+            // Asked again when there is more to spend.
+            Ahead::Cut => {}
+            Ahead::Free { .. } | Ahead::Unsure => self.missed = at,
+        }
+    }
+
+    /// How far behind the share reached to look for a touch, where none is known: each look that finds nothing goes
+    /// farther, to the end of the way where it will not do without.
+    fn behind(&self, step: f64) -> f64 {
+        let gap_m = self.last.1.max(0.0);
+        let ahead = if self.slope > 0.0 {
+            gap_m / self.slope
+        } else {
+            step
+        };
+        let missing = if ahead.is_finite() { ahead } else { 0.0 };
+        let most = if self.stuck { 18 } else { 12 };
+        let factor = 4.0_f64.powi(i32::try_from(self.probes.min(most)).unwrap_or(12));
+        1.05 * (missing - step).max(0.0) + factor * 0.4 * CREEP
+    }
+}
