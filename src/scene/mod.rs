@@ -21,6 +21,7 @@ mod table;
 
 pub use build::BuiltShapes;
 pub use model::{BodySpec, Origin, PairAction, PairRule, PlacedSpec, Scene, SourceSpec};
+pub(crate) use pattern::literal_ends;
 pub use pattern::{is_pattern, pattern_matches};
 pub use question::{Impact, Question, Ray, Subject, Touching, Velocity};
 pub use read_body::{BODY_NAME_BYTES_MAX, BodyDraft, SOURCE_NAME_BYTES_MAX};

@@ -34,6 +34,13 @@ pub fn pattern_matches(pattern: &str, name: &str) -> bool {
     }
 }
 
+/// The characters that every match begins with, and those that it ends with.
+pub(crate) fn literal_ends(pattern: &str) -> (&str, &str) {
+    let mut head = pattern.split(['*', '?']);
+    let mut tail = pattern.rsplit(['*', '?']);
+    (head.next().unwrap_or(""), tail.next().unwrap_or(""))
+}
+
 /// Whether a pattern has a `*` or `?`, and so may match more than one name.
 #[must_use]
 pub fn is_pattern(text: &str) -> bool {

@@ -2,102 +2,186 @@
 //!
 //! In: the compiled filters. Out: a count and a sorted list; both anew when the scene changes, never in between.
 //!
-//! The count needs no walk over all pairs: bodies of which the pattern rules, rigid groups and attachments say the
-//! same form a class, classes are decided once a pair of classes, and the pairs of neighbours and of plain rules are
-//! put right one by one.
+//! The count needs no walk over all pairs: bodies of which the pattern rules say the same form a class, classes are
+//! decided once a pair that a rule speaks of, rigid groups and roots add what their sizes say, and the pairs of
+//! neighbours and of plain rules are put right one by one.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::filters::{
-    Because, EXACT, Filters, Hot, LIVE, MOVES, NO_GROUP, SIDED, UNBOUNDED, are_neighbours,
+    Because, EXACT, Filters, Hot, LIVE, MOVES, NO_GROUP, UNBOUNDED, are_neighbours,
     by_default_of_strangers, by_rule, never,
 };
 use super::names::{NameId, Names};
-use super::rules::{SIDE_A, SIDE_B, ignores, sides_of};
+use super::rules::{SIDE_A, SIDE_B, ignores};
 use crate::ids::{BodySlot, PairKey};
 
 /// Most pairs one rule may force to be candidates; a rule with more widens the boxes of its bodies instead.
 pub(super) const FORCED_PER_RULE_MAX: usize = 1 << 12;
 
-/// What makes two bodies alike for the count.
-type Class<'a> = (&'a [(u32, u8)], u32, u32, u16);
+/// What makes two bodies alike for pattern rules: which speak of them, and whether they can be paired at all.
+struct Class<'a> {
+    sided: &'a [(u32, u8)],
+    count: u64,
+    /// One of them.
+    hot: &'a Hot,
+}
+
+/// The classes, and that of each slot; `None`: no body.
+struct Classes<'a> {
+    list: Vec<Class<'a>>,
+    of_slot: Vec<Option<u32>>,
+}
 
 impl Filters {
     /// Counts the ignored pairs, whether their bodies are enabled or not.
     ///
-    /// Cost: O(classes^2 + plain rules + bodies log bodies).
+    /// Cost: O(bodies log bodies + plain rules + pairs of classes that a pattern rule speaks of), where a class is what
+    /// the same pattern rules speak of; in a rigid group or on one root, all pairs of its classes.
     pub(super) fn count_ignored(&mut self, names: &Names) {
-        let alone = self.lone_roots();
-        let mut classes: BTreeMap<Class<'_>, (u64, &Hot)> = BTreeMap::new();
-        for hot in self.bodies.iter().filter(|hot| hot.has(LIVE)) {
-            let class = self.class_of(hot, &alone);
-            classes.entry(class).or_insert((0, hot)).0 += 1;
-        }
-        let mut ignored: u64 = 0;
-        let listed: Vec<_> = classes.iter().collect();
-        for (place, (class_a, (count_a, hot_a))) in listed.iter().enumerate() {
-            let same_root = class_a.2 != NO_GROUP;
-            let within = self.decide_class(hot_a, hot_a, class_a, class_a, same_root);
-            ignored += u64::from(within.is_ignored()) * (count_a * (count_a - 1) / 2);
-            for (class_b, (count_b, hot_b)) in &listed[place + 1..] {
-                let same_root = class_a.2 == class_b.2 && class_a.2 != NO_GROUP;
-                let because = self.decide_class(hot_a, hot_b, class_a, class_b, same_root);
-                ignored += u64::from(because.is_ignored()) * (count_a * count_b);
-            }
-        }
-        // The exceptions: what the classes said is taken back, what holds is put in its place.
+        let classes = self.classes();
+        let mut ignored = self.count_by_patterns(&classes);
+        // Rigid groups and roots, where no rule speaks; what is alike in both is counted once.
+        let alike = |key: fn(&Hot) -> u64, has: fn(&Hot) -> bool| {
+            let keyed = self.bodies.iter().zip(&classes.of_slot);
+            let keyed = keyed.filter(|(hot, _)| has(hot));
+            self.count_alike(
+                &classes,
+                keyed.filter_map(|(hot, class)| Some((key(hot), (*class)?))),
+            )
+        };
+        let (rigid, root) = (
+            |hot: &Hot| u64::from(hot.rigid),
+            |hot: &Hot| u64::from(hot.root.0),
+        );
+        let both = |hot: &Hot| u64::from(hot.rigid) << 32 | u64::from(hot.root.0);
+        let grouped = |hot: &Hot| hot.rigid != NO_GROUP;
+        ignored += alike(rigid, grouped) + alike(root, |_| true) - alike(both, grouped);
+        // The exceptions: what was said without them is taken back, what holds is put in its place.
         for key in self.exceptions(names) {
             let (a, b) = key.slots();
             let (hot_a, hot_b) = (&self.bodies[a.index()], &self.bodies[b.index()]);
-            let same_root = hot_a.root == hot_b.root;
-            let (class_a, class_b) = (self.class_of(hot_a, &alone), self.class_of(hot_b, &alone));
-            let said = self.decide_class(hot_a, hot_b, &class_a, &class_b, same_root);
+            let said = self.decide_plainly(hot_a, hot_b);
             ignored -= u64::from(said.is_ignored());
             ignored += u64::from(self.decide_enabled(hot_a, hot_b).is_ignored());
         }
         self.ignored = ignored;
     }
 
-    /// Roots on which nothing but the body itself hangs.
-    fn lone_roots(&self) -> BTreeSet<NameId> {
-        let mut seen: BTreeMap<NameId, u32> = BTreeMap::new();
-        for hot in self.bodies.iter().filter(|hot| hot.has(LIVE)) {
-            *seen.entry(hot.root).or_insert(0) += 1;
+    fn classes(&self) -> Classes<'_> {
+        let mut places: BTreeMap<(&[(u32, u8)], u16), u32> = BTreeMap::new();
+        let mut list: Vec<Class<'_>> = Vec::new();
+        let mut of_slot = Vec::with_capacity(self.bodies.len());
+        for hot in &self.bodies {
+            if !hot.has(LIVE) {
+                of_slot.push(None);
+                continue;
+            }
+            let sided = self.rules.sided_of(hot.name);
+            let key = (sided, hot.flags & (MOVES | UNBOUNDED));
+            let next = slot_at(list.len()).0;
+            let place = *places.entry(key).or_insert(next);
+            if place == next {
+                list.push(Class {
+                    sided,
+                    count: 0,
+                    hot,
+                });
+            }
+            list[place as usize].count += 1;
+            of_slot.push(Some(place));
         }
-        seen.retain(|_, count| *count == 1);
-        seen.into_keys().collect()
+        Classes { list, of_slot }
     }
 
-    fn class_of(&self, hot: &Hot, alone: &BTreeSet<NameId>) -> Class<'_> {
-        let root = if alone.contains(&hot.root) {
-            NO_GROUP
-        } else {
-            hot.root.0
-        };
-        let flags = hot.flags & (MOVES | UNBOUNDED | SIDED);
-        (self.rules.sided_of(hot.name), hot.rigid, root, flags)
+    /// The pairs that the last pattern rule of both ignores.
+    fn count_by_patterns(&self, classes: &Classes<'_>) -> u64 {
+        // By rule, the classes of its sides.
+        let mut of_rule: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
+        for (place, class) in classes.list.iter().enumerate() {
+            for &(rule, sides) in class.sided {
+                let lists = of_rule.entry(rule).or_default();
+                for (side, list) in [SIDE_A, SIDE_B].into_iter().zip(lists) {
+                    if sides & side != 0 {
+                        list.push(slot_at(place).0);
+                    }
+                }
+            }
+        }
+        let mut ignored = 0;
+        // Which class each one was decided with last: rules may speak of a pair more than once.
+        let mut decided = vec![u32::MAX; classes.list.len()];
+        for (place, class) in classes.list.iter().enumerate() {
+            let a = slot_at(place).0;
+            for &(rule, sides) in class.sided {
+                let Some(lists) = of_rule.get(&rule) else {
+                    continue;
+                };
+                for (side, list) in [SIDE_B, SIDE_A].into_iter().zip(lists) {
+                    let behind = list.partition_point(|&b| b < a);
+                    for &b in list[behind..].iter().filter(|_| sides & side != 0) {
+                        if std::mem::replace(&mut decided[b as usize], a) != a {
+                            ignored +=
+                                self.ignored_of_two(class, &classes.list[b as usize], a == b);
+                        }
+                    }
+                }
+            }
+        }
+        ignored
     }
 
-    /// A pair of two classes, plain rules and neighbours left aside.
-    fn decide_class(
-        &self,
-        hot_a: &Hot,
-        hot_b: &Hot,
-        class_a: &Class<'_>,
-        class_b: &Class<'_>,
-        same_root: bool,
-    ) -> Because {
-        if let Some(never) = never(hot_a, hot_b) {
+    /// How many pairs of two classes the pattern rules ignore.
+    fn ignored_of_two(&self, a: &Class<'_>, b: &Class<'_>, same: bool) -> u64 {
+        if never(a.hot, b.hot).is_some() {
+            return 0;
+        }
+        match self.rules.last_sided_match(a.sided, b.sided) {
+            Some((_, rule)) if ignores(rule) => pairs_of(a.count, b.count, same),
+            _ => 0,
+        }
+    }
+
+    /// The pairs of bodies with one key that could be paired and of which no pattern rule speaks.
+    ///
+    /// * `keyed` - the key and the class of each body that has one.
+    fn count_alike(&self, classes: &Classes<'_>, keyed: impl Iterator<Item = (u64, u32)>) -> u64 {
+        let mut keyed: Vec<(u64, u32)> = keyed.collect();
+        keyed.sort_unstable();
+        let mut alike = 0;
+        for group in keyed.chunk_by(|one, other| one.0 == other.0) {
+            if group.len() < 2 {
+                continue;
+            }
+            let members: Vec<(u32, u64)> = group
+                .chunk_by(|one, other| one.1 == other.1)
+                .filter_map(|same| Some((same.first()?.1, u64::try_from(same.len()).ok()?)))
+                .collect();
+            for (place, &(a, count_a)) in members.iter().enumerate() {
+                for &(b, count_b) in &members[place..] {
+                    let (one, other) = (&classes.list[a as usize], &classes.list[b as usize]);
+                    let open = never(one.hot, other.hot).is_none()
+                        && self
+                            .rules
+                            .last_sided_match(one.sided, other.sided)
+                            .is_none();
+                    alike += u64::from(open) * pairs_of(count_a, count_b, a == b);
+                }
+            }
+        }
+        alike
+    }
+
+    /// A pair, plain rules and neighbours left aside.
+    fn decide_plainly(&self, a: &Hot, b: &Hot) -> Because {
+        if let Some(never) = never(a, b) {
             return never;
         }
-        if let Some((_, rule)) = self.rules.last_sided_match(class_a.0, class_b.0) {
-            return by_rule(ignores(rule));
+        let sided = (self.rules.sided_of(a.name), self.rules.sided_of(b.name));
+        match self.rules.last_sided_match(sided.0, sided.1) {
+            Some((_, rule)) => by_rule(ignores(rule)),
+            None => by_default_of_strangers(a, b),
         }
-        // The bodies stand for others of their class: their own roots mean nothing here.
-        let (mut hot_a, mut hot_b) = (*hot_a, *hot_b);
-        hot_a.root = NameId(0);
-        hot_b.root = NameId(u32::from(!same_root));
-        by_default_of_strangers(&hot_a, &hot_b)
     }
 
     /// As [`Filters::decide`], enabled or not.
@@ -149,22 +233,20 @@ impl Filters {
             let Some(report_within_m) = rule.report_within_m else {
                 continue;
             };
-            let sided: Vec<(BodySlot, u8)> = names
-                .all()
-                .iter()
-                .filter_map(|name| Some((name.slot?, sides_of(rule, &name.text))))
-                .filter(|(_, sides)| *sides != 0)
-                .collect();
-            let on = |bit: u8| sided.iter().filter(move |(_, s)| s & bit != 0);
-            if on(SIDE_A).count().saturating_mul(on(SIDE_B).count()) > FORCED_PER_RULE_MAX {
-                for (slot, _) in &sided {
+            let there = |pattern| -> Vec<BodySlot> {
+                let slots = names.matching(pattern).map(|name| names.get(name).slot);
+                slots.flatten().collect()
+            };
+            let (side_a, side_b) = (there(&rule.a), there(&rule.b));
+            if side_a.len().saturating_mul(side_b.len()) > FORCED_PER_RULE_MAX {
+                for slot in side_a.iter().chain(&side_b) {
                     let margin_m = &mut self.margins_m[slot.index()];
                     *margin_m = margin_m.max(report_within_m / 2.0);
                 }
                 continue;
             }
-            for &(a, _) in on(SIDE_A) {
-                for &(b, _) in on(SIDE_B).filter(|(b, _)| *b != a) {
+            for &a in &side_a {
+                for &b in side_b.iter().filter(|b| **b != a) {
                     if self.is_forced(a, b, place, report_within_m) {
                         self.forced.push(PairKey::new(a, b));
                     }
@@ -184,6 +266,15 @@ impl Filters {
                 .last_match(hot_a.name, hot_b.name)
                 .is_some_and(|(last, _)| last == rule)
             && self.decide(a, b).allows()
+    }
+}
+
+/// Pairs of bodies of two classes, or within one.
+fn pairs_of(count_a: u64, count_b: u64, same: bool) -> u64 {
+    if same {
+        count_a * (count_a - 1) / 2
+    } else {
+        count_a * count_b
     }
 }
 

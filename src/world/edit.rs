@@ -112,6 +112,12 @@ impl World {
         for edit in edits {
             self.apply_one(edit, &mut after);
         }
+        let ruled = self.edit_rules(edits);
+        after.changed |= ruled;
+        after.census |= ruled;
+        if after.census {
+            self.mark_all_ruled();
+        }
         if after.links {
             self.link();
         }
@@ -146,8 +152,8 @@ impl World {
                 name,
                 report_within_m,
             } => self.set_margins(name.as_deref(), *report_within_m),
-            Edit::Rule(rule) => self.add_rule(rule),
-            Edit::DropRules { a, b } => self.drop_rules(a, b),
+            // All at once, behind the last edit.
+            Edit::Rule(_) | Edit::DropRules { .. } => false,
             Edit::Attach { name, to, pose } => {
                 let attached = self.attach(name, to.as_deref(), pose.as_ref());
                 after.links |= attached;
@@ -200,7 +206,6 @@ impl World {
             .as_ref()
             .map(|g| self.rigid_groups.intern(g).0);
         let flag = |on: bool, bit: u16| if on { bit } else { 0 };
-        self.filters.sync_names(&self.names);
         self.filters.bodies[slot.index()] = Hot {
             flags: LIVE
                 | flag(spec.enabled, ENABLED)
@@ -214,7 +219,6 @@ impl World {
             root: name,
             report_within_m: spec.report_within_m,
         };
-        self.filters.mark_ruled(slot.index());
         self.by_status[usize::from(body.status.code())] += 1;
         if let Err(at) = self.order.binary_search_by_key(&id, |e| e.0) {
             self.order.insert(at, (id, slot));

@@ -2,23 +2,22 @@
 //!
 //! In: edits in their order. Out: nothing, or a text that says which edit, what is wrong and what to change.
 
-use std::collections::BTreeMap;
+mod rules;
+
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::World;
 use super::edit::Edit;
-use super::edit_rules::is_rule_of;
 use super::parts::PlacedShape;
-use super::rules::sides_of;
+use super::rule_draft::RuleDraft;
 use crate::ids::BodyId;
 use crate::limits::{EXTENT_MAX_M, PRIORITY_MAX, PRIORITY_MIN, SHAPES_PER_BODY_MAX};
 use crate::math::Pose;
-use crate::scene::{BodySpec, PairRule};
+use crate::scene::BodySpec;
 use crate::wire::BODY_NAME_LEN;
 
 /// Most names met in a boot: each is kept, because an id stays with its name.
 const NAMES_MAX: usize = 1 << 22;
-/// Most pair rules. Every new name is matched with each rule that has a pattern.
-const RULES_MAX: usize = 1 << 20;
 
 /// The scene as it would be after the edits looked at so far, where they change it.
 struct Draft<'a> {
@@ -28,7 +27,9 @@ struct Draft<'a> {
     /// Names that ids were given to by the request.
     ids: BTreeMap<BodyId, &'a str>,
     len: usize,
-    rules: Option<Vec<PairRule>>,
+    rules: Option<RuleDraft<'a>>,
+    /// Patterns that a body is known to match; emptied when a body goes.
+    matched: BTreeSet<&'a str>,
 }
 
 /// What a body hangs on.
@@ -55,6 +56,7 @@ impl World {
             ids: BTreeMap::new(),
             len: self.order.len(),
             rules: None,
+            matched: BTreeSet::new(),
         };
         for (at, edit) in edits.iter().enumerate() {
             draft.look_at(edit).map_err(|text| {
@@ -88,6 +90,7 @@ impl<'a> Draft<'a> {
             Edit::Remove { name } => {
                 self.must_have(name)?;
                 self.bodies.insert(name, None);
+                self.matched.clear();
                 self.len -= 1;
                 Ok(())
             }
@@ -221,50 +224,6 @@ impl<'a> Draft<'a> {
             .map(|n| &*n.text)
             .filter(|name| !matches!(self.bodies.get(name), Some(None)))
             .chain(put.map(|(name, _)| *name))
-    }
-
-    fn rules(&mut self) -> &mut Vec<PairRule> {
-        let list = self.world.filters.rules.list();
-        self.rules.get_or_insert_with(|| list.to_vec())
-    }
-
-    fn look_at_rule(&mut self, rule: &PairRule) -> Result<(), String> {
-        if rule
-            .report_within_m
-            .is_some_and(|m| !m.is_finite() || m < 0.0)
-        {
-            return Err("a rule's `report_within_m` is finite and not negative".to_owned());
-        }
-        let (mut a, mut b) = (false, false);
-        for name in self.names() {
-            let sides = sides_of(rule, name);
-            a |= sides & 1 != 0;
-            b |= sides & 2 != 0;
-        }
-        if let Some(side) = [(a, &rule.a), (b, &rule.b)].iter().find(|(any, _)| !any) {
-            return Err(format!(
-                "no body matches `{}`: correct the rule, or put the body first",
-                side.1
-            ));
-        }
-        if self.rules().len() >= RULES_MAX {
-            return Err(format!(
-                "there are {RULES_MAX} pair rules: drop some, or use patterns"
-            ));
-        }
-        self.rules().push(rule.clone());
-        Ok(())
-    }
-
-    fn look_at_drop(&mut self, a: &str, b: &str) -> Result<(), String> {
-        let before = self.rules().len();
-        self.rules().retain(|rule| !is_rule_of(rule, a, b));
-        if self.rules().len() == before {
-            return Err(format!(
-                "there is no pair rule for `{a}` and `{b}`: write both as the rule does"
-            ));
-        }
-        Ok(())
     }
 
     fn look_at_attach(

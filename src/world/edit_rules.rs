@@ -1,49 +1,65 @@
 //! Edits that touch many bodies: pair rules, margins, reset, and what the filters make of the scene afterwards.
 
+use std::collections::BTreeSet;
+
 use super::World;
 use super::census::slot_at;
-use super::rules::sides_of;
+use super::edit::Edit;
+use super::rule_draft::RuleDraft;
 use crate::ids::BodySlot;
 use crate::scene::PairRule;
 use crate::wire::EndCause;
 
 impl World {
-    pub(super) fn add_rule(&mut self, rule: &PairRule) -> bool {
-        if self.filters.rules.list().last() == Some(rule) {
+    /// The rules as the edits of a request make them, compiled once behind the last; whether they changed.
+    ///
+    /// What other edits make of the bodies has no say in it: what counts is the scene after the request.
+    pub(super) fn edit_rules(&mut self, edits: &[Edit]) -> bool {
+        let is_rule = |edit: &Edit| matches!(edit, Edit::Rule(_) | Edit::DropRules { .. });
+        if !edits.iter().any(is_rule) {
             return false;
         }
-        let mut list = self.filters.rules.list().to_vec();
-        // The same rule further up has nothing to say behind this one.
-        list.retain(|other| other != rule);
-        list.push(rule.clone());
-        self.set_rules(list, std::slice::from_ref(rule));
+        let old = self.filters.rules.take_list();
+        let mut draft = RuleDraft::of(&old);
+        let mut changed: Vec<&PairRule> = Vec::new();
+        for edit in edits {
+            match edit {
+                Edit::Rule(rule) if draft.add(rule) => changed.push(rule),
+                Edit::DropRules { a, b } => changed.append(&mut draft.drop_of(a, b)),
+                _ => {}
+            }
+        }
+        if changed.is_empty() {
+            self.filters.rules.put_back(old);
+            return false;
+        }
+        self.filters.rules.set(draft.to_list(), &mut self.names);
+        self.requery_named(&changed);
         true
     }
 
-    pub(super) fn drop_rules(&mut self, a: &str, b: &str) -> bool {
-        let (dropped, list): (Vec<PairRule>, Vec<PairRule>) = self
-            .filters
-            .rules
-            .list()
-            .iter()
-            .cloned()
-            .partition(|r| is_rule_of(r, a, b));
-        self.set_rules(list, &dropped);
-        !dropped.is_empty()
+    /// A new search for the pairs of all bodies that these rules speak of.
+    fn requery_named(&mut self, rules: &[&PairRule]) {
+        let sides = rules.iter().flat_map(|rule| [&*rule.a, &*rule.b]);
+        let patterns: BTreeSet<&str> = sides.collect();
+        let mut named = vec![false; self.bodies.len()];
+        for pattern in patterns {
+            for name in self.names.matching(pattern) {
+                if let Some(slot) = self.names.get(name).slot {
+                    named[slot.index()] = true;
+                }
+            }
+        }
+        for (index, _) in named.iter().enumerate().filter(|(_, named)| **named) {
+            self.requery(slot_at(index));
+        }
     }
 
-    /// New rules, and a new search for the pairs of all bodies that the changed ones speak of.
-    fn set_rules(&mut self, list: Vec<PairRule>, changed: &[PairRule]) {
-        self.filters.rules.set(list, &mut self.names);
+    /// Compiles the rules for new names, and marks what they say of each body.
+    pub(super) fn mark_all_ruled(&mut self) {
+        self.filters.sync_names(&self.names);
         for index in 0..self.bodies.len() {
             self.filters.mark_ruled(index);
-            let slot = slot_at(index);
-            let named = self
-                .body(slot)
-                .is_some_and(|body| changed.iter().any(|rule| sides_of(rule, &body.name) != 0));
-            if named {
-                self.requery(slot);
-            }
         }
     }
 
@@ -124,9 +140,4 @@ impl World {
             }
         }
     }
-}
-
-/// Whether a rule has these two sides, in either order.
-pub(super) fn is_rule_of(rule: &PairRule, a: &str, b: &str) -> bool {
-    (rule.a == a && rule.b == b) || (rule.a == b && rule.b == a)
 }

@@ -25,6 +25,7 @@ mod names;
 mod parts;
 mod path;
 mod place;
+mod rule_draft;
 mod rules;
 mod source;
 mod tag;

@@ -4,8 +4,10 @@
 //! removed and put again (id, generation). Names are never forgotten: an id stays with its name for a boot.
 
 use std::collections::BTreeMap;
+use std::ops::Bound;
 
 use crate::ids::{BodyId, BodySlot};
+use crate::scene::{is_pattern, literal_ends, pattern_matches};
 
 /// A name's number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -70,6 +72,21 @@ impl Names {
         self.find(text).map(|name| self.get(name))
     }
 
+    /// The names that a plain name or a pattern matches, by text.
+    ///
+    /// Cost: a search, and a short look at each name that begins as every match does.
+    pub(super) fn matching<'a>(&'a self, pattern: &'a str) -> impl Iterator<Item = NameId> + 'a {
+        let (head, tail) = literal_ends(pattern);
+        // A plain name is the first of those that begin with it, if it is there at all.
+        let most = if is_pattern(pattern) { usize::MAX } else { 1 };
+        self.numbers
+            .range::<str, _>((Bound::Included(head), Bound::Unbounded))
+            .take_while(move |(text, _)| text.starts_with(head))
+            .take(most)
+            .filter(move |(text, _)| text.ends_with(tail) && pattern_matches(pattern, text))
+            .map(|(_, &name)| name)
+    }
+
     pub(super) fn get(&self, name: NameId) -> &Name {
         &self.list[name.index()]
     }
@@ -125,5 +142,27 @@ mod tests {
         assert_eq!(names.claim(c, None), BodyId(3));
         assert_eq!(names.claim(b, Some(BodyId(9))), BodyId(1));
         assert_eq!(&*names.owner_of(BodyId(3)).unwrap().text, "c");
+    }
+
+    #[test]
+    fn the_names_that_match_are_those_that_match_one_by_one() {
+        let texts = ["a", "ab", "abc", "b", "ba", "bab", "c", "ca", "ü", "üb", ""];
+        let mut names = Names::default();
+        for text in texts {
+            names.intern(text);
+        }
+        for pattern in [
+            "a", "ab", "x", "", "*", "?", "a*", "*b", "b*b", "?b", "ü*", "*a?", "a*a",
+        ] {
+            let mut found: Vec<&str> = names
+                .matching(pattern)
+                .map(|name| &*names.get(name).text)
+                .collect();
+            let mut wanted = texts.to_vec();
+            wanted.retain(|text| pattern_matches(pattern, text));
+            found.sort_unstable();
+            wanted.sort_unstable();
+            assert_eq!(found, wanted, "{pattern}");
+        }
     }
 }

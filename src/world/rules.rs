@@ -6,6 +6,9 @@
 use super::names::{NameId, Names};
 use crate::scene::{PairAction, PairRule, is_pattern, pattern_matches as matches};
 
+/// New names that are matched with the patterns one by one; of more, each pattern looks for its own.
+const FEW_NAMES: usize = 16;
+
 /// The name stands on the `a` side of the rule.
 pub(super) const SIDE_A: u8 = 1;
 /// The name stands on the `b` side of the rule.
@@ -35,49 +38,72 @@ impl Rules {
         &self.list
     }
 
-    /// Replaces all rules.
+    /// Takes the list out, to be edited and set again.
+    pub(super) fn take_list(&mut self) -> Vec<PairRule> {
+        std::mem::take(&mut self.list)
+    }
+
+    /// Puts a list back as it was taken out.
+    pub(super) fn put_back(&mut self, list: Vec<PairRule>) {
+        self.list = list;
+    }
+
+    /// Replaces all rules and compiles them.
+    ///
+    /// Cost: O(rules log names + names that their patterns match or that begin as they do).
     pub(super) fn set(&mut self, list: Vec<PairRule>, names: &mut Names) {
         self.list = list;
         self.of_name.clear();
         self.patterned.clear();
         self.any_report = self.list.iter().any(|r| r.report_within_m.is_some());
         // Plain names first, so that every name of a rule has its number before patterns are matched.
-        for place in 0..self.list.len() {
-            let (a, b) = (self.list[place].a.clone(), self.list[place].b.clone());
-            if is_pattern(&a) || is_pattern(&b) {
+        for (place, rule) in self.list.iter().enumerate() {
+            if is_pattern(&rule.a) || is_pattern(&rule.b) {
                 self.patterned.push(number(place));
-            } else {
-                let (a, b) = (names.intern(&a), names.intern(&b));
-                self.of_name.resize_with(names.len(), OfName::default);
-                let rule = number(place);
-                self.put_exact(a, b, rule);
-                self.put_exact(b, a, rule);
+                continue;
             }
+            let (a, b) = (names.intern(&rule.a), names.intern(&rule.b));
+            self.of_name.resize_with(names.len(), OfName::default);
+            self.of_name[a.index()].exact.push((b.0, number(place)));
+            self.of_name[b.index()].exact.push((a.0, number(place)));
+        }
+        for of_name in &mut self.of_name {
+            keep_last(&mut of_name.exact);
         }
         self.of_name.resize_with(names.len(), OfName::default);
-        for name in 0..names.len() {
-            self.match_patterns(name, names);
-        }
+        self.match_patterns(0, names);
     }
 
     /// Compiles the rules for names that have turned up since.
     pub(super) fn sync(&mut self, names: &Names) {
         let old = self.of_name.len();
         self.of_name.resize_with(names.len(), OfName::default);
+        if names.len() - old > FEW_NAMES {
+            return self.match_patterns(old, names);
+        }
         for name in old..names.len() {
-            self.match_patterns(name, names);
+            self.match_name(name, names);
         }
     }
 
-    fn put_exact(&mut self, name: NameId, other: NameId, rule: u32) {
-        let list = &mut self.of_name[name.index()].exact;
-        match list.binary_search_by_key(&other.0, |e| e.0) {
-            Ok(at) => list[at].1 = rule,
-            Err(at) => list.insert(at, (other.0, rule)),
+    /// Matches all patterns with the names from `first` on.
+    fn match_patterns(&mut self, first: usize, names: &Names) {
+        for &place in &self.patterned {
+            let rule = &self.list[place as usize];
+            for (pattern, side) in [(&rule.a, SIDE_A), (&rule.b, SIDE_B)] {
+                for name in names.matching(pattern).filter(|name| name.index() >= first) {
+                    let sided = &mut self.of_name[name.index()].sided;
+                    match sided.last_mut() {
+                        Some((last, sides)) if *last == place => *sides |= side,
+                        _ => sided.push((place, side)),
+                    }
+                }
+            }
         }
     }
 
-    fn match_patterns(&mut self, name: usize, names: &Names) {
+    /// Matches one name with all patterns.
+    fn match_name(&mut self, name: usize, names: &Names) {
         let text = &*names.all()[name].text;
         let of_name = &mut self.of_name[name];
         for &place in &self.patterned {
@@ -153,6 +179,18 @@ pub(super) fn ignores(rule: &PairRule) -> bool {
     rule.action == PairAction::Ignore
 }
 
+/// Sorts the rules of one name by the other name; of one pair the last stays.
+fn keep_last(exact: &mut Vec<(u32, u32)>) {
+    exact.sort_unstable();
+    exact.dedup_by(|later, kept| {
+        let same = later.0 == kept.0;
+        if same {
+            kept.1 = later.1;
+        }
+        same
+    });
+}
+
 fn find_exact(list: &[(u32, u32)], other: NameId) -> Option<u32> {
     let at = list.binary_search_by_key(&other.0, |e| e.0).ok()?;
     Some(list[at].1)
@@ -206,16 +244,25 @@ mod tests {
             rule(Ignore, "box", "*_2"),
         ];
         let texts = ["arm_1", "arm_2", "arm_22", "wall", "box", "x"];
-        // Some names are there before the rules, some turn up after.
-        let mut names = Names::default();
-        names.intern(texts[0]);
-        names.intern(texts[5]);
-        let mut rules = Rules::default();
-        rules.set(list.clone(), &mut names);
-        let ids = texts.map(|t| names.intern(t));
-        rules.sync(&names);
-        for (a, &id_a) in texts.iter().zip(&ids) {
-            for (b, &id_b) in texts.iter().zip(&ids).filter(|(b, _)| b != &a) {
+        // Some names are there before the rules, some turn up after, alone or with many others.
+        for others in [0, 2 * FEW_NAMES] {
+            let mut names = Names::default();
+            names.intern(texts[0]);
+            names.intern(texts[5]);
+            let mut rules = Rules::default();
+            rules.set(list.clone(), &mut names);
+            let ids = texts.map(|t| names.intern(t));
+            for other in 0..others {
+                names.intern(&format!("other_{other}"));
+            }
+            rules.sync(&names);
+            assert_as_list(&rules, &list, &texts, &ids);
+        }
+    }
+
+    fn assert_as_list(rules: &Rules, list: &[PairRule], texts: &[&str], ids: &[NameId]) {
+        for (a, &id_a) in texts.iter().zip(ids) {
+            for (b, &id_b) in texts.iter().zip(ids).filter(|(b, _)| b != &a) {
                 let wanted = list.iter().rposition(|r| {
                     (matches(&r.a, a) && matches(&r.b, b)) || (matches(&r.a, b) && matches(&r.b, a))
                 });
