@@ -118,20 +118,27 @@ impl World {
         let header = &frame.header;
         let times = self.times_of(frame);
         let state = &mut self.sources[source.index()];
-        match stand(state, source, &mut self.over, header, times.received_ns) {
+        let standing = stand(state, source, &mut self.over, header, times.received_ns);
+        match standing {
             Standing::Refused(reason) => return Err(reason),
             Standing::Afresh => self.forget_poses(source),
             Standing::Next => {}
         }
         // An older frame that still waits has nothing to say any more.
         let state = &mut self.sources[source.index()];
-        state.pass_over_waiting();
+        let older_until_ns = state.pass_over_waiting();
         if frame.waited && header.sent_ns == 0 {
             return Err(RejectReason::TooOld);
         }
         if header.scene_rev > self.scene_rev {
+            let own_until_ns = times.received_ns.saturating_add(state.timeout_ns);
+            // The stream waits, not each of its frames: one that takes another's place would put off the end for ever.
+            let until_ns = match older_until_ns {
+                Some(older_ns) if standing == Standing::Next => older_ns.min(own_until_ns),
+                _ => own_until_ns,
+            };
             let waiting = &mut state.waiting;
-            waiting.until_ns = Some(times.received_ns.saturating_add(state.timeout_ns));
+            waiting.until_ns = Some(until_ns);
             waiting.frame.clone_from(frame);
             waiting.frame.received_ns = times.received_ns;
             return Ok(Admission::Waiting { source });

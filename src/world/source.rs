@@ -139,10 +139,12 @@ impl SourceState {
     }
 
     /// What waits has nothing to say any more: it is passed over.
-    pub(super) fn pass_over_waiting(&mut self) {
-        if self.waiting.until_ns.take().is_some() {
-            self.skipped += 1;
-        }
+    ///
+    /// * returns - when its wait would have ended.
+    pub(super) fn pass_over_waiting(&mut self) -> Option<u64> {
+        let until_ns = self.waiting.until_ns.take();
+        self.skipped += u64::from(until_ns.is_some());
+        until_ns
     }
 }
 

@@ -292,6 +292,30 @@ fn law_4_3_a_frame_for_a_revision_that_does_not_come_is_refused_after_one_time_o
 }
 
 #[test]
+fn bug_a_stream_for_a_revision_that_does_not_come_is_refused_each_time_out() {
+    let mut bench = Bench::of(vec![moving("a", 1)]);
+    let mut waits = 0;
+    // 50 Hz for two time-outs and a bit: far more often than a wait is long.
+    for seq in 1..=52 {
+        let now_ns = bench.now_ns + 20 * MS;
+        let mut next = frame("sim", seq, now_ns, &[row(1, 0.0)]);
+        next.header.scene_rev = 9 + seq;
+        let admission = bench.tick_at(now_ns, &[], &[next])[0];
+        waits += u64::from(matches!(admission, Admission::Waiting { .. }));
+    }
+    assert_eq!(waits, 52);
+    assert_eq!(bench.rejects(RejectReason::SceneRevision), 2);
+    assert_eq!(bench.status("a"), BodyStatus::NotReceived);
+    // A new epoch waits anew.
+    let now_ns = bench.now_ns + MS;
+    let mut next = frame("sim", 1, now_ns, &[row(1, 0.0)]);
+    next.header.epoch = 1;
+    next.header.scene_rev = 9;
+    bench.tick_at(now_ns, &[], &[next]);
+    assert_eq!(bench.world.next_timeout(), Some(now_ns + TIMEOUT_NS));
+}
+
+#[test]
 fn law_4_3_a_newer_frame_ends_the_wait_of_an_older_one() {
     let mut bench = Bench::of(vec![moving("a", 1)]);
     send_with(&mut bench, MS, |f| f.header.scene_rev = 9);
