@@ -78,7 +78,7 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     );
     daemon.run(stop, args.ticks)?;
     // That it failed was told when it did; the daemon has done its work.
-    let _told_already = daemon.end_record();
+    let _told_already = daemon.end_record(watchdog);
     tracing::info!("ended after {} ticks", daemon.engine().ticks());
     Ok(true)
 }

@@ -1,6 +1,6 @@
 //! What the daemon tells its recorder beside the ticks.
 
-use super::Daemon;
+use super::{Daemon, Watchdog};
 use crate::error::Result;
 use crate::record::{Between, Origin, Recorder};
 use crate::tick::EditBatch;
@@ -11,11 +11,14 @@ impl Daemon<'_> {
         self.recorder = Some(recorder);
     }
 
-    /// Ends the recording, where there is one.
+    /// Ends the recording, where there is one, after the last tick.
+    ///
+    /// * `watchdog` - ends first: nothing ticks any more, and a slow disk may take its time for what waits.
     ///
     /// # Errors
     /// As [`Recorder::finish`].
-    pub fn end_record(&mut self) -> Result<()> {
+    pub fn end_record(&mut self, watchdog: Option<Watchdog>) -> Result<()> {
+        drop(watchdog);
         self.recorder.take().map_or(Ok(()), Recorder::finish)
     }
 

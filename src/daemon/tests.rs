@@ -1,6 +1,9 @@
-//! A tree that the worker cannot build.
+//! A tree that the worker cannot build; a recording that a slow disk ends.
+
+use std::time::Duration;
 
 use super::*;
+use crate::record::{Sink, TickRecord};
 use crate::scene::Scene;
 use crate::time::SystemClock;
 use crate::transport::client::{Client, FrameInfo, Part, Rows};
@@ -127,4 +130,42 @@ fn a_tree_that_cannot_be_built_is_told_once_and_asked_for_again_only_with_other_
     frame(&mut daemon, None);
     assert!(daemon.engine.worn_tree().is_none());
     daemon.engine.validate().unwrap();
+}
+
+/// Takes each tick when it may, and all when nobody is left to say so.
+struct Slow(std::sync::mpsc::Receiver<()>);
+
+impl Sink for Slow {
+    fn tick(&mut self, _: &TickRecord, _: bool) -> Result<()> {
+        let _nobody_left = self.0.recv();
+        Ok(())
+    }
+    fn flush(&mut self) -> Result<()> {
+        Ok(())
+    }
+    fn end(&mut self, _: &str) -> Result<()> {
+        Ok(())
+    }
+}
+
+#[test]
+fn bug_the_end_of_a_recording_may_take_longer_than_the_watchdog_waits() {
+    let (hub, scene) = (Hub::new(), scene());
+    let shapes = build_shapes(&scene).unwrap();
+    let mut door = MemoryServer::open(&hub, 7, SECOND_NS).unwrap();
+    let mut daemon = Daemon::new(&scene, shapes, 7, Arc::new(SystemClock), &mut door).unwrap();
+    let (let_go, may) = std::sync::mpsc::channel();
+    daemon.record(Recorder::start(Box::new(Slow(may))).unwrap());
+    daemon.run(&AtomicBool::new(false), Some(2)).unwrap();
+    let (told, stuck) = std::sync::mpsc::channel();
+    let limit = Duration::from_millis(50);
+    let watchdog = Watchdog::start(limit, move || told.send(()).unwrap()).unwrap();
+    daemon.watched_by(&watchdog);
+    let disk = std::thread::spawn(move || {
+        std::thread::park_timeout(20 * limit);
+        drop(let_go);
+    });
+    daemon.end_record(Some(watchdog)).unwrap();
+    disk.join().unwrap();
+    assert!(stuck.try_recv().is_err(), "the watchdog bit");
 }

@@ -135,7 +135,7 @@ pub fn run(
         daemon.engine().validate().unwrap();
     }
     let ticks = daemon.engine().ticks();
-    let _told = daemon.end_record();
+    let _told = daemon.end_record(None);
     ticks
 }
 
