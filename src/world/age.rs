@@ -38,7 +38,10 @@ impl Ages {
     pub(super) fn set(&mut self, slot: BodySlot, deadline_ns: Option<u64>, stamp_ns: Option<u64>) {
         self.list[slot.index()] = Age {
             deadline_ns: deadline_ns.unwrap_or(NONE),
-            stamp_ns: stamp_ns.map_or(NONE, |s| s.min(NONE - 1)),
+            // A sender that does not stamp says 0, which is older than any time.
+            stamp_ns: stamp_ns
+                .filter(|s| *s != 0)
+                .map_or(NONE, |s| s.min(NONE - 1)),
         };
     }
 

@@ -1,6 +1,7 @@
 //! Sources, sessions, epochs and frames: DESIGN 4.1 to 4.3, 4.8.
 
 use sweepd::ids::SourceSlot;
+use sweepd::scene::BodySpec;
 use sweepd::wire::{
     BodyStatus, EndCause, Frame, RejectReason, TransformRow, VertexFrame, VertexHeader,
     WIRE_VERSION, frame_flags, name_bytes, vertex_flags,
@@ -313,6 +314,24 @@ fn bug_a_stream_for_a_revision_that_does_not_come_is_refused_each_time_out() {
     next.header.scene_rev = 9;
     bench.tick_at(now_ns, &[], &[next]);
     assert_eq!(bench.world.next_timeout(), Some(now_ns + TIMEOUT_NS));
+}
+
+#[test]
+fn bug_a_pose_without_a_stamp_is_not_the_oldest() {
+    let robots = BodySpec {
+        source: Some(1),
+        ..moving("b", 2)
+    };
+    let mut bench = Bench::of(vec![moving("a", 1), robots]);
+    let now_ns = bench.now_ns + MS;
+    let mut unstamped = frame("robot", 1, now_ns, &[row(2, 9.0)]);
+    unstamped.header.stamp_ns = 0;
+    bench.tick_at(now_ns, &[], std::slice::from_ref(&unstamped));
+    assert_eq!(bench.world.stamps(), (0, 0));
+    unstamped.header.seq = 2;
+    let stamped = frame("sim", 1, now_ns, &[row(1, 0.0)]);
+    bench.tick_at(now_ns, &[], &[unstamped, stamped]);
+    assert_eq!(bench.world.stamps(), (now_ns, now_ns));
 }
 
 #[test]

@@ -52,6 +52,7 @@ impl Show {
             speaker: Speaker {
                 frame_id: frame_id.to_owned(),
                 book: Book::default(),
+                stamp: None,
             },
         }
     }

@@ -31,6 +31,7 @@ mod services;
 mod shared;
 mod shelf;
 mod sockets;
+mod stamp;
 mod strangers;
 mod tf;
 mod topics;

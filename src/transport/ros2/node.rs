@@ -146,6 +146,7 @@ impl RosNode {
             speaker: Speaker {
                 frame_id: scene.frame_id.clone(),
                 book,
+                stamp: None,
             },
             boot_id: options.boot_id,
             name: names.full_node(),

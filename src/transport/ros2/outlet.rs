@@ -23,6 +23,7 @@ use super::parcel::{Next, Parcel, Parcels};
 use super::readers::Readers;
 use super::services::open;
 use super::shared::{Say, Shared};
+use super::stamp::stamp_of;
 use super::strangers::Strangers;
 use super::wheel::{Sent, Wheel};
 use crate::config::RosKind;
@@ -99,6 +100,8 @@ impl Outlet {
                     if let Some((scene_rev, rows)) = names {
                         self.take_names(scene_rev, &rows);
                     }
+                    let now = self.shared.now();
+                    self.speaker.stamp = Some(stamp_of(&parcel.tick, &self.sources, now));
                     self.send(&parcel);
                     self.show(&parcel);
                     self.told.0 = parcel.tick;

@@ -121,14 +121,16 @@ pub struct Speaker {
     pub frame_id: String,
     /// Names in force.
     pub book: Book,
+    /// What `header.stamp` says in place of the oldest stamp of all sources, of whatever clock.
+    pub stamp: Option<Time>,
 }
 
 impl Speaker {
-    /// `header.stamp` is the oldest pose used.
+    /// `header.stamp` is the oldest pose used, unless [`Speaker::stamp`] says another.
     #[must_use]
     pub fn header(&self, stamp_ns: u64) -> Header {
         Header {
-            stamp: Time::from_ns(stamp_ns),
+            stamp: self.stamp.unwrap_or(Time::from_ns(stamp_ns)),
             frame_id: self.frame_id.clone(),
         }
     }

@@ -30,6 +30,7 @@ fn the_largest_message_stays_below_128_kilobytes_on_the_wire() {
     let all = Speaker {
         frame_id: "world".to_owned(),
         book: Book::of(&rows),
+        stamp: None,
     };
     let contact = |body_b| ContactRow {
         body_a: 1,
@@ -66,9 +67,10 @@ fn largest<M: serde::Serialize>(messages: &[M]) -> usize {
 
 #[test]
 fn a_state_says_its_reasons_in_words_and_its_worst_pair_by_name() {
-    let speaker = Speaker {
+    let mut speaker = Speaker {
         frame_id: "cell".to_owned(),
         book: Book::of(&[named(7, "arm")]),
+        stamp: None,
     };
     let mut row = TickRow {
         worst_a: 7,
@@ -95,6 +97,8 @@ fn a_state_says_its_reasons_in_words_and_its_worst_pair_by_name() {
         ),
         (3, 1, "cell")
     );
+    speaker.stamp = Some(Time::from_ns(5_000_000_000));
+    assert_eq!(speaker.state(&row).header.stamp.sec, 5);
 }
 
 #[test]
