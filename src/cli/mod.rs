@@ -24,6 +24,7 @@ mod report;
 mod ros;
 mod run;
 mod screen;
+mod worst;
 
 use std::process::ExitCode;
 use std::sync::Arc;

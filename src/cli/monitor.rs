@@ -17,6 +17,7 @@ use super::args::MonitorArgs;
 use super::connect;
 use super::out::Out;
 use super::screen::Screen;
+use super::worst;
 
 /// Longest wait before a look at the stop flag, nanoseconds.
 const LOOK_NS: u64 = 100_000_000;
@@ -228,25 +229,14 @@ fn tick_json(view: &View, names: &Names, args: &MonitorArgs) -> Value {
         line["worst"] = json!([names.of(tick.worst_a), names.of(tick.worst_b)]);
     }
     if let Some(pairs) = view.pairs() {
-        let rows = pairs
-            .rows
-            .iter()
-            .take(args.pairs)
-            .map(|row| pair_json(row, names));
-        line["pairs"] = rows.collect();
+        let rows = worst::pairs(&pairs.rows, args.pairs);
+        line["pairs"] = rows.iter().map(|row| pair_json(row, names)).collect();
         line["pairs_shown"] = json!([args.pairs.min(pairs.rows.len()), pairs.rows.len()]);
     }
     if let Some(contacts) = view.contacts() {
-        line["contacts"] = contacts
-            .rows
-            .iter()
-            .take(args.pairs * 4)
-            .map(|row| contact_json(row, names))
-            .collect();
-        line["contacts_shown"] = json!([
-            (args.pairs * 4).min(contacts.rows.len()),
-            contacts.rows.len()
-        ]);
+        let rows = worst::contacts(&contacts.rows, args.pairs.saturating_mul(4));
+        line["contacts"] = rows.iter().map(|row| contact_json(row, names)).collect();
+        line["contacts_shown"] = json!([rows.len(), contacts.rows.len()]);
     }
     line
 }

@@ -12,6 +12,7 @@ use crate::wire::{
 use super::figures::{cut, number, seconds, time};
 use super::monitor::{Names, reasons, rejects, state_word, unknown_word};
 use super::out::{Out, coloured_stdout, drawn_stdout, stdout_lines};
+use super::worst;
 
 /// Time between two drawings, nanoseconds: faster cannot be read, and would cost the daemon's machine a core.
 const REDRAW_NS: u64 = 100_000_000;
@@ -291,29 +292,13 @@ impl Screen {
             "\n{:<24} {:<24} {:<9} {:>12} {:>12} {:>9}  event",
             "a", "b", "verdict", "gap from [m]", "to [m]", "closing"
         );
-        let mut rows: Vec<&PairRow> = pairs.rows.iter().collect();
-        // The worst on top: by verdict or what happened on the way, then the deepest.
-        let rank = |row: &PairRow| {
-            let way = if row.flags & pair_flags::SWEPT_HIT != 0 {
-                Verdict::Colliding.code()
-            } else if row.flags & pair_flags::SWEPT_OPEN != 0 {
-                Verdict::Possible.code()
-            } else {
-                0
-            };
-            row.verdict.max(way)
-        };
-        rows.sort_by(|x, y| {
-            rank(y)
-                .cmp(&rank(x))
-                .then(x.gap_min_m.total_cmp(&y.gap_min_m))
-        });
-        let shown = rows.len().min(self.pairs).min(self.room(text));
-        for row in rows.iter().take(shown) {
+        let most = pairs.rows.len().min(self.pairs).min(self.room(text));
+        let rows = worst::pairs(&pairs.rows, most);
+        for row in &rows {
             let _ = writeln!(text, "{}", self.row(row, names));
         }
-        if rows.len() > shown {
-            let _ = writeln!(text, "and {} more", rows.len() - shown);
+        if pairs.rows.len() > rows.len() {
+            let _ = writeln!(text, "and {} more", pairs.rows.len() - rows.len());
         }
     }
 
