@@ -9,7 +9,9 @@ use crate::daemon::{Daemon, Watchdog};
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::time::{Clock, SystemClock};
-use crate::transport::iceoryx::{Place, Server, ServerOptions, spawn_cleaner};
+use crate::transport::iceoryx::{
+    Place, Server, ServerOptions, bytes_needed, scarce, spawn_cleaner,
+};
 use crate::transport::{Both, Door};
 
 use super::args::{Limit, RunArgs};
@@ -48,6 +50,10 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
         options.spin_ns = u64::MAX;
     }
     let mut server = Server::open(options)?;
+    let (bodies, sources) = (scene.bodies.len(), scene.sources.len());
+    if let Some(warning) = scarce(bytes_needed(&scene.config.limits, bodies, sources)) {
+        tracing::warn!("{warning}");
+    }
     // Dead clients are cleaned up beside the tick, never in it.
     let _cleaner = spawn_cleaner(&place)?;
     let mut node = asked.open(&scene, &shapes, &place, boot_id)?;

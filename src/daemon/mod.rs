@@ -9,6 +9,7 @@ mod requests;
 mod settings;
 #[cfg(test)]
 mod tests;
+mod unsent;
 mod watchdog;
 
 use std::collections::VecDeque;
@@ -27,6 +28,7 @@ use crate::wire::{Inbox, TickRow};
 use crate::world::TreeOf;
 
 use builder::{Asking, Builder, Done, TREE};
+use unsent::Unsent;
 
 pub use crate::tick::build::{Shapes, build_shapes};
 pub use notes::body_note;
@@ -61,6 +63,7 @@ pub struct Daemon<'a> {
     progress: Arc<AtomicU64>,
     /// Who writes down what the engine is given and says.
     recorder: Option<Recorder>,
+    unsent: Unsent,
 }
 
 impl std::fmt::Debug for Daemon<'_> {
@@ -98,6 +101,7 @@ impl<'a> Daemon<'a> {
             tree_asked: None,
             progress: Arc::default(),
             recorder: None,
+            unsent: Unsent::default(),
         };
         daemon.follow();
         Ok(daemon)
@@ -284,9 +288,10 @@ impl<'a> Daemon<'a> {
             recorder.tick(&self.due, ask, &self.engine);
         }
         let send_ns = self.clock.monotonic_ns().saturating_sub(start_ns);
-        if lost > 0 {
-            tracing::debug!(
-                "{lost} messages of tick {} could not be handed over",
+        if let Some(lost) = self.unsent.note(lost, start_ns) {
+            tracing::warn!(
+                "{lost} messages up to tick {} could not be handed over: shared memory may be full, see \
+                 `sweepd doctor`",
                 self.engine.ticks()
             );
         }

@@ -14,6 +14,7 @@ mod list;
 mod lock;
 mod place;
 mod qos;
+mod room;
 mod server;
 mod waker;
 
@@ -23,5 +24,6 @@ pub use link::IoxLink;
 pub use list::{InstanceInfo, list_instances};
 pub use lock::{Holder, Lock, locks};
 pub use place::Place;
+pub use room::{bytes_needed, scarce};
 pub use server::{Server, ServerOptions};
 pub use waker::Waker;
