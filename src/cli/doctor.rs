@@ -5,7 +5,6 @@ mod files;
 mod instance;
 mod limits;
 mod memory;
-mod process;
 #[cfg(feature = "ros2")]
 mod ros;
 

@@ -6,9 +6,10 @@ use std::path::Path;
 
 use rustix::fs::{Access, AtFlags, CWD, accessat};
 
-use crate::transport::iceoryx::{Cleaned, Leftovers, NodeOwner, Place, clean_leftovers, leftovers};
+use crate::transport::iceoryx::{
+    Cleaned, Leftovers, NodeOwner, Place, clean_leftovers, leftovers, unreaped_by,
+};
 
-use super::process::process;
 use super::{Finding, bytes};
 
 /// Directories of iceoryx2 under its root.
@@ -216,14 +217,12 @@ fn judge(left: &Leftovers, mend: &str) -> Vec<Finding> {
 
 /// A process that has ended and that its parent has not asked for counts as alive.
 fn zombie(node: &NodeOwner) -> Option<Finding> {
-    let process = process(node.pid)?;
-    (process.state == 'Z' && process.is_named(&node.executable)).then(|| {
-        Finding::warning(
-            "leftovers",
-            format!("{node} has ended, and counts as alive until its parent {} waits for it", process.parent),
-            "start daemons and sources under a parent that waits: a shell, systemd, `docker run --init`",
-        )
-    })
+    let parent = unreaped_by(node)?;
+    Some(Finding::warning(
+        "leftovers",
+        format!("{node} has ended, and counts as alive until its parent {parent} waits for it"),
+        "start daemons and sources under a parent that waits: a shell, systemd, `docker run --init`",
+    ))
 }
 
 fn nodes(owners: &[NodeOwner]) -> String {

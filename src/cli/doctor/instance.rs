@@ -5,11 +5,10 @@ use crate::error::Error;
 use crate::time::{Clock as _, SystemClock};
 use crate::transport::ICEORYX2_VERSION;
 use crate::transport::client::{ClientOptions, Heard};
-use crate::transport::iceoryx::{Holder, InstanceInfo, Lock, Place, locks};
+use crate::transport::iceoryx::{Holder, InstanceInfo, Lock, Place, locks, process, shares};
 use crate::wire::{SourceRow, TickRow, WIRE_VERSION, name_str};
 
 use super::Finding;
-use super::process::{process, shares};
 use crate::cli::monitor::rejects;
 
 const CHECK: &str = "instance";

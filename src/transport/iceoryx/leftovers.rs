@@ -13,6 +13,7 @@ use iceoryx2::prelude::{CallbackProgression, Node, NodeState};
 
 use super::lock::{self, LOCK_DIR, Lock};
 use super::place::Place;
+use super::process::process;
 use super::qos::{Ipc, failed};
 use crate::error::Result;
 
@@ -32,6 +33,13 @@ pub struct NodeOwner {
     pub pid: u32,
     /// Its executable; empty: not known.
     pub executable: String,
+}
+
+/// The parent of a process that has ended and that nobody has waited for; `None`: it runs, or is not seen from here.
+#[must_use]
+pub fn unreaped_by(node: &NodeOwner) -> Option<u32> {
+    let process = process(node.pid)?;
+    (process.state == 'Z' && process.is_named(&node.executable)).then_some(process.parent)
 }
 
 /// What there is under a place's files.

@@ -13,17 +13,21 @@ mod link;
 mod list;
 mod lock;
 mod place;
+mod process;
 mod qos;
 mod room;
 mod server;
 mod waker;
 
 pub use cleaner::{Cleaner, spawn_cleaner};
-pub use leftovers::{Cleaned, Leftovers, NodeOwner, Unmapped, clean_leftovers, leftovers};
+pub use leftovers::{
+    Cleaned, Leftovers, NodeOwner, Unmapped, clean_leftovers, leftovers, unreaped_by,
+};
 pub use link::IoxLink;
 pub use list::{InstanceInfo, list_instances};
 pub use lock::{Holder, Lock, locks};
 pub use place::Place;
+pub use process::{Process, process, shares};
 pub use room::{bytes_needed, scarce};
 pub use server::{Server, ServerOptions};
 pub use waker::Waker;

@@ -25,8 +25,10 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory as PubSub;
 use iceoryx2::waitset::{WaitSet, WaitSetBuilder};
 use readers::Changes;
 
+use super::leftovers::{leftovers, unreaped_by};
 use super::lock::{Holder, InstanceLock, RootLock};
 use super::place::Place;
+use super::process::process;
 use super::qos::{self, Ipc, Open, events, failed};
 use crate::error::{Error, Result};
 use crate::limits;
@@ -335,10 +337,50 @@ fn held(e: Error) -> Error {
     }
 }
 
+/// The lock was free, and still somebody serves the instance.
 fn refused_twice(place: &Place, e: &dyn std::fmt::Display) -> Error {
+    let name = format!("sweepd/{}/daemon", place.instance());
+    let alive = leftovers(place).map_or_else(|_| Vec::new(), |left| left.alive);
+    let mut ours = alive.iter().filter(|node| node.name == name);
+    match ours.find_map(|node| Some((node.pid, unreaped_by(node)?))) {
+        Some((pid, parent)) => unreaped(place.instance(), pid, parent),
+        None => Error::Refused(format!(
+            "instance `{}` is taken: another daemon answers its requests ({e}); end it, or choose another name with \
+             --instance",
+            place.instance()
+        )),
+    }
+}
+
+/// There is nothing to end: it has ended, and the kernel keeps it for its parent.
+fn unreaped(instance: &str, pid: u32, parent: u32) -> Error {
+    let named = process(parent).map_or_else(String::new, |parent| format!(" ({})", parent.name));
     Error::Refused(format!(
-        "instance `{}` is taken: another daemon answers its requests ({e}); end it, or choose another name with \
-         --instance",
-        place.instance()
+        "instance `{instance}`: process {pid} had it and has ended, but counts as alive until its parent \
+         {parent}{named} waits for it; end the parent (of a container: restart it), and start daemons under one that \
+         waits: a shell, systemd, `docker run --init`"
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bug_a_killed_daemon_that_nobody_waited_for_is_told_with_its_parent() {
+        let us = std::process::id();
+        let text = unreaped("cell", 4_000_000, us).to_string();
+        let name = process(us).unwrap().name;
+        for part in [
+            "`cell`",
+            "4000000",
+            &format!("parent {us} ({name})"),
+            "--init",
+        ] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        let place = Place::new("nobody").unwrap().under("/nowhere/at/all", "p_");
+        let text = refused_twice(&place, &"full").to_string();
+        assert!(text.contains("another daemon answers"), "{text}");
+    }
 }

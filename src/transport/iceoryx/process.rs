@@ -4,17 +4,17 @@ use std::path::Path;
 
 /// A process of this pid namespace.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Process {
+pub struct Process {
     /// Its name, cut to 15 bytes by the kernel.
-    pub(super) name: String,
+    pub name: String,
     /// `R`, `S`, `D`, `T`, `Z` ..: see proc(5).
-    pub(super) state: char,
+    pub state: char,
     /// Its parent.
-    pub(super) parent: u32,
+    pub parent: u32,
 }
 
 /// `None`: there is none of that number.
-pub(super) fn process(pid: u32) -> Option<Process> {
+pub fn process(pid: u32) -> Option<Process> {
     read(&std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?)
 }
 
@@ -32,13 +32,13 @@ fn read(stat: &str) -> Option<Process> {
 
 impl Process {
     /// Whether it may be a process of this executable: numbers count anew in another namespace.
-    pub(super) fn is_named(&self, executable: &str) -> bool {
+    pub fn is_named(&self, executable: &str) -> bool {
         !self.name.is_empty() && executable.starts_with(&self.name)
     }
 }
 
 /// Whether a process is in the same namespace of a kind (`mnt`, `time`, ..) as this one; `None`: it may not be asked.
-pub(super) fn shares(pid: u32, kind: &str) -> Option<bool> {
+pub fn shares(pid: u32, kind: &str) -> Option<bool> {
     let of =
         |who: &str| std::fs::read_link(Path::new("/proc").join(who).join("ns").join(kind)).ok();
     Some(of("self")? == of(&pid.to_string())?)
