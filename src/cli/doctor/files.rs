@@ -125,7 +125,7 @@ fn judge_root(root: &Path, meta: &Metadata, us: u32) -> Finding {
                 "{shown} belongs to user id {}, this process runs as {us}",
                 meta.uid()
             ),
-            "run all as one user; or, when no iceoryx2 program runs any more, remove it",
+            "run all as one user, or this one in a container; or, when no iceoryx2 program runs any more, remove it",
         );
     }
     Finding::ok(check, format!("{shown} belongs to this user"))

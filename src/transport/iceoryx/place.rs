@@ -145,7 +145,8 @@ fn check_owner(root: &Path) -> Result<bool> {
     let us = rustix::process::geteuid().as_raw();
     if meta.uid() != us {
         return Err(Error::Refused(format!(
-            "{} belongs to user id {}, this process runs as {us}; run both as one user, or give both another root",
+            "{} belongs to user id {}, this process runs as {us}; run all as one user, or this one in a container: two \
+             users of a machine do not share it",
             root.display(),
             meta.uid()
         )));
@@ -179,6 +180,8 @@ mod tests {
         let place = Place::new("x").unwrap().under(&theirs, "p_");
         let text = place.check_owner().unwrap_err().to_string();
         assert!(text.contains("belongs to user id"), "{text}");
+        // The command line has no other root to give.
+        assert!(!text.contains("another root"), "{text}");
         if rustix::process::geteuid().is_root() {
             std::fs::remove_dir(&theirs).unwrap();
         }
