@@ -486,6 +486,37 @@ fn a_restarted_daemon_is_told_with_ends_and_running_clients_go_on<B: Backend>() 
     assert_eq!(client.view().pairs().unwrap().rows[0].gap_best_m, 3.0);
 }
 
+fn bug_after_a_restart_a_range_of_vertices_waits_for_all_of_them<B: Backend>() {
+    let backend = B::new();
+    let daemon = backend.daemon(Manners::default());
+    let mut client = backend.client(Some("sim"));
+    let rows = [VertexRow::default(); 4];
+    let range = Part::Range { first: 1, total: 4 };
+    let refused = |client: &mut Client| {
+        let refused = client.send_vertices(1, range, &rows[..2]).unwrap_err();
+        assert!(
+            refused.to_string().contains("send all of them first"),
+            "{refused}"
+        );
+    };
+    refused(&mut client);
+    client.send_vertices(1, Part::Full, &rows).unwrap();
+    step(&mut client, 3, 1.0).unwrap();
+    assert_eq!(client.send_vertices(1, range, &rows[..2]).unwrap(), 2);
+    daemon.stop();
+    let _again = backend.daemon(Manners {
+        boot_id: 8,
+        ..Manners::default()
+    });
+    assert!(matches!(
+        step(&mut client, 3, 2.0),
+        Err(StepError::Restarted(_))
+    ));
+    refused(&mut client);
+    assert_eq!(client.send_vertices(1, Part::Full, &rows).unwrap(), 1);
+    assert_eq!(client.send_vertices(1, range, &rows[..2]).unwrap(), 2);
+}
+
 fn the_end_of_a_client_ends_its_session_after_its_frames<B: Backend>() {
     let backend = B::new();
     let daemon = backend.daemon(Manners::default());
@@ -697,6 +728,7 @@ both! {
     nothing_is_sent_for_nobody
     a_request_is_answered_and_a_broken_one_refused
     a_restarted_daemon_is_told_with_ends_and_running_clients_go_on
+    bug_after_a_restart_a_range_of_vertices_waits_for_all_of_them
     the_end_of_a_client_ends_its_session_after_its_frames
     pauses_and_epochs_are_carried
     frames_that_waited_while_the_daemon_was_silent_say_so

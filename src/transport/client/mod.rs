@@ -246,7 +246,7 @@ impl Client {
         let looked_ns = start_ns.saturating_add(look_ns);
         let mut looking = look_ns > 0;
         loop {
-            let heard = self.follow.next(self.link.as_mut())?;
+            let heard = self.next_heard()?;
             if heard != Heard::Silence {
                 if looking {
                     self.patience.found();
@@ -268,6 +268,15 @@ impl Client {
         }
     }
 
+    fn next_heard(&mut self) -> Result<Heard> {
+        let heard = self.follow.next(self.link.as_mut())?;
+        if matches!(heard, Heard::Restarted(_)) {
+            // The new daemon has no vertices that a range could change.
+            self.versions.clear();
+        }
+        Ok(heard)
+    }
+
     /// Takes what is there without waiting, up to the newest tick.
     ///
     /// # Errors
@@ -275,7 +284,7 @@ impl Client {
     pub fn latest(&mut self) -> Result<Heard> {
         let mut newest = Heard::Silence;
         loop {
-            match self.follow.next(self.link.as_mut())? {
+            match self.next_heard()? {
                 Heard::Silence => return Ok(newest),
                 restarted @ Heard::Restarted(_) => return Ok(restarted),
                 Heard::Tick => newest = Heard::Tick,
