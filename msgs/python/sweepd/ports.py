@@ -126,7 +126,7 @@ def _check_owner(config):
     if owner != os.geteuid():
         raise Refused(
             f"{path} belongs to user id {owner}, this process runs as {os.geteuid()}; "
-            "run both as one user, or give both another root"
+            "run both as one user, or this one in a container"
         )
     return True
 
