@@ -55,7 +55,7 @@ mod tests {
         a.motion.bent_m = 2e12;
         for k in 0..10 {
             let then = Bent::of_bodies(&a, &b);
-            assert_eq!(changed_since(&a, &b, (&rel, then), &rel), 0.0);
+            assert!(changed_since(&a, &b, (&rel, then), &rel) <= 0.0);
             b.motion.bend(1e-4, &b.pose, &b.centre, 1.0);
             let change_m = changed_since(&a, &b, (&rel, then), &rel);
             assert!((1e-4..1.01e-4).contains(&change_m), "{k}: {change_m}");
@@ -85,7 +85,7 @@ mod tests {
                 a.refit(usize::MAX);
             }
         }
-        assert_eq!(a.lag_m(), 0.0);
+        assert!(a.lag_m() <= 0.0);
         let (mut store, mut front) = (FrontStore::default(), CarriedFront::default());
         let clock = ManualClock::new(0);
         let mut meter = Meter::unlimited(&clock);

@@ -19,7 +19,10 @@ use crate::ids::{BodySlot, PairKey};
 /// Most pairs one rule may force to be candidates; a rule with more widens the boxes of its bodies instead.
 pub(super) const FORCED_PER_RULE_MAX: usize = 1 << 12;
 
-/// What makes two bodies alike for pattern rules: which speak of them, and whether they can be paired at all.
+/// What makes bodies alike for pattern rules: which speak of them and on which side, and whether they can be paired.
+type Kind<'a> = (&'a [(u32, u8)], u16);
+
+/// Bodies of a kind.
 struct Class<'a> {
     sided: &'a [(u32, u8)],
     count: u64,
@@ -69,7 +72,7 @@ impl Filters {
     }
 
     fn classes(&self) -> Classes<'_> {
-        let mut places: BTreeMap<(&[(u32, u8)], u16), u32> = BTreeMap::new();
+        let mut places: BTreeMap<Kind<'_>, u32> = BTreeMap::new();
         let mut list: Vec<Class<'_>> = Vec::new();
         let mut of_slot = Vec::with_capacity(self.bodies.len());
         for hot in &self.bodies {

@@ -112,7 +112,7 @@ fn surely_pierces(a: &Triangle, b: &Triangle, slop: f64) -> bool {
     let from = b.map(|p| p - a[0]);
     let longest = |v: &[Vec3; 3]| {
         let squares = v.map(|v| v.norm_squared());
-        squares[0].max(squares[1]).max(squares[2]).sqrt() + 2.0 * slop
+        greater(greater(squares[0], squares[1]), squares[2]).sqrt() + 2.0 * slop
     };
     let (edge, far) = (longest(&edges_a), longest(&from));
     let over = from.map(|p| normal.dot(&p));
@@ -125,8 +125,10 @@ fn surely_pierces(a: &Triangle, b: &Triangle, slop: f64) -> bool {
         let along = b[q] - b[p];
         let least = unsure(edge, along.norm() + 2.0 * slop, far + edge, slop);
         let beside = |i: usize| along.dot(&edges_a[i].cross(&(b[p] - a[i])));
-        let sides = [beside(0), beside(1), beside(2)];
-        sides.iter().all(|s| *s > least) || sides.iter().all(|s| *s < -least)
+        // As the first says, or not at all: most are turned away by one or two.
+        let first = beside(0);
+        let sign = f64::copysign(1.0, first);
+        first.abs() > least && sign * beside(1) > least && sign * beside(2) > least
     })
 }
 

@@ -114,10 +114,9 @@ impl RosNode {
         }
         let heartbeat_ns = scene.config.heartbeat_ns;
         let reliable = shared.reliable();
-        let sources_len = scene.sources.len();
         let publishers = Publishers::create(
             (&mut node, &context, &mut names),
-            (heartbeat_ns, sources_len),
+            (heartbeat_ns, scene.sources.len()),
             reliable,
         )?;
         let (lines, unheard) = subscribe(&mut node, &context, &mut names, &sources, scene.again)?;

@@ -65,7 +65,7 @@ fn what_surely_crosses_is_found_crossing() {
     assert!(crossed > 1_000, "{crossed}");
 }
 
-/// Faces whose corners are in one line but for rounding have a normal of noise, and with it weights of a point anywhere.
+/// Corners in one line but for rounding make a normal of noise, and with it weights of a point anywhere.
 #[test]
 fn bug_a_face_that_is_flat_by_rounding_reaches_no_farther_than_its_edges() {
     let face = |corners: [[f64; 3]; 3]| corners.map(Point::from);
@@ -115,7 +115,7 @@ fn bug_a_face_that_is_flat_by_rounding_reaches_no_farther_than_its_edges() {
     }
 }
 
-/// A needle 1.5e-8 m wide has a normal that is off by more than a billionth.
+/// A needle 5 nm wide has a normal that is off by more than a billionth.
 #[test]
 fn bug_what_is_all_on_one_side_of_a_needle_does_not_surely_cross_it() {
     let needle = [
