@@ -80,6 +80,7 @@ impl Draw {
         // Edits go before frames, and are as old as the tick before.
         for (request, taken) in drawn.chunks(together).zip(taken) {
             seen.edits[usize::from(taken)] += request.len() as u64;
+            self.world.begin_request();
             for (edit, solid) in request.iter().filter(|_| taken) {
                 self.world.apply(edit, solid.clone());
             }
@@ -93,7 +94,9 @@ impl Draw {
                 self.world.take_row(*id, pose.as_ref());
             }
         }
-        seen.check(&self.world, &self.twins, what);
+        let told: Vec<String> = requests.iter().flatten().map(tell).collect();
+        let what = format!("{what} ({})", told.join(", "));
+        seen.check(&self.world, &self.twins, &what);
         self.world.end_tick();
     }
 
@@ -237,5 +240,22 @@ impl Draw {
         let is_anew = self.rng.below(60) == 0;
         let full = self.rng.below(2) == 0;
         self.twins.send(Sent { is_anew, rows }, full);
+    }
+}
+
+/// An edit in some words.
+fn tell(edit: &Edit) -> String {
+    match edit {
+        Edit::Put { body, .. } => format!("put {} on {:?}", body.name, body.attached_to),
+        Edit::Remove { name } => format!("remove {name}"),
+        Edit::Enable { name, enabled } => format!("enable {name} {enabled}"),
+        Edit::Filter { name, .. } => format!("filter {name}"),
+        Edit::Attach { name, to, pose } => {
+            format!("attach {name} to {to:?}, told where: {}", pose.is_some())
+        }
+        Edit::Rule(rule) => format!("rule {} {}", rule.a, rule.b),
+        Edit::DropRules { a, b } => format!("drop rules {a} {b}"),
+        Edit::Margin { .. } => "margin".to_owned(),
+        Edit::Reset { .. } => "reset".to_owned(),
     }
 }

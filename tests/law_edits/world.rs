@@ -29,6 +29,14 @@ pub struct Thing {
     pub since_ns: u64,
 }
 
+/// A body as a request finds it: its edits are done in order, and where bodies are is known from before.
+struct Found {
+    pose: Pose,
+    root: u64,
+    moves: bool,
+    since_ns: u64,
+}
+
 /// Where a body was in the last tick.
 #[derive(Clone, Copy)]
 pub struct Before {
@@ -45,6 +53,7 @@ pub struct World {
     pub before: BTreeMap<u64, Before>,
     /// Since the last tick something else than frames changed it.
     pub edited: bool,
+    found: BTreeMap<u64, Found>,
 }
 
 /// The number in `bN`.
@@ -110,7 +119,7 @@ impl World {
         match (self.status(id), self.things[&id].solid.spec.max_speed_mps) {
             (BodyStatus::Known | BodyStatus::Held, _) => 0.0,
             (BodyStatus::Stale, Some(speed_mps)) => Some(speed_mps * age_ns as f64 * 1e-9)
-                .filter(|reach_m| *reach_m <= STALE_REACH_M)
+                .filter(|reach_m| *reach_m < STALE_REACH_M - 1e-9)
                 .unwrap_or(f64::INFINITY),
             _ => f64::INFINITY,
         }
@@ -135,6 +144,21 @@ impl World {
             && other.group & one.mask != 0
     }
 
+    /// A request begins.
+    pub fn begin_request(&mut self) {
+        let found = |id: &u64| {
+            let (root, _) = self.root(*id);
+            let found = Found {
+                pose: self.pose(*id),
+                root,
+                moves: self.moves(*id),
+                since_ns: self.things[&root].since_ns,
+            };
+            (*id, found)
+        };
+        self.found = self.things.keys().map(found).collect();
+    }
+
     /// What an edit that an engine took makes of it.
     pub fn apply(&mut self, edit: &Edit, solid: Option<Solid>) {
         self.edited = true;
@@ -153,6 +177,13 @@ impl World {
                     since_ns: 0,
                     solid,
                 };
+                let found = Found {
+                    pose: body.pose,
+                    root: body.id.0,
+                    moves: body.moves,
+                    since_ns: 0,
+                };
+                self.found.insert(body.id.0, found);
                 self.things.insert(body.id.0, thing);
             }
             Edit::Remove { name } => {
@@ -176,7 +207,8 @@ impl World {
             Edit::Attach { name, to, pose } => match to {
                 Some(to) => {
                     let (id, to) = (id_of(name), id_of(to));
-                    let local = pose.unwrap_or_else(|| relative(&self.pose(to), &self.pose(id)));
+                    let found = |id: u64| &self.found[&id].pose;
+                    let local = pose.unwrap_or_else(|| relative(found(to), found(id)));
                     self.named(name).hangs = Some((to, local));
                 }
                 None => self.detach(name, pose.as_ref()),
@@ -192,24 +224,25 @@ impl World {
 
     fn detach(&mut self, name: &str, pose: Option<&Pose>) {
         let id = id_of(name);
-        let (now_ns, at, (root, _)) = (self.now_ns, self.pose(id), self.root(id));
-        if root == id {
+        if self.things[&id].hangs.is_none() {
             return;
         }
-        let root = &self.things[&root];
-        let (placed, refused) = (root.placed, root.refused);
-        let since_ns = if root.solid.spec.moves {
-            root.since_ns
-        } else {
-            now_ns
-        };
+        let Found {
+            pose: at,
+            root,
+            moves,
+            since_ns,
+        } = self.found[&id];
+        let now_ns = self.now_ns;
+        let root = self.things.get(&root);
+        let (placed, refused) = root.map_or((false, false), |root| (root.placed, root.refused));
         let thing = self.named(name);
         thing.hangs = None;
         let fixed = !thing.solid.spec.moves;
         thing.pose = pose.copied().filter(|_| fixed).unwrap_or(at);
         thing.placed = placed || fixed;
         thing.refused = refused && !fixed;
-        thing.since_ns = since_ns;
+        thing.since_ns = if moves { since_ns } else { now_ns };
     }
 
     /// All poses of frames are forgotten.
