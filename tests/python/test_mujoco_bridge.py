@@ -414,7 +414,8 @@ def made_up_sweepd(of_run, leave_out=None, silent_at=None):
         def __exit__(self, *_):
             pass
 
-        def step(self, poses, timeout_s, stamp_ns):
+        def step(self, poses, timeout_s, stamp_ns, clock_id):
+            assert clock_id != 0, "simulated seconds are on no clock of the machine"
             Client.sent += 1
             if Client.sent == silent_at:
                 raise TimedOut("silence")
