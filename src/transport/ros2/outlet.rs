@@ -101,7 +101,7 @@ impl Outlet {
                         self.take_names(scene_rev, &rows);
                     }
                     let now = self.shared.now();
-                    self.speaker.stamp = Some(stamp_of(&parcel.tick, &self.sources, now));
+                    self.speaker.stamp = Some(stamp_of(&parcel.tick, now));
                     self.send(&parcel);
                     self.show(&parcel);
                     self.told.0 = parcel.tick;
