@@ -20,7 +20,7 @@ use std::sync::Arc;
 use crate::broad::{BroadPhase, Method};
 use crate::config::Config;
 use crate::error::Result;
-use crate::ids::{BodySlot, SourceSlot};
+use crate::ids::SourceSlot;
 use crate::limits;
 use crate::narrow::{Narrow, Wanted};
 use crate::pairs::{PairDelta, PairSet};
@@ -233,25 +233,26 @@ impl Engine {
         let method = self.plan.method();
         // Taken whatever the method does: else a tick in which both hold would be followed by a second renewal.
         let renew = std::mem::take(&mut self.renew);
-        let switch = self.method != method;
-        let mut changes = world.changes();
+        let anew = renew || self.method != method;
+        if anew {
+            self.whole.clear();
+            let inside = world.bodies().filter(|(_, body)| body.in_broad);
+            self.whole.inserted.extend(inside.map(|(slot, _)| slot));
+        }
         if renew {
             (self.method, self.broad) = (method, broad_phase(method, &self.config));
-            self.whole.clear();
-            self.whole.inserted.extend(inside(world));
-            changes = &self.whole;
         }
         if renew || world.scene_changed() {
             self.broad.force(filters.forced_pairs());
         }
+        let changes = if renew { &self.whole } else { world.changes() };
         self.broad
             .update(changes, world, filters, &mut self.pairs, &mut self.delta);
-        if switch && !renew {
+        if anew && !renew {
             // What changed in this tick is the business of the method that knows the pairs that there are.
             (self.method, self.broad) = (method, broad_phase(method, &self.config));
             self.broad.force(filters.forced_pairs());
-            let slots: Vec<BodySlot> = inside(world).collect();
-            self.broad.take_over(&slots, world);
+            self.broad.take_over(&self.whole.inserted, world);
         }
     }
 
@@ -381,12 +382,6 @@ fn place(source: Option<usize>) -> u8 {
     source
         .and_then(|source| u8::try_from(source).ok())
         .unwrap_or(u8::MAX)
-}
-
-/// The bodies that are in the broad phase.
-fn inside(world: &World) -> impl Iterator<Item = BodySlot> + '_ {
-    let bodies = world.bodies().filter(|(_, body)| body.in_broad);
-    bodies.map(|(slot, _)| slot)
 }
 
 /// A broad phase without bodies.

@@ -153,7 +153,7 @@ fn bug_the_count_of_ignored_pairs_is_that_of_a_walk_over_all_pairs() {
 
 /// A request with as many rules as bodies, and one body enabled among many attached pairs.
 #[test]
-#[ignore = "timing; run by hand in release"]
+#[ignore = "timing; SWEEPD_CI_SLOW=1 .ci/run runs it"]
 #[allow(clippy::disallowed_methods, reason = "a timing")]
 fn long_requests_of_rules_and_many_groups_take_no_longer_than_reading_them() {
     let mut bodies: Vec<_> = (0..5000).map(|k| moving(&format!("b{k}"), k + 1)).collect();
