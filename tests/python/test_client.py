@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
+from daemons import started  # noqa: F401
 from needed import needed
 
 np = needed("numpy")
@@ -60,25 +61,6 @@ def daemon(tmp_path):
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
         assert process.wait(timeout=10) in (0, -signal.SIGKILL)
-
-
-@pytest.fixture
-def started(tmp_path):
-    """Starts a daemon with a scene; the name of its instance."""
-    processes = []
-
-    def start(text):
-        path = tmp_path / f"scene_{len(processes)}.toml"
-        path.write_text(text)
-        name = f"py_{os.getpid()}_{len(processes)}_{time.monotonic_ns() % 1_000_000}"
-        processes.append(subprocess.Popen([SWEEPD, "--quiet", "run", str(path), "--instance", name]))
-        return name
-
-    yield start
-    for process in processes:
-        process.send_signal(signal.SIGINT)
-    for process in processes:
-        assert process.wait(timeout=10) == 0
 
 
 @pytest.fixture

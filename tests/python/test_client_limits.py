@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
+from daemons import started  # noqa: F401
 from needed import needed
 
 sweepd = needed("sweepd")
@@ -39,21 +40,9 @@ PLACES = {"cart": (0.0, 0.0, 0.0), "post": (5.0, 0.0, 0.0)}
 
 
 @pytest.fixture
-def start(tmp_path):
+def start(started):  # noqa: F811
     """Starts a daemon with a scene; the name of its instance."""
-    processes = []
-
-    def started(text=SCENE):
-        path = tmp_path / f"scene_{len(processes)}.toml"
-        path.write_text(text)
-        name = f"lim_{os.getpid()}_{len(processes)}_{time.monotonic_ns() % 1_000_000}"
-        processes.append(subprocess.Popen([SWEEPD, "--quiet", "run", str(path), "--instance", name]))
-        return name
-
-    yield started
-    for process in processes:
-        process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=10) == 0
+    return lambda text=SCENE: started(text)
 
 
 def poses(velocities=False, only=tuple(PLACES), x=0.0):
