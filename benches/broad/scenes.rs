@@ -11,7 +11,7 @@ pub type Box3 = [[f32; 3]; 2];
 /// How a scene is made and moves. What each flatters: `Gas` and `Sheet` fat boxes, `OnePercent` sparse updates, `Pile`
 /// cached pairs; what each punishes: `Pile` a sort on one axis, `Mixed` grids, `Galaxy` cells of one size, `Teleport`
 /// and `Fast` coherence, `Churn` insertion, `Tumble` and `Redraw` predicted motion, `Rove` sleeping sets, `Dense` and
-/// `Heap` pair lists, `Far` f32.
+/// `Heap` pair lists, `Far` f32, `Stray` (a gas and one body 1,000 km from it) an origin and cells by the extent of all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     Gas,
@@ -30,6 +30,7 @@ pub enum Kind {
     Field,
     Far,
     Heap,
+    Stray,
 }
 
 impl Kind {
@@ -50,6 +51,7 @@ impl Kind {
         (Self::Field, "field"),
         (Self::Far, "far"),
         (Self::Heap, "heap"),
+        (Self::Stray, "stray"),
     ];
 
     pub fn named(name: &str) -> Option<Self> {
@@ -83,6 +85,8 @@ pub struct Scene {
 const CLUSTER: usize = 500;
 /// Bodies on one place in the heap.
 const HEAP: usize = 2000;
+/// From the gas to its stray body, on each axis.
+const ASTRAY_M: f64 = 1e6;
 
 impl Scene {
     pub fn new(kind: Kind, bodies: usize, seed: u64) -> Self {
@@ -142,6 +146,7 @@ impl Scene {
                 centre = self.side.map(|s| s / 2.0);
                 half = [0.4; 3];
             }
+            Kind::Stray if body == 0 => centre = [ASTRAY_M; 3],
             _ => {}
         }
         let mut velocity = self.way(speed);
@@ -194,7 +199,7 @@ impl Scene {
         match self.kind {
             Kind::OnePercent | Kind::Field => body.is_multiple_of(100),
             Kind::Rove => body % 100 == self.frame % 100,
-            Kind::Pile => body != 0,
+            Kind::Pile | Kind::Stray => body != 0,
             _ => true,
         }
     }
