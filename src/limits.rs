@@ -24,6 +24,8 @@ pub const DEFORMING_VERTICES_MAX: usize = 1 << 20;
 pub const HULL_VERTICES_MAX: usize = 4096;
 /// Default for pairs kept; beyond it the state is `unknown` and so is each body concerned.
 pub const PAIRS_DEFAULT: usize = 1 << 22;
+/// Most rows of `pairs`, `contacts` or `regions` that a scene may ask for, and that a client takes.
+pub const ROWS_MAX: usize = 1 << 24;
 /// Default for rows of `pairs`; beyond it rows are left out by rank and counted.
 pub const PAIR_ROWS_DEFAULT: usize = 1 << 16;
 /// Default for rows of `contacts`.
@@ -51,8 +53,8 @@ pub const MANIFOLD_POINTS_MAX: usize = 4;
 pub const CONTACTS_PER_PAIR_MAX: usize = 16;
 /// Transforms in one frame; more are refused as `over_limit`.
 pub const FRAME_ROWS_MAX: usize = BODIES_MAX;
-/// Vertex messages that wait for their tick; beyond it the oldest go, and the bodies concerned are unknown until all of
-/// their vertices come again.
+/// Vertex messages of one source that wait for their tick; beyond it the oldest go, and what the source has bent is
+/// unknown until all of its vertices come again.
 pub const VERTEX_FRAMES_WAITING_MAX: usize = 1024;
 /// Frames taken from one source in one drain; the rest waits in its queue, newest kept.
 pub const FRAMES_PER_DRAIN_MAX: usize = 64;

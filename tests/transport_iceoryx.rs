@@ -17,12 +17,14 @@ use std::time::Duration;
 use iceoryx2::prelude::{Config, FileName, NodeBuilder, Path as IoxPath, SemanticString, ipc};
 use sweepd::time::{Clock, SystemClock};
 use sweepd::transport::Door;
-use sweepd::transport::client::{ClientOptions, FrameInfo, Heard, Rows, StepError, Topics};
-use sweepd::transport::iceoryx::{
-    Cleaned, Place, Server, ServerOptions, Waker, clean_leftovers, leftovers, list_instances,
-    spawn_cleaner,
+use sweepd::transport::client::{
+    ClientOptions, FrameInfo, Heard, Link, Message, Rows, StepError, Topics,
 };
-use sweepd::wire::{FrameHeader, Hello, Inbox, TransformRow};
+use sweepd::transport::iceoryx::{
+    Cleaned, IoxLink, Place, Server, ServerOptions, Waker, clean_leftovers, leftovers,
+    list_instances, spawn_cleaner,
+};
+use sweepd::wire::{FrameHeader, Hello, Inbox, TransformRow, TransformVelRow};
 use transport_support::{Files, Manners, SECOND_NS, StandIn, poses, until};
 
 /// Says to the child program which part it plays, and where.
@@ -279,9 +281,8 @@ fn a_busy_poll_finds_frames_and_ends_at_its_time() {
     let before_ns = clock.monotonic_ns();
     assert!(!server.wait(20_000_000, &clock).unwrap().notified);
     assert!(clock.monotonic_ns() - before_ns >= 20_000_000);
-    let link = sweepd::transport::iceoryx::IoxLink::open(&files.place, &clock, u64::MAX);
-    let mut link = link.unwrap();
-    sweepd::transport::client::Link::send(
+    let mut link = IoxLink::open(&files.place, &clock, u64::MAX).unwrap();
+    Link::send(
         &mut link,
         &FrameHeader::default(),
         Rows::Poses(&poses(1, 0.0)),
@@ -296,17 +297,66 @@ fn a_busy_poll_finds_frames_and_ends_at_its_time() {
 }
 
 #[test]
+fn bug_frames_with_and_without_velocities_are_taken_in_the_order_of_their_sending() {
+    let files = Files::new();
+    let mut server = server(&files, 0);
+    let mut link = IoxLink::open(&files.place, &SystemClock, u64::MAX).unwrap();
+    let moving = [TransformVelRow::default(); 2];
+    let still = poses(2, 0.0);
+    for seq in 1..=7 {
+        let mut header = FrameHeader::default();
+        (header.session, header.epoch, header.seq) = (1, 1, seq);
+        header.sent_ns = SystemClock.boottime_ns();
+        let rows = match seq % 2 {
+            0 => Rows::Poses(&still),
+            _ => Rows::Moving(&moving),
+        };
+        Link::send(&mut link, &header, rows).unwrap();
+    }
+    let mut seen = Vec::new();
+    until("all frames", || {
+        let mut inbox = Inbox::default();
+        server.receive(&mut inbox, &SystemClock);
+        let frames = inbox.frames().iter();
+        seen.extend(frames.map(|frame| (frame.header.seq, frame.velocities.len())));
+        seen.len() == 7
+    });
+    let sent: Vec<_> = (1..=7).map(|seq| (seq, (seq % 2) as usize * 2)).collect();
+    assert_eq!(seen, sent);
+}
+
+#[test]
+fn bug_a_port_of_changes_that_could_not_be_renewed_is_opened_with_the_next_look() {
+    let files = Files::new();
+    let daemon = server(&files, 0);
+    let mut link = IoxLink::open(&files.place, &SystemClock, u64::MAX).unwrap();
+    let changes = Topics {
+        changes: true,
+        ..Topics::default()
+    };
+    Link::subscribe(&mut link, changes).unwrap();
+    drop(daemon);
+    Link::renew_changes(&mut link).unwrap_err();
+    let mut message = Message::default();
+    Link::changes(&mut link, &mut message).unwrap_err();
+    let mut daemon = server(&files, 0);
+    assert!(!daemon.demand().changes);
+    assert!(!Link::changes(&mut link, &mut message).unwrap());
+    until("the reader", || daemon.demand().changes);
+}
+
+#[test]
 fn bug_a_wait_of_less_than_a_microsecond_ends() {
     let (ended, end) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
         let files = Files::new();
         let mut server = server(&files, 0);
         let clock = SystemClock;
-        let link = sweepd::transport::iceoryx::IoxLink::open(&files.place, &clock, u64::MAX);
+        let link = IoxLink::open(&files.place, &clock, u64::MAX);
         let mut link = link.unwrap();
         for timeout_ns in (1..2_000).step_by(37) {
             server.wait(timeout_ns, &clock).unwrap();
-            sweepd::transport::client::Link::wait(&mut link, timeout_ns).unwrap();
+            Link::wait(&mut link, timeout_ns).unwrap();
         }
         ended.send(()).unwrap();
     });

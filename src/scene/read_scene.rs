@@ -277,9 +277,9 @@ fn read_limits(node: Option<Node>) -> std::result::Result<Limits, Fault> {
     for (key, slot, max) in [
         ("bodies", &mut all.bodies, limits::BODIES_MAX),
         ("pairs", &mut all.pairs, u32::MAX as usize - 1),
-        ("pair_rows", &mut all.pair_rows, 1 << 24),
-        ("contact_rows", &mut all.contact_rows, 1 << 24),
-        ("region_rows", &mut all.region_rows, 1 << 24),
+        ("pair_rows", &mut all.pair_rows, limits::ROWS_MAX),
+        ("contact_rows", &mut all.contact_rows, limits::ROWS_MAX),
+        ("region_rows", &mut all.region_rows, limits::ROWS_MAX),
         (
             "contacts_per_pair",
             &mut all.contacts_per_pair,

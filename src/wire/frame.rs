@@ -45,7 +45,7 @@ impl Frame {
     }
 }
 
-/// The frames of one tick, in order of receipt. Cleared frames are kept and reused.
+/// The frames of one tick, those of a source in the order of their sending. Cleared frames are kept and reused.
 #[derive(Clone, Debug, Default)]
 pub struct Inbox {
     frames: Vec<Frame>,
@@ -73,7 +73,16 @@ impl Inbox {
         frame
     }
 
-    /// The frames, oldest first.
+    /// Puts frames that came on two ways in the order of their sending: by `sent_ns`, those of one time by session,
+    /// epoch and number.
+    pub fn sort_by_sending(&mut self) {
+        self.frames[..self.len].sort_unstable_by_key(|frame| {
+            let header = &frame.header;
+            (header.sent_ns, header.session, header.epoch, header.seq)
+        });
+    }
+
+    /// The frames, those of a source oldest first.
     #[must_use]
     pub fn frames(&self) -> &[Frame] {
         &self.frames[..self.len]
@@ -154,6 +163,22 @@ mod tests {
         assert!(inbox.is_empty());
         assert!(inbox.push().transforms.is_empty());
         assert_eq!(inbox.frames().len(), 1);
+    }
+
+    #[test]
+    fn frames_of_two_ways_are_put_in_the_order_of_their_sending() {
+        let mut inbox = Inbox::default();
+        for (sent_ns, session, epoch, seq) in
+            [(7, 1, 1, 4), (9, 1, 2, 1), (5, 2, 1, 2), (7, 1, 1, 3)]
+        {
+            let header = &mut inbox.push().header;
+            (header.sent_ns, header.session) = (sent_ns, session);
+            (header.epoch, header.seq) = (epoch, seq);
+        }
+        inbox.sort_by_sending();
+        let numbers = |frame: &Frame| (frame.header.session, frame.header.epoch, frame.header.seq);
+        let sorted: Vec<_> = inbox.frames().iter().map(numbers).collect();
+        assert_eq!(sorted, [(2, 1, 2), (1, 1, 3), (1, 1, 4), (1, 2, 1)]);
     }
 
     #[test]

@@ -159,6 +159,25 @@ def test_a_list_that_missed_a_message_is_not_shown_until_the_whole_of_it_came(st
         assert after.changes_header.base_tick != 0 and len(after.listed) == after.changes_header.listed
 
 
+def test_bug_a_list_whose_place_another_reader_took_is_asked_for_again(started, monkeypatch):
+    with sweepd.Client(started(MANY), "sim", quat_order="wxyz", listen=("changes",)) as client:
+        client.step(crowd(0), timeout_s=5)
+        subscribe = client._ports.subscribe
+
+        def taken(topic, *args):
+            monkeypatch.setattr(client._ports, "subscribe", subscribe)
+            raise sweepd.Refused(f"`{topic}`: every place is taken")
+
+        monkeypatch.setattr(client._ports, "subscribe", taken)
+        with pytest.raises(sweepd.Refused, match="every place"):
+            client._renew_list()
+        for step in range(1, 12):
+            result = client.step(crowd(step), timeout_s=5)
+            if result.listed is not None and result.changes_header.base_tick == 0:
+                break
+        assert result.changes_header.base_tick == 0 and len(result.listed) == len(result.changes)
+
+
 def test_a_quaternion_is_read_in_the_order_that_was_said(daemon):
     half = math.sqrt(0.5)
     with sweepd.Client(daemon[0], "sim", quat_order="wxyz") as client:

@@ -133,26 +133,19 @@ def test_a_frame_that_is_late_has_the_least_time_and_not_all_of_it(start, monkey
         assert len(sent) == 5, "nothing that was refused went out"
 
 
-def test_a_frame_of_the_other_kind_waits_for_the_result_of_the_last(start):
+def test_bug_frames_with_and_without_velocities_in_turn_are_taken_in_their_order(start):
     # few ticks: the daemon finds several frames at once
     instance = start("[run]\nrate = 10\n" + SCENE)
-    with sweepd.Client(instance, "sim", quat_order="wxyz") as client:
-        for moving in (True, False, True):
-            client.step(poses(moving), timeout_s=5)
-        for moving in (True, False):
-            client.step(poses(moving), timeout_s=5)
-            client.send(poses(moving, ["cart"], 0.1), partial=True)
-            with pytest.raises(sweepd.SweepdError, match="wait for its result first"):
-                client.send(poses(not moving, ["post"], 0.1), partial=True)
-            client.send(poses(moving, ["post"], 0.1), partial=True)
+    with sweepd.Client(instance, "sim", quat_order="wxyz", listen=("bodies",)) as client:
+        for round in range(1, 6):
+            for turn, moving in enumerate((True, False, True)):
+                client.send(poses(moving, x=float(10 * round + turn)))
             until = time.monotonic() + 5
             while client._row(client.wait(timeout_s=5).tick).seq < client._seq:
                 assert time.monotonic() < until
-            client.send(poses(not moving), partial=True)
-            # what was before a reset is void, and may be overtaken
-            client.reset_epoch()
-            result = client.step(poses(moving), timeout_s=5)
-            assert result.state == "clear"
+            result = client.latest()
+            assert result.tick.rejects[layout.RejectReason.OLD_FRAME] == 0
+            assert result.bodies["position"][0][0] == 10 * round + 2
 
 
 def test_a_pause_does_not_overtake_a_frame_with_velocities(start):

@@ -246,10 +246,17 @@ class Ports:
         self.wake(14)
 
     def renew(self, topic, row, header):
-        """Opens the port of a message kind anew: what waits in it is gone, and the daemon sees a new reader."""
+        """Opens the port of a message kind anew: what waits in it is gone, and the daemon sees a new reader.
+
+        Raises Refused where another one took the place meanwhile; the topic is not open then.
+        """
         # first the old one, which takes a reader's place
-        del self._readers[topic]
+        self._readers.pop(topic, None)
         self.subscribe(topic, row, header)
+
+    def is_open(self, topic):
+        """Whether the topic is listened to."""
+        return topic in self._readers
 
     @_ours("`tick` cannot be received")
     def tick(self):

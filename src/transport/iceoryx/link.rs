@@ -51,6 +51,8 @@ pub struct IoxLink {
     hello: Subscriber<Ipc, Hello, ()>,
     pairs: Reader<PairRow>,
     changes: Reader<PairRow, ChangesHeader>,
+    /// Its place went to another reader when it was to be renewed.
+    changes_owed: bool,
     contacts: Reader<ContactRow>,
     regions: Reader<RegionRow>,
     bodies: Reader<BodyRow>,
@@ -128,6 +130,7 @@ impl IoxLink {
             hello,
             pairs: None,
             changes: None,
+            changes_owed: false,
             contacts: None,
             regions: None,
             bodies: None,
@@ -293,28 +296,33 @@ impl Link for IoxLink {
     }
 
     fn pairs(&mut self, into: &mut Message<PairRow>) -> Result<bool> {
-        read(&self.pairs, limits::PAIRS_DEFAULT, into)
+        read(&self.pairs, limits::ROWS_MAX, into)
     }
 
     fn changes(&mut self, into: &mut Message<PairRow, ChangesHeader>) -> Result<bool> {
-        read(&self.changes, limits::PAIRS_DEFAULT, into)
+        if self.changes_owed {
+            self.renew_changes()?;
+        }
+        read(&self.changes, limits::ROWS_MAX, into)
     }
 
     fn renew_changes(&mut self) -> Result<()> {
         // first the old one, which takes a reader's place
-        if self.changes.take().is_some() {
+        self.changes_owed |= self.changes.take().is_some();
+        if self.changes_owed {
             self.open_changes()?;
+            self.changes_owed = false;
             self.wake(events::CREATED);
         }
         Ok(())
     }
 
     fn contacts(&mut self, into: &mut Message<ContactRow>) -> Result<bool> {
-        read(&self.contacts, limits::PAIRS_DEFAULT, into)
+        read(&self.contacts, limits::ROWS_MAX, into)
     }
 
     fn regions(&mut self, into: &mut Message<RegionRow>) -> Result<bool> {
-        read(&self.regions, limits::PAIRS_DEFAULT, into)
+        read(&self.regions, limits::ROWS_MAX, into)
     }
 
     fn bodies(&mut self, into: &mut Message<BodyRow>) -> Result<bool> {

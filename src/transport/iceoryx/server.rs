@@ -146,8 +146,13 @@ pub struct Server {
     patience: Patience,
     demand: Demand,
     next_token: u64,
+    /// Receives that failed since somebody was told, and when that was.
     receive_errors: u64,
+    errors_told_ns: u64,
 }
+
+/// Time between two lines on messages that cannot be received, nanoseconds.
+const ERRORS_TOLD_NS: u64 = 10_000_000_000;
 
 /// Services whose ports are held elsewhere; they stay open as long as the server.
 struct Services {
@@ -243,16 +248,24 @@ impl Server {
             demand: Demand::default(),
             next_token: 1,
             receive_errors: 0,
+            errors_told_ns: 0,
             options,
         };
         server.say_hello()?;
         Ok(server)
     }
 
-    /// Times a receive failed in this boot; the samples behind it are lost (a client's files were tampered with).
-    #[must_use]
-    pub fn receive_errors(&self) -> u64 {
-        self.receive_errors
+    /// Says that messages could not be received, now and then while it goes on: what is behind them is lost.
+    fn tell_receive_errors(&mut self, now_ns: u64) {
+        let due = now_ns.saturating_sub(self.errors_told_ns) >= ERRORS_TOLD_NS;
+        if self.receive_errors > 0 && (self.errors_told_ns == 0 || due) {
+            tracing::warn!(
+                "{} times messages of clients could not be received: a client died in the middle of one, or its files in \
+                 shared memory are damaged; see `sweepd doctor`",
+                std::mem::take(&mut self.receive_errors)
+            );
+            self.errors_told_ns = now_ns;
+        }
     }
 }
 

@@ -28,6 +28,12 @@ where
     service: PubSub<Ipc, [T], H>,
 }
 
+/// What a drain found: messages, and receives that failed.
+struct Drained {
+    frames: usize,
+    errors: u64,
+}
+
 /// What is the same for every frame of a drain.
 #[derive(Clone, Copy)]
 struct Stamped {
@@ -102,16 +108,17 @@ where
         })
     }
 
-    /// Hands over what is there, header and rows; no rows where there are more than `rows_max`.
+    /// Hands over what is there, header and rows; no rows where there are more than `rows_max`. The samples stay
+    /// borrowed until [`Self::release`], so that one source gives at most its queue however often this is called.
     ///
     /// * `take` - yields the session.
-    /// * returns - receives that failed.
     fn drain(
         &mut self,
         rows_max: usize,
         sessions: &mut BTreeMap<u128, u64>,
         mut take: impl FnMut(H, Option<&[T]>) -> u64,
-    ) -> u64 {
+    ) -> Drained {
+        let before = self.kept.len();
         let mut errors = 0;
         loop {
             match self.subscriber.receive() {
@@ -133,8 +140,12 @@ where
                 }
             }
         }
+        let frames = self.kept.len() - before;
+        Drained { frames, errors }
+    }
+
+    fn release(&mut self) {
         self.kept.clear();
-        errors
     }
 }
 
@@ -166,20 +177,39 @@ impl Server {
             ..
         } = self;
         let rows_max = options.frame_rows_max;
-        *receive_errors += transforms.drain(rows_max, sessions, |header, rows| {
-            stamp.take(inbox, header, rows, Frame::set_transforms)
-        });
-        *receive_errors += transforms_vel.drain(rows_max, sessions, |header, rows| {
-            stamp.take(inbox, header, rows, Frame::set_transforms_vel)
-        });
+        // Two queues, one order: both are read until neither has more, so that whatever a source sent before a frame
+        // that is here is here, too; then they are put in the order of their sending.
+        let (mut poses, mut motions) = (0, 0);
+        loop {
+            let of_poses = transforms.drain(rows_max, sessions, |header, rows| {
+                stamp.take(inbox, header, rows, Frame::set_transforms)
+            });
+            let of_motions = transforms_vel.drain(rows_max, sessions, |header, rows| {
+                stamp.take(inbox, header, rows, Frame::set_transforms_vel)
+            });
+            *receive_errors += of_poses.errors + of_motions.errors;
+            poses += of_poses.frames;
+            motions += of_motions.frames;
+            if of_poses.frames + of_motions.frames == 0 {
+                break;
+            }
+        }
+        transforms.release();
+        transforms_vel.release();
+        if poses > 0 && motions > 0 {
+            inbox.sort_by_sending();
+        }
         // After the frames: vertices are sent before the frame that they belong with, so those of what was drained
         // above are there.
         let rows_max = crate::limits::DEFORMING_VERTICES_MAX;
-        *receive_errors += vertices.drain(rows_max, sessions, |header, rows| {
+        let of_vertices = vertices.drain(rows_max, sessions, |header, rows| {
             stamp.take_vertices(inbox, header, rows)
         });
+        vertices.release();
+        *receive_errors += of_vertices.errors;
         // who came and left between the look and the drain must be looked at again
         self.peers_changed |= self.sessions.len() > known;
+        self.tell_receive_errors(now_ns);
         self.end_sessions(inbox);
     }
 
