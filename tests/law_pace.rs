@@ -568,8 +568,9 @@ fn law_4_4_vertices_wait_for_the_frame_that_they_belong_with() {
     vertices(&mut daemon, "sim", 1, 1);
     vertices(&mut daemon, "robot", 5, 50);
     vertices(&mut daemon, "sim", 0, 2);
-    // The first tick is a heartbeat: what is not of the lead, or of no frame, goes with it.
-    assert_eq!(next(&mut daemon), Some((vec![], vec![50, 2])));
+    // The first tick is a heartbeat: what is not of the lead goes with it. What is of no frame keeps its place behind
+    // what was sent before.
+    assert_eq!(next(&mut daemon), Some((vec![], vec![50])));
     assert_eq!(next(&mut daemon), None);
     *daemon.drained.push() = sim(1);
     vertices(&mut daemon, "sim", 2, 3);
@@ -577,7 +578,7 @@ fn law_4_4_vertices_wait_for_the_frame_that_they_belong_with() {
     *daemon.drained.push() = sim(2);
     vertices(&mut daemon, "sim", 4, 5);
     *daemon.drained.push() = sim(3);
-    assert_eq!(next(&mut daemon), Some((vec![1], vec![1])));
+    assert_eq!(next(&mut daemon), Some((vec![1], vec![1, 2])));
     assert_eq!(next(&mut daemon), Some((vec![2], vec![3, 4])));
     assert_eq!(next(&mut daemon), Some((vec![3], vec![])));
     // Its session ends: what waited for a frame that never comes is gone with it.
@@ -589,6 +590,66 @@ fn law_4_4_vertices_wait_for_the_frame_that_they_belong_with() {
     let mut daemon = Daemon::of(Mode::Rate(100.0));
     vertices(&mut daemon, "sim", 7, 1);
     assert_eq!(next(&mut daemon), Some((vec![], vec![1])));
+}
+
+#[test]
+fn law_4_2_bug_vertices_of_another_session_wait_for_the_frames_of_the_one_in_force() {
+    let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
+    daemon.run(5.0, vec![(1.0, robot(1)), (2.0, sim(1))]);
+    // The robot's frames wait for the lead; another one's vertices would be taken with any tick.
+    for seq in 2..=4 {
+        *daemon.drained.push() = robot(seq);
+    }
+    let header = &mut daemon.drained.push_vertices().header;
+    (header.session, header.schema) = (77, WIRE_VERSION);
+    header.source = sweepd::wire::name_bytes("robot");
+    let now_ns = daemon.clock.boottime_ns();
+    daemon.pacer.take(&mut daemon.drained, now_ns);
+    let due = (daemon.pacer).due(now_ns + HEARTBEAT_NS, false, None, &mut daemon.inbox);
+    assert_eq!(due.unwrap().cause, TickCause::Heartbeat);
+    assert!(daemon.inbox.vertices().is_empty());
+    *daemon.drained.push() = sim(2);
+    daemon.pacer.take(&mut daemon.drained, now_ns);
+    (daemon.pacer)
+        .due(now_ns, false, None, &mut daemon.inbox)
+        .unwrap();
+    // The newest of the robot's, and the lead's.
+    assert_eq!(daemon.inbox.frames().len(), 2);
+    assert_eq!(daemon.inbox.vertices().len(), 1);
+}
+
+#[test]
+fn law_4_2_bug_a_strangers_frame_is_none_of_the_round() {
+    let mut daemon = Daemon::of(Mode::OnAll);
+    daemon.run(10.0, vec![(1.0, sim(1)), (2.0, robot(1))]);
+    let mut stranger = robot(1);
+    stranger.header.session = 77;
+    let mut foreign = robot(2);
+    foreign.header.schema = WIRE_VERSION + 1;
+    let ticks = daemon.run(
+        30.0,
+        vec![
+            (20.0, sim(2)),
+            (20.5, stranger),
+            (21.0, foreign),
+            (22.0, robot(2)),
+        ],
+    );
+    let [tick] = ticks else {
+        panic!("one round: {ticks:?}")
+    };
+    assert_eq!(tick.at_ms, 22.0);
+    assert!(tick.frames.contains(&("robot".to_owned(), 2)));
+    assert_eq!(daemon.world.sources()[1].session, 1);
+    // Who has ended is no stranger to the one that comes after it.
+    daemon.drained.end_session(1);
+    let mut next = robot(1);
+    next.header.session = 78;
+    let mut lead = sim(1);
+    lead.header.session = 78;
+    // Nobody else is there to be waited for.
+    let ticks = daemon.run(60.0, vec![(50.0, next), (51.0, lead)]);
+    assert_eq!((ticks[0].at_ms, ticks[0].frames.len()), (50.0, 1));
 }
 
 #[test]

@@ -54,7 +54,7 @@ fn layouts() -> Vec<Layout> {
         TransformVelRow { transform linear angular }
         FrameHeader { session epoch seq sent_ns stamp_ns scene_rev deadline_ns time_left_ns source flags clock_id schema boot }
         VertexRow { position }
-        VertexHeader { session epoch seq sent_ns body version base_version source first count total flags schema boot }
+        VertexHeader { session epoch seq sent_ns body version base_version number source first count total flags schema boot }
         MessageHeader { boot_id tick scene_rev oldest_stamp_ns newest_stamp_ns truncated state reserved schema }
         ChangesHeader { message base_tick listed }
         PairRow { body_a body_b gap_min_m gap_max_m gap_best_m closing_mps toi_min toi_max begin_first_tick begin_last_tick end_first_tick end_last_tick certified_tick bound_age_ticks verdict certified_verdict events end_cause level flags reserved }

@@ -67,7 +67,7 @@ enum {
     SWEEPD_REASON_HELD = 2,
     /* A too old body was taken out of the scene by request. */
     SWEEPD_REASON_REMOVED_BY_AGE = 3,
-    /* A body's newest pose was refused. */
+    /* A body's newest pose or vertices were refused. */
     SWEEPD_REASON_REJECTED = 4,
     /* Rows or pairs did not fit. */
     SWEEPD_REASON_TRUNCATED = 5,
@@ -201,7 +201,7 @@ enum {
     /* A chain of ROS 2 frames from the body to the scene's frame that has a loop, or stamps too far apart. */
     SWEEPD_REJECT_REASON_BAD_CHAIN = 14,
     /* A range of vertices that does not follow on the version the body has, or comes after
-     * refused ones. */
+     * refused ones; or vertices of the source were lost on the way. */
     SWEEPD_REJECT_REASON_VERTEX_VERSION = 15,
 };
 
@@ -292,8 +292,8 @@ enum {
     SWEEPD_PAIR_FLAGS_UNKNOWN_BODY = 4,
     /* A body of the pair is held at an old pose. */
     SWEEPD_PAIR_FLAGS_HELD_BODY = 8,
-    /* The pair is gone (removed, filtered, ended by a cause); this row only carries its last
-     * event. */
+    /* The pair is gone (removed, filtered, ended by a cause, or its boxes parted); this row only
+     * carries its last event. */
     SWEEPD_PAIR_FLAGS_GONE = 16,
     /* Certified to have touched on the way to this tick's poses, within toi_min to toi_max. */
     SWEEPD_PAIR_FLAGS_SWEPT_HIT = 32,
@@ -412,7 +412,7 @@ typedef struct sweepd_vertex_row {
 SWEEPD_ASSERT(offsetof(sweepd_vertex_row, position) == 0);
 SWEEPD_ASSERT(sizeof(sweepd_vertex_row) == 12);
 
-/* Type name "sweepd.v1.VertexHeader", 112 bytes. User header of vertices: whose they are, which
+/* Type name "sweepd.v1.VertexHeader", 120 bytes. User header of vertices: whose they are, which
  * of them, and which version they make. */
 typedef struct sweepd_vertex_header {
     /* Session of the client, the same as in its frames; never 0. */
@@ -420,7 +420,8 @@ typedef struct sweepd_vertex_header {
     /* Epoch of the frame that they belong with. */
     uint64_t epoch;
     /* Number of the frame that they belong with: in a mode that takes each frame by itself they
-     * are taken with the first that is not older. 0: at once. */
+     * are taken with the first that is not older. 0: at once, behind what the session sent before.
+     */
     uint64_t seq;
     /* When the client sent them, nanoseconds of CLOCK_BOOTTIME; 0: not said. */
     uint64_t sent_ns;
@@ -430,6 +431,9 @@ typedef struct sweepd_vertex_header {
     uint64_t version;
     /* Of a range: the version that it is applied to. Any other, and it is refused. */
     uint64_t base_version;
+    /* Which message of vertices of the session this is, from 1: a gap says that some were lost, and all that
+     * the source bent is unknown until all of its vertices come again. 0: not said. */
+    uint64_t number;
     /* Name of the source, NUL-padded UTF-8. */
     uint8_t source[SWEEPD_SOURCE_NAME_LEN];
     /* Place of the first row in the mesh's list of vertices; 0 where all are sent. */
@@ -453,14 +457,15 @@ SWEEPD_ASSERT(offsetof(sweepd_vertex_header, sent_ns) == 24);
 SWEEPD_ASSERT(offsetof(sweepd_vertex_header, body) == 32);
 SWEEPD_ASSERT(offsetof(sweepd_vertex_header, version) == 40);
 SWEEPD_ASSERT(offsetof(sweepd_vertex_header, base_version) == 48);
-SWEEPD_ASSERT(offsetof(sweepd_vertex_header, source) == 56);
-SWEEPD_ASSERT(offsetof(sweepd_vertex_header, first) == 88);
-SWEEPD_ASSERT(offsetof(sweepd_vertex_header, count) == 92);
-SWEEPD_ASSERT(offsetof(sweepd_vertex_header, total) == 96);
-SWEEPD_ASSERT(offsetof(sweepd_vertex_header, flags) == 100);
-SWEEPD_ASSERT(offsetof(sweepd_vertex_header, schema) == 104);
-SWEEPD_ASSERT(offsetof(sweepd_vertex_header, boot) == 108);
-SWEEPD_ASSERT(sizeof(sweepd_vertex_header) == 112);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, number) == 56);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, source) == 64);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, first) == 96);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, count) == 100);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, total) == 104);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, flags) == 108);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, schema) == 112);
+SWEEPD_ASSERT(offsetof(sweepd_vertex_header, boot) == 116);
+SWEEPD_ASSERT(sizeof(sweepd_vertex_header) == 120);
 
 /* Type name "sweepd.v1.MessageHeader", 56 bytes. User header of every message the daemon
  * publishes. */

@@ -196,13 +196,14 @@ impl Found {
         self.gather(judge);
         self.truncated.clear();
         self.truncated.extend_from_slice(pairs.truncated());
+        self.truncated.retain(|slot| judge.members.has(*slot, IN));
+        let missing = pairs.missing();
         pairs.forget_missing();
         pairs.insert_all(&self.began, |key| judge.begins(key), &mut delta.began);
-        // What a body of unknown place misses cannot be found again by its box, so it stays marked.
-        for slot in self.truncated.drain(..) {
-            if judge.members.has(slot, IN) && judge.policy.keeps(slot) {
-                pairs.mark_truncated(slot);
-            }
+        // What a body of unknown place misses cannot be found again by boxes: with whom it would be paired is not
+        // known any more, so all who missed a pair stay marked, and what was missing may still be.
+        if self.truncated.iter().any(|slot| judge.policy.keeps(*slot)) {
+            pairs.go_on_missing(missing, &self.truncated);
         }
     }
 

@@ -157,6 +157,26 @@ impl Members {
         true
     }
 
+    /// Notes that all who are in come in this tick: no structure knows them.
+    ///
+    /// * `with_bounds` - whether boxes are copied from now on.
+    pub(super) fn come_anew(&mut self, with_bounds: bool, proxies: &impl Proxies) {
+        self.with_bounds = with_bounds;
+        self.bounds.clear();
+        if with_bounds {
+            self.bounds.resize(self.flags.len(), Bounds::EMPTY);
+            for slot in &self.bounded {
+                self.bounds[slot.index()] = Bounds::of(proxies.aabb(*slot));
+            }
+        }
+        for at in 0..self.flags.len() {
+            let slot = BodySlot(small(at));
+            if self.has(slot, IN) {
+                self.touch(slot, ASKED | CAME);
+            }
+        }
+    }
+
     /// Sets the id of a slot.
     fn name(&mut self, at: usize, id: BodyId) {
         let around = at.saturating_sub(1)..self.ids.len().min(at + 2);

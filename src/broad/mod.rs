@@ -83,6 +83,8 @@ enum Engine {
 #[derive(Clone, Debug)]
 pub struct BroadPhase {
     engine: Engine,
+    /// The method has not seen the bodies that are in.
+    is_new: bool,
     members: Members,
     forced: Forced,
     found: Found,
@@ -95,22 +97,33 @@ pub struct BroadPhase {
     work: Work,
 }
 
+impl Engine {
+    fn new(method: Method) -> Self {
+        match method {
+            Method::BruteForce => Self::Brute,
+            Method::SweepAndPrune => Self::Sap(Box::default()),
+            Method::Order => Self::Order(Box::default()),
+            Method::UniformGrid => Self::Grid(Box::new(Grid::new(Kind::Uniform))),
+            Method::SpatialHash => Self::Grid(Box::new(Grid::new(Kind::Hash))),
+            Method::HierarchicalGrid => Self::Grid(Box::new(Grid::new(Kind::Levels))),
+        }
+    }
+
+    /// Whether it goes through copies of the boxes.
+    fn copies_boxes(&self) -> bool {
+        matches!(self, Self::Sap(_) | Self::Grid(_))
+    }
+}
+
 impl BroadPhase {
     /// A broad phase without bodies.
     #[must_use]
     pub fn new(method: Method) -> Self {
-        let engine = match method {
-            Method::BruteForce => Engine::Brute,
-            Method::SweepAndPrune => Engine::Sap(Box::default()),
-            Method::Order => Engine::Order(Box::default()),
-            Method::UniformGrid => Engine::Grid(Box::new(Grid::new(Kind::Uniform))),
-            Method::SpatialHash => Engine::Grid(Box::new(Grid::new(Kind::Hash))),
-            Method::HierarchicalGrid => Engine::Grid(Box::new(Grid::new(Kind::Levels))),
-        };
-        let with_bounds = matches!(engine, Engine::Sap(_) | Engine::Grid(_));
+        let engine = Engine::new(method);
         Self {
+            members: Members::new(engine.copies_boxes()),
             engine,
-            members: Members::new(with_bounds),
+            is_new: false,
             forced: Forced::default(),
             found: Found::default(),
             causes: Vec::new(),
@@ -118,6 +131,13 @@ impl BroadPhase {
             parted: Vec::new(),
             work: Work::default(),
         }
+    }
+
+    /// Goes on with another method, with settings as those of a new one: the next update shows it all bodies as if they
+    /// had come. Pairs go on, and what has begun or ended by then is told as ever.
+    pub fn change_to(&mut self, method: Method) {
+        self.engine = Engine::new(method);
+        self.is_new = true;
     }
 
     /// Sets which vector instructions the order uses; all give the same bits. Without it: the best there are.
@@ -192,12 +212,17 @@ impl BroadPhase {
         self.work = Work::default();
         self.leave(changes, pairs);
         self.enter(changes, proxies);
+        if self.is_new {
+            self.members.come_anew(self.engine.copies_boxes(), proxies);
+        }
         self.mark(changes, proxies, pairs);
         let is_brute = matches!(self.engine, Engine::Brute);
         if !is_brute {
             let judge = Judge::of(&self.members, &self.forced, proxies, policy);
             touched::end(&judge, pairs, &mut self.found);
-            self.search(&changes.moved, proxies);
+            // Whoever came has the new box already.
+            let moved = if self.is_new { &[][..] } else { &changes.moved };
+            self.search(moved, proxies);
         }
         let judge = Judge::of(&self.members, &self.forced, proxies, policy);
         if is_brute {
@@ -207,21 +232,11 @@ impl BroadPhase {
             touched::begin(&judge, &mut self.found);
         }
         self.found.commit(&judge, pairs, delta);
-        self.close_tick();
-    }
-
-    /// Takes over from another method, whose update of this tick has brought the pair set up to date: it builds what
-    /// it keeps of the bodies that are in, and finds the pairs that are stored. Where the set was full, what is not
-    /// stored is looked for by the next update.
-    ///
-    /// * `inside` - the slots of all bodies that are in.
-    pub fn take_over(&mut self, inside: &[BodySlot], proxies: &impl Proxies) {
-        self.members.open_tick();
-        for slot in inside {
-            self.members.enter(*slot, proxies);
-        }
-        self.search(&[], proxies);
-        self.close_tick();
+        self.is_new = false;
+        self.forced.settle();
+        let bodies = self.len();
+        self.found.close_tick(bodies);
+        give_back(&mut self.parted, bodies);
     }
 
     /// Lets the method find what has begun, or may have, and what has parted.
@@ -243,13 +258,6 @@ impl BroadPhase {
                 order.update(tick, &mut self.work);
             }
         }
-    }
-
-    fn close_tick(&mut self) {
-        self.forced.settle();
-        let bodies = self.len();
-        self.found.close_tick(bodies);
-        give_back(&mut self.parted, bodies);
     }
 
     /// Takes out the bodies that left; their pairs end. Of two bodies that left, the cause with the lower code wins,
@@ -287,6 +295,7 @@ impl BroadPhase {
             }
         }
         match &mut self.engine {
+            _ if self.is_new => {}
             Engine::Brute => {}
             Engine::Sap(sap) => sap.leave(&self.left, &self.members),
             Engine::Order(order) => order.leave(&self.left),
@@ -304,7 +313,7 @@ impl BroadPhase {
     /// Takes the new boxes and notes whom to ask again.
     fn mark(&mut self, changes: &ChangeSet, proxies: &impl Proxies, pairs: &PairSet) {
         // The order keeps the difference itself: it reads the list of the moved and marks nobody.
-        if !matches!(self.engine, Engine::Order(_)) {
+        if self.is_new || !matches!(self.engine, Engine::Order(_)) {
             for slot in &changes.moved {
                 self.members.moved(*slot, proxies);
             }

@@ -315,8 +315,16 @@ impl PairSet {
         self.mark_truncated(high);
     }
 
+    /// What was missing before may be missing still: so many pairs, of these bodies.
+    pub(crate) fn go_on_missing(&mut self, pairs: u64, bodies: &[BodySlot]) {
+        self.missing = self.missing.max(pairs);
+        for body in bodies {
+            self.mark_truncated(*body);
+        }
+    }
+
     /// A body's pairs are not all there.
-    pub(crate) fn mark_truncated(&mut self, body: BodySlot) {
+    fn mark_truncated(&mut self, body: BodySlot) {
         if self.is_truncated.len() <= body.index() {
             self.is_truncated.resize(body.index() + 1, false);
         }

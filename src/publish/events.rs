@@ -81,6 +81,8 @@ pub(super) struct Events {
     /// By ids; one entry a pair after [`Events::merge`].
     waiting: Vec<PairEvent>,
     seq: u64,
+    /// `seq` before this tick.
+    before: u64,
     /// Begins and their ends that were both never sent.
     pub(super) cancelled: u64,
 }
@@ -141,6 +143,7 @@ impl Events {
     /// Then comes [`Events::certify`] for each active pair of which there may be something new to say, and
     /// [`Events::merge`].
     pub(super) fn begin(&mut self, tick: u64, world: &World, narrow: &Narrow, delta: &PairDelta) {
+        self.before = self.seq;
         for ended in &delta.ended {
             if let Some(history) = self.histories.get_mut(ended.slot.index()) {
                 let mut gone = std::mem::replace(history, History::NONE);
@@ -179,6 +182,12 @@ impl Events {
     /// Events that wait, by ids.
     pub(super) fn waiting(&self) -> &[PairEvent] {
         &self.waiting
+    }
+
+    /// What is sent first where not all fit: what found no room in ticks before, the oldest first; then what is new.
+    pub(super) fn turn(&self, event: u32) -> u64 {
+        let seq = self.waiting.get(event as usize).map(|event| event.seq);
+        seq.filter(|seq| *seq <= self.before).unwrap_or(u64::MAX)
     }
 
     /// Forgets what was sent: all events but those `kept` says to keep.

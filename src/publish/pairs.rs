@@ -148,14 +148,18 @@ impl Publisher {
         view.pairs.find(PairKey::new(a, b))
     }
 
-    /// Chooses what is sent where not all fit, best rank first; returns how many are left out.
+    /// Chooses what is sent where not all fit, events that waited and then the best rank first; returns how many are
+    /// left out.
     fn rank(&mut self) -> u64 {
         let (most, listing, ranked) = (self.limits.pair_rows, &self.listing, &mut self.ranked);
         let left_out = listing.len().saturating_sub(most);
         if left_out > 0 {
             ranked.clear();
             ranked.extend(0..listing.len());
-            ranked.sort_unstable_by(|&x, &y| listing.row(x).by_rank(listing.row(y)));
+            let turn = |at: usize| self.events.turn(listing.row(at).event);
+            ranked.sort_unstable_by(|&x, &y| {
+                (turn(x).cmp(&turn(y))).then(listing.row(x).by_rank(listing.row(y)))
+            });
             self.chosen.clear();
             self.chosen.resize(listing.len(), false);
             ranked[..most].iter().for_each(|&at| self.chosen[at] = true);

@@ -50,8 +50,8 @@ rows! {
     }
     VertexHeader {
         session: u64, epoch: u64, seq: u64, sent_ns: u64, body: u64, version: u64,
-        base_version: u64, source: [u8; 32], first: u32, count: u32, total: u32, flags: u32,
-        schema: u32, boot: u32,
+        base_version: u64, number: u64, source: [u8; 32], first: u32, count: u32, total: u32,
+        flags: u32, schema: u32, boot: u32,
     }
     MessageHeader {
         boot_id: u64, tick: u64, scene_rev: u64, oldest_stamp_ns: u64, newest_stamp_ns: u64,

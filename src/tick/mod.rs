@@ -3,6 +3,7 @@
 //!
 //! In: [`TickInput`] (frames, edits, demand, budget, and why this tick). Out: a filled [`Outbox`].
 
+mod admit;
 pub mod build;
 mod end;
 mod floor;
@@ -32,7 +33,7 @@ use crate::wire::{
     BroadCause, BroadMode, Demand, MessageHeader, Outbox, Reason, RejectReason, Stage, State,
     TickRow, WIRE_VERSION,
 };
-use crate::world::{Admission, ChangeSet, Parts, World};
+use crate::world::{ChangeSet, Parts, World};
 
 use end::End;
 use floor::{Began, Floor, Laps};
@@ -50,7 +51,7 @@ pub struct Engine {
     renew: bool,
     /// The last tick that left structures which were checked and held; 0: none was.
     checked: u64,
-    /// All bodies as inserted: how a broad phase of another method begins.
+    /// All bodies as inserted: how a broad phase is built anew.
     whole: ChangeSet,
     pairs: PairSet,
     delta: PairDelta,
@@ -104,10 +105,12 @@ impl Engine {
             ..scene.config.clone()
         };
         let plan = Plan::of(&world, &config);
+        let mut broad = BroadPhase::new(plan.method());
+        share(&mut broad, &config);
         let mut narrow = Narrow::new(limits.contacts_per_pair);
         narrow.set_search(scene.config.mesh_search.unwrap_or_default());
         Ok(Self {
-            broad: broad_phase(plan.method(), &config),
+            broad,
             method: plan.method(),
             renew: false,
             checked: 0,
@@ -181,44 +184,6 @@ impl Engine {
         Laps::start(Arc::clone(&self.clock), input.woke_ns)
     }
 
-    fn admit(&mut self, input: &TickInput<'_>) {
-        let now_ns = self.clock.boottime_ns();
-        self.now_ns = now_ns;
-        let asked = input.edits.iter().any(|batch| batch.validate);
-        let fault = asked.then(|| self.repair()).flatten();
-        self.world.begin_tick(self.tick);
-        for batch in input.edits {
-            let (token, mut warnings) = (batch.token, batch.warnings.clone());
-            if batch.validate {
-                warnings.extend(fault.clone());
-            }
-            let result = self.world.apply(&batch.edits);
-            self.outcomes.push(EditOutcome {
-                token,
-                result,
-                warnings,
-            });
-        }
-        for frame in input.inbox.frames() {
-            if let Admission::Admitted { .. } = self.world.admit(frame, now_ns) {
-                self.end.shorten(&frame.header, frame.received_ns, now_ns);
-            }
-        }
-        for vertices in input.inbox.vertices() {
-            self.world.admit_vertices(vertices, now_ns);
-        }
-        // After its last frames: a client that leaves has still said where its bodies are.
-        for &session in input.inbox.ended() {
-            self.world.end_session(session);
-        }
-        self.world.age(now_ns);
-        self.world
-            .tell_waited(|header, received_ns| self.end.shorten(header, received_ns, now_ns));
-        if !input.edits.is_empty() {
-            self.replan();
-        }
-    }
-
     fn replan(&mut self) {
         let plan = Plan::after(Some(&self.plan), &self.world, &self.config);
         if plan != self.plan {
@@ -233,14 +198,17 @@ impl Engine {
         let method = self.plan.method();
         // Taken whatever the method does: else a tick in which both hold would be followed by a second renewal.
         let renew = std::mem::take(&mut self.renew);
-        let anew = renew || self.method != method;
-        if anew {
+        if renew {
+            self.broad = BroadPhase::new(method);
             self.whole.clear();
             let inside = world.bodies().filter(|(_, body)| body.in_broad);
             self.whole.inserted.extend(inside.map(|(slot, _)| slot));
+        } else if self.method != method {
+            self.broad.change_to(method);
         }
-        if renew {
-            (self.method, self.broad) = (method, broad_phase(method, &self.config));
+        if renew || self.method != method {
+            self.method = method;
+            share(&mut self.broad, &self.config);
         }
         if renew || world.scene_changed() {
             self.broad.force(filters.forced_pairs());
@@ -248,12 +216,6 @@ impl Engine {
         let changes = if renew { &self.whole } else { world.changes() };
         self.broad
             .update(changes, world, filters, &mut self.pairs, &mut self.delta);
-        if anew && !renew {
-            // What changed in this tick is the business of the method that knows the pairs that there are.
-            (self.method, self.broad) = (method, broad_phase(method, &self.config));
-            self.broad.force(filters.forced_pairs());
-            self.broad.take_over(&self.whole.inserted, world);
-        }
     }
 
     fn widen(&mut self) {
@@ -384,9 +346,7 @@ fn place(source: Option<usize>) -> u8 {
         .unwrap_or(u8::MAX)
 }
 
-/// A broad phase without bodies.
-fn broad_phase(method: Method, config: &Config) -> BroadPhase {
-    let mut broad = BroadPhase::new(method);
+/// Gives a broad phase of another method the threads that it may use.
+fn share(broad: &mut BroadPhase, config: &Config) {
     broad.use_threads(config.threads.unwrap_or(1), limits::SHARED_TESTS_MIN);
-    broad
 }

@@ -107,6 +107,8 @@ impl Pacer {
 
     /// Takes everything out of an inbox and leaves it empty.
     pub fn take(&mut self, inbox: &mut Inbox, now_ns: u64) {
+        // No allocation: as a rule nobody is.
+        let gone = inbox.ended().to_vec();
         for frame in inbox.frames_mut() {
             let name = name_str(&frame.header.source).map(name_bytes);
             let place = self.sources.iter().position(|s| Some(s.name) == name);
@@ -114,7 +116,8 @@ impl Pacer {
                 0 => now_ns,
                 received_ns => received_ns.min(now_ns),
             };
-            if let Some(source) = place.and_then(|p| self.sources.get_mut(p)) {
+            let source = place.and_then(|p| self.sources.get_mut(p));
+            if let Some(source) = source.filter(|s| s.is_spoken_for(frame, received_ns, &gone)) {
                 source.heard_ns = Some(source.heard_ns.unwrap_or(0).max(received_ns));
                 source.passed += source.lost_before(&frame.header);
                 source.session = frame.header.session;
@@ -175,7 +178,7 @@ impl Pacer {
             Beat::OnFrame(lead) => Some(lead),
             _ => None,
         };
-        self.vertices.take(into, lead);
+        self.vertices.take(into, lead, self.queue.frames());
         self.hand_over_ended(into);
         self.last_tick_ns = Some(now_ns);
         Some(due)

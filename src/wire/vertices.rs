@@ -24,7 +24,7 @@ pub struct VertexHeader {
     /// Epoch of the frame that they belong with.
     pub epoch: u64,
     /// Number of the frame that they belong with: in a mode that takes each frame by itself they are taken with the
-    /// first that is not older. 0: at once.
+    /// first that is not older. 0: at once, behind what the session sent before.
     pub seq: u64,
     /// When the client sent them, nanoseconds of `CLOCK_BOOTTIME`; 0: not said.
     pub sent_ns: u64,
@@ -34,6 +34,9 @@ pub struct VertexHeader {
     pub version: u64,
     /// Of a range: the version that it is applied to. Any other, and it is refused.
     pub base_version: u64,
+    /// Which message of vertices of the session this is, from 1: a gap says that some were lost, and all that the
+    /// source bent is unknown until all of its vertices come again. 0: not said.
+    pub number: u64,
     /// Name of the source, NUL-padded UTF-8.
     pub source: [u8; SOURCE_NAME_LEN],
     /// Place of the first row in the mesh's list of vertices; 0 where all are sent.

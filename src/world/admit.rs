@@ -281,12 +281,12 @@ impl World {
         self.settle(slot, false);
     }
 
-    /// Tells header and receipt (`CLOCK_BOOTTIME`, nanoseconds) of each frame that had to wait and was admitted since
-    /// the last call.
-    pub fn tell_waited(&mut self, mut tell: impl FnMut(&FrameHeader, u64)) {
-        for source in &mut self.sources {
+    /// Tells source, header and receipt (`CLOCK_BOOTTIME`, nanoseconds) of each frame that had to wait and was admitted
+    /// since the last call.
+    pub fn tell_waited(&mut self, mut tell: impl FnMut(SourceSlot, &FrameHeader, u64)) {
+        for (slot, source) in (0..).map(SourceSlot).zip(&mut self.sources) {
             if let Some((header, received_ns)) = source.waiting.admitted.take() {
-                tell(&header, received_ns);
+                tell(slot, &header, received_ns);
             }
         }
     }

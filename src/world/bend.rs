@@ -10,7 +10,7 @@ use super::World;
 use super::admit::Admission;
 use super::body::Body;
 use super::place::tight_box;
-use super::source::{Standing, stand_beside};
+use super::source::{Standing, owns, stand_beside};
 use crate::ids::{BodyId, BodySlot, SourceSlot};
 use crate::limits::DEFORMING_VERTICES_MAX;
 use crate::math::Aabb;
@@ -145,6 +145,14 @@ impl World {
         if self.is_of_other_boot(header.boot) {
             return refused(RejectReason::SessionOver);
         }
+        if self.sources[source.index()].note_bent(header) {
+            self.lose_vertices(source);
+        }
+        // Who may not bend it ends nobody's session.
+        if header.session != self.sources[source.index()].session {
+            self.find_bendable(source, header.body)
+                .map_err(|reason| (Some(source), reason))?;
+        }
         let received_ns = match frame.received_ns {
             0 => self.now_ns,
             received_ns => received_ns.min(self.now_ns),
@@ -155,20 +163,25 @@ impl World {
             Standing::Afresh => {
                 // A frame that still waits is of before.
                 state.pass_over_waiting();
+                state.note_bent(header);
                 self.forget_poses(source);
             }
             Standing::Next => {}
         }
-        let Some(slot) = self.slot_of(BodyId(header.body)) else {
-            return refused(RejectReason::UnknownBody);
-        };
-        if let Err(reason) = self.may_move(source, slot) {
-            return refused(reason);
+        let found = self.find_bendable(source, header.body);
+        found.map_or_else(refused, |slot| Ok((source, slot)))
+    }
+
+    /// The body of this id, if the source may bend it.
+    fn find_bendable(&self, source: SourceSlot, body: u64) -> Result<BodySlot, RejectReason> {
+        let slot = self
+            .slot_of(BodyId(body))
+            .ok_or(RejectReason::UnknownBody)?;
+        self.may_move(source, slot)?;
+        match self.body(slot) {
+            Some(body) if body.vertices.is_some() => Ok(slot),
+            _ => Err(RejectReason::NotSteerable),
         }
-        if self.body(slot).is_none_or(|body| body.vertices.is_none()) {
-            return refused(RejectReason::NotSteerable);
-        }
-        Ok((source, slot))
     }
 
     /// Takes the vertices of a frame whose sender may bend the body, all or none.
@@ -241,6 +254,18 @@ impl World {
             Ok(()) => Ok(first),
             Err(NoVertex::NotFinite) => Err(RejectReason::NotFinite),
             Err(NoVertex::TooFar) => Err(RejectReason::OverLimit),
+        }
+    }
+
+    /// Vertices of a source were lost, of which body is not known: all that it has bent may have another shape by now.
+    fn lose_vertices(&mut self, source: SourceSlot) {
+        for at in 0..self.deforming.len() {
+            let slot = self.deforming[at];
+            let body = self.body(slot).filter(|body| owns(source, body));
+            let vertices = body.and_then(|body| body.vertices.as_deref());
+            if vertices.is_some_and(|vertices| vertices.version.is_some()) {
+                self.refuse_vertices(slot, RejectReason::VertexVersion);
+            }
         }
     }
 

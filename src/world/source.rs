@@ -8,7 +8,8 @@ use crate::ids::{BodySlot, SourceSlot};
 use crate::limits::SESSIONS_OVER_MAX;
 use crate::scene::SourceSpec;
 use crate::wire::{
-    Frame, FrameHeader, RejectReason, SourceRow, VertexHeader, frame_flags, name_bytes,
+    Frame, FrameHeader, RejectReason, SOURCE_NAME_LEN, SourceRow, VertexHeader, frame_flags,
+    name_bytes, name_str,
 };
 
 /// A source as the world knows it.
@@ -22,7 +23,9 @@ pub struct SourceState {
     pub session: u64,
     /// Newest `(epoch, seq)` taken note of, waiting frames included.
     pub(super) order: Option<(u64, u64)>,
-    /// Header of the newest frame admitted in this boot.
+    /// Number of the newest message of vertices in the session in force; 0: none that says it.
+    pub(super) bent: u64,
+    /// Header of the newest frame admitted of the session in force, or of the last one.
     pub(super) newest: Option<FrameHeader>,
     /// When the age of that frame starts, nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) since_ns: u64,
@@ -60,6 +63,7 @@ impl SourceState {
             timeout_ns: spec.timeout_ns,
             session: 0,
             order: None,
+            bent: 0,
             newest: None,
             since_ns: 0,
             heard_ns: 0,
@@ -121,6 +125,13 @@ impl super::World {
         if let Some(state) = self.sources.get_mut(source) {
             state.timeout_ns = timeout_ns;
         }
+    }
+
+    /// Whether this session is in force for the source of this name.
+    #[must_use]
+    pub fn speaks_for(&self, session: u64, source: &[u8; SOURCE_NAME_LEN]) -> bool {
+        let of_name = name_str(source).and_then(|name| self.source_named(name));
+        of_name.is_some_and(|slot| self.sources[slot.index()].session == session)
     }
 
     /// Whether a continuous body goes where the frames of a source say: each of them is then a part of its way, and
@@ -189,6 +200,18 @@ impl SessionsOver {
     }
 }
 
+impl SourceState {
+    /// Takes note of a message of vertices; whether some of the session before it were lost.
+    pub(super) fn note_bent(&mut self, header: &VertexHeader) -> bool {
+        if header.session != self.session || header.number == 0 {
+            return false;
+        }
+        let lost = self.bent != 0 && header.number > self.bent.saturating_add(1);
+        self.bent = self.bent.max(header.number);
+        lost
+    }
+}
+
 /// Judges a header by session and order, and takes note of it: which session is in force, when it was heard.
 ///
 /// A session ends here when another asks and it has not been heard for the source's time-out.
@@ -214,6 +237,8 @@ pub(super) fn stand(
         source.session = header.session;
         source.heard_ns = received_ns;
         source.order = Some(order);
+        // Nothing of this session has been taken yet.
+        (source.newest, source.alive, source.bent) = (None, false, 0);
         return Standing::Afresh;
     }
     source.heard_ns = source.heard_ns.max(received_ns);

@@ -162,6 +162,7 @@ pub struct Outcome {
 struct Oracle {
     stored: BTreeSet<(usize, usize)>,
     truncated: BTreeSet<usize>,
+    missing: u64,
 }
 
 impl Oracle {
@@ -223,13 +224,21 @@ impl Oracle {
         let was = std::mem::take(&mut self.truncated);
         self.truncated
             .extend(rest.iter().flat_map(|(a, b)| [*a, *b]));
-        let still = |b: &usize| world.bodies[*b].inside && world.bodies[*b].keeps;
-        self.truncated.extend(was.into_iter().filter(still));
+        let inside: Vec<usize> = was
+            .into_iter()
+            .filter(|b| world.bodies[*b].inside)
+            .collect();
+        let mut missing = rest.len() as u64;
+        if inside.iter().any(|b| world.bodies[*b].keeps) {
+            missing = missing.max(self.missing);
+            self.truncated.extend(inside);
+        }
+        self.missing = missing;
         outcome.began = fit.iter().map(|p| ids(*p)).collect();
         outcome.ended.sort_by_key(|(ids, _)| *ids);
         outcome.stored = self.stored.iter().map(|p| ids(*p)).collect();
         outcome.truncated = self.truncated.iter().map(|b| world.bodies[*b].id).collect();
-        outcome.missing = rest.len() as u64;
+        outcome.missing = missing;
         outcome
     }
 }
@@ -239,6 +248,8 @@ struct Rig {
     method: Method,
     /// Which ticks the order works from scratch, around the clock; nothing: as it chooses.
     gears: &'static [bool],
+    /// Goes on with the next method every third tick.
+    changing: bool,
     broad: BroadPhase,
     pairs: PairSet,
     delta: PairDelta,
@@ -278,6 +289,7 @@ impl Bench {
         let rig = |method, gears| Rig {
             method,
             gears,
+            changing: false,
             broad: BroadPhase::new(method),
             pairs: PairSet::new(limit),
             delta: PairDelta::default(),
@@ -289,6 +301,10 @@ impl Bench {
         // The ways of the order, whatever it would choose.
         rigs.push(rig(Method::Order, &[true]));
         rigs.push(rig(Method::Order, &[true, true, false, true, false]));
+        rigs.push(Rig {
+            changing: true,
+            ..rig(Method::BruteForce, &[])
+        });
         Self {
             rigs,
             oracle: Oracle::default(),
@@ -310,6 +326,11 @@ impl Bench {
             let at = self.seen.ticks as usize % rig.gears.len().max(1);
             if let Some(afresh) = rig.gears.get(at) {
                 rig.broad.use_afresh(*afresh);
+            }
+            if rig.changing && self.seen.ticks.is_multiple_of(3) {
+                let next = self.seen.ticks as usize / 3 % Method::NAMED.len();
+                rig.method = Method::NAMED[next].0;
+                rig.broad.change_to(rig.method);
             }
             rig.broad
                 .update(&world.changes, world, world, &mut rig.pairs, &mut rig.delta);

@@ -122,6 +122,24 @@ fn law_3_9_an_event_waits_after_its_pair_is_gone_and_begin_and_end_unsent_cancel
 }
 
 #[test]
+fn law_3_9_bug_an_event_that_waits_has_its_turn_before_deeper_ones_that_are_new() {
+    let mut rig = couples("[limits]\npair_rows = 1", 2, |_| -0.1, "");
+    rig.send(ALL);
+    assert_eq!(ids(&rig), [1]);
+    rig.send(ALL);
+    assert_eq!(ids(&rig), [2]);
+    // Both end; then the first goes in and out, deeper than the second ever was.
+    rig.row(4).position[1] = 50.0;
+    let mut told = Vec::new();
+    for tick in 0..8 {
+        rig.row(2).position[1] = if tick % 2 == 0 { 50.0 } else { 0.0 };
+        rig.send(ALL);
+        told.extend(ids(&rig));
+    }
+    assert!(told[..2].contains(&2), "{told:?}");
+}
+
+#[test]
 fn law_3_9_rows_keep_their_rank_colliding_before_possible_before_near() {
     let near = "report_within_m = 0.5";
     for (rows, want) in [(1, vec![1]), (2, vec![1, 2]), (3, vec![1, 2, 3])] {

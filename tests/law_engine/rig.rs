@@ -83,7 +83,10 @@ pub(crate) struct Rig {
     pub(crate) clock: Arc<ManualClock>,
     pub(crate) rows: Vec<TransformRow>,
     pub(crate) demand: Demand,
+    pub(crate) session: u64,
     pub(crate) epoch: u64,
+    /// Sessions whose client is gone, told with the next frame.
+    pub(crate) ended: Vec<u64>,
     pub(crate) flags: u32,
     /// Linear and angular velocity of each row, or empty.
     pub(crate) velocities: Vec<[f64; 6]>,
@@ -124,7 +127,9 @@ impl Rig {
             clock,
             rows,
             demand: Demand::ALL,
+            session: 11,
             epoch: 1,
+            ended: Vec::new(),
             flags: frame_flags::FULL,
             velocities: Vec::new(),
             vertices: Vec::new(),
@@ -233,7 +238,7 @@ impl Rig {
         self.inbox.clear();
         let frame = self.inbox.push();
         frame.header = FrameHeader {
-            session: 11,
+            session: self.session,
             epoch: self.epoch,
             seq: self.seq,
             source: name_bytes("feed"),
@@ -249,6 +254,9 @@ impl Rig {
         frame.set_transforms(&self.rows);
         frame.velocities.clone_from(&self.velocities);
         self.take_vertices();
+        for session in self.ended.drain(..) {
+            self.inbox.end_session(session);
+        }
         self.clock.advance(self.waited_ns);
     }
 

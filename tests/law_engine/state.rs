@@ -1,6 +1,6 @@
 //! 3.6 the state in one word, 3.7 unknown bodies.
 
-use sweepd::wire::{BodyStatus, Reason, State, Verdict};
+use sweepd::wire::{BodyStatus, Reason, RejectReason, State, Verdict};
 use sweepd::world::Edit;
 
 use crate::rig::{ALL, FRAME_NS, NONE, Rig, ball, body, scene};
@@ -227,4 +227,39 @@ fn budget_zero_is_sound_and_never_clear_while_boxes_overlap() {
     rig.move_x(2, 2.5);
     rig.send(NONE);
     assert_eq!(rig.state(), State::Clear, "boxes alone prove it");
+}
+
+#[test]
+fn law_4_2_bug_a_client_that_follows_one_that_has_just_gone_loses_no_frame() {
+    let mut rig = Rig::new(&scene("", &[ball(1, 0.0, ""), ball(2, 9.0, "")]));
+    rig.send(ALL);
+    // Its end and the first frame of the next come with one tick.
+    (rig.session, rig.ended) = (12, vec![11]);
+    rig.move_x(2, 1.5);
+    rig.send(ALL);
+    assert_eq!(rig.rejects(RejectReason::SourceTaken), 0);
+    assert_eq!(rig.out.tick.sources[0].session, 12);
+    assert_eq!(rig.state(), State::Colliding);
+    // One that is still heard is not followed, and who is gone stays over.
+    (rig.session, rig.ended) = (13, vec![11]);
+    rig.send(ALL);
+    assert_eq!(rig.rejects(RejectReason::SourceTaken), 1);
+    rig.session = 11;
+    rig.send(ALL);
+    assert_eq!(rig.rejects(RejectReason::SessionOver), 1);
+}
+
+#[test]
+fn law_6_bug_the_row_of_a_new_session_has_no_number_of_the_one_before() {
+    let mut rig = Rig::new(&scene("", &[ball(1, 0.0, ""), ball(2, 9.0, "")]));
+    for _ in 0..5 {
+        rig.send(ALL);
+    }
+    // The first frame of the next session waits for a revision of the scene.
+    (rig.session, rig.ended, rig.scene_rev) = (12, vec![11], 99);
+    rig.send(ALL);
+    let row = rig.out.tick.sources[0];
+    assert_eq!((row.session, row.epoch, row.seq, row.alive), (12, 0, 0, 0));
+    assert_eq!(row.age_ns, u64::MAX);
+    assert_eq!(rig.state(), State::Unknown);
 }

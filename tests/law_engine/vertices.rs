@@ -251,6 +251,68 @@ fn law_4_2_a_new_session_or_epoch_has_to_send_all_vertices() {
 }
 
 #[test]
+fn law_3_7_bug_after_lost_vertices_all_that_the_source_bent_is_unknown_until_all_of_it_comes_again()
+{
+    let bends = "deforms = true\n";
+    let mut rig = Rig::new(&scene(
+        "",
+        &[
+            body(1, [0.0, 0.0, 3.0], SHEET, bends),
+            body(2, [0.0, 0.0, 0.0], CUBE, ""),
+            body(3, [9.0, 0.0, 0.0], SHEET, bends),
+        ],
+    ));
+    let of = |body: u64, number: u64, version: u64| {
+        let mut frame = full(version, at(0.0));
+        (frame.header.body, frame.header.number) = (body, number);
+        frame
+    };
+    let both = |rig: &Rig| [status(rig, 1), status(rig, 3)];
+    let (known, rejected) = (BodyStatus::Known, BodyStatus::Rejected);
+    send(&mut rig, vec![of(1, 5, 1), of(3, 6, 1)]);
+    assert_eq!(both(&rig), [known, known], "what came before is not needed");
+    // What is refused for another reason is not lost, nor is what says no number or comes twice.
+    send(
+        &mut rig,
+        vec![of(77, 7, 1), of(3, 8, 2), of(3, 0, 3), of(3, 8, 3)],
+    );
+    assert_eq!(both(&rig), [known, known]);
+    // Number 9 went: it may have been of either.
+    send(&mut rig, vec![of(3, 10, 4)]);
+    assert_eq!(both(&rig), [rejected, known]);
+    assert_eq!(rig.state(), State::Unknown);
+    send(&mut rig, vec![of(1, 11, 2)]);
+    assert_eq!(both(&rig), [known, known]);
+    let mut part = range(5, 4, 0, at(0.0));
+    (part.header.body, part.header.number) = (3, 13);
+    send(&mut rig, vec![part]);
+    assert_eq!(both(&rig), [rejected, rejected]);
+    // A new session counts anew.
+    (rig.session, rig.ended) = (12, vec![11]);
+    let of_next = [of(1, 2, 1), of(3, 3, 1)].map(|mut frame| {
+        frame.header.session = 12;
+        frame
+    });
+    send(&mut rig, of_next.to_vec());
+    assert_eq!(both(&rig), [known, known]);
+}
+
+#[test]
+fn law_4_2_bug_vertices_that_are_refused_do_not_end_a_session() {
+    let mut rig = rig();
+    known(&mut rig);
+    // The source is silent for longer than its time-out; a stranger bends what cannot be bent.
+    let mut rigid = full(1, at(0.0));
+    (rigid.header.session, rigid.header.body) = (12, 2);
+    rig.vertices = vec![rigid];
+    rig.idle_with_vertices(700_000_000, ALL);
+    assert_eq!(rig.rejects(RejectReason::NotSteerable), 1);
+    rig.send(ALL);
+    assert_eq!(rig.rejects(RejectReason::SessionOver), 0);
+    assert_eq!(status(&rig, 2), BodyStatus::Known);
+}
+
+#[test]
 fn law_4_6_a_sheet_that_goes_there_and_back_has_gone_both_ways() {
     let mut rig = rig();
     rig.demand.bodies = true;

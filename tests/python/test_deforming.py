@@ -156,3 +156,53 @@ def test_a_client_that_comes_after_one_that_was_killed_has_to_send_all_vertices(
         assert status(client, result, "cloth")[0] == layout.BodyStatus.NOT_RECEIVED
         client.send_vertices("cloth", vertices)
         assert client.step(POSES, timeout_s=5).state == "clear"
+
+
+TWO = """
+frame_id = "world"
+[run]
+on_frame = "sim"
+[[source]]
+name = "sim"
+timeout_ms = 5000
+[[body]]
+name = "cloth"
+deforms = true
+shape = { type = "trimesh", solid = false, vertices = [[-1, -1, 0], [1, -1, 0], [0, 1, 0]], faces = [[0, 1, 2]] }
+[[body]]
+name = "veil"
+deforms = true
+shape = { type = "trimesh", solid = false, vertices = [[-1, -1, 0], [1, -1, 0], [0, 1, 0]], faces = [[0, 1, 2]] }
+[[body]]
+name = "box"
+shape = { type = "box", half_extents = [0.5, 0.5, 0.5] }
+"""
+
+
+def test_bug_vertices_that_the_queue_has_lost_are_never_taken_for_the_old_shape(tmp_path):
+    path = tmp_path / "two.toml"
+    path.write_text(TWO)
+    name = f"lose_{os.getpid()}_{time.monotonic_ns() % 1_000_000}"
+    process = subprocess.Popen([SWEEPD, "--quiet", "run", str(path), "--instance", name])
+    flat = np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], dtype=float)
+    poses = {"cloth": ((0, 0, 2), NO_TURN), "veil": ((9, 0, 2), NO_TURN), "box": ((0, 0, 0), NO_TURN)}
+    with sweepd.Client(name, "sim", quat_order="wxyz", listen=LISTEN) as client:
+        lost = 0
+        for _ in range(10):
+            client.send_vertices("cloth", flat)
+            client.send_vertices("veil", flat)
+            assert client.step(poses, timeout_s=5).state == "clear"
+            # The cloth reaches into the box; so many others follow that its message may go.
+            client.send_vertices("cloth", flat - (0.0, 0.0, 2.0))
+            for _ in range(100):
+                client.send_vertices("veil", flat)
+            result = client.step(poses, timeout_s=5)
+            assert result.state in ("unknown", "colliding")
+            if result.state == "unknown":
+                lost += 1
+                wrong = (layout.BodyStatus.REJECTED, layout.RejectReason.VERTEX_VERSION)
+                assert status(client, result, "cloth") == wrong
+                assert status(client, result, "veil")[0] == layout.BodyStatus.KNOWN
+        assert lost > 0
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=10) == 0

@@ -130,9 +130,9 @@ class Client:
         self.session = secrets.randbits(64) or 1
         self._epoch = 0
         self._seq = 0
-        # of the last frame with rows: its number and its topic; and the newest that a tick is known to have used
-        self._posed, self._kind, self._used = 0, None, 0
         self._versions = {}
+        # messages of vertices of this session
+        self._bent = 0
         self._requests = 0
         self._tick = None
         self._held = None
@@ -193,8 +193,7 @@ class Client:
         * ``time_left_ns``: of the tick, from receipt; 0 says nothing, and less than 0, too late already, leaves it nothing.
 
         Raises Restarted where another daemon is there than that of the ids, TimedOut where it has not said its own yet;
-        rows made before that are refused. Frames are to have velocities all or none: one of the other kind is refused
-        until the last one has its result, for it could overtake it.
+        rows made before that are refused.
         """
         self._settle(0.0)
         flags = layout.FrameFlags.PARTIAL if partial else layout.FrameFlags.FULL
@@ -211,22 +210,17 @@ class Client:
                 "these rows were made before the daemon restarted, and their ids may be other bodies' now: make them"
                 " anew with rows() or loan()"
             )
-        self._keep_order(rows)
-        self._posed = self._send(rows, flags, fields)
-        return self._posed
+        return self._send(rows, flags, fields)
 
     def pause(self):
         """Says that the world stands still: the ages of its bodies are renewed for one time-out."""
-        # behind the last frame, by the same queue
-        rows = np.empty(0, MOVING if self._kind == _MOTION else POSE)
-        return self._send(rows, layout.FrameFlags.PAUSED, {})
+        return self._send(np.empty(0, POSE), layout.FrameFlags.PAUSED, {})
 
     def reset_epoch(self):
         """Says that the world was reset: with the next frame every pair of the source's bodies ends."""
         self._epoch += 1
-        # what the daemon had of vertices is void with it, and frames that still wait
+        # what the daemon had of vertices is void with it
         self._versions = {}
-        self._kind = None
 
     def send_vertices(self, body, vertices, *, first=None, total=None):
         """Sends vertices of a body that deforms; they belong with the frame that is sent next. Returns their version.
@@ -259,6 +253,7 @@ class Client:
             body=body,
             version=base + 1,
             base_version=base,
+            number=self._bent + 1,
             first=whole("first", first or 0, 32),
             count=len(vertices),
             total=len(vertices) if total is None else whole("total", total, 32),
@@ -269,6 +264,7 @@ class Client:
         rows = vertices.view(_VERTEX).reshape(len(vertices))
         self._ports.send("vertices", layout.VertexRow, header, rows, wake=False)
         self._versions[body] = base + 1
+        self._bent += 1
         return base + 1
 
     def step(self, poses, timeout_s=1.0, **fields):
@@ -288,7 +284,6 @@ class Client:
             if row is None or row.session != self.session:
                 continue
             if (row.epoch, row.seq) >= (self._epoch, seq):
-                self._used = row.seq
                 if row.seq == seq:
                     return self._result()
                 raise Skipped(seq)
@@ -406,22 +401,6 @@ class Client:
                     " moment"
                 )
 
-    def _keep_order(self, rows):
-        """Refuses a frame that could overtake the last one: the two kinds have a queue each, and one is read first."""
-        kind = _MOTION if rows.dtype == MOVING else _POSES
-        if kind != self._kind and self._kind is not None and self._used < self._posed:
-            self._drain()
-            row = self._row(self._tick) if self._tick else None
-            if row is not None and (row.session, row.epoch) == (self.session, self._epoch):
-                self._used = row.seq
-            if self._used < self._posed:
-                with_or_without = "without" if kind == _MOTION else "with"
-                raise SweepdError(
-                    f"frame {self._posed} went {with_or_without} velocities, and one of the other kind could overtake"
-                    " it: send them always or never, or wait for its result first (step, wait)"
-                )
-        self._kind = kind
-
     def _name(self, header):
         if self._source is None:
             raise SweepdError("this client was opened as a reader; name a source to send frames")
@@ -491,8 +470,8 @@ class Client:
             rows = rows[there & (rows["certified_verdict"] == layout.Verdict.COLLIDING)]
             ends = np.stack([rows["body_a"], rows["body_b"]], axis=1)
         self._tick, self._held, self._boot = None, tick, tick.header.boot_id
-        # the new one has no vertices, and no frame of before
-        self._versions, self._kind = {}, None
+        # the new one has no vertices
+        self._versions = {}
         # so that names are new from here on
         self._advance("names", tick.header)
         raise Restarted(old.boot_id, tick.header.boot_id, ends)
@@ -520,6 +499,9 @@ class Client:
 
     def _advance_list(self, tick):
         """As ``_advance``, but every message is applied; one that is not for the list has the whole list asked for."""
+        if not self._ports.is_open("changes"):
+            # the place went to another reader when the port was to be renewed
+            self._renew_list()
         while True:
             ahead, self._ahead["changes"] = self._ahead["changes"] or self._ports.message("changes"), None
             if ahead is None:
@@ -533,9 +515,12 @@ class Client:
             self._now["changes"] = None
             if self._list.take(*ahead):
                 ahead = None
-                self._ports.renew("changes", layout.PairRow, layout.ChangesHeader)
+                self._renew_list()
             elif self._list.is_whole:
                 self._now["changes"] = ahead
+
+    def _renew_list(self):
+        self._ports.renew("changes", layout.PairRow, layout.ChangesHeader)
 
     def _result(self):
         tick = self._tick.header

@@ -115,7 +115,7 @@ class VertexHeader(_Row):
         # Epoch of the frame that they belong with.
         ("epoch", ctypes.c_uint64),
         # Number of the frame that they belong with: in a mode that takes each frame by itself they are taken with
-        # the first that is not older. 0: at once.
+        # the first that is not older. 0: at once, behind what the session sent before.
         ("seq", ctypes.c_uint64),
         # When the client sent them, nanoseconds of CLOCK_BOOTTIME; 0: not said.
         ("sent_ns", ctypes.c_uint64),
@@ -125,6 +125,9 @@ class VertexHeader(_Row):
         ("version", ctypes.c_uint64),
         # Of a range: the version that it is applied to. Any other, and it is refused.
         ("base_version", ctypes.c_uint64),
+        # Which message of vertices of the session this is, from 1: a gap says that some were lost, and all that the
+        # source bent is unknown until all of its vertices come again. 0: not said.
+        ("number", ctypes.c_uint64),
         # Name of the source, NUL-padded UTF-8.
         ("source", ctypes.c_uint8 * SOURCE_NAME_LEN),
         # Place of the first row in the mesh's list of vertices; 0 where all are sent.
@@ -570,7 +573,7 @@ class Reason(IntEnum):
     HELD = 2
     # A too old body was taken out of the scene by request.
     REMOVED_BY_AGE = 3
-    # A body's newest pose was refused.
+    # A body's newest pose or vertices were refused.
     REJECTED = 4
     # Rows or pairs did not fit.
     TRUNCATED = 5
@@ -707,7 +710,8 @@ class RejectReason(IntEnum):
     OVER_LIMIT = 13
     # A chain of ROS 2 frames from the body to the scene's frame that has a loop, or stamps too far apart.
     BAD_CHAIN = 14
-    # A range of vertices that does not follow on the version the body has, or comes after refused ones.
+    # A range of vertices that does not follow on the version the body has, or comes after refused ones; or vertices
+    # of the source were lost on the way.
     VERTEX_VERSION = 15
 
 
@@ -804,7 +808,8 @@ class PairFlags(IntFlag):
     UNKNOWN_BODY = 4
     # A body of the pair is held at an old pose.
     HELD_BODY = 8
-    # The pair is gone (removed, filtered, ended by a cause); this row only carries its last event.
+    # The pair is gone (removed, filtered, ended by a cause, or its boxes parted); this row only carries its last
+    # event.
     GONE = 16
     # Certified to have touched on the way to this tick's poses, within toi_min to toi_max.
     SWEPT_HIT = 32

@@ -86,8 +86,9 @@ impl Queue {
 
 /// Vertices that wait, and spare memory.
 ///
-/// None is passed over for a newer one: a range stands on the version before. Those of the source whose frames make
-/// ticks wait for the frame that they belong with, so that a tick has vertices and poses of one moment.
+/// None is passed over for a newer one, and those of a source go out in the order of their sending: a range stands on
+/// the version before. Those of the source whose frames make ticks wait for the frame that they belong with, so that a
+/// tick has vertices and poses of one moment; those of a new session wait for the frames of the one before.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Vertices {
     waiting: Vec<(VertexFrame, Option<usize>)>,
@@ -95,11 +96,14 @@ pub(super) struct Vertices {
 }
 
 impl Vertices {
-    /// Takes vertices out of an inbox. Beyond the limit the oldest of all go: the versions then say that some are
-    /// missing, and their bodies are unknown.
+    /// Takes vertices out of an inbox. Of more than a source may have waiting the oldest go: the numbers of those that
+    /// follow tell that they are missing.
     pub(super) fn put(&mut self, frame: &mut VertexFrame, source: Option<usize>) {
-        if self.waiting.len() >= VERTEX_FRAMES_WAITING_MAX {
-            let (oldest, _) = self.waiting.remove(0);
+        let of_source = |held: &(VertexFrame, Option<usize>)| held.1 == source;
+        if self.waiting.iter().filter(|held| of_source(held)).count() >= VERTEX_FRAMES_WAITING_MAX
+            && let Some(oldest) = self.waiting.iter().position(of_source)
+        {
+            let (oldest, _) = self.waiting.remove(oldest);
             self.spare.push(oldest);
         }
         let mut held = self.spare.pop().unwrap_or_default();
@@ -110,7 +114,8 @@ impl Vertices {
     /// Hands out what a tick with these frames takes.
     ///
     /// * `lead` - the source each of whose frames makes a tick of its own.
-    pub(super) fn take(&mut self, into: &mut Inbox, lead: Option<usize>) {
+    /// * `frames` - those that go on waiting.
+    pub(super) fn take(&mut self, into: &mut Inbox, lead: Option<usize>, frames: &[Held]) {
         let mut kept = 0;
         for at in 0..self.waiting.len() {
             let (frame, source) = &self.waiting[at];
@@ -122,11 +127,16 @@ impl Vertices {
                     && (frame.session != header.session
                         || (frame.epoch, frame.seq) >= (header.epoch, header.seq))
             };
-            if !of_lead || into.frames().iter().any(belongs) {
-                std::mem::swap(into.push_vertices(), &mut self.waiting[at].0);
-            } else {
+            let before =
+                |held: &Held| held.source == *source && held.frame.header.session != header.session;
+            let waits = of_lead && !into.frames().iter().any(belongs)
+                || frames.iter().any(before)
+                || self.waiting[..kept].iter().any(|held| held.1 == *source);
+            if waits {
                 self.waiting.swap(kept, at);
                 kept += 1;
+            } else {
+                std::mem::swap(into.push_vertices(), &mut self.waiting[at].0);
             }
         }
         self.spare

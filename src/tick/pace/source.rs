@@ -1,7 +1,7 @@
 //! A source as the pacer knows it: who speaks for it, when it was heard, what of it never came.
 
 use crate::scene::SourceSpec;
-use crate::wire::{FrameHeader, SOURCE_NAME_LEN, name_bytes};
+use crate::wire::{Frame, FrameHeader, SOURCE_NAME_LEN, WIRE_VERSION, name_bytes};
 
 /// What the pacer knows of a source.
 #[derive(Clone, Debug)]
@@ -36,6 +36,19 @@ impl Source {
             followed: false,
             passed: 0,
         }
+    }
+
+    /// Whether a frame under its name is one that the world will take for it, as far as can be told here: not that of a
+    /// stranger while somebody else speaks for the source, which may neither end a round nor stand for its frame.
+    ///
+    /// * `gone` - sessions that have just ended.
+    pub(super) fn is_spoken_for(&self, frame: &Frame, received_ns: u64, gone: &[u64]) -> bool {
+        let header = &frame.header;
+        let heard = |heard_ns| received_ns.saturating_sub(heard_ns) < self.timeout_ns;
+        let taken = self.session != header.session
+            && self.heard_ns.is_some_and(heard)
+            && !gone.contains(&self.session);
+        header.schema == WIRE_VERSION && header.session != 0 && frame.refused.is_none() && !taken
     }
 
     /// Frames of the session that never came, as the number of the next one tells: its queue in shared memory holds

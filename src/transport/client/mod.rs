@@ -93,6 +93,8 @@ pub struct Client {
     frame: FrameId,
     /// Version of the last vertices sent, by body.
     versions: BTreeMap<u64, u64>,
+    /// Messages of vertices sent in this session.
+    bent: u64,
     requests: u64,
     follow: follow::Follow,
     patience: Patience,
@@ -132,6 +134,7 @@ impl Client {
                 seq: 0,
             },
             versions: BTreeMap::new(),
+            bent: 0,
             requests: 0,
             follow: follow::Follow::default(),
             patience: Patience::new(0),

@@ -57,6 +57,7 @@ impl Client {
             body,
             version: base_version + 1,
             base_version,
+            number: self.bent + 1,
             source: name_bytes(source),
             first,
             count,
@@ -67,6 +68,7 @@ impl Client {
         };
         self.link.send_vertices(&header, rows)?;
         self.versions.insert(body, header.version);
+        self.bent += 1;
         Ok(header.version)
     }
 }

@@ -1,0 +1,90 @@
+//! What comes into a tick: edits, then frames, vertices and who is gone, then ages.
+//!
+//! In: a tick's input. Out: the world of this tick, and the end of its time as its frames ask for it.
+
+use super::{EditOutcome, Engine, TickInput};
+use crate::ids::SourceSlot;
+use crate::limits::SOURCES_MAX;
+use crate::wire::{Frame, FrameHeader, Inbox, SOURCE_NAME_LEN};
+use crate::world::Admission;
+
+impl Engine {
+    pub(super) fn admit(&mut self, input: &TickInput<'_>) {
+        let now_ns = self.clock.boottime_ns();
+        self.now_ns = now_ns;
+        let asked = input.edits.iter().any(|batch| batch.validate);
+        let fault = asked.then(|| self.repair()).flatten();
+        self.world.begin_tick(self.tick);
+        for batch in input.edits {
+            let (token, mut warnings) = (batch.token, batch.warnings.clone());
+            if batch.validate {
+                warnings.extend(fault.clone());
+            }
+            let result = self.world.apply(&batch.edits);
+            self.outcomes.push(EditOutcome {
+                token,
+                result,
+                warnings,
+            });
+        }
+        self.admit_frames(&input.inbox, now_ns);
+        if !input.edits.is_empty() {
+            self.replan();
+        }
+    }
+
+    fn admit_frames(&mut self, inbox: &Inbox, now_ns: u64) {
+        let frames = inbox.frames();
+        // Of each source the newest: the result of the others is told to nobody.
+        let mut newest = [None; SOURCES_MAX];
+        let mut note = |source: SourceSlot, header: &FrameHeader, received_ns| {
+            if let Some(newest) = newest.get_mut(source.index()) {
+                *newest = Some((*header, received_ns));
+            }
+        };
+        for (at, frame) in frames.iter().enumerate() {
+            self.end_before(
+                &frame.header.source,
+                frame.header.session,
+                inbox,
+                &frames[at..],
+            );
+            let admission = self.world.admit(frame, now_ns);
+            self.world.tell_waited(&mut note);
+            if let Admission::Admitted { source, .. } = admission {
+                note(source, &frame.header, frame.received_ns);
+            }
+        }
+        for vertices in inbox.vertices() {
+            let header = &vertices.header;
+            self.end_before(&header.source, header.session, inbox, &[]);
+            self.world.admit_vertices(vertices, now_ns);
+        }
+        // After its last frames: a client that leaves has still said where its bodies are.
+        for &session in inbox.ended() {
+            self.world.end_session(session);
+        }
+        self.world.age(now_ns);
+        self.world.tell_waited(&mut note);
+        for (header, received_ns) in newest.iter().flatten() {
+            self.end.shorten(header, *received_ns, now_ns);
+        }
+    }
+
+    /// Ends the session in force of a source before another one speaks for it, where its client is gone: what it has
+    /// left is among the frames before, unless some are among the `rest`.
+    fn end_before(
+        &mut self,
+        source: &[u8; SOURCE_NAME_LEN],
+        session: u64,
+        inbox: &Inbox,
+        rest: &[Frame],
+    ) {
+        for &gone in inbox.ended().iter().filter(|gone| **gone != session) {
+            let more = rest.iter().any(|frame| frame.header.session == gone);
+            if !more && self.world.speaks_for(gone, source) {
+                self.world.end_session(gone);
+            }
+        }
+    }
+}
