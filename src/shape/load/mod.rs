@@ -257,23 +257,34 @@ fn check_finite(soup: &Soup, path: &Path) -> Result<(), ShapeError> {
     })
 }
 
-/// A finite number of a text file.
+/// A finite number in a line of a text file.
 fn number(word: &str, line: usize) -> Result<f64, Flaw> {
+    finite(word).map_err(|text| Flaw::at(line, text))
+}
+
+/// A finite number, or what is wrong with it.
+fn finite(word: &str) -> Result<f64, String> {
     match word.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
-        Ok(value) => Err(Flaw::at(
-            line,
-            format!("{value} is not finite: export the mesh again"),
+        Ok(value) => Err(format!("{value} is not finite: export the mesh again")),
+        Err(_) => Err(format!(
+            "\"{}\" is not a number: mend it, or export the mesh again",
+            shown(word)
         )),
-        Err(_) => {
-            let shown: String = word.chars().take(20).collect();
-            let text = format!(
-                "\"{}\" is not a number: mend it, or export the mesh again",
-                shown.escape_default()
-            );
-            Err(Flaw::at(line, text))
-        }
     }
+}
+
+/// The beginning of a word, as messages show it.
+fn shown(word: &str) -> String {
+    let head: String = word.chars().take(20).collect();
+    head.escape_default().to_string()
+}
+
+/// Lines as they end on any system: LF, CR LF, or CR alone.
+fn lines(text: &str) -> impl Iterator<Item = &str> {
+    let text = text.strip_suffix('\n').unwrap_or(text);
+    text.split('\n')
+        .flat_map(|line| line.strip_suffix('\r').unwrap_or(line).split('\r'))
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Wavefront OBJ: vertices and polygons; colours, normals, textures, materials, groups, lines and points are skipped.
 
-use super::{Flaw, Soup, number, polygon};
+use super::{Flaw, Soup, lines, number, polygon, shown};
 use crate::math::Point;
 
 /// Words that carry no surface.
@@ -32,25 +32,35 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Flaw> {
     let mut soup = Soup::default();
     let mut corners: Vec<u32> = Vec::new();
     let mut joined = String::new();
-    let mut lines = text.lines().enumerate();
+    let mut lines = lines(&text).enumerate();
     while let Some((place, line)) = lines.next() {
-        // A backslash at the end joins the next line.
-        let mut row = line;
-        if line.trim_end().ends_with('\\') {
+        let (mut row, mut goes_on) = cut(line);
+        if goes_on {
             joined.clear();
-            let mut part = line;
-            while let Some(head) = part.trim_end().strip_suffix('\\') {
-                joined.push_str(head);
+            joined.push_str(row);
+            while goes_on {
+                let next = lines.next().map_or("", |(_, next)| next);
+                (row, goes_on) = cut(next);
                 joined.push(' ');
-                part = lines.next().map_or("", |(_, next)| next);
+                joined.push_str(row);
             }
-            joined.push_str(part);
             row = &joined;
         }
-        let row = row.split('#').next().unwrap_or_default();
         read_row(row, place + 1, &mut soup, &mut corners)?;
     }
     Ok(soup)
+}
+
+/// What a line says, and whether a backslash at its end joins the next line. One at the end of a comment joins nothing:
+/// it is part of the comment.
+fn cut(line: &str) -> (&str, bool) {
+    if let Some((row, _)) = line.split_once('#') {
+        return (row, false);
+    }
+    match line.trim_end().strip_suffix('\\') {
+        Some(row) => (row, true),
+        None => (line, false),
+    }
 }
 
 fn read_row(row: &str, line: usize, soup: &mut Soup, corners: &mut Vec<u32>) -> Result<(), Flaw> {
@@ -89,10 +99,9 @@ fn read_row(row: &str, line: usize, soup: &mut Soup, corners: &mut Vec<u32>) -> 
         None => Ok(()),
         Some(word) if SKIPPED.contains(&word) => Ok(()),
         Some(word) => {
-            let shown: String = word.chars().take(20).collect();
             let text = format!(
                 "\"{}\" is not read (free-form surfaces are not): export the mesh as triangles",
-                shown.escape_default()
+                shown(word)
             );
             Err(Flaw::at(line, text))
         }
@@ -116,10 +125,9 @@ fn corner(word: &str, line: usize, vertices: usize) -> Result<u32, Flaw> {
     place
         .and_then(|place| u32::try_from(place).ok())
         .ok_or_else(|| {
-            let shown: String = word.chars().take(20).collect();
             let text = format!(
                 "the face names vertex \"{}\", but {vertices} came before it: count from 1",
-                shown.escape_default()
+                shown(word)
             );
             Flaw::at(line, text)
         })

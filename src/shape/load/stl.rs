@@ -1,6 +1,6 @@
 //! STL, binary and text.
 
-use super::{Flaw, Soup, number};
+use super::{Flaw, Soup, lines, number, shown};
 use crate::math::Point;
 
 /// Header and count of a binary file, bytes.
@@ -79,13 +79,14 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Flaw> {
 }
 
 /// The words of a text file with their lines.
-struct Words<'a> {
-    lines: std::iter::Enumerate<std::str::Lines<'a>>,
+struct Words<'a, L> {
+    /// With their places.
+    lines: L,
     words: std::str::SplitAsciiWhitespace<'a>,
     line: usize,
 }
 
-impl<'a> Words<'a> {
+impl<'a, L: Iterator<Item = (usize, &'a str)>> Words<'a, L> {
     fn next(&mut self) -> Option<&'a str> {
         loop {
             if let Some(word) = self.words.next() {
@@ -111,10 +112,9 @@ impl<'a> Words<'a> {
     fn unexpected(&self, found: Option<&str>, wanted: &str) -> Flaw {
         let text = match found {
             Some(word) => {
-                let shown: String = word.chars().take(20).collect();
                 format!(
                     "expected `{wanted}`, found \"{}\": the file is damaged, export the mesh again",
-                    shown.escape_default()
+                    shown(word)
                 )
             }
             None => {
@@ -129,7 +129,7 @@ fn parse_text(bytes: &[u8]) -> Result<Soup, Flaw> {
     // Names behind `solid` are in any encoding; everything else is ASCII.
     let text = String::from_utf8_lossy(bytes);
     let mut words = Words {
-        lines: text.lines().enumerate(),
+        lines: lines(&text).enumerate(),
         words: "".split_ascii_whitespace(),
         line: 1,
     };
@@ -154,7 +154,10 @@ fn parse_text(bytes: &[u8]) -> Result<Soup, Flaw> {
 }
 
 /// What follows `facet`: a normal, which is not used, and a loop of three corners.
-fn read_facet(words: &mut Words<'_>, soup: &mut Soup) -> Result<(), Flaw> {
+fn read_facet<'a>(
+    words: &mut Words<'a, impl Iterator<Item = (usize, &'a str)>>,
+    soup: &mut Soup,
+) -> Result<(), Flaw> {
     words.expect("normal")?;
     for _ in 0..3 {
         let found = words.next();

@@ -60,6 +60,31 @@ fn an_obj_has_negative_places_long_lines_and_polygons() {
     }
 }
 
+/// A comment ends with its line, whatever it ends in: the next line, here the last face, was lost with it.
+#[test]
+fn bug_a_comment_that_ends_in_a_backslash_joins_no_line() {
+    let soup = ok(
+        Kind::Obj,
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\n# faces, by C:\\models\\\nf 1 2 3\nf 1 \\\n 3 2 # x \\\nf 2 3 1\n",
+    );
+    assert_eq!(soup.faces, [[0, 1, 2], [0, 2, 1], [1, 2, 0]]);
+}
+
+#[test]
+fn bug_lines_may_end_in_a_carriage_return_alone() {
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 2 9\n";
+    for end in ["\n", "\r\n", "\r"] {
+        let (line, message) = refused(Kind::Obj, &text.replace('\n', end));
+        assert!(line == 5 && message.contains("vertex \"9\""), "{message}");
+        assert_eq!(
+            ok(Kind::Obj, &text.replace("f 1 2 9", "").replace('\n', end)).faces,
+            [[0, 1, 2]]
+        );
+        let stl = STL_TEXT.replace("\r\n", "\n").replace('\n', end);
+        assert_eq!(ok(Kind::Stl, &stl).faces.len(), 8);
+    }
+}
+
 #[test]
 fn an_stl_that_is_cut_off_or_damaged_is_refused() {
     let binary = |bytes: &[u8]| match parse(Kind::Stl, bytes) {
