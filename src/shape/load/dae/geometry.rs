@@ -1,12 +1,14 @@
 //! One `<geometry>`: its corners in the file's own unit, and its triangles.
 
+use std::collections::BTreeMap;
+
 use roxmltree::Node;
 
 use super::{DaeFile, child, children, flaw, numbers, text_of, whole};
 use crate::limits::TRIANGLES_MAX;
 use crate::math::Point;
 use crate::shape::ShapeError;
-use crate::shape::load::{Flaw, polygon};
+use crate::shape::load::{Flaw, polygon, shown};
 
 /// Corners and triangles of a geometry, its own frame and unit.
 #[derive(Debug, Default)]
@@ -23,8 +25,9 @@ pub(super) fn read<'a>(file: &DaeFile<'a>, geometry: Node<'a, 'a>) -> Result<Par
         return Err(flaw(geometry, text));
     };
     let mut part = Part::default();
-    // Several primitives share one list of corners as a rule; each list is read once.
-    let mut lists: Vec<(Node<'a, 'a>, u32)> = Vec::new();
+    // Several primitives share one list of corners as a rule; each list is read once, and kept as its first corner and
+    // how many it has.
+    let mut lists: BTreeMap<usize, (u32, usize)> = BTreeMap::new();
     for primitive in mesh.children().filter(Node::is_element) {
         let kind = primitive.tag_name().name();
         match kind {
@@ -32,18 +35,21 @@ pub(super) fn read<'a>(file: &DaeFile<'a>, geometry: Node<'a, 'a>) -> Result<Par
             _ => continue,
         }
         let inputs = Inputs::read(file, primitive)?;
-        let first = match lists.iter().find(|(source, _)| *source == inputs.positions) {
-            Some((_, first)) => *first,
+        let source = inputs.positions.id().get_usize();
+        let (first, count) = match lists.get(&source) {
+            Some(list) => *list,
             None => {
                 let first = place(part.vertices.len())?;
-                part.vertices.extend(positions(file, inputs.positions)?);
-                lists.push((inputs.positions, first));
-                first
+                let points = positions(file, inputs.positions)?;
+                let list = (first, points.len());
+                part.vertices.extend(points);
+                lists.insert(source, list);
+                list
             }
         };
         let corners = Corners {
             first,
-            count: part.vertices.len() - first as usize,
+            count,
             inputs: &inputs,
         };
         read_primitive(primitive, kind, &corners, &mut part)?;
@@ -135,27 +141,37 @@ fn positions<'a>(file: &DaeFile<'a>, source: Node<'a, 'a>) -> Result<Vec<Point>,
             ));
         }
     };
-    let stride = whole(accessor, "stride")?.unwrap_or(1);
+    let stride = whole(accessor, "stride")?;
     let offset = whole(accessor, "offset")?.unwrap_or(0);
     let count = whole(accessor, "count")?.unwrap_or(0);
-    let mut points = Vec::new();
-    for k in 0..count {
-        let value = |axis: usize| {
-            let at = k
-                .checked_mul(stride)?
-                .checked_add(offset)?
-                .checked_add(axis)?;
-            values.get(at).copied()
-        };
-        let (Some(x), Some(y), Some(z)) = (value(axes[0]), value(axes[1]), value(axes[2])) else {
-            let text = format!(
-                "the accessor counts {count} corners, more than its array holds: export the mesh again"
-            );
-            return Err(flaw(accessor, text));
-        };
-        points.push(Point::new(x, y, z));
+    let [x, y, z] = axes;
+    let reach = x.max(y).max(z);
+    // COLLADA's default.
+    let step = stride.unwrap_or(1);
+    if step <= reach {
+        let said = stride.map_or("no stride, which means 1".to_owned(), |stride| {
+            format!("stride {stride}")
+        });
+        let text = format!(
+            "the accessor has {said}, but a corner takes {} numbers: export the mesh again",
+            reach + 1
+        );
+        return Err(flaw(accessor, text));
     }
-    Ok(points)
+    if count == 0 {
+        return Ok(Vec::new());
+    }
+    let last = (count - 1)
+        .checked_mul(step)
+        .and_then(|at| at.checked_add(offset)?.checked_add(reach));
+    if last.is_none_or(|last| last >= values.len()) {
+        let text = format!(
+            "the accessor counts {count} corners, more than its array holds: export the mesh again"
+        );
+        return Err(flaw(accessor, text));
+    }
+    let corners = values[offset..].chunks(step).take(count);
+    Ok(corners.map(|v| Point::new(v[x], v[y], v[z])).collect())
 }
 
 /// How numbers of a primitive become corners of the part.
@@ -178,9 +194,9 @@ impl Corners<'_> {
                     .ok()
                     .filter(|index| (*index as usize) < self.count);
                 let Some(index) = index else {
-                    let shown: String = word.chars().take(20).collect();
                     let text = format!(
-                        "a face names corner {shown}, but there are {}: export the mesh again",
+                        "a face names corner \"{}\", but there are {}: export the mesh again",
+                        shown(word),
                         self.count
                     );
                     return Err(flaw(p, text));
@@ -213,6 +229,7 @@ fn read_primitive<'a>(
         ));
     }
     let claimed = whole(primitive, "count")?;
+    let vcount = child(primitive, "vcount");
     let mut counted = 0;
     for p in children(primitive, "p") {
         let list = corners.read(p)?;
@@ -231,7 +248,15 @@ fn read_primitive<'a>(
                 counted += faces.len();
                 add(part, faces.iter().copied())?;
             }
-            "polylist" => counted += read_polylist(primitive, p, &list, part)?,
+            "polylist" => {
+                let Some(vcount) = vcount else {
+                    return Err(flaw(
+                        primitive,
+                        "<polylist> has no <vcount>: export the mesh again",
+                    ));
+                };
+                counted += read_polylist(vcount, p, &list, part)?;
+            }
             "polygons" => {
                 counted += 1;
                 let faces = cut(part, &list, p)?;
@@ -267,17 +292,11 @@ fn read_primitive<'a>(
 }
 
 fn read_polylist<'a>(
-    primitive: Node<'a, 'a>,
+    vcount: Node<'a, 'a>,
     p: Node<'a, 'a>,
     list: &[u32],
     part: &mut Part,
 ) -> Result<usize, Flaw> {
-    let Some(vcount) = child(primitive, "vcount") else {
-        return Err(flaw(
-            primitive,
-            "<polylist> has no <vcount>: export the mesh again",
-        ));
-    };
     let text = text_of(vcount);
     let mut rest = list;
     let mut counted = 0;

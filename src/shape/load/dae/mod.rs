@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 use roxmltree::{Document, Node, ParsingOptions};
 
-use super::{Flaw, Soup, number};
+use super::{Flaw, Soup, finite};
 use crate::math::Point;
 
 /// XML elements and texts of one file: a robot's have some thousands, bulk data counts once.
@@ -144,7 +144,7 @@ impl Frame {
         let asset = child(root, "asset");
         let unit = asset.and_then(|asset| child(asset, "unit"));
         let unit_m = match unit.and_then(|unit| Some((unit, unit.attribute("meter")?))) {
-            Some((unit, meter)) => number(meter.trim(), line(unit))?,
+            Some((unit, meter)) => finite(meter.trim()).map_err(|text| flaw(unit, text))?,
             None => 1.0,
         };
         if !(1e-12..=1e12).contains(&unit_m) {
@@ -225,10 +225,10 @@ fn text_of(node: Node<'_, '_>) -> String {
 
 /// All numbers of an element.
 fn numbers(node: Node<'_, '_>) -> Result<Vec<f64>, Flaw> {
-    let text = text_of(node);
-    let line = line(node);
-    text.split_ascii_whitespace()
-        .map(|word| number(word, line))
+    // The line of a node is counted from the start of the file: only where it is wanted.
+    text_of(node)
+        .split_ascii_whitespace()
+        .map(|word| finite(word).map_err(|text| flaw(node, text)))
         .collect()
 }
 

@@ -117,6 +117,30 @@ const REFUSED: &[(&str, &str, usize, &str)] = &[
         "more than its array holds",
     ),
     (
+        "count=\"8\" stride=\"3\"",
+        "count=\"4000000000\" stride=\"0\"",
+        17,
+        "has stride 0, but a corner takes 3 numbers",
+    ),
+    (
+        "count=\"8\" stride=\"3\"",
+        "count=\"8\" stride=\"2\"",
+        17,
+        "has stride 2, but a corner takes 3 numbers",
+    ),
+    (
+        "count=\"8\" stride=\"3\"",
+        "count=\"8\"",
+        17,
+        "has no stride, which means 1, but a corner takes 3 numbers",
+    ),
+    (
+        "count=\"8\" stride=\"3\"",
+        "count=\"8\" stride=\"4\"",
+        17,
+        "more than its array holds",
+    ),
+    (
         "count=\"8\"",
         "count=\"8\" offset=\"1\"",
         17,
@@ -126,7 +150,7 @@ const REFUSED: &[(&str, &str, usize, &str)] = &[
         "1 6 5</p>",
         "1 6 8</p>",
         41,
-        "names corner 8, but there are 8",
+        "names corner \"8\", but there are 8",
     ),
     ("1 6 5</p>", "1 6</p>", 41, "no whole triangles"),
     (
@@ -166,6 +190,44 @@ fn what_a_dae_holds_and_we_do_not_read_is_refused_with_its_line() {
         assert!(text.contains(wanted), "{to}: {text}");
         assert!(at == *line, "{to}: line {at}, not {line}: {text}");
     }
+}
+
+/// Each source is a list of its own: a face of the first was let reach into the second.
+#[test]
+fn bug_faces_of_a_list_that_was_read_before_stay_in_it() {
+    let with = |last: u32| {
+        let source = |id: &str| {
+            format!(
+                "<source id=\"{id}\"><float_array id=\"{id}a\" count=\"9\">0 0 0  1 0 0  0 1 0</float_array>
+                <technique_common><accessor source=\"#{id}a\" count=\"3\" stride=\"3\"/></technique_common></source>
+                <vertices id=\"{id}v\"><input semantic=\"POSITION\" source=\"#{id}\"/></vertices>"
+            )
+        };
+        let face = |id: &str, last: u32| {
+            format!(
+                "<triangles count=\"1\"><input semantic=\"VERTEX\" source=\"#{id}v\" offset=\"0\"/><p>0 1 {last}</p></triangles>"
+            )
+        };
+        format!(
+            "<COLLADA version=\"1.5.0\"><asset><up_axis>Z_UP</up_axis></asset><library_geometries><geometry id=\"g\"><mesh>
+            {}{}{}{}{}
+            </mesh></geometry></library_geometries></COLLADA>",
+            source("s"),
+            source("t"),
+            face("s", 2),
+            face("t", 2),
+            face("s", last)
+        )
+    };
+    assert_eq!(
+        ok(Kind::Dae, &with(2)).faces,
+        [[0, 1, 2], [3, 4, 5], [0, 1, 2]]
+    );
+    let (_, text) = refused(Kind::Dae, &with(3));
+    assert!(
+        text.contains("names corner \"3\", but there are 3"),
+        "{text}"
+    );
 }
 
 #[test]
