@@ -88,6 +88,7 @@ impl Inside {
         self.winding
     }
 
+    /// Takes one triangle into account.
     fn count(&mut self, triangle: &[Point; 3]) {
         let p = &self.point;
         let mut outline = 0i64;
@@ -109,4 +110,12 @@ impl Inside {
             _ => {}
         }
     }
+}
+
+/// How often a closed surface, given by its triangles, winds round a point that is not on it.
+pub(super) fn winding_of(point: Point, triangles: impl Iterator<Item = [Point; 3]>) -> i64 {
+    let mut test = Inside::default();
+    test.start(point);
+    triangles.for_each(|triangle| test.count(&triangle));
+    test.winding
 }

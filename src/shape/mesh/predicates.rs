@@ -142,6 +142,27 @@ pub(crate) fn side(a: &Point, b: &Point, c: &Point, d: &Point) -> Ordering {
     side_exact(a, b, c, d)
 }
 
+/// Whether a point lies on a triangle, its border included; the triangle may be flat.
+pub(super) fn is_on(triangle: &[Point; 3], p: &Point) -> bool {
+    let [a, b, c] = triangle;
+    let within = |k: usize| {
+        let (low, high) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
+        low <= p[k] && p[k] <= high
+    };
+    // In a plane with it, and seen along no axis on both sides of its edges.
+    let seen_on = |k: usize| {
+        let turned = |q: &Point| Point::new(q[k], q[(k + 1) % 3], q[(k + 2) % 3]);
+        let ([a, b, c], p) = ([a, b, c].map(turned), turned(p));
+        let turns = [
+            turn_yz(&a, &b, &p),
+            turn_yz(&b, &c, &p),
+            turn_yz(&c, &a, &p),
+        ];
+        !(turns.contains(&Ordering::Less) && turns.contains(&Ordering::Greater))
+    };
+    (0..3).all(within) && side(a, b, c, p).is_eq() && (0..3).all(seen_on)
+}
+
 #[cold]
 fn side_exact(a: &Point, b: &Point, c: &Point, d: &Point) -> Ordering {
     let difference = |p: &Point, k: usize| Expansion::difference(p[k], a[k]);
@@ -173,6 +194,28 @@ mod tests {
         assert_eq!(side(&a, &b, &c, &above), Ordering::Greater);
         let below = Point::new(12.0, 12.0, 0.1_f64.next_down());
         assert_eq!(side(&a, &b, &c, &below), Ordering::Less);
+    }
+
+    #[test]
+    fn a_point_is_on_a_triangle_or_an_ulp_beside_it() {
+        let p = Point::new;
+        for k in 0..3 {
+            let at = |x: f64, y: f64, z: f64| {
+                let all = [x, y, z];
+                p(all[k], all[(k + 1) % 3], all[(k + 2) % 3])
+            };
+            let triangle = [at(0.0, 0.0, 0.5), at(2.0, 0.0, 0.5), at(0.0, 2.0, 0.5)];
+            for (x, y) in [(0.0, 0.0), (0.5, 0.0), (1.0, 1.0), (0.1, 0.7), (0.0, 2.0)] {
+                assert!(is_on(&triangle, &at(x, y, 0.5)));
+                assert!(!is_on(&triangle, &at(x, y, 0.5_f64.next_up())));
+            }
+            for (x, y) in [(1.0, 1.0_f64.next_up()), (0.5, -1e-300), (2.1, 0.0)] {
+                assert!(!is_on(&triangle, &at(x, y, 0.5)));
+            }
+            let line = [at(0.0, 0.0, 0.0), at(1.0, 1.0, 1.0), at(3.0, 3.0, 3.0)];
+            assert!(is_on(&line, &at(2.5, 2.5, 2.5)) && is_on(&line, &at(0.0, 0.0, 0.0)));
+            assert!(!is_on(&line, &at(2.5, 2.5, 2.0)) && !is_on(&line, &at(3.5, 3.5, 3.5)));
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::*;
 
-fn cuboid(centre: [f64; 3], half: f64, inward: bool) -> (Vec<Point>, Vec<[u32; 3]>) {
+pub(super) fn cuboid(centre: [f64; 3], half: f64, inward: bool) -> (Vec<Point>, Vec<[u32; 3]>) {
     let vertices = (0..8u32)
         .map(|i| {
             let at = |k: u32| if i >> k & 1 == 1 { half } else { -half };
@@ -29,7 +29,7 @@ fn cuboid(centre: [f64; 3], half: f64, inward: bool) -> (Vec<Point>, Vec<[u32; 3
     (vertices, faces)
 }
 
-fn joined(parts: &[(Vec<Point>, Vec<[u32; 3]>)]) -> (Vec<Point>, Vec<[u32; 3]>) {
+pub(super) fn joined(parts: &[(Vec<Point>, Vec<[u32; 3]>)]) -> (Vec<Point>, Vec<[u32; 3]>) {
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
     for (v, f) in parts {
         let first = u32::try_from(vertices.len()).unwrap();
@@ -39,11 +39,11 @@ fn joined(parts: &[(Vec<Point>, Vec<[u32; 3]>)]) -> (Vec<Point>, Vec<[u32; 3]>) 
     (vertices, faces)
 }
 
-fn winding(mesh: &Mesh, x: f64, y: f64, z: f64) -> i64 {
+pub(super) fn winding(mesh: &Mesh, x: f64, y: f64, z: f64) -> i64 {
     Inside::default().run(mesh, Point::new(x, y, z), |_| true)
 }
 
-fn says(mesh: &Mesh, text: &str) -> bool {
+pub(super) fn says(mesh: &Mesh, text: &str) -> bool {
     mesh.warnings().iter().any(|w| w.contains(text))
 }
 
@@ -61,43 +61,6 @@ fn a_closed_box_is_a_solid_and_an_open_one_a_surface() {
     assert!(!open.is_solid() && says(&open, "surface, because it has 3 open edges"));
     let refused = Mesh::new(vertices, faces, Some(true)).unwrap_err();
     assert!(refused.to_string().contains("3 open edges"), "{refused}");
-}
-
-#[test]
-fn law_3_3_an_inverted_shell_is_turned_round_with_all_it_holds() {
-    // Outer shell and cavity both inverted: the outer is in no other, so both are turned.
-    let parts = [
-        cuboid([5.0, 0.0, 0.0], 2.0, true),
-        cuboid([5.0, 0.0, 0.0], 1.0, false),
-    ];
-    let (vertices, faces) = joined(&parts);
-    let mesh = Mesh::new(vertices, faces, None).unwrap();
-    assert!(says(&mesh, "1 of 2 shells faced inwards"));
-    assert_eq!(winding(&mesh, 5.0, 0.1, 0.2), 0, "in the cavity");
-    assert_eq!(winding(&mesh, 6.5, 0.1, 0.2), 1, "in the wall");
-}
-
-#[test]
-fn law_3_3_a_cavity_within_a_shell_is_kept() {
-    let parts = [cuboid([0.0; 3], 2.0, false), cuboid([0.0; 3], 1.0, true)];
-    let (vertices, faces) = joined(&parts);
-    let mesh = Mesh::new(vertices, faces, None).unwrap();
-    assert!(!says(&mesh, "faced inwards"));
-    assert_eq!(mesh.shells().len(), 2);
-    assert_eq!(winding(&mesh, 0.1, 0.2, 0.3), 0);
-    assert_eq!(winding(&mesh, 1.5, 0.2, 0.3), 1);
-}
-
-#[test]
-fn an_inverted_shell_beside_another_is_turned_alone() {
-    let parts = [
-        cuboid([0.0; 3], 1.0, false),
-        cuboid([9.0, 0.0, 0.0], 0.5, true),
-    ];
-    let (vertices, faces) = joined(&parts);
-    let mesh = Mesh::new(vertices, faces, None).unwrap();
-    assert_eq!(winding(&mesh, 9.0, 0.1, 0.2), 1);
-    assert_eq!(winding(&mesh, 0.0, 0.1, 0.2), 1);
 }
 
 #[test]
