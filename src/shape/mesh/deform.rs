@@ -80,12 +80,7 @@ impl Mesh {
     /// Too many triangles or vertices, a vertex too far out, or two vertices of faces in one place.
     pub(crate) fn into_deforming(mut self) -> Result<Self, ShapeError> {
         self.check_deforming()?;
-        #[allow(
-            clippy::cast_possible_truncation,
-            reason = "to the nearest: what is kept is what the body is from now on"
-        )]
-        let row = |v: &Point| [v.x as f32, v.y as f32, v.z as f32, 0.0];
-        let rows: Vec<[f32; 4]> = self.vertices.iter().map(row).collect();
+        let rows = self.rows()?;
         for (vertex, row) in self.vertices.iter_mut().zip(&rows) {
             *vertex = point(row);
         }
@@ -114,6 +109,24 @@ impl Mesh {
             deform.built_surface = deform.last_surface;
         }
         Ok(self)
+    }
+
+    /// Its vertices as they would come in a message: one that a message may not hold would leave it unknown for ever.
+    fn rows(&self) -> Result<Vec<[f32; 4]>, ShapeError> {
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "to the nearest: what is kept is what the body is from now on"
+        )]
+        let row = |v: &Point| [v.x as f32, v.y as f32, v.z as f32, 0.0];
+        let rows: Vec<[f32; 4]> = self.vertices.iter().map(row).collect();
+        let fits = |[x, y, z, _]: &[f32; 4]| can_be_vertices(&[[*x, *y, *z]]).is_ok();
+        match rows.iter().position(|row| !fits(row)) {
+            Some(at) => Err(ShapeError::Setting(format!(
+                "it deforms, and its vertex {at} is {:e} m from its origin, where none can be sent: stay within {EXTENT_MAX_M:e} m",
+                self.vertices[at].coords.amax()
+            ))),
+            None => Ok(rows),
+        }
     }
 
     fn check_deforming(&self) -> Result<(), ShapeError> {

@@ -142,6 +142,23 @@ fn a_mesh_with_two_vertices_in_one_place_cannot_deform() {
     );
 }
 
+/// Also one that no face names: whole updates hold it.
+#[test]
+fn bug_a_vertex_that_no_message_can_hold_is_refused_at_once() {
+    let p = |x: f64| Point::new(x, x * x, 0.0);
+    let with = |far: f64| {
+        let vertices = vec![p(0.0), p(1.0), p(2.0), Point::new(0.0, far, 0.0)];
+        Mesh::new(vertices, vec![[0, 1, 2]], None)
+            .unwrap()
+            .into_deforming()
+    };
+    assert!(with(1e9).is_ok());
+    for far in [1.1e9, -1e300] {
+        let error = with(far).unwrap_err().to_string();
+        assert!(error.contains("its vertex 3 is 1"), "{error}");
+    }
+}
+
 #[test]
 fn rows_that_are_no_vertices_are_told_apart() {
     let good = [[0.0_f32, 1.0, -1e8]];
