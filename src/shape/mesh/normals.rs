@@ -94,7 +94,8 @@ fn angle(u: &Vec3, v: &Vec3) -> f64 {
 /// Cones of a mesh's boxes, own frame.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Normals {
-    /// By face: how far the normals about it lean from its own, radians, rounded up; pi: it has none.
+    /// By face: how far the normals about it lean from its own, radians, rounded up; pi: it has none, or not all that
+    /// lie about it were met.
     spread: Vec<f32>,
     /// By pack, of all in it: axis and half angle.
     packs: Vec<[f32; 4]>,
@@ -111,12 +112,13 @@ impl Normals {
                 return f32_up(PI);
             };
             let mut most = 0.0_f64;
-            mesh.about(face, |other| {
+            let whole = mesh.about(face, |other| {
                 if let Some(normal) = mesh.face_normal(other) {
                     most = most.max(angle(&own, &normal));
                 }
             });
-            f32_up(most + ROUNDED_RAD)
+            // A face about a corner that was not met may look anywhere.
+            f32_up(if whole { most + ROUNDED_RAD } else { PI })
         });
         let mut normals = Self {
             spread: spread.collect(),
@@ -242,6 +244,31 @@ mod tests {
             }
         }
         assert_eq!(narrow, mesh.faces.len());
+    }
+
+    /// A cone of many faces, the bottom a fan about its middle: the rings of tip and middle are cut, and what was met
+    /// of them were faces on one side of the axis.
+    #[test]
+    fn bug_faces_about_a_corner_of_very_many_have_any_normal() {
+        let fan = |n: u32| {
+            let rim = (0..n).map(|k| {
+                let (sin, cos) = (f64::from(k) / f64::from(n) * 2.0 * PI).sin_cos();
+                Point::new(cos, sin, 0.0)
+            });
+            let ends = [Point::new(0.0, 0.0, 1.0), Point::origin()];
+            let faces = (0..n).flat_map(|k| {
+                let (a, b) = (2 + k, 2 + (k + 1) % n);
+                [[0, a, b], [1, b, a]]
+            });
+            Mesh::new(ends.into_iter().chain(rim).collect(), faces.collect(), None).unwrap()
+        };
+        let many = fan(300);
+        assert!(many.is_solid());
+        for face in 0..600 {
+            assert!(many.normals.face(&many, face).half_rad >= PI, "{face}");
+        }
+        let few = fan(40);
+        assert!((0..80).all(|face| few.normals.face(&few, face).half_rad < 3.0));
     }
 
     #[test]

@@ -127,16 +127,19 @@ impl Mesh {
     }
 
     /// Visits the faces about the corners of a face, some more than once.
-    pub(super) fn about(&self, face: u32, mut visit: impl FnMut(u32)) {
-        for side in 3 * face..3 * face + 3 {
-            self.go_round(side, |other| visit(other / 3));
-        }
+    ///
+    /// * returns - whether these are all: about each corner they close to a ring that is not cut.
+    pub(super) fn about(&self, face: u32, mut visit: impl FnMut(u32)) -> bool {
+        let round = |side| self.go_round(side, |other| visit(other / 3)).is_some();
+        (3 * face..3 * face + 3)
+            .map(round)
+            .fold(true, |all, closed| all & closed)
     }
 
     /// Visits the corners of all faces about the start of a side, as sides that start there: each at the first face
     /// that has it.
     ///
-    /// * returns - how many faces there are, where they close to a ring.
+    /// * returns - how many faces there are, where they close to a ring of no more than 64.
     pub(super) fn go_round(&self, side: u32, mut visit: impl FnMut(u32)) -> Option<u32> {
         let (face, k) = (side / 3, side % 3);
         let start = self.start_of(side);
