@@ -332,7 +332,12 @@ fn a_mesh_that_fails_when_it_is_built_names_file_line_and_body() {
     // A binary STL whose head speaks of ten million triangles.
     let head = [&[0; 80][..], &10_000_000_u32.to_le_bytes(), &[0; 100]].concat();
     std::fs::write(folder.join("huge.stl"), head).unwrap();
-    for file in ["empty.obj", "broken.obj", "huge.stl"] {
+    std::fs::write(
+        folder.join("far.obj"),
+        "v 0 0 0\nv 1 0 0\nv 0 2e9 0\nf 1 2 3\n",
+    )
+    .unwrap();
+    for file in ["empty.obj", "broken.obj", "huge.stl", "far.obj"] {
         let text = ball("first", "") + &shaped(&format!("type = \"trimesh\", file = \"{file}\""));
         let scene = Scene::parse(&text, "scene.toml", &folder).unwrap();
         results.push(
@@ -344,7 +349,8 @@ fn a_mesh_that_fails_when_it_is_built_names_file_line_and_body() {
     }
     std::fs::remove_dir_all(&folder).unwrap();
     assert!(
-        results[0].starts_with("scene.toml:9: body \"b\": the mesh has no triangle"),
+        results[0].starts_with("scene.toml:9: body \"b\": ")
+            && results[0].contains("empty.obj: the mesh has no triangle"),
         "{}",
         results[0]
     );
@@ -356,8 +362,16 @@ fn a_mesh_that_fails_when_it_is_built_names_file_line_and_body() {
     );
     assert_eq!(
         results[2],
-        "scene.toml:9: body \"b\": the mesh has 10000000 triangles, more than 8000000: simplify it, or split it over \
-         several bodies"
+        format!(
+            "scene.toml:9: body \"b\": {}: the mesh has 10000000, more than 8000000 triangles: simplify it, or split \
+             it over several bodies",
+            folder.join("huge.stl").display()
+        )
+    );
+    assert!(
+        results[3].contains("far.obj: the extent of the mesh is 2000000000 m: write a size"),
+        "{}",
+        results[3]
     );
 }
 

@@ -48,17 +48,15 @@ pub(super) fn build_by(spec: &ShapeSpec, read: &mut Read<'_>) -> Result<Built, S
             file,
             scale,
             solid,
-        } => {
-            let (vertices, faces) = match file {
-                Some(file) => {
-                    let soup = load_by(read, file, *scale)?;
-                    warnings.extend(soup.warnings);
-                    (soup.vertices, soup.faces)
-                }
-                None => (points(vertices), faces.clone()),
-            };
-            mesh(vertices, faces, *solid, &mut warnings)?
-        }
+        } => match file {
+            Some(file) => {
+                let (path, soup) = load_by(read, file, *scale)?;
+                warnings.extend(soup.warnings);
+                mesh(soup.vertices, soup.faces, *solid, &mut warnings)
+                    .map_err(|e| e.of_file(&path))?
+            }
+            None => mesh(points(vertices), faces.clone(), *solid, &mut warnings)?,
+        },
         ShapeSpec::HeightField {
             heights,
             size,
@@ -81,9 +79,10 @@ fn load_by(
     read: &mut Read<'_>,
     file: &str,
     scale: Option<[f64; 3]>,
-) -> Result<load::Soup, ShapeError> {
+) -> Result<(PathBuf, load::Soup), ShapeError> {
     let (path, bytes) = read(file)?;
-    load::load(&path, &bytes, scale)
+    let soup = load::load(&path, &bytes, scale)?;
+    Ok((path, soup))
 }
 
 fn convex(
@@ -113,9 +112,9 @@ fn convex(
             scale,
         } => match file {
             Some(file) => {
-                let soup = load_by(read, file, *scale)?;
+                let (path, soup) = load_by(read, file, *scale)?;
                 warnings.extend(soup.warnings);
-                hull(&soup.vertices)?
+                hull(&soup.vertices).map_err(|e| e.of_file(&path))?
             }
             None => hull(&points(vertices))?,
         },
@@ -126,7 +125,7 @@ fn convex(
     Ok(Shape::of_convex(convex.checked()?))
 }
 
-/// The hull of points; hull builders are known to panic on odd input, and a user's file must not end the daemon.
+/// The hull of points; whatever a hull builder makes of odd input, a user's file must not end the daemon.
 fn hull(points: &[Point]) -> Result<Convex, ShapeError> {
     let built = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| Convex::hull(points)));
     built.unwrap_or_else(|_| {

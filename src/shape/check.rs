@@ -164,7 +164,7 @@ pub(crate) fn indices(vertices: usize, faces: &[[u32; 3]]) -> Result<(), ShapeEr
     }
     if faces.len() > TRIANGLES_MAX {
         return Err(ShapeError::TooManyTriangles {
-            given: faces.len() as u64,
+            given: Some(faces.len() as u64),
         });
     }
     for (face, corners) in faces.iter().enumerate() {
@@ -226,7 +226,9 @@ fn grid(heights: &[Vec<f64>]) -> Result<(), ShapeError> {
     }
     let triangles = super::height_field::triangles(heights.len(), columns);
     if triangles > TRIANGLES_MAX as u64 {
-        return Err(ShapeError::TooManyTriangles { given: triangles });
+        return Err(ShapeError::TooManyTriangles {
+            given: Some(triangles),
+        });
     }
     Ok(())
 }

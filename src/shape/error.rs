@@ -1,6 +1,8 @@
 //! Why a shape cannot be built: what is wrong with it and what to change. Where it stands (file, line, body) is
 //! added by whoever read it.
 
+use std::path::Path;
+
 use crate::error::Error;
 use crate::limits::{EXTENT_MAX_M, EXTENT_MIN_M, HULL_VERTICES_MAX, TRIANGLES_MAX};
 
@@ -17,7 +19,10 @@ pub enum ShapeError {
         value: f64,
     },
     /// A size is zero, negative, or outside what can be computed with.
-    #[error("{what} is {value_m} m: write a size from {EXTENT_MIN_M:e} to {EXTENT_MAX_M:e} m")]
+    #[error(
+        "{what} is {} m: write a size from {EXTENT_MIN_M:e} to {EXTENT_MAX_M:e} m",
+        metres(*.value_m)
+    )]
     Extent {
         /// Which size, e.g. `radius`.
         what: String,
@@ -71,11 +76,12 @@ pub enum ShapeError {
     EmptyMesh,
     /// More triangles than a mesh may have.
     #[error(
-        "the mesh has {given} triangles, more than {TRIANGLES_MAX}: simplify it, or split it over several bodies"
+        "the mesh has {}more than {TRIANGLES_MAX} triangles: simplify it, or split it over several bodies",
+        .given.map_or(String::new(), |given| format!("{given}, "))
     )]
     TooManyTriangles {
-        /// How many.
-        given: u64,
+        /// How many; `None`: a file that was not read to its end.
+        given: Option<u64>,
     },
     /// A direction without a length.
     #[error("{what} has no length: give a direction that is not (0, 0, 0)")]
@@ -104,6 +110,33 @@ pub enum ShapeError {
         /// What is wrong, and what to change.
         message: String,
     },
+    /// A file that was read, and whose geometry cannot be built.
+    #[error("{path}: {error}")]
+    Content {
+        /// The file.
+        path: String,
+        /// What is wrong with its geometry.
+        error: Box<ShapeError>,
+    },
+}
+
+impl ShapeError {
+    /// The same, of the geometry of a file.
+    pub(super) fn of_file(self, path: &Path) -> Self {
+        Self::Content {
+            path: path.display().to_string(),
+            error: Box::new(self),
+        }
+    }
+}
+
+/// Without hundreds of zeros.
+fn metres(value: f64) -> String {
+    if value == 0.0 || (1e-4..1e16).contains(&value.abs()) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
 }
 
 impl From<ShapeError> for Error {
@@ -126,6 +159,11 @@ mod tests {
             error.to_string(),
             "radius is -1 m: write a size from 1e-9 to 1e9 m"
         );
+        let error = ShapeError::Extent {
+            what: "radius".to_owned(),
+            value_m: 1e-82,
+        };
+        assert!(error.to_string().starts_with("radius is 1e-82 m: "));
         let error = ShapeError::Format {
             path: "a.obj".to_owned(),
             line: Some(3),

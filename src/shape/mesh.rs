@@ -279,7 +279,7 @@ impl Mesh {
 fn check(vertices: &[Point], faces: &[[u32; 3]]) -> Result<Aabb, ShapeError> {
     if faces.len() > TRIANGLES_MAX {
         return Err(ShapeError::TooManyTriangles {
-            given: faces.len() as u64,
+            given: Some(faces.len() as u64),
         });
     }
     for (i, vertex) in vertices.iter().enumerate() {

@@ -97,11 +97,7 @@ impl Soup {
     /// Adds a face, up to the limit.
     fn face(&mut self, face: [u32; 3]) -> Result<(), Flaw> {
         if self.faces.len() == TRIANGLES_MAX {
-            // The count goes on to be unknown: the file is not read to its end.
-            return Err(ShapeError::TooManyTriangles {
-                given: TRIANGLES_MAX as u64 + 1,
-            }
-            .into());
+            return Err(ShapeError::TooManyTriangles { given: None }.into());
         }
         self.faces.push(face);
         Ok(())
@@ -129,7 +125,8 @@ pub(crate) fn find_mesh(base: &Path, file: &str) -> Result<PathBuf, ShapeError> 
 /// * `base` - the folder of the scene file.
 ///
 /// # Errors
-/// As [`find_mesh`]; `TooManyTriangles` before such a file is read whole.
+/// As [`find_mesh`]; before a file is read whole, `Format` for one that is too long, and `Content` with
+/// `TooManyTriangles`.
 pub(crate) fn read(base: &Path, file: &str) -> Result<(PathBuf, Arc<[u8]>), ShapeError> {
     let path = find_mesh(base, file)?;
     let bytes = read_whole(&path, kind(&path)?)?;
@@ -143,10 +140,10 @@ pub(crate) fn read(base: &Path, file: &str) -> Result<(PathBuf, Arc<[u8]>), Shap
 ///   factors is negative it mirrors, and faces are turned so that outside stays outside.
 ///
 /// # Errors
-/// `Format` with the line, `TooManyTriangles`, `NotFinite`.
+/// `Format` with the line, `Content` with `TooManyTriangles`, `NotFinite`.
 pub(crate) fn load(path: &Path, bytes: &[u8], scale: Option<[f64; 3]>) -> Result<Soup, ShapeError> {
     let mut soup = parse(kind(path)?, bytes).map_err(|flaw| match flaw.error {
-        FlawKind::Shape(error) => error,
+        FlawKind::Shape(error) => error.of_file(path),
         FlawKind::Format(message) => ShapeError::Format {
             path: path.display().to_string(),
             line: flaw.line,
@@ -214,14 +211,18 @@ fn read_whole(path: &Path, kind: Kind) -> Result<Vec<u8>, ShapeError> {
             .read_to_end(&mut bytes)
             .map_err(failed)?;
         if let Some(given) = stl::claimed(&bytes).filter(|given| *given > TRIANGLES_MAX as u64) {
-            return Err(ShapeError::TooManyTriangles { given });
+            let error = ShapeError::TooManyTriangles { given: Some(given) };
+            return Err(error.of_file(path));
         }
     }
     if size > FILE_BYTES_MAX {
-        return Err(unreadable(
-            path,
-            format!("the file has {size} bytes, more than {FILE_BYTES_MAX}; simplify the mesh"),
-        ));
+        return Err(ShapeError::Format {
+            path: path.display().to_string(),
+            line: None,
+            message: format!(
+                "the file has {size} bytes, more than {FILE_BYTES_MAX}: simplify the mesh, or split it"
+            ),
+        });
     }
     // A file that grows while it is read ends at the limit too.
     file.take(FILE_BYTES_MAX)

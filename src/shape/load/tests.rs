@@ -139,7 +139,26 @@ fn too_many_triangles_are_refused_by_the_head_of_the_file() {
     std::fs::write(folder.join("huge.stl"), &bytes).unwrap();
     let error = read(&folder, "huge.stl").unwrap_err();
     std::fs::remove_dir_all(&folder).unwrap();
-    assert_eq!(error, ShapeError::TooManyTriangles { given: 10_000_000 });
+    let wanted = ShapeError::TooManyTriangles {
+        given: Some(10_000_000),
+    };
+    assert_eq!(error, wanted.of_file(&folder.join("huge.stl")));
+    assert!(
+        (error.to_string())
+            .contains("huge.stl: the mesh has 10000000, more than 8000000 triangles")
+    );
+}
+
+#[test]
+fn bug_a_file_that_is_too_long_is_told_to_be_simplified() {
+    let folder = std::env::temp_dir().join(format!("sweepd_long_{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = File::create(folder.join("long.obj")).unwrap();
+    file.set_len(FILE_BYTES_MAX + 1).unwrap();
+    let error = read(&folder, "long.obj").unwrap_err().to_string();
+    std::fs::remove_dir_all(&folder).unwrap();
+    let wanted = "long.obj: the file has 2147483649 bytes, more than 2147483648: simplify the mesh, or split it";
+    assert!(error.ends_with(wanted), "{error}");
 }
 
 #[test]
@@ -149,7 +168,7 @@ fn faces_past_the_limit_are_refused_without_reading_on() {
         faces: vec![[0, 1, 2]; TRIANGLES_MAX],
         warnings: vec![],
     };
-    let given = TRIANGLES_MAX as u64 + 1;
+    let given = None;
     match soup.face([0, 1, 2]) {
         Err(Flaw {
             error: FlawKind::Shape(error),
