@@ -294,12 +294,6 @@ pub(crate) fn to_glam_vec(v: &Vec3) -> glamx::DVec3 {
     glamx::DVec3::new(v.x, v.y, v.z)
 }
 
-/// From parry's vector.
-#[must_use]
-pub(crate) fn from_glam_vec(v: glamx::DVec3) -> Vec3 {
-    Vec3::new(v.x, v.y, v.z)
-}
-
 /// The lower ten bits of a number, two zeros between any two: a share of a place on the Morton curve (Morton 1966).
 #[must_use]
 pub(crate) fn morton_bits(cell: u32) -> u32 {

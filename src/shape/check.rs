@@ -50,7 +50,10 @@ impl ShapeSpec {
                 }
                 points(vertices)
             }
-            Self::Triangle { vertices } => points(vertices),
+            Self::Triangle { vertices } => {
+                points(vertices)?;
+                spread("the extent of the triangle", vertices)
+            }
             Self::Trimesh {
                 vertices,
                 faces,
@@ -126,7 +129,7 @@ pub(crate) fn finite(what: &str, value: f64) -> Result<(), ShapeError> {
 }
 
 /// A size that can be computed with.
-fn extent(what: &str, value_m: f64) -> Result<(), ShapeError> {
+pub(super) fn extent(what: &str, value_m: f64) -> Result<(), ShapeError> {
     finite(what, value_m)?;
     if (EXTENT_MIN_M..=EXTENT_MAX_M).contains(&value_m) {
         return Ok(());
@@ -135,6 +138,18 @@ fn extent(what: &str, value_m: f64) -> Result<(), ShapeError> {
         what: what.to_owned(),
         value_m,
     })
+}
+
+/// Points that are all in one place, or span what can be computed with.
+fn spread(what: &str, vertices: &[[f64; 3]]) -> Result<(), ShapeError> {
+    let sides = (0..3).map(|k| {
+        let along = || vertices.iter().map(|vertex| vertex[k]);
+        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+    });
+    match sides.fold(0.0, f64::max) {
+        0.0 => Ok(()),
+        side => extent(what, side.min(EXTENT_MAX_M)),
+    }
 }
 
 /// Points that can be computed with.
@@ -259,6 +274,15 @@ mod tests {
             vertices: [[0.2, 0.1, 0.0]; 3],
         };
         assert_eq!(triangle.check(), Ok(()));
+        let tiny = |side: f64| ShapeSpec::Triangle {
+            vertices: [[0.0; 3], [side, 0.0, 0.0], [0.0, side, 0.0]],
+        };
+        assert_eq!(tiny(EXTENT_MIN_M).check(), Ok(()));
+        let text = tiny(1e-82).check().unwrap_err().to_string();
+        assert!(
+            text.starts_with("the extent of the triangle is 1e-82 m"),
+            "{text}"
+        );
         let mesh = ShapeSpec::Trimesh {
             vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
             faces: vec![[0, 1, 3]],

@@ -145,17 +145,47 @@ fn ball_of_triangle(corners: &[Vec3; 3]) -> (Point, f64) {
         let across = u.cross(&v);
         a + (across.cross(&u) * ac + v.cross(&across) * ab) / (2.0 * across.norm_squared())
     };
+    // Of sides whose squares are too small for a number it is none.
+    let centre = if centre.iter().all(|x| x.is_finite()) {
+        centre
+    } else {
+        a + (u + v) / 3.0
+    };
     // Whatever rounding did to the middle, it is a ball around them.
     (Point::from(centre), farthest(corners, &centre) * UP)
 }
 
+/// The greatest distance; where one is no number, none bounds it.
 fn farthest(points: &[Vec3], from: &Vec3) -> f64 {
-    points.iter().map(|p| (p - from).norm()).fold(0.0, f64::max)
+    points.iter().fold(0.0, |most, p| {
+        let distance = (p - from).norm();
+        if distance.is_nan() {
+            return f64::INFINITY;
+        }
+        greater(most, distance)
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bug_bounds_of_tiny_triangles_are_numbers() {
+        for side in [1e-30, 1e-82, 1e-170, 1e-300] {
+            let corners = [
+                Vec3::zeros(),
+                Vec3::new(side, 0.0, 0.0),
+                Vec3::new(0.5 * side, 0.87 * side, 0.0),
+            ];
+            let (centre, radius) = ball_of_triangle(&corners);
+            assert!(centre.iter().all(|x| x.is_finite()), "{side:e}: {centre}");
+            assert!(radius < 2.0 * side, "{side:e}: {radius:e}");
+        }
+        let none = Vec3::repeat(f64::NAN);
+        let bound = farthest(&[Vec3::x(), none, Vec3::y()], &Vec3::zeros());
+        assert!(bound.is_infinite());
+    }
 
     /// The least ball of a triangle, by trial: about each pair, and through all three.
     #[test]

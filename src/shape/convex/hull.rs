@@ -1,15 +1,17 @@
 //! Hulls of points: which points matter, and the faces that manifolds are clipped from.
 //!
-//! In: points, own frame, metres. Out: a [`Hull`] that is exactly the hull of the points: parry's hull builder moves
-//! vertices of thin hulls, so its result says only which points are strictly inside and which lie on one face.
+//! In: points, own frame, metres. Out: a [`Hull`] that is exactly the hull of the points: only what is proved to lie
+//! within the others is left out, and nothing is moved.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-
-use parry3d_f64::transformation::try_convex_hull;
-
-use crate::limits::{EXTENT_MAX_M, HULL_VERTICES_MAX};
-use crate::math::{Point, Vec3, from_glam_vec, to_glam_vec};
+use super::facets::{Facet, corners_of, facets_of};
+use crate::limits::{EXTENT_MAX_M, EXTENT_MIN_M, HULL_VERTICES_MAX};
+use crate::math::{Aabb, Point, Vec3};
 use crate::shape::ShapeError;
+
+/// What lies this near to the plane of a large triangle is of its face, as a share of the hull's size.
+const FACE_THICK: f64 = 1e-9;
+/// A triangle of twice this area has no normal, as a share of the size's square.
+const NO_AREA: f64 = 1e-12;
 
 /// A hull: its points, and its faces where they could be found.
 #[derive(Debug)]
@@ -55,9 +57,9 @@ impl Hull {
         for (place, point) in given.iter().enumerate() {
             check_point(place, &point.coords)?;
         }
-        let mut points: Vec<Vec3> = given.iter().map(|p| p.coords).collect();
+        let mut points = given.to_vec();
         points.sort_by(|a, b| {
-            let key = |p: &Vec3| [p.x + 0.0, p.y + 0.0, p.z + 0.0];
+            let key = |p: &Point| [p.x + 0.0, p.y + 0.0, p.z + 0.0];
             let (a, b) = (key(a), key(b));
             a[0].total_cmp(&b[0])
                 .then(a[1].total_cmp(&b[1]))
@@ -67,16 +69,33 @@ impl Hull {
         if points.is_empty() {
             return Err(ShapeError::TooFewPoints { given: 0 });
         }
+        check_extent(&points)?;
+        // Where there is no surface, all points stay: every query works, manifolds have one point.
+        let facets = facets_of(&points).unwrap_or_default();
+        let is_corner = match facets[..] {
+            [] => vec![true; points.len()],
+            _ => corners_of(&points, &facets),
+        };
+        let corners = is_corner.iter().filter(|is| **is).count();
+        if corners > HULL_VERTICES_MAX {
+            return Err(ShapeError::TooManyHullVertices { given: corners });
+        }
+        let mut new_place = vec![u32::MAX; points.len()];
+        let kept = (0..points.len()).filter(|&place| is_corner[place]);
+        for (new, old) in (0u32..).zip(kept) {
+            new_place[old] = new;
+        }
         let mut hull = Self {
-            points,
+            points: (points.iter().zip(&is_corner))
+                .filter_map(|(p, is)| is.then_some(p.coords))
+                .collect(),
             faces: Vec::new(),
             corners: Vec::new(),
         };
-        hull.find_faces();
-        if hull.points.len() > HULL_VERTICES_MAX {
-            return Err(ShapeError::TooManyHullVertices {
-                given: hull.points.len(),
-            });
+        let (_, size_m) = hull.thickness();
+        for (normal, corners) in faces_of(&points, &facets, size_m) {
+            let named = corners.into_iter().map(|k| new_place[k as usize]);
+            hull.push_face(normal, named.filter(|k| *k != u32::MAX).collect());
         }
         Ok(hull)
     }
@@ -153,129 +172,88 @@ impl Hull {
         )
     }
 
-    /// Asks parry for the triangles, merges them into faces and drops what lies strictly inside all of them. When it
-    /// fails, all points stay and there are no faces: every query works, manifolds have one point.
-    fn find_faces(&mut self) {
-        if self.points.len() < 4 {
+    /// * `corners` - places of the face's corners in `points`, in any order.
+    fn push_face(&mut self, normal: Vec3, mut corners: Vec<u32>) {
+        if corners.len() < 3 {
             return;
         }
-        let (_, size_m) = self.thickness();
-        let Some(triangles) = triangles_of(&self.points, size_m) else {
-            return;
-        };
-        let mut planes: Vec<(Vec3, f64, Vec<u32>)> = Vec::new();
-        let mut whole = is_closed(&triangles);
-        for triangle in triangles {
-            let [a, b, c] = triangle.map(|k| self.points[k as usize]);
-            let normal = (b - a).cross(&(c - a));
-            let length = normal.norm();
-            if length <= 1e-12 * size_m * size_m {
-                whole = false;
-                continue;
-            }
-            let normal = normal / length;
-            let offset = normal.dot(&a);
-            // Triangles of one plane: the corners of the one lie in the plane of the other.
-            let same = planes.iter_mut().find(|(n, o, _)| {
-                n.dot(&normal) > 1.0 - 1e-9
-                    && [a, b, c]
-                        .iter()
-                        .all(|p| (n.dot(p) - *o).abs() <= 1e-9 * size_m)
-            });
-            match same {
-                Some((_, _, corners)) => {
-                    for corner in triangle {
-                        if !corners.contains(&corner) {
-                            corners.push(corner);
-                        }
-                    }
-                }
-                None => planes.push((normal, offset, triangle.to_vec())),
-            }
-        }
-        // Only the planes of a whole surface tell what is inside.
-        if whole {
-            self.drop_inner(&mut planes, size_m);
-        }
-        for (normal, _, mut corners) in planes {
-            order_around(&self.points, &normal, &mut corners);
-            #[allow(
-                clippy::cast_possible_truncation,
-                reason = "at most a few HULL_VERTICES_MAX"
-            )]
-            let (first, count) = (self.corners.len() as u32, corners.len() as u32);
-            self.corners.extend(corners);
-            self.faces.push(HullFace {
-                normal,
-                first,
-                count,
-            });
-        }
-    }
-
-    fn drop_inner(&mut self, planes: &mut [(Vec3, f64, Vec<u32>)], size_m: f64) {
-        let mut new_place = vec![u32::MAX; self.points.len()];
-        let mut kept = Vec::with_capacity(self.points.len());
-        for (place, point) in self.points.iter().enumerate() {
-            let named = planes
-                .iter()
-                .any(|(_, _, corners)| corners.iter().any(|&k| k as usize == place));
-            let inside = planes
-                .iter()
-                .all(|(n, o, _)| n.dot(point) < o - 1e-9 * size_m);
-            if named || !inside {
-                #[allow(clippy::cast_possible_truncation, reason = "checked by the caller")]
-                let at = kept.len() as u32;
-                new_place[place] = at;
-                kept.push(*point);
-            }
-        }
-        for (_, _, corners) in planes {
-            for corner in corners {
-                *corner = new_place[*corner as usize];
-            }
-        }
-        self.points = kept;
+        order_around(&self.points, &normal, &mut corners);
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "at most a few HULL_VERTICES_MAX"
+        )]
+        let (first, count) = (self.corners.len() as u32, corners.len() as u32);
+        self.corners.extend(corners);
+        self.faces.push(HullFace {
+            normal,
+            first,
+            count,
+        });
     }
 }
 
-/// parry's triangles as places in `points`; `None` when it fails, in whatever way.
-fn triangles_of(points: &[Vec3], size_m: f64) -> Option<Vec<[u32; 3]>> {
-    // Brought to size 1 by a power of two, so that nothing is rounded: parry's tolerances are absolute.
-    let scale = (-size_m.log2().round()).exp2();
-    let scaled: Vec<_> = points.iter().map(|p| to_glam_vec(&(p * scale))).collect();
-    let built = catch_unwind(AssertUnwindSafe(|| try_convex_hull(&scaled)));
-    let (vertices, triangles) = built.ok()?.ok()?;
-    let places: Vec<u32> = vertices
-        .iter()
-        .map(|v| nearest(points, &(from_glam_vec(*v) / scale)))
+/// Refuses points that lie in more than one place but nearer to each other than can be computed with.
+fn check_extent(points: &[Point]) -> Result<(), ShapeError> {
+    let bounds = Aabb::of(points);
+    let extent_m = (bounds.max - bounds.min).amax();
+    if extent_m == 0.0 || extent_m >= EXTENT_MIN_M {
+        return Ok(());
+    }
+    Err(ShapeError::Extent {
+        what: "the extent of the hull".to_owned(),
+        value_m: extent_m,
+    })
+}
+
+/// Plane faces: facets beside each other that lie in the plane of the largest of them. Normal, outward, and corners in
+/// any order, with some that lie on the face's edges.
+fn faces_of(points: &[Point], facets: &[Facet], size_m: f64) -> Vec<(Vec3, Vec<u32>)> {
+    let across = |facet: usize| {
+        let [a, b, c] = facets[facet].corners.map(|k| points[k as usize]);
+        (b - a).cross(&(c - a))
+    };
+    let mut largest: Vec<(f64, usize)> = (0..facets.len())
+        .map(|facet| (across(facet).norm(), facet))
+        .filter(|(area, _)| *area > NO_AREA * size_m * size_m)
         .collect();
-    triangles
-        .iter()
-        .map(|t| {
-            let [a, b, c] = t.map(|k| places.get(k as usize).copied());
-            Some([a?, b?, c?])
-        })
-        .collect()
-}
-
-/// Whether a triangle surface can be that of a ball: Euler's count.
-fn is_closed(triangles: &[[u32; 3]]) -> bool {
-    let mut corners: Vec<u32> = triangles.iter().flatten().copied().collect();
-    corners.sort_unstable();
-    corners.dedup();
-    triangles.len() + 4 == 2 * corners.len()
-}
-
-fn nearest(points: &[Vec3], to: &Vec3) -> u32 {
-    let mut best = (0, f64::INFINITY);
-    for (place, point) in (0_u32..).zip(points) {
-        let square = (point - to).norm_squared();
-        if square < best.1 {
-            best = (place, square);
+    largest.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
+    let mut face_of = vec![usize::MAX; facets.len()];
+    let mut faces = Vec::new();
+    for (area, seed) in largest {
+        if face_of[seed] != usize::MAX {
+            continue;
         }
+        let normal = across(seed) / area;
+        let from = points[facets[seed].corners[0] as usize];
+        let is_near =
+            |k: u32| normal.dot(&(points[k as usize] - from)).abs() <= FACE_THICK * size_m;
+        face_of[seed] = faces.len();
+        let (mut all, mut done) = (vec![seed], 0);
+        while let Some(&at) = all.get(done) {
+            done += 1;
+            for other in facets[at].beside.map(|other| other as usize) {
+                let is_free = face_of[other] == usize::MAX;
+                if is_free
+                    && facets[other].corners.into_iter().all(is_near)
+                    && across(other).dot(&normal) >= 0.0
+                {
+                    face_of[other] = faces.len();
+                    all.push(other);
+                }
+            }
+        }
+        // What no other face meets at is within this one.
+        let face = faces.len();
+        let mut corners: Vec<u32> = Vec::new();
+        for facet in all.into_iter().map(|facet| &facets[facet]) {
+            let sides = (0..3).filter(|&k| face_of[facet.beside[k] as usize] != face);
+            corners.extend(sides.flat_map(|k| [facet.corners[k], facet.corners[(k + 1) % 3]]));
+        }
+        corners.sort_unstable();
+        corners.dedup();
+        faces.push((normal, corners));
     }
-    best.0
+    faces
 }
 
 /// Sorts corners of a convex face counter-clockwise about its normal.
@@ -292,4 +270,87 @@ fn order_around(points: &[Vec3], normal: &Vec3, corners: &mut [u32]) {
         p.dot(&y).atan2(p.dot(&x))
     };
     corners.sort_by(|&a, &b| angle(a).total_cmp(&angle(b)).then(a.cmp(&b)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bug_a_cube_with_points_all_over_its_faces_has_eight_corners_and_six_faces() {
+        let n = 30_i32;
+        let on = |k: i32| k == 0 || k == n;
+        let cells =
+            (0..=n).flat_map(|x| (0..=n).flat_map(move |y| (0..=n).map(move |z| [x, y, z])));
+        let points: Vec<Point> = cells
+            .filter(|[x, y, z]| on(*x) || on(*y) || on(*z))
+            .map(|cell| Point::from(cell.map(|k| f64::from(k) / f64::from(n))))
+            .collect();
+        assert_eq!(points.len(), 5402);
+        let hull = Hull::build(&points).unwrap();
+        assert_eq!(hull.points().len(), 8);
+        assert_eq!(hull.faces().len(), 6);
+        for face in hull.faces() {
+            assert_eq!(hull.corners(face).len(), 4);
+            assert!((face.normal.amax() - 1.0).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn no_corner_is_left_out_however_little_it_stands_out() {
+        let mut random = crate::builtin::Random::new(7);
+        let mut number = || random.unit() * 2.0 - 1.0;
+        for thin in [1.0, 1e-6, 1e-12] {
+            let points: Vec<Point> = (0..2000)
+                .map(|_| {
+                    let p = Vec3::new(number(), number(), number());
+                    // A third in one plane but for rounding.
+                    let turned = Vec3::new(p.x, p.y + 0.3 * p.x, thin * p.z + 0.7 * p.x);
+                    Point::from(if number() > 0.3 {
+                        p.normalize() * 0.9
+                    } else {
+                        turned
+                    })
+                })
+                .collect();
+            let hull = Hull::build(&points).unwrap();
+            assert!(
+                hull.points()
+                    .iter()
+                    .all(|p| points.contains(&Point::from(*p)))
+            );
+            for _ in 0..2000 {
+                let dir = Vec3::new(number(), number(), number());
+                let all = points.iter().map(|p| p.coords.dot(&dir));
+                let most = all.fold(f64::NEG_INFINITY, f64::max);
+                let kept = hull.support(&dir).0.dot(&dir);
+                assert!(kept >= most - 2.0 * f64::EPSILON, "{kept} {most}");
+            }
+        }
+    }
+
+    #[test]
+    fn bug_points_of_almost_no_extent_are_refused_and_one_place_is_none() {
+        let simplex = |side: f64| {
+            let corners = [Vec3::zeros(), Vec3::x(), Vec3::y(), Vec3::z()];
+            Hull::build(&corners.map(|p| Point::from(p * side)))
+        };
+        assert!(simplex(EXTENT_MIN_M).is_ok() && simplex(0.0).is_ok());
+        for side in [0.9 * EXTENT_MIN_M, 1e-70, 1e-170] {
+            let text = simplex(side).unwrap_err().to_string();
+            assert!(text.starts_with("the extent of the hull is "), "{text}");
+        }
+    }
+
+    #[test]
+    fn many_points_on_a_ball_are_refused_with_their_number() {
+        let points = (0..20_000).map(|k| {
+            let z = 1.0 - (2.0 * f64::from(k) + 1.0) / 20_000.0;
+            let (sin, cos) = (2.399_963 * f64::from(k)).sin_cos();
+            let across = (1.0 - z * z).sqrt();
+            Point::new(across * cos, across * sin, z)
+        });
+        let refused = Hull::build(&points.collect::<Vec<_>>()).unwrap_err();
+        assert_eq!(refused, ShapeError::TooManyHullVertices { given: 20_000 });
+    }
 }

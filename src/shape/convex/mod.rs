@@ -5,13 +5,14 @@
 //! and a capsule a segment for every query.
 
 mod bounds;
+mod facets;
 mod hull;
 
 use std::sync::Arc;
 
-use crate::limits::{EXTENT_MAX_M, EXTENT_MIN_M};
 use crate::math::{Point, Vec3, across_z};
 use crate::shape::ShapeError;
+use crate::shape::check::extent;
 
 pub(crate) use hull::Hull;
 
@@ -76,23 +77,6 @@ pub(crate) struct Circle {
     pub(crate) radius_m: f64,
 }
 
-fn extent(what: &str, value_m: f64) -> Result<(), ShapeError> {
-    if !value_m.is_finite() {
-        return Err(ShapeError::NotFinite {
-            what: what.to_owned(),
-            value: value_m,
-        });
-    }
-    if (EXTENT_MIN_M..=EXTENT_MAX_M).contains(&value_m) {
-        Ok(())
-    } else {
-        Err(ShapeError::Extent {
-            what: what.to_owned(),
-            value_m,
-        })
-    }
-}
-
 impl Convex {
     fn build(core: Core, margin_m: f64) -> Self {
         let (centre, core_radius_m) = bounds::ball(&core);
@@ -155,8 +139,10 @@ impl Convex {
 
     /// The solid hull of points, which must span a volume.
     ///
-    /// Every point that is not strictly inside is kept as given, so the hull is exactly the hull of the points also
-    /// where it is very thin.
+    /// Every corner is kept as given, and only what is proved to be none is left out, so the hull is exactly the hull
+    /// of the points also where it is very thin.
+    ///
+    /// Cost: O(n log n) as a rule.
     ///
     /// # Errors
     /// `NotFinite`, `TooFewPoints`, `FlatHull`, `TooManyHullVertices`, `Extent`.

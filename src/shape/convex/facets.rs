@@ -1,0 +1,382 @@
+//! The surface of a hull as triangles, exactly.
+//!
+//! In: points, own frame, all different. Out: triangles that no point lies beyond, each with its neighbours, and which
+//! points are corners of the hull.
+//!
+//! Signs are exact, so nothing is thick and nothing is moved: a point in the plane of a triangle does not lie beyond
+//! it, and what lies within the hull, its faces and its edges is told from corners for certain. Refused: parry's
+//! builder, which moves vertices of thin hulls, and tolerances, which cost corners or keep what is none.
+//!
+//! Source: Barber, Dobkin, Huhdanpaa 1996, "The quickhull algorithm for convex hulls".
+
+use std::collections::VecDeque;
+
+use crate::math::Point;
+use crate::shape::mesh::side;
+
+const NONE: u32 = u32::MAX;
+
+/// A triangle of the surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Facet {
+    /// Places of its corners, counter-clockwise seen from outside.
+    pub(super) corners: [u32; 3],
+    /// The facet beyond the side from each corner to the next.
+    pub(super) beside: [u32; 3],
+}
+
+/// The facets of the hull of points; `None` where all lie in one plane, or numbers are too small for exact products.
+///
+/// Cost: O(n log n) as a rule.
+pub(super) fn facets_of(points: &[Point]) -> Option<Vec<Facet>> {
+    let mut hull = Quickhull::begin(points)?;
+    while let Some(facet) = hull.pending.pop_front() {
+        if let Some(apex) = hull.farthest(facet) {
+            hull.add(facet, apex)?;
+        }
+    }
+    hull.finish()
+}
+
+/// Which points are corners: at least three edges that are none by cutting a plane face meet there. Of others the
+/// facets about them lie in one plane or in two.
+pub(super) fn corners_of(points: &[Point], facets: &[Facet]) -> Vec<bool> {
+    let mut edges = vec![0_u32; points.len()];
+    for facet in facets {
+        for (start, other) in facet.corners.into_iter().zip(facet.beside) {
+            let beyond = facets[other as usize].corners;
+            let plane = facet.corners.map(|k| &points[k as usize]);
+            let in_plane = |k: u32| side(plane[0], plane[1], plane[2], &points[k as usize]).is_eq();
+            if !beyond.into_iter().all(in_plane) {
+                edges[start as usize] += 1;
+            }
+        }
+    }
+    edges.into_iter().map(|count| count >= 3).collect()
+}
+
+/// A facet under way.
+#[derive(Clone, Copy)]
+struct Live {
+    facet: Facet,
+    /// First of the points that lie beyond it, each of which is kept at one facet.
+    first: u32,
+    is_gone: bool,
+    /// The round in which it was looked at last, and whether the new point lay beyond it.
+    seen: (u32, bool),
+}
+
+struct Quickhull<'a> {
+    points: &'a [Point],
+    live: Vec<Live>,
+    /// Places of facets that are gone.
+    free: Vec<u32>,
+    /// The next point beyond the same facet.
+    next: Vec<u32>,
+    /// Facets with points beyond them, and others. Taken in turn: one region at a time would be cut finely beside a
+    /// coarse one, in fans of which each later point sees all.
+    pending: VecDeque<u32>,
+    round: u32,
+    /// The new facet whose first corner it is, by point.
+    begins: Vec<u32>,
+}
+
+impl<'a> Quickhull<'a> {
+    /// A tetrahedron, and what lies beyond its faces.
+    fn begin(points: &'a [Point]) -> Option<Self> {
+        let mut hull = Self {
+            points,
+            live: Vec::new(),
+            free: Vec::new(),
+            next: vec![NONE; points.len()],
+            pending: VecDeque::new(),
+            round: 0,
+            begins: vec![NONE; points.len()],
+        };
+        let [a, b, c, d] = simplex(points)?;
+        let faces = [[a, b, c], [b, a, d], [c, b, d], [a, c, d]];
+        let beside = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+        for (corners, beside) in faces.into_iter().zip(beside) {
+            hull.make(Facet { corners, beside });
+        }
+        let others = (0u32..).zip(points).map(|(place, _)| place);
+        hull.share_out(others, &[0, 1, 2, 3]);
+        Some(hull)
+    }
+
+    fn make(&mut self, facet: Facet) -> u32 {
+        let live = Live {
+            facet,
+            first: NONE,
+            is_gone: false,
+            seen: (0, false),
+        };
+        if let Some(place) = self.free.pop() {
+            self.live[place as usize] = live;
+            return place;
+        }
+        self.live.push(live);
+        u32::try_from(self.live.len() - 1).unwrap_or(NONE)
+    }
+
+    /// Puts each point with one of the facets that it lies beyond, if there is one.
+    fn share_out(&mut self, points: impl Iterator<Item = u32>, facets: &[u32]) {
+        for point in points {
+            if let Some(&facet) = facets.iter().find(|facet| self.is_beyond(**facet, point)) {
+                let first = &mut self.live[facet as usize].first;
+                self.next[point as usize] = *first;
+                *first = point;
+            }
+        }
+        let has = |facet: &&u32| self.live[**facet as usize].first != NONE;
+        self.pending.extend(facets.iter().filter(has));
+    }
+
+    fn is_beyond(&self, facet: u32, point: u32) -> bool {
+        let corners = self.live[facet as usize].facet.corners;
+        // Its own corners are most of what lies in a plane.
+        if corners.contains(&point) {
+            return false;
+        }
+        let [a, b, c] = corners.map(|k| &self.points[k as usize]);
+        side(a, b, c, &self.points[point as usize]).is_gt()
+    }
+
+    /// Of the points kept at a facet the one farthest from it.
+    fn farthest(&self, facet: u32) -> Option<u32> {
+        let live = &self.live[facet as usize];
+        if live.is_gone || live.first == NONE {
+            return None;
+        }
+        let [a, b, c] = live.facet.corners.map(|k| self.points[k as usize]);
+        let normal = (b - a).cross(&(c - a));
+        let height = |point: u32| normal.dot(&(self.points[point as usize] - a));
+        let (mut best, mut at) = ((live.first, height(live.first)), live.first);
+        while at != NONE {
+            let there = height(at);
+            if there > best.1 {
+                best = (at, there);
+            }
+            at = self.next[at as usize];
+        }
+        Some(best.0)
+    }
+
+    /// Makes a point that lies beyond a facet a vertex of the surface; `None` where signs contradict each other.
+    fn add(&mut self, facet: u32, apex: u32) -> Option<()> {
+        self.round += 1;
+        let (visible, rim) = self.look_from(facet, apex);
+        let mut orphans = Vec::new();
+        for &facet in &visible {
+            let live = &mut self.live[facet as usize];
+            live.is_gone = true;
+            let mut at = std::mem::replace(&mut live.first, NONE);
+            while at != NONE {
+                if at != apex {
+                    orphans.push(at);
+                }
+                at = self.next[at as usize];
+            }
+        }
+        self.free.extend(&visible);
+        let new = self.cover(apex, &rim);
+        for (from, ..) in rim {
+            self.begins[from as usize] = NONE;
+        }
+        self.share_out(orphans.into_iter(), &new?);
+        Some(())
+    }
+
+    /// The facets that a point lies beyond, beginning with one of them; and the sides around them, each from corner to
+    /// corner, with the facet that stays beside it.
+    fn look_from(&mut self, facet: u32, apex: u32) -> (Vec<u32>, Vec<(u32, u32, u32)>) {
+        let (mut visible, mut rim) = (vec![facet], Vec::new());
+        self.live[facet as usize].seen = (self.round, true);
+        let mut done = 0;
+        while let Some(&at) = visible.get(done) {
+            done += 1;
+            let Facet { corners, beside } = self.live[at as usize].facet;
+            for (k, other) in beside.into_iter().enumerate() {
+                let seen = self.live[other as usize].seen;
+                let beyond = if seen.0 == self.round {
+                    seen.1
+                } else {
+                    let beyond = self.is_beyond(other, apex);
+                    self.live[other as usize].seen = (self.round, beyond);
+                    if beyond {
+                        visible.push(other);
+                    }
+                    beyond
+                };
+                if !beyond {
+                    rim.push((corners[k], corners[(k + 1) % 3], other));
+                }
+            }
+        }
+        (visible, rim)
+    }
+
+    /// New facets from the sides of a rim to a point.
+    fn cover(&mut self, apex: u32, rim: &[(u32, u32, u32)]) -> Option<Vec<u32>> {
+        let mut new = Vec::with_capacity(rim.len());
+        for &(from, to, outer) in rim {
+            let place = self.make(Facet {
+                corners: [from, to, apex],
+                beside: [outer, NONE, NONE],
+            });
+            new.push(place);
+            let Facet { corners, beside } = &mut self.live[outer as usize].facet;
+            let back = (0..3).find(|&k| (corners[k], corners[(k + 1) % 3]) == (to, from))?;
+            beside[back] = place;
+            let begins = &mut self.begins[from as usize];
+            if *begins != NONE {
+                return None;
+            }
+            *begins = place;
+        }
+        for (&place, (_, to, _)) in new.iter().zip(rim) {
+            let after = self.begins[*to as usize];
+            self.live.get_mut(after as usize)?.facet.beside[2] = place;
+            self.live[place as usize].facet.beside[1] = after;
+        }
+        Some(new)
+    }
+
+    /// The facets that are left, side by side.
+    fn finish(self) -> Option<Vec<Facet>> {
+        let mut places = vec![NONE; self.live.len()];
+        let left = || self.live.iter().filter(|live| !live.is_gone);
+        let kept = (0..self.live.len()).filter(|&place| !self.live[place].is_gone);
+        for (new, old) in (0u32..).zip(kept) {
+            places[old] = new;
+        }
+        let mut facets: Vec<Facet> = left().map(|live| live.facet).collect();
+        for other in facets.iter_mut().flat_map(|facet| &mut facet.beside) {
+            *other = *places
+                .get(*other as usize)
+                .filter(|place| **place != NONE)?;
+        }
+        Some(facets)
+    }
+}
+
+/// Four points that span a volume, the last beneath the triangle of the others.
+fn simplex(points: &[Point]) -> Option<[u32; 4]> {
+    let first = *points.first()?;
+    let farthest = |far: &dyn Fn(&Point) -> f64| {
+        let mut best = (0, f64::NEG_INFINITY);
+        for (place, point) in (0u32..).zip(points) {
+            let there = far(point);
+            if there > best.1 {
+                best = (place, there);
+            }
+        }
+        best.0
+    };
+    let at = |place: u32| &points[place as usize];
+    let second = farthest(&|p| (p - first).norm_squared());
+    let along = at(second) - first;
+    let third = farthest(&|p| along.cross(&(p - first)).norm_squared());
+    let normal = along.cross(&(at(third) - first));
+    let height = |p: &Point| side(&first, at(second), at(third), p);
+    let mut fourth = farthest(&|p| normal.dot(&(p - first)).abs());
+    if height(at(fourth)).is_eq() {
+        let mut places = (0u32..).zip(points);
+        fourth = places.find(|(_, p)| height(p).is_ne())?.0;
+    }
+    Some(if height(at(fourth)).is_lt() {
+        [0, second, third, fourth]
+    } else {
+        [0, third, second, fourth]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every point on or beneath every facet, neighbours beside each other, and as many facets as a ball has.
+    fn check(points: &[Point]) -> Vec<Facet> {
+        let facets = facets_of(points).unwrap();
+        let mut named = vec![false; points.len()];
+        for (place, facet) in (0u32..).zip(&facets) {
+            let [a, b, c] = facet.corners.map(|k| &points[k as usize]);
+            assert!(points.iter().all(|p| side(a, b, c, p).is_le()));
+            for k in 0..3 {
+                let other = &facets[facet.beside[k] as usize];
+                let back = (0..3).find(|&j| {
+                    other.beside[j] == place && {
+                        let ends = (other.corners[(j + 1) % 3], other.corners[j]);
+                        ends == (facet.corners[k], facet.corners[(k + 1) % 3])
+                    }
+                });
+                assert!(back.is_some());
+                named[facet.corners[k] as usize] = true;
+            }
+        }
+        let vertices = named.iter().filter(|named| **named).count();
+        assert_eq!(facets.len() + 4, 2 * vertices);
+        facets
+    }
+
+    fn corners(points: &[Point]) -> usize {
+        let all = corners_of(points, &check(points));
+        all.iter().filter(|corner| **corner).count()
+    }
+
+    #[test]
+    fn hulls_of_grids_balls_and_noise_are_closed_and_hold_all_points() {
+        let mut random = crate::builtin::Random::new(11);
+        let mut point =
+            || Point::from(nalgebra::Vector3::from_fn(|_, _| random.unit() * 2.0 - 1.0));
+        let noise: Vec<Point> = (0..500).map(|_| point()).collect();
+        check(&noise);
+        let ball: Vec<Point> = noise
+            .iter()
+            .map(|p| Point::from(p.coords.normalize()))
+            .collect();
+        assert!(corners(&ball) > 490);
+        // Nearly flat, nearly a line, and off by an ulp from a plane.
+        for thin in [1e-3, 1e-9, 1e-15] {
+            let flat: Vec<Point> = noise
+                .iter()
+                .map(|p| Point::new(p.x, p.y, p.z * thin))
+                .collect();
+            check(&flat);
+            let line: Vec<Point> = noise
+                .iter()
+                .map(|p| Point::new(p.x, p.y * thin, p.z * thin))
+                .collect();
+            check(&line);
+        }
+    }
+
+    #[test]
+    fn what_lies_on_a_face_or_an_edge_is_no_corner() {
+        let n = 6;
+        let whole = |x: i32, y: i32, z: i32| Point::new(x.into(), y.into(), z.into());
+        let all =
+            || (-n..=n).flat_map(|x| (-n..=n).flat_map(move |y| (-n..=n).map(move |z| (x, y, z))));
+        let cube: Vec<Point> = all().map(|(x, y, z)| whole(x, y, z)).collect();
+        assert_eq!(corners(&cube), 8);
+        let octahedron: Vec<Point> = all()
+            .filter(|(x, y, z)| x.abs() + y.abs() + z.abs() <= n)
+            .map(|(x, y, z)| whole(x, y, z))
+            .collect();
+        assert_eq!(corners(&octahedron), 6);
+        // A point an ulp above the middle of a face is one.
+        let mut cube = cube;
+        cube.push(Point::new(0.5, 0.25, f64::from(n).next_up()));
+        assert_eq!(corners(&cube), 9);
+    }
+
+    #[test]
+    fn points_in_a_plane_have_no_surface() {
+        let flat: Vec<Point> = (0..40)
+            .map(|k| Point::new(f64::from(k % 7), f64::from(k / 7), 0.5))
+            .collect();
+        assert!(facets_of(&flat).is_none());
+        assert!(facets_of(&flat[..7]).is_none());
+        assert!(facets_of(&flat[..1]).is_none() && facets_of(&[]).is_none());
+    }
+}
