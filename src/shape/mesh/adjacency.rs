@@ -8,7 +8,7 @@
 //! them nevertheless, they have a seam (`seams`).
 
 use super::Mesh;
-use super::seams::{self, SIDES_MAX, Seam};
+use super::seams::{self, Seam};
 use super::topology::{Sets, Topology};
 use crate::math::{Point, Vec3};
 
@@ -27,8 +27,8 @@ pub(super) struct Adjacency {
     seams: Vec<Seam>,
     /// For each face the least face of its region.
     regions: Vec<u32>,
-    /// Sides without a neighbour.
-    open: usize,
+    /// Sides without a neighbour, where they are too many or too much work to look beyond; else 0.
+    unlooked: usize,
 }
 
 impl Adjacency {
@@ -62,10 +62,9 @@ impl Adjacency {
             }
         }
         let open = twins.iter().filter(|twin| **twin == NONE).count();
-        let mut seams = Vec::new();
-        if open <= SIDES_MAX {
-            seams = seams::find(mesh, &twins);
-        }
+        let seams = seams::find(mesh, &twins);
+        let unlooked = if seams.is_none() { open } else { 0 };
+        let seams = seams.unwrap_or_default();
         for seam in &seams {
             let face = seam.side / 3;
             let Some(here) = mesh.face_normal(face) else {
@@ -84,7 +83,7 @@ impl Adjacency {
             twins,
             seams,
             regions,
-            open,
+            unlooked,
         }
     }
 
@@ -100,10 +99,10 @@ impl Adjacency {
 
     /// What `check` says where seams were not looked for.
     pub(super) fn warning(&self) -> Option<String> {
-        (self.open > SIDES_MAX).then(|| {
+        (self.unlooked > 0).then(|| {
             format!(
-                "{} edges without a neighbour, more than {SIDES_MAX}: contacts may show edges within its surface; weld it",
-                self.open
+                "{} edges without a neighbour, too many or too long to look beyond: contacts may show edges within its surface; weld it",
+                self.unlooked
             )
         })
     }

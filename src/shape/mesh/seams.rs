@@ -14,7 +14,13 @@ const LOOKS: [f64; 5] = [0.01, 0.2, 0.5, 0.8, 0.99];
 const BEYOND: f64 = 1e-6;
 /// Sides without a neighbour of one mesh; of more none is looked beyond, and a warning says so. Each look takes a
 /// microsecond or two: a quarter of a million are the time of reading as many triangles.
-pub(super) const SIDES_MAX: usize = 1 << 18;
+const SIDES_MAX: usize = 1 << 18;
+
+/// Nodes of the tree that are passed for all of them: a side of a compact mesh takes some hundreds, one of large
+/// triangles that all lie across each other takes as many as there are. About a second.
+const NODES_MAX: usize = 1 << 28;
+/// A face that is asked takes as long as so many nodes.
+const NODES_PER_FACE: usize = 16;
 
 /// A side, and faces beyond it; [`NONE`] where there is none.
 #[derive(Clone, Copy, Debug)]
@@ -23,20 +29,35 @@ pub(super) struct Seam {
     pub(super) faces: [u32; LOOKS.len()],
 }
 
-/// The seams of a mesh, by side.
-pub(super) fn find(mesh: &Mesh, twins: &[u32]) -> Vec<Seam> {
-    let sides = (0u32..).zip(twins).filter(|(_, twin)| **twin == NONE);
-    let seam = |(side, _)| {
-        let faces = LOOKS.map(|t| mesh.face_beyond(side, t).unwrap_or(NONE));
-        let any = faces.iter().any(|face| *face != NONE);
-        any.then_some(Seam { side, faces })
-    };
-    sides.filter_map(seam).collect()
+/// The seams of a mesh, by side; `None` where they are too much work.
+pub(super) fn find(mesh: &Mesh, twins: &[u32]) -> Option<Vec<Seam>> {
+    find_within(mesh, twins, NODES_MAX)
+}
+
+fn find_within(mesh: &Mesh, twins: &[u32], nodes_max: usize) -> Option<Vec<Seam>> {
+    let open = || (0u32..).zip(twins).filter(|(_, twin)| **twin == NONE);
+    if open().nth(SIDES_MAX).is_some() {
+        return None;
+    }
+    let mut left = nodes_max;
+    let mut seams = Vec::new();
+    for (side, _) in open() {
+        let faces = LOOKS.map(|t| mesh.face_beyond(side, t, &mut left).unwrap_or(NONE));
+        if left == 0 {
+            return None;
+        }
+        if faces.iter().any(|face| *face != NONE) {
+            seams.push(Seam { side, faces });
+        }
+    }
+    Some(seams)
 }
 
 impl Mesh {
     /// A face just beyond a side, at a place along it.
-    fn face_beyond(&self, side: u32, t: f64) -> Option<u32> {
+    ///
+    /// * `left` - nodes that may still be passed; at 0 nothing is said.
+    fn face_beyond(&self, side: u32, t: f64, left: &mut usize) -> Option<u32> {
         let face = side / 3;
         let normal = self.face_normal(face)?;
         let corners = self.triangle(face);
@@ -60,6 +81,7 @@ impl Mesh {
         let mut waiting = [0u32; NODES_WAITING_MAX];
         let mut len = 1;
         while len > 0 {
+            *left = left.checked_sub(1)?;
             len -= 1;
             let place = waiting[len];
             if !holds(place) {
@@ -73,10 +95,12 @@ impl Mesh {
                 }
                 Below::Row(..) => {}
                 Below::Triangle(other) if other == face => {}
-                Below::Triangle(other) if self.is_near(other, &point, 2.0 * beyond) => {
-                    return Some(other);
+                Below::Triangle(other) => {
+                    *left = left.saturating_sub(NODES_PER_FACE);
+                    if self.is_near(other, &point, 2.0 * beyond) {
+                        return Some(other);
+                    }
                 }
-                Below::Triangle(_) => {}
             }
         }
         None
@@ -94,5 +118,31 @@ impl Mesh {
             outward.dot(&(point - from)) - metres * outward.norm()
         };
         normal.dot(&(point - corners[0])).abs() <= metres && (0..3).all(|k| off(k) <= 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::mesh::tests::sheet;
+
+    #[test]
+    fn bug_seams_of_triangles_that_all_lie_across_each_other_are_given_up() {
+        let cross = |k: u32| {
+            let (sin, cos) = f64::from(k).sin_cos();
+            [
+                Point::new(cos, sin, 0.0),
+                Point::new(-cos, -sin, 0.1),
+                Point::new(-sin, cos, -0.1),
+            ]
+        };
+        let vertices = (0..500).flat_map(cross).collect();
+        let faces = (0..500).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+        let soup = Mesh::new(vertices, faces, None).unwrap();
+        let twins = soup.adjacency.twins();
+        assert!(find_within(&soup, twins, 100_000).is_none());
+        // A sheet of sixteen times as many triangles has a border, and the time for it.
+        let sheet = sheet(64);
+        assert!(find_within(&sheet, sheet.adjacency.twins(), 100_000).is_some());
     }
 }
