@@ -1,19 +1,17 @@
 //! How a daemon runs: mode, budget, heartbeat, limits. Read from a scene file, overridden by flags.
 
-use serde::{Deserialize, Serialize};
-
-use crate::limits;
+use crate::limits::{self, RATE_HZ_MAX, RATE_HZ_MIN};
 use crate::time::Budget;
 
 /// What makes a tick.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Mode {
     /// Lockstep: one tick for each frame of this source, in order, none skipped in silence.
     OnFrame(String),
     /// A round: the newest frame of each live source, and all of one that moves continuous bodies.
     OnAll,
-    /// So many ticks a second on the newest state, hertz; it too with all frames of one that moves continuous bodies.
+    /// So many ticks a second on the newest state, hertz from `limits::RATE_HZ_MIN` to `RATE_HZ_MAX`; it too with all
+    /// frames of one that moves continuous bodies.
     Rate(f64),
 }
 
@@ -29,9 +27,9 @@ impl Mode {
                 Ok(Self::OnFrame(source.to_owned()))
             }
             Some(("rate", hertz)) => match hertz.parse::<f64>() {
-                Ok(hertz) if hertz > 0.0 && hertz <= 1e6 => Ok(Self::Rate(hertz)),
+                Ok(hertz) if (RATE_HZ_MIN..=RATE_HZ_MAX).contains(&hertz) => Ok(Self::Rate(hertz)),
                 _ => Err(format!(
-                    "`{hertz}` is no rate: write hertz above 0, such as rate=100"
+                    "`{hertz}` is no rate: write hertz from {RATE_HZ_MIN} to {RATE_HZ_MAX}, such as rate=100"
                 )),
             },
             _ => Err("write on_all, on_frame=SOURCE or rate=HZ".to_owned()),
@@ -119,8 +117,7 @@ impl MeshSearch {
 }
 
 /// What happens to a body that is too old.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnStale {
     /// Its pairs become `possible` within its reach.
     #[default]
@@ -199,8 +196,7 @@ pub struct Config {
 }
 
 /// Sizes of messages and sets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Bodies.
     pub bodies: usize,
@@ -252,6 +248,24 @@ impl Default for Config {
             stale_reach_m: 1.0,
             viewpoint: None,
             limits: Limits::default(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bug_rates_have_one_range_and_a_message_that_says_it() {
+        assert_eq!(Mode::parse("rate=100000"), Ok(Mode::Rate(RATE_HZ_MAX)));
+        assert_eq!(Mode::parse("rate=0.001"), Ok(Mode::Rate(RATE_HZ_MIN)));
+        for bad in ["0", "-1", "nan", "inf", "0.0001", "100001", "2000000", "x"] {
+            let text = Mode::parse(&format!("rate={bad}")).unwrap_err();
+            assert_eq!(
+                text,
+                format!("`{bad}` is no rate: write hertz from 0.001 to 100000, such as rate=100")
+            );
         }
     }
 }

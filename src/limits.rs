@@ -14,7 +14,7 @@ pub const SOURCES_MAX: usize = 16;
 pub const BODIES_MAX: usize = 1 << 20;
 /// Shapes in one body; contact rows name them by place.
 pub const SHAPES_PER_BODY_MAX: usize = 1 << 16;
-/// Triangles of one mesh. 10 million take about two gigabytes with their trees; refused, never loaded in part.
+/// Triangles of one mesh: 8 million take about two gigabytes with their trees; more are refused, never loaded in part.
 pub const TRIANGLES_MAX: usize = 8_000_000;
 /// Triangles of a mesh that deforms: a million are refitted in some 5 ms.
 pub const DEFORMING_TRIANGLES_MAX: usize = 1 << 20;
@@ -79,6 +79,10 @@ pub const LEGS_MAX: usize = 32;
 /// Whole turns between two poses that a declared angular velocity may add; beyond it a pair is told as open. A drill at
 /// 100,000 turns a minute makes 1667 in a second.
 pub const LEG_TURNS_MAX: f64 = 4096.0;
+/// Fewest ticks a second of mode `rate`, hertz: one in a quarter of an hour.
+pub const RATE_HZ_MIN: f64 = 1e-3;
+/// Most of them, hertz: beyond it a tick has no time for its floor.
+pub const RATE_HZ_MAX: f64 = 1e5;
 /// Default heartbeat, milliseconds.
 pub const HEARTBEAT_MS_DEFAULT: u64 = 100;
 /// Default spin of a wait before it sleeps, microseconds: a wake-up costs 10 to 25, so a peer that answers within this

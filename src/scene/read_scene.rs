@@ -21,8 +21,6 @@ use crate::time::Budget;
 const FILE_BYTES_MAX: u64 = 1 << 29;
 /// Longest time that a setting can name, milliseconds: a day.
 const TIME_MS_MAX: f64 = 86_400_000.0;
-/// Fastest rate, hertz: beyond it a tick has no time for its floor.
-const RATE_HZ_MAX: f64 = 100_000.0;
 /// Longest `frame_id`, bytes.
 const FRAME_ID_BYTES_MAX: usize = 63;
 
@@ -395,6 +393,6 @@ fn read_mode(
         return Err(Fault::new(at, text));
     }
     Ok(table
-        .number_within("rate", 1e-3, RATE_HZ_MAX)?
+        .number_within("rate", limits::RATE_HZ_MIN, limits::RATE_HZ_MAX)?
         .map(Mode::Rate))
 }
