@@ -57,6 +57,19 @@ fn the_example_scene_is_read_with_every_key() {
     assert_eq!(scene.rules[1].report_within_m, Some(0.1));
 }
 
+#[test]
+fn bug_a_viewpoint_looks_along_any_direction_that_is_not_zero() {
+    for length in ["1e200", "3.0", "1e-200", "4.9e-324"] {
+        let text = format!("[viewpoint]\ndirection = [0, -{length}, 0]\n");
+        let scene = Scene::parse(&text, "scene.toml", Path::new("")).unwrap();
+        let viewpoint = scene.config.viewpoint.unwrap();
+        assert_eq!(viewpoint.direction, [0.0, -1.0, 0.0], "{length}");
+    }
+    let text = "[viewpoint]\ndirection = [0, 0, 0]\n";
+    let error = Scene::parse(text, "scene.toml", Path::new("")).unwrap_err();
+    assert!(error.to_string().contains("has no length"), "{error}");
+}
+
 /// A reader of each table tells all its keys when it meets one that is like none of them.
 #[test]
 fn the_example_scene_names_every_key_there_is() {

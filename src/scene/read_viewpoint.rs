@@ -48,10 +48,13 @@ pub(crate) fn read_viewpoint(node: Node, bodies: &[&str]) -> Result<Viewpoint, F
     }
     let at = table.at("direction");
     let direction = Vec3::from(table.triple("direction")?.unwrap_or([1.0, 0.0, 0.0]));
-    let Some(direction) = direction.try_normalize(f64::MIN_POSITIVE) else {
+    let largest = direction.amax();
+    if largest == 0.0 {
         let text = "direction of the viewpoint has no length: write where it looks, as [1, 0, 0]";
         return Err(Fault::new(at, text));
-    };
+    }
+    // By its largest part first: the square of 1e200 or 1e-200 is none.
+    let direction = (direction / largest).normalize();
     let half_angle_rad = table.number_within("half_angle_rad", HALF_ANGLE_RAD_MIN, PI)?;
     let weight = table.number_within("weight", 1.0, VIEW_WEIGHT_MAX)?;
     Ok(Viewpoint {
