@@ -27,7 +27,7 @@ impl Engine {
                 warnings,
             });
         }
-        self.admit_frames(&input.inbox, now_ns);
+        self.admit_frames(input.inbox, now_ns);
         if !input.edits.is_empty() {
             self.replan();
         }
