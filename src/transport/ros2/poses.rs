@@ -8,14 +8,13 @@ mod stamps;
 
 use judge::judge;
 pub(super) use stamps::off;
-use stamps::{both, older, rivalry};
+use stamps::{both, crowded, forgotten, older, rivalry};
 
 use ros2_client::Gid;
 
 use super::RosScene;
-use super::lines::Heard;
 use super::shelf::Update;
-use super::tf::{Missing, Taken, Tree, sound};
+use super::tf::{Missing, Taken, Tree, plain, sound};
 use crate::config::RosKind;
 use crate::math::{Quat, Vec3, pose_from};
 use crate::wire::ros::{Odometry, PoseStamped, TfMessage};
@@ -72,8 +71,6 @@ pub(super) struct Source {
     /// The scene's frame, by name and by its number in the tree.
     root: (String, usize),
     tree: Tree,
-    /// Who sends the link of each frame, by its number in the tree.
-    heard: Vec<Heard>,
     members: Vec<Member>,
     /// Widest skew of a chain at the last look, nanoseconds; `None`: no chain.
     pub(super) skew_ns: Option<u64>,
@@ -90,7 +87,7 @@ impl Source {
         for (place, spec) in scene.sources.iter().enumerate() {
             let Some(ros) = &spec.ros2 else { continue };
             let mut tree = Tree::default();
-            let root = tree.id(&scene.frame_id).unwrap_or_default();
+            let root = tree.pin(&scene.frame_id);
             let bodies = scene.bodies.iter().filter(|b| b.source == Some(place));
             let members = bodies.map(|body| Member::of(body, &mut tree)).collect();
             all.push(Self {
@@ -105,7 +102,6 @@ impl Source {
                 members,
                 root: (scene.frame_id.clone(), root),
                 tree,
-                heard: Vec::new(),
                 skew_ns: None,
                 refused: 0,
                 passing: None,
@@ -166,16 +162,20 @@ impl Source {
             let odd = match taken {
                 Taken::Newer if !fixed => off(what, stamp_ns, receipt, self.timeout_ns),
                 Taken::Older(by_ns) => Some(older(what, by_ns)),
+                Taken::Full => Some(crowded(what)),
                 Taken::Newer | Taken::Refused | Taken::WentBack => None,
             };
             // Those that never change are said again by whoever starts anew.
-            let rivals = !fixed && taken != Taken::Refused && self.has_rivals(what.1, receipt);
-            let odd = mixed.filter(|_| taken != Taken::Refused).or(odd);
+            let is_in = !matches!(taken, Taken::Refused | Taken::Full);
+            let rivals = !fixed && is_in && self.tree.hear(what.1, receipt.from, receipt.now_ns);
+            let odd = mixed.filter(|_| is_in).or(odd);
             let odd = if rivals { Some(rivalry(what)) } else { odd };
             back |= taken == Taken::WentBack;
-            self.refused += u64::from(matches!(taken, Taken::Older(_) | Taken::Refused));
+            self.refused += u64::from(!matches!(taken, Taken::Newer | Taken::WentBack));
             self.tell(odd, receipt);
         }
+        let let_go = self.tree.take_let_go();
+        self.tell((let_go > 0).then(|| forgotten(let_go)), receipt);
         if back {
             self.members
                 .iter_mut()
@@ -327,12 +327,11 @@ impl Source {
             back = true;
         }
         let odd = off(("body", &member.name), stamp_ns, receipt, self.timeout_ns);
-        let plain = frame.strip_prefix('/').unwrap_or(frame);
         let mut result = sound(row.position, row.orientation).map(|_| row);
         member.fault = result
             .err()
             .map(|reason| format!("its pose is no pose: {reason}"));
-        if plain != self.root.0 {
+        if plain(frame) != plain(&self.root.0) {
             result = Err(RejectReason::BadChain);
             member.fault = Some(format!(
                 "its pose is in frame \"{frame}\", not in the scene's \"{}\": send it there, or use a source of type tf",

@@ -1,16 +1,20 @@
 //! The tree of `/tf`: links between frames, and the pose of a frame by its chain of links to the scene's frame.
 //!
-//! In: links as they come. Out: poses with the stamps of their chains, or why there is none. Pure.
+//! In: links as they come, frames of bodies. Out: poses with the stamps of their chains, or why there is none. Pure: no
+//! DDS beyond the names of publishers.
+
+mod room;
 
 use std::collections::BTreeMap;
 
+use ros2_client::Gid;
+
+use super::lines::Heard;
 use crate::limits::QUATERNION_NORM_TOLERANCE;
 use crate::math::{Pose, pose_from};
 use crate::wire::RejectReason;
 use crate::wire::ros::TransformStamped;
 
-/// Frames of one tree: a robot has some hundred; beyond it somebody invents names, and memory would grow.
-const FRAMES_MAX: usize = 1 << 16;
 /// Links of one chain; a longer one is as good as a loop.
 const CHAIN_MAX: usize = 256;
 
@@ -39,8 +43,10 @@ pub(super) enum Taken {
     Older(u64),
     /// It is so much older than the one that is there that time has gone back.
     WentBack,
-    /// A frame without a name, hung on itself, or one too many.
+    /// A frame without a name, or hung on itself.
     Refused,
+    /// A frame too many.
+    Full,
 }
 
 /// Where a frame is.
@@ -69,49 +75,98 @@ pub(super) enum Missing {
     Bad(String, RejectReason),
 }
 
+/// A frame that a body has or that was heard of.
+#[derive(Clone, Debug, Default)]
+struct Frame {
+    name: String,
+    link: Option<Link>,
+    /// Who sends its link.
+    heard: Heard,
+    /// How many bodies, and the scene, have it as theirs: it stays while there is one.
+    pins: usize,
+}
+
 /// The links that were heard.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tree {
     ids: BTreeMap<String, usize>,
-    names: Vec<String>,
-    links: Vec<Option<Link>>,
+    frames: Vec<Frame>,
+    /// Numbers of frames that have gone.
+    free: Vec<usize>,
+    /// Frames that bodies or the scene have.
+    pinned: usize,
+    /// Links refused since room was last made.
+    denied: usize,
+    /// Links that never change which had to go.
+    let_go: u64,
 }
 
 /// tf2 knows no slash in front; old senders write it.
-fn plain(frame: &str) -> &str {
+pub(super) fn plain(frame: &str) -> &str {
     frame.strip_prefix('/').unwrap_or(frame)
 }
 
 impl Tree {
-    /// The number of a frame, a new one if need be; `None`: one too many.
-    pub(super) fn id(&mut self, frame: &str) -> Option<usize> {
-        let frame = plain(frame);
+    /// The number of a frame that a body or the scene has. It is never refused, and stays until it is unpinned: the
+    /// scene bounds how many there are.
+    pub(super) fn pin(&mut self, frame: &str) -> usize {
+        let id = self.id(plain(frame));
+        if let Some(frame) = self.frames.get_mut(id) {
+            frame.pins += 1;
+            self.pinned += usize::from(frame.pins == 1);
+        }
+        id
+    }
+
+    /// A body that has this frame has left.
+    pub(super) fn unpin(&mut self, frame: usize) {
+        if let Some(frame) = self.frames.get_mut(frame).filter(|frame| frame.pins > 0) {
+            frame.pins -= 1;
+            self.pinned -= usize::from(frame.pins == 0);
+        }
+    }
+
+    /// The number of a frame, a new one if need be.
+    fn id(&mut self, frame: &str) -> usize {
         if let Some(&id) = self.ids.get(frame) {
-            return Some(id);
+            return id;
         }
-        if self.names.len() >= FRAMES_MAX {
-            return None;
+        let id = self.free.pop().unwrap_or(self.frames.len());
+        if id == self.frames.len() {
+            self.frames.push(Frame::default());
         }
-        let id = self.names.len();
+        if let Some(slot) = self.frames.get_mut(id) {
+            frame.clone_into(&mut slot.name);
+        }
         self.ids.insert(frame.to_owned(), id);
-        self.names.push(frame.to_owned());
-        self.links.push(None);
-        Some(id)
+        id
+    }
+
+    /// Takes who sent the link of a frame; whether another one sends it, too.
+    pub(super) fn hear(&mut self, child: &str, from: Gid, now_ns: u64) -> bool {
+        let id = self.ids.get(plain(child));
+        let frame = id.and_then(|id| self.frames.get_mut(*id));
+        frame.is_some_and(|frame| {
+            frame.heard.hear(from, now_ns);
+            frame.heard.are_two(now_ns)
+        })
     }
 
     /// Whether the link of a frame that is there is one that never changes, and this is none, or the other way round.
     pub(super) fn is_otherwise(&self, child: &str, fixed: bool) -> bool {
         let id = self.ids.get(plain(child));
-        let link = id.and_then(|id| self.links.get(*id)?.as_ref());
+        let link = id.and_then(|id| self.link(*id));
         link.is_some_and(|link| link.fixed != fixed)
+    }
+
+    fn link(&self, frame: usize) -> Option<&Link> {
+        self.frames.get(frame)?.link.as_ref()
     }
 
     /// Forgets every link that has an age.
     pub(super) fn forget(&mut self) {
-        for link in &mut self.links {
-            if link.as_ref().is_some_and(|link| !link.fixed) {
-                *link = None;
-            }
+        for frame in &mut self.frames {
+            frame.link.take_if(|link| !link.fixed);
         }
     }
 
@@ -125,16 +180,17 @@ impl Tree {
         received_ns: u64,
         back_ns: u64,
     ) -> Taken {
-        let (child, parent) = (&link.child_frame_id, &link.header.frame_id);
-        if plain(child).is_empty() || plain(parent).is_empty() || plain(child) == plain(parent) {
+        let (child, parent) = (plain(&link.child_frame_id), plain(&link.header.frame_id));
+        if child.is_empty() || parent.is_empty() || child == parent {
             return Taken::Refused;
         }
-        let (Some(child), Some(parent)) = (self.id(child), self.id(parent)) else {
-            return Taken::Refused;
-        };
+        if !self.has_room(child, parent) {
+            return Taken::Full;
+        }
+        let (child, parent) = (self.id(child), self.id(parent));
         let stamp_ns = link.header.stamp.to_ns();
         let mut taken = Taken::Newer;
-        if let Some(Some(old)) = self.links.get(child)
+        if let Some(old) = self.link(child)
             && !fixed
             && !old.fixed
             && stamp_ns < old.stamp_ns
@@ -156,8 +212,8 @@ impl Tree {
             received_ns,
             fixed,
         };
-        if let Some(slot) = self.links.get_mut(child) {
-            *slot = Some(new);
+        if let Some(frame) = self.frames.get_mut(child) {
+            frame.link = Some(new);
         }
         taken
     }
@@ -166,7 +222,10 @@ impl Tree {
     ///
     /// A single link is handed on as it came, so that its pose is bit by bit what the sender wrote.
     pub(super) fn find(&self, frame: usize, root: usize) -> Result<Found, Missing> {
-        let name = |at: usize| self.names.get(at).cloned().unwrap_or_default();
+        let name = |at: usize| {
+            let frame = self.frames.get(at);
+            frame.map(|frame| frame.name.clone()).unwrap_or_default()
+        };
         let (mut at, mut pose, mut single) = (frame, None::<Pose>, None);
         let (mut oldest, mut newest) = (u64::MAX, 0);
         let (mut earliest, mut latest) = (u64::MAX, 0);
@@ -177,7 +236,7 @@ impl Tree {
             if length == CHAIN_MAX {
                 return Err(Missing::Loop(name(at)));
             }
-            let Some(link) = self.links.get(at).and_then(Option::as_ref) else {
+            let Some(link) = self.link(at) else {
                 return Err(Missing::Frame(name(at)));
             };
             let Some(own) = link.pose else {
@@ -227,100 +286,4 @@ pub(super) fn sound(position: [f64; 3], orientation: [f64; 4]) -> Result<Pose, R
 }
 
 #[cfg(test)]
-mod tests {
-    #![allow(clippy::float_cmp, reason = "numbers are handed on bit by bit")]
-
-    use super::*;
-    use crate::wire::ros::{Header, Time, Transform};
-
-    const BACK_NS: u64 = 500;
-
-    fn link(parent: &str, child: &str, x: f64, stamp_ns: u64) -> TransformStamped {
-        let rotation = [0.0, 0.0, 0.5_f64.sqrt(), 0.5_f64.sqrt()].into();
-        TransformStamped {
-            header: Header {
-                stamp: Time::from_ns(stamp_ns),
-                frame_id: parent.to_owned(),
-            },
-            child_frame_id: child.to_owned(),
-            transform: Transform {
-                translation: [x, 0.0, 0.0].into(),
-                rotation,
-            },
-        }
-    }
-
-    fn find(tree: &mut Tree, frame: &str) -> Result<Found, Missing> {
-        let (frame, root) = (tree.id(frame).unwrap(), tree.id("world").unwrap());
-        tree.find(frame, root)
-    }
-
-    #[test]
-    fn a_chain_is_composed_and_its_stamps_are_compared() {
-        let mut tree = Tree::default();
-        tree.take(&link("/world", "base", 1.0, 100), false, 7, BACK_NS);
-        tree.take(&link("base", "tool", 2.0, 130), false, 8, BACK_NS);
-        tree.take(&link("tool", "tip", 0.0, 0), true, 9, BACK_NS);
-        let found = find(&mut tree, "tip").unwrap();
-        // A quarter turn at the base swings the tool to +y; three of them make the tip look back along -y.
-        let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
-        assert!(
-            near(found.position[0], 1.0) && near(found.position[1], 2.0),
-            "{found:?}"
-        );
-        assert_eq!((found.stamp_ns, found.skew_ns), (100, 30));
-        assert_eq!(found.received_ns, Some((8, 7)));
-    }
-
-    #[test]
-    fn a_single_link_is_handed_on_bit_by_bit() {
-        let mut tree = Tree::default();
-        let mut sent = link("world", "b", 0.1, 5);
-        sent.transform.rotation = [0.0, 0.0, 0.0, 1.000_001].into();
-        tree.take(&sent, false, 1, BACK_NS);
-        assert_eq!(
-            find(&mut tree, "b").unwrap().orientation,
-            [0.0, 0.0, 0.0, 1.000_001]
-        );
-    }
-
-    #[test]
-    fn loops_gaps_and_bad_numbers_are_told_apart() {
-        let mut tree = Tree::default();
-        tree.take(&link("a", "b", 0.0, 1), false, 1, BACK_NS);
-        assert_eq!(find(&mut tree, "b"), Err(Missing::Frame("a".to_owned())));
-        tree.take(&link("b", "a", 0.0, 1), false, 1, BACK_NS);
-        assert!(matches!(find(&mut tree, "b"), Err(Missing::Loop(_))));
-        let mut zero = link("world", "a", 0.0, 2);
-        zero.transform.rotation = [0.0; 4].into();
-        tree.take(&zero, false, 1, BACK_NS);
-        let bad = Missing::Bad("a".to_owned(), RejectReason::BadQuaternion);
-        assert_eq!(find(&mut tree, "b"), Err(bad));
-        assert_eq!(
-            tree.take(&link("a", "a", 0.0, 1), false, 1, BACK_NS),
-            Taken::Refused
-        );
-        assert_eq!(
-            tree.take(&link("", "x", 0.0, 1), false, 1, BACK_NS),
-            Taken::Refused
-        );
-    }
-
-    #[test]
-    fn an_older_link_is_passed_over_and_a_much_older_one_turns_time_back() {
-        let mut tree = Tree::default();
-        tree.take(&link("world", "a", 1.0, 2000), false, 1, BACK_NS);
-        tree.take(&link("world", "b", 1.0, 2000), false, 1, BACK_NS);
-        assert_eq!(
-            tree.take(&link("world", "a", 2.0, 1900), false, 2, BACK_NS),
-            Taken::Older(100)
-        );
-        assert_eq!(find(&mut tree, "a").unwrap().position[0], 1.0);
-        assert_eq!(
-            tree.take(&link("world", "a", 3.0, 100), false, 3, BACK_NS),
-            Taken::WentBack
-        );
-        assert_eq!(find(&mut tree, "a").unwrap().position[0], 3.0);
-        assert_eq!(find(&mut tree, "b"), Err(Missing::Frame("b".to_owned())));
-    }
-}
+mod tests;

@@ -2,15 +2,15 @@
 
 use super::super::RosScene;
 use super::super::poses::{Receipt, off};
-use super::super::tf::sound;
+use super::super::tf::{plain, sound};
 use crate::limits::FRAME_ROWS_MAX;
 use crate::wire::ros::{BodyTransform, BodyTransforms, Book, Twist};
 use crate::wire::{Frame, FrameHeader, RejectReason, TransformRow, WIRE_VERSION, name_bytes};
 
 /// What is wrong with a frame that is not in the scene's frame.
 pub(super) fn foreign(message: &BodyTransforms, frame_id: &str) -> Option<String> {
-    let given = message.header.frame_id.trim_start_matches('/');
-    (!given.is_empty() && given != frame_id).then(|| {
+    let given = plain(&message.header.frame_id);
+    (!given.is_empty() && given != plain(frame_id)).then(|| {
         format!(
             "frames of source {} are in \"{given}\", not in the scene's frame \"{frame_id}\": they are refused",
             message.source

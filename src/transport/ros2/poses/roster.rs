@@ -9,7 +9,7 @@ impl Member {
         Self {
             body: body.id,
             name: body.name.clone(),
-            frame: tree.id(&body.frame).unwrap_or_default(),
+            frame: tree.pin(&body.frame),
             topic: body.topic.clone(),
             stamp_ns: 0,
             last: None,
@@ -40,6 +40,7 @@ impl Source {
         member.body = NOBODY;
         member.fault = None;
         member.last = None;
+        self.tree.unpin(member.frame);
         Some(place)
     }
 

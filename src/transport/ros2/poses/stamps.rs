@@ -2,7 +2,6 @@
 //!
 //! Stamps are carried and never trusted for ages (law 4.8), so none of this changes a pose; whoever sends them is told.
 
-use super::super::lines::Heard;
 use super::{Receipt, Source, seconds};
 
 /// How long something that passes is told of, nanoseconds: as long as it takes a person to look.
@@ -18,20 +17,6 @@ impl Source {
         }
     }
 
-    /// Takes who sent the link of a frame; whether another one sends it, too.
-    pub(super) fn has_rivals(&mut self, frame: &str, receipt: Receipt) -> bool {
-        let Some(frame) = self.tree.id(frame) else {
-            return false;
-        };
-        if self.heard.len() <= frame {
-            self.heard.resize(frame + 1, Heard::default());
-        }
-        self.heard.get_mut(frame).is_some_and(|heard| {
-            heard.hear(receipt.from, receipt.now_ns);
-            heard.are_two(receipt.now_ns)
-        })
-    }
-
     /// What was wrong with stamps a moment ago.
     pub(super) fn passing(&self, now_ns: u64) -> Option<String> {
         let fresh = |(_, at): &&(String, u64)| now_ns.saturating_sub(*at) < TOLD_NS;
@@ -44,6 +29,20 @@ impl Source {
 pub(super) fn both((kind, name): (&str, &str)) -> String {
     format!(
         "{kind} {name}: its link comes on the topic of fixed links and on that of others, and the last one counts: leave one out"
+    )
+}
+
+/// There is no room for a frame.
+pub(super) fn crowded((kind, name): (&str, &str)) -> String {
+    format!(
+        "{kind} {name}: its link is refused, because the links on its topic name too many frames: give this source a topic of its own"
+    )
+}
+
+/// Links that never change had to go.
+pub(super) fn forgotten(count: u64) -> String {
+    format!(
+        "{count} links that never change are forgotten, because they are too many: give this source a topic of its own"
     )
 }
 

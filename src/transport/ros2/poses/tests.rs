@@ -245,3 +245,27 @@ fn a_frame_that_two_publishers_link_is_told_and_a_sender_that_starts_anew_is_not
     one.take_links(&link("world", "tool", 5000 * MS), false, from(2, 5000 * MS));
     assert!(!told(&one, 5000 * MS), "the other has stopped");
 }
+
+#[test]
+fn bug_a_body_that_is_put_after_frames_without_end_is_not_at_the_scenes_origin() {
+    let mut one = tf("tool");
+    for n in 0..70_000 {
+        let seen = link("camera", &format!("seen_{n}"), MS);
+        one.take_links(&seen, false, at(MS));
+    }
+    let late = BodyNote {
+        id: 2,
+        name: "late".to_owned(),
+        source: Some(0),
+        frame: "late".to_owned(),
+        topic: String::new(),
+        bounds: None,
+    };
+    one.put_body(&late);
+    assert!(look(&mut one, 2 * MS).is_empty(), "nobody has said where");
+    let told = one.faults(9, 2 * MS);
+    assert!(told[1].contains("no link from frame \"late\""), "{told:?}");
+    one.take_links(&link("world", "late", 3 * MS), false, at(3 * MS));
+    let said = look(&mut one, 3 * MS);
+    assert_eq!(said[0].result.unwrap().position, [1.0, 0.0, 0.0]);
+}

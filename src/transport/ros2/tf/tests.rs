@@ -1,0 +1,173 @@
+//! Chains, their faults, and what becomes of frames that nobody needs.
+
+#![allow(clippy::float_cmp, reason = "numbers are handed on bit by bit")]
+
+use super::room::FRAMES_MAX;
+use super::*;
+use crate::wire::ros::{Header, Time, Transform};
+
+const BACK_NS: u64 = 500;
+
+fn link(parent: &str, child: &str, x: f64, stamp_ns: u64) -> TransformStamped {
+    let rotation = [0.0, 0.0, 0.5_f64.sqrt(), 0.5_f64.sqrt()].into();
+    TransformStamped {
+        header: Header {
+            stamp: Time::from_ns(stamp_ns),
+            frame_id: parent.to_owned(),
+        },
+        child_frame_id: child.to_owned(),
+        transform: Transform {
+            translation: [x, 0.0, 0.0].into(),
+            rotation,
+        },
+    }
+}
+
+fn find(tree: &mut Tree, frame: &str) -> Result<Found, Missing> {
+    let (frame, root) = (tree.pin(frame), tree.pin("world"));
+    tree.find(frame, root)
+}
+
+#[test]
+fn a_chain_is_composed_and_its_stamps_are_compared() {
+    let mut tree = Tree::default();
+    tree.take(&link("/world", "base", 1.0, 100), false, 7, BACK_NS);
+    tree.take(&link("base", "tool", 2.0, 130), false, 8, BACK_NS);
+    tree.take(&link("tool", "tip", 0.0, 0), true, 9, BACK_NS);
+    let found = find(&mut tree, "tip").unwrap();
+    // A quarter turn at the base swings the tool to +y; three of them make the tip look back along -y.
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+    assert!(
+        near(found.position[0], 1.0) && near(found.position[1], 2.0),
+        "{found:?}"
+    );
+    assert_eq!((found.stamp_ns, found.skew_ns), (100, 30));
+    assert_eq!(found.received_ns, Some((8, 7)));
+}
+
+#[test]
+fn a_single_link_is_handed_on_bit_by_bit() {
+    let mut tree = Tree::default();
+    let mut sent = link("world", "b", 0.1, 5);
+    sent.transform.rotation = [0.0, 0.0, 0.0, 1.000_001].into();
+    tree.take(&sent, false, 1, BACK_NS);
+    assert_eq!(
+        find(&mut tree, "b").unwrap().orientation,
+        [0.0, 0.0, 0.0, 1.000_001]
+    );
+}
+
+#[test]
+fn loops_gaps_and_bad_numbers_are_told_apart() {
+    let mut tree = Tree::default();
+    tree.take(&link("a", "b", 0.0, 1), false, 1, BACK_NS);
+    assert_eq!(find(&mut tree, "b"), Err(Missing::Frame("a".to_owned())));
+    tree.take(&link("b", "a", 0.0, 1), false, 1, BACK_NS);
+    assert!(matches!(find(&mut tree, "b"), Err(Missing::Loop(_))));
+    let mut zero = link("world", "a", 0.0, 2);
+    zero.transform.rotation = [0.0; 4].into();
+    tree.take(&zero, false, 1, BACK_NS);
+    let bad = Missing::Bad("a".to_owned(), RejectReason::BadQuaternion);
+    assert_eq!(find(&mut tree, "b"), Err(bad));
+    assert_eq!(
+        tree.take(&link("a", "a", 0.0, 1), false, 1, BACK_NS),
+        Taken::Refused
+    );
+    assert_eq!(
+        tree.take(&link("", "x", 0.0, 1), false, 1, BACK_NS),
+        Taken::Refused
+    );
+}
+
+#[test]
+fn an_older_link_is_passed_over_and_a_much_older_one_turns_time_back() {
+    let mut tree = Tree::default();
+    tree.take(&link("world", "a", 1.0, 2000), false, 1, BACK_NS);
+    tree.take(&link("world", "b", 1.0, 2000), false, 1, BACK_NS);
+    assert_eq!(
+        tree.take(&link("world", "a", 2.0, 1900), false, 2, BACK_NS),
+        Taken::Older(100)
+    );
+    assert_eq!(find(&mut tree, "a").unwrap().position[0], 1.0);
+    assert_eq!(
+        tree.take(&link("world", "a", 3.0, 100), false, 3, BACK_NS),
+        Taken::WentBack
+    );
+    assert_eq!(find(&mut tree, "a").unwrap().position[0], 3.0);
+    assert_eq!(find(&mut tree, "b"), Err(Missing::Frame("b".to_owned())));
+}
+
+#[test]
+fn bug_frames_without_end_leave_room_for_those_of_bodies() {
+    let mut tree = Tree::default();
+    tree.pin("world");
+    let tool = tree.pin("tool");
+    tree.take(&link("world", "plate", 1.0, 0), true, 1, BACK_NS);
+    for n in 0..2 * FRAMES_MAX {
+        let taken = tree.take(
+            &link("camera", &format!("seen_{n}"), 0.0, 1),
+            false,
+            1,
+            BACK_NS,
+        );
+        assert_eq!(taken, Taken::Newer, "{n}");
+    }
+    // What hangs on a body's chain, and what is said once, has stayed or finds room; and no frame is another's.
+    tree.take(&link("plate", "arm", 1.0, 5), false, 1, BACK_NS);
+    tree.take(&link("arm", "tool", 1.0, 5), false, 1, BACK_NS);
+    assert!(find(&mut tree, "tool").is_ok());
+    assert_eq!(tree.pin("tool"), tool);
+    let late = find(&mut tree, "late");
+    assert_eq!(late, Err(Missing::Frame("late".to_owned())));
+    assert_eq!(tree.take_let_go(), 0);
+}
+
+#[test]
+fn bug_every_body_of_a_large_scene_has_a_frame_of_its_own() {
+    let mut tree = Tree::default();
+    let ids: Vec<usize> = (0..FRAMES_MAX + 9)
+        .map(|n| tree.pin(&format!("f{n}")))
+        .collect();
+    assert!(ids.windows(2).all(|two| two[0] < two[1]));
+    let taken = tree.take(&link("f1", "other", 0.0, 1), false, 1, BACK_NS);
+    assert_eq!(taken, Taken::Newer);
+}
+
+#[test]
+fn links_that_never_change_go_only_where_they_alone_are_too_many_and_that_is_counted() {
+    let mut tree = Tree::default();
+    tree.take(&link("world", "tool", 1.0, 0), true, 1, BACK_NS);
+    tree.pin("tool");
+    for n in 0..FRAMES_MAX + 9 {
+        tree.take(&link("map", &format!("tag_{n}"), 0.0, 0), true, 1, BACK_NS);
+    }
+    assert!(tree.take_let_go() > 0);
+    assert!(find(&mut tree, "tool").is_ok());
+}
+
+#[test]
+fn frames_that_all_hang_on_one_body_are_refused_when_they_are_too_many() {
+    let mut tree = Tree::default();
+    tree.pin("up_0");
+    for n in 0..=FRAMES_MAX {
+        let (child, parent) = (format!("up_{n}"), format!("up_{}", n + 1));
+        let taken = tree.take(&link(&parent, &child, 0.0, 1), false, 1, BACK_NS);
+        let wanted = if n < FRAMES_MAX {
+            Taken::Newer
+        } else {
+            Taken::Full
+        };
+        assert_eq!(taken, wanted, "{n}");
+    }
+}
+
+#[test]
+fn a_frame_that_no_body_has_any_more_makes_room() {
+    let mut tree = Tree::default();
+    for n in 0..2 * FRAMES_MAX {
+        let frame = tree.pin(&format!("f{n}"));
+        tree.unpin(frame);
+    }
+    tree.take(&link("world", "a", 0.0, 1), false, 1, BACK_NS);
+    assert!(find(&mut tree, "a").is_ok());
+}
