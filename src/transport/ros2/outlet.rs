@@ -1,8 +1,9 @@
 //! The sending thread (`ros-tx`): turns parcels into messages and publishes them, the tick last.
 //!
-//! In: parcels of the tick thread. Out: topics; who listens to them. A message that DDS does not take at once is
-//! counted, not waited for.
+//! In: parcels of the tick thread. Out: topics; who listens to them. A message that DDS does not take at once is held
+//! while it may be taken soon, and counted where it is lost; this thread does not wait for it.
 
+mod owed;
 mod publishers;
 
 use std::sync::Arc;
@@ -25,7 +26,7 @@ use super::services::open;
 use super::shared::{Say, Shared};
 use super::stamp::stamp_of;
 use super::strangers::Strangers;
-use super::wheel::{Sent, Wheel};
+use super::wheel::{Means, Sent, Wheel};
 use crate::config::RosKind;
 use crate::error::Error;
 use crate::time::{Clock as _, SystemClock};
@@ -35,6 +36,8 @@ use crate::wire::{Demand, NameRow, TickRow};
 
 /// Longest sleep: how soon a new reader is noticed.
 const SLEEP: Duration = Duration::from_millis(100);
+/// As [`SLEEP`], while a writer has not taken all: how late at most a message is that was held.
+const SLEEP_HOLDING: Duration = Duration::from_millis(5);
 /// Between two messages of diagnostics, nanoseconds: what `/diagnostics` is read at.
 const DIAGNOSTICS_NS: u64 = 1_000_000_000;
 /// The sending thread's own things.
@@ -93,7 +96,9 @@ impl Outlet {
             for text in self.namesakes.look().into_iter().chain(strange) {
                 self.shared.say(Say::Warn, &text);
             }
-            match self.parcels.next(SLEEP) {
+            let holds = self.hand_over();
+            let sleep = if holds { SLEEP_HOLDING } else { SLEEP };
+            match self.parcels.next(sleep) {
                 Next::Stop => break,
                 Next::Nothing => {}
                 Next::Parcel(parcel, names) => {
@@ -102,8 +107,9 @@ impl Outlet {
                     }
                     let now = self.shared.now();
                     self.speaker.stamp = Some(stamp_of(&parcel.tick, now));
-                    self.send(&parcel);
+                    self.send_rows(&parcel);
                     self.show(&parcel);
+                    self.send_tick(&parcel);
                     self.told.0 = parcel.tick;
                     self.parcels.give_back(*parcel);
                 }
@@ -149,7 +155,7 @@ impl Outlet {
         let reliable = self.shared.reliable();
         self.publishers
             .set_reliable(&mut self.node, &self.context, reliable);
-        self.readers.hear();
+        self.readers.hear(SystemClock.boottime_ns());
         let (out, readers) = (&self.publishers, &self.readers);
         let markers = self.shared.markers_period_ns().is_some() && out.markers.is_read(readers);
         let collisions = self.shared.collisions() && out.collisions.is_read(readers);
@@ -170,6 +176,21 @@ impl Outlet {
         });
     }
 
+    /// Publishes what writers have not taken; whether there is still some.
+    fn hand_over(&mut self) -> bool {
+        let out = &mut self.publishers;
+        self.shared.note_unsent(out.names.hand_over());
+        let readers = &mut self.readers;
+        let mut pen = Pen::of(&mut self.node, &self.context, &self.shared, readers);
+        pen.flush(&mut out.contacts);
+        pen.flush(&mut out.pairs);
+        pen.flush(&mut out.collisions);
+        pen.flush(&mut out.markers);
+        pen.flush(&mut out.state);
+        pen.flush(&mut out.tick);
+        out.hold()
+    }
+
     /// Markers at their own rate, collisions each tick; where somebody listens.
     fn show(&mut self, parcel: &Parcel) {
         let readers = &mut self.readers;
@@ -184,9 +205,10 @@ impl Outlet {
         let Some(period_ns) = self.shared.markers_period_ns() else {
             return;
         };
-        let due = pen.now_ns.saturating_sub(self.shown_ns) >= period_ns;
+        let now_ns = pen.means.now_ns;
+        let due = now_ns.saturating_sub(self.shown_ns) >= period_ns;
         if self.read.markers && parcel.holds.bodies && due {
-            self.shown_ns = pen.now_ns;
+            self.shown_ns = now_ns;
             let message = markers(&self.speaker, parcel, &self.boxes, period_ns);
             pen.write(&mut self.publishers.markers, message);
         }
@@ -234,13 +256,12 @@ impl Outlet {
         self.boxes.retain(|id, _| book.holds(*id));
         self.speaker.book = book;
         let now = self.shared.now();
-        for message in self.speaker.names(now, self.boot_id, scene_rev) {
-            self.publish(&self.publishers.names, message);
-        }
+        let messages = self.speaker.names(now, self.boot_id, scene_rev);
+        self.shared.note_unsent(self.publishers.names.say(messages));
     }
 
-    /// Contacts and pairs first, the tick last: whoever has the tick has all that belongs to it.
-    fn send(&mut self, parcel: &Parcel) {
+    /// Contacts and pairs.
+    fn send_rows(&mut self, parcel: &Parcel) {
         let out = &mut self.publishers;
         let readers = &mut self.readers;
         let mut pen = Pen::of(&mut self.node, &self.context, &self.shared, readers);
@@ -257,9 +278,16 @@ impl Outlet {
                 pen.write(&mut out.pairs, message);
             }
         }
+    }
+
+    /// The tick, last: whoever has it has all that belongs to it.
+    fn send_tick(&mut self, parcel: &Parcel) {
         if !self.read.ticks {
             return;
         }
+        let out = &mut self.publishers;
+        let readers = &mut self.readers;
+        let mut pen = Pen::of(&mut self.node, &self.context, &self.shared, readers);
         pen.write(&mut out.state, self.speaker.state(&parcel.tick));
         let tick = self.speaker.tick(&parcel.tick, self.shared.counts());
         pen.write(&mut out.tick, tick);
@@ -272,13 +300,10 @@ impl Outlet {
     }
 }
 
-/// What it takes to publish on a [`Wheel`].
+/// Publishes on a [`Wheel`], and counts what is lost.
 struct Pen<'a> {
-    node: &'a mut Node,
-    context: &'a Context,
+    means: Means<'a>,
     shared: &'a Shared,
-    readers: &'a mut Readers,
-    now_ns: u64,
 }
 
 impl<'a> Pen<'a> {
@@ -288,25 +313,29 @@ impl<'a> Pen<'a> {
         shared: &'a Shared,
         readers: &'a mut Readers,
     ) -> Self {
-        Self {
+        let means = Means {
             node,
             context,
-            shared,
             readers,
             now_ns: SystemClock.boottime_ns(),
-        }
+        };
+        Self { means, shared }
     }
 
     fn write<M: Serialize>(&mut self, to: &mut Wheel<M>, message: M) {
-        match to.publish(self.node, self.context, message, self.now_ns) {
-            Sent::Yes => {}
-            Sent::Turned { given_up, gone } => {
-                tracing::debug!("ROS 2: a reader does not acknowledge; a new writer goes on");
-                self.shared.note_unsent(given_up);
-                gone.into_iter()
-                    .for_each(|writer| self.readers.forget(writer));
-            }
-            Sent::No => self.shared.note_unsent(1),
+        let sent = to.publish(message, &mut self.means);
+        self.note(sent);
+    }
+
+    fn flush<M: Serialize>(&mut self, to: &mut Wheel<M>) {
+        let sent = to.flush(&mut self.means);
+        self.note(sent);
+    }
+
+    fn note(&self, sent: Sent) {
+        if sent.turned {
+            tracing::debug!("ROS 2: a reader does not acknowledge; a new writer goes on");
         }
+        self.shared.note_unsent(sent.lost + sent.given_up);
     }
 }

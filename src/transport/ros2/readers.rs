@@ -14,7 +14,15 @@ use serde::Serialize;
 /// Readers of each writer.
 pub(super) struct Readers {
     listener: DomainParticipantStatusListener,
-    of: BTreeMap<GUID, BTreeSet<GUID>>,
+    of: BTreeMap<GUID, Matched>,
+}
+
+/// Readers of one writer.
+#[derive(Default)]
+struct Matched {
+    readers: BTreeSet<GUID>,
+    /// When the last one came, nanoseconds of `CLOCK_BOOTTIME`.
+    newest_ns: u64,
 }
 
 impl Readers {
@@ -27,17 +35,18 @@ impl Readers {
     }
 
     /// Takes what DDS has said since the last call.
-    pub(super) fn hear(&mut self) {
+    ///
+    /// * `now_ns` - nanoseconds of `CLOCK_BOOTTIME`.
+    pub(super) fn hear(&mut self, now_ns: u64) {
         while let Some(event) = self.listener.try_recv_status() {
             match event {
                 DomainParticipantStatusEvent::RemoteReaderMatched {
                     local_writer,
                     remote_reader,
                 } => {
-                    self.of
-                        .entry(local_writer)
-                        .or_default()
-                        .insert(remote_reader);
+                    let matched = self.of.entry(local_writer).or_default();
+                    matched.readers.insert(remote_reader);
+                    matched.newest_ns = now_ns;
                 }
                 DomainParticipantStatusEvent::ReaderLost { guid, .. } => {
                     self.lose(|reader| *reader == guid);
@@ -57,14 +66,34 @@ impl Readers {
     }
 
     fn lose(&mut self, gone: impl Fn(&GUID) -> bool) {
-        self.of.retain(|_, readers| {
-            readers.retain(|reader| !gone(reader));
-            !readers.is_empty()
+        self.of.retain(|_, matched| {
+            matched.readers.retain(|reader| !gone(reader));
+            !matched.readers.is_empty()
         });
     }
 
     /// How many read this writer, as of the last [`Self::hear`].
     pub(super) fn count<M: Serialize>(&self, writer: &Publisher<M>) -> usize {
-        self.of.get(&writer.guid()).map_or(0, BTreeSet::len)
+        let matched = self.of.get(&writer.guid());
+        matched.map_or(0, |matched| matched.readers.len())
+    }
+
+    /// When the last of those came that read this writer, nanoseconds of `CLOCK_BOOTTIME`; 0: there are none.
+    pub(super) fn newest_ns<M: Serialize>(&self, writer: &Publisher<M>) -> u64 {
+        let matched = self.of.get(&writer.guid());
+        matched.map_or(0, |matched| matched.newest_ns)
+    }
+
+    /// Whether a writer has all the readers of another one.
+    pub(super) fn has_those_of<M: Serialize>(
+        &self,
+        writer: &Publisher<M>,
+        other: &Publisher<M>,
+    ) -> bool {
+        let Some(wanted) = self.of.get(&other.guid()) else {
+            return true;
+        };
+        let own = self.of.get(&writer.guid());
+        own.is_some_and(|own| own.readers.is_superset(&wanted.readers))
     }
 }

@@ -7,6 +7,7 @@ use ros2_client::{Context, Node, Publisher};
 use super::super::names::Names;
 use super::super::topics::{Out, publisher};
 use super::super::wheel::Wheel;
+use super::owed::Owed;
 use crate::error::{Error, Result};
 use crate::wire::ros;
 
@@ -15,6 +16,7 @@ const NAMES_DEPTH: usize = 64;
 /// Bytes of a state, of a tick, and of each of its sources: a reader that has stopped may hold 16 thousand states and,
 /// of a scene with one source, 8 thousand ticks, which is 20 s at 400 Hz, and its lease has ended. So these topics keep
 /// one writer, as watchers of a node expect; only above 400 Hz, and only beside a stopped reader, does a new one go on.
+/// A reader that comes later holds them up until it has caught up, for which their messages wait.
 const STATE_BYTES: usize = 512;
 /// As [`STATE_BYTES`].
 const TICK_BYTES: usize = 832;
@@ -29,7 +31,7 @@ pub(in super::super) struct Publishers {
     pub(super) tick: Wheel<ros::Tick>,
     pub(super) pairs: Wheel<ros::Pairs>,
     pub(super) contacts: Wheel<ros::Contacts>,
-    pub(super) names: Publisher<ros::Names>,
+    pub(super) names: Owed<ros::Names>,
     pub(super) diagnostics: Publisher<ros::DiagnosticArray>,
     pub(super) markers: Wheel<ros::MarkerArray>,
     pub(super) collisions: Wheel<ros::GzContacts>,
@@ -82,12 +84,12 @@ impl Publishers {
                 (&claim("~/pairs")?, ("sweepd_msgs", "Pairs")),
                 large,
             )?,
-            names: publisher(
+            names: Owed::of(publisher(
                 node,
                 context,
                 (&claim("~/names")?, ("sweepd_msgs", "Names")),
                 latched,
-            )?,
+            )?),
             markers: Wheel::new(
                 node,
                 context,
@@ -128,6 +130,13 @@ impl Publishers {
                 watched(TICK_BYTES + sources_len * SOURCE_BYTES),
             )?,
         })
+    }
+
+    /// Whether a writer has not taken all.
+    pub(super) fn hold(&self) -> bool {
+        let rows = self.contacts.holds() || self.pairs.holds();
+        let shown = self.collisions.holds() || self.markers.holds();
+        rows || shown || self.state.holds() || self.tick.holds() || self.names.holds()
     }
 
     /// Sets whether pairs and contacts that were lost are sent again.
