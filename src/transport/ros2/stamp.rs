@@ -1,26 +1,35 @@
-//! What `header.stamp` says: the oldest pose on the node's clock. In: a tick. Out: a time that goes with `/tf`.
+//! What `header.stamp` says: the oldest pose in use on the node's clock. In: a tick. Out: a time that goes with `/tf`.
 //!
 //! Sources may stamp on clocks of their own: a simulator's seconds since its start are no time that a ROS 2 program
-//! could look a transform up for.
+//! could look a transform up for. And one that has fallen silent must not hold the time of the others back for ever.
 
-use crate::wire::TickRow;
 use crate::wire::ros::Time;
+use crate::wire::{Reason, TickRow};
 
-/// The oldest stamp of sources on the node's clock; the node's time where none has any.
+/// Why a body's last pose may be in use though it is none of now.
+const OLD: [Reason; 4] = [
+    Reason::Stale,
+    Reason::Held,
+    Reason::RemovedByAge,
+    Reason::Rejected,
+];
+
+/// The oldest stamp of live sources on the node's clock; the node's time where none has any.
 ///
 /// On the node's clock are sources that name no other: their frames have `clock_id` 0.
 pub(super) fn stamp_of(row: &TickRow, now: Time) -> Time {
     let rows = row.sources.iter().take(usize::from(row.sources_len));
-    let (mut oldest_ns, mut all_ours) = (None, true);
+    let is_old = OLD.iter().any(|reason| row.reasons & reason.bit() != 0);
+    let (mut oldest_ns, mut all_ours) = (None, !is_old);
     for row in rows.filter(|row| row.stamp_ns != 0) {
-        let ours = row.clock_id == 0;
+        let ours = row.clock_id == 0 && row.alive != 0;
         all_ours &= ours;
         if ours {
             oldest_ns = Some(oldest_ns.unwrap_or(u64::MAX).min(row.stamp_ns));
         }
     }
-    // Where no other clock is about, the tick's own word holds bodies that are older than their source's newest frame,
-    // and none whose poses are void.
+    // Where no other clock is about and nobody is silent, the tick's own word holds bodies that are older than their
+    // source's newest frame, and none whose poses are void.
     let stamp_ns = if all_ours {
         Some(row.header.oldest_stamp_ns).filter(|ns| *ns != 0)
     } else {
@@ -39,7 +48,7 @@ mod tests {
         row.header.oldest_stamp_ns = oldest_stamp_ns;
         row.sources_len = u8::try_from(sources.len()).unwrap();
         for (to, &(stamp_ns, clock_id)) in row.sources.iter_mut().zip(sources) {
-            (to.stamp_ns, to.clock_id) = (stamp_ns, clock_id);
+            (to.stamp_ns, to.clock_id, to.alive) = (stamp_ns, clock_id, 1);
         }
         row
     }
@@ -57,5 +66,22 @@ mod tests {
         assert_eq!(stamp(&row(&[(5, 1)], 5)), 900);
         assert_eq!(stamp(&row(&[(0, 0)], 0)), 900);
         assert_eq!(stamp(&row(&[], 0)), 900);
+    }
+
+    #[test]
+    fn bug_a_silent_source_or_body_does_not_hold_the_stamp_back() {
+        let stamp = |row: &TickRow| stamp_of(row, Time::from_ns(900)).to_ns();
+        let mut two = row(&[(100, 0), (800, 0)], 100);
+        two.sources[0].alive = 0;
+        assert_eq!(stamp(&two), 800);
+        two.sources[1].alive = 0;
+        assert_eq!(stamp(&two), 900);
+        // A source lives, and one of its bodies does not.
+        for reason in [Reason::Stale, Reason::Held, Reason::Rejected] {
+            let mut one = row(&[(800, 0)], 100);
+            assert_eq!(stamp(&one), 100);
+            one.reasons = reason.bit();
+            assert_eq!(stamp(&one), 800);
+        }
     }
 }
