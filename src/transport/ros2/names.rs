@@ -75,6 +75,11 @@ impl Names {
         }
     }
 
+    /// Gives a full name back: its thing is no more.
+    pub fn release(&mut self, full: &str) {
+        self.taken.remove(full);
+    }
+
     /// The full name after expansion and remaps.
     ///
     /// # Errors

@@ -22,7 +22,7 @@ use super::lines::subscribe;
 use super::markers::Boxes;
 use super::names::Names;
 use super::namesakes::Namesakes;
-use super::outlet::{Outlet, Publishers, Read};
+use super::outlet::{Outlet, Publishers, Read, Topics};
 use super::params::{Answers, Table};
 use super::parcel::Parcels;
 use super::poses::Source;
@@ -159,6 +159,7 @@ impl RosNode {
             readers,
             read: Read::default(),
             namesakes,
+            topics: Topics::of(scene, &names),
             names: names.clone(),
             sources: scene.sources.clone(),
         };

@@ -3,12 +3,14 @@
 //! In: parcels of the tick thread. Out: topics; who listens to them. A message that DDS does not take at once is held
 //! while it may be taken soon, and counted where it is lost; this thread does not wait for it.
 
+mod heard;
 mod owed;
 mod publishers;
 
 use std::sync::Arc;
 use std::time::Duration;
 
+pub(super) use heard::Topics;
 pub(super) use publishers::Publishers;
 use ros2_client::{Context, Node, Publisher};
 use serde::Serialize;
@@ -66,6 +68,8 @@ pub(super) struct Outlet {
     pub(super) namesakes: Namesakes,
     /// Makes full names of the topics of bodies that come.
     pub(super) names: Names,
+    /// The topics of bodies.
+    pub(super) topics: Topics,
     pub(super) sources: Vec<RosSourceSpec>,
 }
 
@@ -121,6 +125,10 @@ impl Outlet {
     fn follow_edits(&mut self) {
         let changes = std::mem::take(&mut *open(&self.shared.changes));
         for change in changes {
+            let (BodyChange::Put(BodyNote { name, .. }) | BodyChange::Removed(name)) = &change;
+            if let Some(topic) = self.topics.remove(name, &mut self.names) {
+                self.strangers.part(&topic);
+            }
             let line = match &change {
                 BodyChange::Put(body) => self.meet(body),
                 BodyChange::Removed(_) => None,
@@ -139,7 +147,10 @@ impl Outlet {
         if kind == RosKind::Tf {
             return None;
         }
-        let topic = self.names.claim(&body.topic).map_err(Error::Usage);
+        let topic = self
+            .topics
+            .put(&body.name, &body.topic, &mut self.names)
+            .map_err(Error::Usage);
         if let Ok(topic) = &topic {
             self.strangers.meet(topic, kind);
         }

@@ -87,6 +87,11 @@ impl Strangers {
         self.own.insert(format!("rt{topic}"), kind);
     }
 
+    /// The topic of a body that has left, by its full name, is nothing to this node any more.
+    pub(super) fn part(&mut self, topic: &str) {
+        self.own.remove(&format!("rt{topic}"));
+    }
+
     /// What is so now.
     pub(super) fn found(&self) -> &[String] {
         &self.found
