@@ -11,8 +11,8 @@ use crate::error::{Error, Result};
 use crate::transport::BodyChange;
 use crate::wire::ros::{BodyTransforms, Clock, Odometry, PoseStamped, TfMessage};
 
-/// Frames of a client. Lockstep wants each of them, and best effort takes them from reliable senders and from others; one
-/// that is lost is counted as skipped, by its number, and would come too late if it was sent again.
+/// Frames of a client. Lockstep wants each of them, and best effort takes them from reliable senders and from others;
+/// one that is lost is counted as skipped, by its number, and would come too late if it was sent again.
 const FRAMES: In = In {
     reliable: false,
     latched: false,

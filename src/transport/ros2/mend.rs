@@ -12,8 +12,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use super::services::open;
-use super::{RosNode, RosScene};
+use super::{RosNode, RosScene, open};
 use crate::error::{Error, Result};
 use crate::time::Clock;
 use crate::transport::{BodyChange, Door, RequestToken, Setting, Wake};

@@ -41,8 +41,15 @@ pub use mend::{LastingNode, Opener};
 pub use node::{RosNode, RosOptions};
 pub use params::Kept;
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use super::{BodyChange, BodyNote};
 use crate::config::{Config, RosSource};
+
+/// Takes a lock. One whose holder panicked has whole values still, because each change is one move; the panic is told.
+fn open<T>(lock: &Mutex<T>) -> MutexGuard<'_, T> {
+    lock.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// What the node needs to know of a scene.
 #[derive(Clone, Debug, Default)]

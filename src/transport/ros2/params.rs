@@ -18,8 +18,8 @@ use rules::{count, some_ns};
 use specs::{Spec, When, all};
 
 use super::RosScene;
+use super::open;
 use super::params_file::{Setting as Said, Value};
-use super::services::open;
 use crate::config::Mode;
 use crate::transport::Setting;
 

@@ -2,9 +2,10 @@
 //! In: an outbox. Out: parcels, the newest kept. No allocation once a parcel has been at its largest.
 
 use std::collections::VecDeque;
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
+use super::open;
 use crate::wire::{
     BodyRow, ContactRow, Demand, Event, MessageHeader, NameRow, Outbox, PairRow, Reason, State,
     TickRow, Verdict, pair_flags,
@@ -179,10 +180,6 @@ pub(super) enum Next {
 }
 
 impl Parcels {
-    fn open(&self) -> MutexGuard<'_, Line> {
-        self.line.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Puts a tick into the queue; the oldest gives way.
     ///
     /// * returns - ticks that gave way.
@@ -206,11 +203,11 @@ impl Parcels {
     }
 
     fn take_spare(&self) -> Parcel {
-        self.open().spare.pop().unwrap_or_default()
+        open(&self.line).spare.pop().unwrap_or_default()
     }
 
     fn push(&self, parcel: Parcel, names: Option<(u64, Vec<NameRow>)>) -> u64 {
-        let mut line = self.open();
+        let mut line = open(&self.line);
         let mut gone = 0;
         if line.ready.len() >= QUEUE_MAX
             && let Some(oldest) = line.ready.pop_front()
@@ -230,7 +227,7 @@ impl Parcels {
 
     /// Waits for a parcel.
     pub(super) fn next(&self, wait: Duration) -> Next {
-        let line = self.open();
+        let line = open(&self.line);
         let nothing = |line: &mut Line| line.ready.is_empty() && !line.stop;
         let waited = self.bell.wait_timeout_while(line, wait, nothing);
         let (mut line, _) = waited.unwrap_or_else(PoisonError::into_inner);
@@ -245,18 +242,18 @@ impl Parcels {
 
     /// Gives a parcel's memory back.
     pub(super) fn give_back(&self, parcel: Parcel) {
-        self.open().spare.push(parcel);
+        open(&self.line).spare.push(parcel);
     }
 
     /// Ticks that gave way to newer ones.
     #[cfg(test)]
     pub(super) fn dropped(&self) -> u64 {
-        self.open().dropped
+        open(&self.line).dropped
     }
 
     /// Ends the wait of the sending thread for good.
     pub(super) fn stop(&self) {
-        self.open().stop = true;
+        open(&self.line).stop = true;
         self.bell.notify_one();
     }
 }

@@ -20,6 +20,7 @@ use edits::{attach, filter, put, short};
 use gap::told;
 
 use super::names::Names;
+use super::open;
 use super::shared::{Say, Shared};
 use super::topics::{TypeName, failed};
 use crate::error::{Error, Result};
@@ -67,12 +68,6 @@ pub(super) struct Desk {
     pub(super) answered: Mutex<Vec<(u64, Answer)>>,
     /// Ticks that were asked for.
     pub(super) ticked: Mutex<Vec<(u64, MessageHeader)>>,
-}
-
-/// A lock whose holder panicked still holds whole values: each change is one move.
-pub(super) fn open<T>(lock: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    lock.lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
 /// The servers, on the receiving thread.

@@ -8,9 +8,10 @@ use ros2_client::log::Log;
 use ros2_client::{Publisher, builtin_interfaces};
 
 use super::lines::Arrival;
+use super::open;
 use super::params::{Effect, Own};
 use super::parcel::Caps;
-use super::services::{Desk, open};
+use super::services::Desk;
 use crate::time::SystemClock;
 use crate::transport::{BodyChange, Setting};
 use crate::wire::Demand;

@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use super::open;
 use crate::limits::FRAMES_PER_DRAIN_MAX;
 use crate::wire::{
     Frame, FrameHeader, Inbox, RejectReason, SOURCE_NAME_LEN, TransformRow, WIRE_VERSION,
@@ -61,12 +62,6 @@ struct Waiting {
 pub(super) struct Shelf {
     waiting: Mutex<Waiting>,
     passed_over: AtomicU64,
-}
-
-/// A thread that panicked has been told of; what it left is whole, because every change is a plain move.
-fn open<T>(lock: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    lock.lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner)
 }
 
 impl Shelf {

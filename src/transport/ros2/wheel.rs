@@ -5,13 +5,13 @@
 //! (20 s with Fast DDS); until then a bounded writer takes nothing more for anybody. Best effort would not do: plain
 //! subscribers ask for reliable topics. Larger bounds would not do: 5 MB/s for 20 s is 100 MB a stopped reader.
 //!
-//! Who has just come has acknowledged nothing, and all that was ever sent counts against it: a writer that has sent more
-//! than its window takes nothing until the first acknowledgement is there, some 100 ms.
+//! Who has just come has acknowledged nothing, and all that was ever sent counts against it: a writer that has sent
+//! more than its window takes nothing until the first acknowledgement is there, some 100 ms.
 //!
 //! In: messages. Out: the same, in their order, on a writer that has room; what none takes yet is held. The writer that
-//! is full stays until the next turn, so that what is on its way to the healthy readers is not lost. Readers do not hear
-//! a new writer for some 170 ms (measured: what was sent in that time was lost), so one is made in advance, and is gone
-//! over to when it has the readers of the old one and they have had time to find it.
+//! is full stays until the next turn, so that what is on its way to the healthy readers is not lost. Readers do not
+//! hear a new writer for some 170 ms (measured: what was sent in that time was lost), so one is made in advance, and is
+//! gone over to when it has the readers of the old one and they have had time to find it.
 
 use std::collections::VecDeque;
 

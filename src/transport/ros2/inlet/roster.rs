@@ -6,8 +6,8 @@
 use rustdds::mio1::Token;
 
 use super::super::lines::{Arrival, Feeder};
+use super::super::open;
 use super::super::poses::Source;
-use super::super::services::open;
 use super::super::shared::Say;
 use super::Inlet;
 use crate::transport::{BodyChange, BodyNote};

@@ -1,5 +1,6 @@
-//! Topics that bodies have of their own: given out when a body comes, given back when the last body of one has left. In:
-//! bodies. Out: names of topics, and which of them nobody has any more.
+//! Topics that bodies have of their own: given out when a body comes, given back when the last body of one has left.
+//!
+//! In: bodies. Out: names of topics, and which of them nobody has any more.
 
 use std::collections::BTreeMap;
 

@@ -1,5 +1,6 @@
-//! Room in the tree of `/tf`: a tracker may name a frame a detection, for ever. In: links of ever new frames. Out: frames
-//! that are needed stay, the others go when there are too many. Pure.
+//! Room in the tree of `/tf`: a tracker may name a frame a detection, for ever.
+//!
+//! In: links of ever new frames. Out: frames that are needed stay, the others go when there are too many. Pure.
 
 use super::Tree;
 
@@ -32,8 +33,8 @@ impl Tree {
         std::mem::take(&mut self.let_go)
     }
 
-    /// Lets the frames go that no body's chain leads over. Links that have an age come again when they are needed; those
-    /// that never change are said once, and go only where they are what fills the tree.
+    /// Lets the frames go that no body's chain leads over. Links that have an age come again when they are needed;
+    /// those that never change are said once, and go only where they are what fills the tree.
     fn make_room(&mut self) {
         let mut needed = self.needed(true);
         let kept = needed.iter().filter(|needed| **needed).count();
