@@ -1,5 +1,6 @@
 """What goes in and out over ROS 2 is what goes in and out over shared memory, field by field, with a real rclpy peer."""
 
+import itertools
 import math
 
 import pytest
@@ -122,6 +123,20 @@ def test_refused_frames_are_counted_by_reason_and_the_next_good_one_is_taken(roo
     stranger = Sender(room.nodes[0], source="nobody")
     room.until(lambda: ticks[-1].rejects[Tick.REJECT_UNKNOWN_SOURCE] > 0, "an unknown source",
                then=lambda: stranger.send(poses(0)))  # fmt: skip
+
+
+def test_bug_a_subscriber_that_comes_to_a_busy_topic_costs_the_others_nothing(room):
+    room.daemon(HANDS)
+    room.node()
+    sender, step = Sender(room.nodes[0]), itertools.count()
+    ticks = room.hear(Pairs, "/sweepd/pairs", keep=lambda m: m.tick_header.tick)
+    send = lambda: sender.send(poses(next(step)))  # noqa: E731
+    # more than the writer keeps for a reader that does not acknowledge
+    room.until(lambda: len(ticks) > 150, "pairs", then=send)
+    for number in range(4):
+        theirs = room.hear(Pairs, "/sweepd/pairs", node=room.node(f"newcomer_{number}"))
+        room.until(lambda: len(theirs) > 40, "pairs for the newcomer", then=send)
+    assert ticks == list(range(ticks[0], ticks[-1] + 1))
 
 
 def test_paused_frames_keep_the_poses_young_and_silence_makes_them_unknown(room):
