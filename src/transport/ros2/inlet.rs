@@ -2,6 +2,7 @@
 //!
 //! In: samples of anybody in the DDS domain. Out: frames for the tick thread, which is woken; faults in words.
 
+mod early;
 mod frames;
 mod roster;
 
@@ -22,6 +23,8 @@ use crate::error::{Error, Result};
 use crate::time::{Clock as _, SystemClock};
 use crate::transport::Setting;
 use crate::wire::RejectReason;
+use crate::wire::ros::{BodyTransforms, Book};
+use early::Early;
 pub(super) use frames::Local;
 use frames::{fill, foreign};
 
@@ -29,6 +32,8 @@ use frames::{fill, foreign};
 const SLEEP: Duration = Duration::from_nanos(SLEEP_NS);
 /// [`SLEEP`], nanoseconds.
 const SLEEP_NS: u64 = 100_000_000;
+/// As [`SLEEP`], while frames or answers wait for names of which nobody tells that they have come.
+const SLEEP_WAITING: Duration = Duration::from_millis(5);
 /// Samples taken from one subscription in one go, so that a flooder starves nobody.
 const TAKES_MAX: usize = 256;
 /// Samples that cannot be decoded, in one go.
@@ -53,6 +58,7 @@ pub(super) struct Inlet {
     /// Wakes the tick thread.
     wake: Box<dyn Fn() + Send>,
     local: Local,
+    early: Early,
     /// The daemon's heartbeat: a longer silence of this loop means that the process stood still, nanoseconds.
     heartbeat_ns: u64,
     poll: Poll,
@@ -94,6 +100,7 @@ impl Inlet {
             shared,
             wake,
             local,
+            early: Early::default(),
             heartbeat_ns,
             poll,
             updates: Vec::new(),
@@ -109,7 +116,11 @@ impl Inlet {
         let mut round_ns = SystemClock.boottime_ns();
         let mut more = false;
         while !self.shared.stopped() {
-            let sleep = if more { Duration::ZERO } else { SLEEP };
+            let sleep = match more {
+                true => Duration::ZERO,
+                false if self.services.wait() || !self.early.is_empty() => SLEEP_WAITING,
+                false => SLEEP,
+            };
             if let Err(e) = self.poll.poll(&mut events, Some(sleep))
                 && e.kind() != std::io::ErrorKind::Interrupted
             {
@@ -171,6 +182,7 @@ impl Inlet {
             shelf,
             shared,
             local,
+            early,
             frame_fault,
             ..
         } = self;
@@ -193,21 +205,10 @@ impl Inlet {
                 taken
             }
             Line::Transforms(from) => {
-                let book = shared.book();
-                drain(from, shared, |message, _| {
-                    let mut frame = shelf.spare();
-                    fill(&mut frame, &message, &book, receipt);
-                    let foreign = foreign(&message, &local.frame_id);
-                    if foreign.is_some() {
-                        shared.note_refused(1);
-                        frame.refused = Some(RejectReason::BadChain);
-                    }
-                    let fault = foreign.or_else(|| local.odd(&message, receipt, &book));
-                    if let Some(fault) = fault {
-                        *frame_fault = Some((fault, receipt.now_ns));
-                    }
-                    shelf.put(frame);
-                })
+                let (came, more, fault) = take_frames(from, (shelf, shared), local, early, receipt);
+                let fault = fault.map(|text| (text, receipt.now_ns));
+                *frame_fault = fault.or(frame_fault.take());
+                (came, more)
             }
             Line::Links {
                 from,
@@ -275,6 +276,57 @@ impl Inlet {
         all.truncate(FAULTS_MAX);
         self.shared.set_faults(all);
     }
+}
+
+/// Takes frames of `~/transforms`, and those that came before and whose time has come.
+///
+/// * returns - whether some came, whether there may be more, and what is odd about them.
+fn take_frames(
+    from: &Subscription<BodyTransforms>,
+    (shelf, shared): (&Shelf, &Shared),
+    local: &Local,
+    early: &mut Early,
+    receipt: Receipt,
+) -> (bool, bool, Option<String>) {
+    // The revision first: the book is never older than what it is taken for.
+    let names_rev = shared.names_rev();
+    let book = shared.book();
+    let mut odd = None;
+    let mut put = |message: &BodyTransforms, receipt| {
+        let fault = put_frame((shelf, shared), local, (message, receipt), &book);
+        odd = fault.or(odd.take());
+    };
+    let mut released = false;
+    while let Some((message, receipt)) = early.next(receipt.now_ns, names_rev) {
+        put(&message, receipt);
+        released = true;
+    }
+    let (came, more) = drain(from, shared, |message: BodyTransforms, _| {
+        let place = local.place(&message.source);
+        let timeout_ns = place.map(|place| shared.timeout_ns(place));
+        let (message, gone) = early.take(message, receipt, names_rev, timeout_ns);
+        shared.note_refused(gone);
+        message.iter().for_each(|message| put(message, receipt));
+    });
+    (came || released, more, odd)
+}
+
+/// Puts a frame of `~/transforms` on the shelf; what is odd about it.
+fn put_frame(
+    (shelf, shared): (&Shelf, &Shared),
+    local: &Local,
+    (message, receipt): (&BodyTransforms, Receipt),
+    book: &Book,
+) -> Option<String> {
+    let mut frame = shelf.spare();
+    fill(&mut frame, message, book, receipt);
+    let foreign = foreign(message, &local.frame_id);
+    if foreign.is_some() {
+        shared.note_refused(1);
+        frame.refused = Some(RejectReason::BadChain);
+    }
+    shelf.put(frame);
+    foreign.or_else(|| local.odd(message, receipt, book))
 }
 
 /// Takes a message of one body.

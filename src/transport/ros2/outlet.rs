@@ -108,6 +108,8 @@ impl Outlet {
                     if let Some((scene_rev, rows)) = names {
                         self.take_names(scene_rev, &rows);
                     }
+                    // Names come with the first tick that has them, or with one before.
+                    self.shared.set_names_rev(parcel.tick.header.scene_rev);
                     let now = self.shared.now();
                     self.speaker.stamp = Some(stamp_of(&parcel.tick, now));
                     self.send_rows(&parcel);

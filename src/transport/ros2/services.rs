@@ -82,6 +82,8 @@ pub(super) struct Services {
     tick: Server<TickNow, Ticked>,
     pending: BTreeMap<u64, (Verb, RmwRequestId)>,
     ticks: BTreeMap<u64, RmwRequestId>,
+    /// Answers to edits whose names are not known here yet.
+    late: Vec<(u64, Answer)>,
     next: u64,
     allowed: bool,
 }
@@ -106,6 +108,7 @@ impl Services {
             tick: server(node, names, "~/tick_now", kind("TickNow"))?,
             pending: BTreeMap::new(),
             ticks: BTreeMap::new(),
+            late: Vec::new(),
             next: 1,
             allowed,
         })
@@ -169,6 +172,11 @@ impl Services {
         came
     }
 
+    /// Whether answers wait for names.
+    pub(super) fn wait(&self) -> bool {
+        !self.late.is_empty()
+    }
+
     fn token(&mut self) -> u64 {
         self.next += 1;
         self.next
@@ -213,9 +221,16 @@ impl Services {
     fn respond(&mut self, desk: &Desk, shared: &Shared) {
         // Taken in statements of their own: a loop would keep the lock while DDS sends, and the tick thread would wait
         // for it.
-        let answered = std::mem::take(&mut *open(&desk.answered));
+        let mut answered = std::mem::take(&mut self.late);
+        answered.append(&mut open(&desk.answered));
         let ticked = std::mem::take(&mut *open(&desk.ticked));
+        let names_rev = shared.names_rev();
         for (token, answer) in answered {
+            // Whoever has the answer may send poses by the names that it brought.
+            if answer.scene_rev > names_rev {
+                self.late.push((token, answer));
+                continue;
+            }
             let Some((verb, id)) = self.pending.remove(&token) else {
                 continue;
             };

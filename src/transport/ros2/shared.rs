@@ -73,6 +73,7 @@ pub(super) struct Shared {
     /// The same, with the new subscriptions, for the receiving thread.
     pub(super) arrivals: Mutex<Vec<Arrival>>,
     book: Mutex<Arc<Book>>,
+    names_rev: AtomicU64,
     faults: Mutex<Vec<String>>,
     rosout: Mutex<Option<Arc<Option<Publisher<Log>>>>>,
     node: String,
@@ -116,6 +117,7 @@ impl Shared {
             changes: Mutex::default(),
             arrivals: Mutex::default(),
             book: Mutex::new(Arc::new(book)),
+            names_rev: AtomicU64::new(0),
             faults: Mutex::new(Vec::new()),
             rosout: Mutex::new(None),
             node: node.to_owned(),
@@ -295,6 +297,16 @@ impl Shared {
     /// New names.
     pub(super) fn set_book(&self, book: Arc<Book>) {
         *open(&self.book) = book;
+    }
+
+    /// The scene revision that the book holds the names of, at least; 0: no tick has said one yet.
+    pub(super) fn names_rev(&self) -> u64 {
+        self.names_rev.load(Ordering::Acquire)
+    }
+
+    /// The book holds the names of this scene revision.
+    pub(super) fn set_names_rev(&self, scene_rev: u64) {
+        self.names_rev.fetch_max(scene_rev, Ordering::Release);
     }
 
     /// What is wrong with what comes in, in words.

@@ -8,18 +8,18 @@ from frames import pose
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry
 from shape_msgs.msg import SolidPrimitive
-from sweepd_msgs.msg import State, Tick
+from sweepd_msgs.msg import BodyTransforms, State, Tick
 from sweepd_msgs.srv import PutBody, RemoveBody
 from tf2_msgs.msg import TFMessage
 from topics import SCENE, Feeder
 from visualization_msgs.msg import MarkerArray
 
 
-def put(room, name, source, **options):
+def put(room, name, source, then=None, **options):
     ball = SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[0.1])
     request = PutBody.Request(name=name, source=source, moves=True, pose=pose((0, 0, 0)), primitives=[ball],
                               primitive_poses=[pose((0, 0, 0))], options_json=json.dumps(options) if options else "")  # fmt: skip
-    return room.call(PutBody, "/sweepd/put_body", request)
+    return room.call(PutBody, "/sweepd/put_body", request, then=then)
 
 
 class Late:
@@ -131,3 +131,17 @@ def test_what_does_not_fit_its_source_is_refused_and_a_shared_topic_is_told(room
     assert put(room, "twin", "poses", ros_topic="/tracker/person").success
     room.until(lambda: any("/tracker/person: it moves more than one body" in s.message for m in said[-2:] for s in m.status), "a word on it",
                then=late.feeder)  # fmt: skip
+
+
+def test_bug_poses_by_name_move_a_body_that_the_answer_to_an_edit_or_a_revision_brings(room):
+    late = Late(room)
+    sim = late.feeder.sim
+    # once, just behind the answer
+    answer = put(room, "one", "sim")
+    assert answer.success, answer.message
+    sim.send({"one": (7.0, 0.0, 0.0)}, flags=BodyTransforms.PARTIAL)
+    room.until(lambda: late.where("one") == ([7, 0, 0], 0), "known by one frame")
+    # before the edit, with the revision that it needs: it waits
+    early = lambda: sim.send({"two": (8.0, 0.0, 0.0)}, flags=BodyTransforms.PARTIAL, scene_rev=answer.scene_rev + 1)  # noqa: E731
+    assert put(room, "two", "sim", then=early).success
+    room.until(lambda: late.where("two") == ([8, 0, 0], 0), "known by a frame that waited")

@@ -37,6 +37,11 @@ impl Local {
         }
     }
 
+    /// The place of a source in the scene.
+    pub(super) fn place(&self, source: &str) -> Option<usize> {
+        self.sources.iter().position(|own| own == source)
+    }
+
     /// What is odd about a frame whose other bodies are taken as they come: a pose that is none, a body that another
     /// source moves, or a stamp far from the node's clock where it is said to be of that.
     pub(super) fn odd(
@@ -46,7 +51,7 @@ impl Local {
         book: &Book,
     ) -> Option<String> {
         let source = message.source.as_str();
-        let place = self.sources.iter().position(|own| own == source);
+        let place = self.place(source);
         let odd_body = message.transforms.iter().find_map(|body| {
             let id = id(body, book);
             let name = match body.name.as_str() {
