@@ -22,11 +22,10 @@ use super::shelf::{Shelf, Update};
 use crate::error::{Error, Result};
 use crate::time::{Clock as _, SystemClock};
 use crate::transport::Setting;
-use crate::wire::RejectReason;
 use crate::wire::ros::{BodyTransforms, Book};
 use early::Early;
 pub(super) use frames::Local;
-use frames::{fill, foreign};
+use frames::fill;
 
 /// Longest sleep: how soon the end, and chains that never change, are seen.
 const SLEEP: Duration = Duration::from_nanos(SLEEP_NS);
@@ -320,13 +319,13 @@ fn put_frame(
 ) -> Option<String> {
     let mut frame = shelf.spare();
     fill(&mut frame, message, book, receipt);
-    let foreign = foreign(message, &local.frame_id);
-    if foreign.is_some() {
+    let fault = local.fault(message);
+    if let Some((reason, _)) = &fault {
         shared.note_refused(1);
-        frame.refused = Some(RejectReason::BadChain);
+        frame.refused = Some(*reason);
     }
     shelf.put(frame);
-    foreign.or_else(|| local.odd(message, receipt, book))
+    fault.map_or_else(|| local.odd(message, receipt, book), |(_, text)| Some(text))
 }
 
 /// Takes a message of one body.

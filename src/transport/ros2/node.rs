@@ -134,7 +134,7 @@ impl RosNode {
             Arc::clone(&shelf),
             Arc::clone(&shared),
             wake,
-            (Local::of(scene), heartbeat_ns),
+            (Local::of(scene, options.boot_id), heartbeat_ns),
         )?;
         let outlet = Outlet {
             node,

@@ -233,6 +233,7 @@ impl Speaker {
             header: self.header(tick.header.oldest_stamp_ns),
             seq: tick.header.tick,
             sent_ns: tick.sent_ns,
+            boot_id: tick.header.boot_id,
             flags: frame_flags::PARTIAL,
             transforms: placed.map(transform).collect(),
             ..BodyTransforms::default()

@@ -52,6 +52,8 @@ pub struct BodyTransforms {
     pub sent_ns: u64,
     /// Least scene revision these poses need; 0: any.
     pub scene_rev: u64,
+    /// The run of the daemon that ids are of; needed where a body has no name.
+    pub boot_id: u64,
     /// Deadline of the tick on `CLOCK_MONOTONIC`, nanoseconds; 0: none.
     pub deadline_ns: u64,
     /// Time left for the tick from receipt, nanoseconds; 0: not said.

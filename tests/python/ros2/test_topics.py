@@ -114,6 +114,8 @@ def test_refused_frames_are_counted_by_reason_and_the_next_good_one_is_taken(roo
         (Tick.REJECT_BAD_QUATERNION, dict(poses={"left": ((0, 0, 0), (0, 0, 0, 0)), "right": (3, 0, 0)})),
         (Tick.REJECT_UNKNOWN_BODY, dict(poses={"nobody": (0, 0, 0)}, flags=BodyTransforms.PARTIAL)),
         (Tick.REJECT_BAD_LAYOUT, dict(poses=poses(0), flags=9)),
+        (Tick.REJECT_SESSION_OVER, dict(poses={1: (0, 0, 0)}, flags=BodyTransforms.PARTIAL)),
+        (Tick.REJECT_SESSION_OVER, dict(poses={1: (0, 0, 0)}, flags=BodyTransforms.PARTIAL, boot_id=1)),
     ]
     for reason, frame in bad:
         before = ticks[-1].rejects[reason]
@@ -137,6 +139,17 @@ def test_bug_a_subscriber_that_comes_to_a_busy_topic_costs_the_others_nothing(ro
         theirs = room.hear(Pairs, "/sweepd/pairs", node=room.node(f"newcomer_{number}"))
         room.until(lambda: len(theirs) > 40, "pairs for the newcomer", then=send)
     assert ticks == list(range(ticks[0], ticks[-1] + 1))
+
+
+def test_ids_are_those_of_one_run_of_the_daemon(room):
+    room.daemon(HANDS)
+    room.node()
+    names, states = room.hear(Names, "/sweepd/names", LATCHED), room.hear(State, "/sweepd/state")
+    sender = Sender(room.nodes[0])
+    room.until(lambda: names, "names")
+    ids = {name.name: name.body for name in names[-1].names}
+    far = {ids["left"]: (0, 0, 0), ids["right"]: (5, 0, 0)}
+    room.until(lambda: states and states[-1].word == "clear", "clear by ids", then=lambda: sender.send(far, boot_id=names[-1].boot_id))
 
 
 def test_paused_frames_keep_the_poses_young_and_silence_makes_them_unknown(room):

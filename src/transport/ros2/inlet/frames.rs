@@ -8,7 +8,7 @@ use crate::wire::ros::{BodyTransform, BodyTransforms, Book, Twist};
 use crate::wire::{Frame, FrameHeader, RejectReason, TransformRow, WIRE_VERSION, name_bytes};
 
 /// What is wrong with a frame that is not in the scene's frame.
-pub(super) fn foreign(message: &BodyTransforms, frame_id: &str) -> Option<String> {
+fn foreign(message: &BodyTransforms, frame_id: &str) -> Option<String> {
     let given = plain(&message.header.frame_id);
     (!given.is_empty() && given != plain(frame_id)).then(|| {
         format!(
@@ -25,21 +25,41 @@ pub(in super::super) struct Local {
     pub(super) frame_id: String,
     /// The scene's sources by name, in its order.
     sources: Vec<String>,
+    /// This run of the daemon.
+    boot_id: u64,
 }
 
 impl Local {
-    /// Of a scene.
-    pub(in super::super) fn of(scene: &RosScene) -> Self {
+    /// Of a scene, in this run of the daemon.
+    pub(in super::super) fn of(scene: &RosScene, boot_id: u64) -> Self {
         let sources = scene.sources.iter();
         Self {
             frame_id: scene.frame_id.clone(),
             sources: sources.map(|source| source.name.clone()).collect(),
+            boot_id,
         }
     }
 
     /// The place of a source in the scene.
     pub(super) fn place(&self, source: &str) -> Option<usize> {
         self.sources.iter().position(|own| own == source)
+    }
+
+    /// What is wrong with a frame as a whole, and why it is refused for that: it is not in the scene's frame, or names
+    /// bodies by ids that are of another run of the daemon, where they may be other bodies'.
+    pub(super) fn fault(&self, message: &BodyTransforms) -> Option<(RejectReason, String)> {
+        if let Some(text) = foreign(message, &self.frame_id) {
+            return Some((RejectReason::BadChain, text));
+        }
+        let by_id = message.transforms.iter().any(|body| body.name.is_empty());
+        if !by_id || message.boot_id == self.boot_id {
+            return None;
+        }
+        let text = format!(
+            "frames of source {} say bodies by id with boot_id {}, and this run of the daemon is {}: they are refused; send names, or ids with the boot_id of the ~/names they are from",
+            message.source, message.boot_id, self.boot_id
+        );
+        Some((RejectReason::SessionOver, text))
     }
 
     /// What is odd about a frame whose other bodies are taken as they come: a pose that is none, a body that another
@@ -156,6 +176,7 @@ mod tests {
         let local = Local {
             frame_id: "world".to_owned(),
             sources: vec!["sim".to_owned(), "arm".to_owned()],
+            boot_id: 77,
         };
         (local, Book::of(&[row]))
     }
@@ -233,5 +254,33 @@ mod tests {
                 .unwrap()
                 .contains("body lid: its pose from source arm is no pose")
         );
+    }
+
+    #[test]
+    fn bug_ids_of_another_run_of_the_daemon_are_refused_and_names_are_not() {
+        let (local, _) = local();
+        let by = |name: &str, boot_id| {
+            let body = BodyTransform {
+                name: name.to_owned(),
+                body: 4,
+                ..BodyTransform::default()
+            };
+            local.fault(&BodyTransforms {
+                source: "arm".to_owned(),
+                boot_id,
+                transforms: vec![body],
+                ..BodyTransforms::default()
+            })
+        };
+        for boot_id in [0, 76] {
+            let (reason, text) = by("", boot_id).unwrap();
+            assert_eq!(reason, RejectReason::SessionOver);
+            assert!(
+                text.contains("source arm") && text.contains("is 77"),
+                "{text}"
+            );
+            assert_eq!(by("lid", boot_id), None);
+        }
+        assert_eq!(by("", 77), None);
     }
 }
