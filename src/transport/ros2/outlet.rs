@@ -292,7 +292,8 @@ impl Outlet {
         }
     }
 
-    /// The tick, last: whoever has it has all that belongs to it.
+    /// The tick, last: whoever has it has all that belongs to it, but what a topic holds for one of its readers. It
+    /// does not wait for that, since its own silence means that the daemon is gone.
     fn send_tick(&mut self, parcel: &Parcel) {
         if !self.read.ticks {
             return;
