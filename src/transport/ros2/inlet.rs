@@ -115,11 +115,9 @@ impl Inlet {
         let mut round_ns = SystemClock.boottime_ns();
         let mut more = false;
         while !self.shared.stopped() {
-            let sleep = match more {
-                true => Duration::ZERO,
-                false if self.services.wait() || !self.early.is_empty() => SLEEP_WAITING,
-                false => SLEEP,
-            };
+            let waits = self.services.wait() || !self.early.is_empty();
+            let sleep = if waits { SLEEP_WAITING } else { SLEEP };
+            let sleep = if more { Duration::ZERO } else { sleep };
             if let Err(e) = self.poll.poll(&mut events, Some(sleep))
                 && e.kind() != std::io::ErrorKind::Interrupted
             {

@@ -109,7 +109,9 @@ impl Outlet {
                         self.take_names(scene_rev, &rows);
                     }
                     // Names come with the first tick that has them, or with one before.
-                    self.shared.set_names_rev(parcel.tick.header.scene_rev);
+                    if parcel.done {
+                        self.shared.set_names_rev(parcel.tick.header.scene_rev);
+                    }
                     let now = self.shared.now();
                     self.speaker.stamp = Some(stamp_of(&parcel.tick, now));
                     self.send_rows(&parcel);

@@ -38,6 +38,8 @@ impl Caps {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Parcel {
     pub(super) tick: TickRow,
+    /// The tick is done; one that is sent from within has no names yet.
+    pub(super) done: bool,
     /// What of the rest was filled.
     pub(super) holds: Demand,
     pub(super) pairs_header: MessageHeader,
@@ -126,6 +128,7 @@ impl Parcel {
     /// Takes what a tick filled.
     fn fill(&mut self, outbox: &Outbox, demand: Demand, caps: Caps) {
         self.tick = outbox.tick;
+        self.done = true;
         self.holds = demand;
         if demand.pairs {
             let most = caps.pairs_of(&outbox.pairs);
@@ -198,6 +201,7 @@ impl Parcels {
     pub(super) fn put_tick(&self, tick: &TickRow) -> u64 {
         let mut parcel = self.take_spare();
         parcel.tick = *tick;
+        parcel.done = false;
         parcel.holds = Demand::default();
         self.push(parcel, None)
     }
@@ -373,5 +377,16 @@ mod tests {
         assert!(parcel.pairs.is_empty());
         parcels.stop();
         assert!(matches!(parcels.next(Duration::MAX), Next::Stop));
+    }
+
+    #[test]
+    fn a_tick_that_is_not_done_says_so_in_memory_that_was_used_before() {
+        let parcels = Parcels::default();
+        parcels.put(&outbox(1), Demand::default(), CAPS);
+        let parcel = next(&parcels);
+        assert!(parcel.done);
+        parcels.give_back(parcel);
+        parcels.put_tick(&outbox(2).tick);
+        assert!(!next(&parcels).done);
     }
 }
