@@ -113,11 +113,10 @@ impl RosNode {
             shelf.add_group(source.name, options.session, source.bodies());
         }
         let heartbeat_ns = scene.config.heartbeat_ns;
-        let reliable = shared.reliable();
         let publishers = Publishers::create(
             (&mut node, &context, &mut names),
             (heartbeat_ns, scene.sources.len()),
-            reliable,
+            shared.reliable(),
         )?;
         let (lines, unheard) = subscribe(&mut node, &context, &mut names, &sources, scene.again)?;
         odd.extend(unheard);
