@@ -85,7 +85,7 @@ def test_transforms_arrive_as_sent_and_each_frame_has_its_tick(room):
         stamp = 5_000_000_000 + 1_000_003 * step
         # by name and by id in turn
         named = poses(step) if step % 2 else {ids[name]: pose for name, pose in poses(step).items()}
-        seq = sender.send(named, stamp_ns=stamp)
+        seq = sender.send(named, stamp_ns=stamp, boot_id=ticks[-1].tick_header.boot_id)
         row = room.until(lambda: next((t for t in ticks if t.sources[0].seq == seq), None), f"the tick of frame {seq}")
         assert (row.cause, row.sources[0].session, row.tick_header.newest_stamp_ns) == (Tick.FRAME, sender.session, stamp)
         result = reader.latest()
