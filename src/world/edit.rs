@@ -21,7 +21,8 @@ use crate::wire::EndCause;
 pub enum Edit {
     /// A body by name: new, or in place of the one of this name. The same content again changes nothing.
     Put {
-        /// What it is; id 0: the one its name had in this boot, or the least that is free.
+        /// What it is; id 0: the one its name had in this boot, or the least that is free and that no put of the
+        /// request asks for.
         body: Arc<BodySpec>,
         /// Its built shapes, in the order of `body.shapes`.
         shapes: Parts,
@@ -109,6 +110,7 @@ impl World {
     /// Applies edits that [`World::check`] let pass.
     pub(super) fn apply_checked(&mut self, edits: &[Edit]) -> Applied {
         let mut after = After::default();
+        self.reserve_ids(edits);
         for edit in edits {
             self.apply_one(edit, &mut after);
         }
@@ -131,6 +133,18 @@ impl World {
         Applied {
             scene_rev: self.scene_rev,
             changed: after.changed,
+        }
+    }
+
+    /// Ids that the request asks for are given to no other name of it.
+    fn reserve_ids(&mut self, edits: &[Edit]) {
+        for edit in edits {
+            if let Edit::Put { body, .. } = edit
+                && body.id != BodyId(0)
+            {
+                let name = self.names.intern(&body.name);
+                self.names.claim(name, Some(body.id));
+            }
         }
     }
 

@@ -24,8 +24,10 @@ struct Draft<'a> {
     world: &'a World,
     /// Bodies that the request puts (with what they hang on) or removes (`None`).
     bodies: BTreeMap<&'a str, Option<Hangs<'a>>>,
-    /// Names that ids were given to by the request.
+    /// Ids that the request asks for, and for which name; they stay with it, also where its body goes again.
     ids: BTreeMap<BodyId, &'a str>,
+    /// The same by name.
+    asked: BTreeMap<&'a str, BodyId>,
     len: usize,
     rules: Option<RuleDraft<'a>>,
     /// Patterns that a body is known to match; emptied when a body goes.
@@ -54,6 +56,7 @@ impl World {
             world: self,
             bodies: BTreeMap::new(),
             ids: BTreeMap::new(),
+            asked: BTreeMap::new(),
             len: self.order.len(),
             rules: None,
             matched: BTreeSet::new(),
@@ -199,6 +202,7 @@ impl<'a> Draft<'a> {
         let (name, id) = (&*spec.name, spec.id.0);
         let names = &self.world.names;
         let had = names.find_name(name).and_then(|n| n.id);
+        let had = had.or_else(|| self.asked.get(name).copied());
         if let Some(had) = had.filter(|had| *had != spec.id) {
             return Err(format!(
                 "body `{name}` has the id {} for this run of the daemon, not {id}: give that, or none",
@@ -213,6 +217,7 @@ impl<'a> Draft<'a> {
             ));
         }
         self.ids.insert(spec.id, name);
+        self.asked.insert(name, spec.id);
         Ok(())
     }
 

@@ -343,6 +343,8 @@ fn compare_bodies(world: &World, told: &sweepd::world::World, what: &str) {
     for (_, body) in told.bodies() {
         count += 1;
         let id = body.id.0;
+        let name = &body.name;
+        assert_eq!(world.ids.get(name), Some(&id), "{what}: the id of {name}");
         assert_eq!(body.status, world.status(id), "{what}: body {id}");
         if !world.things[&world.root(id).0].placed {
             continue;

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use sweepd::config::OnStale;
+use sweepd::ids::BodyId;
 use sweepd::math::{Pose, Quat, Vec3};
 use sweepd::scene::{PairAction, PairRule};
 use sweepd::world::Edit;
@@ -16,7 +17,7 @@ use crate::world::World;
 /// Names there are: few, or so many that the plan changes its broad phase back and forth.
 const BODIES: [usize; 4] = [10, 10, 10, 40];
 /// Edits of a tick, drawn; with many names now and then more.
-const EDITS: [usize; 6] = [0, 0, 0, 1, 1, 2];
+const EDITS: [usize; 8] = [0, 0, 0, 1, 1, 2, 2, 4];
 const BURST: usize = 14;
 
 /// What a scene is about.
@@ -64,7 +65,7 @@ impl Draw {
         let now_ns = self.twins.wait(step_ns);
         let drawn: Vec<(Edit, Option<Solid>)> = (0..edits).map(|_| self.edit()).collect();
         // Each a request of its own, or all of them one.
-        let together = if self.rng.below(4) == 0 {
+        let together = if self.rng.below(2) == 0 {
             edits.max(1)
         } else {
             1
@@ -80,8 +81,12 @@ impl Draw {
         // Edits go before frames, and are as old as the tick before.
         for (request, taken) in drawn.chunks(together).zip(taken) {
             seen.edits[usize::from(taken)] += request.len() as u64;
-            self.world.begin_request();
-            for (edit, solid) in request.iter().filter(|_| taken) {
+            if !taken {
+                continue;
+            }
+            self.world
+                .begin_request(request.iter().map(|(edit, _)| edit));
+            for (edit, solid) in request {
                 self.world.apply(edit, solid.clone());
             }
         }
@@ -108,6 +113,17 @@ impl Draw {
         format!("b{}", self.id())
     }
 
+    /// What a put asks for; 0: nothing.
+    fn asked_id(&mut self, name: &str) -> u64 {
+        let known = self.world.ids.get(name).copied();
+        match (self.rng.below(8), known) {
+            (0..=3, _) => 0,
+            (4..=6, Some(known)) => known,
+            // As often as not another has it.
+            _ => self.id(),
+        }
+    }
+
     /// A place in a room that is too small for all.
     fn place(&mut self) -> Pose {
         let room_m = if self.bodies > BODIES[0] { 3.5 } else { 2.0 };
@@ -129,8 +145,7 @@ impl Draw {
         let rng = &mut self.rng;
         let edit = match kind {
             0..=3 => {
-                let id = self.id();
-                return self.put(id);
+                return self.put(name);
             }
             4 => Edit::Remove { name },
             5..=7 => Edit::Enable {
@@ -178,8 +193,9 @@ impl Draw {
         (edit, None)
     }
 
-    fn put(&mut self, id: u64) -> (Edit, Option<Solid>) {
-        let mut solid = Solid::any(&mut self.rng, &format!("b{id}"), id);
+    fn put(&mut self, name: String) -> (Edit, Option<Solid>) {
+        let mut solid = Solid::any(&mut self.rng, &name);
+        solid.spec.id = BodyId(self.asked_id(&name));
         let pose = self.place();
         let other = self.name();
         let rng = &mut self.rng;
@@ -246,7 +262,12 @@ impl Draw {
 /// An edit in some words.
 fn tell(edit: &Edit) -> String {
     match edit {
-        Edit::Put { body, .. } => format!("put {} on {:?}", body.name, body.attached_to),
+        Edit::Put { body, .. } => {
+            format!(
+                "put {} as {} on {:?}",
+                body.name, body.id.0, body.attached_to
+            )
+        }
         Edit::Remove { name } => format!("remove {name}"),
         Edit::Enable { name, enabled } => format!("enable {name} {enabled}"),
         Edit::Filter { name, .. } => format!("filter {name}"),

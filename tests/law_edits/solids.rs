@@ -34,8 +34,8 @@ fn read(text: &str) -> (BodySpec, Parts) {
 }
 
 impl Solid {
-    /// A body of a random kind; `name` and `id` are its own, the rest is the caller's.
-    pub fn any(rng: &mut Rng, name: &str, id: u64) -> Self {
+    /// A body of a random kind; `name` is its own, the rest is the caller's.
+    pub fn any(rng: &mut Rng, name: &str) -> Self {
         let half = Vec3::new(
             rng.range(0.2, 0.6),
             rng.range(0.2, 0.6),
@@ -69,7 +69,7 @@ impl Solid {
             4 => (trimesh(&cuboid(half), None), cuboid_text),
             _ => (cuboid_text.clone(), cuboid_text),
         };
-        let head = format!("[[body]]\nname = \"{name}\"\nid = {id}\n");
+        let head = format!("[[body]]\nname = \"{name}\"\n");
         let far_m = if kind == 7 {
             [3.0, 40.0][rng.below(2)]
         } else {

@@ -1,6 +1,6 @@
 //! The world as the test sees it: what each body is, what was last said of it, and on what it hangs.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use sweepd::config::OnStale;
 use sweepd::math::{Pose, relative};
@@ -53,12 +53,9 @@ pub struct World {
     pub before: BTreeMap<u64, Before>,
     /// Since the last tick something else than frames changed it.
     pub edited: bool,
+    /// The id of each name that ever had a body.
+    pub ids: BTreeMap<String, u64>,
     found: BTreeMap<u64, Found>,
-}
-
-/// The number in `bN`.
-fn id_of(name: &str) -> u64 {
-    name[1..].parse().unwrap()
 }
 
 impl World {
@@ -144,8 +141,38 @@ impl World {
             && other.group & one.mask != 0
     }
 
-    /// A request begins.
-    pub fn begin_request(&mut self) {
+    /// 0: of a name that never had a body; something may hang on that amid a request.
+    fn id_of(&self, name: &str) -> u64 {
+        self.ids.get(name).copied().unwrap_or(0)
+    }
+
+    /// Gives the names of a request their ids: first those asked for, then in their order the least that are free.
+    fn take_ids<'a>(&mut self, edits: impl Iterator<Item = &'a Edit>) {
+        let (mut asked, mut others) = (Vec::new(), Vec::new());
+        for edit in edits {
+            if let Edit::Put { body, .. } = edit {
+                match body.id.0 {
+                    0 => others.push(&body.name),
+                    id => asked.push((&body.name, id)),
+                }
+            }
+        }
+        for (name, id) in asked {
+            let given = *self.ids.entry(name.clone()).or_insert(id);
+            assert_eq!(given, id, "{name} has another id");
+        }
+        for name in others {
+            let is_given = |id: &u64| self.ids.values().any(|given| given == id);
+            let free = (1..).find(|id| !is_given(id)).unwrap();
+            self.ids.entry(name.clone()).or_insert(free);
+        }
+        let each: BTreeSet<u64> = self.ids.values().copied().collect();
+        assert_eq!(each.len(), self.ids.len(), "an id of two names");
+    }
+
+    /// A request that the engines took begins.
+    pub fn begin_request<'a>(&mut self, edits: impl Iterator<Item = &'a Edit>) {
+        self.take_ids(edits);
         let found = |id: &u64| {
             let (root, _) = self.root(*id);
             let found = Found {
@@ -165,7 +192,8 @@ impl World {
         match edit {
             Edit::Put { body, .. } => {
                 let solid = solid.unwrap();
-                let to = body.attached_to.as_deref().map(id_of);
+                let id = self.id_of(&body.name);
+                let to = body.attached_to.as_deref().map(|to| self.id_of(to));
                 let thing = Thing {
                     enabled: body.enabled,
                     group: body.group,
@@ -179,15 +207,15 @@ impl World {
                 };
                 let found = Found {
                     pose: body.pose,
-                    root: body.id.0,
+                    root: id,
                     moves: body.moves,
                     since_ns: 0,
                 };
-                self.found.insert(body.id.0, found);
-                self.things.insert(body.id.0, thing);
+                self.found.insert(id, found);
+                self.things.insert(id, thing);
             }
             Edit::Remove { name } => {
-                self.things.remove(&id_of(name));
+                self.things.remove(&self.id_of(name));
             }
             Edit::Enable { name, enabled } => self.named(name).enabled = *enabled,
             Edit::Filter { name, group, mask } => {
@@ -197,16 +225,17 @@ impl World {
             }
             Edit::Rule(rule) => {
                 let check = rule.action == PairAction::Check;
-                self.rules.push((check, id_of(&rule.a), id_of(&rule.b)));
+                let (a, b) = (self.id_of(&rule.a), self.id_of(&rule.b));
+                self.rules.push((check, a, b));
             }
             Edit::DropRules { a, b } => {
-                let (a, b) = (id_of(a), id_of(b));
+                let (a, b) = (self.id_of(a), self.id_of(b));
                 let is_of = |x: u64, y: u64| (x, y) == (a, b) || (x, y) == (b, a);
                 self.rules.retain(|rule| !is_of(rule.1, rule.2));
             }
             Edit::Attach { name, to, pose } => match to {
                 Some(to) => {
-                    let (id, to) = (id_of(name), id_of(to));
+                    let (id, to) = (self.id_of(name), self.id_of(to));
                     let found = |id: u64| &self.found[&id].pose;
                     let local = pose.unwrap_or_else(|| relative(found(to), found(id)));
                     self.named(name).hangs = Some((to, local));
@@ -219,11 +248,12 @@ impl World {
     }
 
     fn named(&mut self, name: &str) -> &mut Thing {
-        self.things.get_mut(&id_of(name)).unwrap()
+        let id = self.id_of(name);
+        self.things.get_mut(&id).unwrap()
     }
 
     fn detach(&mut self, name: &str, pose: Option<&Pose>) {
-        let id = id_of(name);
+        let id = self.id_of(name);
         if self.things[&id].hangs.is_none() {
             return;
         }
