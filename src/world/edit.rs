@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use super::World;
 use super::census::slot_at;
+use super::edit_links::Places;
 use super::filters::{ENABLED, Hot, LIVE, MOVES, NO_GROUP, UNBOUNDED};
 use super::names::NameId;
 use super::parts::{Parts, PlacedShape};
@@ -90,11 +91,13 @@ pub struct Applied {
 }
 
 /// What has to be done once for a request, after its last edit.
-#[derive(Clone, Copy, Debug, Default)]
-struct After {
+#[derive(Clone, Debug, Default)]
+pub(super) struct After {
     changed: bool,
     links: bool,
     census: bool,
+    /// Where bodies are by now.
+    pub(super) places: Places,
 }
 
 impl World {
@@ -152,12 +155,18 @@ impl World {
         let changed = match edit {
             Edit::Put { body, shapes } => {
                 let put = self.put(body, shapes);
-                after.links |= put;
+                if put {
+                    after.links = true;
+                    after.places.forget();
+                }
                 put
             }
             Edit::Remove { name } => {
                 let removed = self.remove(name);
-                after.links |= removed;
+                if removed {
+                    after.links = true;
+                    after.places.forget();
+                }
                 removed
             }
             Edit::Enable { name, enabled } => self.enable(name, *enabled),
@@ -169,7 +178,7 @@ impl World {
             // All at once, behind the last edit.
             Edit::Rule(_) | Edit::DropRules { .. } => false,
             Edit::Attach { name, to, pose } => {
-                let attached = self.attach(name, to.as_deref(), pose.as_ref());
+                let attached = self.attach(name, to.as_deref(), pose.as_ref(), &mut after.places);
                 after.links |= attached;
                 attached
             }
@@ -247,7 +256,7 @@ impl World {
     }
 
     /// Whether a put would change nothing: the same words, the same shapes, and no edit in between.
-    fn is_same(&self, slot: BodySlot, spec: &BodySpec, shapes: &[PlacedShape]) -> bool {
+    pub(super) fn is_same(&self, slot: BodySlot, spec: &BodySpec, shapes: &[PlacedShape]) -> bool {
         let entry = &self.entries[slot.index()];
         let (Some(old), Some(body)) = (&entry.spec, self.body(slot)) else {
             return false;

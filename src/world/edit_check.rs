@@ -2,6 +2,7 @@
 //!
 //! In: edits in their order. Out: nothing, or a text that says which edit, what is wrong and what to change.
 
+mod links;
 mod rules;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,6 +16,7 @@ use crate::limits::{EXTENT_MAX_M, PRIORITY_MAX, PRIORITY_MIN, SHAPES_PER_BODY_MA
 use crate::math::Pose;
 use crate::scene::BodySpec;
 use crate::wire::BODY_NAME_LEN;
+use links::Sketch;
 
 /// Most names met in a boot: each is kept, because an id stays with its name.
 const NAMES_MAX: usize = 1 << 22;
@@ -22,8 +24,14 @@ const NAMES_MAX: usize = 1 << 22;
 /// The scene as it would be after the edits looked at so far, where they change it.
 struct Draft<'a> {
     world: &'a World,
-    /// Bodies that the request puts (with what they hang on) or removes (`None`).
-    bodies: BTreeMap<&'a str, Option<Hangs<'a>>>,
+    /// Bodies that the request puts, hangs, lets go or removes (`None`).
+    bodies: BTreeMap<&'a str, Option<Sketch<'a>>>,
+    /// Bodies whose place is known; emptied when that of some may be no more.
+    placed: BTreeSet<&'a str>,
+    /// Number of the edit that is looked at, from 1 on.
+    at: usize,
+    /// Number of the last edit that forgot the poses of a source's bodies, by source; 0: none did.
+    forgotten: Vec<usize>,
     /// Ids that the request asks for, and for which name; they stay with it, also where its body goes again.
     ids: BTreeMap<BodyId, &'a str>,
     /// The same by name.
@@ -33,9 +41,6 @@ struct Draft<'a> {
     /// Patterns that a body is known to match; emptied when a body goes.
     matched: BTreeSet<&'a str>,
 }
-
-/// What a body hangs on.
-type Hangs<'a> = Option<&'a str>;
 
 /// Whether a distance can be one that pairs are told as near within.
 fn is_margin(report_within_m: Option<f64>) -> Result<(), String> {
@@ -55,6 +60,9 @@ impl World {
         let mut draft = Draft {
             world: self,
             bodies: BTreeMap::new(),
+            placed: BTreeSet::new(),
+            at: 0,
+            forgotten: vec![0; self.sources.len()],
             ids: BTreeMap::new(),
             asked: BTreeMap::new(),
             len: self.order.len(),
@@ -62,6 +70,7 @@ impl World {
             matched: BTreeSet::new(),
         };
         for (at, edit) in edits.iter().enumerate() {
+            draft.at = at + 1;
             draft.look_at(edit).map_err(|text| {
                 if numbered {
                     format!("edit {}: {text}", at + 1)
@@ -72,15 +81,6 @@ impl World {
         }
         draft.references_hold(edits)
     }
-
-    /// Whether the place of a body is known well enough to hang something on it, or it on something.
-    fn is_placed(&self, name: &str) -> bool {
-        let Some(slot) = self.slot_named(name) else {
-            return false;
-        };
-        let root = &self.entries[self.entries[slot.index()].root.index()];
-        root.has_pose && !root.refused
-    }
 }
 
 impl<'a> Draft<'a> {
@@ -88,16 +88,29 @@ impl<'a> Draft<'a> {
         match edit {
             Edit::Put { body, shapes } => {
                 bends_as_said(body, shapes)?;
-                self.look_at_put(body, shapes.len())
+                self.look_at_put(body, shapes.len())?;
+                // The same again is nothing: where it is stays known as well as it was.
+                let slot = self.world.slot_named(&body.name);
+                let is_new = self.bodies.contains_key(&*body.name)
+                    || !slot.is_some_and(|slot| self.world.is_same(slot, body, shapes));
+                if is_new {
+                    self.bodies
+                        .insert(&body.name, Some(Sketch::of_put(body, self.at)));
+                    self.placed.clear();
+                }
+                Ok(())
             }
             Edit::Remove { name } => {
                 self.must_have(name)?;
                 self.bodies.insert(name, None);
+                self.placed.clear();
                 self.matched.clear();
                 self.len -= 1;
                 Ok(())
             }
-            Edit::Enable { name, .. } | Edit::Filter { name, .. } => self.must_have(name),
+            Edit::Enable { name, .. } | Edit::Filter { name, .. } => {
+                self.must_have(name).map(|_| ())
+            }
             Edit::Margin {
                 name,
                 report_within_m,
@@ -112,13 +125,24 @@ impl<'a> Draft<'a> {
             Edit::Attach { name, to, pose } => {
                 self.look_at_attach(name, to.as_deref(), pose.as_ref())
             }
-            Edit::Reset { source } => match source {
-                Some(name) if self.world.source_named(name).is_none() => Err(format!(
-                    "there is no source `{name}`: name one of the scene's sources, or none to reset all"
-                )),
-                _ => Ok(()),
-            },
+            Edit::Reset { source } => self.look_at_reset(source.as_deref()),
         }
+    }
+
+    fn look_at_reset(&mut self, source: Option<&str>) -> Result<(), String> {
+        match source {
+            None => self.forgotten.fill(self.at),
+            Some(name) => {
+                let Some(source) = self.world.source_named(name) else {
+                    return Err(format!(
+                        "there is no source `{name}`: name one of the scene's sources, or none to reset all"
+                    ));
+                };
+                self.forgotten[source.index()] = self.at;
+            }
+        }
+        self.placed.clear();
+        Ok(())
     }
 
     /// Whether a body is there at this point of the request.
@@ -129,13 +153,18 @@ impl<'a> Draft<'a> {
         }
     }
 
-    fn must_have(&self, name: &str) -> Result<(), String> {
-        if self.has(name) {
-            return Ok(());
+    /// A body as it is at this point of the request.
+    fn body(&self, name: &str) -> Option<Sketch<'a>> {
+        match self.bodies.get(name) {
+            Some(body) => *body,
+            None => Sketch::of_world(self.world, self.world.slot_named(name)?),
         }
-        Err(format!(
-            "there is no body `{name}`: correct the name, or put the body first"
-        ))
+    }
+
+    fn must_have(&self, name: &str) -> Result<Sketch<'a>, String> {
+        self.body(name).ok_or_else(|| {
+            format!("there is no body `{name}`: correct the name, or put the body first")
+        })
     }
 
     fn look_at_put(&mut self, spec: &'a BodySpec, shapes: usize) -> Result<(), String> {
@@ -190,7 +219,6 @@ impl<'a> Draft<'a> {
                 ));
             }
         }
-        self.bodies.insert(name, Some(spec.attached_to.as_deref()));
         Ok(())
     }
 
@@ -219,123 +247,6 @@ impl<'a> Draft<'a> {
         self.ids.insert(spec.id, name);
         self.asked.insert(name, spec.id);
         Ok(())
-    }
-
-    fn names(&self) -> impl Iterator<Item = &str> {
-        let world = self.world;
-        let there = world.names.all().iter().filter(|n| n.slot.is_some());
-        let put = self.bodies.iter().filter(|(_, b)| b.is_some());
-        there
-            .map(|n| &*n.text)
-            .filter(|name| !matches!(self.bodies.get(name), Some(None)))
-            .chain(put.map(|(name, _)| *name))
-    }
-
-    fn look_at_attach(
-        &mut self,
-        name: &'a str,
-        to: Option<&'a str>,
-        pose: Option<&Pose>,
-    ) -> Result<(), String> {
-        self.must_have(name)?;
-        if pose.is_some_and(|p| !p.to_homogeneous().iter().all(|v| v.is_finite())) {
-            return Err(format!("body `{name}`: its pose must be finite"));
-        }
-        // What this request puts has no place of its own yet but its start pose.
-        let placed = |name: &str| self.bodies.contains_key(name) || self.world.is_placed(name);
-        match to {
-            Some(_) if self.deforms(name) => {
-                return Err(format!(
-                    "body `{name}` deforms: its source says where its vertices are, so it cannot hang on another"
-                ));
-            }
-            Some(to) => {
-                self.must_have(to)?;
-                if pose.is_none() && !(placed(name) && placed(to)) {
-                    return Err(format!(
-                        "it is not known where `{name}` is seen from `{to}`: give `pose`, or wait for their frames"
-                    ));
-                }
-            }
-            None => self.look_at_detach(name, pose, placed(name))?,
-        }
-        self.bodies.insert(name, Some(to));
-        Ok(())
-    }
-
-    /// A body let go needs a place, if it cannot move, or a source.
-    fn look_at_detach(&self, name: &str, pose: Option<&Pose>, placed: bool) -> Result<(), String> {
-        let slot = self.world.slot_named(name);
-        let spec = slot.and_then(|s| self.world.entries[s.index()].spec.as_ref());
-        let Some(spec) = spec else {
-            return Ok(());
-        };
-        if spec.moves && pose.is_some() {
-            return Err(format!(
-                "body `{name}` moves: its source says where it is, leave out `pose`"
-            ));
-        }
-        if spec.moves && spec.source.is_none() {
-            return Err(format!(
-                "body `{name}` moves, but no source may move it: put it with a `source`"
-            ));
-        }
-        if !spec.moves && pose.is_none() && !placed {
-            return Err(format!("it is not known where `{name}` is: give `pose`"));
-        }
-        Ok(())
-    }
-
-    fn deforms(&self, name: &str) -> bool {
-        let slot = self.world.slot_named(name);
-        let body = slot.and_then(|slot| self.world.body(slot));
-        body.is_some_and(|body| body.vertices.is_some())
-    }
-
-    /// After the last edit: parents and attachments are there, and none hangs on itself.
-    fn references_hold(&self, edits: &[Edit]) -> Result<(), String> {
-        for edit in edits {
-            if let Edit::Put { body, .. } = edit
-                && self.has(&body.name)
-                && let Some(parent) = body.parent.as_deref().filter(|p| !self.has(p))
-            {
-                return Err(format!(
-                    "body `{}`: there is no body `{parent}` to be its parent: correct the name, or put it too",
-                    body.name
-                ));
-            }
-        }
-        let names: Vec<&str> = self.names().collect();
-        if !names.iter().any(|name| self.hangs_on(name).is_some()) {
-            return Ok(());
-        }
-        for name in &names {
-            let (mut at, mut steps) = (*name, 0);
-            while let Some(to) = self.hangs_on(at) {
-                if !self.has(to) {
-                    return Err(format!(
-                        "body `{at}` hangs on `{to}`, which is not there: let it go or remove it too"
-                    ));
-                }
-                steps += 1;
-                if steps > names.len() {
-                    return Err(format!(
-                        "body `{name}` would hang on itself: let one go first"
-                    ));
-                }
-                at = to;
-            }
-        }
-        Ok(())
-    }
-
-    fn hangs_on(&self, name: &str) -> Option<&str> {
-        if let Some(body) = self.bodies.get(name) {
-            return body.flatten();
-        }
-        let slot = self.world.slot_named(name)?;
-        let (to, _) = self.world.entries[slot.index()].attach?;
-        Some(&self.world.names.get(to).text)
     }
 }
 

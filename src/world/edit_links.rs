@@ -2,101 +2,146 @@
 //!
 //! In: attachments by name, after an edit. Out: roots and root poses, and each body settled whose root is another now.
 
+use std::collections::BTreeMap;
+
 use super::World;
+use super::body::Body;
 use super::census::slot_at;
 use super::filters::MOVES;
 use crate::ids::{BodySlot, SourceSlot};
 use crate::math::{Pose, relative};
 
+/// Where bodies are after the edits of a request so far, as far as that was asked.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Places {
+    /// Whether some may be elsewhere than before the request.
+    any_moved: bool,
+    found: BTreeMap<BodySlot, Pose>,
+}
+
+impl Places {
+    /// Bodies may be elsewhere by now.
+    pub(super) fn forget(&mut self) {
+        self.any_moved = true;
+        self.found.clear();
+    }
+}
+
 impl World {
     /// Hangs a body on another, or lets it go; [`World::link`] does the rest.
-    pub(super) fn attach(&mut self, name: &str, to: Option<&str>, pose: Option<&Pose>) -> bool {
+    pub(super) fn attach(
+        &mut self,
+        name: &str,
+        to: Option<&str>,
+        pose: Option<&Pose>,
+        places: &mut Places,
+    ) -> bool {
         let Some(slot) = self.slot_named(name) else {
             return false;
         };
-        self.entries[slot.index()].edited = true;
         let Some(to) = to else {
-            return self.detach(slot, pose);
+            return self.detach(slot, pose, places);
         };
-        let now = self.pose_seen_from(slot, to);
+        let seen = match (pose, self.slot_named(to)) {
+            (None, Some(to)) => relative(&self.by_now(to, places), &self.by_now(slot, places)),
+            _ => Pose::identity(),
+        };
         let to = self.names.intern(to);
-        let attach = Some((to, pose.copied().unwrap_or(now)));
         let entry = &mut self.entries[slot.index()];
-        let changed = entry.attach != attach;
-        entry.attach = attach;
-        changed
+        let old = entry.attach;
+        let hangs_there = old.is_some_and(|(on, _)| on == to);
+        let attach = (to, pose.copied().unwrap_or(seen));
+        if old == Some(attach) || pose.is_none() && hangs_there {
+            return false;
+        }
+        entry.attach = Some(attach);
+        if pose.is_some() {
+            places.forget();
+        }
+        true
     }
 
-    fn pose_seen_from(&self, slot: BodySlot, to: &str) -> Pose {
-        let to = self.slot_named(to).and_then(|to| self.body(to));
-        match (self.body(slot), to) {
-            (Some(body), Some(to)) => relative(&to.pose, &body.pose),
-            _ => Pose::identity(),
+    /// Where a body is after the edits so far. Where what it hung on is gone: where it was before them.
+    ///
+    /// Cost: the bodies above it, where the request moved any.
+    fn by_now(&self, slot: BodySlot, places: &mut Places) -> Pose {
+        let pose = |slot| {
+            self.body(slot)
+                .map_or_else(Pose::identity, |body| body.pose)
+        };
+        if !places.any_moved {
+            return pose(slot);
         }
+        if let Some(found) = places.found.get(&slot) {
+            return *found;
+        }
+        let (top, local) = self.root_of(slot);
+        let found = pose(top) * local;
+        if self.entries[top.index()].attach.is_none() {
+            places.found.insert(slot, found);
+        }
+        found
     }
 
     /// It stays where it is, as old and as well known as it was; from now on its own source speaks for it.
-    fn detach(&mut self, slot: BodySlot, pose: Option<&Pose>) -> bool {
-        let entry = &self.entries[slot.index()];
-        if entry.attach.is_none() {
+    fn detach(&mut self, slot: BodySlot, pose: Option<&Pose>, places: &mut Places) -> bool {
+        if self.entries[slot.index()].attach.is_none() {
             return false;
         }
-        let root = &self.entries[entry.root.index()];
-        let (has_pose, refused) = (root.has_pose, root.refused);
-        let spec = entry.spec.clone();
-        // What it hung on does not move: until now its place was beyond doubt.
+        let by_now = self.by_now(slot, places);
+        let (root, _) = self.root_of(slot);
+        let of_root = &self.entries[root.index()];
+        // Else what it hung on is gone, and with it who says where it is.
+        let is_root = of_root.attach.is_none();
+        let (has_pose, refused) = (is_root && of_root.has_pose, is_root && of_root.refused);
+        let root_moves = of_root.spec.as_ref().is_some_and(|spec| spec.moves);
+        let age = |b: &Body| (b.stamp_ns, b.since_ns, b.received_ns, b.reject);
+        let age = self.body(root).map(age);
         let now_ns = self.now_ns;
-        if let Some(body) = self.bodies[slot.index()].as_mut().filter(|b| !b.moves) {
-            body.since_ns = Some(now_ns);
-        }
         let entry = &mut self.entries[slot.index()];
+        let Some(moves) = entry.spec.as_ref().map(|spec| spec.moves) else {
+            return false;
+        };
         entry.attach = None;
-        entry.has_pose = has_pose;
-        entry.refused = refused;
+        entry.has_pose = has_pose || !moves;
+        entry.refused = refused && moves;
         entry.raw = [f64::NAN; 7];
-        if let Some(spec) = spec
-            && !spec.moves
-        {
-            entry.has_pose = true;
-            entry.refused = false;
-            if let Some(pose) = pose
-                && self.place(slot, pose)
-            {
-                self.forget_way(slot);
-                self.settle(slot, true);
+        if let (Some(body), Some(age)) = (self.bodies[slot.index()].as_mut(), age) {
+            (body.stamp_ns, body.since_ns, body.received_ns, body.reject) = age;
+            if !root_moves {
+                // Until now its place was beyond doubt.
+                body.since_ns = Some(now_ns);
             }
+        }
+        // At once: edits that follow find it on its own.
+        self.take_root(slot, (slot, Pose::identity()));
+        let told = pose.filter(|_| !moves);
+        if self.place(slot, told.unwrap_or(&by_now)) {
+            self.forget_way(slot);
+            self.settle(slot, true);
+        }
+        if told.is_some() {
+            places.forget();
         }
         true
     }
 
     /// Finds every body's root anew and settles the bodies whose root, pose or freedom to move changed.
+    ///
+    /// Cost: O(bodies + attached bodies log attached bodies).
     pub(super) fn link(&mut self) {
         self.attached.clear();
+        let mut known = BTreeMap::new();
         for index in 0..self.bodies.len() {
             let slot = slot_at(index);
             if self.bodies[index].is_none() {
                 continue;
             }
-            let (root, root_pose) = self.root_of(slot);
-            let entry = &mut self.entries[index];
-            let rooted = entry.root == root && entry.root_pose == root_pose;
-            entry.root = root;
-            entry.root_pose = root_pose;
-            if root != slot {
+            let root = self.root_among(slot, &mut known);
+            if root.0 != slot {
                 self.attached.push(slot);
             }
-            let moves_changed = self.take_freedom(slot, root);
-            if !rooted || moves_changed {
-                self.filters_of_root(slot, root);
-                if root == slot {
-                    self.settle(slot, false);
-                }
-                self.requery(slot);
-                if moves_changed && self.body(slot).is_some_and(|body| body.unbounded) {
-                    // What its certificates say of its motion was said by another rule.
-                    self.begin_anew(slot);
-                }
-            }
+            self.take_root(slot, root);
         }
         self.link_paths();
         // Their roots are settled now.
@@ -107,36 +152,94 @@ impl World {
         self.settle_attached();
     }
 
-    /// Walks up to the body that hangs on none. The check before an edit has shut out rings and loose ends.
-    fn root_of(&self, slot: BodySlot) -> (BodySlot, Pose) {
-        let (mut at, mut pose) = (slot, Pose::identity());
-        for _ in 0..self.bodies.len() {
-            let Some((to, local)) = self.entries[at.index()].attach else {
-                break;
-            };
-            let Some(next) = self.names.get(to).slot else {
-                break;
-            };
-            pose = local * pose;
-            at = next;
+    /// Takes down which body one hangs on in the end and its pose there, and settles it where that, or its freedom to
+    /// move, is another now.
+    fn take_root(&mut self, slot: BodySlot, (root, root_pose): (BodySlot, Pose)) {
+        let entry = &mut self.entries[slot.index()];
+        let rooted = entry.root == root && entry.root_pose == root_pose;
+        entry.root = root;
+        entry.root_pose = root_pose;
+        let moves_changed = self.take_freedom(slot, root);
+        if rooted && !moves_changed {
+            return;
         }
-        (at, pose)
+        self.filters_of_root(slot, root);
+        if root == slot {
+            self.settle(slot, false);
+        }
+        self.requery(slot);
+        if moves_changed && self.body(slot).is_some_and(|body| body.unbounded) {
+            // What its certificates say of its motion was said by another rule.
+            self.begin_anew(slot);
+        }
+    }
+
+    /// What a body hangs on, if that is there, and its pose there.
+    fn hold_of(&self, slot: BodySlot) -> Option<(BodySlot, Pose)> {
+        let (to, local) = self.entries[slot.index()].attach?;
+        Some((self.names.get(to).slot?, local))
+    }
+
+    /// The bodies that one hangs on, the nearest first, each with its pose seen from there.
+    pub(super) fn above(&self, slot: BodySlot) -> impl Iterator<Item = (BodySlot, Pose)> + '_ {
+        let first = Some((slot, Pose::identity()));
+        let next = |(at, pose): &(BodySlot, Pose)| {
+            let (to, local) = self.hold_of(*at)?;
+            Some((to, local * pose))
+        };
+        // No longer than the longest chain there can be: amid a request they may hang on each other.
+        let walk = std::iter::successors(first, next).skip(1);
+        walk.take(self.bodies.len())
+    }
+
+    /// The body that one hangs on in the end, itself where on none, and its pose seen from there.
+    fn root_of(&self, slot: BodySlot) -> (BodySlot, Pose) {
+        let itself = (slot, Pose::identity());
+        self.above(slot).last().unwrap_or(itself)
+    }
+
+    /// As [`World::root_of`], but for rounding; each body that hangs on another is walked over once.
+    fn root_among(
+        &self,
+        slot: BodySlot,
+        known: &mut BTreeMap<BodySlot, (BodySlot, Pose)>,
+    ) -> (BodySlot, Pose) {
+        let (mut at, mut way) = (slot, Vec::new());
+        // The check before an edit has shut out rings and loose ends.
+        let (root, mut pose) = loop {
+            if let Some(found) = known.get(&at) {
+                break *found;
+            }
+            match self.hold_of(at) {
+                Some((to, local)) if way.len() < self.bodies.len() => {
+                    way.push((at, local));
+                    at = to;
+                }
+                _ => break (at, Pose::identity()),
+            }
+        };
+        for (at, local) in way.into_iter().rev() {
+            pose *= local;
+            known.insert(at, (root, pose));
+        }
+        (root, pose)
     }
 
     /// A body moves when its root does, and by the hand of the root's source.
     ///
     /// * returns - whether it may move now and could not before, or the other way round.
     fn take_freedom(&mut self, slot: BodySlot, root: BodySlot) -> bool {
-        let Some(spec) = self.entries[root.index()].spec.clone() else {
+        let Some(spec) = &self.entries[root.index()].spec else {
             return false;
         };
-        let source = spec.source.filter(|_| spec.moves).map(slot_at);
+        let source = spec.source.filter(|_| spec.moves);
+        let source = source.map(|source| SourceSlot(slot_at(source).0));
         let Some(body) = self.bodies[slot.index()].as_mut() else {
             return false;
         };
         let changed = body.moves != spec.moves;
         body.moves = spec.moves;
-        body.source = source.map(|s| SourceSlot(s.0));
+        body.source = source;
         changed
     }
 

@@ -91,24 +91,12 @@ impl World {
         let kin = |other: &BodySlot| self.entries[other.index()].root == entry.root;
         let attached = self.attached.iter().copied().filter(kin);
         let mut found: Vec<_> = attached
-            .filter_map(|other| Some((other, self.seen_from(other, slot)?)))
+            .filter_map(|other| {
+                let (_, pose) = self.above(other).find(|(at, _)| *at == slot)?;
+                Some((other, pose))
+            })
             .collect();
         found.sort_unstable_by_key(|(other, _)| *other);
         found
-    }
-
-    /// The pose of a body seen from one that it hangs on; `None`: it does not.
-    fn seen_from(&self, slot: BodySlot, above: BodySlot) -> Option<Pose> {
-        let (mut at, mut pose) = (slot, Pose::identity());
-        // No longer than the longest chain there can be.
-        for _ in 0..self.bodies.len() {
-            let (to, local) = self.entries[at.index()].attach?;
-            at = self.names.get(to).slot?;
-            pose = local * pose;
-            if at == above {
-                return Some(pose);
-            }
-        }
-        None
     }
 }

@@ -29,14 +29,6 @@ pub struct Thing {
     pub since_ns: u64,
 }
 
-/// A body as a request finds it: its edits are done in order, and where bodies are is known from before.
-struct Found {
-    pose: Pose,
-    root: u64,
-    moves: bool,
-    since_ns: u64,
-}
-
 /// Where a body was in the last tick.
 #[derive(Clone, Copy)]
 pub struct Before {
@@ -55,7 +47,8 @@ pub struct World {
     pub edited: bool,
     /// The id of each name that ever had a body.
     pub ids: BTreeMap<String, u64>,
-    found: BTreeMap<u64, Found>,
+    /// Where bodies were before a request, or are put by it.
+    found: BTreeMap<u64, Pose>,
 }
 
 impl World {
@@ -173,17 +166,25 @@ impl World {
     /// A request that the engines took begins.
     pub fn begin_request<'a>(&mut self, edits: impl Iterator<Item = &'a Edit>) {
         self.take_ids(edits);
-        let found = |id: &u64| {
-            let (root, _) = self.root(*id);
-            let found = Found {
-                pose: self.pose(*id),
-                root,
-                moves: self.moves(*id),
-                since_ns: self.things[&root].since_ns,
-            };
-            (*id, found)
-        };
+        let found = |id: &u64| (*id, self.pose(*id));
         self.found = self.things.keys().map(found).collect();
+    }
+
+    /// The body that one hangs on in the end amid a request, and where that puts it. Where one that it hangs on is
+    /// gone, or they hang on each other: none, and by where the last that is there was before.
+    fn by_now(&self, id: u64) -> (Option<u64>, Pose) {
+        let (mut at, mut pose) = (id, Pose::identity());
+        for _ in 0..=self.things.len() {
+            let Some((to, local)) = self.things[&at].hangs else {
+                return (Some(at), self.things[&at].pose * pose);
+            };
+            if !self.things.contains_key(&to) {
+                break;
+            }
+            pose = local * pose;
+            at = to;
+        }
+        (None, self.found[&at] * pose)
     }
 
     /// What an edit that an engine took makes of it.
@@ -205,13 +206,7 @@ impl World {
                     since_ns: 0,
                     solid,
                 };
-                let found = Found {
-                    pose: body.pose,
-                    root: id,
-                    moves: body.moves,
-                    since_ns: 0,
-                };
-                self.found.insert(id, found);
+                self.found.insert(id, body.pose);
                 self.things.insert(id, thing);
             }
             Edit::Remove { name } => {
@@ -236,8 +231,8 @@ impl World {
             Edit::Attach { name, to, pose } => match to {
                 Some(to) => {
                     let (id, to) = (self.id_of(name), self.id_of(to));
-                    let found = |id: u64| &self.found[&id].pose;
-                    let local = pose.unwrap_or_else(|| relative(found(to), found(id)));
+                    let by_now = |id: u64| self.by_now(id).1;
+                    let local = pose.unwrap_or_else(|| relative(&by_now(to), &by_now(id)));
                     self.named(name).hangs = Some((to, local));
                 }
                 None => self.detach(name, pose.as_ref()),
@@ -257,15 +252,12 @@ impl World {
         if self.things[&id].hangs.is_none() {
             return;
         }
-        let Found {
-            pose: at,
-            root,
-            moves,
-            since_ns,
-        } = self.found[&id];
+        let (root, at) = self.by_now(id);
         let now_ns = self.now_ns;
-        let root = self.things.get(&root);
+        let root = root.map(|root| &self.things[&root]);
         let (placed, refused) = root.map_or((false, false), |root| (root.placed, root.refused));
+        let moves = root.is_some_and(|root| root.solid.spec.moves);
+        let since_ns = root.map_or(0, |root| root.since_ns);
         let thing = self.named(name);
         thing.hangs = None;
         let fixed = !thing.solid.spec.moves;
@@ -273,6 +265,8 @@ impl World {
         thing.placed = placed || fixed;
         thing.refused = refused && !fixed;
         thing.since_ns = if moves { since_ns } else { now_ns };
+        let at = thing.pose;
+        self.found.insert(id, at);
     }
 
     /// All poses of frames are forgotten.

@@ -1,12 +1,16 @@
 //! Requests of several edits: each finds the scene as those before it made it (DESIGN 3.1, 3.10, 6).
 
+use std::path::Path;
 use std::sync::Arc;
 
 use sweepd::ids::BodyId;
+use sweepd::math::Pose;
 use sweepd::scene::BodySpec;
-use sweepd::world::Edit;
+use sweepd::shape::{ShapeSpec, build};
+use sweepd::wire::BodyStatus;
+use sweepd::world::{Edit, Parts, PlacedShape};
 
-use crate::support::{Bench, cube, moving};
+use crate::support::{Bench, MS, cube, fixed, moving, row};
 
 fn put(spec: BodySpec) -> Edit {
     Edit::Put {
@@ -21,6 +25,30 @@ fn remove(name: &str) -> Edit {
     }
 }
 
+fn attach(name: &str, to: &str, at_x: Option<f64>) -> Edit {
+    Edit::Attach {
+        name: name.to_owned(),
+        to: Some(to.to_owned()),
+        pose: at_x.map(|x| Pose::translation(x, 0.0, 0.0)),
+    }
+}
+
+fn detach(name: &str) -> Edit {
+    Edit::Attach {
+        name: name.to_owned(),
+        to: None,
+        pose: None,
+    }
+}
+
+fn hung(name: &str, to: &str, at_x: f64) -> BodySpec {
+    BodySpec {
+        attached_to: Some(to.to_owned()),
+        pose: Pose::translation(at_x, 0.0, 0.0),
+        ..moving(name, 0)
+    }
+}
+
 /// A tick with one request.
 fn request(bench: &mut Bench, edits: &[Edit]) {
     bench.tick += 1;
@@ -28,6 +56,17 @@ fn request(bench: &mut Bench, edits: &[Edit]) {
     bench.world.apply(edits).unwrap();
     bench.world.age(bench.now_ns);
     bench.world.validate().unwrap();
+}
+
+fn x_of(bench: &Bench, name: &str) -> f64 {
+    bench.body(name).pose.translation.vector.x
+}
+
+/// `x` at 5 and `z` at 6.5, both sent; a floor at 0.
+fn grasp() -> Bench {
+    let mut bench = Bench::of(vec![moving("x", 1), moving("z", 2), fixed("floor", 3, 0.0)]);
+    bench.send(MS, "sim", 1, &[row(1, 5.0), row(2, 6.5)]);
+    bench
 }
 
 #[test]
@@ -45,4 +84,131 @@ fn bug_an_id_that_a_request_asks_for_was_given_to_another_name_of_it() {
     // It stays with the name, also where its body goes again.
     let text = bench.refused(&[put(moving("s", 7)), remove("s"), put(moving("t", 7))]);
     assert!(text.contains("belongs to `s`"), "{text}");
+}
+
+#[test]
+fn bug_a_body_hung_where_it_is_moved_where_the_request_moves_what_it_hangs_on() {
+    let mut bench = grasp();
+    let edits = [attach("x", "floor", Some(0.0)), attach("z", "x", None)];
+    request(&mut bench, &edits);
+    assert_eq!((x_of(&bench, "x"), x_of(&bench, "z")), (0.0, 6.5));
+    // As two requests: what hangs on a body goes with it, and is let go where that was.
+    let mut bench = grasp();
+    let edits = [
+        attach("z", "x", None),
+        attach("x", "floor", Some(0.0)),
+        detach("z"),
+    ];
+    request(&mut bench, &edits);
+    assert_eq!((x_of(&bench, "x"), x_of(&bench, "z")), (0.0, 1.5));
+    assert_eq!(bench.status("z"), BodyStatus::Known);
+    // Also at the start pose of one that is put in place of it.
+    let mut bench = grasp();
+    bench.edit(attach("z", "x", None));
+    request(&mut bench, &[put(fixed("x", 1, 2.0)), detach("z")]);
+    assert_eq!((x_of(&bench, "x"), x_of(&bench, "z")), (2.0, 3.5));
+    // And of one that the request has put there.
+    let lamp = BodySpec {
+        attached_to: Some("x".to_owned()),
+        ..fixed("lamp", 0, 1.0)
+    };
+    let reset = Edit::Reset { source: None };
+    request(&mut bench, &[put(lamp), detach("lamp"), reset]);
+    assert_eq!(x_of(&bench, "lamp"), 3.0);
+    assert_eq!(bench.status("lamp"), BodyStatus::Known);
+    // Where what it hung on is removed it stays where it was.
+    let mut bench = grasp();
+    bench.edit(attach("z", "x", None));
+    let edits = [remove("x"), attach("z", "floor", None)];
+    request(&mut bench, &edits);
+    assert_eq!(x_of(&bench, "z"), 6.5);
+}
+
+#[test]
+fn bug_a_start_pose_that_was_never_received_became_an_offset() {
+    let mut bench = Bench::of(vec![moving("x", 1), moving("y", 2), fixed("floor", 3, 0.0)]);
+    bench.send(MS, "sim", 1, &[row(1, 5.0)]);
+    let text = bench.refused(&[detach("y"), attach("y", "x", None)]);
+    assert!(
+        text.starts_with("edit 2: it is not known where `y`"),
+        "{text}"
+    );
+    let text = bench.refused(&[attach("x", "y", Some(1.0)), attach("x", "floor", None)]);
+    assert!(
+        text.starts_with("edit 2: it is not known where `x`"),
+        "{text}"
+    );
+    // Nor does one that the request forgets.
+    let reset = Edit::Reset { source: None };
+    let text = bench.refused(&[reset, attach("x", "floor", None)]);
+    assert!(
+        text.starts_with("edit 2: it is not known where `x`"),
+        "{text}"
+    );
+}
+
+#[test]
+fn bug_a_body_put_on_another_counted_as_where_it_hangs_of_the_scene() {
+    let mut bench = grasp();
+    let edits = [put(hung("g", "x", 1.0)), attach("g", "floor", None)];
+    request(&mut bench, &edits);
+    assert_eq!(x_of(&bench, "g"), 6.0);
+}
+
+/// A sheet that deforms.
+fn cloth() -> Edit {
+    let mesh = ShapeSpec::Trimesh {
+        vertices: vec![
+            [0.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [1.0, 1.0, 0.0],
+        ],
+        faces: vec![[0, 1, 2], [1, 3, 2]],
+        file: None,
+        scale: None,
+        solid: Some(false),
+    };
+    let shape = build(&mesh, Path::new("")).unwrap().shape;
+    let shape = shape.to_deforming().unwrap();
+    Edit::Put {
+        body: Arc::new(BodySpec {
+            deforms: true,
+            ..moving("cloth", 0)
+        }),
+        shapes: Parts::from([PlacedShape {
+            shape: Arc::new(shape),
+            pose: Pose::identity(),
+        }]),
+    }
+}
+
+#[test]
+fn bug_edits_were_held_against_the_bodies_of_before_the_request() {
+    let mut bench = grasp();
+    let text = bench.refused(&[cloth(), attach("cloth", "x", Some(0.0))]);
+    assert!(text.starts_with("edit 2: body `cloth` deforms"), "{text}");
+    let lost = || BodySpec {
+        source: None,
+        ..hung("g", "x", 1.0)
+    };
+    let text = bench.refused(&[put(lost()), detach("g")]);
+    assert!(text.contains("no source may move it"), "{text}");
+    // And the other way round: what takes their place can.
+    bench.edit(put(lost()));
+    request(&mut bench, &[put(hung("g", "x", 2.0)), detach("g")]);
+    assert_eq!(x_of(&bench, "g"), 7.0);
+    bench.edit(cloth());
+    let edits = [put(moving("cloth", 0)), attach("cloth", "x", Some(0.0))];
+    request(&mut bench, &edits);
+    assert_eq!(x_of(&bench, "cloth"), 5.0);
+}
+
+#[test]
+fn bug_a_body_that_cannot_move_was_let_go_and_lost_its_pose_with_those_that_a_reset_forgets() {
+    let mut bench = grasp();
+    bench.edit(attach("floor", "x", Some(1.0)));
+    request(&mut bench, &[detach("floor"), Edit::Reset { source: None }]);
+    assert_eq!(bench.status("floor"), BodyStatus::Known);
+    assert_eq!(x_of(&bench, "floor"), 6.0);
 }

@@ -1,0 +1,209 @@
+//! What hangs on what, and where that is known, at each point of a request. In: one edit, at last all of them. Out:
+//! nothing, or what is wrong.
+
+use std::collections::BTreeSet;
+
+use super::super::World;
+use super::super::edit::Edit;
+use super::Draft;
+use crate::ids::BodySlot;
+use crate::math::Pose;
+use crate::scene::BodySpec;
+
+/// A body as the edits so far make it.
+#[derive(Clone, Copy)]
+pub(super) struct Sketch<'a> {
+    pub(super) spec: &'a BodySpec,
+    /// What it hangs on.
+    hangs: Option<&'a str>,
+    /// Whether it is known where it is, where what it hangs on has no say in it.
+    has_place: bool,
+    /// Number of the edit that said so; 0: it was so before the request.
+    at: usize,
+}
+
+impl<'a> Sketch<'a> {
+    /// One that the request puts: the start pose that is written beside the other edits counts for them.
+    pub(super) fn of_put(spec: &'a BodySpec, at: usize) -> Self {
+        Self {
+            spec,
+            hangs: spec.attached_to.as_deref(),
+            has_place: spec.attached_to.is_none(),
+            at,
+        }
+    }
+
+    /// One that is there before the request.
+    pub(super) fn of_world(world: &'a World, slot: BodySlot) -> Option<Self> {
+        let entry = &world.entries[slot.index()];
+        let root = &world.entries[entry.root.index()];
+        Some(Self {
+            spec: entry.spec.as_deref()?,
+            hangs: entry.attach.map(|(to, _)| &*world.names.get(to).text),
+            has_place: root.has_pose && !root.refused,
+            at: 0,
+        })
+    }
+}
+
+impl<'a> Draft<'a> {
+    /// Whether the place of a body is known well enough to hang something on it, or it on something. Cost: the bodies
+    /// above it; once where it is, and nothing is put elsewhere.
+    fn is_placed(&mut self, name: &'a str) -> bool {
+        let mut at = name;
+        let mut way = Vec::new();
+        // No longer than the longest chain there can be: they may hang on each other by now.
+        while way.len() <= self.len {
+            if self.placed.contains(at) {
+                self.placed.extend(way);
+                return true;
+            }
+            let Some(body) = self.body(at) else {
+                return false;
+            };
+            match body.hangs.filter(|to| self.has(to)) {
+                Some(to) => way.push(std::mem::replace(&mut at, to)),
+                None => {
+                    let has_place = body.has_place && !self.is_forgotten(&body);
+                    if has_place && body.hangs.is_none() {
+                        self.placed.extend(way);
+                        self.placed.insert(at);
+                    }
+                    return has_place;
+                }
+            }
+        }
+        false
+    }
+
+    fn is_forgotten(&self, body: &Sketch<'_>) -> bool {
+        let source = body.spec.source.filter(|_| body.spec.moves);
+        let forgotten = source.and_then(|source| self.forgotten.get(source));
+        forgotten.is_some_and(|edit| *edit > body.at)
+    }
+
+    pub(super) fn look_at_attach(
+        &mut self,
+        name: &'a str,
+        to: Option<&'a str>,
+        pose: Option<&Pose>,
+    ) -> Result<(), String> {
+        let body = self.must_have(name)?;
+        if pose.is_some_and(|p| !p.to_homogeneous().iter().all(|v| v.is_finite())) {
+            return Err(format!("body `{name}`: its pose must be finite"));
+        }
+        let Some(to) = to else {
+            return self.look_at_detach(name, &body, pose);
+        };
+        if body.spec.deforms {
+            return Err(format!(
+                "body `{name}` deforms: its source says where its vertices are, so it cannot hang on another"
+            ));
+        }
+        self.must_have(to)?;
+        if pose.is_none() && !(self.is_placed(name) && self.is_placed(to)) {
+            return Err(format!(
+                "it is not known where `{name}` is seen from `{to}`: give `pose`, or wait for their frames"
+            ));
+        }
+        if pose.is_some() {
+            self.placed.clear();
+        }
+        let hung = Sketch {
+            hangs: Some(to),
+            has_place: body.has_place && pose.is_none(),
+            ..body
+        };
+        self.bodies.insert(name, Some(hung));
+        Ok(())
+    }
+
+    /// A body let go needs a place, if it cannot move, or a source.
+    fn look_at_detach(
+        &mut self,
+        name: &'a str,
+        body: &Sketch<'a>,
+        pose: Option<&Pose>,
+    ) -> Result<(), String> {
+        let spec = body.spec;
+        if spec.moves && pose.is_some() {
+            return Err(format!(
+                "body `{name}` moves: its source says where it is, leave out `pose`"
+            ));
+        }
+        if spec.moves && spec.source.is_none() {
+            return Err(format!(
+                "body `{name}` moves, but no source may move it: put it with a `source`"
+            ));
+        }
+        let placed = self.is_placed(name);
+        if !spec.moves && pose.is_none() && !placed {
+            return Err(format!("it is not known where `{name}` is: give `pose`"));
+        }
+        // Who says where it is goes with what it hung on, where that is gone.
+        let hangs_on_one = body.hangs.is_none_or(|to| self.has(to));
+        let free = Sketch {
+            hangs: None,
+            has_place: !spec.moves || placed && hangs_on_one,
+            at: self.at,
+            ..*body
+        };
+        if !free.has_place {
+            self.placed.clear();
+        }
+        self.bodies.insert(name, Some(free));
+        Ok(())
+    }
+
+    /// After the last edit: parents and attachments are there, and none hangs on itself.
+    ///
+    /// Cost: O(edits + bodies that hang on others), each a search.
+    pub(super) fn references_hold(&self, edits: &[Edit]) -> Result<(), String> {
+        for edit in edits {
+            if let Edit::Put { body, .. } = edit
+                && self.has(&body.name)
+                && let Some(parent) = body.parent.as_deref().filter(|p| !self.has(p))
+            {
+                return Err(format!(
+                    "body `{}`: there is no body `{parent}` to be its parent: correct the name, or put it too",
+                    body.name
+                ));
+            }
+        }
+        let world = self.world;
+        let hung = world.attached.iter();
+        let hung = hung.filter_map(|slot| Some(&*world.body(*slot)?.name));
+        let edited = self.bodies.iter();
+        let edited = edited.filter(|(_, body)| body.is_some_and(|body| body.hangs.is_some()));
+        // Those above which all is well.
+        let mut held: BTreeSet<&str> = BTreeSet::new();
+        for name in hung.chain(edited.map(|(name, _)| *name)) {
+            self.is_held(name, &mut held)?;
+        }
+        Ok(())
+    }
+
+    /// Whether a body, if it is there, hangs on one that hangs on none in the end.
+    fn is_held<'b>(&'b self, name: &'b str, held: &mut BTreeSet<&'b str>) -> Result<(), String> {
+        let mut at = name;
+        let mut way = BTreeSet::new();
+        while !held.contains(at) {
+            if !way.insert(at) {
+                return Err(format!(
+                    "body `{name}` would hang on itself: let one go first"
+                ));
+            }
+            let Some(to) = self.body(at).and_then(|body| body.hangs) else {
+                break;
+            };
+            if !self.has(to) {
+                return Err(format!(
+                    "body `{at}` hangs on `{to}`, which is not there: let it go or remove it too"
+                ));
+            }
+            at = to;
+        }
+        held.extend(way);
+        Ok(())
+    }
+}
