@@ -239,6 +239,8 @@ impl World {
         };
         let changed = body.moves != spec.moves;
         body.moves = spec.moves;
+        // Names say whose a body is, too.
+        self.names_changed |= body.source != source;
         body.source = source;
         changed
     }

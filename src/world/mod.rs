@@ -296,7 +296,7 @@ impl World {
         self.scene_rev
     }
 
-    /// Whether bodies came or went in this tick, so that names must be sent again.
+    /// Whether bodies came, went or got another source in this tick, so that names must be sent again.
     #[must_use]
     pub fn names_changed(&self) -> bool {
         self.names_changed

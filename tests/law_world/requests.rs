@@ -205,6 +205,20 @@ fn bug_edits_were_held_against_the_bodies_of_before_the_request() {
 }
 
 #[test]
+fn bug_names_kept_the_source_of_a_body_that_was_hung_or_let_go() {
+    let mut bench = grasp();
+    for edit in [attach("z", "floor", None), detach("z")] {
+        bench.edit(edit);
+        assert!(bench.world.names_changed());
+    }
+    // Its source is the same.
+    for edit in [attach("z", "x", None), detach("z")] {
+        bench.edit(edit);
+        assert!(!bench.world.names_changed());
+    }
+}
+
+#[test]
 fn bug_a_body_that_cannot_move_was_let_go_and_lost_its_pose_with_those_that_a_reset_forgets() {
     let mut bench = grasp();
     bench.edit(attach("floor", "x", Some(1.0)));
