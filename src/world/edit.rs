@@ -10,7 +10,7 @@ use super::census::slot_at;
 use super::edit_links::Places;
 use super::filters::{ENABLED, Hot, LIVE, MOVES, NO_GROUP, UNBOUNDED};
 use super::names::NameId;
-use super::parts::{Parts, PlacedShape};
+use super::parts::Parts;
 use super::place::{Entry, new_body};
 use crate::ids::{BodyId, BodySlot, SourceSlot};
 use crate::math::Pose;
@@ -255,38 +255,6 @@ impl World {
         true
     }
 
-    /// Whether a put would change nothing: the same words, the same shapes, and no edit in between.
-    pub(super) fn is_same(&self, slot: BodySlot, spec: &BodySpec, shapes: &[PlacedShape]) -> bool {
-        let entry = &self.entries[slot.index()];
-        let (Some(old), Some(body)) = (&entry.spec, self.body(slot)) else {
-            return false;
-        };
-        let same_words = if spec.id == BodyId(0) || old.id == BodyId(0) {
-            let with_id = |s: &BodySpec| BodySpec {
-                id: body.id,
-                ..s.clone()
-            };
-            with_id(old) == with_id(spec)
-        } else {
-            **old == *spec
-        };
-        // A file may have changed under the same name.
-        let measures = |placed: &PlacedShape| match &body.vertices {
-            // As it was put: what its sender made of it since is no other shape.
-            Some(vertices) => vertices.rest,
-            None => (placed.shape.aabb, placed.shape.radius),
-        };
-        let same_shapes = body.shapes.len() == shapes.len()
-            && body.shapes.iter().zip(shapes).all(|(a, b)| {
-                let (aabb, radius) = measures(a);
-                Arc::ptr_eq(&a.shape, &b.shape)
-                    || aabb == b.shape.aabb
-                        && radius.to_bits() == b.shape.radius.to_bits()
-                        && a.shape.is_built_alike(&b.shape, body.vertices.is_some())
-            });
-        !entry.edited && same_words && same_shapes
-    }
-
     fn new_slot(&mut self) -> BodySlot {
         let slot = slot_at(self.bodies.len());
         self.bodies.push(None);
@@ -343,7 +311,6 @@ impl World {
             return false;
         }
         entry.enabled = enabled;
-        entry.edited = true;
         if let Some(hot) = self.hot(slot) {
             hot.flags = if enabled {
                 hot.flags | ENABLED
@@ -367,7 +334,6 @@ impl World {
             return false;
         }
         (hot.group, hot.mask) = (group, mask);
-        self.entries[slot.index()].edited = true;
         self.requery(slot);
         true
     }

@@ -76,7 +76,7 @@ impl World {
     }
 
     fn set_margin(&mut self, slot: BodySlot, report_within_m: Option<f64>) -> bool {
-        let entry = &mut self.entries[slot.index()];
+        let entry = &self.entries[slot.index()];
         let put_m = entry.spec.as_ref().map(|spec| spec.report_within_m);
         let Some(wanted_m) = report_within_m.or(put_m) else {
             return false;
@@ -87,7 +87,6 @@ impl World {
             return false;
         };
         body.report_within_m = wanted_m;
-        entry.edited |= put_m != Some(wanted_m);
         if let Some(hot) = self.hot(slot) {
             hot.report_within_m = wanted_m;
         }

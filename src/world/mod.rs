@@ -17,6 +17,7 @@ mod edit;
 mod edit_check;
 mod edit_links;
 mod edit_rules;
+mod edit_same;
 mod elsewhere;
 mod filters;
 mod gaze;

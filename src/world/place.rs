@@ -23,8 +23,6 @@ use crate::wire::{BodyStatus, EndCause};
 #[derive(Clone, Debug)]
 pub(super) struct Entry {
     pub(super) spec: Option<Arc<BodySpec>>,
-    /// An edit made it other than `spec` says.
-    pub(super) edited: bool,
     pub(super) enabled: bool,
     /// A pose was admitted since it was put or reset; always so for a body that cannot move.
     pub(super) has_pose: bool,
@@ -56,7 +54,6 @@ impl Entry {
     pub(super) fn gone(slot: BodySlot) -> Self {
         Self {
             spec: None,
-            edited: false,
             enabled: false,
             has_pose: false,
             refused: false,
@@ -387,7 +384,7 @@ fn sphere_around(shapes: &[PlacedShape], unbounded: bool) -> (Point, f64) {
     (centre, radius + 32.0 * ROUND * magnitude)
 }
 
-fn same_bits(one: &Pose, other: &Pose) -> bool {
+pub(super) fn same_bits(one: &Pose, other: &Pose) -> bool {
     let (v, w) = (&one.translation.vector, &other.translation.vector);
     let (q, r) = (&one.rotation.as_vector(), &other.rotation.as_vector());
     v.iter()

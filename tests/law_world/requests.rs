@@ -205,6 +205,37 @@ fn bug_edits_were_held_against_the_bodies_of_before_the_request() {
 }
 
 #[test]
+fn bug_a_put_after_edits_that_changed_nothing_made_a_new_generation() {
+    let enable = |enabled| Edit::Enable {
+        name: "x".to_owned(),
+        enabled,
+    };
+    let filter = |group| Edit::Filter {
+        name: "x".to_owned(),
+        group: Some(group),
+        mask: None,
+    };
+    let mut bench = grasp();
+    bench.edit(detach("x"));
+    bench.edit(enable(false));
+    bench.edit(enable(true));
+    bench.edit(filter(2));
+    bench.edit(filter(moving("x", 1).group));
+    bench.edit(attach("x", "floor", Some(0.0)));
+    bench.edit(detach("x"));
+    let rev = bench.world.scene_rev();
+    bench.edit(put(moving("x", 1)));
+    assert_eq!(bench.world.scene_rev(), rev);
+    assert_eq!(bench.body("x").generation, 1);
+    // One that cannot move is as it was put where it was put.
+    bench.edit(attach("floor", "x", Some(1.0)));
+    bench.edit(detach("floor"));
+    bench.edit(put(fixed("floor", 3, 0.0)));
+    assert_eq!(bench.body("floor").generation, 2);
+    assert_eq!(x_of(&bench, "floor"), 0.0);
+}
+
+#[test]
 fn bug_names_kept_the_source_of_a_body_that_was_hung_or_let_go() {
     let mut bench = grasp();
     for edit in [attach("z", "floor", None), detach("z")] {

@@ -1,0 +1,63 @@
+//! Whether a body that is put is the one that is there.
+//!
+//! In: what is put. Out: yes or no; a yes makes of the put an edit that changes nothing.
+
+use std::sync::Arc;
+
+use super::World;
+use super::parts::PlacedShape;
+use super::place::same_bits;
+use crate::ids::{BodyId, BodySlot};
+use crate::scene::BodySpec;
+
+impl World {
+    /// Whether a put would change nothing: the same words, the same shapes, and what edits made of it is the same.
+    pub(super) fn is_same(&self, slot: BodySlot, spec: &BodySpec, shapes: &[PlacedShape]) -> bool {
+        let entry = &self.entries[slot.index()];
+        let (Some(old), Some(body)) = (&entry.spec, self.body(slot)) else {
+            return false;
+        };
+        let same_words = if spec.id == BodyId(0) || old.id == BodyId(0) {
+            let with_id = |s: &BodySpec| BodySpec {
+                id: body.id,
+                ..s.clone()
+            };
+            with_id(old) == with_id(spec)
+        } else {
+            **old == *spec
+        };
+        // A file may have changed under the same name.
+        let measures = |placed: &PlacedShape| match &body.vertices {
+            // As it was put: what its sender made of it since is no other shape.
+            Some(vertices) => vertices.rest,
+            None => (placed.shape.aabb, placed.shape.radius),
+        };
+        let same_shapes = body.shapes.len() == shapes.len()
+            && body.shapes.iter().zip(shapes).all(|(a, b)| {
+                let (aabb, radius) = measures(a);
+                Arc::ptr_eq(&a.shape, &b.shape)
+                    || aabb == b.shape.aabb
+                        && radius.to_bits() == b.shape.radius.to_bits()
+                        && a.shape.is_built_alike(&b.shape, body.vertices.is_some())
+            });
+        same_words && same_shapes && self.is_as_put(slot, spec)
+    }
+
+    /// Whether what edits can change of a body is as it was put.
+    fn is_as_put(&self, slot: BodySlot, spec: &BodySpec) -> bool {
+        let (Some(body), Some(hot)) = (self.body(slot), self.filters.bodies.get(slot.index()))
+        else {
+            return false;
+        };
+        let entry = &self.entries[slot.index()];
+        let attach = spec.attached_to.as_deref().map(|to| (to, spec.pose));
+        let hangs = entry.attach;
+        let hangs = hangs.map(|(to, pose)| (&*self.names.get(to).text, pose));
+        let stays = spec.moves || attach.is_some();
+        entry.enabled == spec.enabled
+            && (hot.group, hot.mask) == (spec.group, spec.mask)
+            && body.report_within_m.to_bits() == spec.report_within_m.to_bits()
+            && hangs == attach
+            && (stays || same_bits(&body.pose, &spec.pose))
+    }
+}
