@@ -9,11 +9,6 @@ pub use meter::{Meter, Pause, Reserve, Share};
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A sender's time stamp, nanoseconds of the sender's own clock; carried and echoed, never trusted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-#[repr(transparent)]
-pub struct Stamp(pub u64);
-
 /// Where the engine gets its time from.
 pub trait Clock: Send + Sync {
     /// Nanoseconds on `CLOCK_BOOTTIME`: ages, time-outs.

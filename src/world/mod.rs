@@ -375,23 +375,15 @@ impl World {
         self.rejects[usize::from(reason.code())] += 1;
     }
 
-    /// The client of a source is dead (its node is gone): its session is over, another may begin at once.
-    pub fn session_dead(&mut self, source: SourceSlot) {
-        if let Some(state) = self.sources.get_mut(source.index())
-            && state.session != 0
-        {
-            self.over.put(source, state.session);
-            state.session = 0;
-            state.order = None;
-            state.pass_over_waiting();
-        }
-    }
-
-    /// As [`World::session_dead`], of whichever sources this session speaks for.
+    /// The client that had this session is dead (its node is gone): it is over for whichever sources it speaks for, and
+    /// another may begin at once.
     pub fn end_session(&mut self, session: u64) {
-        for place in 0..self.sources.len() {
-            if self.sources[place].session == session {
-                self.session_dead(SourceSlot(slot_at(place).0));
+        for (place, state) in self.sources.iter_mut().enumerate() {
+            if session != 0 && state.session == session {
+                self.over.put(SourceSlot(slot_at(place).0), session);
+                state.session = 0;
+                state.order = None;
+                state.pass_over_waiting();
             }
         }
     }

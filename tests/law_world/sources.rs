@@ -122,7 +122,7 @@ fn law_4_2_a_stopped_owner_loses_its_source_and_is_refused_for_this_boot() {
 fn law_4_2_a_dead_node_frees_its_source_at_once() {
     let mut bench = Bench::of(vec![moving("a", 1)]);
     bench.send(MS, "sim", 7, &[row(1, 0.0)]);
-    bench.world.session_dead(SourceSlot(0));
+    bench.world.end_session(1);
     // Its death alone says nothing about its bodies: they age.
     bench.wait(MS);
     assert_eq!(bench.status("a"), BodyStatus::Known);
@@ -132,7 +132,7 @@ fn law_4_2_a_dead_node_frees_its_source_at_once() {
     assert_eq!(bench.removed("a"), Some(EndCause::Reset));
     let ghost = bench.send(MS, "sim", 8, &[row(1, 0.0)]);
     assert_eq!(ghost, refused(0, RejectReason::SessionOver));
-    // By session, as the transport says it; a session that is not in force changes nothing.
+    // A session that is not in force changes nothing.
     bench.world.end_session(1);
     assert_eq!(bench.world.sources()[0].session, 2);
     bench.world.end_session(2);
