@@ -71,7 +71,7 @@ impl Ages {
 
 impl World {
     /// Judges every age at `now_boot_ns` and closes the tick's change set: frames that waited, bodies too old, the
-    /// growing reach of stale ones, attached bodies.
+    /// growing reach of stale ones, attached bodies, what edits mean for the filters.
     pub fn age(&mut self, now_boot_ns: u64) {
         self.now_ns = self.now_ns.max(now_boot_ns);
         for place in 0..self.sources.len() {
@@ -81,6 +81,7 @@ impl World {
             source.alive = source.newest.is_some() && age_ns < source.timeout_ns;
         }
         self.settle_attached();
+        self.recount();
         self.ages.sweep();
         if self.ages.next_ns.is_some_and(|next| next <= self.now_ns) {
             self.settle_expired();

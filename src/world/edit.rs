@@ -92,12 +92,14 @@ pub struct Applied {
 
 /// What has to be done once for a request, after its last edit.
 #[derive(Clone, Debug, Default)]
-pub(super) struct After {
+struct After {
     changed: bool,
     links: bool,
     census: bool,
+    /// Slots that another body is in, or none, than before; any number of times.
+    slots: Vec<BodySlot>,
     /// Where bodies are by now.
-    pub(super) places: Places,
+    places: Places,
 }
 
 impl World {
@@ -117,18 +119,14 @@ impl World {
         for edit in edits {
             self.apply_one(edit, &mut after);
         }
+        self.relist(std::mem::take(&mut after.slots));
         let ruled = self.edit_rules(edits);
         after.changed |= ruled;
         after.census |= ruled;
-        if after.census {
-            self.mark_all_ruled();
-        }
         if after.links {
             self.link();
         }
-        if after.census {
-            self.recount();
-        }
+        self.uncounted |= after.census;
         if after.changed {
             self.scene_rev += 1;
             self.edited = true;
@@ -154,7 +152,7 @@ impl World {
     fn apply_one(&mut self, edit: &Edit, after: &mut After) {
         let changed = match edit {
             Edit::Put { body, shapes } => {
-                let put = self.put(body, shapes);
+                let put = self.put(body, shapes, after);
                 if put {
                     after.links = true;
                     after.places.forget();
@@ -162,7 +160,7 @@ impl World {
                 put
             }
             Edit::Remove { name } => {
-                let removed = self.remove(name);
+                let removed = self.remove(name, after);
                 if removed {
                     after.links = true;
                     after.places.forget();
@@ -193,7 +191,7 @@ impl World {
     }
 
     /// Puts a body, unless the very same is there.
-    fn put(&mut self, spec: &Arc<BodySpec>, shapes: &Parts) -> bool {
+    fn put(&mut self, spec: &Arc<BodySpec>, shapes: &Parts, after: &mut After) -> bool {
         let known = self.names.find_name(&spec.name).and_then(|n| n.slot);
         if let Some(slot) = known {
             if self.is_same(slot, spec, shapes) {
@@ -243,13 +241,8 @@ impl World {
             report_within_m: spec.report_within_m,
         };
         self.by_status[usize::from(body.status.code())] += 1;
-        if let Err(at) = self.order.binary_search_by_key(&id, |e| e.0) {
-            self.order.insert(at, (id, slot));
-        }
         self.bodies[slot.index()] = Some(body);
-        if spec.deforms {
-            self.deforming.push(slot);
-        }
+        after.slots.push(slot);
         self.names_changed = true;
         self.settle(slot, true);
         true
@@ -267,7 +260,40 @@ impl World {
         slot
     }
 
-    /// Takes a slot's body out of everything but the names.
+    /// Brings the lists of bodies in line with what these slots hold.
+    ///
+    /// Cost: O(listed bodies), and sorting the slots.
+    fn relist(&mut self, mut slots: Vec<BodySlot>) {
+        if slots.is_empty() {
+            return;
+        }
+        slots.sort_unstable();
+        slots.dedup();
+        let others = |slot: &BodySlot| slots.binary_search(slot).is_err();
+        self.growing.retain(others);
+        self.travelled.retain(others);
+        self.deforming.retain(others);
+        self.order.retain(|(_, slot)| others(slot));
+        for &slot in &slots {
+            let Some(body) = self.bodies[slot.index()].as_ref() else {
+                continue;
+            };
+            if self.entries[slot.index()].growing {
+                self.growing.push(slot);
+            }
+            if body.path.as_ref().is_some_and(|path| !path.is_empty()) {
+                self.travelled.push(slot);
+            }
+            if body.vertices.is_some() {
+                self.deforming.push(slot);
+            }
+            self.order.push((body.id, slot));
+        }
+        // All but the end is in order: that costs a walk.
+        self.order.sort();
+    }
+
+    /// Takes a slot's body out of everything but the names and the lists of bodies.
     fn clear_slot(&mut self, slot: BodySlot, cause: EndCause) {
         let Some(body) = self.bodies[slot.index()].take() else {
             return;
@@ -277,12 +303,6 @@ impl World {
         }
         self.lists.forget(slot);
         self.by_status[usize::from(body.status.code())] -= 1;
-        if let Ok(at) = self.order.binary_search_by_key(&body.id, |e| e.0) {
-            self.order.remove(at);
-        }
-        self.growing.retain(|&other| other != slot);
-        self.travelled.retain(|&other| other != slot);
-        self.deforming.retain(|&other| other != slot);
         self.entries[slot.index()] = Entry::gone(slot);
         self.filters.bodies[slot.index()] = Hot::GONE;
         self.ages.set(slot, None, None);
@@ -293,11 +313,12 @@ impl World {
         self.names_changed = true;
     }
 
-    fn remove(&mut self, name: &str) -> bool {
+    fn remove(&mut self, name: &str, after: &mut After) -> bool {
         let Some(slot) = self.slot_named(name) else {
             return false;
         };
         self.clear_slot(slot, EndCause::Removed);
+        after.slots.push(slot);
         self.resting.push(slot);
         true
     }

@@ -55,14 +55,6 @@ impl World {
         }
     }
 
-    /// Compiles the rules for new names, and marks what they say of each body.
-    pub(super) fn mark_all_ruled(&mut self) {
-        self.filters.sync_names(&self.names);
-        for index in 0..self.bodies.len() {
-            self.filters.mark_ruled(index);
-        }
-    }
-
     /// Sets the distance that pairs of a body, or of all, are told as near within; whether any was another.
     pub(super) fn set_margins(&mut self, name: Option<&str>, report_within_m: Option<f64>) -> bool {
         let Some(name) = name else {
@@ -124,8 +116,16 @@ impl World {
         }
     }
 
-    /// What the filters make of the scene after an edit: ignored and forced pairs, and how wide boxes must be.
+    /// What the filters make of the scene after the edits of a tick: what the rules say of each body, ignored and
+    /// forced pairs, and how wide boxes must be.
     pub(super) fn recount(&mut self) {
+        if !std::mem::take(&mut self.uncounted) {
+            return;
+        }
+        self.filters.sync_names(&self.names);
+        for index in 0..self.bodies.len() {
+            self.filters.mark_ruled(index);
+        }
         self.filters.count_ignored(&self.names);
         self.filters.find_forced(&self.names);
         for index in 0..self.bodies.len() {

@@ -113,6 +113,8 @@ pub struct World {
     scene_rev: u64,
     names_changed: bool,
     edited: bool,
+    /// Edits changed what the filters make of the scene, and nobody has looked at that yet.
+    uncounted: bool,
     /// The change set was not taken yet by a tick: what `new` put there.
     first: bool,
     tick: u64,
@@ -167,6 +169,7 @@ impl World {
             .set(scene.rules.clone(), &mut world.names);
         world.check(&edits, false).map_err(Error::Scene)?;
         world.apply_checked(&edits);
+        world.recount();
         world.scene_rev = 1;
         world.names_changed = true;
         world.edited = true;
@@ -201,6 +204,7 @@ impl World {
             scene_rev: 0,
             names_changed: false,
             edited: false,
+            uncounted: false,
             first: false,
             tick: 0,
             now_ns,
@@ -310,7 +314,7 @@ impl World {
         self.edited
     }
 
-    /// The filters: which pairs are checked and reported.
+    /// The filters: which pairs are checked and reported. As of [`World::age`].
     #[must_use]
     pub fn filters(&self) -> &Filters {
         &self.filters
@@ -322,7 +326,7 @@ impl World {
         self.filters.report_within(a, b)
     }
 
-    /// How many pairs a rule, neighbour, rigid group or attachment ignores.
+    /// How many pairs a rule, neighbour, rigid group or attachment ignores. As of [`World::age`].
     #[must_use]
     pub fn ignored_pairs_count(&self) -> u64 {
         self.filters.ignored_pairs_count()

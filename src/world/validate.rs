@@ -29,6 +29,12 @@ impl World {
             self.validate_body(slot, body)
                 .map_err(|what| format!("body `{}`: {what}", body.name))?;
         }
+        let bends = self.bodies.iter().flatten();
+        let bends = bends.filter(|body| body.vertices.is_some()).count();
+        let grow = self.entries.iter().filter(|entry| entry.growing).count();
+        if (bends, grow) != (self.deforming.len(), self.growing.len()) {
+            return Err("a body that deforms, or whose reach grows, is lost".to_owned());
+        }
         if by_status != self.by_status {
             return Err("the tallies by status are off".to_owned());
         }
@@ -98,7 +104,8 @@ impl World {
             !body.in_broad || placed,
             "it is in the broad phase without a pose",
         )?;
-        let rooted = (entry.root != slot) == self.attached.contains(&slot);
+        let hangs = self.attached.binary_search(&slot).is_ok();
+        let rooted = (entry.root != slot) == hangs;
         check(rooted, "it hangs on a body, or not, by mistake")
     }
 }

@@ -249,6 +249,32 @@ fn bug_names_kept_the_source_of_a_body_that_was_hung_or_let_go() {
     }
 }
 
+/// Looked at link by link from each end, this would take minutes.
+#[test]
+fn bug_a_long_chain_in_one_request_was_walked_from_each_of_its_bodies() {
+    const LEN: u64 = 20_000;
+    let mut bench = grasp();
+    let name = |at: u64| match at {
+        0 => "x".to_owned(),
+        at => format!("link{at}"),
+    };
+    let link = |at: u64| put(hung(&name(at), &name(at - 1), 0.25));
+    let mut edits: Vec<Edit> = (1..=LEN).map(link).collect();
+    request(&mut bench, &edits);
+    let last = name(LEN);
+    assert_eq!(x_of(&bench, &last), 5.0 + 0.25 * LEN as f64);
+    // Let go and hung again where they are, from the first on, then taken out.
+    edits = vec![attach("z", "floor", Some(1.0))];
+    edits.extend(
+        (1..=LEN).flat_map(|at| [detach(&name(at)), attach(&name(at), &name(at - 1), None)]),
+    );
+    request(&mut bench, &edits);
+    assert_eq!(x_of(&bench, &last), 5.0 + 0.25 * LEN as f64);
+    edits = (1..=LEN).map(|at| remove(&name(at))).collect();
+    request(&mut bench, &edits);
+    assert_eq!(bench.world.bodies().count(), 3);
+}
+
 #[test]
 fn bug_a_body_that_cannot_move_was_let_go_and_lost_its_pose_with_those_that_a_reset_forgets() {
     let mut bench = grasp();
