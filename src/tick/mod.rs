@@ -163,7 +163,7 @@ impl Engine {
         self.out.plan_changed = false;
     }
 
-    /// Sets the time-out of a source, by its place; it holds from its next frame on.
+    /// Sets the time-out of a source, by its place; from the next tick on every age is judged by it.
     pub fn set_timeout(&mut self, source: usize, timeout_ns: u64) {
         self.world.set_timeout(source, timeout_ns);
     }

@@ -45,6 +45,11 @@ impl Ages {
         };
     }
 
+    /// Whatever its deadline was, it is now.
+    fn set_due(&mut self, slot: BodySlot) {
+        self.list[slot.index()].deadline_ns = 0;
+    }
+
     pub(super) fn deadline_ns(&self, slot: BodySlot) -> Option<u64> {
         let deadline_ns = self.list.get(slot.index())?.deadline_ns;
         (deadline_ns != NONE).then_some(deadline_ns)
@@ -70,6 +75,28 @@ impl Ages {
 }
 
 impl World {
+    /// Sets the time-out of a source: from the next tick on it is what every age is judged by, also of what was sent
+    /// before.
+    pub fn set_timeout(&mut self, source: usize, timeout_ns: u64) {
+        if source < self.sources.len() {
+            self.timeouts
+                .push((SourceSlot(slot_at(source).0), timeout_ns));
+        }
+    }
+
+    /// A tick begins with the time-outs that were set since the last: whom one concerns [`World::age`] judges anew.
+    pub(super) fn take_timeouts(&mut self) {
+        for (source, timeout_ns) in std::mem::take(&mut self.timeouts) {
+            self.sources[source.index()].timeout_ns = timeout_ns;
+            for (_, slot) in &self.order {
+                let body = self.bodies[slot.index()].as_ref();
+                if body.is_some_and(|body| body.source == Some(source)) {
+                    self.ages.set_due(*slot);
+                }
+            }
+        }
+    }
+
     /// Judges every age at `now_boot_ns` and closes the tick's change set: frames that waited, bodies too old, the
     /// growing reach of stale ones, attached bodies, what edits mean for the filters.
     pub fn age(&mut self, now_boot_ns: u64) {

@@ -91,6 +91,8 @@ pub struct World {
     rigid_groups: Names,
     sources: Vec<SourceState>,
     over: SessionsOver,
+    /// Time-outs set since the last tick.
+    timeouts: Vec<(SourceSlot, u64)>,
     /// Low half of the boot id; 0: not said.
     boot: u32,
     /// Slots free for another body.
@@ -190,6 +192,7 @@ impl World {
             rigid_groups: Names::default(),
             sources: Vec::new(),
             over: SessionsOver::new(),
+            timeouts: Vec::new(),
             boot: 0,
             free: Vec::new(),
             resting: Vec::new(),
@@ -223,6 +226,7 @@ impl World {
             self.edited = false;
         }
         self.free.append(&mut self.resting);
+        self.take_timeouts();
         self.end_travels();
     }
 

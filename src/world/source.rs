@@ -120,13 +120,6 @@ impl SourceState {
 }
 
 impl super::World {
-    /// Sets the time-out of a source; the ages of what it has sent already are judged by the old one.
-    pub fn set_timeout(&mut self, source: usize, timeout_ns: u64) {
-        if let Some(state) = self.sources.get_mut(source) {
-            state.timeout_ns = timeout_ns;
-        }
-    }
-
     /// Whether this session is in force for the source of this name.
     #[must_use]
     pub fn speaks_for(&self, session: u64, source: &[u8; SOURCE_NAME_LEN]) -> bool {

@@ -259,3 +259,32 @@ fn a_body_that_does_not_move_costs_no_entry_in_any_list() {
     );
     assert!(bench.body("a").motion.spent_m() >= 0.25);
 }
+
+#[test]
+fn bug_a_time_out_that_was_set_and_the_ages_of_before_did_not_agree() {
+    let gone = BodySpec {
+        on_stale: OnStale::Remove,
+        ..moving("b", 2)
+    };
+    let mut bench = Bench::of(vec![moving("a", 1), gone]);
+    bench.send(MS, "sim", 1, &[row(1, 0.0), row(2, 3.0)]);
+    bench.wait(100 * MS);
+    bench.world.set_timeout(0, 50 * MS);
+    // Until the next tick, all is as the last one said.
+    bench.world.validate().unwrap();
+    assert_eq!(bench.status("a"), BodyStatus::Known);
+    // It judges what was sent before, and not before it has heard what came.
+    let now_ns = bench.now_ns + MS;
+    let mut some = frame("sim", 2, now_ns, &[row(2, 3.0)]);
+    some.header.flags = sweepd::wire::frame_flags::PARTIAL;
+    bench.tick_at(now_ns, &[], &[some]);
+    assert_eq!(bench.status("a"), BodyStatus::Stale);
+    assert_eq!(bench.status("b"), BodyStatus::Known);
+    assert_eq!(bench.removed("b"), None);
+    assert_eq!(bench.world.next_timeout(), Some(now_ns + 50 * MS));
+    // As young as it was it is known again where more is allowed.
+    bench.world.set_timeout(0, TIMEOUT_NS);
+    bench.wait(60 * MS);
+    assert_eq!(bench.status("a"), BodyStatus::Known);
+    assert_eq!(bench.status("b"), BodyStatus::Known);
+}
