@@ -220,8 +220,8 @@ code! {
         OverLimit = 13 => "over_limit",
         /// A chain of ROS 2 frames from the body to the scene's frame that has a loop, or stamps too far apart.
         BadChain = 14 => "bad_chain",
-        /// A range of vertices that does not follow on the version the body has, or comes after refused ones; or vertices
-        /// of the source were lost on the way.
+        /// A range of vertices that does not follow on the version the body has, or comes after refused ones; or
+        /// vertices of the source were lost on the way.
         VertexVersion = 15 => "vertex_version",
     }
 }

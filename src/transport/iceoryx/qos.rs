@@ -35,8 +35,8 @@ const SOURCE_PUBLISHERS_MAX: usize = SOURCES_MAX + 8;
 const SOURCE_SUBSCRIBERS_MAX: usize = 4;
 /// Frames of one source that wait for the daemon; then the oldest goes (world counts the gap).
 pub(super) const SOURCE_BUFFER: usize = 4;
-/// Vertex messages of one source that wait for the daemon; then the oldest goes, and what the source has bent is unknown
-/// until all of its vertices come again.
+/// Vertex messages of one source that wait for the daemon; then the oldest goes, and what the source has bent is
+/// unknown until all of its vertices come again.
 pub(super) const VERTEX_BUFFER: usize = 64;
 /// Publishers of results: the daemon, its successor, a tunnel.
 const RESULT_PUBLISHERS_MAX: usize = 3;
