@@ -13,7 +13,7 @@ use super::given::{Between, EditRecord, Origin, Start, TickRecord, TreeMark, cop
 use super::law::{self, Judged};
 use crate::config::Mode;
 use crate::error::{Error, Result};
-use crate::ids::SourceSlot;
+use crate::ids::{BodyId, SourceSlot};
 use crate::scene::{Request, Scene};
 use crate::shape::Library;
 use crate::tick::build::{EditBuilder, build_shapes_in};
@@ -236,7 +236,8 @@ impl Replay {
         edit.or_else(|| differ::first(&record.out, &self.said, demand))
     }
 
-    /// Does what was done between two ticks; whatever cannot be done again is a difference.
+    /// Does what was done between two ticks; whatever cannot be done again is a difference. By the law none is: which
+    /// tree wears, and when, follows from refits that were cut off by time.
     fn do_between(&mut self, between: &Between) -> Option<Spot> {
         let told = |done: &str| Some(Spot::whole("between ticks", &format!("{between:?}"), done));
         match between {
@@ -247,6 +248,10 @@ impl Replay {
             Between::Timeout { source, timeout_ns } => {
                 let source = usize::try_from(*source).unwrap_or(usize::MAX);
                 self.engine.set_timeout(source, *timeout_ns);
+                None
+            }
+            Between::TreeAsked(of) if self.lawful => {
+                self.worn = self.engine.worn_tree_of(BodyId(of.body));
                 None
             }
             Between::TreeAsked(of) => {
@@ -260,7 +265,7 @@ impl Replay {
             Between::TreeBuilt(_, taken) => {
                 let built = self.worn.take().map(WornTree::build);
                 let mine = built.is_some_and(|tree| self.engine.take_tree(tree));
-                (mine != *taken)
+                (mine != *taken && !self.lawful)
                     .then(|| told(&format!("taken: {mine}")))
                     .flatten()
             }

@@ -7,6 +7,7 @@
 use super::Engine;
 use super::floor::Began;
 use super::interrupts::Interrupts;
+use crate::ids::BodyId;
 use crate::narrow::Wanted;
 use crate::time::Meter;
 use crate::world::{BuiltTree, TreeOf, WornTree};
@@ -66,6 +67,12 @@ impl Engine {
     #[must_use]
     pub fn worn_tree(&self) -> Option<WornTree> {
         self.world.worn_tree()
+    }
+
+    /// That of one body alone; see [`crate::world::World::worn_tree_of`].
+    #[must_use]
+    pub fn worn_tree_of(&self, body: BodyId) -> Option<WornTree> {
+        self.world.worn_tree_of(body)
     }
 
     /// Puts a built tree in place, between two ticks; pairs of the body then start from its root. Whether it was taken.

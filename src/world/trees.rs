@@ -79,18 +79,16 @@ impl World {
     /// Cost: nothing to speak of for each body that deforms; of one that is worn, a copy of its vertices and faces.
     #[must_use]
     pub fn worn_tree(&self) -> Option<WornTree> {
-        let worn = |slot: &_| {
-            let body = self.body(*slot)?;
-            let vertices = body.vertices.as_deref().filter(|of| of.can_be_built())?;
-            let job = body.shapes.first()?.shape.mesh()?.worn_tree()?;
-            let of = TreeOf {
-                body: body.id,
-                generation: body.generation,
-                updates: vertices.updates,
-            };
-            Some(WornTree { of, job })
-        };
-        self.deforming.iter().find_map(worn)
+        let all = self.deforming.iter();
+        all.filter_map(|slot| self.body(*slot))
+            .find_map(Body::worn_tree)
+    }
+
+    /// The same of one body alone: where boxes were refitted within a limit of time, which tree wears first is the
+    /// machine's choice.
+    #[must_use]
+    pub fn worn_tree_of(&self, body: BodyId) -> Option<WornTree> {
+        self.body(self.slot_of(body)?)?.worn_tree()
     }
 
     /// Puts a tree in place, between two ticks. Whether it was taken: its body may be another by now.
@@ -126,6 +124,19 @@ impl World {
         let slot = self.slot_of(of.body)?;
         let body = self.bodies[slot.index()].as_mut();
         body.filter(|body| body.generation == of.generation)
+    }
+}
+
+impl Body {
+    fn worn_tree(&self) -> Option<WornTree> {
+        let vertices = self.vertices.as_deref().filter(|of| of.can_be_built())?;
+        let job = self.shapes.first()?.shape.mesh()?.worn_tree()?;
+        let of = TreeOf {
+            body: self.id,
+            generation: self.generation,
+            updates: vertices.updates,
+        };
+        Some(WornTree { of, job })
     }
 }
 

@@ -22,7 +22,7 @@ use std::io::{Seek, SeekFrom, Write};
 use rich::{Play, play};
 use stage::{Folder, ended, records, replay};
 use sweepd::record::file::{Ending, McapSink};
-use sweepd::record::{Between, EditRecord, Origin, Sink, Start, TickRecord};
+use sweepd::record::{Between, EditRecord, Origin, Sink, Start, TickRecord, TreeMark};
 use sweepd::wire::{PairRow, Verdict, pair_flags};
 
 /// Flips the last bit.
@@ -222,6 +222,45 @@ fn ticks_limited_by_time_are_held_against_the_law_and_one_that_lies_is_found() {
     let tick = record.out.tick.header.tick;
     let found = replay(&start, lie).0.unwrap();
     assert_eq!((found.tick, &*found.field), (tick, "gap interval, metres"));
+}
+
+#[test]
+fn bug_by_the_law_another_tree_that_wears_first_is_no_difference() {
+    let folder = Folder::new();
+    play(
+        &folder,
+        &Play {
+            units: None,
+            time_ns: Some((3_000_000, 20_000)),
+            rounds: 60,
+            ..Play::default()
+        },
+    );
+    let (start, mut all) = records(&folder.file());
+    // Which tree wears first depends on how far refits came in time: here one that no replay finds worn.
+    let of = TreeMark {
+        body: 42,
+        generation: 0,
+        updates: 1,
+    };
+    let marks = [Between::TreeAsked(of), Between::TreeBuilt(of, true)];
+    all[10].between.extend(marks.clone());
+    let ticks = all.len() as u64;
+    let (found, tally) = replay(&start, all);
+    assert_eq!(found.map(|f| f.to_string()), None);
+    assert_eq!(tally.lawful, ticks);
+    // Bit by bit it is one.
+    play(
+        &folder,
+        &Play {
+            rounds: 40,
+            ..Play::default()
+        },
+    );
+    let (start, mut all) = records(&folder.file());
+    all[10].between.extend(marks);
+    let found = replay(&start, all).0.unwrap();
+    assert_eq!(&*found.place, "between ticks", "{found}");
 }
 
 /// A disk with so many bytes left.
