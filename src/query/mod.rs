@@ -3,6 +3,7 @@ pub mod batch;
 mod gap;
 mod impact;
 mod measure;
+mod nearest;
 mod ray;
 mod touching;
 mod unknown;

@@ -12,6 +12,7 @@ use std::cmp::Reverse;
 
 use super::gap::find;
 use super::measure::{Measured, WORK_NS, age_ns, fit};
+use super::nearest::{Groups, Hit, Nearest};
 use super::unknown::Unknown;
 use crate::ids::BodySlot;
 use crate::limits::TOUCHING_ROWS_MAX;
@@ -52,21 +53,13 @@ struct Near {
     bound_m: f64,
 }
 
-/// A pair that may be near, before it is copied.
-#[derive(Clone, Copy)]
-struct Hit {
-    bound_m: f64,
-    asked: usize,
-    slot: BodySlot,
-}
-
 impl TouchingQuestion {
     /// Takes the bodies as they stand.
     ///
     /// * `tick_header` - of the tick that left the world so.
     /// * `shapes` - those of the question, built, where it has any.
     ///
-    /// Cost: O(bodies), and a copy of each that may be near.
+    /// Cost: a look at the box of each body and at each pair of near boxes, and a copy of those there is room for.
     ///
     /// # Errors
     /// Why there is no answer, which body, and what to change: no such body, it is disabled, it is to be asked for
@@ -115,22 +108,29 @@ impl TouchingQuestion {
     }
 
     /// Finds who may be near by the boxes, and counts who is not to be looked at or cannot be.
-    fn look_around(&mut self, world: &World, asked: &Touching, slots: &[BodySlot]) -> Vec<Hit> {
-        let (mut hits, mut unknown) = (Vec::new(), Unknown::default());
+    fn look_around(&mut self, world: &World, asked: &Touching, slots: &[BodySlot]) -> Nearest {
+        let (mut hits, mut unknown) = (Nearest::new(TOUCHING_ROWS_MAX), Unknown::default());
         // One box around all: most bodies are far from it.
         let whole = self
             .asked
             .iter()
             .fold(Aabb::empty(), |all, body| all.merged(&body.proxy));
+        let groups = Groups::of(&self.asked);
         for (slot, other) in world.bodies_ahead() {
             let is_lost = other.reach_m.is_infinite() && other.status != BodyStatus::Disabled;
             if !is_lost && whole.distance(&other.proxy) > self.within_m || slots.contains(&slot) {
                 continue;
             }
             let mut is_asked = false;
-            for (place, part) in self.asked.iter().enumerate() {
+            let reach_m = if is_lost {
+                f64::INFINITY
+            } else {
+                self.within_m
+            };
+            for place in groups.near(&other.proxy, reach_m) {
+                let part = &self.asked[place];
                 let bound_m = bound_m(part, other);
-                if !is_lost && bound_m > self.within_m {
+                if bound_m > reach_m {
                     continue;
                 }
                 let by_filter = || match &asked.subject {
@@ -147,7 +147,7 @@ impl TouchingQuestion {
                 }
                 is_asked = true;
                 if fit(other).is_ok() {
-                    hits.push(Hit {
+                    hits.take(Hit {
                         bound_m,
                         asked: place,
                         slot,
@@ -164,20 +164,12 @@ impl TouchingQuestion {
     }
 
     /// Copies those there is room for: the nearest, by their boxes.
-    fn keep(&mut self, world: &World, mut hits: Vec<Hit>) {
-        let order = |one: &Hit, other: &Hit| {
-            let tie = || (one.slot, one.asked).cmp(&(other.slot, other.asked));
-            one.bound_m.total_cmp(&other.bound_m).then_with(tie)
-        };
-        if hits.len() > TOUCHING_ROWS_MAX {
-            self.found.left_out = (hits.len() - TOUCHING_ROWS_MAX) as u64;
-            self.found.complete = false;
-            hits.select_nth_unstable_by(TOUCHING_ROWS_MAX, order);
-            hits.truncate(TOUCHING_ROWS_MAX);
-        }
-        hits.sort_unstable_by(order);
+    fn keep(&mut self, world: &World, hits: Nearest) {
+        self.found.left_out = hits.left_out;
+        self.found.complete &= hits.left_out == 0;
         self.near = hits
-            .iter()
+            .sorted()
+            .into_iter()
             .filter_map(|hit| {
                 Some(Near {
                     asked: hit.asked,
