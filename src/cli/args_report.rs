@@ -30,8 +30,8 @@ pub(super) struct ErrorArgs {
     #[arg(long, value_name = "TIME,..", value_delimiter = ',', value_parser = duration)]
     pub(super) budgets: Vec<Limit>,
     /// Budgets of work units in place of time: no clock takes part, and a report is the same to the last bit whenever
-    /// it is made. With numbers, such as `--units 0,1000,none`, those; by default nine.
-    #[arg(long, value_name = "UNITS,..", value_delimiter = ',', num_args = 0..=1, value_parser = units, conflicts_with = "budgets")]
+    /// it is made. With numbers, such as `--units=0,1000,none`, those; by default nine.
+    #[arg(long, value_name = "UNITS,..", value_delimiter = ',', num_args = 0..=1, require_equals = true, value_parser = units, conflicts_with = "budgets")]
     pub(super) units: Option<Vec<Limit>>,
     /// Ticks at each budget, after a sixth as many to warm up.
     #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]

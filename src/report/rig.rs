@@ -29,15 +29,6 @@ const DEMAND: Demand = Demand {
     changes_anew: false,
 };
 
-/// What a tick took, nanoseconds of the engine's clock.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Took {
-    /// From wake-up until the outbox was filled.
-    pub told_ns: u64,
-    /// The same with the work that went on after it.
-    pub whole_ns: u64,
-}
-
 /// An engine, and what it is fed with.
 pub struct Rig {
     engine: Engine,
@@ -63,7 +54,10 @@ impl Rig {
     /// # Errors
     /// `Error::Scene` when the scene holds more than its limits allow.
     pub fn new(scene: &Scene, shapes: &[Parts], clock: Arc<dyn Clock>) -> Result<Self> {
-        let engine = Engine::new(scene, shapes.to_vec(), 1, Arc::clone(&clock))?;
+        // A row that is left out for want of room says nothing: of what there is no row would not be known apart.
+        let mut whole = scene.clone();
+        whole.config.limits.pair_rows = usize::MAX;
+        let engine = Engine::new(&whole, shapes.to_vec(), 1, Arc::clone(&clock))?;
         let deforming = scene.bodies.iter().zip(shapes).filter(|(b, _)| b.deforms);
         let vertices = deforming.filter_map(|(body, placed)| {
             let Geometry::Mesh(mesh) = &placed.first()?.shape.geometry else {
@@ -86,7 +80,8 @@ impl Rig {
     /// One tick with a frame of each source, and all that its budget leaves.
     ///
     /// * `frames` - rows by the source's place.
-    pub fn tick(&mut self, frames: &[Vec<TransformRow>], budget: Budget) -> Took {
+    /// * returns - what it took from wake-up until nothing was left to work on, nanoseconds of the engine's clock.
+    pub fn tick(&mut self, frames: &[Vec<TransformRow>], budget: Budget) -> u64 {
         self.seq += 1;
         self.inbox.clear();
         let now_ns = self.clock.boottime_ns();
@@ -118,12 +113,8 @@ impl Rig {
             woke_ns,
             pulse: None,
         });
-        let told_ns = self.clock.monotonic_ns() - woke_ns;
         while self.engine.work_on(u64::MAX) {}
-        Took {
-            told_ns,
-            whole_ns: self.clock.monotonic_ns() - woke_ns,
-        }
+        self.clock.monotonic_ns() - woke_ns
     }
 
     /// What the last tick filled.

@@ -92,8 +92,9 @@ pub fn figure(title: &str, text: &str, plot: &str) -> String {
 
 /// A count that is to be 0, in the colour of what it is.
 #[must_use]
-pub fn must_be_0(count: u64) -> String {
-    let class = if count == 0 { "good" } else { "bad" };
+pub fn must_be_0(count: impl std::fmt::Display) -> String {
+    let count = count.to_string();
+    let class = if count == "0" { "good" } else { "bad" };
     format!("<span class=\"{class}\">{count}</span>")
 }
 

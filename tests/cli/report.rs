@@ -83,8 +83,7 @@ fn error_against_counted_work_is_the_same_to_the_last_bit_and_falls_with_the_bud
         "--ticks",
         "24",
         "--json",
-        "--units",
-        "0,5,40,none",
+        "--units=0,5,40,none",
     ];
     let ended = output(&args);
     assert_eq!(code(&ended), Some(0), "{}", err(&ended));
@@ -124,6 +123,23 @@ fn error_against_counted_work_is_the_same_to_the_last_bit_and_falls_with_the_bud
 }
 
 #[test]
+fn bug_rows_that_the_scene_leaves_out_are_held_against_the_truth_too() {
+    let desk = Desk::new();
+    let path = scene(&desk);
+    let cut = desk.write("cut.toml", &format!("{MIXED}\n[limits]\npair_rows = 1\n"));
+    // The scene stands before its flags or behind them.
+    let of = |path: &str| {
+        json(&[
+            "report", "error", "--ticks", "24", "--json", "--units", path,
+        ])
+    };
+    let (whole, cut) = (of(&path), of(cut.to_str().unwrap()));
+    let told = whole["rows"].as_array().unwrap().last().unwrap();
+    assert!(told["colliding"].as_f64() > Some(1.0), "{told}");
+    assert_eq!(cut["rows"], whole["rows"]);
+}
+
+#[test]
 fn error_against_time_has_a_row_a_budget_a_table_and_a_page() {
     let desk = Desk::new();
     let path = scene(&desk);
@@ -146,11 +162,14 @@ fn error_against_time_has_a_row_a_budget_a_table_and_a_page() {
         text.contains("20.0 us") && text.contains("1000.00 ms") && text.contains("no limit"),
         "{text}"
     );
+    // Widths without an end are in no mean: they are counted beside it.
+    assert!(text.contains("endless"), "bug: {text}");
     assert!(
         text.contains("0 verdicts are wrong, 0 intervals exclude the truth"),
         "{text}"
     );
     let html = std::fs::read_to_string(&page).unwrap();
+    assert!(html.contains("endless</th>"));
     assert!(html.matches("<svg").count() >= 5 && html.ends_with("</html>\n"));
     assert!(
         !html.contains("http") && !html.contains("<script"),
@@ -172,8 +191,7 @@ fn a_scene_that_is_decided_at_every_budget_says_so_and_one_without_pairs_too() {
         "--ticks",
         "6",
         "--json",
-        "--units",
-        "100000,none",
+        "--units=100000,none",
     ]);
     assert_eq!(report["decided_everywhere"], true);
     assert!(
@@ -283,9 +301,9 @@ fn what_cannot_be_meant_is_refused_with_what_to_change() {
             "folder that exists",
         ),
         (&["error", &path, "--budgets", "5"], "such as 2ms"),
-        (&["error", &path, "--units", "many"], "whole number"),
+        (&["error", &path, "--units=many"], "whole number"),
         (
-            &["error", &path, "--units", "1", "--budgets", "1ms"],
+            &["error", &path, "--units=1", "--budgets", "1ms"],
             "cannot be used with",
         ),
         (&["error", &path, "--ticks", "0"], "1..="),

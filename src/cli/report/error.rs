@@ -7,8 +7,8 @@ use crate::cli::args_report::ErrorArgs;
 use crate::cli::out::Out;
 use crate::daemon::build_shapes;
 use crate::error::{Error, Result};
-use crate::report::error::page::{html, name, summary};
-use crate::report::error::tally::Row;
+use crate::report::error::columns::{COLUMNS, Column};
+use crate::report::error::page::{html, summary};
 use crate::report::error::{Report, Setup, Sweep, run};
 use crate::scene::Scene;
 
@@ -92,69 +92,21 @@ fn table(report: &Report, scene: &str, out: &mut Out) -> Result<()> {
         report.seed
     ))?;
     let timed = report.limited == "time";
-    let mut head = format!(
-        "{:>13} {:>9} {:>7} {:>10} {:>10} {:>7} {:>9} {:>9}",
-        "budget", "undecided", "guessed", "width", "p99", "oldest", "onset", "never"
-    );
-    let mut units = format!(
-        "{:>13} {:>9} {:>7} {:>10} {:>10} {:>7} {:>9} {:>9}",
-        "", "%", "wrong %", "m", "m", "ticks", "p50/p99", "told"
-    );
-    if timed {
-        head += &format!(
-            " {:>15} {:>8} {:>13} {:>6}",
-            "time", "floor", "over", "late"
-        );
-        units += &format!(
-            " {:>15} {:>8} {:>13} {:>6}",
-            "p50/p99 us", "p50 us", "p50/p99 us", "%"
-        );
-    }
-    out.line(&format!(
-        "{head} {:>9} {:>6} {:>8}",
-        "units", "wrong", "excluded"
-    ))?;
-    out.line(&format!("{units} {:>9} {:>6} {:>8}", "a tick", "", ""))?;
+    let shown = || COLUMNS.iter().filter(|column| timed || !column.timed);
+    let line = |cell: &dyn Fn(&Column) -> String| {
+        let cells: Vec<String> = shown()
+            .map(|column| format!("{:>1$}", cell(column), column.width))
+            .collect();
+        cells.join(" ")
+    };
+    out.line(&line(&|column| column.name.to_owned()))?;
+    out.line(&line(&|column| column.unit.to_owned()))?;
     for row in &report.rows {
-        out.line(&line(row, timed))?;
+        out.line(&line(&|column| (column.cell)(row)))?;
     }
     out.line(&summary(report))?;
     out.line(&format!(
         "against a twin without a budget: {} verdicts are wrong, {} intervals exclude the truth",
         report.wrong, report.excluded
     ))
-}
-
-fn line(row: &Row, timed: bool) -> String {
-    let metres = |m: Option<f64>| m.map_or_else(|| "-".to_owned(), |m| format!("{m:.2e}"));
-    let both = |a: Option<u64>, b: Option<u64>| match (a, b) {
-        (Some(a), Some(b)) => format!("{a}/{b}"),
-        _ => "-".to_owned(),
-    };
-    let micro = |ns: Option<u64>| ns.map(|ns| (ns + 500) / 1_000);
-    let mut line = format!(
-        "{:>13} {:>9.2} {:>7.2} {:>10} {:>10} {:>7} {:>9} {:>9}",
-        name(row),
-        100.0 * row.undecided_share,
-        100.0 * row.guess_error_share,
-        metres(row.width_mean_m),
-        metres(row.width_p99_m),
-        row.oldest_ticks,
-        both(row.onset_p50_ticks, row.onset_p99_ticks),
-        format!("{}/{}", row.onsets_never, row.onsets),
-    );
-    if timed {
-        line += &format!(
-            " {:>15} {:>8} {:>13} {:>6}",
-            both(micro(row.time_p50_ns), micro(row.time_p99_ns)),
-            micro(row.floor_p50_ns).map_or_else(|| "-".to_owned(), |us| us.to_string()),
-            both(micro(row.over_p50_ns), micro(row.over_p99_ns)),
-            row.late_share
-                .map_or_else(|| "-".to_owned(), |share| format!("{:.1}", 100.0 * share)),
-        );
-    }
-    line + &format!(
-        " {:>9.0} {:>6} {:>8}",
-        row.units_mean, row.wrong, row.excluded
-    )
 }

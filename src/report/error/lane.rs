@@ -52,14 +52,14 @@ impl Lane {
         if let Some(clock) = &self.manual {
             clock.advance(self.period_ns);
         }
-        let took = self.rig.tick(&course.frames(tick), self.budget);
+        let took_ns = self.rig.tick(&course.frames(tick), self.budget);
         let out = self.rig.out();
         let mut told: Vec<Told> = out.pairs.iter().filter_map(Told::of).collect();
         told.sort_unstable_by_key(|told| told.key);
         if counts {
             let timed = self.manual.is_none();
             self.tally
-                .take_tick(&out.tick, timed.then_some(took), &told);
+                .take_tick(&out.tick, timed.then_some(took_ns), &told);
         }
         self.told.push(told);
     }

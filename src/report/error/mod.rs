@@ -8,6 +8,7 @@
 //! then the twin goes over the same ticks, and what was told is compared.
 
 pub mod check;
+pub mod columns;
 pub mod course;
 mod lane;
 pub mod page;
@@ -215,11 +216,11 @@ fn pilot(setup: &Setup<'_>, course: &Course, timed: bool) -> Result<Vec<Option<u
     let mut rig = Rig::new(setup.scene, setup.shapes, clock)?;
     let (mut floors, mut whole, mut units) = (Vec::new(), Vec::new(), Vec::new());
     for tick in 0..PILOT_TICKS {
-        let took = rig.tick(&course.frames(tick), Budget::UNLIMITED);
+        let took_ns = rig.tick(&course.frames(tick), Budget::UNLIMITED);
         // The first ticks build what all others keep.
         if tick >= PILOT_TICKS / 4 {
             floors.push(rig.out().tick.floor_ns);
-            whole.push(took.whole_ns);
+            whole.push(took_ns);
             units.push(rig.out().tick.units);
         }
     }

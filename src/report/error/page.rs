@@ -3,6 +3,7 @@
 //! In: a [`Report`]. Out: HTML.
 
 use super::Report;
+use super::columns::{COLUMNS, Column};
 use super::tally::Row;
 use crate::report::plot::{Axis, Plot, Series};
 use crate::report::sheet::{escaped, figure, must_be_0, page, table};
@@ -31,33 +32,29 @@ pub fn html(report: &Report, scene: &str) -> String {
         report.excluded,
         escaped(&summary(report))
     );
-    let rows: Vec<_> = report.rows.iter().map(cells).collect();
-    body += &table(
-        &[
-            "budget",
-            "wrong",
-            "excluded",
-            "undecided",
-            "guess errors",
-            "width mean, m",
-            "width p99, m",
-            "oldest, ticks",
-            "onset p50, ticks",
-            "onset p99",
-            "never told",
-            "time p50",
-            "time p99",
-            "floor p50",
-            "over p50",
-            "over p99",
-            "late",
-            "units",
-        ],
-        &rows,
-    );
+    let timed = report.limited == "time";
+    let shown = || COLUMNS.iter().filter(|column| timed || !column.timed);
+    let heads: Vec<String> = shown()
+        .map(|column| format!("{} {}", column.name, column.unit))
+        .collect();
+    let cell = |column: &Column, row: &Row| {
+        let text = (column.cell)(row);
+        if column.must_be_0 {
+            must_be_0(text)
+        } else {
+            escaped(&text)
+        }
+    };
+    let rows: Vec<Vec<String>> = report
+        .rows
+        .iter()
+        .map(|row| shown().map(|column| cell(column, row)).collect())
+        .collect();
+    let heads: Vec<&str> = heads.iter().map(|head| head.trim_end()).collect();
+    body += &table(&heads, &rows);
     body += "<p class=\"note\">Undecided: pair-ticks told as possible. Guess errors: of all pair-ticks, those that are \
-             undecided and whose last verdict is not the truth. Width: of the proved interval of each pair that is told. \
-             Onset: ticks from the begin of a collision until it is told as certain. Over: time beyond the budget, or beyond \
+             undecided and whose last verdict is not the truth. Width: of the proved interval of each pair that is told; \
+             endless ones are in no mean, but counted. Onset: ticks from the begin of a collision until it is told as certain. Over: time beyond the budget, or beyond \
              the floor where that is more (below its floor a tick takes the floor, and says so). Wrong, excluded: against a \
              twin without a budget at the same poses.</p>\n<div class=\"figures\">";
     body += &figures(report);
@@ -112,32 +109,6 @@ fn time(ns: Option<u64>) -> String {
         Some(us) if us < 1e3 => format!("{us:.1} us"),
         Some(us) => format!("{:.2} ms", us / 1e3),
     }
-}
-
-fn cells(row: &Row) -> Vec<String> {
-    let share = |share: f64| format!("{:.2} %", 100.0 * share);
-    let metres = |m: Option<f64>| m.map_or_else(|| "-".to_owned(), |m| format!("{m:.2e}"));
-    let ticks = |ticks: Option<u64>| ticks.map_or_else(|| "-".to_owned(), |t| t.to_string());
-    vec![
-        name(row),
-        must_be_0(row.wrong),
-        must_be_0(row.excluded),
-        share(row.undecided_share),
-        share(row.guess_error_share),
-        metres(row.width_mean_m),
-        metres(row.width_p99_m),
-        row.oldest_ticks.to_string(),
-        ticks(row.onset_p50_ticks),
-        ticks(row.onset_p99_ticks),
-        format!("{} of {}", row.onsets_never, row.onsets),
-        time(row.time_p50_ns),
-        time(row.time_p99_ns),
-        time(row.floor_p50_ns),
-        time(row.over_p50_ns),
-        time(row.over_p99_ns),
-        row.late_share.map_or_else(|| "-".to_owned(), share),
-        format!("{:.0}", row.units_mean),
-    ]
 }
 
 /// What a series takes from a row.

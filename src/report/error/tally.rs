@@ -6,7 +6,6 @@ use serde::Serialize;
 
 use super::check::{Checked, Key, Told};
 use super::lane::collides;
-use crate::report::rig::Took;
 use crate::report::stats::{mean, quantile, share};
 use crate::time::Budget;
 use crate::wire::TickRow;
@@ -42,7 +41,7 @@ pub struct Row {
     pub onset_p50_ticks: Option<u64>,
     /// 99th of a hundred.
     pub onset_p99_ticks: Option<u64>,
-    /// Collisions that ended before they were told as certain (they were told as possible).
+    /// Collisions that were not told as certain until they, or the ticks, ended (they were told as possible).
     pub onsets_never: u64,
     /// Time of a whole tick, with what is worked on after its outbox is filled; median.
     pub time_p50_ns: Option<u64>,
@@ -97,7 +96,7 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    pub(super) fn take_tick(&mut self, out: &TickRow, took: Option<Took>, told: &[Told]) {
+    pub(super) fn take_tick(&mut self, out: &TickRow, took_ns: Option<u64>, told: &[Told]) {
         self.ticks += 1;
         self.pair_ticks += out.candidates;
         self.colliding += out.colliding;
@@ -111,8 +110,8 @@ impl Tally {
                 self.endless += 1;
             }
         }
-        if let Some(took) = took {
-            self.times_ns.push(took.whole_ns);
+        if let Some(took_ns) = took_ns {
+            self.times_ns.push(took_ns);
             self.floors_ns.push(out.floor_ns);
             self.overruns += u64::from(out.overrun);
         }
@@ -181,6 +180,7 @@ impl Tally {
             list.sort_unstable();
         }
         self.widths_m.sort_by(f64::total_cmp);
+        let untold = self.going_on.values().filter(|onset| !onset.told);
         let ticks = self.ticks;
         Row {
             budget_ns,
@@ -197,7 +197,7 @@ impl Tally {
             onsets: self.onsets,
             onset_p50_ticks: quantile(&self.delays, 0.5),
             onset_p99_ticks: quantile(&self.delays, 0.99),
-            onsets_never: self.never,
+            onsets_never: self.never + untold.count() as u64,
             time_p50_ns: quantile(&self.times_ns, 0.5),
             time_p99_ns: quantile(&self.times_ns, 0.99),
             floor_p50_ns: quantile(&self.floors_ns, 0.5),
@@ -210,5 +210,50 @@ impl Tally {
             wrong: self.found.wrong,
             excluded: self.found.excluded,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Interval;
+    use crate::wire::Verdict;
+
+    fn told(verdict: Verdict) -> Told {
+        Told {
+            key: (3, 7),
+            verdict,
+            last: Verdict::Apart,
+            gap: Interval {
+                min: -0.1,
+                max: 0.1,
+            },
+            unknown: false,
+        }
+    }
+
+    /// Each tick's verdict, and the truth.
+    fn row(ticks: &[(Verdict, Verdict)]) -> Row {
+        let mut tally = Tally::default();
+        for (tick, (said, truth)) in (0..).zip(ticks) {
+            let truth = BTreeMap::from([((3, 7), told(*truth))]);
+            tally.onsets(&[told(*said)], &truth, tick, true);
+        }
+        tally.row(Budget::UNLIMITED)
+    }
+
+    #[test]
+    fn bug_a_collision_that_is_not_told_by_the_last_tick_was_never_told() {
+        use Verdict::{Colliding, Near, Possible};
+        let begin = [(Near, Near), (Possible, Colliding)];
+        let untold = row(&begin);
+        assert_eq!((untold.onsets, untold.onsets_never), (1, 1));
+        let told = row(&[&begin[..], &[(Colliding, Colliding)]].concat());
+        assert_eq!((told.onsets, told.onsets_never), (1, 0));
+        let ended = row(&[&begin[..], &[(Near, Near)]].concat());
+        assert_eq!((ended.onsets, ended.onsets_never), (1, 1));
+        // What was there before the ticks that count has no onset.
+        let before = row(&[(Possible, Colliding), (Possible, Colliding)]);
+        assert_eq!((before.onsets, before.onsets_never), (0, 0));
     }
 }
