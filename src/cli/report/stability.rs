@@ -87,7 +87,8 @@ fn table(report: &Report, out: &mut Out) -> Result<()> {
     let answers: u64 = report.families.iter().map(|f| f.summary.answers).sum();
     out.line("")?;
     out.line(
-        "Errors are those of the best estimate, in parts of the pair's size. Truth: twice the precision, no code of the engine.",
+        "Errors are those of the best estimate, or of the interval's farther end where there is none, in parts of the pair's \
+         size. Truth: twice the precision, no code of the engine.",
     )?;
     out.line(&format!(
         "{cases} cases, {answers} answers: {} intervals exclude the truth, {} verdicts are wrong",

@@ -35,8 +35,8 @@ pub struct Judgement {
     pub touching: bool,
     /// No verdict, although nothing limited the work.
     pub open: bool,
-    /// Distance of the best estimate from the truth, metres; where there is none of the two, of the interval's farther
-    /// end; NaN where neither is known.
+    /// Distance of the best estimate from the truth, metres; where there is no estimate, of the interval's farther end,
+    /// which may be without end; NaN: the truth is not known.
     pub error_m: f64,
     /// Width of the interval, metres.
     pub width_m: f64,
@@ -58,7 +58,12 @@ pub fn judge(truth: &Truth, answer: &Answer) -> Judgement {
         Verdict::None => (true, false, false),
     };
     let known = truth.low.filter(|low| *low == truth.high);
-    let off = |value: f64| known.map_or(f64::NAN, |gap| (Dd::from(value) - gap).abs().near());
+    let off = |value: f64| match known {
+        // What is subtracted from an end that there is not is no number.
+        Some(_) if value.is_infinite() => f64::INFINITY,
+        Some(gap) => (Dd::from(value) - gap).abs().near(),
+        None => f64::NAN,
+    };
     Judgement {
         excluded,
         wrong,
@@ -67,7 +72,7 @@ pub fn judge(truth: &Truth, answer: &Answer) -> Judgement {
         error_m: if answer.best_m.is_finite() {
             off(answer.best_m)
         } else {
-            f64::NAN
+            off(answer.min_m).max(off(answer.max_m))
         },
         width_m: answer.max_m - answer.min_m,
     }
@@ -96,6 +101,20 @@ mod tests {
         assert!(judge(&truth, &above).excluded);
         assert!(judge(&truth, &below).excluded);
         assert!(judge(&truth, &answer(f64::NAN, 1.0, Verdict::Apart)).excluded);
+    }
+
+    #[test]
+    fn bug_without_an_estimate_the_error_is_that_of_the_farther_end() {
+        let truth = Truth::is(Dd::from(-0.5));
+        let error = |min_m: f64| {
+            let told = Answer {
+                best_m: f64::NAN,
+                ..answer(min_m, -0.25, Verdict::Colliding)
+            };
+            judge(&truth, &told).error_m
+        };
+        assert_eq!((error(-0.625), error(-2.5)), (0.25, 2.0));
+        assert_eq!(error(f64::NEG_INFINITY), f64::INFINITY);
     }
 
     #[test]

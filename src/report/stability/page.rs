@@ -15,8 +15,8 @@ pub fn html(report: &Report) -> String {
     let mut body = format!(
         "<p class=\"note\">sweepd {}</p>\n<p><span class=\"{class}\">{} intervals exclude the truth, {} verdicts are wrong</span>, \
          of {answers} answers in {cases} cases. Each case goes through a whole engine without a budget, and is held against a \
-         truth in twice the precision of f64 that shares no code with it. Errors are those of the best estimate, in parts of \
-         the pair's size (how far both reach, and how far they are apart). Beside it, dashed: plain parry3d in f64, called \
+         truth in twice the precision of f64 that shares no code with it. Errors are those of the best estimate, or of the \
+         farther end of the interval where there is none, in parts of the pair's size (how far both reach, and how far they are apart). Beside it, dashed: plain parry3d in f64, called \
          once at the same poses, without what is built around it here; it tells no interval. Its answers count as wrong where \
          their sign is, or where there is none.</p>\n",
         escaped(report.version),

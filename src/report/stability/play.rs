@@ -47,7 +47,8 @@ pub struct Point {
     pub best: Option<f64>,
     /// What errors are told in parts of, metres; of impacts 1.
     pub size: f64,
-    /// Greatest error of the best estimate, in parts of the size; `null`: no truth to hold it against.
+    /// Greatest error of the best estimate, or of the interval's farther end where there is none, in parts of the size;
+    /// `null`: no truth to hold it against, or without end.
     pub error: Option<f64>,
     /// Greatest width of an interval whose truth is known, in parts of the size; `null`: of none, or without end.
     pub width: Option<f64>,
@@ -132,7 +133,7 @@ impl Point {
         self.wrong += u64::from(found.wrong);
         self.open += u64::from(found.open);
         self.touching += u64::from(found.touching);
-        let error = Some(found.error_m / size).filter(|error| error.is_finite());
+        let error = Some(found.error_m / size).filter(|error| !error.is_nan());
         let bad = found.excluded || found.wrong;
         let first = self.answers == 1;
         let worse = error.is_some_and(|e| self.error.is_none_or(|most| e > most));
