@@ -20,8 +20,14 @@ struct Found {
     ending: Option<Ending>,
 }
 
-/// Replays a recording; `false` when it differs, or the file is damaged.
+/// Replays a recording; `false` when it differs, nothing was compared, or the file is damaged.
 pub(super) fn replay(args: &ReplayArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
+    let (from, until) = (args.from.unwrap_or(0), args.until.unwrap_or(u64::MAX));
+    if from > until {
+        return Err(Error::Usage(format!(
+            "--from {from} --until {until}: no tick lies between them; give a first one that is not behind the last"
+        )));
+    }
     let found = run(args, stop)?;
     if args.json {
         out.line(&json(&found).to_string())?;
@@ -30,7 +36,14 @@ pub(super) fn replay(args: &ReplayArgs, out: &mut Out, stop: &AtomicBool) -> Res
     }
     out.flush()?;
     let damaged = matches!(found.ending, Some(Ending::Damaged(_)));
-    Ok(found.difference.is_none() && !damaged)
+    Ok(found.difference.is_none() && found.compared() > 0 && !damaged)
+}
+
+impl Found {
+    /// Ticks that were compared, either way.
+    fn compared(&self) -> u64 {
+        self.tally.exact + self.tally.lawful
+    }
 }
 
 fn run(args: &ReplayArgs, stop: &AtomicBool) -> Result<Found> {
@@ -102,6 +115,9 @@ fn tell(found: &Found, out: &mut Out) -> Result<()> {
     }
     match &found.difference {
         Some(difference) => out.line(&format!("first difference: {difference}")),
+        None if found.compared() == 0 => {
+            out.line("nothing was compared: no tick of the recording was asked for")
+        }
         None => out.line("no difference"),
     }
 }
@@ -119,7 +135,7 @@ fn json(found: &Found) -> serde_json::Value {
     serde_json::json!({
         "scene": facts.scene_file,
         "sweepd_version": facts.sweepd_version,
-        "boot_id": facts.boot_id,
+        "boot_id": format!("{:016x}", facts.boot_id),
         "ticks": found.ticks,
         "ticks_exact": tally.exact,
         "ticks_by_law": tally.lawful,

@@ -76,7 +76,23 @@ fn a_recorded_run_replays_bit_by_bit_with_code_0() {
             (&json["ticks"], &json["ticks_exact"]),
             (&99.into(), &50.into())
         );
+        let boot = json["boot_id"].as_str().unwrap();
+        assert!(
+            boot.len() == 16 && u64::from_str_radix(boot, 16).is_ok(),
+            "bug: {boot}"
+        );
     }
+    // What compared nothing has found nothing out.
+    let (json, code_of) = replayed(&file, &["--from", "99999"]);
+    assert_eq!(
+        (code_of, &json["ticks_exact"]),
+        (Some(1), &0.into()),
+        "bug: {json}"
+    );
+    let text = out(&output(&["replay", path(&file), "--from", "99999"]));
+    assert!(text.contains("nothing was compared"), "{text}");
+    let ended = output(&["replay", path(&file), "--from", "10", "--until", "5"]);
+    assert_eq!(code(&ended), Some(2), "bug: {}", err(&ended));
     let text = out(&output(&["replay", path(&file)]));
     assert!(
         text.contains("compared bit by bit") && text.contains("no difference"),
