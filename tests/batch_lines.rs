@@ -262,3 +262,36 @@ fn a_crossing_mesh_surface_has_no_gap_and_a_surface_around_a_ball_is_apart() {
         assert!(answers[k]["gap_min_m"].as_f64().unwrap() < 0.0);
     }
 }
+
+#[test]
+fn bug_what_is_too_far_to_compute_with_is_refused_by_id_and_no_answer() {
+    let ball = json!({"type": "sphere", "radius": 1.0});
+    let block = json!({"type": "box", "half_extents": [1.0, 1.0, 1.0]});
+    let ground = json!({"type": "half_space", "normal": [0.0, 0.0, 1.0], "offset": 0.0});
+    let tile = json!({
+        "type": "trimesh", "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], "faces": [[0, 1, 2], [1, 3, 2]],
+    });
+    let mut text = String::new();
+    for (id, a, b, t) in [
+        ("balls", &ball, &ball, [1e160, 0.0, 0.0]),
+        ("ground", &ground, &block, [0.0, 0.0, 2e200]),
+        ("block", &block, &ground, [0.0, 0.0, -2e200]),
+        ("tile", &tile, &ball, [1e200, 0.0, 0.0]),
+        ("far", &ball, &ball, [1e150, 0.0, 0.0]),
+    ] {
+        text += &line(id, a, b, t);
+        text.push('\n');
+    }
+    let (whole, answers) = ask(text.as_bytes());
+    assert!(!whole);
+    for answer in &answers[..4] {
+        let error = answer["error"].as_str().unwrap();
+        assert!(
+            error.contains("too far") && answer.get("gap_m").is_none(),
+            "{answer}"
+        );
+    }
+    assert_eq!(answers[0]["id"], "balls");
+    // As far as squares of it are numbers, it is answered.
+    assert_eq!(answers[4]["gap_m"], 1e150);
+}

@@ -164,17 +164,26 @@ pub(super) fn gap(a: &Pieces, b: &Pieces, pos12: &Pose) -> Result<Closest, Strin
     }
     least
         .found
-        .ok_or_else(|| "the pose is too far out to compute with".to_owned())
+        .filter(|_| !least.is_lost)
+        .ok_or_else(|| {
+            "the shapes are too far from each other to compute with: write positions that are nearer".to_owned()
+        })
 }
 
 /// The answer of the piece pair with the least gap, with the interval over all pairs.
 #[derive(Default)]
 struct Least {
     found: Option<Closest>,
+    /// Of a pair of pieces nothing is known: squares of its lengths are beyond what a number holds.
+    is_lost: bool,
 }
 
 impl Least {
     fn offer(&mut self, closest: &Closest) {
+        if !(closest.gap.min.is_finite() && closest.gap.max.is_finite()) {
+            self.is_lost = true;
+            return;
+        }
         match &mut self.found {
             None => self.found = Some(*closest),
             Some(found) => {
