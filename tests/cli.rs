@@ -236,6 +236,9 @@ fn check_says_what_the_daemon_would_do_as_text_and_as_json() {
     );
     let ended = output(&["check", scene, "--json"]);
     let json: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
+    assert!(json["ignored"].is_null(), "bug: not asked for, and listed");
+    let ended = output(&["check", scene, "--json", "--ignored"]);
+    let json: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
     assert_eq!(
         (&json["bodies"], &json["ignored_pairs"]),
         (&2.into(), &1.into())

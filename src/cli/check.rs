@@ -25,7 +25,12 @@ pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
     let world = World::new(&scene, shapes.bodies, SystemClock.boottime_ns())?;
     let plan = Plan::of(&world, &scene.config);
     if args.json {
-        let ignored = ignored(&world);
+        let ignored = args.ignored.then(|| {
+            let pairs = ignored(&world).0.into_iter();
+            pairs
+                .map(|(a, b, why)| json!([a, b, why]))
+                .collect::<Vec<_>>()
+        });
         let line = json!({
             "scene": args.scene.display().to_string(),
             "frame_id": scene.frame_id,
@@ -33,7 +38,7 @@ pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
             "sources": scene.sources.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(),
             "plan": plan,
             "ignored_pairs": world.ignored_pairs_count(),
-            "ignored": ignored.iter().map(|(a, b, why)| json!([a, b, why])).collect::<Vec<_>>(),
+            "ignored": ignored,
             "warnings": warnings,
         });
         out.line(&line.to_string())?;
@@ -69,8 +74,7 @@ pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
         world.ignored_pairs_count()
     ))?;
     if args.ignored {
-        let listed = ignored(&world);
-        let is_cut = listed.len() == IGNORED_SHOWN;
+        let (listed, is_cut) = ignored(&world);
         for (a, b, why) in listed {
             out.line(&format!("    {a} - {b}: {why}"))?;
         }
@@ -88,14 +92,17 @@ pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
     Ok(true)
 }
 
-/// The ignored pairs with their reasons, by id.
-fn ignored(world: &World) -> Vec<(&str, &str, String)> {
+/// The ignored pairs with their reasons, by id, and whether there are more.
+fn ignored(world: &World) -> (Vec<(&str, &str, String)>, bool) {
     let bodies: Vec<(_, &Body)> = world.bodies().collect();
     let mut list = Vec::new();
     for (at, (slot_a, a)) in bodies.iter().enumerate() {
         for (slot_b, b) in &bodies[at + 1..] {
             let because = world.filters().decide(*slot_a, *slot_b);
             if because.is_ignored() {
+                if list.len() == IGNORED_SHOWN {
+                    return (list, true);
+                }
                 let rule = world
                     .filters()
                     .rule_reason(*slot_a, *slot_b)
@@ -105,11 +112,8 @@ fn ignored(world: &World) -> Vec<(&str, &str, String)> {
                     b.name.as_str(),
                     format!("{}{}", because.word(), rule.unwrap_or_default()),
                 ));
-                if list.len() == IGNORED_SHOWN {
-                    return list;
-                }
             }
         }
     }
-    list
+    (list, false)
 }
