@@ -130,23 +130,18 @@ fn apply(args: &RunArgs, scene: &mut Scene) -> Result<()> {
         scene.config.budget.units = limit(units);
     }
     if let Some(mode) = &args.mode {
-        if let Mode::OnFrame(source) = mode
-            && !scene.sources.iter().any(|own| own.name == *source)
-        {
-            return Err(Error::Usage(format!(
-                "--mode on_frame={source}: the scene has no source of that name; add a [[source]] or name another"
-            )));
-        }
-        if let Mode::OnFrame(name) = mode
-            && scene
-                .sources
-                .iter()
-                .any(|own| own.name == *name && own.ros2.is_some())
-        {
-            return Err(Error::Usage(format!(
-                "--mode on_frame={name}: {}",
-                crate::scene::no_lockstep(name)
-            )));
+        if let Mode::OnFrame(name) = mode {
+            let wrong = match scene.sources.iter().find(|own| own.name == *name) {
+                Some(own) => own.ros2.as_ref().map(|_| crate::scene::no_lockstep(name)),
+                None => {
+                    let text =
+                        "the scene has no source of that name; add a [[source]] or name another";
+                    Some(text.to_owned())
+                }
+            };
+            if let Some(wrong) = wrong {
+                return Err(Error::Usage(format!("--mode on_frame={name}: {wrong}")));
+            }
         }
         scene.config.mode = mode.clone();
     }
