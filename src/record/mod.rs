@@ -29,6 +29,6 @@ pub use given::{
 };
 #[cfg(feature = "mcap")]
 pub use law::Judged;
-pub use recorder::{Recorder, Sink};
+pub use recorder::{FLUSH_NS, Recorder, Sink};
 #[cfg(feature = "mcap")]
 pub use replay::{Difference, Replay, Tally};

@@ -19,8 +19,8 @@ use crate::wire::{Demand, Inbox};
 
 /// How often the writer looks for records: nobody wakes it, for a wake-up would cost the tick a system call.
 const LOOK: Duration = Duration::from_millis(20);
-/// Time between two flushes at most, nanoseconds: what a killed process loses.
-const FLUSH_NS: u64 = 500_000_000;
+/// Time between two flushes of a recording at most, nanoseconds: what a killed process loses.
+pub const FLUSH_NS: u64 = 500_000_000;
 /// Records kept for their memory: more than come between two looks at 1 kHz.
 const SPARE_MAX: usize = 32;
 /// Time between two ticks whose bodies are asked for only to be recorded, nanoseconds: for those who look at the file,
@@ -221,23 +221,23 @@ impl Recorder {
         }
     }
 
-    /// Writes what waits and ends the recording.
+    /// Writes what waits and ends the recording, as it was meant to; one that is dropped instead says that it was not.
     ///
     /// # Errors
     /// What failed, where the recording is not whole; it was told in the log already.
     pub fn finish(mut self) -> Result<()> {
-        self.close();
+        self.close("");
         match self.desk.lock().failed.take() {
             Some(error) => Err(error),
             None => Ok(()),
         }
     }
 
-    fn close(&mut self) {
+    fn close(&mut self, why: &str) {
         let desk = Arc::clone(&self.desk);
         let mut state = desk.lock();
         self.hand_over(&mut state);
-        state.ending.get_or_insert_default();
+        state.ending.get_or_insert_with(|| why.to_owned());
         drop(state);
         self.desk.wake.notify_one();
         if let Some(writer) = self.writer.take() {
@@ -247,8 +247,9 @@ impl Recorder {
 }
 
 impl Drop for Recorder {
+    /// Nobody said that this is the end.
     fn drop(&mut self) {
-        self.close();
+        self.close("the daemon broke down: its log says why");
     }
 }
 

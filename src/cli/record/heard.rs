@@ -11,6 +11,7 @@ use crate::cli::args_tools::{RecordArgs, Recorded};
 use crate::cli::connect;
 use crate::cli::out::Out;
 use crate::error::{Error, Result};
+use crate::record::FLUSH_NS;
 use crate::record::file::{McapLog, Shown, create};
 use crate::time::{Clock, SystemClock};
 use crate::transport::client::{Client, Heard, Message, Restarted, Topics, View};
@@ -18,8 +19,6 @@ use crate::wire::{MessageHeader, TickRow};
 
 /// Longest wait before a look at the stop flag, nanoseconds.
 const LOOK_NS: u64 = 100_000_000;
-/// Time between two flushes at most, nanoseconds: what a killed recorder loses.
-const FLUSH_NS: u64 = 500_000_000;
 
 /// The names of a boot come with the first ticks that are heard of it: for so long ticks without are passed over,
 /// nanoseconds. Their rows would be without names.
@@ -128,7 +127,7 @@ impl Tally {
         if last != 0 && now > last {
             self.missed += now - last - 1;
         }
-        self.ticks += u64::from(now != last);
+        self.ticks += u64::from(!view.is_under_way());
         self.last = *tick;
         let names = view.names().filter(|names| {
             let these = (names.header.boot_id, names.header.tick);
@@ -151,4 +150,42 @@ impl Tally {
 
 fn parts<T>(message: &Message<T>) -> (&MessageHeader, &[T]) {
     (&message.header, &message.rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::transport::Door as _;
+    use crate::transport::memory::{Hub, MemoryServer};
+    use crate::wire::{Outbox, Reason, State};
+
+    const SECOND_NS: u64 = 1_000_000_000;
+
+    #[test]
+    fn bug_a_tick_that_is_under_way_is_written_and_counts_once_it_has_ended() {
+        let hub = Hub::new();
+        let mut server = MemoryServer::open(&hub, 7, SECOND_NS).unwrap();
+        let link = Box::new(hub.link());
+        let mut client = Client::over(link, Arc::new(SystemClock), None, SECOND_NS).unwrap();
+        let path = std::env::temp_dir().join(format!("sweepd_heard_{}.mcap", std::process::id()));
+        let mut log = McapLog::new(create(&path, true).unwrap(), "heard", "world", 0).unwrap();
+        let mut tally = Tally::default();
+        let mut out = Outbox::default();
+        out.tick.header.boot_id = 7;
+        out.tick.header.tick = 1;
+        let mut under_way = out.tick;
+        under_way.header.state = State::Unknown.code();
+        under_way.reasons = Reason::Undecided.bit();
+        server.publish_tick(&under_way).unwrap();
+        out.tick.sent_ns = 1;
+        for ticks in 0..=1 {
+            assert_eq!(client.wait_tick(SECOND_NS).unwrap(), Heard::Tick);
+            tally.tick(&mut log, client.view()).unwrap();
+            assert_eq!((tally.ticks, tally.missed), (ticks, 0));
+            server.publish(&out).unwrap();
+        }
+        std::fs::remove_file(&path).unwrap();
+    }
 }

@@ -23,8 +23,10 @@ const INPUT: &str = "/sweepd/record/input";
 const OUTPUT: &str = "/sweepd/record/output";
 /// The last record: why nothing follows.
 const END: &str = "sweepd.end";
-/// Its keys: that; of how many ticks nothing is there for people; how many were overtaken before they were heard.
+/// Its keys: that; how many ticks came before it; of how many nothing is there for people; how many were overtaken
+/// before they were heard.
 const WHY: &str = "why";
+const TICKS: &str = "ticks";
 const NOT_SHOWN: &str = "ticks_without_messages";
 const MISSED: &str = "ticks_missed";
 /// What CDR begins with: little-endian, no options.

@@ -3,14 +3,14 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::Read as _;
+use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 
 use mcap::McapError;
 use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::{END, INPUT, OUTPUT, START, WHY};
+use super::{END, INPUT, OUTPUT, START, TICKS, WHY};
 use crate::error::{Error, Result};
 use crate::record::bytes::Damaged;
 use crate::record::code::{start_of, take_input, take_output};
@@ -18,6 +18,11 @@ use crate::record::{Start, TickRecord};
 
 /// Most that is read at once, bytes, whatever length a record claims: memory grows only with what is there.
 const READ_BYTES_MAX: usize = 1 << 20;
+/// Longest record there can be, bytes: a message tells its length in 32 bits, and a chunk ends with the one that fills
+/// it. What claims to be longer is damaged.
+const RECORD_BYTES_MAX: usize = (1 << 32) + (1 << 22);
+/// What an MCAP file begins and, once it is closed, ends with.
+const MAGIC: &[u8; 8] = b"\x89MCAP0\r\n";
 
 /// How a recording ends.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -64,7 +69,19 @@ pub struct Reader {
     record: TickRecord,
     /// The tick whose input was read, and whose output is next.
     open: Option<u64>,
-    why: Option<String>,
+    /// Ticks that were read; a recording has all from the first on.
+    ticks: u64,
+    /// The file was closed: no record of it ends beyond its end.
+    is_closed: bool,
+    /// Which program wrote it.
+    library: String,
+    note: Option<Note>,
+}
+
+/// What the last record says.
+struct Note {
+    why: String,
+    ticks: Option<u64>,
 }
 
 impl std::fmt::Debug for Reader {
@@ -91,12 +108,15 @@ impl Reader {
     pub fn open(path: &Path) -> Result<(Self, Start)> {
         let name = path.display().to_string();
         let unreadable = |e| Error::io(format!("cannot read the recording {name}"), e);
-        let file = File::open(path).map_err(unreadable)?;
+        let mut file = File::open(path).map_err(unreadable)?;
         let bytes = file.metadata().map_err(unreadable)?.len();
+        let is_closed = is_closed(&mut file, bytes).map_err(unreadable)?;
         let mut reader = Self {
             file,
             mcap: LinearReader::new_with_options(
-                LinearReaderOptions::default().with_prevalidate_chunk_crcs(true),
+                LinearReaderOptions::default()
+                    .with_prevalidate_chunk_crcs(true)
+                    .with_record_length_limit(RECORD_BYTES_MAX),
             ),
             read_bytes: 0,
             bytes,
@@ -104,15 +124,20 @@ impl Reader {
             start: None,
             record: TickRecord::default(),
             open: None,
-            why: None,
+            ticks: 0,
+            is_closed,
+            library: String::new(),
+            note: None,
             name,
         };
         while reader.start.is_none() {
             match reader.step()? {
                 Ok(Step::Start | Step::Other) => {}
-                Ok(Step::Tick) => return Err(reader.not_ours()),
-                Err(Ending::Damaged(how)) => return Err(reader.no_mcap(&how)),
-                Err(_) => return Err(reader.not_ours()),
+                Ok(Step::Tick) => {
+                    let ending = Ending::Damaged("it is missing".to_owned());
+                    return Err(reader.no_start(&ending));
+                }
+                Err(ending) => return Err(reader.no_start(&ending)),
             }
         }
         let start = reader.start.take().unwrap_or_default();
@@ -145,6 +170,10 @@ impl Reader {
             let event = match self.mcap.next_event() {
                 Some(Ok(event)) => event,
                 None => return Ok(Err(self.ending())),
+                Some(Err(McapError::UnexpectedEof)) if self.is_closed => {
+                    let text = "a record ends beyond the end of the file";
+                    return Ok(Err(Ending::Damaged(text.to_owned())));
+                }
                 Some(Err(McapError::UnexpectedEof)) => return Ok(Err(Ending::Cut)),
                 Some(Err(McapError::UnsupportedCompression(kind))) => {
                     let text = format!("its chunks are compressed ({kind}): decompress it first");
@@ -177,12 +206,13 @@ impl Reader {
             Record::Channel(channel) => {
                 self.topics.insert(channel.id, channel.topic);
             }
-            Record::Metadata(note) if note.name == END => {
-                self.why = note
-                    .metadata
-                    .get(WHY)
-                    .filter(|why| !why.is_empty())
-                    .cloned();
+            Record::Header(header) => self.library = header.library,
+            Record::Metadata(mut note) if note.name == END => {
+                let ticks = note.metadata.get(TICKS);
+                self.note = Some(Note {
+                    ticks: ticks.and_then(|ticks| ticks.parse().ok()),
+                    why: note.metadata.remove(WHY).unwrap_or_default(),
+                });
             }
             Record::Message { header, data } => {
                 let topic = self.topics.get(&header.channel_id).map(String::as_str);
@@ -206,7 +236,7 @@ impl Reader {
                         Ok(Step::Other)
                     }
                     Ok(None) if self.open.take() == Some(self.record.out.tick.header.tick) => {
-                        Ok(Step::Tick)
+                        self.next_is_there()
                     }
                     _ => Err(Ending::Damaged(format!(
                         "message {} of {topic} is not what it should be",
@@ -219,8 +249,57 @@ impl Reader {
         Ok(Ok(Step::Other))
     }
 
+    /// Whether the tick that was read follows the one before it.
+    fn next_is_there(&mut self) -> std::result::Result<Step, Ending> {
+        let (tick, next) = (self.record.out.tick.header.tick, self.ticks + 1);
+        if tick != next {
+            let how = format!("after tick {} comes tick {tick}", self.ticks);
+            return Err(Ending::Damaged(how));
+        }
+        self.ticks = tick;
+        Ok(Step::Tick)
+    }
+
+    /// How a file ends that was closed.
     fn ending(&mut self) -> Ending {
-        self.why.take().map_or(Ending::Whole, Ending::Early)
+        let Some(note) = self.note.take() else {
+            if !self.has_start() {
+                return Ending::Whole;
+            }
+            return Ending::Damaged("its last record is missing".to_owned());
+        };
+        if let Some(ticks) = note.ticks.filter(|ticks| *ticks != self.ticks) {
+            let how = format!("{} of its {ticks} ticks are there", self.ticks);
+            return Ending::Damaged(how);
+        }
+        if note.why.is_empty() {
+            Ending::Whole
+        } else {
+            Ending::Early(note.why)
+        }
+    }
+
+    /// Whether it is a recording: it has a topic for a start.
+    fn has_start(&self) -> bool {
+        self.topics.values().any(|topic| topic == START)
+    }
+
+    /// Why a file is refused that ends before a start was read.
+    fn no_start(&self, ending: &Ending) -> Error {
+        let ours = self.library.starts_with("sweepd/");
+        let ours = ours && (self.topics.is_empty() || self.has_start());
+        match ending {
+            Ending::Damaged(how) if !ours => self.no_mcap(how),
+            Ending::Damaged(how) => Error::Refused(format!(
+                "the start of {} cannot be read ({how}), so that nothing of it can be replayed: record anew",
+                self.name
+            )),
+            Ending::Cut if ours => Error::Refused(format!(
+                "{} is cut off within its start, so that nothing of it can be replayed: record anew",
+                self.name
+            )),
+            _ => self.not_ours(),
+        }
     }
 
     fn no_mcap(&self, how: &str) -> Error {
@@ -237,6 +316,19 @@ impl Reader {
             self.name
         ))
     }
+}
+
+/// Whether a file ends as one does that was closed; it is at its front again.
+fn is_closed(file: &mut File, bytes: u64) -> std::io::Result<bool> {
+    let mut tail = [0; MAGIC.len()];
+    // The front has the same.
+    if bytes < 2 * tail.len() as u64 {
+        return Ok(false);
+    }
+    file.seek(SeekFrom::Start(bytes - tail.len() as u64))?;
+    file.read_exact(&mut tail)?;
+    file.rewind()?;
+    Ok(tail == *MAGIC)
 }
 
 /// The bytes of `uint8[] data` in CDR.

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::*;
+use crate::error::Error;
 use crate::record::{Facts, LAYOUT, Sink as _, Start, TickRecord};
 use crate::wire::{Demand, PairRow, WIRE_VERSION};
 
@@ -119,6 +120,72 @@ fn a_changed_byte_ends_the_reading_at_its_chunk() {
     let (ticks, ending) = read(&Scrap::of(&bytes));
     assert!(matches!(ending, Ending::Damaged(_)), "{ending:?}");
     assert!(ticks % 10 == 0 && (10..40).contains(&ticks), "{ticks}");
+}
+
+/// Opcode and place of each record of a file.
+fn places(bytes: &[u8]) -> Vec<(u8, usize)> {
+    let (mut at, mut all) = (8, Vec::new());
+    while at + 8 < bytes.len() {
+        all.push((bytes[at], at));
+        let len = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap());
+        at += 9 + usize::try_from(len).unwrap();
+    }
+    all
+}
+
+/// How a recording of 50 ticks ends where one byte is another.
+fn changed(at: usize, to: u8) -> Result<(u64, Ending), Error> {
+    let mut bytes = std::fs::read(&written(50, Some("")).0).unwrap();
+    assert_ne!(bytes[at], to);
+    bytes[at] = to;
+    let scrap = Scrap::of(&bytes);
+    Reader::open(&scrap.0)?;
+    Ok(read(&scrap))
+}
+
+#[test]
+fn bug_a_record_that_is_not_known_any_more_or_claims_to_be_longer_is_damage() {
+    const CHUNK: u8 = 6;
+    const METADATA: u8 = 12;
+    let whole = std::fs::read(&written(50, Some("")).0).unwrap();
+    let places = places(&whole);
+    let chunks: Vec<usize> = places
+        .iter()
+        .filter(|place| place.0 == CHUNK)
+        .map(|place| place.1)
+        .collect();
+    assert!(chunks.len() > 5, "{places:?}");
+    for (nth, at) in (0..).zip(&chunks) {
+        for (at, to) in [(*at, 0xf0), (at + 4, 1), (at + 8, 0x7f)] {
+            match changed(at, to) {
+                Err(error) => {
+                    assert!(
+                        nth == 0 && error.to_string().contains("the start of"),
+                        "{error}"
+                    );
+                }
+                Ok((ticks, ending)) => {
+                    assert!(matches!(ending, Ending::Damaged(_)), "{nth}: {ending:?}");
+                    assert!(ticks % 10 == 0, "{ticks}");
+                }
+            }
+        }
+    }
+    let note = places.iter().find(|place| place.0 == METADATA).unwrap();
+    let (ticks, ending) = changed(note.1, 0xf0).unwrap();
+    assert!(matches!(ending, Ending::Damaged(_)), "{ending:?}");
+    assert_eq!(ticks, 50);
+}
+
+#[test]
+fn bug_a_recording_that_is_cut_off_within_its_start_says_so() {
+    let whole = std::fs::read(&written(1, Some("")).0).unwrap();
+    let first = places(&whole).iter().find(|place| place.0 == 6).unwrap().1;
+    for len in [first, first + 5, first + 40, first + 300] {
+        let error = Reader::open(&Scrap::of(&whole[..len]).0).unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains("cut off within its start"), "{len}: {text}");
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::io::{Seek, Write};
 
 use super::shown::{self, Show, Shown};
 use super::tape::Tape;
-use super::{INPUT, NOT_SHOWN, OUTPUT, START, WHY};
+use super::{INPUT, NOT_SHOWN, OUTPUT, START, TICKS, WHY};
 use crate::error::Result;
 use crate::record::code::{put_input, put_output, start_bytes};
 use crate::record::{Sink, Start, TickRecord};
@@ -23,6 +23,7 @@ pub struct McapSink<W: Write + Seek> {
     tape: Tape<W>,
     show: Show,
     since_1970_ns: u64,
+    ticks: u64,
     /// Ticks of which nothing is there for people: the disk did not follow.
     not_shown: u64,
 }
@@ -42,6 +43,7 @@ impl<W: Write + Seek> McapSink<W> {
             tape: Tape::new(to, name, topics)?,
             show: Show::new(frame_id),
             since_1970_ns: facts.since_1970_ns,
+            ticks: 0,
             not_shown: 0,
         };
         let time_ns = facts.started_ns.saturating_add(facts.since_1970_ns);
@@ -61,6 +63,7 @@ impl<W: Write + Seek + Send> Sink for McapSink<W> {
             .write_bytes(INPUT, time_ns, |to| put_input(record, to))?;
         self.tape
             .write_bytes(OUTPUT, time_ns, |to| put_output(out, demand, to))?;
+        self.ticks += 1;
         // Names belong to what follows.
         if hurried && !out.names_changed {
             self.not_shown += 1;
@@ -87,6 +90,7 @@ impl<W: Write + Seek + Send> Sink for McapSink<W> {
     fn end(&mut self, why: &str) -> Result<()> {
         self.tape.end(BTreeMap::from([
             (WHY.to_owned(), why.to_owned()),
+            (TICKS.to_owned(), self.ticks.to_string()),
             (NOT_SHOWN.to_owned(), self.not_shown.to_string()),
         ]))
     }

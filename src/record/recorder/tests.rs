@@ -76,6 +76,20 @@ fn records_are_written_in_order_and_the_end_comes_last() {
 }
 
 #[test]
+fn bug_a_recording_that_nobody_ended_says_so() {
+    let (mut recorder, heard, let_go) = slow();
+    drop(let_go);
+    run(&mut engine(), &mut recorder, &Inbox::default());
+    drop(recorder);
+    let heard: Vec<_> = heard.try_iter().collect();
+    assert_eq!(heard.len(), 2, "{heard:?}");
+    assert!(
+        heard[1].starts_with("end the daemon broke down"),
+        "{heard:?}"
+    );
+}
+
+#[test]
 fn a_tick_does_not_wait_for_the_writer_and_nothing_is_lost() {
     let (mut recorder, heard, let_go) = slow();
     drop(let_go);
