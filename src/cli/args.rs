@@ -151,7 +151,7 @@ pub(super) struct CheckArgs {
     /// One JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
-    /// List every ignored pair, not only how many (up to 10,000).
+    /// List every ignored pair, not only how many (up to 10,000); in JSON `ignored` is null without it.
     #[arg(long)]
     pub(super) ignored: bool,
 }
@@ -210,11 +210,24 @@ pub(super) struct FeedArgs {
     #[arg(long, default_value = "10s", value_name = "TIME", value_parser = nanoseconds)]
     pub(super) wait: u64,
     /// Write a scene of `--count` mixed bodies to this file, and end.
-    #[arg(long, value_name = "FILE")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with_all = ["scene", "instance", "source", "rate", "motion", "frames", "work", "wait"]
+    )]
     pub(super) write_scene: Option<PathBuf>,
     /// The scene to write: `pool` (in free space) or `pile` (on a floor).
-    #[arg(long, default_value = "pool", value_parser = ["pool", "pile"], value_name = "KIND")]
+    #[arg(
+        long,
+        default_value = "pool",
+        value_parser = ["pool", "pile"],
+        value_name = "KIND",
+        conflicts_with = "scene"
+    )]
     pub(super) kind: String,
+    /// Write over a file that is there.
+    #[arg(long, conflicts_with = "scene")]
+    pub(super) force: bool,
 }
 
 #[derive(Debug, Args)]

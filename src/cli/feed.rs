@@ -2,6 +2,9 @@
 
 mod cadence;
 
+use std::fs::File;
+use std::io::{ErrorKind, Write as _};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::builtin::{Motion, Random, pile, pool};
@@ -31,8 +34,7 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
         } else {
             pool(count, args.course.seed)
         };
-        std::fs::write(path, text)
-            .map_err(|e| Error::io(format!("cannot write {}", path.display()), e))?;
+        write_scene(path, &text, args.force)?;
         out.line(&format!("wrote {}: {count} bodies", path.display()))?;
         out.flush()?;
         return Ok(true);
@@ -61,6 +63,25 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
         None => stream(args, &name, &mut bodies, &mut client, stop)?,
     }
     Ok(true)
+}
+
+/// Writes a scene; one that is there is somebody's work.
+fn write_scene(path: &Path, text: &str, over: bool) -> Result<()> {
+    let mut how = File::options();
+    how.write(true)
+        .create(over)
+        .create_new(!over)
+        .truncate(true);
+    let written = how
+        .open(path)
+        .and_then(|mut file| file.write_all(text.as_bytes()));
+    written.map_err(|e| match e.kind() {
+        ErrorKind::AlreadyExists => Error::Refused(format!(
+            "{} is there already: name another file, or write over it with --force",
+            path.display()
+        )),
+        _ => Error::io(format!("cannot write {}", path.display()), e),
+    })
 }
 
 /// Sends frame after frame at the rate, until stopped or for the frames asked for.

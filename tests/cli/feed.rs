@@ -12,7 +12,7 @@ use crate::live::{Desk, SECOND_NS, TWO_SPHERES, output, state, tick_until, until
 /// A daemon and a scene of so many bodies, written by the command itself.
 fn pool(desk: &Desk, count: &str) -> String {
     let path = desk.dir.join("pool.toml").to_str().unwrap().to_owned();
-    let ended = output(&["feed", "--write-scene", &path, "--count", count]);
+    let ended = output(&["feed", "--write-scene", &path, "--count", count, "--force"]);
     assert_eq!(code(&ended), Some(0), "{}", err(&ended));
     assert_eq!(code(&output(&["check", &path])), Some(0));
     path
@@ -57,6 +57,38 @@ fn without_a_daemon_it_ends_with_code_3_after_its_wait() {
         let ended = output(&["feed", scene, bad[0], bad[1]]);
         assert_eq!(code(&ended), Some(2), "{bad:?} {}", err(&ended));
     }
+}
+
+#[test]
+fn bug_a_scene_that_is_there_is_not_written_over_and_flags_that_say_nothing_are_refused() {
+    let desk = Desk::new();
+    let path = pool(&desk, "12");
+    let kept = std::fs::read(&path).unwrap();
+    let write = |more: &[&str]| {
+        let mut args = vec!["feed", "--write-scene", &path, "--count", "5"];
+        args.extend_from_slice(more);
+        output(&args)
+    };
+    let ended = write(&[]);
+    assert_eq!(code(&ended), Some(4), "{}", err(&ended));
+    assert!(err(&ended).contains("--force"), "{}", err(&ended));
+    for more in [
+        &["--rate", "50"][..],
+        &["--frames", "9"],
+        &["--source", "feed"],
+        &[&path],
+    ] {
+        let ended = write(&[more, &["--force"]].concat());
+        assert_eq!(code(&ended), Some(2), "{more:?}: {}", err(&ended));
+    }
+    for more in [&["--kind", "pile"][..], &["--force"]] {
+        let ended = output(&[&["feed", &path, "--wait", "100ms"], more].concat());
+        assert_eq!(code(&ended), Some(2), "{more:?}: {}", err(&ended));
+    }
+    assert_eq!(std::fs::read(&path).unwrap(), kept);
+    let ended = write(&["--kind", "pile", "--seed", "3", "--force"]);
+    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+    assert_ne!(std::fs::read(&path).unwrap(), kept);
 }
 
 #[test]
