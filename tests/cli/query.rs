@@ -183,7 +183,7 @@ fn a_body_is_tried_at_a_pose_and_a_shape_anywhere() {
         );
     }
     let ended = ask(&desk, &["--shape", r#"{"type": "sphere", "radius": -1}"#]);
-    assert_eq!(code(&ended), Some(4), "{}", err(&ended));
+    assert_eq!(code(&ended), Some(2), "{}", err(&ended));
     assert!(err(&ended).contains("radius is -1"), "{}", err(&ended));
 }
 
@@ -236,7 +236,7 @@ fn a_ray_is_followed_to_what_it_hits() {
         assert!(err(&ended).contains(words), "{args:?}: {}", err(&ended));
     }
     let ended = ask(&desk, &["--ray", "1,2,3,0,0,0"]);
-    assert_eq!(code(&ended), Some(4), "{}", err(&ended));
+    assert_eq!(code(&ended), Some(2), "{}", err(&ended));
     assert!(err(&ended).contains("all 0"), "{}", err(&ended));
 }
 
@@ -274,6 +274,7 @@ fn a_time_of_impact_is_told_for_velocities_that_are_said() {
         ),
         (&["a", "b", "--linear-a", "1,2,3"], "--impact"),
         (&["--touching", "a", "--impact", "1s"], "cannot be used"),
+        (&["a", "b", "--impact", "0s"], "--impact: within_s is 0"),
         (&["a", "zeppelin", "--impact", "1s"], "zeppelin"),
     ] {
         let ended = ask(&desk, args);

@@ -1,6 +1,7 @@
 //! Questions to a running daemon: asked, waited for, and why there is no answer. In: JSON. Out: the answer; and how its
 //! parts are told to people.
 
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
@@ -11,7 +12,8 @@ use crate::cli::connect;
 use crate::cli::figures::{metres, time};
 use crate::cli::out::Out;
 use crate::error::{Error, Result};
-use crate::scene::nearest;
+use crate::scene::{Request, nearest};
+use crate::shape::{ShapeSpec, build};
 use crate::time::{Clock, SystemClock};
 use crate::transport::client::{Client, Topics};
 use crate::wire::{Answer, MessageHeader, UnknownBody, Verdict, name_str};
@@ -20,6 +22,52 @@ use crate::wire::{Answer, MessageHeader, UnknownBody, Verdict, name_str};
 const LOOK_NS: u64 = 100_000_000;
 /// How long to wait for the names of the scene, which only help to say what is wrong, nanoseconds.
 const NAMES_WAIT_NS: u64 = 1_000_000_000;
+
+/// What the text of a fault may begin with: which question.
+const KINDS: [&str; 4] = ["gap: ", "touching: ", "ray: ", "impact: "];
+/// The flags that keys of questions are told by.
+const FLAGS: [(&str, &str); 12] = [
+    ("shape", "--shape"),
+    ("position", "--at"),
+    ("orientation", "--at"),
+    ("within_m", "--within"),
+    ("from", "--ray"),
+    ("direction", "--ray"),
+    ("max_m", "--max"),
+    ("within_s", "--impact"),
+    ("linear_a", "--linear-a"),
+    ("angular_a", "--angular-a"),
+    ("linear_b", "--linear-b"),
+    ("angular_b", "--angular-b"),
+];
+
+/// Reads a question as the daemon will: what is wrong with it is the user's, and needs no daemon to be told.
+fn check(question: &str) -> Result<()> {
+    let wrong = |why: String| {
+        let said = KINDS.iter().find_map(|kind| why.strip_prefix(kind));
+        let said = said.unwrap_or(&why);
+        let word = said.split([' ', ':', '.']).next().unwrap_or_default();
+        let word = word.trim_matches('`');
+        match FLAGS.iter().find(|(key, _)| *key == word) {
+            Some((_, flag)) => Error::Usage(format!("{flag}: {said}")),
+            None => Error::Usage(said.to_owned()),
+        }
+    };
+    let Request::Ask(question) = Request::parse(question.as_bytes(), &[]).map_err(wrong)? else {
+        return Ok(());
+    };
+    for spec in question.shapes() {
+        // Its file is beside the daemon's scene.
+        let is_elsewhere = matches!(
+            &spec.shape,
+            ShapeSpec::Convex { file: Some(_), .. } | ShapeSpec::Trimesh { file: Some(_), .. }
+        );
+        if !is_elsewhere {
+            build(&spec.shape, Path::new("")).map_err(|e| wrong(format!("shape: {e}")))?;
+        }
+    }
+    Ok(())
+}
 
 /// Asks and waits.
 ///
@@ -32,12 +80,14 @@ pub(super) fn ask<T>(
     stop: &AtomicBool,
     found: impl Fn(&mut Answer) -> Option<T>,
 ) -> Result<(T, Vec<String>)> {
+    let question = question.to_string();
+    check(&question)?;
     let until_ns = SystemClock.monotonic_ns().saturating_add(args.timeout);
     let instance = &args.which.instance;
     let Some(mut client) = connect(instance, None, args.timeout, stop)? else {
         return Err(stopped());
     };
-    let request = client.ask(&question.to_string(), &[])?;
+    let request = client.ask(&question, &[])?;
     let text = loop {
         let left_ns = until_ns.saturating_sub(SystemClock.monotonic_ns());
         if let Some(text) = client.answer_text(request, left_ns.min(LOOK_NS))? {
@@ -211,6 +261,34 @@ pub(super) fn clean(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bug_what_is_wrong_with_a_question_is_the_users_and_names_its_flag() {
+        for (question, words) in [
+            (
+                json!({ "impact": { "a": "a", "b": "b", "within_s": 0.0 } }),
+                "--impact: within_s is 0",
+            ),
+            (
+                json!({ "ray": { "from": [0, 0, 0], "direction": [0, 0, 0] } }),
+                "--ray: direction is all 0",
+            ),
+            (
+                json!({ "touching": { "shape": { "type": "sphere", "radius": -1.0 } } }),
+                "--shape: ",
+            ),
+            (
+                json!({ "touching": { "body": "a", "position": [1e13, 0, 0] } }),
+                "--at: position holds",
+            ),
+        ] {
+            let error = check(&question.to_string()).unwrap_err();
+            assert_eq!(error.exit_code(), 2, "{error}");
+            assert!(error.to_string().starts_with(words), "{error}");
+        }
+        let good = json!({ "touching": { "shape": { "type": "sphere", "radius": 1.0 } } });
+        check(&good.to_string()).unwrap();
+    }
 
     #[test]
     fn an_unknown_name_is_told_with_one_that_is_near_or_one_that_is_there() {
