@@ -40,7 +40,7 @@ pub fn html(report: &Report, scene: &str) -> String {
     let cell = |column: &Column, row: &Row| {
         let text = (column.cell)(row);
         if column.must_be_0 {
-            must_be_0(text)
+            must_be_0(&text)
         } else {
             escaped(&text)
         }

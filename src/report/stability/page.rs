@@ -63,8 +63,8 @@ fn row(found: &Found) -> Vec<String> {
         format!("<a href=\"#{name}\">{name}</a>"),
         sum.cases.to_string(),
         sum.answers.to_string(),
-        must_be_0(sum.excluded),
-        must_be_0(sum.wrong),
+        must_be_0(&sum.excluded),
+        must_be_0(&sum.wrong),
         number(sum.worst_error),
         number(sum.tolerance),
         worst.map_or_else(
