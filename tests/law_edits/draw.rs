@@ -145,7 +145,7 @@ impl Draw {
         let rng = &mut self.rng;
         let edit = match kind {
             0..=3 => {
-                return self.put(name);
+                return self.put(&name);
             }
             4 => Edit::Remove { name },
             5..=7 => Edit::Enable {
@@ -193,9 +193,9 @@ impl Draw {
         (edit, None)
     }
 
-    fn put(&mut self, name: String) -> (Edit, Option<Solid>) {
-        let mut solid = Solid::any(&mut self.rng, &name);
-        solid.spec.id = BodyId(self.asked_id(&name));
+    fn put(&mut self, name: &str) -> (Edit, Option<Solid>) {
+        let mut solid = Solid::any(&mut self.rng, name);
+        solid.spec.id = BodyId(self.asked_id(name));
         let pose = self.place();
         let other = self.name();
         let rng = &mut self.rng;

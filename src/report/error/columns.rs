@@ -4,6 +4,7 @@ use super::page::name;
 use super::tally::Row;
 
 /// A column.
+#[derive(Clone, Copy)]
 pub struct Column {
     /// Its head.
     pub name: &'static str,

@@ -114,7 +114,7 @@ mod tests {
             judge(&truth, &told).error_m
         };
         assert_eq!((error(-0.625), error(-2.5)), (0.25, 2.0));
-        assert_eq!(error(f64::NEG_INFINITY), f64::INFINITY);
+        assert!(error(f64::NEG_INFINITY) > f64::MAX);
     }
 
     #[test]
