@@ -180,7 +180,7 @@ fn a_rate_makes_ticks_on_the_newest_state() {
 #[test]
 fn a_rate_beyond_what_the_machine_can_do_still_takes_frames_requests_and_signals() {
     let desk = Desk::new();
-    let mut daemon = desk.run(TWO_SPHERES, &["--mode", "rate=1000000"]);
+    let mut daemon = desk.run(TWO_SPHERES, &["--mode", "rate=100000"]);
     let mut client = desk.source("sim");
     send(&mut client, &[at(1, 0.0), at(2, 0.4)]);
     tick_until(&mut client, "the frame", |tick| {

@@ -42,7 +42,7 @@ const FLAGS: [(&str, &str); 12] = [
 ];
 
 /// Reads a question as the daemon will: what is wrong with it is the user's, and needs no daemon to be told.
-fn check(question: &str) -> Result<()> {
+fn check(question: &Value) -> Result<()> {
     let wrong = |why: String| {
         let said = KINDS.iter().find_map(|kind| why.strip_prefix(kind));
         let said = said.unwrap_or(&why);
@@ -50,10 +50,15 @@ fn check(question: &str) -> Result<()> {
         let word = word.trim_matches('`');
         match FLAGS.iter().find(|(key, _)| *key == word) {
             Some((_, flag)) => Error::Usage(format!("{flag}: {said}")),
+            // What is wrong with a shape begins with the number that is.
+            None if question["touching"]["shape"].is_object() => {
+                Error::Usage(format!("--shape: {said}"))
+            }
             None => Error::Usage(said.to_owned()),
         }
     };
-    let Request::Ask(question) = Request::parse(question.as_bytes(), &[]).map_err(wrong)? else {
+    let text = question.to_string();
+    let Request::Ask(question) = Request::parse(text.as_bytes(), &[]).map_err(wrong)? else {
         return Ok(());
     };
     for spec in question.shapes() {
@@ -80,14 +85,13 @@ pub(super) fn ask<T>(
     stop: &AtomicBool,
     found: impl Fn(&mut Answer) -> Option<T>,
 ) -> Result<(T, Vec<String>)> {
-    let question = question.to_string();
-    check(&question)?;
+    check(question)?;
     let until_ns = SystemClock.monotonic_ns().saturating_add(args.timeout);
     let instance = &args.which.instance;
     let Some(mut client) = connect(instance, None, args.timeout, stop)? else {
         return Err(stopped());
     };
-    let request = client.ask(&question, &[])?;
+    let request = client.ask(&question.to_string(), &[])?;
     let text = loop {
         let left_ns = until_ns.saturating_sub(SystemClock.monotonic_ns());
         if let Some(text) = client.answer_text(request, left_ns.min(LOOK_NS))? {
@@ -282,12 +286,12 @@ mod tests {
                 "--at: position holds",
             ),
         ] {
-            let error = check(&question.to_string()).unwrap_err();
+            let error = check(&question).unwrap_err();
             assert_eq!(error.exit_code(), 2, "{error}");
             assert!(error.to_string().starts_with(words), "{error}");
         }
         let good = json!({ "touching": { "shape": { "type": "sphere", "radius": 1.0 } } });
-        check(&good.to_string()).unwrap();
+        check(&good).unwrap();
     }
 
     #[test]
