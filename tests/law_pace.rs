@@ -132,6 +132,7 @@ impl Daemon {
         }
         self.world.age(now_ns);
         self.world.validate().unwrap();
+        self.pacer.learn(&self.world);
         let passed = &mut self.passed;
         self.pacer
             .drain_passed(|source, n| passed.push((source, n)));
@@ -393,9 +394,7 @@ fn law_1_no_frame_of_a_source_that_moves_a_continuous_body_is_passed_over() {
         });
         daemon.run(3.0, Vec::new());
         for source in 0..2 {
-            let followed = daemon.world.is_followed(source);
-            assert_eq!(followed, source == 1);
-            daemon.pacer.set_followed(source, followed);
+            assert_eq!(daemon.world.is_followed(source), source == 1);
         }
         let frames = (1..=40).map(|seq| (4.0 + 0.25 * seq as f64, robot(seq)));
         let frames = frames.chain([(15.0, sim(1))]).collect();
@@ -650,6 +649,115 @@ fn law_4_2_bug_a_strangers_frame_is_none_of_the_round() {
     // Nobody else is there to be waited for.
     let ticks = daemon.run(60.0, vec![(50.0, next), (51.0, lead)]);
     assert_eq!((ticks[0].at_ms, ticks[0].frames.len()), (50.0, 1));
+}
+
+/// Vertices of the lead, to be drained next.
+fn bend(daemon: &mut Daemon, session: u64, seq: u64, version: u64) {
+    let header = &mut daemon.drained.push_vertices().header;
+    (header.session, header.seq, header.version) = (session, seq, version);
+    (header.source, header.schema) = (sweepd::wire::name_bytes("sim"), WIRE_VERSION);
+}
+
+/// What the next tick takes once what was drained is with the pacer: `(session, seq)` of frames, versions of vertices.
+fn taken(daemon: &mut Daemon) -> (Vec<(u64, u64)>, Vec<u64>) {
+    let now_ns = daemon.clock.boottime_ns();
+    daemon.pacer.take(&mut daemon.drained, now_ns);
+    (daemon.pacer)
+        .due(now_ns, false, None, &mut daemon.inbox)
+        .unwrap();
+    let frames = daemon.inbox.frames().iter();
+    let frames = frames.map(|f| (f.header.session, f.header.seq)).collect();
+    let versions = daemon.inbox.vertices().iter().map(|v| v.header.version);
+    (frames, versions.collect())
+}
+
+#[test]
+fn law_4_4_bug_vertices_go_with_their_frame_whoever_else_sends() {
+    let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
+    daemon.run(1.0, Vec::new());
+    let mut foreign = sim(1);
+    foreign.header.session = 77;
+    // A stranger's frame behind, then before.
+    bend(&mut daemon, 1, 1, 1);
+    *daemon.drained.push() = sim(1);
+    *daemon.drained.push() = foreign.clone();
+    bend(&mut daemon, 77, 2, 70);
+    assert_eq!(taken(&mut daemon), (vec![(1, 1)], vec![1]));
+    bend(&mut daemon, 1, 2, 2);
+    *daemon.drained.push() = sim(2);
+    assert_eq!(taken(&mut daemon), (vec![(77, 1)], vec![]));
+    assert_eq!(taken(&mut daemon), (vec![(1, 2)], vec![2]));
+    // A number that is too high is the frame's that comes next, with what was sent before it and after.
+    bend(&mut daemon, 1, 10, 3);
+    bend(&mut daemon, 1, 3, 4);
+    *daemon.drained.push() = sim(3);
+    assert_eq!(taken(&mut daemon), (vec![(1, 3)], vec![3, 4]));
+    foreign.header.seq = 2;
+    *daemon.drained.push() = foreign;
+    assert_eq!(taken(&mut daemon), (vec![(77, 2)], vec![70]));
+}
+
+#[test]
+fn law_4_2_bug_what_the_world_refuses_takes_nobodys_place_in_a_round() {
+    let mut daemon = Daemon::of(Mode::OnAll);
+    daemon.run(1.0, vec![(0.0, sim(1)), (0.5, robot(1))]);
+    let of_77 = |seq| {
+        let mut frame = robot(seq);
+        frame.header.session = 77;
+        frame
+    };
+    // 77 takes over from who is silent, is silent itself, and hears from who is over.
+    let silent_ms = (TIMEOUT_NS / MS) as f64 + 10.0;
+    let then_ms = 2.0 * silent_ms;
+    daemon.run(silent_ms + 1.0, vec![(silent_ms, of_77(1))]);
+    assert_eq!(daemon.world.sources()[1].session, 77);
+    let ticks = daemon.run(
+        then_ms + 50.0,
+        vec![
+            (then_ms, robot(2)),
+            (then_ms + 1.0, of_77(2)),
+            (then_ms + 2.0, robot(3)),
+            (then_ms + 3.0, of_77(3)),
+        ],
+    );
+    for (at_ms, seq) in [(1.0, 2), (3.0, 3)] {
+        let frame = ("robot".to_owned(), seq);
+        let of_77 = |tick: &&Tick| tick.at_ms == then_ms + at_ms && tick.frames.contains(&frame);
+        assert!(ticks.iter().find(of_77).is_some(), "{seq}: {ticks:?}");
+    }
+    assert_eq!(daemon.world.sources()[1].session, 77);
+}
+
+#[test]
+fn law_4_2_bug_a_stranger_is_told_so_with_the_next_heartbeat() {
+    let mut daemon = Daemon::of(Mode::OnAll);
+    daemon.run(1.0, vec![(0.0, robot(1))]);
+    let mut stranger = robot(1);
+    stranger.header.session = 77;
+    let mut foreign = sim(1);
+    foreign.header.schema = WIRE_VERSION + 1;
+    daemon.run(110.0, vec![(5.0, stranger.clone()), (6.0, foreign)]);
+    let rejects = |daemon: &Daemon, reason: sweepd::wire::RejectReason| {
+        daemon.world.rejects()[usize::from(reason.code())]
+    };
+    for reason in [
+        sweepd::wire::RejectReason::SourceTaken,
+        sweepd::wire::RejectReason::BadLayout,
+    ] {
+        assert_eq!(rejects(&daemon, reason), 1, "{reason:?}");
+    }
+    // Who is in force leaves while the other one waits: it waits no more.
+    stranger.header.seq = 2;
+    let ticks = daemon.ticks.len();
+    daemon.run(120.0, vec![(115.0, stranger)]);
+    assert_eq!(daemon.ticks.len(), ticks);
+    daemon.drained.end_session(1);
+    let now_ns = daemon.clock.boottime_ns();
+    daemon.pacer.take(&mut daemon.drained, now_ns);
+    daemon.run(121.0, Vec::new());
+    let tick = daemon.ticks.last().unwrap();
+    assert_eq!(tick.due.cause, TickCause::Frame);
+    assert_eq!(tick.frames, [("robot".to_owned(), 2)]);
 }
 
 #[test]

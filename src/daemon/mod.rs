@@ -103,16 +103,8 @@ impl<'a> Daemon<'a> {
             recorder: None,
             unsent: Unsent::default(),
         };
-        daemon.follow();
+        daemon.pacer.learn(daemon.engine.world());
         Ok(daemon)
-    }
-
-    /// Tells the pacer whose frames move continuous bodies.
-    fn follow(&mut self) {
-        let world = self.engine.world();
-        for source in 0..world.sources().len() {
-            self.pacer.set_followed(source, world.is_followed(source));
-        }
     }
 
     /// Raises this counter from now on, each round and each heartbeat of a long tick.
@@ -296,6 +288,7 @@ impl<'a> Daemon<'a> {
             );
         }
         self.engine.note_sent(send_ns);
+        self.pacer.learn(self.engine.world());
         self.settle_edits();
         Ok(())
     }

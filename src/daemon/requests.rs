@@ -51,9 +51,6 @@ impl Daemon<'_> {
     /// Answers the requests whose edits the last tick applied or refused.
     pub(super) fn settle_edits(&mut self) {
         self.tell_bodies();
-        if !self.ready.is_empty() {
-            self.follow();
-        }
         self.ready.clear();
         for at in 0..self.engine.outcomes().len() {
             let outcome = &self.engine.outcomes()[at];

@@ -9,17 +9,20 @@
 //! those ticks take no frame and judge ages only; with `on_all` they leave a round that is under way alone; with a
 //! rate every tick takes the newest state. Of a source that moves continuous bodies all frames are taken, in each mode.
 
+mod beat;
 mod held;
 mod source;
 
-use held::{Held, Queue, Vertices};
-use source::Source;
+use beat::Beat;
+use held::{Held, Queue, Vertices, Whose};
+use source::{Source, Speaker};
 
-use crate::config::{Config, Mode};
-use crate::error::{Error, Result};
+use crate::config::Config;
+use crate::error::Result;
 use crate::ids::SourceSlot;
 use crate::scene::SourceSpec;
 use crate::wire::{Inbox, TickCause, name_bytes, name_str};
+use crate::world::World;
 
 /// A tick that is due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,20 +33,6 @@ pub struct Due {
     pub source: Option<SourceSlot>,
     /// It judges ages (and applies edits) only and spends no work units.
     pub ages_only: bool,
-}
-
-/// What makes a tick.
-#[derive(Clone, Copy, Debug)]
-enum Beat {
-    /// Each frame of this source.
-    OnFrame(usize),
-    /// A round, which began with a frame received then.
-    OnAll { since_ns: Option<u64>, late_ns: u64 },
-    /// Every so often.
-    Rate {
-        period_ns: u64,
-        next_ns: Option<u64>,
-    },
 }
 
 /// Decides when ticks happen.
@@ -67,7 +56,7 @@ impl Pacer {
     /// `Error::Usage` when the mode names no source of the scene, or its rate is no positive number.
     pub fn new(config: &Config, sources: &[SourceSpec]) -> Result<Self> {
         let names: Vec<&str> = sources.iter().map(|s| &*s.name).collect();
-        let beat = beat_of(config, &names)?;
+        let beat = Beat::of(config, &names)?;
         Ok(Self {
             beat,
             heartbeat_ns: config.heartbeat_ns.max(1),
@@ -87,7 +76,7 @@ impl Pacer {
     pub fn set_mode(&mut self, config: &Config) -> Result<()> {
         let names = self.sources.iter();
         let names: Vec<&str> = names.map(|s| name_str(&s.name).unwrap_or("")).collect();
-        self.beat = beat_of(config, &names)?;
+        self.beat = Beat::of(config, &names)?;
         Ok(())
     }
 
@@ -98,17 +87,21 @@ impl Pacer {
         }
     }
 
-    /// Sets whether each frame of a source counts: see `World::is_followed`.
-    pub fn set_followed(&mut self, source: usize, followed: bool) {
-        if let Some(source) = self.sources.get_mut(source) {
-            source.followed = followed;
+    /// Learns from the world what has become of the frames that it was given: who speaks for each source, and whose
+    /// frames move continuous bodies. To be called after each tick.
+    pub fn learn(&mut self, world: &World) {
+        for (place, source) in self.sources.iter_mut().enumerate() {
+            source.followed = world.is_followed(place);
+            let in_force = world.in_force(place);
+            source.in_force = in_force.map(|(session, heard_ns)| Speaker { session, heard_ns });
         }
+        self.hear_anew();
     }
 
     /// Takes everything out of an inbox and leaves it empty.
     pub fn take(&mut self, inbox: &mut Inbox, now_ns: u64) {
-        // No allocation: as a rule nobody is.
-        let gone = inbox.ended().to_vec();
+        // Who leaves has sent its last frame, and the next one may speak for its source.
+        self.ended.extend(inbox.ended());
         for frame in inbox.frames_mut() {
             let name = name_str(&frame.header.source).map(name_bytes);
             let place = self.sources.iter().position(|s| Some(s.name) == name);
@@ -116,20 +109,25 @@ impl Pacer {
                 0 => now_ns,
                 received_ns => received_ns.min(now_ns),
             };
-            let source = place.and_then(|p| self.sources.get_mut(p));
-            if let Some(source) = source.filter(|s| s.is_spoken_for(frame, received_ns, &gone)) {
-                source.heard_ns = Some(source.heard_ns.unwrap_or(0).max(received_ns));
-                source.passed += source.lost_before(&frame.header);
-                source.session = frame.header.session;
-                source.sent = true;
-                source.late = false;
-                if let Beat::OnAll { since_ns, .. } = &mut self.beat {
-                    since_ns.get_or_insert(received_ns);
+            let mut whose = Whose {
+                source: place,
+                received_ns,
+                speaks: false,
+            };
+            if let Some(source) = place.and_then(|p| self.sources.get_mut(p)) {
+                whose.speaks = source.hear(frame, received_ns, &self.ended);
+                if whose.speaks {
+                    source.passed += source.lost_before(&frame.header);
                 }
+            }
+            if let Beat::OnAll { since_ns, .. } = &mut self.beat
+                && whose.speaks
+            {
+                since_ns.get_or_insert(received_ns);
             }
             let leads = |at| matches!(self.beat, Beat::OnFrame(lead) if at == lead);
             let alone = place.is_some_and(|at| leads(at) || self.sources[at].followed);
-            let passed = self.queue.put(frame, place, alone);
+            let passed = self.queue.put(frame, whose, alone);
             let source = place.and_then(|p| self.sources.get_mut(p));
             *source.map_or(&mut self.passed_of_none, |source| &mut source.passed) += passed;
         }
@@ -138,11 +136,8 @@ impl Pacer {
             let place = self.sources.iter().position(|s| Some(s.name) == name);
             self.vertices.put(frame, place);
         }
-        for &session in inbox.ended() {
-            self.ended.push(session);
-            for source in self.sources.iter_mut().filter(|s| s.session == session) {
-                source.heard_ns = None;
-            }
+        if !inbox.ended().is_empty() {
+            self.hear_anew();
         }
         inbox.clear();
     }
@@ -165,8 +160,7 @@ impl Pacer {
             let on_frame = matches!(self.beat, Beat::OnFrame(_));
             match self.beat {
                 Beat::Rate { .. } => self.queue.take(into, |_| true),
-                // Frames of no source are in no round: they are refused, and that is told soon.
-                _ => self.queue.take(into, |held| held.source.is_none()),
+                _ => self.queue.take_strangers(into),
             }
             Some(Due {
                 cause,
@@ -228,7 +222,7 @@ impl Pacer {
                 }
                 let mut first = true;
                 self.queue.take(into, |held: &Held| {
-                    held.source != Some(lead) || std::mem::take(&mut first)
+                    held.whose.source != Some(lead) || std::mem::take(&mut first)
                 });
                 Some(by_frame(Some(slot(lead))))
             }
@@ -275,7 +269,8 @@ impl Pacer {
     }
 
     fn has_frame_of(&self, source: usize) -> bool {
-        self.queue.frames().iter().any(|h| h.source == Some(source))
+        let frames = self.queue.frames();
+        frames.iter().any(|held| held.whose.source == Some(source))
     }
 
     /// When the round under way ends: now, if every source that is waited for has sent; else when it is late.
@@ -306,6 +301,34 @@ impl Pacer {
         };
     }
 
+    /// Hears the frames that wait anew, on top of what the world has: what seemed a stranger's may count now, and what
+    /// seemed to count may not.
+    fn hear_anew(&mut self) {
+        for source in &mut self.sources {
+            (source.speaker, source.sent) = (source.in_force, false);
+        }
+        let mut first_ns = None;
+        for held in self.queue.frames_mut() {
+            let whose = &mut held.whose;
+            let Some(source) = whose.source.and_then(|place| self.sources.get_mut(place)) else {
+                continue;
+            };
+            let before = whose.speaks;
+            whose.speaks = source.hear(&held.frame, whose.received_ns, &self.ended);
+            if whose.speaks && !before {
+                source.passed += source.lost_before(&held.frame.header);
+            }
+            first_ns = first_ns.or(whose.speaks.then_some(whose.received_ns));
+        }
+        let ended = &self.ended;
+        for source in &mut self.sources {
+            source.speaker = source.speaker.filter(|by| !ended.contains(&by.session));
+        }
+        if let Beat::OnAll { since_ns, .. } = &mut self.beat {
+            *since_ns = first_ns.map(|first_ns| since_ns.unwrap_or(first_ns));
+        }
+    }
+
     /// Sessions that ended go out with, or after, the last of their frames.
     fn hand_over_ended(&mut self, into: &mut Inbox) {
         let waiting = self.queue.frames();
@@ -320,59 +343,7 @@ impl Pacer {
     }
 }
 
-impl Source {
-    /// Whether a round waits for it: alive, and not late in the round before.
-    fn is_waited_for(&self, now_ns: u64) -> bool {
-        let alive = |heard_ns| now_ns.saturating_sub(heard_ns) < self.timeout_ns;
-        !self.late && self.heard_ns.is_some_and(alive)
-    }
-}
-
 /// There are at most 16 sources.
 fn slot(place: usize) -> SourceSlot {
     SourceSlot(u32::try_from(place).unwrap_or(u32::MAX))
-}
-
-fn beat_of(config: &Config, sources: &[&str]) -> Result<Beat> {
-    Ok(match &config.mode {
-        Mode::OnFrame(name) => {
-            let place = sources.iter().position(|own| own == name);
-            Beat::OnFrame(place.ok_or_else(|| no_such_source(name, sources))?)
-        }
-        Mode::OnAll => Beat::OnAll {
-            since_ns: None,
-            late_ns: config.late_ns,
-        },
-        Mode::Rate(hz) => Beat::Rate {
-            period_ns: period_ns(*hz)?,
-            next_ns: None,
-        },
-    })
-}
-
-fn no_such_source(name: &str, sources: &[&str]) -> Error {
-    let names = if sources.is_empty() {
-        "none".to_owned()
-    } else {
-        sources.join(", ")
-    };
-    Error::Usage(format!(
-        "mode `on_frame`: the scene has no source `{name}`; it has {names}"
-    ))
-}
-
-fn period_ns(hz: f64) -> Result<u64> {
-    let period_ns = 1e9 / hz;
-    if !(hz.is_finite() && hz > 0.0 && period_ns < 1e18) {
-        return Err(Error::Usage(format!(
-            "mode `rate`: {hz} ticks a second cannot be: give a positive number of hertz"
-        )));
-    }
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "between 0 and 1e18, checked above"
-    )]
-    let period_ns = period_ns as u64;
-    Ok(period_ns.max(1))
 }

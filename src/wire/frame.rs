@@ -52,6 +52,8 @@ pub struct Inbox {
     len: usize,
     vertices: VertexFrames,
     ended: Vec<u64>,
+    /// Memory of [`Inbox::sort_by_sending`]: sessions, and when each first sent.
+    sessions: Vec<(u64, u64)>,
 }
 
 impl Inbox {
@@ -73,12 +75,31 @@ impl Inbox {
         frame
     }
 
-    /// Puts frames that came on two ways in the order of their sending: by `sent_ns`, those of one time by session,
-    /// epoch and number.
+    /// Puts frames that came on two ways in the order of their sending, source by source: those of a session by epoch
+    /// and number, the sessions of a source by when each began to send.
     pub fn sort_by_sending(&mut self) {
-        self.frames[..self.len].sort_unstable_by_key(|frame| {
+        let Self {
+            frames,
+            len,
+            sessions,
+            ..
+        } = self;
+        let frames = &mut frames[..*len];
+        sessions.clear();
+        for header in frames.iter().map(|frame| &frame.header) {
+            // 0 says nothing.
+            let sent_ns = header.sent_ns.wrapping_sub(1);
+            match sessions.iter_mut().find(|(of, _)| *of == header.session) {
+                Some((_, first_ns)) => *first_ns = sent_ns.min(*first_ns),
+                None => sessions.push((header.session, sent_ns)),
+            }
+        }
+        let began = |session: u64| sessions.iter().find(|(of, _)| *of == session);
+        frames.sort_unstable_by_key(|frame| {
             let header = &frame.header;
-            (header.sent_ns, header.session, header.epoch, header.seq)
+            let began_ns = began(header.session).map_or(0, |(_, first_ns)| *first_ns);
+            let (epoch, seq) = (header.epoch, header.seq);
+            (header.source, began_ns, header.session, epoch, seq)
         });
     }
 
@@ -168,9 +189,14 @@ mod tests {
     #[test]
     fn frames_of_two_ways_are_put_in_the_order_of_their_sending() {
         let mut inbox = Inbox::default();
-        for (sent_ns, session, epoch, seq) in
-            [(7, 1, 1, 4), (9, 1, 2, 1), (5, 2, 1, 2), (7, 1, 1, 3)]
-        {
+        // 3 is before 1; 1 does not always say when it sends, and says it wrongly.
+        for (sent_ns, session, epoch, seq) in [
+            (7, 1, 1, 4),
+            (9, 1, 2, 1),
+            (5, 3, 1, 2),
+            (0, 1, 1, 5),
+            (6, 1, 1, 3),
+        ] {
             let header = &mut inbox.push().header;
             (header.sent_ns, header.session) = (sent_ns, session);
             (header.epoch, header.seq) = (epoch, seq);
@@ -178,7 +204,8 @@ mod tests {
         inbox.sort_by_sending();
         let numbers = |frame: &Frame| (frame.header.session, frame.header.epoch, frame.header.seq);
         let sorted: Vec<_> = inbox.frames().iter().map(numbers).collect();
-        assert_eq!(sorted, [(2, 1, 2), (1, 1, 3), (1, 1, 4), (1, 2, 1)]);
+        let wanted = [(3, 1, 2), (1, 1, 3), (1, 1, 4), (1, 1, 5), (1, 2, 1)];
+        assert_eq!(sorted, wanted);
     }
 
     #[test]

@@ -127,6 +127,13 @@ impl super::World {
         of_name.is_some_and(|slot| self.sources[slot.index()].session == session)
     }
 
+    /// The session in force of a source, by its place, and when it was last heard, nanoseconds of `CLOCK_BOOTTIME`.
+    #[must_use]
+    pub fn in_force(&self, source: usize) -> Option<(u64, u64)> {
+        let state = self.sources.get(source)?;
+        (state.session != 0).then_some((state.session, state.heard_ns))
+    }
+
     /// Whether a continuous body goes where the frames of a source say: each of them is then a part of its way, and
     /// none may be passed over for a newer one.
     #[must_use]

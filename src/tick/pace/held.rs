@@ -4,15 +4,25 @@
 //! are passed over and counted; a partial one does not, because those may hold bodies that it lacks, and one of a
 //! source that moves continuous bodies does not, because those are on their way.
 
-use crate::limits::{FRAMES_PER_DRAIN_MAX, VERTEX_FRAMES_WAITING_MAX};
-use crate::wire::{Frame, Inbox, VertexFrame, WIRE_VERSION, frame_flags};
+use crate::limits::{FRAMES_PER_DRAIN_MAX, SOURCES_MAX, VERTEX_FRAMES_WAITING_MAX};
+use crate::wire::{Frame, Inbox, VertexFrame, VertexHeader, WIRE_VERSION, frame_flags};
+
+/// Whose a frame is.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Whose {
+    /// Place of its source; `None`: of no source of the scene, to be refused and counted by the world.
+    pub(super) source: Option<usize>,
+    /// Its receipt, nanoseconds of `CLOCK_BOOTTIME`.
+    pub(super) received_ns: u64,
+    /// It is of the session that speaks for its source once the frames before it are with the world.
+    pub(super) speaks: bool,
+}
 
 /// A frame and whose it is.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Held {
     pub(super) frame: Frame,
-    /// Place of its source; `None`: of no source of the scene, to be refused and counted by the world.
-    pub(super) source: Option<usize>,
+    pub(super) whose: Whose,
 }
 
 /// The frames that wait, and spare memory.
@@ -27,20 +37,19 @@ impl Queue {
         &self.frames
     }
 
+    pub(super) fn frames_mut(&mut self) -> &mut [Held] {
+        &mut self.frames
+    }
+
     /// Takes one frame out of an inbox.
     ///
     /// * `stands_alone` - each frame of this source makes a tick of its own, or is a part of a body's way: none is
     ///   passed over for a newer one.
     /// * returns - how many frames of its source are passed over for it.
-    pub(super) fn put(
-        &mut self,
-        frame: &mut Frame,
-        source: Option<usize>,
-        stands_alone: bool,
-    ) -> u64 {
+    pub(super) fn put(&mut self, frame: &mut Frame, whose: Whose, stands_alone: bool) -> u64 {
         let mut held = self.spare.pop().unwrap_or_default();
         std::mem::swap(&mut held.frame, frame);
-        held.source = source;
+        held.whose = whose;
         let mut passed = 0;
         let mut place = None;
         if !stands_alone && is_whole(&held.frame) {
@@ -52,7 +61,7 @@ impl Queue {
                 passed += 1;
             }
         }
-        let of_source = |old: &Held| old.source == source;
+        let of_source = |old: &Held| old.whose.source == whose.source;
         if self.frames.iter().filter(|old| of_source(old)).count() >= FRAMES_PER_DRAIN_MAX
             && let Some(oldest) = self.frames.iter().position(of_source)
         {
@@ -78,6 +87,20 @@ impl Queue {
         self.spare.extend(self.frames.drain(kept..));
     }
 
+    /// Hands out the frames that are in no round: the world refuses them, and that is told soon. One that came behind
+    /// frames of its source that count goes after them: it must not find the source silent.
+    pub(super) fn take_strangers(&mut self, into: &mut Inbox) {
+        let mut waited_for = [false; SOURCES_MAX];
+        self.take(into, |held| {
+            let source = held.whose.source;
+            let Some(waited_for) = source.and_then(|place| waited_for.get_mut(place)) else {
+                return true;
+            };
+            *waited_for |= held.whose.speaks;
+            !*waited_for
+        });
+    }
+
     fn drop_at(&mut self, at: usize) {
         let held = self.frames.remove(at);
         self.spare.push(held);
@@ -86,29 +109,46 @@ impl Queue {
 
 /// Vertices that wait, and spare memory.
 ///
-/// None is passed over for a newer one, and those of a source go out in the order of their sending: a range stands on
-/// the version before. Those of the source whose frames make ticks wait for the frame that they belong with, so that a
-/// tick has vertices and poses of one moment; those of a new session wait for the frames of the one before.
+/// None is passed over for a newer one, and those of a session go out in the order of their sending: a range stands on
+/// the version before. Those of the source whose frames make ticks wait for the frame of their session that they belong
+/// with, so that a tick has vertices and poses of one moment; without it those of a new session wait for the frames of
+/// the one before.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Vertices {
-    waiting: Vec<(VertexFrame, Option<usize>)>,
+    waiting: Vec<Bent>,
     spare: Vec<VertexFrame>,
+    /// Sessions of which a message goes out with the tick that is being made, and so what was sent before it.
+    going: Vec<(Option<usize>, u64)>,
+}
+
+/// A message of vertices that waits.
+#[derive(Clone, Debug, Default)]
+struct Bent {
+    frame: VertexFrame,
+    /// Place of its source.
+    source: Option<usize>,
+    /// It goes out with its frame, or what was sent after it does.
+    goes: bool,
 }
 
 impl Vertices {
     /// Takes vertices out of an inbox. Of more than a source may have waiting the oldest go: the numbers of those that
     /// follow tell that they are missing.
     pub(super) fn put(&mut self, frame: &mut VertexFrame, source: Option<usize>) {
-        let of_source = |held: &(VertexFrame, Option<usize>)| held.1 == source;
+        let of_source = |held: &Bent| held.source == source;
         if self.waiting.iter().filter(|held| of_source(held)).count() >= VERTEX_FRAMES_WAITING_MAX
             && let Some(oldest) = self.waiting.iter().position(of_source)
         {
-            let (oldest, _) = self.waiting.remove(oldest);
-            self.spare.push(oldest);
+            let oldest = self.waiting.remove(oldest);
+            self.spare.push(oldest.frame);
         }
-        let mut held = self.spare.pop().unwrap_or_default();
-        std::mem::swap(&mut held, frame);
-        self.waiting.push((held, source));
+        let mut held = Bent {
+            frame: self.spare.pop().unwrap_or_default(),
+            source,
+            goes: false,
+        };
+        std::mem::swap(&mut held.frame, frame);
+        self.waiting.push(held);
     }
 
     /// Hands out what a tick with these frames takes.
@@ -116,44 +156,69 @@ impl Vertices {
     /// * `lead` - the source each of whose frames makes a tick of its own.
     /// * `frames` - those that go on waiting.
     pub(super) fn take(&mut self, into: &mut Inbox, lead: Option<usize>, frames: &[Held]) {
+        self.going.clear();
+        for held in self.waiting.iter_mut().rev() {
+            let (header, session) = (&held.frame.header, held.session());
+            let of_tick = || into.frames().iter().any(|frame| belongs(header, frame));
+            held.goes = self.going.contains(&session);
+            if !held.goes && header.seq != 0 && of_tick() {
+                held.goes = true;
+                self.going.push(session);
+            }
+        }
         let mut kept = 0;
         for at in 0..self.waiting.len() {
-            let (frame, source) = &self.waiting[at];
-            let header = &frame.header;
-            let of_lead = lead.is_some() && *source == lead && header.seq != 0;
-            let belongs = |f: &Frame| {
-                let frame = &f.header;
-                frame.source == header.source
-                    && (frame.session != header.session
-                        || (frame.epoch, frame.seq) >= (header.epoch, header.seq))
-            };
-            let before =
-                |held: &Held| held.source == *source && held.frame.header.session != header.session;
-            let waits = of_lead && !into.frames().iter().any(belongs)
-                || frames.iter().any(before)
-                || self.waiting[..kept].iter().any(|held| held.1 == *source);
-            if waits {
+            if self.waiting[at].waits(&self.waiting[..kept], into, lead, frames) {
                 self.waiting.swap(kept, at);
                 kept += 1;
             } else {
-                std::mem::swap(into.push_vertices(), &mut self.waiting[at].0);
+                std::mem::swap(into.push_vertices(), &mut self.waiting[at].frame);
             }
         }
         self.spare
-            .extend(self.waiting.drain(kept..).map(|(frame, _)| frame));
+            .extend(self.waiting.drain(kept..).map(|held| held.frame));
     }
 
     /// Drops what a session that is over has left without a frame.
     pub(super) fn forget(&mut self, session: u64) {
-        let Self { waiting, spare } = self;
-        waiting.retain_mut(|(frame, _)| {
-            let stays = frame.header.session != session;
+        let Self { waiting, spare, .. } = self;
+        waiting.retain_mut(|held| {
+            let stays = held.frame.header.session != session;
             if !stays {
-                spare.push(std::mem::take(frame));
+                spare.push(std::mem::take(&mut held.frame));
             }
             stays
         });
     }
+}
+
+impl Bent {
+    /// Place of its source, and its session.
+    fn session(&self) -> (Option<usize>, u64) {
+        (self.source, self.frame.header.session)
+    }
+
+    /// Whether it waits on, by what [`Vertices::take`] is given and what of it was `kept` so far.
+    fn waits(&self, kept: &[Self], into: &Inbox, lead: Option<usize>, frames: &[Held]) -> bool {
+        let header = &self.frame.header;
+        let own = |frame: &Frame| frame.header.session == header.session;
+        let before = |held: &Held| {
+            held.whose.source == self.source && held.whose.speaks && !own(&held.frame)
+        };
+        let awaits_frame = lead.is_some() && self.source == lead && header.seq != 0;
+        !self.goes
+            && (awaits_frame
+                || kept.iter().any(|held| held.session() == self.session())
+                || frames.iter().any(before) && !into.frames().iter().any(own))
+    }
+}
+
+/// Whether vertices may go out with a frame: it is the one that they belong with, or came after it.
+fn belongs(vertices: &VertexHeader, frame: &Frame) -> bool {
+    let frame = &frame.header;
+    frame.source == vertices.source
+        && frame.session == vertices.session
+        && (frame.epoch, frame.seq) >= (vertices.epoch, vertices.seq)
 }
 
 /// Whether nothing in the frame itself keeps the world from taking it: only then may an older one be dropped for it.
@@ -169,7 +234,7 @@ fn is_whole(frame: &Frame) -> bool {
 /// Whether the world would take the new frame wherever it would take the old one, and then not need the old one.
 fn replaces(new: &Held, old: &Held) -> bool {
     let (a, b) = (&new.frame.header, &old.frame.header);
-    new.source == old.source
+    new.whose.source == old.whose.source
         && a.session == b.session
         && (a.epoch, a.seq) > (b.epoch, b.seq)
         && a.scene_rev <= b.scene_rev
