@@ -140,6 +140,24 @@ fn a_gas_is_put_in_order_a_little_in_each_tick_and_not_sorted_anew() {
 }
 
 #[test]
+fn bug_bodies_that_travel_among_others_at_rest_stretch_no_blocks() {
+    let mut scene = Scene::new(Kind::Field, 8000, 11);
+    let mut rig = Rig::new(Level::best(), 8000, false);
+    rig.start(&scene.boxes);
+    let mut tests = [0; 10];
+    for frame in 0..400 {
+        scene.step();
+        let wanted = exact::pairs(&scene.boxes);
+        rig.take(&scene);
+        rig.tick(&wanted, &format!("frame {frame}"));
+        assert!(frame == 0 || rig.work().rebuilds == 0, "frame {frame}");
+        tests[frame / 40] += rig.work().tests;
+    }
+    let first = tests[0];
+    assert!(tests.iter().all(|tests| tests * 3 < first * 4), "{tests:?}");
+}
+
+#[test]
 fn pairs_that_are_sure_are_not_compared() {
     let (_, tests, pairs) = work(Kind::Heap, 500, 60);
     assert!(tests * 4 < pairs, "{tests} comparisons for {pairs} pairs");

@@ -77,12 +77,14 @@ impl Order {
             held,
             verlet,
             finds,
+            team,
             reach,
             ..
         } = &mut self.afresh;
         presort.give_back();
         held.give_back();
         finds.give_back();
+        team.give_back();
         verlet.give_back();
         shed(reach);
     }

@@ -70,6 +70,26 @@ impl Order {
         }
     }
 
+    /// Of the bodies that are renewed sends those on to a nearer block that have gone farther from their block's part
+    /// of space than that is long: a block that kept a traveller would become as long as its way, and everybody's
+    /// queries would meet it. For where few move: the quarters are not looked after then.
+    pub(super) fn send_on(&mut self) {
+        for at in 0..self.worklist.len() {
+            let block = self.worklist[at] as usize;
+            let home = self.home(block);
+            let longest = (0..3).fold(0.0, |longest, k| (home[k + 3] - home[k]).max(longest));
+            for lane in ones(self.renewing[block]) {
+                let from = block * WIDTH + lane;
+                let boxed = self.exact[from];
+                let far = far_from(&centre(&boxed.corners()), &home);
+                let side = boxed.mean_side().max(longest);
+                if far > side * side {
+                    self.move_nearer(from, far);
+                }
+            }
+        }
+    }
+
     /// Looks after the quarters whose turn it is: who has left one moves, and those that have got mixed up are dealt
     /// anew.
     pub(super) fn mend(&mut self) {
@@ -159,21 +179,25 @@ impl Order {
             if far <= side * side * DRIFT_SIDES * DRIFT_SIDES {
                 continue;
             }
-            let Some((near, to)) = self.lane_near(&one, 0.0) else {
-                continue;
-            };
-            if near * NEARER >= far {
-                continue;
-            }
-            let slot = BodySlot(self.slot_of[from]);
-            let (gait, held) = (self.gaits[from], self.held[from]);
-            self.evict(slot, true);
-            self.seat(slot, to, boxed);
-            let to = to as usize;
-            (self.gaits[to], self.held[to]) = (gait, held);
-            drifted = true;
+            drifted |= self.move_nearer(from, far);
         }
         drifted
+    }
+
+    /// Moves a body to a lane of a block that is much nearer than `far`, squared, where one has room; whether there is.
+    fn move_nearer(&mut self, from: usize, far: f32) -> bool {
+        let boxed = self.exact[from];
+        let nearer = self.lane_near(&boxed.corners(), 0.0);
+        let Some((_, to)) = nearer.filter(|(near, _)| near * NEARER < far) else {
+            return false;
+        };
+        let slot = BodySlot(self.slot_of[from]);
+        let (gait, held) = (self.gaits[from], self.held[from]);
+        self.evict(slot, true);
+        self.seat(slot, to, boxed);
+        let to = to as usize;
+        (self.gaits[to], self.held[to]) = (gait, held);
+        true
     }
 
     /// Whether the blocks have spread over much more space than when they were dealt.

@@ -266,6 +266,8 @@ impl Order {
             self.rehome();
             if many {
                 self.mend();
+            } else {
+                self.send_on();
             }
         }
         if anew || self.is_worn() || !self.settle(&tick) {

@@ -4,44 +4,16 @@
 //! its renewed lanes, and overwrites their rows and columns. So of two bodies that leave their boxes in one tick each
 //! sees the other's new box, and since a row is written, not added to, no pair is there twice.
 
-use super::links::{Bits, EMPTY, Matrix, room};
+mod scratch;
+
+pub(super) use scratch::Scratch;
+
+use scratch::Close;
+
+use super::links::{Bits, EMPTY, Matrix};
 use super::look::sure;
 use super::{BodySlot, NONE, Order, PairKey, Proxies, Tick, Work as Done, ones, parts, small};
 use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch};
-
-/// Memory of the queries, kept over ticks.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Scratch {
-    /// Blocks that a query found.
-    near: Vec<u32>,
-    /// Those of them that are looked into.
-    close: Vec<Close>,
-    /// Records of the block at hand: the other block, the record.
-    have: Vec<(u32, u32)>,
-    /// By block: the stamp of the query that met it last, and its record with the asking block.
-    mark: Vec<(u32, u32)>,
-    stamp: u32,
-}
-
-impl Scratch {
-    /// Room for a query that meets every block.
-    pub(super) fn reserve(&mut self, blocks: usize) {
-        room(&mut self.near, blocks);
-        room(&mut self.close, blocks);
-        room(&mut self.have, blocks);
-        room(&mut self.mark, blocks);
-    }
-}
-
-/// A block to be looked into.
-#[derive(Clone, Copy, Debug)]
-struct Close {
-    block: u32,
-    /// Its record with the asking block, or `NONE`.
-    record: u32,
-    /// Renewed lanes of the asking block that meet its bound.
-    lanes: u16,
-}
 
 impl Order {
     /// Renews the lanes noted in `renewing`.
@@ -179,9 +151,7 @@ impl Renew<'_> {
         let order = &mut *self.order;
         let renewing = order.renewing[block as usize];
         let around = lanes.bound(&order.fat[block as usize], renewing);
-        // Two stamps a query: one for blocks with a record, one for those of them that were met.
-        scratch.stamp = scratch.stamp.wrapping_add(2);
-        let stamp = scratch.stamp;
+        let stamp = scratch.next_stamp();
         scratch.have.clear();
         let (have, mark) = (&mut scratch.have, &mut scratch.mark);
         for (other, record) in order.links.of(block) {

@@ -161,6 +161,13 @@ impl Team {
         }
     }
 
+    /// Gives the memory of what the others found back.
+    pub(super) fn give_back(&mut self) {
+        for mate in &mut self.mates {
+            mate.finds.give_back();
+        }
+    }
+
     /// Searches some blocks. What is near is listed behind what is listed already.
     ///
     /// * `blocks` - from a multiple of `WIDTH` on.
