@@ -1,7 +1,7 @@
 //! Frames of `~/transforms` that came before the names of their scene revision are known here: they wait, since a name
 //! that nobody has yet would be nobody's.
 //!
-//! In: messages, the revision of the names. Out: messages whose time has come, in the order of their source.
+//! In: messages, the revision of the names. Out: messages whose time has come, those of a session in their order.
 
 use std::collections::VecDeque;
 
@@ -29,7 +29,7 @@ impl Early {
         self.waiting.is_empty()
     }
 
-    /// Takes a message that must wait, or that comes behind one of its source that does; gives back any other.
+    /// Takes a message that must wait, or that comes behind one of its session that does; gives back any other.
     ///
     /// * `names_rev` - scene revision of the names that are known here.
     /// * `timeout_ns` - of its source; `None`: the scene has no such source, and the frame is refused for that.
@@ -44,11 +44,14 @@ impl Early {
         let Some(timeout_ns) = timeout_ns else {
             return (Some(message), 0);
         };
-        let of_source = |other: &Waiting| other.message.source == message.source;
-        let ahead = self.waiting.iter().filter(|other| of_source(other)).count();
-        if ahead == 0 && !is_early(&message, names_rev) {
+        // Only a session has an order (law 4.2): a stranger under the name of a source must not hold it up.
+        let is_behind =
+            (self.waiting.iter()).any(|other| session(&other.message) == session(&message));
+        if !is_behind && !is_early(&message, names_rev) {
             return (Some(message), 0);
         }
+        let of_source = |other: &Waiting| other.message.source == message.source;
+        let ahead = self.waiting.iter().filter(|other| of_source(other)).count();
         let oldest = self.waiting.iter().position(of_source);
         let gone = oldest.filter(|_| ahead >= FRAMES_PER_DRAIN_MAX);
         let gone = gone.and_then(|at| self.waiting.remove(at));
@@ -71,13 +74,18 @@ impl Early {
         let is_due = |one: &Waiting| !is_early(&one.message, names_rev) || one.until_ns <= now_ns;
         let is_first = |at: usize, one: &Waiting| {
             let mut ahead = self.waiting.iter().take(at);
-            ahead.all(|other| other.message.source != one.message.source)
+            ahead.all(|other| session(&other.message) != session(&one.message))
         };
         let mut all = self.waiting.iter().enumerate();
         let (at, _) = all.find(|(at, one)| is_due(one) && is_first(*at, one))?;
         let one = self.waiting.remove(at)?;
         Some((one.message, one.receipt))
     }
+}
+
+/// Whose a frame is: what has an order of its own.
+fn session(message: &BodyTransforms) -> (&str, u64) {
+    (&message.source, message.session)
 }
 
 /// Whether a frame has names that are not known here yet.
@@ -140,6 +148,30 @@ mod tests {
         let both = [("sim".to_owned(), 2), ("sim".to_owned(), 3)];
         assert_eq!(out(&mut early, 20, 5), both);
         assert!(early.is_empty());
+    }
+
+    #[test]
+    fn bug_a_second_session_that_waits_holds_nobody_else_up() {
+        let mut early = Early::default();
+        let stranger = BodyTransforms {
+            session: 2,
+            ..frame("sim", 1, 9)
+        };
+        let own = |seq, scene_rev| BodyTransforms {
+            session: 1,
+            ..frame("sim", seq, scene_rev)
+        };
+        let mut take = |message| early.take(message, at(10), 4, Some(100)).0;
+        assert!(take(stranger).is_none());
+        assert!(take(own(2, 0)).is_some(), "the live session goes on");
+        assert!(take(own(3, 5)).is_none());
+        assert!(take(own(4, 0)).is_none(), "behind its own");
+        let both = [("sim".to_owned(), 3), ("sim".to_owned(), 4)];
+        assert_eq!(
+            out(&mut early, 20, 5),
+            both,
+            "and waits for its own names only"
+        );
     }
 
     #[test]
