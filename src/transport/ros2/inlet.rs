@@ -22,6 +22,7 @@ use super::shelf::{Shelf, Update};
 use crate::error::{Error, Result};
 use crate::time::{Clock as _, SystemClock};
 use crate::transport::Setting;
+use crate::wire::RejectReason;
 use crate::wire::ros::{BodyTransforms, Book};
 use early::Early;
 pub(super) use frames::Local;
@@ -289,21 +290,19 @@ fn take_frames(
     let names_rev = shared.names_rev();
     let book = shared.book();
     let mut odd = None;
-    let mut put = |message: &BodyTransforms, receipt| {
-        let fault = put_frame((shelf, shared), local, (message, receipt), &book);
+    let mut put = |message: &BodyTransforms, receipt, refused| {
+        let fault = put_frame((shelf, shared), local, (message, receipt, refused), &book);
         odd = fault.or(odd.take());
     };
     let mut released = false;
     while let Some((message, receipt)) = early.next(receipt.now_ns, names_rev) {
-        put(&message, receipt);
+        put(&message, receipt, None);
         released = true;
     }
     let (came, more) = drain(from, shared, |message: BodyTransforms, _| {
         let place = local.place(&message.source);
         let timeout_ns = place.map(|place| shared.timeout_ns(place));
-        let (message, gone) = early.take(message, receipt, names_rev, timeout_ns);
-        shared.note_refused(gone);
-        message.iter().for_each(|message| put(message, receipt));
+        early.take(message, receipt, names_rev, timeout_ns, &mut put);
     });
     (came || released, more, odd)
 }
@@ -312,15 +311,15 @@ fn take_frames(
 fn put_frame(
     (shelf, shared): (&Shelf, &Shared),
     local: &Local,
-    (message, receipt): (&BodyTransforms, Receipt),
+    (message, receipt, refused): (&BodyTransforms, Receipt, Option<RejectReason>),
     book: &Book,
 ) -> Option<String> {
     let mut frame = shelf.spare();
     fill(&mut frame, message, book, receipt);
     let fault = local.fault(message);
-    if let Some((reason, _)) = &fault {
+    if let Some(reason) = fault.as_ref().map(|(reason, _)| *reason).or(refused) {
         shared.note_refused(1);
-        frame.refused = Some(*reason);
+        frame.refused = Some(reason);
     }
     shelf.put(frame);
     fault.map_or_else(|| local.odd(message, receipt, book), |(_, text)| Some(text))

@@ -6,7 +6,8 @@
 use std::collections::VecDeque;
 
 use super::super::poses::Receipt;
-use crate::limits::FRAMES_PER_DRAIN_MAX;
+use crate::limits::{FRAME_ROWS_MAX, FRAMES_PER_DRAIN_MAX};
+use crate::wire::RejectReason;
 use crate::wire::ros::BodyTransforms;
 
 /// A message that waits, since when, and until when at most.
@@ -29,32 +30,35 @@ impl Early {
         self.waiting.is_empty()
     }
 
-    /// Takes a message that must wait, or that comes behind one of its session that does; gives back any other.
+    /// Takes a message: one that must wait, or that comes behind one of its session that does, is kept; any other goes
+    /// to `put` at once, as do those that are refused because too many of their source wait, the oldest first.
     ///
     /// * `names_rev` - scene revision of the names that are known here.
     /// * `timeout_ns` - of its source; `None`: the scene has no such source, and the frame is refused for that.
-    /// * returns - a message that need not wait, and how many were passed over because too many of its source wait.
+    /// * `put` - takes messages, and why they are refused where they are.
     pub(super) fn take(
         &mut self,
         message: BodyTransforms,
         receipt: Receipt,
         names_rev: u64,
         timeout_ns: Option<u64>,
-    ) -> (Option<BodyTransforms>, u64) {
-        let Some(timeout_ns) = timeout_ns else {
-            return (Some(message), 0);
-        };
+        put: &mut impl FnMut(&BodyTransforms, Receipt, Option<RejectReason>),
+    ) {
         // Only a session has an order (law 4.2): a stranger under the name of a source must not hold it up.
         let is_behind =
             (self.waiting.iter()).any(|other| session(&other.message) == session(&message));
-        if !is_behind && !is_early(&message, names_rev) {
-            return (Some(message), 0);
+        let waits = is_behind || is_early(&message, names_rev);
+        let Some(timeout_ns) = timeout_ns.filter(|_| waits && rows(&message) <= FRAME_ROWS_MAX)
+        else {
+            return put(&message, receipt, None);
+        };
+        while let Some(oldest) = self.crowded_out_by(&message) {
+            put(
+                &oldest.message,
+                oldest.receipt,
+                Some(RejectReason::SceneRevision),
+            );
         }
-        let of_source = |other: &Waiting| other.message.source == message.source;
-        let ahead = self.waiting.iter().filter(|other| of_source(other)).count();
-        let oldest = self.waiting.iter().position(of_source);
-        let gone = oldest.filter(|_| ahead >= FRAMES_PER_DRAIN_MAX);
-        let gone = gone.and_then(|at| self.waiting.remove(at));
         self.waiting.push_back(Waiting {
             message,
             receipt,
@@ -62,7 +66,18 @@ impl Early {
             // revision.
             until_ns: receipt.now_ns.saturating_add(timeout_ns),
         });
-        (None, u64::from(gone.is_some()))
+    }
+
+    /// The oldest of a source, where this one of it would be one frame or one row too many.
+    fn crowded_out_by(&mut self, message: &BodyTransforms) -> Option<Waiting> {
+        let of_source = |other: &&Waiting| other.message.source == message.source;
+        let ahead = self.waiting.iter().filter(of_source);
+        let (frames, ahead_rows) = ahead.fold((0, 0), |(frames, all), other| {
+            (frames + 1, all + rows(&other.message))
+        });
+        let fits = frames < FRAMES_PER_DRAIN_MAX && ahead_rows + rows(message) <= FRAME_ROWS_MAX;
+        let oldest = self.waiting.iter().position(|other| of_source(&other));
+        self.waiting.remove(oldest.filter(|_| !fits)?)
     }
 
     /// A message whose time has come: its names are there, or it has waited for its time-out.
@@ -83,6 +98,11 @@ impl Early {
     }
 }
 
+/// Rows of a message, of which each takes memory.
+fn rows(message: &BodyTransforms) -> usize {
+    message.transforms.len().max(message.velocities.len())
+}
+
 /// Whose a frame is: what has an order of its own.
 fn session(message: &BodyTransforms) -> (&str, u64) {
     (&message.source, message.session)
@@ -98,7 +118,7 @@ fn is_early(message: &BodyTransforms, names_rev: u64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wire::ros::BodyTransform;
+    use crate::wire::ros::{BodyTransform, Twist};
 
     fn frame(source: &str, seq: u64, scene_rev: u64) -> BodyTransforms {
         let body = BodyTransform {
@@ -123,6 +143,19 @@ mod tests {
         }
     }
 
+    /// Takes one at a time of which the names are known up to revision 4; what comes out at once, with its refusal.
+    fn take(
+        early: &mut Early,
+        message: BodyTransforms,
+        now_ns: u64,
+        timeout_ns: Option<u64>,
+    ) -> Vec<(u64, Option<RejectReason>)> {
+        let mut out = Vec::new();
+        let mut put = |message: &BodyTransforms, _, refused| out.push((message.seq, refused));
+        early.take(message, at(now_ns), 4, timeout_ns, &mut put);
+        out
+    }
+
     /// What comes out now, as sources and numbers.
     fn out(early: &mut Early, now_ns: u64, names_rev: u64) -> Vec<(String, u64)> {
         std::iter::from_fn(|| early.next(now_ns, names_rev))
@@ -133,17 +166,14 @@ mod tests {
     #[test]
     fn bug_a_frame_waits_for_the_names_of_its_revision_and_those_behind_it_wait_too() {
         let mut early = Early::default();
-        let mut take = |message| early.take(message, at(10), 4, Some(100)).0;
-        assert!(take(frame("sim", 1, 4)).is_some(), "its names are there");
-        assert!(take(frame("sim", 2, 5)).is_none());
-        assert!(
-            take(frame("sim", 3, 0)).is_none(),
-            "it is behind one that waits"
-        );
-        assert!(take(frame("arm", 1, 0)).is_some(), "another source's");
+        let mut take = |message| take(&mut early, message, 10, Some(100));
+        assert_eq!(take(frame("sim", 1, 4)), [(1, None)], "its names are there");
+        assert_eq!(take(frame("sim", 2, 5)), []);
+        assert_eq!(take(frame("sim", 3, 0)), [], "it is behind one that waits");
+        assert_eq!(take(frame("arm", 1, 0)), [(1, None)], "another source's");
         let mut by_id = frame("arm", 2, 5);
         by_id.transforms[0].name.clear();
-        assert!(take(by_id).is_some(), "its ids wait in the world");
+        assert_eq!(take(by_id), [(2, None)], "its ids wait in the world");
         assert_eq!(out(&mut early, 20, 4), []);
         let both = [("sim".to_owned(), 2), ("sim".to_owned(), 3)];
         assert_eq!(out(&mut early, 20, 5), both);
@@ -161,11 +191,11 @@ mod tests {
             session: 1,
             ..frame("sim", seq, scene_rev)
         };
-        let mut take = |message| early.take(message, at(10), 4, Some(100)).0;
-        assert!(take(stranger).is_none());
-        assert!(take(own(2, 0)).is_some(), "the live session goes on");
-        assert!(take(own(3, 5)).is_none());
-        assert!(take(own(4, 0)).is_none(), "behind its own");
+        let mut take = |message| take(&mut early, message, 10, Some(100));
+        assert_eq!(take(stranger), []);
+        assert_eq!(take(own(2, 0)), [(2, None)], "the live session goes on");
+        assert_eq!(take(own(3, 5)), []);
+        assert_eq!(take(own(4, 0)), [], "behind its own");
         let both = [("sim".to_owned(), 3), ("sim".to_owned(), 4)];
         assert_eq!(
             out(&mut early, 20, 5),
@@ -175,20 +205,52 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_waits_for_one_time_out_and_a_flood_keeps_its_newest() {
+    fn a_frame_waits_for_one_time_out() {
         let mut early = Early::default();
-        early.take(frame("sim", 1, 9), at(10), 4, Some(100));
-        early.take(frame("sim", 2, 9), at(60), 4, Some(100));
+        take(&mut early, frame("sim", 1, 9), 10, Some(100));
+        take(&mut early, frame("sim", 2, 9), 60, Some(100));
         assert_eq!(out(&mut early, 109, 4), []);
         assert_eq!(out(&mut early, 110, 4), [("sim".to_owned(), 1)]);
         assert_eq!(out(&mut early, 160, 4), [("sim".to_owned(), 2)]);
-        let gone = (0..100).map(|seq| early.take(frame("sim", seq, 9), at(10), 4, Some(100)).1);
-        assert_eq!(gone.sum::<u64>(), 100 - FRAMES_PER_DRAIN_MAX as u64);
+        let unknown = take(&mut early, frame("nobody", 1, 9), 10, None);
+        assert_eq!(unknown, [(1, None)], "refused for its source");
+    }
+
+    #[test]
+    fn bug_of_frames_that_wait_too_many_the_oldest_are_refused_for_their_revision() {
+        let mut early = Early::default();
+        let mut refused = Vec::new();
+        for seq in 0..100 {
+            refused.extend(take(&mut early, frame("sim", seq, 9), 10, Some(100)));
+        }
+        let wanted = 0..100 - FRAMES_PER_DRAIN_MAX as u64;
+        let wanted: Vec<_> = wanted
+            .map(|seq| (seq, Some(RejectReason::SceneRevision)))
+            .collect();
+        assert_eq!(refused, wanted);
+        let kept = out(&mut early, 999, 4);
+        assert_eq!(kept.len(), FRAMES_PER_DRAIN_MAX);
+        assert_eq!(kept.last(), Some(&("sim".to_owned(), 99)));
+    }
+
+    #[test]
+    fn bug_what_waits_of_a_source_has_no_more_rows_than_one_frame_may_have() {
+        let mut early = Early::default();
+        let of_rows = |seq, rows| BodyTransforms {
+            velocities: vec![Twist::default(); rows],
+            ..frame("sim", seq, 9)
+        };
+        let over = take(&mut early, of_rows(1, FRAME_ROWS_MAX + 1), 10, Some(100));
+        assert_eq!(over, [(1, None)], "refused for its size");
         assert_eq!(
-            out(&mut early, 999, 4).last(),
-            Some(&("sim".to_owned(), 99))
+            take(&mut early, of_rows(2, FRAME_ROWS_MAX / 2), 10, Some(100)),
+            []
         );
-        let unknown = early.take(frame("nobody", 1, 9), at(10), 4, None);
-        assert!(unknown.0.is_some(), "refused for its source");
+        assert_eq!(
+            take(&mut early, of_rows(3, FRAME_ROWS_MAX / 2), 10, Some(100)),
+            []
+        );
+        let refused = take(&mut early, of_rows(4, 2), 10, Some(100));
+        assert_eq!(refused, [(2, Some(RejectReason::SceneRevision))]);
     }
 }
