@@ -14,6 +14,7 @@ use crate::limits::QUATERNION_NORM_TOLERANCE;
 use crate::math::{Pose, pose_from};
 use crate::wire::RejectReason;
 use crate::wire::ros::TransformStamped;
+use room::FRAME_NAME_BYTES_MAX;
 
 /// Links of one chain; a longer one is as good as a loop.
 const CHAIN_MAX: usize = 256;
@@ -43,7 +44,7 @@ pub(super) enum Taken {
     Older(u64),
     /// It is so much older than the one that is there that time has gone back.
     WentBack,
-    /// A frame without a name, or hung on itself.
+    /// A frame without a name, with one that is too long, or hung on itself.
     Refused,
     /// A frame too many.
     Full,
@@ -181,7 +182,8 @@ impl Tree {
         back_ns: u64,
     ) -> Taken {
         let (child, parent) = (plain(&link.child_frame_id), plain(&link.header.frame_id));
-        if child.is_empty() || parent.is_empty() || child == parent {
+        let is_named = |frame: &str| (1..=FRAME_NAME_BYTES_MAX).contains(&frame.len());
+        if !is_named(child) || !is_named(parent) || child == parent {
             return Taken::Refused;
         }
         if !self.has_room(child, parent) {

@@ -7,6 +7,9 @@ use super::Tree;
 /// Frames of one tree beside those of bodies: a robot has some hundred; beyond it somebody invents names, and memory
 /// would grow.
 pub(super) const FRAMES_MAX: usize = 1 << 16;
+/// Longest name of a frame, bytes: as long as a body's `ros_frame` may be. Frames are bounded by how many there are,
+/// and names without an end would take all memory.
+pub(super) const FRAME_NAME_BYTES_MAX: usize = 255;
 /// Links refused between two looks for room, which visit every frame: who floods a full tree costs no more.
 const DENIED: usize = FRAMES_MAX / 8;
 

@@ -171,3 +171,21 @@ fn a_frame_that_no_body_has_any_more_makes_room() {
     tree.take(&link("world", "a", 0.0, 1), false, 1, BACK_NS);
     assert!(find(&mut tree, "a").is_ok());
 }
+
+#[test]
+fn bug_a_frame_whose_name_is_too_long_is_refused_and_not_kept() {
+    let mut tree = Tree::default();
+    let (longest, over) = ("x".repeat(FRAME_NAME_BYTES_MAX), "x".repeat(300));
+    for (parent, child) in [("camera", over.as_str()), (over.as_str(), "camera")] {
+        let taken = tree.take(&link(parent, child, 1.0, 100), false, 7, BACK_NS);
+        assert_eq!((taken, tree.ids.len()), (Taken::Refused, 0));
+    }
+    // A slash in front belongs to no name.
+    let taken = tree.take(
+        &link("camera", &format!("/{longest}"), 1.0, 100),
+        false,
+        7,
+        BACK_NS,
+    );
+    assert_eq!((taken, tree.ids.len()), (Taken::Newer, 2));
+}
