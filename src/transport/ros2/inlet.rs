@@ -321,7 +321,7 @@ fn put_frame(
         shared.note_refused(1);
         frame.refused = Some(reason);
     }
-    shelf.put(frame);
+    shelf.put(local.place(&message.source), frame);
     fault.map_or_else(|| local.odd(message, receipt, book), |(_, text)| Some(text))
 }
 

@@ -163,8 +163,17 @@ impl Services {
         }
         let mut ticks = Vec::new();
         receive(&self.tick, shared, |id, _| ticks.push(id));
-        for id in ticks.into_iter().take(OPEN_MAX) {
+        for id in ticks {
             came = true;
+            if self.ticks.len() >= OPEN_MAX {
+                let refusal = Ticked {
+                    message: crowded(),
+                    ..Ticked::default()
+                };
+                let sent = self.tick.send_response(id, refusal);
+                shared.note_unsent(u64::from(sent.is_err()));
+                continue;
+            }
             let token = self.token();
             self.ticks.insert(token, id);
             open(&desk.ticks).push(token);
@@ -194,9 +203,7 @@ impl Services {
             _ if verb != Verb::Gap && !self.allowed => {
                 "edits are refused: start the node with -p ros.allow_edits:=true".to_owned()
             }
-            _ if self.pending.len() >= OPEN_MAX => {
-                format!("{OPEN_MAX} requests wait for their answers: ask again later")
-            }
+            _ if self.pending.len() >= OPEN_MAX => crowded(),
             Err(why) => why,
             Ok(what) => {
                 let request = if verb == Verb::Gap {
@@ -268,6 +275,11 @@ impl Services {
         };
         shared.note_unsent(u64::from(sent.is_err()));
     }
+}
+
+/// Why a request is refused that would be one too many.
+fn crowded() -> String {
+    format!("{OPEN_MAX} requests wait for their answers: ask again later")
 }
 
 fn edited(answer: Answer) -> Edited {

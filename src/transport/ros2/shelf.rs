@@ -52,7 +52,8 @@ struct Group {
 
 #[derive(Debug, Default)]
 struct Waiting {
-    frames: VecDeque<Frame>,
+    /// With the place of their source in the scene, `None` for all that are of none.
+    frames: VecDeque<(Option<usize>, Frame)>,
     spare: Vec<Frame>,
     groups: Vec<Group>,
 }
@@ -103,17 +104,20 @@ impl Shelf {
     }
 
     /// Puts a whole frame behind the others; the oldest of its source goes when there are too many.
-    pub(super) fn put(&self, frame: Frame) {
+    ///
+    /// * `source` - place of its source in the scene; those of sources that it lacks, whose names anybody may make up,
+    ///   count as one.
+    pub(super) fn put(&self, source: Option<usize>, frame: Frame) {
         let mut waiting = open(&self.waiting);
-        let of_source = |old: &Frame| old.header.source == frame.header.source;
+        let of_source = |(other, _): &(Option<usize>, Frame)| *other == source;
         if waiting.frames.iter().filter(|old| of_source(old)).count() >= FRAMES_PER_DRAIN_MAX
             && let Some(at) = waiting.frames.iter().position(of_source)
-            && let Some(oldest) = waiting.frames.remove(at)
+            && let Some((_, oldest)) = waiting.frames.remove(at)
         {
             waiting.spare.push(oldest);
             self.passed_over.fetch_add(1, Ordering::Relaxed);
         }
-        waiting.frames.push_back(frame);
+        waiting.frames.push_back((source, frame));
     }
 
     /// Puts poses of a group's bodies; the newer one of a body stands for the older.
@@ -158,7 +162,7 @@ impl Shelf {
             spare,
             groups,
         } = &mut *waiting;
-        for mut frame in frames.drain(..) {
+        for (_, mut frame) in frames.drain(..) {
             std::mem::swap(inbox.push(), &mut frame);
             spare.push(frame);
         }
@@ -296,13 +300,27 @@ mod tests {
             frame.header.seq = seq;
             frame
         };
-        shelf.put(frame("quiet", 1));
-        (0..1000).for_each(|seq| shelf.put(frame("flood", seq)));
+        shelf.put(Some(0), frame("quiet", 1));
+        (0..1000).for_each(|seq| shelf.put(Some(1), frame("flood", seq)));
         let mut inbox = Inbox::default();
         shelf.drain(&mut inbox);
         assert_eq!(inbox.frames().len(), 1 + FRAMES_PER_DRAIN_MAX);
         assert_eq!(inbox.frames()[FRAMES_PER_DRAIN_MAX].header.seq, 999);
         assert_eq!(inbox.frames()[0].header.source, name_bytes("quiet"));
+        assert_eq!(shelf.take_passed_over(), 1000 - FRAMES_PER_DRAIN_MAX as u64);
+    }
+
+    #[test]
+    fn bug_frames_of_sources_that_the_scene_lacks_share_the_room_of_one() {
+        let shelf = Shelf::default();
+        for number in 0..1000 {
+            let mut frame = shelf.spare();
+            frame.header.source = name_bytes(&format!("source_{number}"));
+            shelf.put(None, frame);
+        }
+        let mut inbox = Inbox::default();
+        shelf.drain(&mut inbox);
+        assert_eq!(inbox.frames().len(), FRAMES_PER_DRAIN_MAX);
         assert_eq!(shelf.take_passed_over(), 1000 - FRAMES_PER_DRAIN_MAX as u64);
     }
 
