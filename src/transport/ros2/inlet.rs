@@ -73,7 +73,7 @@ impl Inlet {
     /// * returns - the thread's things, and what wakes it.
     ///
     /// # Errors
-    /// `Error::Io` when there is no descriptor left.
+    /// `Error::Io` when there is no descriptor or thread left.
     pub(super) fn new(
         (mut lines, mut services, mut answers): (Vec<Line>, Services, Answers),
         sources: Vec<Source>,
@@ -81,16 +81,17 @@ impl Inlet {
         shared: Arc<Shared>,
         wake: Box<dyn Fn() + Send>,
         (local, heartbeat_ns): (Local, u64),
-    ) -> Result<(Self, Waker)> {
+    ) -> Result<(Self, Arc<Waker>)> {
         let failed = |e| Error::io("ROS 2: cannot wait on subscriptions", e);
         let poll = Poll::new().map_err(failed)?;
-        let waker = Waker::new(poll.registry(), WAKE).map_err(failed)?;
+        let waker = Arc::new(Waker::new(poll.registry(), WAKE).map_err(failed)?);
         for (at, line) in lines.iter_mut().enumerate() {
             line.register(poll.registry(), Token(at)).map_err(failed)?;
         }
         let behind = Token(lines.len());
         services.register(poll.registry(), behind).map_err(failed)?;
         answers.register(poll.registry(), behind).map_err(failed)?;
+        services.start(&shared, Arc::clone(&waker))?;
         let inlet = Self {
             lines,
             services,

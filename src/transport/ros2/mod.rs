@@ -2,7 +2,8 @@
 //! the tick thread, and its ticks as topics.
 //!
 //! Threads, none of which the tick thread waits for: `ros-rx` (`inlet`: subscriptions, decoding, chains of frames,
-//! services, parameters), `ros-tx` (`outlet`: messages, publishing), and those of DDS itself.
+//! services, parameters), `ros-words` (`services/scribe`: requests as JSON), `ros-tx` (`outlet`: messages, publishing),
+//! and those of DDS itself.
 //!
 //! Between them and the tick stand a shelf of frames (`shelf`) and a queue of two parcels (`parcel`):
 //! the newest wins, and what gave way is counted. The tick thread never calls into DDS, which may block.

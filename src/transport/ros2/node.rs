@@ -63,7 +63,7 @@ pub struct RosNode {
     shelf: Arc<Shelf>,
     shared: Arc<Shared>,
     parcels: Arc<Parcels>,
-    waker: Waker,
+    waker: Arc<Waker>,
     context: Option<Context>,
     receiving: Option<JoinHandle<()>>,
     sending: Option<JoinHandle<()>>,

@@ -2,22 +2,25 @@
 //! bodies; a tick at once.
 //!
 //! In: requests of anybody in the domain, on the receiving thread. Out: the JSON of a request, as shared memory carries
-//! it, so that both have one reader; responses.
+//! it, so that both have one reader, made on a thread of its own; responses.
 
 mod edits;
 mod gap;
+mod scribe;
 
 use std::collections::BTreeMap;
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 
 use ros2_client::qos::{History, QosProfile, WhenFull};
 use ros2_client::{Message, Name, Node, RmwRequestId, Server, ServiceMapping, ServiceTypeName};
 use rustdds::mio1::event::Source as _;
-use rustdds::mio1::{Interest, Registry, Token};
-use serde_json::{Value, json};
+use rustdds::mio1::{Interest, Registry, Token, Waker};
+use serde_json::json;
 
-use edits::{attach, filter, put, short};
+use edits::{attach, filter, put};
 use gap::told;
+use scribe::{Scribe, Words};
 
 use super::names::Names;
 use super::open;
@@ -62,6 +65,8 @@ enum Verb {
 pub(super) struct Desk {
     /// Requests that the tick thread has not taken: token, JSON.
     pub(super) asked: Mutex<Vec<(u64, Vec<u8>)>>,
+    /// Whether some of them are new, and the tick thread is to be woken.
+    is_written: AtomicBool,
     /// Ticks at once that it has not taken: tokens.
     pub(super) ticks: Mutex<Vec<u64>>,
     /// Answers that the receiving thread has not taken.
@@ -86,6 +91,7 @@ pub(super) struct Services {
     late: Vec<(u64, Answer)>,
     next: u64,
     allowed: bool,
+    scribe: Option<Scribe>,
 }
 
 impl Services {
@@ -111,7 +117,19 @@ impl Services {
             late: Vec::new(),
             next: 1,
             allowed,
+            scribe: None,
         })
+    }
+
+    /// Starts the thread that puts requests in words.
+    ///
+    /// * `waker` - of the receiving thread.
+    ///
+    /// # Errors
+    /// `Error::Io` when the system has no thread left.
+    pub(super) fn start(&mut self, shared: &Arc<Shared>, waker: Arc<Waker>) -> Result<()> {
+        self.scribe = Some(Scribe::start(Arc::clone(shared), waker)?);
+        Ok(())
     }
 
     /// Registers them behind the subscriptions.
@@ -129,38 +147,39 @@ impl Services {
     /// Takes requests and sends responses; whether the tick thread has something to do.
     pub(super) fn round(&mut self, desk: &Desk, shared: &Shared) -> bool {
         self.respond(desk, shared);
-        let mut asked = Vec::new();
+        let mut asked: Vec<(Verb, RmwRequestId, Words)> = Vec::new();
         receive(&self.put, shared, |id, r| {
-            asked.push((Verb::Put, id, put(&r)))
+            asked.push((Verb::Put, id, Box::new(move || put(&r))));
         });
         receive(&self.remove, shared, |id, r| {
-            asked.push((Verb::Remove, id, Ok(json!({ "remove": r.name }))));
+            let edit = move || Ok(json!({ "remove": r.name }));
+            asked.push((Verb::Remove, id, Box::new(edit)));
         });
         receive(&self.enable, shared, |id, r| {
-            let edit = json!({ "enable": { "body": r.name, "enabled": r.enabled } });
-            asked.push((Verb::Enable, id, Ok(edit)));
+            let edit = move || Ok(json!({ "enable": { "body": r.name, "enabled": r.enabled } }));
+            asked.push((Verb::Enable, id, Box::new(edit)));
         });
         receive(&self.attach, shared, |id, r| {
-            asked.push((Verb::Attach, id, Ok(attach(&r))))
+            asked.push((Verb::Attach, id, Box::new(move || Ok(attach(&r)))));
         });
         receive(&self.filter, shared, |id, r| {
-            asked.push((Verb::Filter, id, filter(&r)))
+            asked.push((Verb::Filter, id, Box::new(move || filter(&r))));
         });
         receive(&self.reset, shared, |id, r| {
-            let edit = match r.source.as_str() {
-                "" => json!({ "reset": {} }),
-                source => json!({ "reset": { "source": source } }),
+            let edit = move || match r.source.as_str() {
+                "" => Ok(json!({ "reset": {} })),
+                source => Ok(json!({ "reset": { "source": source } })),
             };
-            asked.push((Verb::Reset, id, Ok(edit)));
+            asked.push((Verb::Reset, id, Box::new(edit)));
         });
         receive(&self.gap, shared, |id, r| {
-            let names = json!({ "gap": { "a": r.name_a, "b": r.name_b } });
-            asked.push((Verb::Gap, id, Ok(names)));
+            let names = move || Ok(json!({ "gap": { "a": r.name_a, "b": r.name_b } }));
+            asked.push((Verb::Gap, id, Box::new(names)));
         });
-        let mut came = !asked.is_empty();
-        for (verb, id, what) in asked {
-            self.ask(verb, id, what, desk, shared);
+        for (verb, id, words) in asked {
+            self.ask(verb, id, words, shared);
         }
+        let mut came = desk.is_written.swap(false, Ordering::Acquire);
         let mut ticks = Vec::new();
         receive(&self.tick, shared, |id, _| ticks.push(id));
         for id in ticks {
@@ -191,32 +210,18 @@ impl Services {
         self.next
     }
 
-    fn ask(
-        &mut self,
-        verb: Verb,
-        id: RmwRequestId,
-        what: std::result::Result<Value, String>,
-        desk: &Desk,
-        shared: &Shared,
-    ) {
-        let refusal = match what {
-            _ if verb != Verb::Gap && !self.allowed => {
-                "edits are refused: start the node with -p ros.allow_edits:=true".to_owned()
-            }
-            _ if self.pending.len() >= OPEN_MAX => crowded(),
-            Err(why) => why,
-            Ok(what) => {
-                let request = if verb == Verb::Gap {
-                    what
-                } else {
-                    shared.say(Say::Info, &in_words(&what));
-                    json!({ "edits": [what] })
-                };
-                let token = self.token();
-                self.pending.insert(token, (verb, id));
-                open(&desk.asked).push((token, request.to_string().into_bytes()));
-                return;
-            }
+    /// Has a request put in words, or refuses it before any work is done for it.
+    fn ask(&mut self, verb: Verb, id: RmwRequestId, words: Words, shared: &Shared) {
+        let token = self.token();
+        let refusal = if verb != Verb::Gap && !self.allowed {
+            "edits are refused: start the node with -p ros.allow_edits:=true".to_owned()
+        } else if self.pending.len() >= OPEN_MAX {
+            crowded()
+        } else if !(self.scribe.as_ref()).is_some_and(|scribe| scribe.take((token, verb, words))) {
+            "the node closes".to_owned()
+        } else {
+            self.pending.insert(token, (verb, id));
+            return;
         };
         let answer = Answer {
             error: Some(refusal),
@@ -289,15 +294,6 @@ fn edited(answer: Answer) -> Edited {
         warnings: answer.warnings,
         scene_rev: answer.scene_rev,
     }
-}
-
-/// An edit for the log: its verb, and the body it names.
-fn in_words(edit: &Value) -> String {
-    let entry = edit.as_object().and_then(|edit| edit.iter().next());
-    let verb = entry.map_or("", |(verb, _)| verb.as_str());
-    let body = entry.and_then(|(_, what)| what.get("name"));
-    let body = body.map_or_else(|| short(edit), ToString::to_string);
-    format!("edit over ROS 2: {verb} {body}")
 }
 
 /// Creates a server.
