@@ -192,7 +192,7 @@ impl Inlet {
             Line::Clock(from) => {
                 let mut back = false;
                 let taken = drain(from, shared, |message, _| {
-                    back |= shared.tick_clock(message.clock)
+                    back |= shared.tick_clock(message.clock, receipt.now_ns)
                 });
                 if back {
                     for (place, source) in sources.iter_mut().enumerate() {
@@ -223,19 +223,21 @@ impl Inlet {
                         && source.take_links(&message, *fixed, receipt)
                     {
                         shelf.reset(place);
-                        shared.say_back(&source_name(source));
+                        shared.say_back(&source_name(source), receipt.now_ns);
                     }
                 }
             }),
             Line::Pose(from, feeder) => drain(from, shared, |message, info| {
                 feeder.hear(info, receipt.now_ns);
-                take_one(sources, shelf, shared, feeder, |source, updates| {
+                let from = (&*feeder, receipt.now_ns);
+                take_one(sources, shelf, shared, from, |source, updates| {
                     source.take_pose(feeder.member, &message, receipt, updates)
                 });
             }),
             Line::Odometry(from, feeder) => drain(from, shared, |message, info| {
                 feeder.hear(info, receipt.now_ns);
-                take_one(sources, shelf, shared, feeder, |source, updates| {
+                let from = (&*feeder, receipt.now_ns);
+                take_one(sources, shelf, shared, from, |source, updates| {
                     source.take_odometry(feeder.member, &message, receipt, updates)
                 });
             }),
@@ -273,7 +275,7 @@ impl Inlet {
             all.extend(source.faults(FAULTS_MAX, now_ns));
         }
         all.truncate(FAULTS_MAX);
-        self.shared.set_faults(all);
+        self.shared.set_faults(all, now_ns);
     }
 }
 
@@ -331,7 +333,7 @@ fn take_one(
     sources: &mut [Source],
     shelf: &Shelf,
     shared: &Shared,
-    feeder: &Feeder,
+    (feeder, now_ns): (&Feeder, u64),
     take: impl FnOnce(&mut Source, &mut Vec<Update>) -> bool,
 ) {
     let Some(source) = sources.get_mut(feeder.source) else {
@@ -340,7 +342,7 @@ fn take_one(
     let mut updates = Vec::new();
     if take(source, &mut updates) {
         shelf.reset(feeder.source);
-        shared.say_back(&source_name(source));
+        shared.say_back(&source_name(source), now_ns);
     }
     shelf.merge(feeder.source, &updates);
 }

@@ -35,6 +35,7 @@ mod sockets;
 mod stamp;
 mod strangers;
 mod tf;
+mod told;
 mod topics;
 mod wheel;
 

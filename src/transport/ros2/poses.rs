@@ -15,6 +15,7 @@ use ros2_client::Gid;
 use super::RosScene;
 use super::shelf::Update;
 use super::tf::{Missing, Taken, Tree, plain, sound};
+use super::told::brief;
 use crate::config::RosKind;
 use crate::math::{Quat, Vec3, pose_from};
 use crate::wire::ros::{Odometry, PoseStamped, TfMessage};
@@ -334,7 +335,8 @@ impl Source {
         if plain(frame) != plain(&self.root.0) {
             result = Err(RejectReason::BadChain);
             member.fault = Some(format!(
-                "its pose is in frame \"{frame}\", not in the scene's \"{}\": send it there, or use a source of type tf",
+                "its pose is in frame \"{}\", not in the scene's \"{}\": send it there, or use a source of type tf",
+                brief(frame),
                 self.root.0
             ));
         }

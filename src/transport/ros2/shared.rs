@@ -12,6 +12,7 @@ use super::open;
 use super::params::{Effect, Own};
 use super::parcel::Caps;
 use super::services::Desk;
+use super::told::Told;
 use crate::time::SystemClock;
 use crate::transport::{BodyChange, Setting};
 use crate::wire::Demand;
@@ -75,6 +76,7 @@ pub(super) struct Shared {
     book: Mutex<Arc<Book>>,
     names_rev: AtomicU64,
     faults: Mutex<Vec<String>>,
+    told: Mutex<Told>,
     rosout: Mutex<Option<Arc<Option<Publisher<Log>>>>>,
     node: String,
     /// Least level that goes to `/rosout`.
@@ -119,6 +121,7 @@ impl Shared {
             book: Mutex::new(Arc::new(book)),
             names_rev: AtomicU64::new(0),
             faults: Mutex::new(Vec::new()),
+            told: Mutex::default(),
             rosout: Mutex::new(None),
             node: node.to_owned(),
             least,
@@ -204,13 +207,15 @@ impl Shared {
     }
 
     /// The clock says a time; whether it went back, where time is that of `/clock`.
-    pub(super) fn tick_clock(&self, clock: Time) -> bool {
+    ///
+    /// * `boot_ns` - now, nanoseconds of `CLOCK_BOOTTIME`.
+    pub(super) fn tick_clock(&self, clock: Time, boot_ns: u64) -> bool {
         let now_ns = clock.to_ns();
         let before_ns = self.sim_now_ns.swap(now_ns, Ordering::Relaxed);
         let back = self.sim_time() && now_ns < before_ns;
         if back {
             let text = "/clock went back: every pair ends, and bodies are not received until their next poses";
-            self.say(Say::Warn, text);
+            self.say_seldom(text, boot_ns);
         }
         back
     }
@@ -315,14 +320,15 @@ impl Shared {
     }
 
     /// Takes what is wrong now and says what is new of it.
-    pub(super) fn set_faults(&self, faults: Vec<String>) {
-        let new: Vec<String> = {
-            let mut old = open(&self.faults);
-            let new = faults.iter().filter(|fault| !old.contains(fault));
-            let new = new.cloned().collect();
-            *old = faults;
-            new
-        };
+    ///
+    /// * `now_ns` - nanoseconds of `CLOCK_BOOTTIME`.
+    pub(super) fn set_faults(&self, faults: Vec<String>, now_ns: u64) {
+        let mut new = faults.clone();
+        {
+            let mut told = open(&self.told);
+            new.retain(|fault| told.is_new(fault, now_ns));
+        }
+        *open(&self.faults) = faults;
         for fault in &new {
             self.say(Say::Warn, fault);
         }
@@ -334,9 +340,19 @@ impl Shared {
     }
 
     /// Says that a source's time went back.
-    pub(super) fn say_back(&self, source: &str) {
+    ///
+    /// * `now_ns` - nanoseconds of `CLOCK_BOOTTIME`.
+    pub(super) fn say_back(&self, source: &str, now_ns: u64) {
         let text = format!("the stamps of source {source} went back: its bodies begin anew");
-        self.say(Say::Warn, &text);
+        self.say_seldom(&text, now_ns);
+    }
+
+    /// Warns of what may happen with each message, once a second.
+    fn say_seldom(&self, text: &str, now_ns: u64) {
+        let due = open(&self.told).is_due(text, now_ns);
+        if due {
+            self.say(Say::Warn, text);
+        }
     }
 
     /// Says it on stderr and on `/rosout`.

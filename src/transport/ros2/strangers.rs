@@ -10,6 +10,7 @@ use rustdds::RTPSEntity as _;
 
 use super::RosScene;
 use super::names::Names;
+use super::told::brief;
 use super::topics::TypeName;
 use crate::config::RosKind;
 
@@ -137,7 +138,7 @@ impl Strangers {
             format!(
                 "topic {}: {count} endpoints of other nodes have type {} there, and this node {}: they do not hear each other; remap one or send the right type",
                 topic.trim_start_matches("rt"),
-                as_ros(kind),
+                brief(&as_ros(kind)),
                 as_ros(own(topic)),
             )
         };

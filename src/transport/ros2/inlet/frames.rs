@@ -3,6 +3,7 @@
 use super::super::RosScene;
 use super::super::poses::{Receipt, off};
 use super::super::tf::{plain, sound};
+use super::super::told::brief;
 use crate::limits::FRAME_ROWS_MAX;
 use crate::wire::ros::{BodyTransform, BodyTransforms, Book, Twist};
 use crate::wire::{Frame, FrameHeader, RejectReason, TransformRow, WIRE_VERSION, name_bytes};
@@ -12,8 +13,9 @@ fn foreign(message: &BodyTransforms, frame_id: &str) -> Option<String> {
     let given = plain(&message.header.frame_id);
     (!given.is_empty() && given != plain(frame_id)).then(|| {
         format!(
-            "frames of source {} are in \"{given}\", not in the scene's frame \"{frame_id}\": they are refused",
-            message.source
+            "frames of source {} are in \"{}\", not in the scene's frame \"{frame_id}\": they are refused",
+            brief(&message.source),
+            brief(given)
         )
     })
 }
@@ -57,7 +59,9 @@ impl Local {
         }
         let text = format!(
             "frames of source {} say bodies by id with boot_id {}, and this run of the daemon is {}: they are refused; send names, or ids with the boot_id of the ~/names they are from",
-            message.source, message.boot_id, self.boot_id
+            brief(&message.source),
+            message.boot_id,
+            self.boot_id
         );
         Some((RejectReason::SessionOver, text))
     }
@@ -70,13 +74,13 @@ impl Local {
         receipt: Receipt,
         book: &Book,
     ) -> Option<String> {
-        let source = message.source.as_str();
-        let place = self.place(source);
+        let place = self.place(&message.source);
+        let source = brief(&message.source);
         let odd_body = message.transforms.iter().find_map(|body| {
             let id = id(body, book);
             let name = match body.name.as_str() {
                 "" => body.body.to_string(),
-                name => name.to_owned(),
+                name => brief(name).into_owned(),
             };
             let (position, orientation) = (body.pose.position.into(), body.pose.orientation.into());
             if let Err(reason) = sound(position, orientation) {
@@ -97,7 +101,7 @@ impl Local {
                 return None;
             }
             let stamp_ns = message.header.stamp.to_ns();
-            let text = off(("source", source), stamp_ns, receipt, 0)?;
+            let text = off(("source", &source), stamp_ns, receipt, 0)?;
             Some(format!(
                 "{text}; frames of another clock have a clock_id other than 0"
             ))

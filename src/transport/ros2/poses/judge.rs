@@ -1,6 +1,7 @@
 //! What a chain of links says of its body. Pure.
 
 use super::super::tf::{Found, Missing};
+use super::super::told::brief;
 use super::seconds;
 use crate::wire::{RejectReason, TransformRow};
 
@@ -40,17 +41,22 @@ pub(super) fn judge(
         Err(Missing::Frame(frame)) => (
             None,
             Some(format!(
-                "no link from frame \"{frame}\" towards \"{root}\" has come"
+                "no link from frame \"{}\" towards \"{root}\" has come",
+                brief(frame)
             )),
         ),
         Err(Missing::Loop(frame)) => (
             Some(Err(RejectReason::BadChain)),
-            Some(format!("the links from frame \"{frame}\" lead in a loop")),
+            Some(format!(
+                "the links from frame \"{}\" lead in a loop",
+                brief(frame)
+            )),
         ),
         Err(Missing::Bad(frame, reason)) => (
             Some(Err(*reason)),
             Some(format!(
-                "the link of frame \"{frame}\" is no pose: {reason}"
+                "the link of frame \"{}\" is no pose: {reason}",
+                brief(frame)
             )),
         ),
     }

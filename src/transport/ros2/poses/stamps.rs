@@ -2,6 +2,7 @@
 //!
 //! Stamps are carried and never trusted for ages (law 4.8), so none of this changes a pose; whoever sends them is told.
 
+use super::super::told::brief;
 use super::{Receipt, Source, seconds};
 
 /// How long something that passes is told of, nanoseconds: as long as it takes a person to look.
@@ -28,14 +29,16 @@ impl Source {
 /// The link of a frame comes as one that never changes and as one that does.
 pub(super) fn both((kind, name): (&str, &str)) -> String {
     format!(
-        "{kind} {name}: its link comes on the topic of fixed links and on that of others, and the last one counts: leave one out"
+        "{kind} {}: its link comes on the topic of fixed links and on that of others, and the last one counts: leave one out",
+        brief(name)
     )
 }
 
 /// There is no room for a frame.
 pub(super) fn crowded((kind, name): (&str, &str)) -> String {
     format!(
-        "{kind} {name}: its link is refused, because the links on its topic name too many frames: give this source a topic of its own"
+        "{kind} {}: its link is refused, because the links on its topic name too many frames: give this source a topic of its own",
+        brief(name)
     )
 }
 
@@ -48,13 +51,15 @@ pub(super) fn forgotten(count: u64) -> String {
 
 /// Two publishers send links of one frame.
 pub(super) fn rivalry((kind, name): (&str, &str)) -> String {
+    let name = brief(name);
     format!("{kind} {name}: two publishers send links of it: stop one of them")
 }
 
 /// A stamp lies before the newest one of the same body or link: the message is passed over.
 pub(super) fn older((kind, name): (&str, &str), by_ns: u64) -> String {
     format!(
-        "{kind} {name}: a stamp lies {:.3} s before the one that was there: it is passed over; do two senders write it?",
+        "{kind} {}: a stamp lies {:.3} s before the one that was there: it is passed over; do two senders write it?",
+        brief(name),
         seconds(by_ns)
     )
 }
@@ -78,7 +83,8 @@ pub(in super::super) fn off(
         _ => return None,
     };
     Some(format!(
-        "{kind} {name}: its stamp lies {:.3} s {side} of this node's clock: look at the clocks of both hosts, and at use_sim_time on both sides",
+        "{kind} {}: its stamp lies {:.3} s {side} of this node's clock: look at the clocks of both hosts, and at use_sim_time on both sides",
+        brief(name),
         seconds(ahead.max(behind))
     ))
 }

@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::super::told::brief;
 use crate::wire::ros::{AttachBody, Pose, PutBody, SetFilter, SolidPrimitive};
 
 /// The head of an edit, for the log.
@@ -15,7 +16,7 @@ pub(super) fn in_words(edit: &Value) -> String {
     let verb = entry.map_or("", |(verb, _)| verb.as_str());
     let body = entry.and_then(|(_, what)| what.get("name"));
     let body = body.map_or_else(|| short(edit), ToString::to_string);
-    format!("edit over ROS 2: {verb} {body}")
+    format!("edit over ROS 2: {verb} {}", brief(&body))
 }
 
 fn place(pose: &Pose) -> (Value, Value) {

@@ -1,0 +1,105 @@
+//! What people were told a moment ago, so that they are told what is new. In: words and when they hold. Out: whether
+//! they are news. Pure.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+/// Words that have not held for so long are news again, nanoseconds: longer than what passes is told of.
+const FORGOTTEN_NS: u64 = 10_000_000_000;
+/// Between two times that the same happens over and over, and is said, nanoseconds.
+const AGAIN_NS: u64 = 1_000_000_000;
+/// Longest name of somebody else's in words, bytes: a name may be as long as a message.
+const NAME_BYTES_MAX: usize = 128;
+
+/// What was told, without its numbers, and when it last held, nanoseconds of `CLOCK_BOOTTIME`. Who tells says a few
+/// words each half second, or those of a source of the scene, so what is not forgotten yet has a bound.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Told(BTreeMap<String, u64>);
+
+impl Told {
+    /// Whether a state of things is news: it holds now, and did not a while ago.
+    pub(super) fn is_new(&mut self, words: &str, now_ns: u64) -> bool {
+        self.forget(now_ns);
+        self.0.insert(gist(words), now_ns).is_none()
+    }
+
+    /// Whether something that happens is to be said: it was not a second ago.
+    pub(super) fn is_due(&mut self, words: &str, now_ns: u64) -> bool {
+        self.forget(now_ns);
+        let last_ns = self.0.entry(gist(words)).or_default();
+        let due = *last_ns == 0 || now_ns.saturating_sub(*last_ns) >= AGAIN_NS;
+        if due {
+            *last_ns = now_ns;
+        }
+        due
+    }
+
+    fn forget(&mut self, now_ns: u64) {
+        let holds = |_: &String, at: &mut u64| now_ns.saturating_sub(*at) < FORGOTTEN_NS;
+        self.0.retain(holds);
+    }
+}
+
+/// Words without numbers such as `3.002`, which differ from one look to the next.
+fn gist(words: &str) -> String {
+    let mut gist = String::with_capacity(words.len());
+    for word in words.split(' ') {
+        if !word.contains('.') || word.parse::<f64>().is_err() {
+            gist.push_str(word);
+            gist.push(' ');
+        }
+    }
+    gist
+}
+
+/// A name for people: the head of one that is too long.
+pub(super) fn brief(name: &str) -> Cow<'_, str> {
+    if name.len() <= NAME_BYTES_MAX {
+        return Cow::Borrowed(name);
+    }
+    let head = name.get(..name.floor_char_boundary(NAME_BYTES_MAX));
+    Cow::Owned(format!("{}..", head.unwrap_or_default()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    const S: u64 = 1_000_000_000;
+
+    #[test]
+    fn bug_words_that_differ_in_their_seconds_are_news_once_as_long_as_they_hold() {
+        let mut told = Told::default();
+        let mut said = Vec::new();
+        for look in 0..60_u64 {
+            let words = format!("body b: its stamp lies 3.{look:03} s in the future");
+            if told.is_new(&words, S + look * S / 2) {
+                said.push(look);
+            }
+        }
+        assert_eq!(said, [0]);
+        // Two that take turns are each said once.
+        let mut two =
+            |look: u64, name| told.is_new(&format!("body {name}: 0.100 s"), 31 * S + look * S);
+        let said = (0..9).map(|look| two(look, if look % 2 == 0 { "a1" } else { "a2" }));
+        assert_eq!(said.filter(|said| *said).count(), 2);
+        assert!(two(30, "a1"), "it is long ago");
+    }
+
+    #[test]
+    fn bug_what_happens_over_and_over_is_said_once_a_second() {
+        let mut told = Told::default();
+        let said = (0..1000_u64).filter(|at| told.is_due("source sim went back", S + at * S / 100));
+        assert_eq!(said.count(), 10);
+        assert!(told.is_due("source arm went back", 5 * S), "another one's");
+    }
+
+    #[test]
+    fn bug_a_name_of_any_length_has_a_short_head() {
+        assert_eq!(brief("arm"), "arm");
+        let long = format!("{}é{}", "x".repeat(NAME_BYTES_MAX - 1), "y".repeat(1000));
+        assert_eq!(
+            brief(&long),
+            format!("{}..", "x".repeat(NAME_BYTES_MAX - 1))
+        );
+    }
+}
