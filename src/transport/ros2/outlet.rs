@@ -193,9 +193,9 @@ impl Outlet {
     /// Publishes what writers have not taken; whether there is still some.
     fn hand_over(&mut self) -> bool {
         let out = &mut self.publishers;
-        self.shared.note_unsent(out.names.hand_over());
         let readers = &mut self.readers;
         let mut pen = Pen::of(&mut self.node, &self.context, &self.shared, readers);
+        (pen.shared).note_unsent(out.names.hand_over(&mut pen.means));
         pen.flush(&mut out.contacts);
         pen.flush(&mut out.pairs);
         pen.flush(&mut out.collisions);
@@ -271,7 +271,10 @@ impl Outlet {
         self.speaker.book = book;
         let now = self.shared.now();
         let messages = self.speaker.names(now, self.boot_id, scene_rev);
-        self.shared.note_unsent(self.publishers.names.say(messages));
+        let readers = &mut self.readers;
+        let mut pen = Pen::of(&mut self.node, &self.context, &self.shared, readers);
+        let lost = self.publishers.names.say(messages, &mut pen.means);
+        self.shared.note_unsent(lost);
     }
 
     /// Contacts and pairs.

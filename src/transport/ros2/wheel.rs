@@ -25,7 +25,7 @@ use crate::error::Result;
 /// Least time between two turns, nanoseconds: where a new writer is full at once, the network is, and no turn helps.
 const TURN_NS: u64 = 250_000_000;
 /// A reader that came within this time catches up, nanoseconds; after it, it is taken for one that has stopped.
-const CATCH_UP_NS: u64 = 1_000_000_000;
+pub(super) const CATCH_UP_NS: u64 = 1_000_000_000;
 /// How long readers have to find a writer that knows them, nanoseconds: twice what was measured.
 const FOUND_NS: u64 = 350_000_000;
 /// A writer that has been full for so long is left for one that lacks readers, too, nanoseconds.

@@ -1,104 +1,112 @@
 //! A latched topic of which every message must come out: what its writer does not take yet is published again until it
-//! does, because nothing that comes later would say it. In: what a topic says from now on. Out: its messages, in order.
+//! does, because nothing that comes later would say it. Where a reader has stopped, or the writer keeps too few
+//! messages for those that come late, a new writer says all of it anew.
+//!
+//! In: what a topic says from now on. Out: its messages, in order.
 
-use std::collections::VecDeque;
-
-use ros2_client::{Publisher, WriteError};
+use ros2_client::{Context, Node, Publisher, WriteError};
 use serde::Serialize;
+
+use super::super::topics::{Out, TypeName, publisher};
+use super::super::wheel::{CATCH_UP_NS, Means};
+use crate::error::Result;
 
 /// A writer and what it has not taken.
 pub(in super::super) struct Owed<M: Serialize> {
     writer: Publisher<M>,
-    owed: VecDeque<M>,
+    full_name: String,
+    kind: TypeName,
+    out: Out,
+    /// What the topic says from now on; empty as soon as the writer has taken all.
+    word: Vec<M>,
+    /// How many of these the writer has taken.
+    taken: usize,
+    /// Since when the writer has been full, nanoseconds of `CLOCK_BOOTTIME`.
+    full_ns: Option<u64>,
 }
 
-impl<M: Serialize> Owed<M> {
-    /// Nothing to say yet.
-    pub(in super::super) fn of(writer: Publisher<M>) -> Self {
-        let owed = VecDeque::new();
-        Self { writer, owed }
+impl<M: Serialize + Clone> Owed<M> {
+    /// Creates the first writer; nothing to say yet.
+    ///
+    /// # Errors
+    /// `Error::Io` when DDS refuses.
+    pub(in super::super) fn new(
+        node: &mut Node,
+        context: &Context,
+        (full_name, kind): (&str, TypeName),
+        out: Out,
+    ) -> Result<Self> {
+        Ok(Self {
+            writer: publisher(node, context, (full_name, kind), out)?,
+            full_name: full_name.to_owned(),
+            kind,
+            out,
+            word: Vec::new(),
+            taken: 0,
+            full_ns: None,
+        })
     }
 
     /// Says this from now on; what of the last word has not been taken is void.
     ///
     /// * returns - messages that are lost.
-    pub(in super::super) fn say(&mut self, messages: impl IntoIterator<Item = M>) -> u64 {
-        self.owed = messages.into_iter().collect();
-        self.hand_over()
+    pub(in super::super) fn say(&mut self, word: Vec<M>, with: &mut Means<'_>) -> u64 {
+        (self.word, self.taken) = (word, 0);
+        if self.word.len() > self.out.depth {
+            let depth = self.word.len().next_power_of_two();
+            self.turn(Out { depth, ..self.out }, with);
+        }
+        self.hand_over(with)
     }
 
     /// Whether the writer has not taken all.
     pub(in super::super) fn holds(&self) -> bool {
-        !self.owed.is_empty()
+        !self.word.is_empty()
     }
 
-    /// Publishes what the writer takes now.
+    /// Publishes what the writer takes now, on a new writer where a reader has stopped.
     ///
     /// * returns - messages that are lost.
-    pub(in super::super) fn hand_over(&mut self) -> u64 {
+    pub(in super::super) fn hand_over(&mut self, with: &mut Means<'_>) -> u64 {
         let mut lost = 0;
-        while let Some(message) = self.owed.pop_front() {
-            match self.writer.publish(message) {
-                Ok(()) => {}
-                Err(WriteError::WouldBlock { data }) => {
-                    self.owed.push_front(data);
-                    break;
+        while let Some(message) = self.word.get(self.taken) {
+            match self.writer.publish(message.clone()) {
+                Err(WriteError::WouldBlock { .. }) => {
+                    if !self.is_stuck(with) || !self.turn(self.out, with) {
+                        return lost;
+                    }
+                    continue;
                 }
                 Err(_) => lost += 1,
+                Ok(()) => {}
             }
+            (self.taken, self.full_ns) = (self.taken + 1, None);
         }
+        // Not kept: of a large scene it is as much as all names.
+        (self.word, self.taken) = (Vec::new(), 0);
         lost
+    }
+
+    /// Whether the writer has been full for longer than a reader that has just come takes to catch up.
+    fn is_stuck(&mut self, with: &Means<'_>) -> bool {
+        let full_ns = *self.full_ns.get_or_insert(with.now_ns);
+        with.now_ns.saturating_sub(full_ns) >= CATCH_UP_NS
+    }
+
+    /// Goes on with a new writer, which says all of the word; whether there is one.
+    ///
+    /// Its readers get it all because it is latched, so nothing is lost with the old one.
+    fn turn(&mut self, out: Out, with: &mut Means<'_>) -> bool {
+        let topic = (self.full_name.as_str(), self.kind);
+        let Ok(writer) = publisher(with.node, with.context, topic, out) else {
+            return false;
+        };
+        let old = std::mem::replace(&mut self.writer, writer);
+        with.readers.forget(old.guid());
+        (self.out, self.taken, self.full_ns) = (out, 0, None);
+        true
     }
 }
 
 #[cfg(test)]
-mod tests {
-    #![allow(clippy::disallowed_methods, reason = "real DDS needs real time")]
-
-    use std::time::{Duration, Instant};
-
-    use super::super::super::topics::{Out, publisher};
-    use super::super::super::wheel::tests::{SMALL, TOPIC, domain, hear, message, peer, reader};
-    use super::*;
-
-    #[test]
-    fn bug_what_is_said_while_a_reader_catches_up_is_said_when_it_has() {
-        let domain = domain(2);
-        let (context, mut node) = peer(domain, "writer");
-        let latched = Out {
-            latched: true,
-            ..SMALL
-        };
-        let writer = publisher(&mut node, &context, TOPIC, latched).unwrap();
-        let mut owed = Owed::of(writer);
-        let mut first = peer(domain, "first");
-        let from = reader(&first.0, &mut first.1, true);
-        let mut heard = Vec::new();
-        let end = Instant::now() + Duration::from_secs(60);
-        let mut number = 0;
-        let mut say = |owed: &mut Owed<_>, heard: &mut Vec<u64>| {
-            number += 1;
-            assert_eq!(owed.say([message(number)]), 0);
-            while heard.last() != Some(&number) {
-                assert!(Instant::now() < end, "{number} is heard");
-                std::thread::sleep(Duration::from_millis(2));
-                assert_eq!(owed.hand_over(), 0);
-                hear(&from, heard);
-            }
-        };
-        for _ in 0..3 * SMALL.window() {
-            say(&mut owed, &mut heard);
-        }
-        // Each of these holds the writer up for a moment, and something is said in it.
-        for round in 0..3 {
-            let mut newcomer = peer(domain, &format!("newcomer_{round}"));
-            let _from = reader(&newcomer.0, &mut newcomer.1, true);
-            let until = Instant::now() + Duration::from_secs(2);
-            while Instant::now() < until {
-                say(&mut owed, &mut heard);
-            }
-        }
-        assert!(!owed.holds());
-        assert!(heard.windows(2).all(|two| two[1] == two[0] + 1));
-    }
-}
+mod tests;

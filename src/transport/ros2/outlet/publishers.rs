@@ -11,7 +11,8 @@ use super::owed::Owed;
 use crate::error::{Error, Result};
 use crate::wire::ros;
 
-/// Messages of names kept for late joiners: a scene of 100,000 bodies.
+/// Messages of names kept for late joiners, at first: some hundred thousand bodies, half as many of the longest names.
+/// A scene of more has a writer that keeps more.
 const NAMES_DEPTH: usize = 64;
 /// Bytes of a state, of a tick, and of each of its sources: a reader that has stopped may hold 16 thousand states and,
 /// of a scene with one source, 8 thousand ticks, which is 20 s at 400 Hz, and its lease has ended. So these topics keep
@@ -84,12 +85,12 @@ impl Publishers {
                 (&claim("~/pairs")?, ("sweepd_msgs", "Pairs")),
                 large,
             )?,
-            names: Owed::of(publisher(
+            names: Owed::new(
                 node,
                 context,
                 (&claim("~/names")?, ("sweepd_msgs", "Names")),
                 latched,
-            )?),
+            )?,
             markers: Wheel::new(
                 node,
                 context,

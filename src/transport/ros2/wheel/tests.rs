@@ -31,7 +31,7 @@ pub(in super::super) const SMALL: Out = Out {
 
 /// A domain that no other process of these tests is in, nor another of `place`.
 pub(in super::super) fn domain(place: u16) -> u16 {
-    101 + u16::try_from(std::process::id() % 30).unwrap() * 4 + place
+    101 + u16::try_from(std::process::id() % 26).unwrap() * 5 + place
 }
 
 pub(in super::super) fn peer(domain: u16, name: &str) -> (Context, Node) {
@@ -88,7 +88,28 @@ fn a_reader_in_a_process_of_its_own() {
     }
 }
 
-struct Killed(Child);
+pub(in super::super) struct Killed(Child);
+
+impl Killed {
+    /// It acknowledges nothing from now on.
+    pub(in super::super) fn stop(&self) {
+        kill_process(Pid::from_child(&self.0), Signal::STOP).unwrap();
+    }
+}
+
+/// A reader in a process of its own, to be stopped.
+pub(in super::super) fn stopped(domain: u16) -> Killed {
+    let child = Command::new(std::env::current_exe().unwrap())
+        .args([
+            "transport::ros2::wheel::tests::a_reader_in_a_process_of_its_own",
+            "--exact",
+        ])
+        .env(DOMAIN, domain.to_string())
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    Killed(child)
+}
 
 impl Drop for Killed {
     fn drop(&mut self) {
@@ -180,16 +201,7 @@ impl Rig {
 fn a_reader_that_stops_turns_the_writer_and_the_others_go_on() {
     let domain = domain(0);
     let mut rig = Rig::of(domain);
-    let child = Command::new(std::env::current_exe().unwrap())
-        .args([
-            "transport::ros2::wheel::tests::a_reader_in_a_process_of_its_own",
-            "--exact",
-        ])
-        .env(DOMAIN, domain.to_string())
-        .stdout(std::process::Stdio::null())
-        .spawn()
-        .unwrap();
-    let child = Killed(child);
+    let child = stopped(domain);
     rig.await_readers(2);
     for _ in 0..50 {
         rig.step();
@@ -199,7 +211,7 @@ fn a_reader_that_stops_turns_the_writer_and_the_others_go_on() {
         (Sent::default(), 0),
         "all acknowledge"
     );
-    kill_process(Pid::from_child(&child.0), Signal::STOP).unwrap();
+    child.stop();
     for _ in 0..150 {
         rig.step();
     }
