@@ -204,20 +204,22 @@ pub(super) fn subscribe(
     let mut lines = vec![Line::Transforms(own), Line::Clock(clock)];
     let mut odd = Vec::new();
     let mut trees: Vec<(String, bool, Vec<usize>)> = Vec::new();
-    for (place, source) in sources.iter().enumerate() {
-        if source.kind == RosKind::Tf {
-            for (given, fixed) in [(&source.topic, false), (&source.static_topic, true)] {
-                let kind = if fixed { "fixed links" } else { "links" };
-                let full = names.share(given, kind).map_err(Error::Usage)?;
-                match trees.iter_mut().find(|(known, ..)| *known == full) {
-                    Some((.., places)) => places.push(place),
-                    None => trees.push((full, fixed, vec![place])),
-                }
+    // Bodies last: one that an edit has brought must not take a topic away that the scene says.
+    let (links, others) = (sources.iter().enumerate())
+        .partition::<Vec<_>, _>(|(_, source)| source.kind == RosKind::Tf);
+    for (place, source) in links {
+        for (given, fixed) in [(&source.topic, false), (&source.static_topic, true)] {
+            let kind = if fixed { "fixed links" } else { "links" };
+            let full = names.share(given, kind).map_err(Error::Usage)?;
+            match trees.iter_mut().find(|(known, ..)| *known == full) {
+                Some((.., places)) => places.push(place),
+                None => trees.push((full, fixed, vec![place])),
             }
-            continue;
         }
+    }
+    for (place, source) in others {
         for (member, given) in source.topics().enumerate() {
-            let full = names.claim(given).map_err(Error::Usage);
+            let full = names.claim_for_body(given).map_err(Error::Usage);
             match full.and_then(|full| of_body(node, context, source.kind, &full)) {
                 Ok(mut line) => {
                     line.feed(place, member);

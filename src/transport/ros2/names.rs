@@ -63,6 +63,9 @@ impl Names {
     pub fn share(&mut self, name: &str, kind: &str) -> Result<String, String> {
         let full = self.resolve(name)?;
         match self.taken.get(&full) {
+            Some((other, taken_for)) if taken_for != kind && other == name => Err(format!(
+                "`{name}` is the name of another thing: give one of them another one"
+            )),
             Some((other, taken_for)) if taken_for != kind => Err(format!(
                 "`{name}` and `{other}` would both be {full}: name or remap (--ros-args -r) one of them otherwise"
             )),
@@ -73,6 +76,22 @@ impl Names {
                 Ok(full)
             }
         }
+    }
+
+    /// As [`Self::claim`], for the topic of a body, which may be that of another body, too, but not of the node's own.
+    ///
+    /// # Errors
+    /// One text, when it is no name or a thing that is no body has it.
+    pub fn claim_for_body(&mut self, topic: &str) -> Result<String, String> {
+        self.share(topic, &of_body(topic))
+    }
+
+    /// The full name of a body's topic; `None` where bodies do not have it.
+    #[must_use]
+    pub fn of_body(&self, topic: &str) -> Option<String> {
+        let full = self.resolve(topic).ok()?;
+        let (_, taken_for) = self.taken.get(&full)?;
+        (*taken_for == of_body(topic)).then_some(full)
     }
 
     /// Gives a full name back: its thing is no more.
@@ -117,6 +136,11 @@ impl Names {
             ))
         }
     }
+}
+
+/// What a body's topic is taken for: by bodies that say it in the same words.
+fn of_body(topic: &str) -> String {
+    format!("poses by {topic}")
 }
 
 #[cfg(test)]
@@ -164,6 +188,22 @@ mod tests {
         assert!(error.contains("/left/pose"), "{error}");
         // What was refused has taken nothing away.
         assert_eq!(names.claim("/left/pose").unwrap(), "/right/pose");
+    }
+
+    #[test]
+    fn bug_a_body_cannot_have_a_topic_of_the_node() {
+        let mut names = names("");
+        for own in ["~/tick", "/clock"] {
+            names.claim(own).unwrap();
+            let error = names.claim_for_body(own).unwrap_err();
+            assert!(error.contains(own), "{error}");
+            assert_eq!(names.of_body(own), None);
+        }
+        for _ in 0..2 {
+            assert_eq!(names.claim_for_body("/pose").unwrap(), "/pose");
+        }
+        assert_eq!(names.of_body("/pose").unwrap(), "/pose");
+        assert!(names.claim("/pose").is_err());
     }
 
     #[test]

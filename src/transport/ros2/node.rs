@@ -118,10 +118,11 @@ impl RosNode {
             (heartbeat_ns, scene.sources.len()),
             shared.reliable(),
         )?;
-        let (lines, unheard) = subscribe(&mut node, &context, &mut names, &sources, scene.again)?;
-        odd.extend(unheard);
         let services = Services::create(&mut node, &mut names, table.flag("ros.allow_edits"))?;
         let answers = Answers::create(&mut node, &context, &mut names, &table)?;
+        // Behind all that is the node's own: no body has a name of these.
+        let (lines, unheard) = subscribe(&mut node, &context, &mut names, &sources, scene.again)?;
+        odd.extend(unheard);
         shared.set_rosout(Some(node.rosout_writer()));
         let namesakes = Namesakes::of(&context, node.fully_qualified_name())?;
         table.run();

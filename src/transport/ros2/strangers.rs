@@ -70,7 +70,7 @@ impl Strangers {
         for body in &scene.bodies {
             let source = body.source.and_then(|place| scene.sources.get(place));
             let ros = source.and_then(|source| source.ros2.as_ref());
-            if let (Some(ros), Ok(topic)) = (ros, names.resolve(&body.topic)) {
+            if let (Some(ros), Some(topic)) = (ros, names.of_body(&body.topic)) {
                 watch.meet(&topic, ros.kind);
             }
         }

@@ -41,8 +41,13 @@ def test_the_graph_shows_the_node_its_topics_and_types(room):
     assert published().get("/rosout") == ["rcl_interfaces/msg/Log"]
     assert published().get("/parameter_events") == ["rcl_interfaces/msg/ParameterEvent"]
     assert published().get("/diagnostics") == ["diagnostic_msgs/msg/DiagnosticArray"]
-    taken = dict(node.get_subscriber_names_and_types_by_node("sweepd", "/"))
-    assert taken.get("/sweepd/transforms") == ["sweepd_msgs/msg/BodyTransforms"]
+
+    def taken():
+        return dict(node.get_subscriber_names_and_types_by_node("sweepd", "/"))
+
+    # what it publishes is in the graph a moment earlier
+    room.until(lambda: {"/sweepd/transforms", "/clock"} <= taken().keys(), "what it reads")
+    assert taken()["/sweepd/transforms"] == ["sweepd_msgs/msg/BodyTransforms"]
     # `ros2 topic echo` and `ros2 bag record` refuse a topic that is shown with two types
     shown = dict(node.get_topic_names_and_types())
     assert {topic: kinds for topic, kinds in shown.items() if len(kinds) != 1} == {}

@@ -15,12 +15,13 @@ pub(in super::super) struct Topics {
 }
 
 impl Topics {
-    /// Those of a scene, whose names have been given out.
+    /// Those of a scene, whose names have been given out. A body whose topic is another thing's has none.
     pub(in super::super) fn of(scene: &RosScene, names: &Names) -> Self {
         let own = scene.bodies.iter().filter_map(|body| {
             let ros = scene.sources.get(body.source?)?.ros2.as_ref()?;
-            let topic = names.resolve(&body.topic).ok()?;
-            (ros.kind != RosKind::Tf).then(|| (body.name.clone(), topic))
+            let is_own = ros.kind != RosKind::Tf;
+            let topic = names.of_body(&body.topic).filter(|_| is_own)?;
+            Some((body.name.clone(), topic))
         });
         Self { of: own.collect() }
     }
@@ -35,7 +36,7 @@ impl Topics {
         topic: &str,
         names: &mut Names,
     ) -> Result<String, String> {
-        let full = names.claim(topic)?;
+        let full = names.claim_for_body(topic)?;
         self.of.insert(body.to_owned(), full.clone());
         Ok(full)
     }
@@ -53,8 +54,11 @@ impl Topics {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::RosSourceSpec;
     use super::super::super::args::RosArgs;
     use super::*;
+    use crate::config::RosSource;
+    use crate::transport::BodyNote;
 
     #[test]
     fn bug_the_topic_of_a_body_that_has_left_is_free_for_another_thing() {
@@ -68,5 +72,39 @@ mod tests {
         assert_eq!(topics.remove("b", &mut names).unwrap(), "/right");
         assert_eq!(topics.put("c", "/right", &mut names).unwrap(), "/right");
         assert_eq!(topics.remove("nobody", &mut names), None);
+    }
+
+    #[test]
+    fn bug_a_body_whose_topic_is_another_things_does_not_give_it_back() {
+        let mut names = Names::new(&RosArgs::parse(&[]).unwrap(), "sweepd").unwrap();
+        names.claim("~/tick").unwrap();
+        assert!(names.claim_for_body("~/tick").is_err());
+        let source = RosSourceSpec {
+            name: "poses".to_owned(),
+            timeout_ns: 1,
+            ros2: Some(RosSource {
+                kind: RosKind::Pose,
+                topic: String::new(),
+                static_topic: String::new(),
+                max_skew_ns: 0,
+            }),
+        };
+        let body = BodyNote {
+            name: "a".to_owned(),
+            source: Some(0),
+            topic: "~/tick".to_owned(),
+            ..BodyNote::default()
+        };
+        let scene = RosScene {
+            sources: vec![source],
+            bodies: vec![body],
+            ..RosScene::default()
+        };
+        let mut topics = Topics::of(&scene, &names);
+        assert_eq!(topics.remove("a", &mut names), None);
+        assert!(
+            names.claim_for_body("~/tick").is_err(),
+            "it is still the node's"
+        );
     }
 }
