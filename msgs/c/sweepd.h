@@ -198,7 +198,9 @@ enum {
     SWEEPD_REJECT_REASON_TOO_OLD = 12,
     /* A frame or pose beyond a limit (rows a frame, coordinates). */
     SWEEPD_REJECT_REASON_OVER_LIMIT = 13,
-    /* A chain of ROS 2 frames from the body to the scene's frame that has a loop, or stamps too far apart. */
+    /* A chain of ROS 2 frames from the body to the scene's frame that has a loop, a link older
+     * than the source's time-out, or stamps too far apart; or a pose or a frame in another
+     * frame than the scene's. */
     SWEEPD_REJECT_REASON_BAD_CHAIN = 14,
     /* A range of vertices that does not follow on the version the body has, or comes after
      * refused ones; or vertices of the source were lost on the way. */

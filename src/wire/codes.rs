@@ -218,7 +218,8 @@ code! {
         TooOld = 12 => "too_old",
         /// A frame or pose beyond a limit (rows a frame, coordinates).
         OverLimit = 13 => "over_limit",
-        /// A chain of ROS 2 frames from the body to the scene's frame that has a loop, or stamps too far apart.
+        /// A chain of ROS 2 frames from the body to the scene's frame that has a loop, a link older than the source's
+        /// time-out, or stamps too far apart; or a pose or a frame in another frame than the scene's.
         BadChain = 14 => "bad_chain",
         /// A range of vertices that does not follow on the version the body has, or comes after refused ones; or
         /// vertices of the source were lost on the way.

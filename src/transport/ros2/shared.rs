@@ -239,7 +239,7 @@ impl Shared {
         self.undecodable.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Samples that were decoded and refused.
+    /// Samples that were decoded and refused, or passed over for newer ones.
     pub(super) fn note_refused(&self, count: u64) {
         self.refused.fetch_add(count, Ordering::Relaxed);
     }

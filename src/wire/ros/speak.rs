@@ -108,7 +108,7 @@ pub struct Counts {
     pub datagrams_dropped: u64,
     /// Datagrams that DDS could not read.
     pub datagrams_unread: u64,
-    /// Samples that were refused.
+    /// Samples that were refused, or passed over for newer ones.
     pub refused: u64,
     /// Widest skew of a chain, nanoseconds; `None`: no chain.
     pub skew_ns: Option<u64>,

@@ -347,7 +347,7 @@ pub struct Tick {
     pub sends_dropped: u64,
     /// Samples that could not be decoded.
     pub receipts_undecodable: u64,
-    /// Samples that were refused.
+    /// Samples that were refused, or passed over for newer ones.
     pub receipts_refused: u64,
     /// Widest skew of a chain, seconds; NaN: no chain.
     pub tf_skew_s: f64,
