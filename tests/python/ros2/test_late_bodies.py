@@ -15,19 +15,19 @@ from topics import SCENE, Feeder
 from visualization_msgs.msg import MarkerArray
 
 
-def put(room, name, source, then=None, **options):
+def put(room, name, source, **options):
     ball = SolidPrimitive(type=SolidPrimitive.SPHERE, dimensions=[0.1])
     request = PutBody.Request(name=name, source=source, moves=True, pose=pose((0, 0, 0)), primitives=[ball],
                               primitive_poses=[pose((0, 0, 0))], options_json=json.dumps(options) if options else "")  # fmt: skip
-    return room.call(PutBody, "/sweepd/put_body", request, then=then)
+    return room.call(PutBody, "/sweepd/put_body", request)
 
 
 class Late:
     """The scene's own bodies kept known, and one more sent on a topic of a kind."""
 
-    def __init__(self, room):
+    def __init__(self, room, scene=SCENE):
         self.room = room
-        room.daemon(SCENE, ros_args=["-p", "ros.allow_edits:=true"])
+        room.daemon(scene, ros_args=["-p", "ros.allow_edits:=true"])
         self.node = room.node()
         self.states, self.ticks = room.hear(State, "/sweepd/state"), room.hear(Tick, "/sweepd/tick")
         self.feeder = Feeder(room, self.node)
@@ -134,14 +134,30 @@ def test_what_does_not_fit_its_source_is_refused_and_a_shared_topic_is_told(room
 
 
 def test_bug_poses_by_name_move_a_body_that_the_answer_to_an_edit_or_a_revision_brings(room):
-    late = Late(room)
+    # a new client of a service may be found later than a source may be silent
+    patient = SCENE.replace('name = "sim"\ntimeout_ms = 500', 'name = "sim"\ntimeout_ms = 20000')
+    assert patient != SCENE
+    late = Late(room, patient)
     sim = late.feeder.sim
     # once, just behind the answer
     answer = put(room, "one", "sim")
     assert answer.success, answer.message
     sim.send({"one": (7.0, 0.0, 0.0)}, flags=BodyTransforms.PARTIAL)
     room.until(lambda: late.where("one") == ([7, 0, 0], 0), "known by one frame")
-    # before the edit, with the revision that it needs: it waits
-    early = lambda: sim.send({"two": (8.0, 0.0, 0.0)}, flags=BodyTransforms.PARTIAL, scene_rev=answer.scene_rev + 1)  # noqa: E731
-    assert put(room, "two", "sim", then=early).success
+    # before the edit, once, with the revision that it needs: it waits
+    number = sim.send({"two": (8.0, 0.0, 0.0)}, flags=BodyTransforms.PARTIAL, scene_rev=answer.scene_rev + 1)
+    room.spin(0.2)
+    assert put(room, "two", "sim").success
     room.until(lambda: late.where("two") == ([8, 0, 0], 0), "known by a frame that waited")
+    room.until(lambda: [source.seq for source in late.ticks[-1].sources if source.name == "sim"] == [number], "by that very frame")
+
+
+def test_bug_frames_that_wait_for_a_revision_that_never_comes_are_refused_at_any_rate(room):
+    late = Late(room)
+    refused = lambda: sum(source.refused for source in late.ticks[-1].sources if source.name == "sim")  # noqa: E731
+    before, needed = refused(), late.ticks[-1].tick_header.scene_rev + 1
+    for _ in range(200):
+        late.feeder.sim.send({"box": (4.0, 0.0, 0.0)}, scene_rev=needed)
+        room.spin(0.005)
+    # 200 Hz where the machine keeps up: within the time-out more come than may wait
+    room.until(lambda: late.ticks[-1].rejects[Tick.REJECT_SCENE_REVISION] >= 100 and refused() >= before + 100, "refused and counted")
