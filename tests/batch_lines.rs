@@ -295,3 +295,30 @@ fn bug_what_is_too_far_to_compute_with_is_refused_by_id_and_no_answer() {
     // As far as squares of it are numbers, it is answered.
     assert_eq!(answers[4]["gap_m"], 1e150);
 }
+
+#[test]
+fn bug_a_plate_with_numbers_too_small_for_their_products_keeps_its_corners() {
+    let ball = json!({"type": "sphere", "radius": 1e-3});
+    for (radius, count, z) in [
+        (0.3, 64, 15e-324),
+        (1.0, 64, 5e-324),
+        (1.0, 64, 1e-320),
+        (0.5, 4000, 1e-318),
+        (0.5, 64, 1e-100),
+    ] {
+        let around = |k: u32| {
+            let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / f64::from(count)).sin_cos();
+            [radius * cos, radius * sin, 0.0]
+        };
+        let mut vertices: Vec<[f64; 3]> = (0..count).map(around).collect();
+        vertices.push([0.0, 0.0, z]);
+        let plate = json!({"type": "convex", "vertices": vertices});
+        let each = vertices.iter().step_by(vertices.len() / 64);
+        let text: Vec<String> = each.map(|at| line("corner", &plate, &ball, *at)).collect();
+        let (whole, answers) = ask(text.join("\n").as_bytes());
+        assert!(whole);
+        for answer in &answers {
+            assert_eq!(answer["colliding"], true, "{radius} {z:e}: {answer}");
+        }
+    }
+}

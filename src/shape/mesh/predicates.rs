@@ -1,6 +1,7 @@
 //! Exact signs: on which side of a line or a plane a point lies, for the f64 coordinates as they are.
 //!
-//! In: points. Out: the sign of a determinant, never wrong: a filter decides nearly always, expansions decide the rest.
+//! In: points. Out: the sign of a determinant, never wrong where coordinates are 0 or at least 1e-75 in size, so that
+//! no product is too small for a number: a filter decides nearly always, expansions decide the rest.
 //!
 //! Source: Shewchuk 1997, Adaptive precision floating-point arithmetic and fast robust geometric predicates.
 
