@@ -322,3 +322,23 @@ fn bug_a_plate_with_numbers_too_small_for_their_products_keeps_its_corners() {
         }
     }
 }
+
+#[test]
+fn bug_flat_hulls_of_many_points_are_answered_by_their_corners() {
+    let cells = (0..70).flat_map(|x| (0..70).map(move |y| [f64::from(x), f64::from(y), 0.0]));
+    let grid: Vec<[f64; 3]> = cells.collect();
+    let along: Vec<[f64; 3]> = (0..5000).map(|x| [f64::from(x), 0.0, 0.0]).collect();
+    let ball = json!({"type": "sphere", "radius": 1.0});
+    let hull = |vertices: &[[f64; 3]]| json!({"type": "convex", "vertices": vertices});
+    let text = [
+        line("grid", &hull(&grid), &ball, [33.3, 44.4, 1.5]),
+        line("beside", &hull(&grid), &ball, [33.3, 71.0, 0.0]),
+        line("line", &hull(&along), &ball, [77.7, 0.0, 1.5]),
+    ];
+    let (whole, answers) = ask(text.join("\n").as_bytes());
+    assert!(whole, "{answers:?}");
+    for (answer, truth) in answers.iter().zip([0.5, 1.0, 0.5]) {
+        let gap_m = answer["gap_m"].as_f64().unwrap();
+        assert!((gap_m - truth).abs() < 1e-12, "{answer}");
+    }
+}

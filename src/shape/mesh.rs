@@ -25,7 +25,7 @@ pub(crate) use deform::{NewTree, NoVertex, TreeJob, can_be_vertices};
 pub(crate) use inside::Inside;
 pub(crate) use normals::Cone;
 pub(crate) use obb::{BoxId, Held, Obb, ObbPack, ObbTree};
-pub(crate) use predicates::side;
+pub(crate) use predicates::{side, turn_yz};
 use tree::Tree;
 pub(crate) use tree::{Below, NODES_WAITING_MAX, Node};
 

@@ -3,7 +3,8 @@
 //! In: points, own frame, metres. Out: a [`Hull`] that is exactly the hull of the points: only what is proved to lie
 //! within the others is left out, and nothing is moved.
 
-use super::facets::{Facet, corners_of, facets_of};
+use super::facets::{Facet, corners_of, facets_of, is_exact};
+use super::flat;
 use crate::limits::{EXTENT_MAX_M, EXTENT_MIN_M, HULL_VERTICES_MAX};
 use crate::math::{Aabb, Point, Vec3};
 use crate::shape::ShapeError;
@@ -54,28 +55,26 @@ pub(super) fn check_point(place: usize, point: &Vec3) -> Result<(), ShapeError> 
 impl Hull {
     /// The hull of at least one point.
     pub(super) fn build(given: &[Point]) -> Result<Self, ShapeError> {
-        for (place, point) in given.iter().enumerate() {
-            check_point(place, &point.coords)?;
-        }
-        let mut points = given.to_vec();
-        points.sort_by(|a, b| {
-            let key = |p: &Point| [p.x + 0.0, p.y + 0.0, p.z + 0.0];
-            let (a, b) = (key(a), key(b));
-            a[0].total_cmp(&b[0])
-                .then(a[1].total_cmp(&b[1]))
-                .then(a[2].total_cmp(&b[2]))
-        });
-        points.dedup();
-        if points.is_empty() {
-            return Err(ShapeError::TooFewPoints { given: 0 });
-        }
-        check_extent(&points)?;
-        // Where there is no surface, all points stay: every query works, manifolds have one point.
-        let facets = facets_of(&points).unwrap_or_default();
+        Self::of_places(&places(given)?)
+    }
+
+    /// The hull of points that span a volume.
+    pub(super) fn build_solid(given: &[Point]) -> Result<Self, ShapeError> {
+        let points = places(given)?;
+        check_volume(&points)?;
+        Self::of_places(&points)
+    }
+
+    fn of_places(points: &[Point]) -> Result<Self, ShapeError> {
+        let facets = facets_of(points).unwrap_or_default();
         let is_corner = match facets[..] {
-            [] => vec![true; points.len()],
-            _ => corners_of(&points, &facets),
+            // Without a surface every query works, and manifolds have one point.
+            [] if is_exact(points) => flat::corners_of(points),
+            [] => None,
+            _ => Some(corners_of(points, &facets)),
         };
+        // Where it cannot be told, all points stay.
+        let is_corner = is_corner.unwrap_or_else(|| vec![true; points.len()]);
         let corners = is_corner.iter().filter(|is| **is).count();
         if corners > HULL_VERTICES_MAX {
             return Err(ShapeError::TooManyHullVertices { given: corners });
@@ -92,51 +91,12 @@ impl Hull {
             faces: Vec::new(),
             corners: Vec::new(),
         };
-        let (_, size_m) = hull.thickness();
-        for (normal, corners) in faces_of(&points, &facets, size_m) {
+        let (_, size_m) = thickness(points);
+        for (normal, corners) in faces_of(points, &facets, size_m) {
             let named = corners.into_iter().map(|k| new_place[k as usize]);
             hull.push_face(normal, named.filter(|k| *k != u32::MAX).collect());
         }
         Ok(hull)
-    }
-
-    /// Refuses a hull without a volume.
-    pub(super) fn check_volume(&self) -> Result<(), ShapeError> {
-        if self.points.len() < 4 {
-            return Err(ShapeError::TooFewPoints {
-                given: self.points.len(),
-            });
-        }
-        let (thickness_m, size_m) = self.thickness();
-        if thickness_m <= 1e-13 * size_m {
-            return Err(ShapeError::FlatHull { thickness_m });
-        }
-        Ok(())
-    }
-
-    /// Greatest distance of a point from the plane of a large triangle of points, and the greatest extent: both 0 for a
-    /// point.
-    fn thickness(&self) -> (f64, f64) {
-        let Some(first) = self.points.first() else {
-            return (0.0, 0.0);
-        };
-        let far = |from: &dyn Fn(&Vec3) -> f64| {
-            self.points
-                .iter()
-                .max_by(|a, b| from(a).total_cmp(&from(b)))
-                .copied()
-                .unwrap_or(*first)
-        };
-        let second = far(&|p| (p - first).norm());
-        let along = second - first;
-        let third = far(&|p| along.cross(&(p - first)).norm());
-        let normal = along.cross(&(third - first));
-        let length = normal.norm();
-        if length == 0.0 {
-            return (0.0, along.norm());
-        }
-        let fourth = far(&|p| normal.dot(&(p - first)).abs());
-        (normal.dot(&(fourth - first)).abs() / length, along.norm())
     }
 
     pub(crate) fn points(&self) -> &[Vec3] {
@@ -190,6 +150,63 @@ impl Hull {
             count,
         });
     }
+}
+
+/// The places of points, each once, in the order of their coordinates.
+fn places(given: &[Point]) -> Result<Vec<Point>, ShapeError> {
+    for (place, point) in given.iter().enumerate() {
+        check_point(place, &point.coords)?;
+    }
+    let mut points = given.to_vec();
+    points.sort_by(|a, b| {
+        let key = |p: &Point| [p.x + 0.0, p.y + 0.0, p.z + 0.0];
+        let (a, b) = (key(a), key(b));
+        a[0].total_cmp(&b[0])
+            .then(a[1].total_cmp(&b[1]))
+            .then(a[2].total_cmp(&b[2]))
+    });
+    points.dedup();
+    if points.is_empty() {
+        return Err(ShapeError::TooFewPoints { given: 0 });
+    }
+    check_extent(&points)?;
+    Ok(points)
+}
+
+/// Refuses points that span no volume.
+fn check_volume(points: &[Point]) -> Result<(), ShapeError> {
+    if points.len() < 4 {
+        return Err(ShapeError::TooFewPoints {
+            given: points.len(),
+        });
+    }
+    let (thickness_m, size_m) = thickness(points);
+    if thickness_m <= 1e-13 * size_m {
+        return Err(ShapeError::FlatHull { thickness_m });
+    }
+    Ok(())
+}
+
+/// Greatest distance of a point from the plane of a large triangle of points, and the greatest extent: both 0 for a
+/// point.
+fn thickness(points: &[Point]) -> (f64, f64) {
+    let Some(first) = points.first() else {
+        return (0.0, 0.0);
+    };
+    let far = |from: &dyn Fn(&Point) -> f64| {
+        let farthest = points.iter().max_by(|a, b| from(a).total_cmp(&from(b)));
+        *farthest.unwrap_or(first)
+    };
+    let second = far(&|p| (p - first).norm());
+    let along = second - first;
+    let third = far(&|p| along.cross(&(p - first)).norm());
+    let normal = along.cross(&(third - first));
+    let length = normal.norm();
+    if length == 0.0 {
+        return (0.0, along.norm());
+    }
+    let fourth = far(&|p| normal.dot(&(p - first)).abs());
+    (normal.dot(&(fourth - first)).abs() / length, along.norm())
 }
 
 /// Refuses points that lie in more than one place but nearer to each other than can be computed with.
@@ -352,5 +369,17 @@ mod tests {
         });
         let refused = Hull::build(&points.collect::<Vec<_>>()).unwrap_err();
         assert_eq!(refused, ShapeError::TooManyHullVertices { given: 20_000 });
+    }
+
+    #[test]
+    fn bug_many_points_without_a_volume_are_flat_and_not_too_many() {
+        let cells = (0..70).flat_map(|x| (0..70).map(move |y| (f64::from(x), f64::from(y))));
+        let grid: Vec<Point> = cells.map(|(x, y)| Point::new(x, y, 0.0)).collect();
+        let line: Vec<Point> = (0..5000).map(|x| Point::new(x.into(), 0.0, 0.0)).collect();
+        for (points, corners) in [(grid, 4), (line, 2)] {
+            let refused = Hull::build_solid(&points).unwrap_err();
+            assert_eq!(refused, ShapeError::FlatHull { thickness_m: 0.0 });
+            assert_eq!(Hull::build(&points).unwrap().points().len(), corners);
+        }
     }
 }

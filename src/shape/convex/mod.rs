@@ -6,6 +6,7 @@
 
 mod bounds;
 mod facets;
+mod flat;
 mod hull;
 
 use std::sync::Arc;
@@ -147,9 +148,10 @@ impl Convex {
     /// # Errors
     /// `NotFinite`, `TooFewPoints`, `FlatHull`, `TooManyHullVertices`, `Extent`.
     pub fn hull(points: &[Point]) -> Result<Self, ShapeError> {
-        let hull = Hull::build(points)?;
-        hull.check_volume()?;
-        Ok(Self::build(Core::Hull(Arc::new(hull)), 0.0))
+        Ok(Self::build(
+            Core::Hull(Arc::new(Hull::build_solid(points)?)),
+            0.0,
+        ))
     }
 
     /// The hull of points, flat ones, doubled ones and a single one too: what an offline query may hold.
