@@ -116,10 +116,13 @@ impl World {
         // At once: edits that follow find it on its own.
         self.take_root(slot, (slot, Pose::identity()));
         let told = pose.filter(|_| !moves);
-        if self.place(slot, told.unwrap_or(&by_now)) {
+        let moved = self.place(slot, told.unwrap_or(&by_now));
+        if moved {
             self.forget_way(slot);
-            self.settle(slot, true);
         }
+        // Also where it was: another says how well that is known, and `take_root` sees no change where the request hung
+        // it there.
+        self.settle(slot, moved);
         if told.is_some() {
             places.forget();
         }

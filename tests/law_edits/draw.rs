@@ -63,10 +63,16 @@ impl Draw {
     fn tick(&mut self, edits: usize, seen: &mut Seen, what: &str) {
         let step_ns = [10_000_000, 10_000_000, 90_000_000][self.rng.below(3)];
         let now_ns = self.twins.wait(step_ns);
-        let drawn: Vec<(Edit, Option<Solid>)> = (0..edits).map(|_| self.edit()).collect();
+        let drawn: Vec<(Edit, Option<Solid>)> = (0..edits)
+            .flat_map(|_| {
+                let drawn = self.edit();
+                let released = self.release(&drawn.0);
+                std::iter::once(drawn).chain(released.map(|edit| (edit, None)))
+            })
+            .collect();
         // Each a request of its own, or all of them one.
         let together = if self.rng.below(2) == 0 {
-            edits.max(1)
+            drawn.len().max(1)
         } else {
             1
         };
@@ -191,6 +197,20 @@ impl Draw {
             },
         };
         (edit, None)
+    }
+
+    /// Now and then what is hung on another is let go at once, whatever is known of that.
+    fn release(&mut self, edit: &Edit) -> Option<Edit> {
+        match edit {
+            Edit::Attach { name, to, .. } if to.is_some() && self.rng.below(3) == 0 => {
+                Some(Edit::Attach {
+                    name: name.clone(),
+                    to: None,
+                    pose: None,
+                })
+            }
+            _ => None,
+        }
     }
 
     fn put(&mut self, name: &str) -> (Edit, Option<Solid>) {

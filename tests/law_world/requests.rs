@@ -283,3 +283,40 @@ fn bug_a_body_that_cannot_move_was_let_go_and_lost_its_pose_with_those_that_a_re
     assert_eq!(bench.status("floor"), BodyStatus::Known);
     assert_eq!(x_of(&bench, "floor"), 6.0);
 }
+
+#[test]
+fn bug_a_body_let_go_by_the_request_that_hung_it_on_an_unknown_one_stayed_known() {
+    let scene = || {
+        let mut bench = Bench::of(vec![moving("a", 1), moving("b", 2)]);
+        bench.send(MS, "sim", 1, &[row(2, 3.0)]);
+        bench
+    };
+    let edits = || [attach("b", "a", Some(3.0)), detach("b")];
+    let mut one = scene();
+    request(&mut one, &edits());
+    let mut two = scene();
+    for edit in edits() {
+        two.edit(edit);
+    }
+    assert_eq!(two.status("b"), BodyStatus::NotReceived);
+    assert_eq!(one.status("b"), BodyStatus::NotReceived);
+    assert_eq!((x_of(&one, "b"), x_of(&two, "b")), (3.0, 3.0));
+    assert!(one.removed("b").is_some());
+    // As old as what it hung on.
+    let stale = || {
+        let mut bench = Bench::of(vec![moving("a", 1), moving("b", 2)]);
+        bench.send(MS, "sim", 1, &[row(1, 1.0)]);
+        bench.send(600 * MS, "sim", 2, &[row(2, 3.0)]);
+        bench
+    };
+    let edits = || [attach("b", "a", None), detach("b")];
+    let mut one = stale();
+    assert_eq!(one.status("b"), BodyStatus::Known);
+    request(&mut one, &edits());
+    let mut two = stale();
+    for edit in edits() {
+        two.edit(edit);
+    }
+    assert_eq!(two.status("b"), BodyStatus::Stale);
+    assert_eq!(one.status("b"), BodyStatus::Stale);
+}
