@@ -342,3 +342,45 @@ fn bug_flat_hulls_of_many_points_are_answered_by_their_corners() {
         assert!((gap_m - truth).abs() < 1e-12, "{answer}");
     }
 }
+
+#[test]
+fn bug_what_is_too_small_for_its_squares_is_refused_or_allowed_for() {
+    let tiny = |side: f64| json!([[0.0, 0.0, 0.0], [side, 0.0, 0.0], [0.0, side, 0.0]]);
+    let ball = json!({"type": "sphere", "radius": 1.0});
+    let mut text = String::new();
+    for side in [1e-200, 1e-30, 0.9e-9] {
+        let triangle = json!({"type": "triangle", "vertices": tiny(side)});
+        let mesh = json!({"type": "trimesh", "vertices": tiny(side), "faces": [[0, 1, 2]]});
+        for small in [triangle, mesh] {
+            let _ = writeln!(text, "{}", line("small", &small, &ball, [0.0; 3]));
+        }
+    }
+    let (whole, answers) = ask(text.as_bytes());
+    assert!(!whole && answers.len() == 6);
+    for answer in &answers {
+        let error = answer["error"].as_str().unwrap();
+        assert!(error.contains("a: the extent of the "), "{error}");
+    }
+    // Nothing but a place, and a small triangle within a mesh that is large.
+    let place = json!({"type": "convex", "vertices": [[0.0, 0.0, 0.0]]});
+    let mesh = json!({
+        "type": "trimesh",
+        "vertices": [[0.0, 0.0, 0.0], [1e-200, 0.0, 0.0], [0.0, 1e-200, 0.0], [-1.0, 5.0, 0.0], [1.0, 5.0, 0.0], [0.0, 6.0, 0.0]],
+        "faces": [[0, 1, 2], [3, 4, 5]],
+    });
+    for (a, b, truth) in [
+        (&place, &place, 0.0),
+        (&place, &place, 1e-170),
+        (&place, &place, 1e-120),
+        (&mesh, &place, 3e-200),
+    ] {
+        let (_, answers) = ask(line("near", a, b, [0.0, 0.0, truth]).as_bytes());
+        let end = |key: &str| answers[0][key].as_f64().unwrap();
+        let holds = end("gap_min_m") <= truth && truth <= end("gap_max_m");
+        assert!(
+            holds && end("gap_max_m") < 1.001 * truth + 1e-150,
+            "{truth:e}: {answers:?}"
+        );
+        assert_eq!(answers[0]["colliding"], truth < 1e-150, "{answers:?}");
+    }
+}

@@ -52,7 +52,7 @@ impl ShapeSpec {
             }
             Self::Triangle { vertices } => {
                 points(vertices)?;
-                spread("the extent of the triangle", vertices)
+                spread("the extent of the triangle", vertices.iter())
             }
             Self::Trimesh {
                 vertices,
@@ -141,11 +141,18 @@ pub(super) fn extent(what: &str, value_m: f64) -> Result<(), ShapeError> {
 }
 
 /// Points that are all in one place, or span what can be computed with.
-fn spread(what: &str, vertices: &[[f64; 3]]) -> Result<(), ShapeError> {
-    let sides = (0..3).map(|k| {
-        let along = || vertices.iter().map(|vertex| vertex[k]);
-        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
-    });
+pub(crate) fn spread<'a>(
+    what: &str,
+    vertices: impl Iterator<Item = &'a [f64; 3]>,
+) -> Result<(), ShapeError> {
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for vertex in vertices {
+        for k in 0..3 {
+            low[k] = low[k].min(vertex[k]);
+            high[k] = high[k].max(vertex[k]);
+        }
+    }
+    let sides = high.iter().zip(low).map(|(high, low)| high - low);
     match sides.fold(0.0, f64::max) {
         0.0 => Ok(()),
         side => extent(what, side.min(EXTENT_MAX_M)),

@@ -15,6 +15,7 @@ mod mesh;
 mod spec;
 
 pub use build::{Built, build};
+pub(crate) use check::spread;
 pub use convex::Convex;
 pub(crate) use convex::Core;
 pub use error::ShapeError;

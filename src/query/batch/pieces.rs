@@ -3,9 +3,13 @@
 //! In: shape specs, a relative pose. Out: one [`Closest`]. A mesh is a surface here: its triangles are its pieces. By
 //! brute force, pruned by bounding balls alone, so that it shares no tree with the engine.
 
-use crate::math::{Point, Pose, Vec3};
+use crate::math::{Interval, Point, Pose, Vec3};
 use crate::narrow::exact::{Closest, Warm, convex_gap, gap_to_half_space, half_space_gap};
-use crate::shape::{Convex, ShapeError, ShapeSpec};
+use crate::shape::{Convex, ShapeError, ShapeSpec, spread};
+
+/// What is lost where squares of lengths are too small for a number, metres (the root of the least that has all its
+/// digits): without it points 1e-170 m apart would be told as in one place. No longer gap is changed by so little.
+const SQUARES_LOST_M: f64 = 1.5e-154;
 
 /// What pieces mean together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,7 +65,9 @@ impl Pieces {
                 Self::convex(Convex::hull_of_any(&points(vertices))?)
             }
             ShapeSpec::Triangle { vertices } => {
-                Self::convex(Convex::triangle(vertices.map(Point::from)))
+                let triangle = Self::convex(Convex::triangle(vertices.map(Point::from)))?;
+                spread("the extent of the triangle", vertices.iter())?;
+                Ok(triangle)
             }
             ShapeSpec::Trimesh {
                 vertices,
@@ -96,6 +102,9 @@ impl Pieces {
         if convexes.is_empty() {
             return Err(ShapeError::EmptyMesh);
         }
+        // Their faces name only vertices that are there.
+        let used = faces.iter().flatten().map(|k| &vertices[*k as usize]);
+        spread("the extent of the mesh", used)?;
         Ok(Self {
             kind: Kind::Surface,
             convexes,
@@ -165,9 +174,23 @@ pub(super) fn gap(a: &Pieces, b: &Pieces, pos12: &Pose) -> Result<Closest, Strin
     least
         .found
         .filter(|_| !least.is_lost)
+        .map(|found| allow_for_squares(&found))
         .ok_or_else(|| {
             "the shapes are too far from each other to compute with: write positions that are nearer".to_owned()
         })
+}
+
+/// Widens an interval by what squares may have lost; one that is no wider than that is as narrow as can be.
+fn allow_for_squares(found: &Closest) -> Closest {
+    let gap = Interval::new(
+        found.gap.min - SQUARES_LOST_M,
+        found.gap.max + SQUARES_LOST_M,
+    );
+    Closest {
+        gap,
+        finished: found.finished || gap.width() <= 4.0 * SQUARES_LOST_M,
+        ..*found
+    }
 }
 
 /// The answer of the piece pair with the least gap, with the interval over all pairs.
