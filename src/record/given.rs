@@ -12,8 +12,8 @@ use crate::transport::Setting;
 use crate::wire::{Demand, Inbox, Outbox, TickCause, WIRE_VERSION};
 use crate::world::{Applied, TreeOf};
 
-/// Number of the layout of our messages in a recording; another is not read.
-pub const LAYOUT: u32 = 1;
+/// Number of the layout of our messages in a recording; another is not read. 2: `number` in `VertexHeader`.
+pub const LAYOUT: u32 = 2;
 
 /// How a daemon began.
 #[derive(Clone, Debug, Default, PartialEq)]

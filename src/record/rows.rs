@@ -36,7 +36,13 @@ macro_rules! rows {
 
         // Nothing is left out, and nothing lies between.
         const _: () = assert!(<$type as Field>::BYTES == size_of::<$type>());
-    )+ };
+    )+
+        /// What stands in a recording, in words.
+        #[cfg(test)]
+        const WORDS: &str = concat!($(
+            stringify!($type), "\n", $("  ", stringify!($field), ": ", stringify!($kind), "\n",)+
+        )+);
+    };
 }
 
 rows! {
@@ -96,5 +102,23 @@ rows! {
         oldest_undecided_ticks: u64, reasons: u32, cause: u8, overrun: u8, sources_len: u8,
         cause_source: u8, rebuilds: u64, broad_renewed: u32, broad_mode: u8, broad_cause: u8,
         reserved: [u8; 2], sources: [SourceRow; 16],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::LAYOUT;
+
+    #[test]
+    fn bug_rows_that_change_are_of_another_layout() {
+        // FNV-1a.
+        let take = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        let hash = WORDS.bytes().fold(0xcbf2_9ce4_8422_2325, take);
+        assert_eq!(
+            (LAYOUT, hash),
+            (2, 0xdbed_7429_18f2_05b9),
+            "raise `LAYOUT` in `given.rs` by one, and write it here with the new number: {hash:#x}\n{WORDS}"
+        );
     }
 }
