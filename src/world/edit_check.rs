@@ -26,8 +26,8 @@ struct Draft<'a> {
     world: &'a World,
     /// Bodies that the request puts, hangs, lets go or removes (`None`).
     bodies: BTreeMap<&'a str, Option<Sketch<'a>>>,
-    /// Bodies whose place is known; emptied when that of some may be no more.
-    placed: BTreeSet<&'a str>,
+    /// Whether the place of bodies is known; emptied when it may be otherwise by now.
+    placed: BTreeMap<&'a str, bool>,
     /// Number of the edit that is looked at, from 1 on.
     at: usize,
     /// Number of the last edit that forgot the poses of a source's bodies, by source; 0: none did.
@@ -60,7 +60,7 @@ impl World {
         let mut draft = Draft {
             world: self,
             bodies: BTreeMap::new(),
-            placed: BTreeSet::new(),
+            placed: BTreeMap::new(),
             at: 0,
             forgotten: vec![0; self.sources.len()],
             ids: BTreeMap::new(),

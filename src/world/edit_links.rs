@@ -2,7 +2,7 @@
 //!
 //! In: attachments by name, after an edit. Out: roots and root poses, and each body settled whose root is another now.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::World;
 use super::body::Body;
@@ -16,14 +16,33 @@ use crate::math::{Pose, relative};
 pub(super) struct Places {
     /// Whether some may be elsewhere than before the request.
     any_moved: bool,
-    found: BTreeMap<BodySlot, Pose>,
+    /// The root of bodies that hang on others, and their pose there.
+    roots: BTreeMap<BodySlot, (BodySlot, Pose)>,
+    /// Of those: on which body each hangs, and that one in turn; the upper first.
+    below: BTreeSet<(BodySlot, BodySlot)>,
 }
 
 impl Places {
     /// Bodies may be elsewhere by now.
     pub(super) fn forget(&mut self) {
         self.any_moved = true;
-        self.found.clear();
+        self.roots.clear();
+        self.below.clear();
+    }
+
+    /// A body hangs elsewhere by now, and with it what hangs on it.
+    fn forget_root(&mut self, slot: BodySlot) {
+        let mut all = vec![slot];
+        while let Some(at) = all.pop() {
+            self.roots.remove(&at);
+            let first = (at, BodySlot(0));
+            while let Some(&(upper, lower)) = self.below.range(first..).next()
+                && upper == at
+            {
+                self.below.remove(&(upper, lower));
+                all.push(lower);
+            }
+        }
     }
 }
 
@@ -55,15 +74,14 @@ impl World {
             return false;
         }
         entry.attach = Some(attach);
-        if pose.is_some() {
-            places.forget();
-        }
+        places.forget_root(slot);
+        places.any_moved |= pose.is_some();
         true
     }
 
     /// Where a body is after the edits so far. Where what it hung on is gone: where it was before them.
     ///
-    /// Cost: the bodies above it, where the request moved any.
+    /// Cost: that of its root, where the request moved any.
     fn by_now(&self, slot: BodySlot, places: &mut Places) -> Pose {
         let pose = |slot| {
             self.body(slot)
@@ -72,15 +90,22 @@ impl World {
         if !places.any_moved {
             return pose(slot);
         }
-        if let Some(found) = places.found.get(&slot) {
-            return *found;
+        let (top, local) = self.root_by_now(slot, places);
+        pose(top) * local
+    }
+
+    /// The body that one hangs on in the end after the edits so far, and its pose there.
+    ///
+    /// Cost: the bodies above it; each of them once, until it hangs elsewhere.
+    fn root_by_now(&self, slot: BodySlot, places: &mut Places) -> (BodySlot, Pose) {
+        let root = self.root_among(slot, &mut places.roots);
+        let mut at = slot;
+        while let Some((to, _)) = self.hold_of(at)
+            && places.below.insert((to, at))
+        {
+            at = to;
         }
-        let (top, local) = self.root_of(slot);
-        let found = pose(top) * local;
-        if self.entries[top.index()].attach.is_none() {
-            places.found.insert(slot, found);
-        }
-        found
+        root
     }
 
     /// It stays where it is, as old and as well known as it was; from now on its own source speaks for it.
@@ -89,7 +114,7 @@ impl World {
             return false;
         }
         let by_now = self.by_now(slot, places);
-        let (root, _) = self.root_of(slot);
+        let (root, _) = self.root_by_now(slot, places);
         let of_root = &self.entries[root.index()];
         // Else what it hung on is gone, and with it who says where it is.
         let is_root = of_root.attach.is_none();
@@ -103,6 +128,7 @@ impl World {
             return false;
         };
         entry.attach = None;
+        places.forget_root(slot);
         entry.has_pose = has_pose || !moves;
         entry.refused = refused && moves;
         entry.raw = [f64::NAN; 7];
@@ -123,9 +149,7 @@ impl World {
         // Also where it was: another says how well that is known, and `take_root` sees no change where the request hung
         // it there.
         self.settle(slot, moved);
-        if told.is_some() {
-            places.forget();
-        }
+        places.any_moved |= told.is_some();
         true
     }
 
@@ -195,13 +219,8 @@ impl World {
         walk.take(self.bodies.len())
     }
 
-    /// The body that one hangs on in the end, itself where on none, and its pose seen from there.
-    fn root_of(&self, slot: BodySlot) -> (BodySlot, Pose) {
-        let itself = (slot, Pose::identity());
-        self.above(slot).last().unwrap_or(itself)
-    }
-
-    /// As [`World::root_of`], but for rounding; each body that hangs on another is walked over once.
+    /// The body that one hangs on in the end, itself where on none, and its pose seen from there; each body that hangs
+    /// on another is walked over once.
     fn root_among(
         &self,
         slot: BodySlot,

@@ -275,6 +275,36 @@ fn bug_a_long_chain_in_one_request_was_walked_from_each_of_its_bodies() {
     assert_eq!(bench.world.bodies().count(), 3);
 }
 
+/// The same from the far end, with a place and without one that was ever received.
+#[test]
+fn bug_a_long_chain_that_is_let_go_from_its_end_was_walked_from_each_of_its_bodies() {
+    const LEN: u64 = 20_000;
+    for (mut bench, status) in [
+        (grasp(), BodyStatus::Known),
+        (Bench::of(vec![moving("x", 1)]), BodyStatus::NotReceived),
+    ] {
+        let name = |at: u64| match at {
+            0 => "x".to_owned(),
+            at => format!("link{at}"),
+        };
+        let link = |at: u64| put(hung(&name(at), &name(at - 1), 0.25));
+        let edits: Vec<Edit> = (1..=LEN).map(link).collect();
+        request(&mut bench, &edits);
+        let (last, was_x) = (name(LEN), x_of(&bench, &name(LEN)));
+        let edits: Vec<Edit> = (1..=LEN).rev().map(|at| detach(&name(at))).collect();
+        request(&mut bench, &edits);
+        assert_eq!((x_of(&bench, &last), bench.status(&last)), (was_x, status));
+        // Hung and let go once more where something has moved.
+        let mut edits: Vec<Edit> = (1..=LEN)
+            .map(|at| attach(&name(at), &name(at - 1), Some(0.5)))
+            .collect();
+        edits.extend((1..=LEN).rev().map(|at| detach(&name(at))));
+        request(&mut bench, &edits);
+        let far_x = x_of(&bench, "x") + 0.5 * LEN as f64;
+        assert_eq!((x_of(&bench, &last), bench.status(&last)), (far_x, status));
+    }
+}
+
 #[test]
 fn bug_a_body_that_cannot_move_was_let_go_and_lost_its_pose_with_those_that_a_reset_forgets() {
     let mut bench = grasp();

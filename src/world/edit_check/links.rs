@@ -48,32 +48,27 @@ impl<'a> Sketch<'a> {
 
 impl<'a> Draft<'a> {
     /// Whether the place of a body is known well enough to hang something on it, or it on something. Cost: the bodies
-    /// above it; once where it is, and nothing is put elsewhere.
+    /// above it; once where nothing is put elsewhere.
     fn is_placed(&mut self, name: &'a str) -> bool {
         let mut at = name;
         let mut way = Vec::new();
         // No longer than the longest chain there can be: they may hang on each other by now.
-        while way.len() <= self.len {
-            if self.placed.contains(at) {
-                self.placed.extend(way);
-                return true;
+        let is_placed = loop {
+            if let Some(known) = self.placed.get(at) {
+                break *known;
             }
-            let Some(body) = self.body(at) else {
-                return false;
+            let Some(body) = self.body(at).filter(|_| way.len() <= self.len) else {
+                break false;
             };
+            way.push(at);
             match body.hangs.filter(|to| self.has(to)) {
-                Some(to) => way.push(std::mem::replace(&mut at, to)),
-                None => {
-                    let has_place = body.has_place && !self.is_forgotten(&body);
-                    if has_place && body.hangs.is_none() {
-                        self.placed.extend(way);
-                        self.placed.insert(at);
-                    }
-                    return has_place;
-                }
+                Some(to) => at = to,
+                None => break body.has_place && !self.is_forgotten(&body),
             }
-        }
-        false
+        };
+        self.placed
+            .extend(way.into_iter().map(|at| (at, is_placed)));
+        is_placed
     }
 
     fn is_forgotten(&self, body: &Sketch<'_>) -> bool {
@@ -148,7 +143,7 @@ impl<'a> Draft<'a> {
             at: self.at,
             ..*body
         };
-        if !free.has_place {
+        if free.has_place != placed {
             self.placed.clear();
         }
         self.bodies.insert(name, Some(free));
