@@ -34,6 +34,8 @@ struct Tally {
     missed: u64,
     /// The newest tick of this boot; tick 0: none yet.
     last: TickRow,
+    /// Number of the last tick of this boot that was heard when it had ended.
+    ended: u64,
     /// Boot id and tick of the names that were written last.
     names: (u64, u64),
 }
@@ -122,12 +124,17 @@ fn follow(
 impl Tally {
     fn tick(&mut self, log: &mut Log, view: &View) -> Result<()> {
         let tick = view.tick();
-        let (last, now) = (self.last.header.tick, tick.header.tick);
-        // A long tick is told of more than once, each time under its number.
-        if last != 0 && now > last {
-            self.missed += now - last - 1;
+        let now = tick.header.tick;
+        if self.last.header.tick == 0 {
+            // What was before the first that is heard is not missed.
+            self.ended = now.saturating_sub(1);
         }
-        self.ticks += u64::from(!view.is_under_way());
+        // A long tick is told of more than once, each time under its number; its end is the whole of it.
+        if !view.is_under_way() {
+            self.ticks += 1;
+            self.missed += now.saturating_sub(self.ended + 1);
+            self.ended = now;
+        }
         self.last = *tick;
         let names = view.names().filter(|names| {
             let these = (names.header.boot_id, names.header.tick);
@@ -185,6 +192,18 @@ mod tests {
             tally.tick(&mut log, client.view()).unwrap();
             assert_eq!((tally.ticks, tally.missed), (ticks, 0));
             server.publish(&out).unwrap();
+        }
+        // One whose end is overtaken is missed.
+        for (tick, is_whole, missed) in [(2, false, 0), (3, true, 1), (4, false, 1), (6, true, 3)] {
+            (under_way.header.tick, out.tick.header.tick) = (tick, tick);
+            if is_whole {
+                server.publish(&out).unwrap();
+            } else {
+                server.publish_tick(&under_way).unwrap();
+            }
+            assert_eq!(client.wait_tick(SECOND_NS).unwrap(), Heard::Tick);
+            tally.tick(&mut log, client.view()).unwrap();
+            assert_eq!(tally.missed, missed, "tick {tick}");
         }
         std::fs::remove_file(&path).unwrap();
     }
