@@ -8,6 +8,7 @@ use std::sync::Arc;
 use super::World;
 use super::census::slot_at;
 use super::edit_links::Places;
+use super::edit_same::Touch;
 use super::filters::{ENABLED, Hot, LIVE, MOVES, NO_GROUP, UNBOUNDED};
 use super::names::NameId;
 use super::parts::Parts;
@@ -194,7 +195,7 @@ impl World {
     fn put(&mut self, spec: &Arc<BodySpec>, shapes: &Parts, after: &mut After) -> bool {
         let known = self.names.find_name(&spec.name).and_then(|n| n.slot);
         if let Some(slot) = known {
-            if self.is_same(slot, spec, shapes) {
+            if self.is_same(slot, spec, shapes, &Touch::default()) {
                 return false;
             }
             self.clear_slot(slot, EndCause::Removed);

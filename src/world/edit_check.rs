@@ -9,6 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::World;
 use super::edit::Edit;
+use super::edit_same::Touch;
 use super::parts::PlacedShape;
 use super::rule_draft::RuleDraft;
 use crate::ids::BodyId;
@@ -28,6 +29,10 @@ struct Draft<'a> {
     bodies: BTreeMap<&'a str, Option<Sketch<'a>>>,
     /// Whether the place of bodies is known; emptied when it may be otherwise by now.
     placed: BTreeMap<&'a str, bool>,
+    /// What the request makes of bodies beside where they are.
+    touched: BTreeMap<&'a str, Touch>,
+    /// How near the pairs of all bodies are told, as of `Touch`, but for those told of since.
+    all_within_m: Option<Option<f64>>,
     /// Number of the edit that is looked at, from 1 on.
     at: usize,
     /// Number of the last edit that forgot the poses of a source's bodies, by source; 0: none did.
@@ -61,6 +66,8 @@ impl World {
             world: self,
             bodies: BTreeMap::new(),
             placed: BTreeMap::new(),
+            touched: BTreeMap::new(),
+            all_within_m: None,
             at: 0,
             forgotten: vec![0; self.sources.len()],
             ids: BTreeMap::new(),
@@ -90,10 +97,7 @@ impl<'a> Draft<'a> {
                 bends_as_said(body, shapes)?;
                 self.look_at_put(body, shapes.len())?;
                 // The same again is nothing: where it is stays known as well as it was.
-                let slot = self.world.slot_named(&body.name);
-                let is_new = self.bodies.contains_key(&*body.name)
-                    || !slot.is_some_and(|slot| self.world.is_same(slot, body, shapes));
-                if is_new {
+                if !self.is_there(body, shapes) {
                     self.bodies
                         .insert(&body.name, Some(Sketch::of_put(body, self.at)));
                     self.placed.clear();
@@ -108,18 +112,22 @@ impl<'a> Draft<'a> {
                 self.len -= 1;
                 Ok(())
             }
-            Edit::Enable { name, .. } | Edit::Filter { name, .. } => {
-                self.must_have(name).map(|_| ())
+            Edit::Enable { name, enabled } => {
+                self.must_have(name)?;
+                self.touched.entry(name).or_default().enabled = Some(*enabled);
+                Ok(())
+            }
+            Edit::Filter { name, group, mask } => {
+                self.must_have(name)?;
+                let touch = self.touched.entry(name).or_default();
+                touch.group = group.or(touch.group);
+                touch.mask = mask.or(touch.mask);
+                Ok(())
             }
             Edit::Margin {
                 name,
                 report_within_m,
-            } => {
-                if let Some(name) = name {
-                    self.must_have(name)?;
-                }
-                is_margin(*report_within_m)
-            }
+            } => self.look_at_margin(name.as_deref(), *report_within_m),
             Edit::Rule(rule) => self.look_at_rule(rule),
             Edit::DropRules { a, b } => self.look_at_drop(a, b),
             Edit::Attach { name, to, pose } => {
@@ -127,6 +135,42 @@ impl<'a> Draft<'a> {
             }
             Edit::Reset { source } => self.look_at_reset(source.as_deref()),
         }
+    }
+
+    fn look_at_margin(
+        &mut self,
+        name: Option<&'a str>,
+        report_within_m: Option<f64>,
+    ) -> Result<(), String> {
+        if let Some(name) = name {
+            self.must_have(name)?;
+            self.touched.entry(name).or_default().report_within_m = Some(report_within_m);
+        } else {
+            self.all_within_m = Some(report_within_m);
+            for touch in self.touched.values_mut() {
+                touch.report_within_m = None;
+            }
+        }
+        is_margin(report_within_m)
+    }
+
+    /// Whether the very body that is put is there at this point of the request.
+    fn is_there(&self, spec: &BodySpec, shapes: &[PlacedShape]) -> bool {
+        let name = &*spec.name;
+        let sketch = self.bodies.get(name);
+        // What hangs elsewhere by now is taken for another: what it hangs on says where it is, or its start pose does.
+        let is_other = |s: &Option<Sketch<'_>>| s.is_none_or(|s| s.is_put || s.hangs.is_some());
+        let slot = self.world.slot_named(name);
+        let Some(slot) = slot.filter(|_| !sketch.is_some_and(is_other)) else {
+            return false;
+        };
+        let touch = self.touched.get(name).copied().unwrap_or_default();
+        let touch = Touch {
+            report_within_m: touch.report_within_m.or(self.all_within_m),
+            is_let_go: sketch.is_some(),
+            ..touch
+        };
+        self.world.is_same(slot, spec, shapes, &touch)
     }
 
     fn look_at_reset(&mut self, source: Option<&str>) -> Result<(), String> {

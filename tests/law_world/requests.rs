@@ -350,3 +350,60 @@ fn bug_a_body_let_go_by_the_request_that_hung_it_on_an_unknown_one_stayed_known(
     assert_eq!(two.status("b"), BodyStatus::Stale);
     assert_eq!(one.status("b"), BodyStatus::Stale);
 }
+
+#[test]
+fn bug_a_put_was_held_against_the_body_of_before_the_request() {
+    let scene = || Bench::of(vec![moving("b", 1), fixed("c", 2, 4.0)]);
+    let again = || [put(moving("b", 1)), attach("c", "b", None)];
+    let filter = |group| Edit::Filter {
+        name: "b".to_owned(),
+        group: Some(group),
+        mask: None,
+    };
+    let enable = |enabled| Edit::Enable {
+        name: "b".to_owned(),
+        enabled,
+    };
+    let margin = |name: Option<&str>, report_within_m| Edit::Margin {
+        name: name.map(str::to_owned),
+        report_within_m,
+    };
+    let was = moving("b", 1).group;
+    // What differs by now is put anew, and its start pose counts.
+    for before in [
+        vec![filter(2)],
+        vec![enable(false)],
+        vec![margin(Some("b"), Some(0.7))],
+        vec![margin(None, Some(0.7))],
+        vec![margin(None, Some(0.7)), margin(Some("b"), Some(0.8))],
+    ] {
+        let mut bench = scene();
+        let edits: Vec<Edit> = before.into_iter().chain(again()).collect();
+        request(&mut bench, &edits);
+        assert_eq!(bench.body("b").generation, 2);
+        assert_eq!(x_of(&bench, "c"), 4.0);
+    }
+    // What is the same by now is not, and was never received.
+    for before in [
+        vec![],
+        vec![filter(2), filter(was)],
+        vec![enable(true)],
+        vec![margin(Some("b"), Some(0.7)), margin(None, None)],
+        vec![margin(None, Some(0.7)), margin(Some("b"), None)],
+        vec![detach("b")],
+        vec![
+            attach("b", "c", Some(1.0)),
+            enable(true),
+            detach("b"),
+            Edit::Reset { source: None },
+        ],
+    ] {
+        let mut bench = scene();
+        let edits: Vec<Edit> = before.into_iter().chain(again()).collect();
+        let text = bench.refused(&edits);
+        assert!(
+            text.contains("it is not known where `c` is seen from `b`"),
+            "{text}"
+        );
+    }
+}

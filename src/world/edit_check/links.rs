@@ -15,11 +15,13 @@ use crate::scene::BodySpec;
 pub(super) struct Sketch<'a> {
     pub(super) spec: &'a BodySpec,
     /// What it hangs on.
-    hangs: Option<&'a str>,
+    pub(super) hangs: Option<&'a str>,
     /// Whether it is known where it is, where what it hangs on has no say in it.
     has_place: bool,
     /// Number of the edit that said so; 0: it was so before the request.
     at: usize,
+    /// Whether the request puts it.
+    pub(super) is_put: bool,
 }
 
 impl<'a> Sketch<'a> {
@@ -30,6 +32,7 @@ impl<'a> Sketch<'a> {
             hangs: spec.attached_to.as_deref(),
             has_place: spec.attached_to.is_none(),
             at,
+            is_put: true,
         }
     }
 
@@ -42,6 +45,7 @@ impl<'a> Sketch<'a> {
             hangs: entry.attach.map(|(to, _)| &*world.names.get(to).text),
             has_place: root.has_pose && !root.refused,
             at: 0,
+            is_put: false,
         })
     }
 }
