@@ -239,7 +239,8 @@ pub(super) struct MonitorArgs {
     /// An open end of a gap's interval is null. `pairs_shown` is [rows in this line, rows published].
     #[arg(long)]
     pub(super) json: bool,
-    /// End after so many ticks; until a signal otherwise.
+    /// End after so many ticks; until a signal otherwise. With --json those that are under way, of which there is word
+    /// each heartbeat, have no line then.
     #[arg(long, value_name = "N")]
     pub(super) ticks: Option<u64>,
     /// End with code 3 when no tick comes for so long.

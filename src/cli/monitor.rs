@@ -60,6 +60,9 @@ pub(super) fn monitor(args: &MonitorArgs, out: &mut Out, stop: &AtomicBool) -> R
                 // One that is under way comes again, whole.
                 seen += u64::from(!client.view().is_under_way());
                 names.follow(client.view().names());
+                if !is_shown(client.view(), args) {
+                    continue;
+                }
                 if args.json {
                     out.line(&tick_json(client.view(), &names, args).to_string())?;
                     out.flush()?;
@@ -101,6 +104,12 @@ fn is_whole(view: &View, args: &MonitorArgs) -> bool {
         && view.pairs().is_some()
         && (!args.contacts || view.contacts().is_some())
         && (args.json || view.bodies().is_some())
+}
+
+/// Whether a tick is shown: where lines are counted each is of a tick that has ended.
+fn is_shown(view: &View, args: &MonitorArgs) -> bool {
+    let are_counted = args.json && args.ticks.is_some();
+    !(are_counted && view.is_under_way())
 }
 
 fn restart_json(news: &Restarted, names: &Names) -> Value {
@@ -312,5 +321,50 @@ pub(super) fn unknown_word(body: &BodyRow) -> Option<&'static str> {
     match BodyStatus::from_code(body.status) {
         Some(BodyStatus::Known | BodyStatus::Disabled) | None => None,
         Some(status) => Some(status.word()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use clap::Parser as _;
+
+    use super::super::args::{Cli, Command};
+    use super::*;
+    use crate::transport::Door as _;
+    use crate::transport::client::Client;
+    use crate::transport::memory::{Hub, MemoryServer};
+    use crate::wire::Outbox;
+
+    const SECOND_NS: u64 = 1_000_000_000;
+
+    #[test]
+    fn bug_where_lines_are_counted_a_tick_under_way_has_none() {
+        let hub = Hub::new();
+        let mut server = MemoryServer::open(&hub, 7, SECOND_NS).unwrap();
+        let link = Box::new(hub.link());
+        let mut client = Client::over(link, Arc::new(SystemClock), None, SECOND_NS).unwrap();
+        let args = |text: &str| match Cli::try_parse_from(text.split(' ')).unwrap().command {
+            Command::Monitor(args) => args,
+            other => panic!("{other:?}"),
+        };
+        let shown = |view: &View| {
+            ["", " --json", " --ticks 3", " --json --ticks 3"]
+                .map(|flags| is_shown(view, &args(&format!("sweepd monitor{flags}"))))
+        };
+        let mut out = Outbox::default();
+        out.tick.header.boot_id = 7;
+        out.tick.header.tick = 1;
+        let mut under_way = out.tick;
+        under_way.header.state = State::Unknown.code();
+        under_way.reasons = Reason::Undecided.bit();
+        server.publish_tick(&under_way).unwrap();
+        assert_eq!(client.wait_tick(SECOND_NS).unwrap(), Heard::Tick);
+        assert_eq!(shown(client.view()), [true, true, true, false]);
+        out.tick.sent_ns = 1;
+        server.publish(&out).unwrap();
+        assert_eq!(client.wait_tick(SECOND_NS).unwrap(), Heard::Tick);
+        assert_eq!(shown(client.view()), [true; 4]);
     }
 }
