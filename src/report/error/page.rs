@@ -56,7 +56,8 @@ pub fn html(report: &Report, scene: &str) -> String {
              undecided and whose last verdict is not the truth. Width: of the proved interval of each pair that is told; \
              endless ones are in no mean, but counted. Onset: ticks from the begin of a collision until it is told as certain. Over: time beyond the budget, or beyond \
              the floor where that is more (below its floor a tick takes the floor, and says so). Wrong, excluded: against a \
-             twin without a budget at the same poses.</p>\n<div class=\"figures\">";
+             twin without a budget at the same poses. Each pair has a row here, also where the scene's `pair_rows` are fewer: with so many pairs \
+             times hold what those rows take.</p>\n<div class=\"figures\">";
     body += &figures(report);
     page("sweepd: error against run time", &(body + "</div>\n"))
 }
