@@ -113,6 +113,19 @@ fn a_file_that_is_cut_off_is_read_as_far_as_its_chunks_are_whole() {
 }
 
 #[test]
+fn a_missing_tick_ends_the_reading_before_it() {
+    let scrap = Scrap::new();
+    let file = create(&scrap.0, false).unwrap();
+    let mut sink = McapSink::new(file, "scrap", "world", &start()).unwrap();
+    for tick in (1..=5).chain(7..=10) {
+        sink.tick(&record(tick), false).unwrap();
+    }
+    sink.end("").unwrap();
+    let how = Ending::Damaged("after tick 5 comes tick 7".to_owned());
+    assert_eq!(read(&scrap), (5, how));
+}
+
+#[test]
 fn a_changed_byte_ends_the_reading_at_its_chunk() {
     let mut bytes = std::fs::read(&written(50, Some("")).0).unwrap();
     let at = bytes.len() / 2;
