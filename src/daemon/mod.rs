@@ -184,7 +184,9 @@ impl<'a> Daemon<'a> {
     /// Takes frames and requests; requests go to the worker, built edits come back from it.
     fn receive(&mut self) -> Result<()> {
         self.door.receive(&mut self.arrived, self.clock.as_ref());
-        self.pacer.take(&mut self.arrived, self.clock.boottime_ns());
+        let now_ns = self.clock.boottime_ns();
+        self.pacer
+            .take(&mut self.arrived, self.engine.world(), now_ns);
         let builder = &mut self.builder;
         self.door.requests(&mut |token, header, payload| {
             let json_len = usize::try_from(header.json_len).unwrap_or(usize::MAX);

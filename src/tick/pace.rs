@@ -14,7 +14,7 @@ mod held;
 mod source;
 
 use beat::Beat;
-use held::{Held, Queue, Vertices, Whose};
+use held::{Held, Lead, Queue, Vertices, Whose};
 use source::{Source, Speaker};
 
 use crate::config::Config;
@@ -95,11 +95,13 @@ impl Pacer {
             let in_force = world.in_force(place);
             source.in_force = in_force.map(|(session, heard_ns)| Speaker { session, heard_ns });
         }
-        self.hear_anew();
+        self.hear_anew(world);
     }
 
     /// Takes everything out of an inbox and leaves it empty.
-    pub fn take(&mut self, inbox: &mut Inbox, now_ns: u64) {
+    ///
+    /// * `world` - that which will be given the frames.
+    pub fn take(&mut self, inbox: &mut Inbox, world: &World, now_ns: u64) {
         // Who leaves has sent its last frame, and the next one may speak for its source.
         self.ended.extend(inbox.ended());
         for frame in inbox.frames_mut() {
@@ -114,8 +116,9 @@ impl Pacer {
                 received_ns,
                 speaks: false,
             };
-            if let Some(source) = place.and_then(|p| self.sources.get_mut(p)) {
-                whose.speaks = source.hear(frame, received_ns, &self.ended);
+            let good = place.filter(|_| !world.would_refuse(frame));
+            if let Some(source) = good.and_then(|p| self.sources.get_mut(p)) {
+                whose.speaks = source.hear(frame.header.session, received_ns, &self.ended);
                 if whose.speaks {
                     source.passed += source.lost_before(&frame.header);
                 }
@@ -137,7 +140,7 @@ impl Pacer {
             self.vertices.put(frame, place);
         }
         if !inbox.ended().is_empty() {
-            self.hear_anew();
+            self.hear_anew(world);
         }
         inbox.clear();
     }
@@ -169,7 +172,10 @@ impl Pacer {
             })
         })?;
         let lead = match self.beat {
-            Beat::OnFrame(lead) => Some(lead),
+            Beat::OnFrame(source) => Some(Lead {
+                source,
+                session: self.sources.get(source).and_then(|s| s.alive(now_ns)),
+            }),
             _ => None,
         };
         self.vertices.take(into, lead, self.queue.frames());
@@ -303,18 +309,20 @@ impl Pacer {
 
     /// Hears the frames that wait anew, on top of what the world has: what seemed a stranger's may count now, and what
     /// seemed to count may not.
-    fn hear_anew(&mut self) {
+    fn hear_anew(&mut self, world: &World) {
         for source in &mut self.sources {
             (source.speaker, source.sent) = (source.in_force, false);
         }
         let mut first_ns = None;
         for held in self.queue.frames_mut() {
             let whose = &mut held.whose;
-            let Some(source) = whose.source.and_then(|place| self.sources.get_mut(place)) else {
+            let before = std::mem::take(&mut whose.speaks);
+            let good = whose.source.filter(|_| !world.would_refuse(&held.frame));
+            let Some(source) = good.and_then(|place| self.sources.get_mut(place)) else {
                 continue;
             };
-            let before = whose.speaks;
-            whose.speaks = source.hear(&held.frame, whose.received_ns, &self.ended);
+            let session = held.frame.header.session;
+            whose.speaks = source.hear(session, whose.received_ns, &self.ended);
             if whose.speaks && !before {
                 source.passed += source.lost_before(&held.frame.header);
             }

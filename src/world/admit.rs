@@ -70,6 +70,14 @@ impl World {
         })
     }
 
+    /// Whether a frame is refused whoever speaks for its source, as far as its rows are not looked at.
+    #[must_use]
+    pub fn would_refuse(&self, frame: &Frame) -> bool {
+        let session = frame.header.session;
+        let checked = self.check_frame(frame);
+        checked.is_err() || checked.is_ok_and(|source| self.over.holds(source, session))
+    }
+
     /// Layout, flags, counts and source: what can be said without looking at sessions.
     fn check_frame(&self, frame: &Frame) -> Result<SourceSlot, (Option<SourceSlot>, RejectReason)> {
         let header = &frame.header;

@@ -27,8 +27,10 @@ struct Draft<'a> {
     world: &'a World,
     /// Bodies that the request puts, hangs, lets go or removes (`None`).
     bodies: BTreeMap<&'a str, Option<Sketch<'a>>>,
-    /// Whether the place of bodies is known; emptied when it may be otherwise by now.
+    /// Whether the place of bodies is known; without those of which it may be otherwise by now.
     placed: BTreeMap<&'a str, bool>,
+    /// Of those: on which body each hangs, and that one in turn; the upper first.
+    below: BTreeSet<(&'a str, &'a str)>,
     /// What the request makes of bodies beside where they are.
     touched: BTreeMap<&'a str, Touch>,
     /// How near the pairs of all bodies are told, as of `Touch`, but for those told of since.
@@ -66,6 +68,7 @@ impl World {
             world: self,
             bodies: BTreeMap::new(),
             placed: BTreeMap::new(),
+            below: BTreeSet::new(),
             touched: BTreeMap::new(),
             all_within_m: None,
             at: 0,
@@ -100,14 +103,14 @@ impl<'a> Draft<'a> {
                 if !self.is_there(body, shapes) {
                     self.bodies
                         .insert(&body.name, Some(Sketch::of_put(body, self.at)));
-                    self.placed.clear();
+                    self.forget_place(&body.name);
                 }
                 Ok(())
             }
             Edit::Remove { name } => {
                 self.must_have(name)?;
                 self.bodies.insert(name, None);
-                self.placed.clear();
+                self.forget_place(name);
                 self.matched.clear();
                 self.len -= 1;
                 Ok(())
@@ -186,6 +189,7 @@ impl<'a> Draft<'a> {
             }
         }
         self.placed.clear();
+        self.below.clear();
         Ok(())
     }
 

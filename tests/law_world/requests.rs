@@ -306,6 +306,39 @@ fn bug_a_long_chain_that_is_let_go_from_its_end_was_walked_from_each_of_its_bodi
 }
 
 #[test]
+fn bug_a_chain_of_bodies_that_cannot_move_was_walked_from_each_that_is_let_go() {
+    const LEN: u64 = 20_000;
+    let name = |at: u64| match at {
+        0 => "x".to_owned(),
+        at => format!("link{at}"),
+    };
+    for mut bench in [Bench::of(vec![moving("x", 1), moving("z", 2)]), grasp()] {
+        let link = |at: u64| BodySpec {
+            moves: false,
+            source: None,
+            ..hung(&name(at), &name(at - 1), 0.25)
+        };
+        request(
+            &mut bench,
+            &(1..=LEN).map(|at| put(link(at))).collect::<Vec<_>>(),
+        );
+        let mut edits = Vec::new();
+        for at in (1..=LEN).rev() {
+            edits.push(Edit::Attach {
+                name: name(at),
+                to: None,
+                pose: Some(Pose::translation(at as f64, 0.0, 0.0)),
+            });
+            // Something else is hung in between.
+            edits.push(attach("z", "x", Some(1.0)));
+        }
+        request(&mut bench, &edits);
+        assert_eq!(x_of(&bench, &name(LEN)), LEN as f64);
+        assert_eq!(bench.status(&name(1)), BodyStatus::Known);
+    }
+}
+
+#[test]
 fn bug_a_body_that_cannot_move_was_let_go_and_lost_its_pose_with_those_that_a_reset_forgets() {
     let mut bench = grasp();
     bench.edit(attach("floor", "x", Some(1.0)));

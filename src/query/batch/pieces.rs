@@ -188,7 +188,8 @@ fn allow_for_squares(found: &Closest) -> Closest {
     );
     Closest {
         gap,
-        finished: found.finished || gap.width() <= 4.0 * SQUARES_LOST_M,
+        // Who collides for certain goes on doing so.
+        finished: found.finished || found.gap.max <= 0.0 || gap.width() <= 4.0 * SQUARES_LOST_M,
         ..*found
     }
 }

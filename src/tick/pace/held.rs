@@ -4,7 +4,9 @@
 //! are passed over and counted; a partial one does not, because those may hold bodies that it lacks, and one of a
 //! source that moves continuous bodies does not, because those are on their way.
 
-use crate::limits::{FRAMES_PER_DRAIN_MAX, SOURCES_MAX, VERTEX_FRAMES_WAITING_MAX};
+use crate::limits::{
+    FRAMES_PER_DRAIN_MAX, SOURCES_MAX, VERTEX_FRAMES_WAITING_MAX, VERTEX_ROWS_WAITING_MAX,
+};
 use crate::wire::{Frame, Inbox, VertexFrame, VertexHeader, WIRE_VERSION, frame_flags};
 
 /// Whose a frame is.
@@ -121,6 +123,15 @@ pub(super) struct Vertices {
     going: Vec<(Option<usize>, u64)>,
 }
 
+/// The source each of whose frames makes a tick of its own.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lead {
+    /// Its place.
+    pub(super) source: usize,
+    /// The session that speaks for it; `None`: nobody's does, or who did has been silent for too long.
+    pub(super) session: Option<u64>,
+}
+
 /// A message of vertices that waits.
 #[derive(Clone, Debug, Default)]
 struct Bent {
@@ -135,10 +146,7 @@ impl Vertices {
     /// Takes vertices out of an inbox. Of more than a source may have waiting the oldest go: the numbers of those that
     /// follow tell that they are missing.
     pub(super) fn put(&mut self, frame: &mut VertexFrame, source: Option<usize>) {
-        let of_source = |held: &Bent| held.source == source;
-        if self.waiting.iter().filter(|held| of_source(held)).count() >= VERTEX_FRAMES_WAITING_MAX
-            && let Some(oldest) = self.waiting.iter().position(of_source)
-        {
+        while let Some(oldest) = self.crowded_out_by(frame, source) {
             let oldest = self.waiting.remove(oldest);
             self.spare.push(oldest.frame);
         }
@@ -151,11 +159,25 @@ impl Vertices {
         self.waiting.push(held);
     }
 
+    /// The oldest of a source, where this one of it is one message or one row too many.
+    fn crowded_out_by(&self, frame: &VertexFrame, source: Option<usize>) -> Option<usize> {
+        let of_source = |held: &&Bent| held.source == source;
+        let (mut messages, mut rows) = (0, frame.rows.len());
+        for held in self.waiting.iter().filter(of_source) {
+            messages += 1;
+            rows += held.frame.rows.len();
+        }
+        let fits = messages < VERTEX_FRAMES_WAITING_MAX && rows <= VERTEX_ROWS_WAITING_MAX;
+        let oldest = self.waiting.iter().position(|held| of_source(&held));
+        oldest.filter(|_| !fits)
+    }
+
     /// Hands out what a tick with these frames takes.
     ///
-    /// * `lead` - the source each of whose frames makes a tick of its own.
+    /// * `lead` - the source each of whose frames makes a tick of its own, and who speaks for it: nobody else's
+    ///   vertices wait for a frame, for they are refused.
     /// * `frames` - those that go on waiting.
-    pub(super) fn take(&mut self, into: &mut Inbox, lead: Option<usize>, frames: &[Held]) {
+    pub(super) fn take(&mut self, into: &mut Inbox, lead: Option<Lead>, frames: &[Held]) {
         self.going.clear();
         for held in self.waiting.iter_mut().rev() {
             let (header, session) = (&held.frame.header, held.session());
@@ -199,13 +221,17 @@ impl Bent {
     }
 
     /// Whether it waits on, by what [`Vertices::take`] is given and what of it was `kept` so far.
-    fn waits(&self, kept: &[Self], into: &Inbox, lead: Option<usize>, frames: &[Held]) -> bool {
+    fn waits(&self, kept: &[Self], into: &Inbox, lead: Option<Lead>, frames: &[Held]) -> bool {
         let header = &self.frame.header;
         let own = |frame: &Frame| frame.header.session == header.session;
         let before = |held: &Held| {
             held.whose.source == self.source && held.whose.speaks && !own(&held.frame)
         };
-        let awaits_frame = lead.is_some() && self.source == lead && header.seq != 0;
+        let speaks = |lead: Lead| {
+            let nobody_else = |session| session == header.session;
+            self.source == Some(lead.source) && lead.session.is_none_or(nobody_else)
+        };
+        let awaits_frame = header.seq != 0 && lead.is_some_and(speaks);
         !self.goes
             && (awaits_frame
                 || kept.iter().any(|held| held.session() == self.session())

@@ -1,7 +1,7 @@
 //! A source as the pacer knows it: who speaks for it, when it was heard, what of it never came.
 
 use crate::scene::SourceSpec;
-use crate::wire::{Frame, FrameHeader, SOURCE_NAME_LEN, WIRE_VERSION, name_bytes};
+use crate::wire::{FrameHeader, SOURCE_NAME_LEN, name_bytes};
 
 /// Who speaks for a source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,20 +47,15 @@ impl Source {
         }
     }
 
-    /// Hears a frame under its name; whether it is one that the world will take for it, as far as can be told here: not
-    /// that of a stranger while somebody else speaks for the source, which may neither end a round nor stand for its
-    /// frame.
+    /// Hears a frame of this session under its name that nothing else is wrong with; whether the world will take it:
+    /// not that of a stranger while somebody else speaks for the source, which may neither end a round nor stand for
+    /// its frame.
     ///
     /// * `ended` - sessions that are over with the last of their frames.
-    pub(super) fn hear(&mut self, frame: &Frame, received_ns: u64, ended: &[u64]) -> bool {
-        let session = frame.header.session;
-        let good = frame.header.schema == WIRE_VERSION && session != 0 && frame.refused.is_none();
+    pub(super) fn hear(&mut self, session: u64, received_ns: u64, ended: &[u64]) -> bool {
         let before = self.speaker.filter(|before| before.session == session);
-        let is_taken = before.is_none() && self.is_alive(received_ns) && {
-            let other = self.speaker.map_or(0, |other| other.session);
-            !ended.contains(&other)
-        };
-        let speaks = good && !is_taken;
+        let other = self.alive(received_ns).filter(|by| !ended.contains(by));
+        let speaks = before.is_some() || other.is_none();
         if speaks {
             let heard_ns = before.map_or(received_ns, |before| before.heard_ns.max(received_ns));
             self.speaker = Some(Speaker { session, heard_ns });
@@ -69,15 +64,15 @@ impl Source {
         speaks
     }
 
-    /// Whether who speaks for it was heard within its time-out.
-    fn is_alive(&self, now_ns: u64) -> bool {
-        self.speaker
-            .is_some_and(|speaker| now_ns.saturating_sub(speaker.heard_ns) < self.timeout_ns)
+    /// The session that speaks for it and was heard within its time-out.
+    pub(super) fn alive(&self, now_ns: u64) -> Option<u64> {
+        let in_time = |by: &Speaker| now_ns.saturating_sub(by.heard_ns) < self.timeout_ns;
+        self.speaker.filter(in_time).map(|by| by.session)
     }
 
     /// Whether a round waits for it: alive, and not late in the round before.
     pub(super) fn is_waited_for(&self, now_ns: u64) -> bool {
-        !self.late && self.is_alive(now_ns)
+        !self.late && self.alive(now_ns).is_some()
     }
 
     /// Frames of the session that never came, as the number of the next one tells: its queue in shared memory holds

@@ -52,7 +52,7 @@ impl<'a> Sketch<'a> {
 
 impl<'a> Draft<'a> {
     /// Whether the place of a body is known well enough to hang something on it, or it on something. Cost: the bodies
-    /// above it; once where nothing is put elsewhere.
+    /// above it that are not known to be placed or not.
     fn is_placed(&mut self, name: &'a str) -> bool {
         let mut at = name;
         let mut way = Vec::new();
@@ -66,13 +66,30 @@ impl<'a> Draft<'a> {
             };
             way.push(at);
             match body.hangs.filter(|to| self.has(to)) {
-                Some(to) => at = to,
+                Some(to) => {
+                    self.below.insert((to, at));
+                    at = to;
+                }
                 None => break body.has_place && !self.is_forgotten(&body),
             }
         };
         self.placed
             .extend(way.into_iter().map(|at| (at, is_placed)));
         is_placed
+    }
+
+    /// A body is put elsewhere or hangs elsewhere by now, and with it what hangs on it.
+    pub(super) fn forget_place(&mut self, name: &'a str) {
+        let mut all = vec![name];
+        while let Some(at) = all.pop() {
+            self.placed.remove(at);
+            while let Some(&(upper, lower)) = self.below.range((at, "")..).next()
+                && upper == at
+            {
+                self.below.remove(&(upper, lower));
+                all.push(lower);
+            }
+        }
     }
 
     fn is_forgotten(&self, body: &Sketch<'_>) -> bool {
@@ -105,9 +122,7 @@ impl<'a> Draft<'a> {
                 "it is not known where `{name}` is seen from `{to}`: give `pose`, or wait for their frames"
             ));
         }
-        if pose.is_some() {
-            self.placed.clear();
-        }
+        self.forget_place(name);
         let hung = Sketch {
             hangs: Some(to),
             has_place: body.has_place && pose.is_none(),
@@ -148,7 +163,7 @@ impl<'a> Draft<'a> {
             ..*body
         };
         if free.has_place != placed {
-            self.placed.clear();
+            self.forget_place(name);
         }
         self.bodies.insert(name, Some(free));
         Ok(())

@@ -32,8 +32,6 @@ where
 struct Drained {
     frames: usize,
     errors: u64,
-    /// A source has given its whole queue, and may have more.
-    cut: bool,
 }
 
 /// What is the same for every frame of a drain.
@@ -121,7 +119,7 @@ where
         mut take: impl FnMut(H, Option<&[T]>) -> u64,
     ) -> Drained {
         let before = self.kept.len();
-        let (mut errors, mut cut) = (0, false);
+        let mut errors = 0;
         loop {
             match self.subscriber.receive() {
                 Ok(Some(sample)) => {
@@ -134,12 +132,8 @@ where
                     sessions.insert(publisher, session);
                     self.kept.push(sample);
                 }
-                Ok(None) => break,
-                // a source has given its whole queue: the fair end of a drain
-                Err(ReceiveError::ExceedsMaxBorrows) => {
-                    cut = true;
-                    break;
-                }
+                // every source has given its whole queue: the fair end of a drain
+                Ok(None) | Err(ReceiveError::ExceedsMaxBorrows) => break,
                 Err(_) => {
                     errors += 1;
                     break;
@@ -147,11 +141,7 @@ where
             }
         }
         let frames = self.kept.len() - before;
-        Drained {
-            frames,
-            errors,
-            cut,
-        }
+        Drained { frames, errors }
     }
 
     fn release(&mut self) {
@@ -188,8 +178,7 @@ impl Server {
         } = self;
         let rows_max = options.frame_rows_max;
         // Two queues, one order: both are read until neither has more, so that whatever a source sent before a frame
-        // that is here is here, too; then they are put in the order of their sending. A cut ends it: what is sent now
-        // comes behind what was left.
+        // that is here is here, too; then they are put in the order of their sending.
         let (mut poses, mut motions) = (0, 0);
         loop {
             let of_poses = transforms.drain(rows_max, sessions, |header, rows| {
@@ -201,7 +190,7 @@ impl Server {
             *receive_errors += of_poses.errors + of_motions.errors;
             poses += of_poses.frames;
             motions += of_motions.frames;
-            if of_poses.frames + of_motions.frames == 0 || of_poses.cut || of_motions.cut {
+            if of_poses.frames + of_motions.frames == 0 {
                 break;
             }
         }

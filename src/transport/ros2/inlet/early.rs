@@ -7,8 +7,8 @@ use std::collections::VecDeque;
 
 use super::super::poses::Receipt;
 use crate::limits::{FRAME_ROWS_MAX, FRAMES_PER_DRAIN_MAX};
-use crate::wire::RejectReason;
 use crate::wire::ros::BodyTransforms;
+use crate::wire::{BODY_NAME_LEN, RejectReason};
 
 /// A message that waits, since when, and until when at most.
 #[derive(Debug)]
@@ -48,8 +48,7 @@ impl Early {
         let is_behind =
             (self.waiting.iter()).any(|other| session(&other.message) == session(&message));
         let waits = is_behind || is_early(&message, names_rev);
-        let Some(timeout_ns) = timeout_ns.filter(|_| waits && rows(&message) <= FRAME_ROWS_MAX)
-        else {
+        let Some(timeout_ns) = timeout_ns.filter(|_| waits && may_be_kept(&message)) else {
             return put(&message, receipt, None);
         };
         while let Some(oldest) = self.crowded_out_by(&message) {
@@ -101,6 +100,12 @@ impl Early {
 /// Rows of a message, of which each takes memory.
 fn rows(message: &BodyTransforms) -> usize {
     message.transforms.len().max(message.velocities.len())
+}
+
+/// Whether a message is of a size that can be good: no body has a longer name, and none more rows.
+fn may_be_kept(message: &BodyTransforms) -> bool {
+    let is_short = |name: &str| name.len() <= BODY_NAME_LEN;
+    rows(message) <= FRAME_ROWS_MAX && message.transforms.iter().all(|row| is_short(&row.name))
 }
 
 /// Whose a frame is: what has an order of its own.

@@ -4,6 +4,7 @@
 //! In: requests that may be done, in the order of their receipt. Out: in the same order, JSON for the tick thread, or
 //! why there is none for the receiving thread, which is woken.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -70,7 +71,9 @@ fn write(from: &Receiver<Asked>, shared: &Shared, waker: &Waker) {
             return;
         }
         let desk: &Desk = &shared.desk;
-        match words() {
+        // One that cannot be put in words leaves the others theirs.
+        let words = catch_unwind(AssertUnwindSafe(words));
+        match words.unwrap_or_else(|_| Err("it cannot be read: its log says why".to_owned())) {
             Ok(what) => {
                 let request = if verb == Verb::Gap {
                     what
@@ -114,6 +117,7 @@ mod tests {
         };
         assert!(scribe.take((1, Verb::Remove, Box::new(name))));
         assert!(scribe.take((2, Verb::Put, Box::new(|| Err("no".to_owned())))));
+        assert!(scribe.take((4, Verb::Put, Box::new(|| panic!("amid a request")))));
         assert!(scribe.take((3, Verb::Gap, Box::new(|| Ok(json!({ "gap": 1 }))))));
         let mut events = Events::with_capacity(4);
         while open(&shared.desk.asked).len() < 2 {
@@ -130,7 +134,7 @@ mod tests {
         ];
         assert_eq!(asked, wanted);
         let answered = std::mem::take(&mut *open(&shared.desk.answered));
-        assert_eq!(answered.len(), 1);
+        assert_eq!(answered.len(), 2);
         assert_eq!(
             (answered[0].0, answered[0].1.error.as_deref()),
             (2, Some("no"))
