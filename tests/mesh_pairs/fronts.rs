@@ -3,10 +3,12 @@
 use crate::oracle::Truth;
 use crate::oracle::meshes;
 use crate::oracle::rng::Rng;
-use crate::support::{CASES, KINDS, any_convex, any_mesh, any_two, place, shape, truth_of, way};
+use crate::support::{
+    CASES, KINDS, any_convex, any_mesh, any_two, convex, place, shape, truth_of, way,
+};
 use sweepd::math::{Pose, Quat, Vec3, relative};
 use sweepd::narrow::mesh::{CarriedFront, FrontStore, Goal, Search, has_front};
-use sweepd::shape::Shape;
+use sweepd::shape::{Convex, Shape};
 use sweepd::time::{ManualClock, Meter};
 
 /// Poses of a pair.
@@ -429,6 +431,67 @@ fn law_3_3_a_front_keeps_what_is_inside_apart_from_what_is_outside() {
             case % 2 == 0,
             &format!("inside {case}"),
         );
+    }
+}
+
+/// Whether a thin plate that trembles about a wall within a hollow body is told to be in the wall where it is, pose
+/// after pose.
+fn tremble(rng: &mut Rng, hollow: &Shape, plate: &Shape, what: &str) {
+    let clock = ManualClock::new(0);
+    let (mut store, mut front) = (FrontStore::default(), CarriedFront::default());
+    let at = Vec3::new(rng.range(-0.5, 0.5), rng.range(-0.5, 0.5), -0.7);
+    // It comes back to where it was, or near.
+    let sides = [0.004, 0.008, -0.004, -0.008].map(|z| at + Vec3::z() * z);
+    for tick in 0..30 {
+        let side = if tick < 4 {
+            sides[tick % 2 * 2]
+        } else {
+            sides[rng.below(4)]
+        };
+        let place = side + rng.vector(1e-5);
+        let pos12 = Pose::from_parts(place.into(), Quat::identity());
+        if tick == 0 {
+            front.start(&mut store, hollow, plate, &pos12, Search::Carried);
+        } else {
+            front.move_to(&mut store, hollow, plate, &pos12);
+        }
+        let goal = if rng.below(8) == 0 {
+            Goal::Gap
+        } else {
+            Goal::Verdict
+        };
+        let mut meter = Meter::unlimited(&clock);
+        assert!(front.advance(&mut store, hollow, plate, goal, u64::MAX, &mut meter));
+        let told = front.interval();
+        let is_in = place.z < -0.7;
+        assert!(
+            if is_in {
+                told.max <= 0.0
+            } else {
+                told.min > 0.0
+            },
+            "{what}, tick {tick}, z {}: {told:?}",
+            place.z + 0.7
+        );
+    }
+}
+
+#[test]
+fn law_3_3_bug_what_was_known_of_insides_does_not_come_back_with_the_pair() {
+    let one = Vec3::new(1.0, 1.0, 1.0);
+    let hollow = shape(
+        &meshes::cuboid(one).and(meshes::cuboid(one * 0.7).inverted()),
+        None,
+    );
+    let half = Vec3::new(0.15, 0.15, 5e-5);
+    let plates = [
+        shape(&meshes::cuboid(half), None),
+        convex(Convex::cuboid(half)),
+    ];
+    for case in 0..CASES {
+        let mut rng = Rng::new(26_000_000 + case);
+        let plate = &plates[rng.below(2)];
+        tremble(&mut rng, &hollow, plate, &format!("plate {case}"));
     }
 }
 

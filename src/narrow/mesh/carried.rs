@@ -165,6 +165,8 @@ impl CarriedFront {
         self.cover.arrive(&mut store.entries);
         if self.cover.drift.left_m(self.shells_expiry_m) <= 0.0 {
             self.shells.start(self.solids);
+            // It spoke of the answer that is gone: where the pair comes back another may stand, of the other side.
+            self.shells_expiry_m = f64::NEG_INFINITY;
         }
     }
 
