@@ -317,3 +317,30 @@ fn what_touches_to_the_last_digit_where_it_is_touches_at_once() {
         at(&ask(rig.engine.world(), json), 0.0);
     }
 }
+
+#[test]
+fn bug_the_first_of_several_touches_was_left_open_up_to_a_later_one() {
+    let bodies = [
+        r#"name = "bar"
+moves = false
+position = [0.6368592544792979, 0.43577930203426707, 0.9176007212909796]
+orientation = [0.42784693145087976, 0.7365849091786374, -0.21577395876454253, -0.47731674340781527]
+shape = { type = "box", half_extents = [0.2015738836889722, 0.20299112438313482, 0.9278040127115219] }"#,
+        r#"name = "roller"
+moves = false
+position = [1.2073054679859343, 0.3646137400052156, -1.591091367559807]
+orientation = [0.7677919816758492, -0.31810038564200405, -0.4352122519302526, -0.3462627807005528]
+shape = { type = "cylinder", radius = 0.2, half_height = 1 }"#,
+    ];
+    let rig = rig(&bodies.map(str::to_owned));
+    let found = ask(
+        rig.engine.world(),
+        r#"{"a": "bar", "b": "roller", "within_s": 1,
+            "angular_a": [5.007442712078114, 0.6021863086100283, -0.7317263361525143],
+            "linear_b": [-1.5502916006967578, -0.09932682419061667, 3.6064579493990205],
+            "angular_b": [52.465515803451204, 8.10818615314173, 9.584417041116245]}"#,
+    );
+    assert_eq!(found.verdict, Verdict::Colliding.code());
+    let (low, high) = (found.t_min_s, found.t_max_s.unwrap());
+    assert!(0.32 < low && high - low < 1e-6, "{found:?}");
+}

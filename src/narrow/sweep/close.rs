@@ -15,6 +15,8 @@ const CLOSE_ENOUGH: f64 = 1e-9;
 const PLAIN_ENOUGH: f64 = 0.1;
 /// A sweep that has not come nearer than this in so many looks is asked for a touch ahead of it.
 const PATIENCE_LOOKS: u32 = 8;
+/// So many shares before a known touch without one tell that it may not be the first.
+const PROBES_IN_VAIN: u32 = 4;
 /// An advance by less has all but met the touch.
 const CREEP: f64 = 1e-10;
 
@@ -35,7 +37,7 @@ impl Sweep {
         }
         let at = match (known, self.stuck) {
             (true, true) => f64::midpoint(self.missed, self.hit),
-            (true, false) => self.free + 0.3 * left,
+            (true, false) => self.free + 0.3 * self.span(step),
             (false, _) => self.free + self.behind(step),
         };
         let at = at.min(1.0);
@@ -52,6 +54,17 @@ impl Sweep {
             // Asked again when there is more to spend.
             Ahead::Cut => {}
             Ahead::Free { .. } | Ahead::Unsure => self.missed = at,
+        }
+    }
+
+    /// How much of the way to the touch that is known to look for one before it in. Two bodies may meet several times:
+    /// where shares between had none again and again, the first touch lies rather before them.
+    fn span(&self, step: f64) -> f64 {
+        let before = self.missed - self.free;
+        if self.probes >= PROBES_IN_VAIN && self.missed < self.hit && 0.3 * before > step {
+            before
+        } else {
+            self.hit - self.free
         }
     }
 
