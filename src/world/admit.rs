@@ -81,14 +81,12 @@ impl World {
     /// Layout, flags, counts and source: what can be said without looking at sessions.
     fn check_frame(&self, frame: &Frame) -> Result<SourceSlot, (Option<SourceSlot>, RejectReason)> {
         let header = &frame.header;
-        let bad_layout = Err((None, RejectReason::BadLayout));
-        if header.schema != WIRE_VERSION || header.session == 0 {
-            return bad_layout;
+        let name = name_str(&header.source);
+        let source = name.and_then(|name| self.source_named(name));
+        if header.schema != WIRE_VERSION || header.session == 0 || name.is_none() {
+            return Err((source, RejectReason::BadLayout));
         }
-        let Some(name) = name_str(&header.source) else {
-            return bad_layout;
-        };
-        let Some(source) = self.source_named(name) else {
+        let Some(source) = source else {
             return Err((None, RejectReason::UnknownSource));
         };
         if let Some(reason) = frame.refused {

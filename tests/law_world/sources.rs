@@ -47,6 +47,8 @@ fn law_4_1_a_frame_that_does_not_fit_is_refused_as_a_whole_and_counted() {
     let nobody = |f: &mut Frame| f.header.source = name_bytes("nobody");
     assert_eq!(wrong(&nobody), RejectReason::UnknownSource);
     assert_eq!(bench.rejects(bad), 7);
+    // Where a frame says whose it is, it is that source's.
+    assert_eq!(bench.world.sources()[0].to_row(0).refused, 7);
     assert_eq!(bench.status("a"), BodyStatus::NotReceived);
     // None of it stands in the way of a good one, and none opened a session.
     assert_eq!(send_with(&mut bench, MS, |_| {}), admitted(0, 1, 0));

@@ -96,15 +96,18 @@ impl Diagnoser {
         });
         let new: Vec<String> = new.collect();
         self.rejects = row.rejects.to_vec();
-        let (level, message) = if !silent.is_empty() {
-            (ERROR, format!("silent: {}", silent.join(", ")))
-        } else if !new.is_empty() {
-            (
-                WARN,
-                format!("refused in the last second: {}", new.join(", ")),
-            )
-        } else {
-            (OK, "all sources send".to_owned())
+        let mut said = Vec::new();
+        if !silent.is_empty() {
+            said.push(format!("silent: {}", silent.join(", ")));
+        }
+        // Also of a silent source: it may be silent because all that it sends is refused.
+        if !new.is_empty() {
+            said.push(format!("refused in the last second: {}", new.join(", ")));
+        }
+        let (level, message) = match said.as_slice() {
+            [] => (OK, "all sources send".to_owned()),
+            _ if silent.is_empty() => (WARN, said.join("; ")),
+            _ => (ERROR, said.join("; ")),
         };
         let age = |source: &SourceRow| match source.age_ns {
             u64::MAX => value(name(source), "never"),
@@ -289,7 +292,8 @@ mod tests {
         row.rejects[1] = 3;
         let all = levels(&mut diagnoser, &row, &["body a: lost".to_owned()]);
         assert_eq!(all[0], (ERROR, "unknown: stale".to_owned()));
-        assert_eq!(all[2], (ERROR, "silent: arm".to_owned()));
+        let refused = "silent: arm; refused in the last second: 3 bad_quaternion";
+        assert_eq!(all[2], (ERROR, refused.to_owned()));
         assert_eq!(all[3], (WARN, "body a: lost".to_owned()));
         row.sources[0].alive = 1;
         row.rejects[1] = 5;
