@@ -10,7 +10,7 @@ import numpy as np
 
 from . import layout
 from .errors import Refused, Restarted, Skipped, SweepdError, TimedOut
-from .frames import MOVING, POSE, columns_of, rows_of, time_left, whole
+from .frames import MOVING, POSE, array, columns_of, rows_of, time_left, whole
 from .pairlist import PairList
 from .ports import Ports
 
@@ -336,12 +336,20 @@ class Client:
         With velocities (see ``send``) of TransformVelRow, whose field ``transform`` is the pose.
         """
         if isinstance(poses, np.ndarray) and poses.dtype in (POSE, MOVING):
+            if poses.ndim != 1:
+                raise SweepdError(f"rows of shape {poses.shape}: give (n,)")
             return poses
         if isinstance(poses, dict):
-            ids, columns = self._ids(poses), columns_of(poses)
+            rows = rows_of(self._ids(poses), columns_of(poses), self._wxyz, poses)
         else:
-            ids, *columns = poses
-        rows = rows_of(ids, columns, self._wxyz)
+            try:
+                ids, *columns = poses
+            except (TypeError, ValueError):
+                raise SweepdError(
+                    f"poses of type {type(poses).__name__}: give {{name: (position, quaternion)}},"
+                    " (ids, positions, quaternions) or rows"
+                ) from None
+            rows = rows_of(ids, columns, self._wxyz)
         rows.boot_id = self._boot
         return rows
 
