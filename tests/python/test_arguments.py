@@ -77,3 +77,87 @@ def test_bug_ids_that_are_no_whole_numbers_are_not_cut(client):
         assert client.step((good, at, turn), timeout_s=5).state == "clear"
     assert list(client.rows(([1, 2**63], at, turn))["body"]) == [1, 2**63]
     assert list(client.rows(([2**64 - 1, 1], at, turn))["body"]) == [2**64 - 1, 1]
+
+
+def test_bug_a_pose_that_does_not_fit_is_told_by_the_name_of_its_body(client):
+    good, far = (0.0, 0.0, 0.0), (10**400, 0.0, 0.0)
+    for wrong in ((0.0, 0.0), "abc", None, far, (0.0, 0.0, "x"), (1j, 0.0, 0.0), 5.0, (10**5000, 0, 0)):
+        refused("position of body 'cart' is .*: give 3 real", client.send, {**POSES, "cart": (wrong, NO_TURN)})
+    for wrong in ((0.0, 0.0, 1.0), "abcd", [NO_TURN]):
+        refused("quaternion of body 'post' is .*: give 4 real", client.send, {**POSES, "post": (good, wrong)})
+    for wrong in (None, 3.0, {1: 2, 3: 4}, {1, 2}):
+        refused("a pose is", client.send, {"cart": wrong})
+    ids = list(client.names.values())
+    refused("position of body 1 is", client.send, (ids, [good, good[:2]], [NO_TURN] * 2))
+    for wrong in (None, 3, np.array(3.0)):
+        refused("poses of type .*: give", client.step, wrong)
+    for wrong in ("abc", "ab", [], np.zeros((3, 7)), np.zeros((2, 2), object), client.rows(POSES).reshape(2, 1)):
+        refused(".+: give|a pose is", client.step, wrong)
+    for wrong in (-1, 0.5, None, 2**40):
+        refused("count=", client.loan, wrong)
+    refused("time_left_ns=", client.send, POSES, time_left_ns=None)
+    for wrong in ([[1, 2, 3], [4, 5]], [[1j, 0, 0]], [["1", "2", "3"]], None, [1, 2, 3]):
+        refused("vertices", client.send_vertices, 1, wrong)
+    refused("no JSON", client.request, {"edits": [np.zeros(3)]})
+    refused("no JSON", client.request, {"edits": []}, [3])
+    refused("give an id", client.name_of, "cart")
+    assert client._seq == 0, "nothing that was refused went out"
+    assert client.step(POSES, timeout_s=5).state == "clear"
+
+
+def test_bug_a_time_that_is_no_number_of_seconds_is_refused(client, instance):
+    nan = float("nan")
+    for wrong in (nan, np.float32("nan"), None, "1", 10**400, [1.0]):
+        refused("timeout_s=.*: give a number of seconds", client.wait, timeout_s=wrong)
+        refused("timeout_s=", client.step, POSES, timeout_s=wrong)
+        refused("timeout_s=", client.request, {"gap": {"a": "cart", "b": "post"}}, timeout_s=wrong)
+        refused("timeout_s=", sweepd.Client, "nobody_here", quat_order="wxyz", timeout_s=wrong)
+    # below 0 one is late, and nothing else
+    for late in (0, -1.0, -float("inf")):
+        with pytest.raises(sweepd.TimedOut):
+            for _ in range(100):
+                client.wait(timeout_s=late)
+    client._ports.wait(nan)
+    assert client.step(POSES, timeout_s=float("inf")).state == "clear"
+
+
+def test_bug_what_a_client_is_opened_with_is_looked_at(instance):
+    with sweepd.Client(instance, "sim", quat_order="wxyz", listen="pairs") as client:
+        assert client._topics == ["pairs", "names"]
+        result = client.step(POSES, timeout_s=5)
+        assert result.pairs is not None and result.contacts is None
+    for wrong in ("pair", ["pairs", 3], None, 3, [["pairs"]]):
+        refused(r"listen=\[.*\]: there are pairs, ", sweepd.Client, instance, quat_order="wxyz", listen=wrong)
+    for wrong in ("", "x" * 32, 3, "\ud800"):
+        refused("source name", sweepd.Client, instance, wrong, quat_order="wxyz")
+    refused("no file names", sweepd.Client, instance, quat_order="wxyz", prefix="a/b", timeout_s=0.1)
+    with pytest.raises(sweepd.Refused, match="instance name 3"):
+        sweepd.Client(3, quat_order="wxyz")
+
+
+def test_bug_a_client_that_is_closed_says_so(instance):
+    client = sweepd.Client(instance, "sim", quat_order="wxyz")
+    client.step(POSES, timeout_s=5)
+    rows = client.rows(POSES)
+    client.close()
+    client.close()
+    calls = (
+        lambda: client.step(POSES),
+        lambda: client.send(rows),
+        lambda: client.send_vertices("cart", [[0, 0, 0]]),
+        lambda: client.request({"gap": {"a": "cart", "b": "post"}}),
+        lambda: client.loan(1),
+        client.pause,
+        client.wait,
+        client.latest,
+    )
+    for call in calls:
+        refused("this client is closed", call)
+    assert client.names == {}
+
+
+def test_poses_that_the_daemon_refuses_are_counted_in_the_tick(client):
+    ids = np.array(list(client.names.values()))
+    rejects = client.step(POSES, timeout_s=5).tick.rejects[sweepd.layout.RejectReason.UNKNOWN_BODY]
+    result = client.step((ids + 100, [POSES["cart"][0], POSES["post"][0]], [NO_TURN] * 2), timeout_s=5)
+    assert result.tick.rejects[sweepd.layout.RejectReason.UNKNOWN_BODY] == rejects + 2

@@ -10,7 +10,7 @@ import numpy as np
 
 from . import layout
 from .errors import Refused, Restarted, Skipped, SweepdError, TimedOut
-from .frames import MOVING, POSE, array, columns_of, rows_of, time_left, whole
+from .frames import MOVING, POSE, array, columns_of, rows_of, seconds, time_left, whole
 from .pairlist import PairList
 from .ports import Ports
 
@@ -35,6 +35,26 @@ _MOTION = ("transforms_vel", layout.TransformVelRow)
 
 def _text(chars):
     return bytes(chars).split(b"\0")[0].decode("utf-8", "replace")
+
+
+def _bytes_of(source):
+    try:
+        return len(source.encode())
+    except (AttributeError, UnicodeEncodeError):
+        return 0
+
+
+def _topics_of(listen):
+    if isinstance(listen, str):
+        listen = (listen,)
+    try:
+        listen = list(listen)
+    except TypeError:
+        listen = [listen]
+    unknown = [topic for topic in listen if not isinstance(topic, str) or topic not in _TOPICS]
+    if unknown:
+        raise SweepdError(f"listen={unknown}: there are {', '.join(_TOPICS)}")
+    return listen
 
 
 class Result:
@@ -88,7 +108,7 @@ class Client:
     """A client of one instance: a source of frames, or with ``source=None`` a reader.
 
     * ``quat_order``: how you write quaternions, ``"xyzw"`` (ROS) or ``"wxyz"`` (MuJoCo). It must be said.
-    * ``listen``: the messages to listen to; the daemon computes what somebody listens to.
+    * ``listen``: the messages to listen to, or one; the daemon computes what somebody listens to.
     * ``timeout_s``: how long to look for a daemon.
     * ``root``, ``prefix``: other files than iceoryx2's default ones; the daemon's must be the same.
     """
@@ -108,11 +128,10 @@ class Client:
             raise SweepdError(f'quat_order={quat_order!r}: say "xyzw" or "wxyz"')
         self._wxyz = quat_order == "wxyz"
         self._source = source
-        if source is not None and not 1 <= len(source.encode()) < layout.SOURCE_NAME_LEN:
-            raise SweepdError(f"source name {source!r}: 1 to {layout.SOURCE_NAME_LEN - 1} bytes")
-        unknown = set(listen) - set(_TOPICS)
-        if unknown:
-            raise SweepdError(f"listen={sorted(unknown)}: there are {', '.join(_TOPICS)}")
+        if source is not None and not 1 <= _bytes_of(source) < layout.SOURCE_NAME_LEN:
+            raise SweepdError(f"source name {source!r}: a text of 1 to {layout.SOURCE_NAME_LEN - 1} bytes of UTF-8")
+        listen = _topics_of(listen)
+        timeout_s = seconds(timeout_s)
         until = time.monotonic() + timeout_s
         self._ports = Ports(instance, timeout_s, root, prefix)
         self._topics = list(dict.fromkeys([*listen, "names"]))
@@ -151,7 +170,7 @@ class Client:
 
     def close(self):
         """Frees the ports; the session is over."""
-        self._ahead, self._now = {}, {}
+        self._ahead, self._now, self._held = {}, {}, None
         self._ports.close()
 
     @property
@@ -177,7 +196,10 @@ class Client:
         names = self.names
         if self._named[0] != self._names[0]:
             self._named = (self._names[0], {id_: name for name, id_ in names.items()})
-        return self._named[1].get(int(body))
+        try:
+            return self._named[1].get(int(body))
+        except (TypeError, ValueError, OverflowError):
+            raise SweepdError(f"body {body!r}: give an id, as rows have it") from None
 
     def send(
         self, poses, *, stamp_ns=0, clock_id=0, scene_rev=0, deadline_ns=0, time_left_ns=0, partial=False
@@ -235,9 +257,12 @@ class Client:
         """
         if (first is None) != (total is None):
             raise SweepdError("a range of vertices needs first and total")
+        vertices = array("vertices", vertices)
+        if vertices.ndim != 2 or vertices.shape[1] != 3 or vertices.dtype.kind not in "fiu":
+            raise SweepdError(
+                f"vertices of shape {vertices.shape} and dtype {vertices.dtype}: give real numbers of shape (n, 3)"
+            )
         vertices = np.ascontiguousarray(vertices, dtype=np.float32)
-        if vertices.ndim != 2 or vertices.shape[1] != 3:
-            raise SweepdError(f"vertices of shape {vertices.shape}: give (n, 3)")
         self._settle(0.0)
         body = self._ids([body])[0] if isinstance(body, str) else whole("body", body)
         base = self._versions.get(body)
@@ -272,6 +297,7 @@ class Client:
 
         Raises TimedOut (with what was refused meanwhile), Restarted or Skipped.
         """
+        timeout_s = seconds(timeout_s)
         until = time.monotonic() + timeout_s
         self._drain()
         self._settle(until)
@@ -295,6 +321,7 @@ class Client:
 
     def wait(self, timeout_s=1.0):
         """The :class:`Result` of the next tick; raises TimedOut or Restarted."""
+        timeout_s = seconds(timeout_s)
         if not self._next(time.monotonic() + timeout_s):
             raise TimedOut(f"no tick within {timeout_s} s; is the daemon running?")
         return self._result()
@@ -305,12 +332,17 @@ class Client:
         Raises Refused with the daemon's words when it refused, TimedOut when it is silent. After an edit ``names`` are
         those of the scene as it is then: as ``latest()`` does, the client goes on to the newest tick.
         """
-        text = json.dumps(edits).encode()
+        timeout_s = seconds(timeout_s)
+        try:
+            text = json.dumps(edits).encode()
+            payload = b"".join([text, *(bytes(memoryview(blob)) for blob in blobs)])
+        except (TypeError, ValueError, RecursionError) as e:
+            raise SweepdError(f"the request is no JSON with blobs of bytes after it: {e}") from e
         self._requests += 1
         header = layout.RequestHeader(
             json_len=len(text), request=self._requests, schema=layout.WIRE_VERSION
         )
-        self._ports.request(header, b"".join([text, *(bytes(blob) for blob in blobs)]))
+        self._ports.request(header, payload)
         until = time.monotonic() + timeout_s
         while True:
             answered = self._ports.answer()
@@ -361,7 +393,7 @@ class Client:
         takes the place of one that was not sent.
         """
         topic, row = _MOTION if velocities else _POSES
-        rows = self._ports.loan(topic, row, layout.FrameHeader, count)
+        rows = self._ports.loan(topic, row, layout.FrameHeader, whole("count", count, 32))
         rows.boot_id = self._boot
         return rows
 

@@ -65,9 +65,11 @@ def _ours(what):
 
     def wrap(method):
         @functools.wraps(method)
-        def call(*args, **kwargs):
+        def call(self, *args, **kwargs):
+            if self._closed:
+                raise SweepdError(f"{what}: this client is closed; make a new one")
             try:
-                return method(*args, **kwargs)
+                return method(self, *args, **kwargs)
             except _FOREIGN as e:
                 raise SweepdError(f"{what}: {_why(e)}") from e
 
@@ -99,7 +101,8 @@ def _patiently(act, until):
 
 def check_name(instance):
     """Refuses what cannot be an instance's name."""
-    fits = 1 <= len(instance) <= 32 and all(c in "abcdefghijklmnopqrstuvwxyz0123456789_" for c in instance)
+    fits = isinstance(instance, str) and 1 <= len(instance) <= 32
+    fits = fits and all(c in "abcdefghijklmnopqrstuvwxyz0123456789_" for c in instance)
     if not fits:
         raise Refused(f"instance name {instance!r}: use 1 to 32 of a-z, 0-9 and _")
 
@@ -107,10 +110,13 @@ def check_name(instance):
 def _config(root, prefix):
     # never from a file: a configuration in the current directory would put us on other files than the daemon
     config = iox2.config.default()
-    if root is not None:
-        config.global_cfg.root_path = iox2.Path.new(str(root))
-    if prefix is not None:
-        config.global_cfg.prefix = iox2.FileName.new(prefix)
+    try:
+        if root is not None:
+            config.global_cfg.root_path = iox2.Path.new(str(root))
+        if prefix is not None:
+            config.global_cfg.prefix = iox2.FileName.new(str(prefix))
+    except _FOREIGN as e:
+        raise SweepdError(f"root={str(root)!r}, prefix={str(prefix)!r}: these make no file names ({e})") from e
     return config
 
 
@@ -144,6 +150,7 @@ class Ports:
         self._client = None
         self._pending = []
         self._loaned = None
+        self._closed = False
         until = time.monotonic() + timeout_s
         try:
             _patiently(self._open, until)
@@ -223,8 +230,8 @@ class Ports:
     def wait(self, timeout_s):
         """Sleeps until the daemon has sent something, a signal came, or the time is up."""
         try:
-            # iceoryx2 0.10 hands the system whole microseconds, rounded down, and 0 is for ever
-            self._ready.timed_wait(iox2.Duration.from_secs_f64(max(timeout_s, 2e-6)))
+            # iceoryx2 0.10 hands the system whole microseconds, rounded down, and 0 is for ever; in this order NaN is less
+            self._ready.timed_wait(iox2.Duration.from_secs_f64(max(2e-6, timeout_s)))
         except iox2.ListenerWaitError as e:
             # Python runs the signal's handler once we are back: for Ctrl-C that raises KeyboardInterrupt
             if str(e) != "InterruptSignal":
@@ -357,6 +364,7 @@ class Ports:
     def close(self):
         """Frees the ports: samples and ports first, the node last."""
         self._loaned = None
+        self._closed = True
         self._pending, self._senders, self._readers = [], {}, {}
         self._client = self._tick = self._hello = self._ready = self._wake = self._node = None
 
