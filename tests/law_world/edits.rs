@@ -420,7 +420,7 @@ fn law_3_10_chains_hang_together_and_rings_are_refused() {
     assert!(!bench.world.filters().allows(b, c), "both hang on `a`");
     // Where it is not known where something is, it is not known where to hang it.
     let text = bench.refused(&[attach("d", Some("c"), None)]);
-    assert!(text.contains("give `pose`"), "{text}");
+    assert!(text.contains("say where (`position`)"), "{text}");
 }
 
 #[test]
@@ -520,4 +520,15 @@ fn law_6_a_body_put_again_after_a_margin_was_set_has_its_own() {
     let rev = bench.world.scene_rev();
     bench.edit(margin(None));
     assert_eq!(bench.world.scene_rev(), rev);
+}
+
+/// It was told to write `pose`, a key that a request has not.
+#[test]
+fn bug_an_attachment_without_a_place_names_the_key_to_write() {
+    let mut bench = Bench::of(vec![fixed("wall", 1, 9.0), moving("lamp", 2)]);
+    let text = bench.refused(&[attach("lamp", Some("wall"), None)]);
+    assert!(text.contains("say where (`position`)"), "{text}");
+    let place = Some(Pose::translation(0.0, 1.0, 0.0));
+    let text = bench.refused(&[attach("lamp", None, place)]);
+    assert!(text.contains("leave out `position`"), "{text}");
 }

@@ -119,7 +119,7 @@ impl<'a> Draft<'a> {
         self.must_have(to)?;
         if pose.is_none() && !(self.is_placed(name) && self.is_placed(to)) {
             return Err(format!(
-                "it is not known where `{name}` is seen from `{to}`: give `pose`, or wait for their frames"
+                "it is not known where `{name}` is seen from `{to}`: say where (`position`), or wait for their frames"
             ));
         }
         self.forget_place(name);
@@ -142,7 +142,7 @@ impl<'a> Draft<'a> {
         let spec = body.spec;
         if spec.moves && pose.is_some() {
             return Err(format!(
-                "body `{name}` moves: its source says where it is, leave out `pose`"
+                "body `{name}` moves: its source says where it is, leave out `position` and `orientation`"
             ));
         }
         if spec.moves && spec.source.is_none() {
@@ -152,7 +152,9 @@ impl<'a> Draft<'a> {
         }
         let placed = self.is_placed(name);
         if !spec.moves && pose.is_none() && !placed {
-            return Err(format!("it is not known where `{name}` is: give `pose`"));
+            return Err(format!(
+                "it is not known where `{name}` is: say where (`position`)"
+            ));
         }
         // Who says where it is goes with what it hung on, where that is gone.
         let hangs_on_one = body.hangs.is_none_or(|to| self.has(to));
