@@ -195,11 +195,11 @@ impl Table {
         match spec.when {
             When::Always => Ok(value),
             When::AtStart => Err(format!(
-                "{name} is set at the start only: -p {name}:=VALUE or a parameter file"
+                "{name} is set at the start only: --ros-args -p {name}:=VALUE or a parameter file"
             )),
             When::IfAllowed if self.flag("ros.allow_edits") => Ok(value),
             When::IfAllowed => Err(format!(
-                "{name} touches what the monitor promises: start the node with -p ros.allow_edits:=true to change it while it runs"
+                "{name} touches what the monitor promises: start the node with --ros-args -p ros.allow_edits:=true to change it while it runs"
             )),
         }
     }

@@ -214,7 +214,7 @@ impl Services {
     fn ask(&mut self, verb: Verb, id: RmwRequestId, words: Words, shared: &Shared) {
         let token = self.token();
         let refusal = if verb != Verb::Gap && !self.allowed {
-            "edits are refused: start the node with -p ros.allow_edits:=true".to_owned()
+            "edits are refused: start the node with --ros-args -p ros.allow_edits:=true".to_owned()
         } else if self.pending.len() >= OPEN_MAX {
             crowded()
         } else if !(self.scribe.as_ref()).is_some_and(|scribe| scribe.take((token, verb, words))) {
