@@ -343,8 +343,12 @@ fn a_mesh_that_fails_when_it_is_built_names_file_line_and_body() {
     std::fs::write(folder.join("broken.obj"), "v 0 0 0\nv 1 oops 0\n").unwrap();
     let mut results = Vec::new();
     // A binary STL whose head speaks of ten million triangles.
-    let head = [&[0; 80][..], &10_000_000_u32.to_le_bytes(), &[0; 100]].concat();
+    let head = [&[0; 80][..], &10_000_000_u32.to_le_bytes()].concat();
     std::fs::write(folder.join("huge.stl"), head).unwrap();
+    let file = std::fs::File::options()
+        .append(true)
+        .open(folder.join("huge.stl"));
+    file.unwrap().set_len(84 + 50 * 10_000_000).unwrap();
     std::fs::write(
         folder.join("far.obj"),
         "v 0 0 0\nv 1 0 0\nv 0 2e9 0\nf 1 2 3\n",
@@ -376,7 +380,7 @@ fn a_mesh_that_fails_when_it_is_built_names_file_line_and_body() {
     assert_eq!(
         results[2],
         format!(
-            "scene.toml:9: body \"b\": {}: the mesh has 10000000, more than 8000000 triangles: simplify it, or split \
+            "scene.toml:9: body \"b\": {}: the mesh has 10000000 triangles, more than 8000000: simplify it, or split \
              it over several bodies",
             folder.join("huge.stl").display()
         )

@@ -76,8 +76,11 @@ pub enum ShapeError {
     EmptyMesh,
     /// More triangles than a mesh may have.
     #[error(
-        "the mesh has {}more than {TRIANGLES_MAX} triangles: simplify it, or split it over several bodies",
-        .given.map_or(String::new(), |given| format!("{given}, "))
+        "the mesh has {}: simplify it, or split it over several bodies",
+        .given.map_or(
+            format!("more than {TRIANGLES_MAX} triangles"),
+            |given| format!("{given} triangles, more than {TRIANGLES_MAX}")
+        )
     )]
     TooManyTriangles {
         /// How many; `None`: a file that was not read to its end.

@@ -211,8 +211,15 @@ fn read_whole(path: &Path, kind: Kind) -> Result<Vec<u8>, ShapeError> {
             .read_to_end(&mut bytes)
             .map_err(failed)?;
         if let Some(given) = stl::claimed(&bytes).filter(|given| *given > TRIANGLES_MAX as u64) {
-            let error = ShapeError::TooManyTriangles { given: Some(given) };
-            return Err(error.of_file(path));
+            // A count that the file has no room for is no count.
+            return Err(match stl::misfit(given, size) {
+                Some(message) => ShapeError::Format {
+                    path: path.display().to_string(),
+                    line: None,
+                    message,
+                },
+                None => ShapeError::TooManyTriangles { given: Some(given) }.of_file(path),
+            });
         }
     }
     if size > FILE_BYTES_MAX {

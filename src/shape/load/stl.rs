@@ -18,6 +18,21 @@ pub(super) fn claimed(bytes: &[u8]) -> Option<u64> {
     Some(u64::from(u32::from_le_bytes(count)))
 }
 
+/// What is wrong with a binary file whose size does not go with its count.
+///
+/// * `size` - of the whole file, bytes.
+pub(super) fn misfit(count: u64, size: u64) -> Option<String> {
+    let expected = HEAD_BYTES + count * TRIANGLE_BYTES as u64;
+    // A line end behind the last triangle is a known habit of exporters.
+    let fits = size.checked_sub(expected).is_some_and(|extra| extra <= 2);
+    (!fits).then(|| {
+        format!(
+            "the header says {count} triangles, which take {expected} bytes, but the file has {size}: it is cut off, \
+             damaged or no STL, export the mesh again"
+        )
+    })
+}
+
 /// Whether this is the head of a text file. Binary headers may begin with `solid` too: a text has no control characters
 /// but white space.
 fn is_text(bytes: &[u8]) -> bool {
@@ -33,8 +48,7 @@ fn is_text(bytes: &[u8]) -> bool {
 }
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Flaw> {
-    let expected = |count: u64| HEAD_BYTES + count * TRIANGLE_BYTES as u64;
-    let fits = |count: &u64| bytes.len() as u64 == expected(*count);
+    let fits = |count: &u64| bytes.len() as u64 == HEAD_BYTES + count * TRIANGLE_BYTES as u64;
     // A header of plain text whose count and size agree is binary all the same.
     let raw_count = bytes.get(80..84).and_then(|b| <[u8; 4]>::try_from(b).ok());
     let is_binary = raw_count.is_some_and(|raw| fits(&u64::from(u32::from_le_bytes(raw))));
@@ -48,14 +62,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Soup, Flaw> {
         )));
     };
     let count = u64::from(u32::from_le_bytes(raw));
-    // A line end behind the last triangle is a known habit of exporters.
-    let extra = (bytes.len() as u64).checked_sub(expected(count));
-    if extra.is_none_or(|extra| extra > 2) {
-        return Err(Flaw::new(format!(
-            "the header says {count} triangles, which take {} bytes, but the file has {}: it is cut off or damaged, export the mesh again",
-            expected(count),
-            bytes.len()
-        )));
+    if let Some(text) = misfit(count, bytes.len() as u64) {
+        return Err(Flaw::new(text));
     }
     let mut soup = Soup::default();
     for row in bytes[84..].chunks_exact(TRIANGLE_BYTES) {

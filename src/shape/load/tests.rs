@@ -135,8 +135,9 @@ fn too_many_triangles_are_refused_by_the_head_of_the_file() {
     std::fs::create_dir_all(&folder).unwrap();
     let mut bytes = vec![0; 80];
     bytes.extend(10_000_000_u32.to_le_bytes());
-    bytes.extend([0; 100]);
     std::fs::write(folder.join("huge.stl"), &bytes).unwrap();
+    let file = File::options().append(true).open(folder.join("huge.stl"));
+    file.unwrap().set_len(84 + 50 * 10_000_000).unwrap();
     let error = read(&folder, "huge.stl").unwrap_err();
     std::fs::remove_dir_all(&folder).unwrap();
     let wanted = ShapeError::TooManyTriangles {
@@ -145,8 +146,20 @@ fn too_many_triangles_are_refused_by_the_head_of_the_file() {
     assert_eq!(error, wanted.of_file(&folder.join("huge.stl")));
     assert!(
         (error.to_string())
-            .contains("huge.stl: the mesh has 10000000, more than 8000000 triangles")
+            .contains("huge.stl: the mesh has 10000000 triangles, more than 8000000: simplify it")
     );
+}
+
+/// What is no STL was told as one of hundreds of millions of triangles.
+#[test]
+fn bug_a_count_that_the_file_has_no_room_for_is_told_as_damage() {
+    let folder = std::env::temp_dir().join(format!("sweepd_short_{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("short.stl"), [0xe7; 5000]).unwrap();
+    let error = read(&folder, "short.stl").unwrap_err().to_string();
+    std::fs::remove_dir_all(&folder).unwrap();
+    let wanted = "says 3890735079 triangles, which take 194536754034 bytes, but the file has 5000: it is cut off";
+    assert!(error.contains(wanted), "{error}");
 }
 
 #[test]

@@ -63,8 +63,7 @@ pub(super) fn descriptor(spec: &Spec) -> ParameterDescriptor {
         }
     };
     if spec.when == When::IfAllowed {
-        let leave =
-            "set while running only where the node was started with --ros-args -p ros.allow_edits:=true";
+        let leave = "set while running only where the node was started with --ros-args -p ros.allow_edits:=true";
         words = Some(words.map_or(leave.to_owned(), |words| format!("{words}; {leave}")));
     }
     ParameterDescriptor {
