@@ -14,6 +14,7 @@ mod read_ros;
 mod read_rule;
 mod read_scene;
 mod read_shape;
+mod read_text;
 mod read_viewpoint;
 mod request;
 mod resolve;

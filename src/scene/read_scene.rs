@@ -17,8 +17,6 @@ use crate::scene::table::{Table, list, mend_name, shortened};
 use crate::scene::{Origin, Scene, SourceSpec};
 use crate::time::Budget;
 
-/// Longest scene file, bytes: beyond it geometry belongs in mesh files.
-const FILE_BYTES_MAX: u64 = 1 << 29;
 /// Longest time that a setting can name, milliseconds: a day.
 const TIME_MS_MAX: f64 = 86_400_000.0;
 /// Longest `frame_id`, bytes.
@@ -64,32 +62,6 @@ impl Scene {
         Self::parse_at(&Self::read_text(path)?, path)
     }
 
-    /// The text of a scene file.
-    ///
-    /// # Errors
-    /// `Error::Scene` when it cannot be read, is too large or no text.
-    pub fn read_text(path: &Path) -> Result<String> {
-        let shown = path.display().to_string();
-        let unreadable = |e: std::io::Error| {
-            Error::Scene(format!(
-                "{shown}: the scene file cannot be read ({e}): check the path and its rights"
-            ))
-        };
-        let size = std::fs::metadata(path).map_err(unreadable)?.len();
-        if size > FILE_BYTES_MAX {
-            return Err(Error::Scene(format!(
-                "{shown}: the scene file has {size} bytes, more than {FILE_BYTES_MAX}: keep meshes in files of their own"
-            )));
-        }
-        let bytes = std::fs::read(path).map_err(unreadable)?;
-        String::from_utf8(bytes).map_err(|e| {
-            let line = line_of(e.as_bytes(), e.utf8_error().valid_up_to());
-            Error::Scene(format!(
-                "{shown}:{line}: this is not UTF-8 text: save the file as UTF-8"
-            ))
-        })
-    }
-
     /// As [`Scene::parse`], of the text of the file at `path`.
     ///
     /// # Errors
@@ -133,7 +105,7 @@ impl Scene {
 }
 
 /// The line of a byte, from 1.
-fn line_of(text: &[u8], at: usize) -> usize {
+pub(super) fn line_of(text: &[u8], at: usize) -> usize {
     let head = &text[..at.min(text.len())];
     1 + head.iter().filter(|byte| **byte == b'\n').count()
 }
