@@ -115,6 +115,8 @@ fn stop() -> Result<Arc<AtomicBool>> {
 
 /// Longest try at a connection before a look at the stop flag, nanoseconds.
 const CONNECT_LOOK_NS: u64 = 250_000_000;
+/// How long a wait for a daemon may be before it is told, nanoseconds.
+const CONNECT_TELL_NS: u64 = 500_000_000;
 
 /// Connects within `wait_ns`; `None`: stopped before a daemon was there.
 fn connect(
@@ -124,12 +126,20 @@ fn connect(
     stop: &AtomicBool,
 ) -> Result<Option<Client>> {
     let clock = SystemClock;
-    let until_ns = clock.monotonic_ns().saturating_add(wait_ns);
+    let start_ns = clock.monotonic_ns();
+    let until_ns = start_ns.saturating_add(wait_ns);
+    let mut told = false;
     loop {
         let left_ns = until_ns.saturating_sub(clock.monotonic_ns());
         match Client::connect(instance, source, left_ns.min(CONNECT_LOOK_NS)) {
             Err(Error::TimedOut(_)) if stop.load(Ordering::Relaxed) => return Ok(None),
-            Err(Error::TimedOut(_)) if left_ns > CONNECT_LOOK_NS => {}
+            Err(Error::TimedOut(_)) if left_ns > CONNECT_LOOK_NS => {
+                let waited_ns = clock.monotonic_ns().saturating_sub(start_ns);
+                if !told && waited_ns >= CONNECT_TELL_NS {
+                    told = true;
+                    tracing::info!("waiting for a daemon `{instance}`");
+                }
+            }
             done => return done.map(Some),
         }
     }

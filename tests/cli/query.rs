@@ -320,3 +320,17 @@ fn a_signal_ends_it_before_the_answer_and_that_is_no_success() {
     assert_eq!(status.code(), Some(3), "{}", query.stderr());
     assert!(query.stderr().contains("signal"), "{}", query.stderr());
 }
+
+/// It was mute for all of its wait.
+#[test]
+fn bug_a_wait_for_a_daemon_is_told_once_and_not_with_quiet() {
+    let desk = Desk::new();
+    for (quiet, times) in [(&[][..], 1), (&["-q"], 0)] {
+        let asked = ["a", "b", "--timeout", "1500ms"];
+        let ended = ask(&desk, &[&asked, quiet].concat());
+        assert_eq!(code(&ended), Some(3), "{}", err(&ended));
+        let line = format!("waiting for a daemon `{}`", desk.instance);
+        assert_eq!(err(&ended).matches(&line).count(), times, "{}", err(&ended));
+        assert!(ended.stdout.is_empty());
+    }
+}
