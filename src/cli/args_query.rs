@@ -14,11 +14,7 @@ pub(super) struct QueryArgs {
     /// The daemon works on the answer for a second at most, beside its ticks: the verdict, the proved interval of the
     /// gap in metres (negative: overlapping), the closest points and the normal, at the poses of its newest tick,
     /// whatever pair rules and masks say.
-    #[arg(
-        value_name = "A",
-        required_unless_present_any = ["batch", "touching", "shape", "ray"],
-        requires = "b"
-    )]
+    #[arg(value_name = "A", requires = "b")]
     pub(super) a: Option<String>,
     /// Name of the other body; the normal points from A to it.
     #[arg(value_name = "B")]

@@ -334,3 +334,14 @@ fn bug_a_wait_for_a_daemon_is_told_once_and_not_with_quiet() {
         assert!(ended.stdout.is_empty());
     }
 }
+
+#[test]
+fn bug_a_query_of_nothing_is_told_all_that_can_be_asked() {
+    for args in [&["query"][..], &["query", "--at", "1,2,3"]] {
+        let ended = output(args);
+        assert_eq!(code(&ended), Some(2), "{}", err(&ended));
+        for flag in ["two bodies", "--touching", "--shape", "--ray", "--batch"] {
+            assert!(err(&ended).contains(flag), "{flag}: {}", err(&ended));
+        }
+    }
+}

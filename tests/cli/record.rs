@@ -209,6 +209,11 @@ fn what_is_no_recording_is_refused_with_code_4() {
         assert_eq!(code(&ended), Some(4), "{}", err(&ended));
         assert!(err(&ended).contains(file), "{}", err(&ended));
     }
+    let empty = scene.with_extension("mcap");
+    std::fs::write(&empty, "").unwrap();
+    let ended = output(&["replay", path(&empty)]);
+    assert_eq!(code(&ended), Some(4), "{}", err(&ended));
+    assert!(err(&ended).contains("is empty"), "{}", err(&ended));
 }
 
 #[test]

@@ -109,7 +109,13 @@ impl Reader {
         let name = path.display().to_string();
         let unreadable = |e| Error::io(format!("cannot read the recording {name}"), e);
         let mut file = File::open(path).map_err(unreadable)?;
-        let bytes = file.metadata().map_err(unreadable)?.len();
+        let about = file.metadata().map_err(unreadable)?;
+        let bytes = about.len();
+        if bytes == 0 && about.is_file() {
+            return Err(Error::Refused(format!(
+                "{name} is empty: nothing was recorded, or the disk was full; record anew"
+            )));
+        }
         let is_closed = is_closed(&mut file, bytes).map_err(unreadable)?;
         let mut reader = Self {
             file,

@@ -204,7 +204,9 @@ fn bug_a_recording_that_is_cut_off_within_its_start_says_so() {
 #[test]
 fn what_is_no_recording_of_ours_is_refused_by_name() {
     let error = |scrap: &Scrap| Reader::open(&scrap.0).unwrap_err().to_string();
-    for bytes in [&b""[..], b"[[body]]\nname = \"a\"\n", &[0; 4096]] {
+    let text = error(&Scrap::of(b""));
+    assert!(text.contains("is empty: "), "{text}");
+    for bytes in [&b"[[body]]\nname = \"a\"\n"[..], &[0; 4096]] {
         let error = error(&Scrap::of(bytes));
         assert!(
             error.contains("is no MCAP file") || error.contains("nothing to replay"),
