@@ -436,6 +436,9 @@ fn run(seed: u64, per_category: usize, samples: u32) -> BTreeMap<&'static str, R
             if c.best_m <= 0.02 * size {
                 assert!(!m.is_empty() && m.len() <= 4);
             }
+            let mut names: Vec<u32> = m.points().map(|p| p.feature).collect();
+            names.dedup();
+            assert_eq!(names.len(), m.len(), "{a:?} {b:?} {pose:?} {m:?}");
         }
     }
     rows

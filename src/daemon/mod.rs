@@ -118,7 +118,7 @@ impl<'a> Daemon<'a> {
     /// `Error::Io` when a port breaks; the daemon must then be started again.
     pub fn run(&mut self, stop: &AtomicBool, ticks: Option<u64>) -> Result<()> {
         while !stop.load(Ordering::Relaxed) {
-            if !self.work_on()? {
+            if !self.work_on(stop)? {
                 let wait_ns = self.wait_ns();
                 self.door.wait(wait_ns, self.clock.as_ref())?;
             }
@@ -129,11 +129,13 @@ impl<'a> Daemon<'a> {
         Ok(())
     }
 
-    /// Uses what the last tick's budget left, until there is something else to do; whether there is.
-    fn work_on(&mut self) -> Result<bool> {
+    /// Uses what the last tick's budget left, until there is something else to do or `stop` is raised; whether there
+    /// is.
+    fn work_on(&mut self, stop: &AtomicBool) -> Result<bool> {
         let mut news = false;
         while !news && self.wait_ns() > 0 && self.engine.work_on(REST_SLICE_NS) {
-            news = self.door.wait(0, self.clock.as_ref())? != Wake::default();
+            news |= stop.load(Ordering::Relaxed);
+            news |= self.door.wait(0, self.clock.as_ref())? != Wake::default();
         }
         Ok(news)
     }

@@ -77,6 +77,13 @@ impl RankCost {
         pairs as u64 * self.ns[usize::from(gaze)]
     }
 
+    /// No list was ranked, for it might have taken too long: what was learned once does not hold for ever.
+    pub(super) fn forget(&mut self, gaze: bool) {
+        let at = usize::from(gaze);
+        let now = self.ns[at];
+        self.ns[at] = (now - now.div_ceil(32)).max(RANK_NS[at]);
+    }
+
     fn learn(&mut self, took_ns: u64, pairs: usize, gaze: bool) {
         if took_ns == 0 || pairs < RANK_LEARN_MIN {
             return;

@@ -36,6 +36,9 @@ impl Narrow {
         // stand: by the last ranking, then the new ones.
         let ranked = meter.has_ns(self.rank_cost.of(work.len(), gaze.is_some()));
         let order = if ranked { order } else { Order::AsFound };
+        if !ranked {
+            self.rank_cost.forget(gaze.is_some());
+        }
         let mut line = self.line_up(&work, order, world, gaze, meter);
         while !work.is_empty() && meter.open() {
             let (mut at, mut left) = (0, 0);

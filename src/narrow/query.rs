@@ -71,11 +71,13 @@ pub(super) fn witness_of(
 }
 
 /// Appends the manifold of a colliding shape pair to `found`.
+///
+/// * `gap` - of the answer, as it holds for the bodies: see [`sound`].
 pub(super) fn add_manifold(
     (a, b): (&Body, &Body),
     (place_a, place_b): (u32, u32),
     pos12: &Pose,
-    closest: &Closest,
+    (closest, gap): (&Closest, Interval),
     found: &mut Vec<Contact>,
 ) {
     let (Some(one), Some(other)) = (
@@ -96,7 +98,7 @@ pub(super) fn add_manifold(
         point_b: other.pose * pos12.inverse_transform_point(&point_b),
         normal: one.pose.rotation * closest.normal,
         gap_m,
-        gap: closest.gap,
+        gap,
     };
     let mut points = Manifold::default();
     if let (Geometry::Convex(first), Geometry::Convex(second)) =

@@ -157,8 +157,9 @@ impl Narrow {
         let witness = witness_of(&a.shapes[0], &b.shapes[0], &pos12, &closest, (0, 0));
         memo.note_asked((a, b), &rel, self.tick);
         memo.tight = closest.finished;
+        let gap = sound(closest.gap, &a.shapes[0], &b.shapes[0], &rel);
         let answer = Answer {
-            gap: sound(closest.gap, &a.shapes[0], &b.shapes[0], &rel),
+            gap,
             finished: closest.finished,
             witness: Some(witness),
         };
@@ -166,7 +167,8 @@ impl Narrow {
         if goal == Goal::Contacts && closest.gap.min <= 0.0 {
             self.counters.manifolds += 1;
             self.found.clear();
-            add_manifold((a, b), (0, 0), &pos12, &closest, &mut self.found);
+            let found = &mut self.found;
+            add_manifold((a, b), (0, 0), &pos12, (&closest, gap), found);
             self.keep_contacts(slot, a.radius.min(b.radius));
         }
     }

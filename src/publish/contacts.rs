@@ -140,7 +140,10 @@ fn push_rows(view: &View<'_>, slot: PairSlot, out: &mut Vec<ContactRow>) {
     if finding.verdict == Verdict::Near {
         if let Some(witness) = finding.witness {
             let mut row = closest_row(a, b, witness);
-            (row.gap_min_m, row.gap_max_m) = (finding.gap.min, finding.gap.max);
+            let gap = finding.gap;
+            // An estimate is never outside what is proved.
+            row.gap_m = row.gap_m.max(gap.min).min(gap.max);
+            (row.gap_min_m, row.gap_max_m) = (gap.min, gap.max);
             row.flags = if finding.level == Level::Exact {
                 0
             } else {

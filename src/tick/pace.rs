@@ -77,6 +77,11 @@ impl Pacer {
         let names = self.sources.iter();
         let names: Vec<&str> = names.map(|s| name_str(&s.name).unwrap_or("")).collect();
         self.beat = Beat::of(config, &names)?;
+        let counting = self.queue.frames().iter().filter(|held| held.whose.speaks);
+        let first_ns = counting.map(|held| held.whose.received_ns).min();
+        if let Beat::OnAll { since_ns, .. } = &mut self.beat {
+            *since_ns = first_ns;
+        }
         Ok(())
     }
 
@@ -228,7 +233,10 @@ impl Pacer {
                 }
                 let mut first = true;
                 self.queue.take(into, |held: &Held| {
-                    held.whose.source != Some(lead) || std::mem::take(&mut first)
+                    let whose = &held.whose;
+                    // A stranger's before it goes along, to be refused.
+                    let leads = whose.source == Some(lead) && whose.speaks;
+                    whose.source != Some(lead) || first && (!leads || std::mem::take(&mut first))
                 });
                 Some(by_frame(Some(slot(lead))))
             }
@@ -274,9 +282,10 @@ impl Pacer {
         }
     }
 
+    /// Whether a frame of who speaks for a source waits.
     fn has_frame_of(&self, source: usize) -> bool {
-        let frames = self.queue.frames();
-        frames.iter().any(|held| held.whose.source == Some(source))
+        let mut frames = self.queue.frames().iter();
+        frames.any(|held| held.whose.source == Some(source) && held.whose.speaks)
     }
 
     /// When the round under way ends: now, if every source that is waited for has sent; else when it is late.

@@ -88,6 +88,10 @@ impl<'a> Meter<'a> {
     /// Calls `call` whenever `period_ns` has passed since `from_ns` (monotonic) or the last call, between two units.
     #[must_use]
     pub fn with_beat(mut self, from_ns: u64, period_ns: u64, call: &'a mut dyn FnMut()) -> Self {
+        // Without a deadline nobody has looked yet.
+        if self.read_ns == 0 {
+            self.read_ns = self.clock.monotonic_ns();
+        }
         self.beat = Some(Beat {
             next_ns: from_ns.saturating_add(period_ns),
             period_ns,
@@ -124,7 +128,7 @@ impl<'a> Meter<'a> {
     }
 
     /// Charges `units` of dear work (an exact query, some microseconds) and reads the clock at once; returns what it
-    /// took since the clock was read before, nanoseconds, 0 without a deadline.
+    /// took since the clock was read before, nanoseconds, 0 without a deadline or a beat.
     pub fn charge_dear(&mut self, units: u64) -> u64 {
         self.count(units);
         let pause = self.look();
@@ -255,6 +259,17 @@ impl<'a> Meter<'a> {
 mod tests {
     use super::*;
     use crate::time::ManualClock;
+
+    #[test]
+    fn bug_without_a_deadline_the_time_since_boot_was_the_first_pause() {
+        let clock = ManualClock::new(5_000_000_000);
+        let mut beats = || {};
+        let mut meter =
+            Meter::new(&clock, None, Some(9)).with_beat(5_000_000_000, 1_000_000, &mut beats);
+        assert_eq!(meter.charge_dear(1), 0);
+        clock.advance(700);
+        assert_eq!(meter.charge_dear(1), 700);
+    }
 
     #[test]
     fn a_meter_closes_after_its_units() {

@@ -15,6 +15,7 @@
 mod oracle;
 
 mod ask;
+mod contacts;
 mod deadline;
 mod degrade;
 mod edits;

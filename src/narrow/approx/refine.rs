@@ -94,8 +94,11 @@ impl Narrow {
         meter: &mut Meter<'_>,
     ) {
         let ranked_ns = self.rank_cost.of(self.active.len(), true);
-        if !wanted.regions || !meter.open() || !meter.has_ns(ranked_ns + CLOSING_NS) {
+        if !wanted.regions || !meter.open() {
             return;
+        }
+        if !meter.has_ns(ranked_ns + CLOSING_NS) {
+            return self.rank_cost.forget(true);
         }
         let mut line = self.line_up_for_regions(world, wanted.order);
         let mut at = 0;

@@ -172,17 +172,19 @@ impl CompoundFront {
                 witness,
             };
         };
+        let (one, other) = (pair.one, pair.other);
+        let gap = sound(closest.gap, one, other, &pair.rel);
         if self.known.goal == Goal::Contacts && closest.gap.min <= 0.0 {
             tools.counters.manifolds += 1;
             tools.found.clear();
-            add_manifold(pair.bodies, pair.places, &pair.pos12, &closest, tools.found);
+            let answer = (&closest, gap);
+            add_manifold(pair.bodies, pair.places, &pair.pos12, answer, tools.found);
             for &contact in &*tools.found {
                 tools.shelves.contacts.push(&mut self.found, contact);
             }
         }
-        let (one, other) = (pair.one, pair.other);
         Answer {
-            gap: sound(closest.gap, one, other, &pair.rel),
+            gap,
             certain: closest.finished,
             witness: Some(witness_of(one, other, &pair.pos12, &closest, pair.places)),
         }

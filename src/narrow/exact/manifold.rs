@@ -6,11 +6,14 @@
 //! capsule axis) or a point. The one is clipped by planes that stand along the normal on the edges of the other;
 //! gaps are measured along the normal. The deepest point is always among those that come out.
 
+mod clipped;
 mod shared;
 mod triangles;
 
 pub(in crate::narrow) use shared::shared_points;
 pub(in crate::narrow) use triangles::shared_by_triangles;
+
+use clipped::Clipped;
 
 use super::feature::{CORNERS_MAX, Feature};
 use super::pair::Pair;
@@ -62,20 +65,6 @@ impl Manifold {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-}
-
-/// A point of one feature that lies over the other, with the gap there and where it comes from.
-#[derive(Clone, Copy, Default)]
-struct Clip {
-    /// On the core of the clipped feature, A's frame.
-    at: Vec3,
-    feature: u32,
-}
-
-/// A polygon being clipped.
-struct Clipped {
-    points: [Clip; 2 * CORNERS_MAX],
-    count: usize,
 }
 
 /// Fills `out` with the contact points of a pair.
@@ -324,73 +313,5 @@ fn overlap_lines(of_a: &Feature, of_b: &Feature, normal: &Vec3, found: &mut Foun
             let gap = normal.dot(&(b[k] - a[0] - along * place[k]));
             found.take(&(b[k] - normal * gap), &b[k], 0x200 | k32);
         }
-    }
-}
-
-impl Clipped {
-    /// `incident`, cut by the planes along the normal on the edges of `base`.
-    fn onto(base: &Feature, incident: &Feature, normal: &Vec3) -> Self {
-        let mut clipped = Self::of(incident);
-        let corners = base.used();
-        let centre: Vec3 = corners.iter().sum::<Vec3>() / corners.len() as f64;
-        for (k, corner) in corners.iter().enumerate() {
-            let next = corners[(k + 1) % corners.len()];
-            let mut outward = (next - corner).cross(normal);
-            if outward.dot(&(corner - centre)) < 0.0 {
-                outward = -outward;
-            }
-            clipped.cut(corner, &outward, base.id(k));
-        }
-        clipped
-    }
-
-    fn of(feature: &Feature) -> Self {
-        let mut points = [Clip::default(); 2 * CORNERS_MAX];
-        for (k, corner) in feature.used().iter().enumerate() {
-            points[k] = Clip {
-                at: *corner,
-                feature: feature.id(k) & 0x7fff,
-            };
-        }
-        Self {
-            points,
-            count: feature.count,
-        }
-    }
-
-    /// Cuts off what lies beyond the plane. Source: Sutherland and Hodgman 1974, Reentrant polygon clipping.
-    fn cut(&mut self, on: &Vec3, outward: &Vec3, edge: u32) {
-        let count = self.count;
-        let mut over = [0.0; 2 * CORNERS_MAX];
-        for (over, clip) in over.iter_mut().zip(&self.points[..count]) {
-            *over = outward.dot(&(clip.at - on));
-        }
-        if over[..count].iter().all(|over| *over <= 0.0) {
-            return;
-        }
-        let (old, mut kept) = (self.points, 0);
-        let mut put = |clip: Clip| {
-            if kept < self.points.len() {
-                self.points[kept] = clip;
-                kept += 1;
-            }
-        };
-        for k in 0..count {
-            let next = if k + 1 < count { k + 1 } else { 0 };
-            let (here, there) = (over[k], over[next]);
-            if here <= 0.0 {
-                put(old[k]);
-            }
-            // A segment is not a ring: its way back adds nothing.
-            let crosses = (here < 0.0 && there > 0.0) || (here > 0.0 && there < 0.0);
-            if crosses && !(count == 2 && k == 1) && count > 1 {
-                let t = here / (here - there);
-                put(Clip {
-                    at: old[k].at + (old[next].at - old[k].at) * t,
-                    feature: (old[k].feature & 0x7fff) | ((edge & 0x7fff) + 1) << 15,
-                });
-            }
-        }
-        self.count = kept;
     }
 }

@@ -64,11 +64,22 @@ impl Queue {
             }
         }
         let of_source = |old: &Held| old.whose.source == whose.source;
-        if self.frames.iter().filter(|old| of_source(old)).count() >= FRAMES_PER_DRAIN_MAX
-            && let Some(oldest) = self.frames.iter().position(of_source)
-        {
-            self.drop_at(oldest);
+        if self.frames.iter().filter(|old| of_source(old)).count() >= FRAMES_PER_DRAIN_MAX {
+            // What the world would refuse makes room first, be it the newest.
+            let stranger = |old: &Held| of_source(old) && !old.whose.speaks;
             passed += 1;
+            match self.frames.iter().position(stranger) {
+                Some(oldest) => self.drop_at(oldest),
+                None if !whose.speaks => {
+                    self.spare.push(held);
+                    return passed;
+                }
+                None => {
+                    if let Some(oldest) = self.frames.iter().position(of_source) {
+                        self.drop_at(oldest);
+                    }
+                }
+            }
         }
         let end = self.frames.len();
         self.frames.insert(place.unwrap_or(end).min(end), held);

@@ -3,6 +3,7 @@
 //! In: six corners, a normal and whose face the points are cast onto. Out: the clipped points, at most six. The twin of
 //! `shared_points`, whose room for polygons of eight corners costs more than the clipping of three.
 
+use super::clipped::{CUT, met};
 use super::{FACING, ManifoldPoint, SAME};
 use crate::math::{Point, Vec3};
 use crate::narrow::exact::feature::RIM;
@@ -15,6 +16,8 @@ const ROOM: usize = 8;
 struct Rest {
     at: [Vec3; ROOM],
     features: [u32; ROOM],
+    /// The line along which the ring goes on from each.
+    lines: [u32; ROOM],
     count: usize,
 }
 
@@ -89,10 +92,11 @@ fn clip(base: &[Vec3; 3], incident: &[Vec3; 3], normal: &Vec3) -> (Rest, Vec3) {
     let mut rest = Rest {
         at: [Vec3::zeros(); ROOM],
         features: [0, 1, 2, 0, 0, 0, 0, 0],
+        lines: [0, 1, 2, 0, 0, 0, 0, 0],
         count: 3,
     };
     rest.at[..3].copy_from_slice(incident);
-    for (edge, k) in (1_u32..).zip(0..3) {
+    for (edge, k) in (0_u32..).zip(0..3) {
         let mut outward = (base[(k + 1) % 3] - base[k]).cross(normal);
         if outward.dot(&(base[k] - centre)) < 0.0 {
             outward = -outward;
@@ -105,7 +109,7 @@ fn clip(base: &[Vec3; 3], incident: &[Vec3; 3], normal: &Vec3) -> (Rest, Vec3) {
 impl Rest {
     /// Cuts off what lies beyond the plane. Source: Sutherland and Hodgman 1974, Reentrant polygon clipping.
     ///
-    /// * `edge` - the plane's place, from 1 on: what a new corner is named by.
+    /// * `edge` - the plane's place, from 0 on: what a new corner is named by, and the line that it lies on.
     fn cut(&self, on: &Vec3, outward: &Vec3, edge: u32) -> Self {
         let mut over = [0.0; ROOM];
         let (mut beyond, mut within) = (false, false);
@@ -124,21 +128,29 @@ impl Rest {
         for k in 0..self.count {
             let next = if k + 1 == self.count { 0 } else { k + 1 };
             let (here, there) = (over[k], over[next]);
+            // Where the ring is left it goes on along the cut.
+            let on = if there > 0.0 {
+                CUT | edge
+            } else {
+                self.lines[k]
+            };
             if here <= 0.0 {
-                kept.put(self.at[k], self.features[k]);
+                let line = if here == 0.0 { on } else { self.lines[k] };
+                kept.put(self.at[k], self.features[k], line);
             }
             if (here < 0.0 && there > 0.0) || (here > 0.0 && there < 0.0) {
                 let along = self.at[next] - self.at[k];
                 let at = self.at[k] + along * (here / (here - there));
-                kept.put(at, (self.features[k] & 0x7fff) | edge << 15);
+                kept.put(at, met(self.lines[k], edge), on);
             }
         }
         kept
     }
 
-    fn put(&mut self, at: Vec3, feature: u32) {
+    fn put(&mut self, at: Vec3, feature: u32, line: u32) {
         if self.count < ROOM {
-            (self.at[self.count], self.features[self.count]) = (at, feature);
+            let k = self.count;
+            (self.at[k], self.features[k], self.lines[k]) = (at, feature, line);
             self.count += 1;
         }
     }
