@@ -547,51 +547,56 @@ fn law_4_2_an_ended_session_ends_after_the_last_of_its_frames() {
     assert_eq!(daemon.world.sources()[1].session, 0);
 }
 
+/// Vertices of a source, to be drained next.
+fn bend(daemon: &mut Daemon, source: &str, session: u64, seq: u64, version: u64) {
+    let header = &mut daemon.drained.push_vertices().header;
+    (header.session, header.seq, header.version) = (session, seq, version);
+    (header.source, header.schema) = (sweepd::wire::name_bytes(source), WIRE_VERSION);
+}
+
+/// What a tick takes: `(session, seq)` of frames, versions of vertices.
+type Taken = (Vec<(u64, u64)>, Vec<u64>);
+
+/// What the next tick takes once what was drained is with the pacer.
+fn next(daemon: &mut Daemon) -> Option<Taken> {
+    let now_ns = daemon.clock.boottime_ns();
+    daemon
+        .pacer
+        .take(&mut daemon.drained, &daemon.world, now_ns);
+    daemon.pacer.due(now_ns, false, None, &mut daemon.inbox)?;
+    let frames = daemon.inbox.frames().iter();
+    let frames = frames.map(|f| (f.header.session, f.header.seq)).collect();
+    let versions = daemon.inbox.vertices().iter().map(|v| v.header.version);
+    Some((frames, versions.collect()))
+}
+
 #[test]
 fn law_4_4_vertices_wait_for_the_frame_that_they_belong_with() {
-    let vertices = |daemon: &mut Daemon, source: &str, seq: u64, version: u64| {
-        let header = &mut daemon.drained.push_vertices().header;
-        (header.session, header.seq, header.version) = (1, seq, version);
-        (header.source, header.schema) = (sweepd::wire::name_bytes(source), WIRE_VERSION);
-    };
-    // What the next tick takes: frames of the lead, and versions of vertices.
-    let next = |daemon: &mut Daemon| {
-        let now_ns = daemon.clock.boottime_ns();
-        daemon
-            .pacer
-            .take(&mut daemon.drained, &daemon.world, now_ns);
-        let due = (daemon.pacer).due(now_ns, false, None, &mut daemon.inbox);
-        due.map(|_| {
-            let frames = daemon.inbox.frames().iter().map(|f| f.header.seq);
-            let versions = daemon.inbox.vertices().iter().map(|v| v.header.version);
-            (frames.collect::<Vec<_>>(), versions.collect::<Vec<_>>())
-        })
-    };
     let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
-    vertices(&mut daemon, "sim", 1, 1);
-    vertices(&mut daemon, "robot", 5, 50);
-    vertices(&mut daemon, "sim", 0, 2);
+    bend(&mut daemon, "sim", 1, 1, 1);
+    bend(&mut daemon, "robot", 1, 5, 50);
+    bend(&mut daemon, "sim", 1, 0, 2);
     // The first tick is a heartbeat: what is not of the lead goes with it. What is of no frame keeps its place behind
     // what was sent before.
     assert_eq!(next(&mut daemon), Some((vec![], vec![50])));
     assert_eq!(next(&mut daemon), None);
     *daemon.drained.push() = sim(1);
-    vertices(&mut daemon, "sim", 2, 3);
-    vertices(&mut daemon, "sim", 2, 4);
+    bend(&mut daemon, "sim", 1, 2, 3);
+    bend(&mut daemon, "sim", 1, 2, 4);
     *daemon.drained.push() = sim(2);
-    vertices(&mut daemon, "sim", 4, 5);
+    bend(&mut daemon, "sim", 1, 4, 5);
     *daemon.drained.push() = sim(3);
-    assert_eq!(next(&mut daemon), Some((vec![1], vec![1, 2])));
-    assert_eq!(next(&mut daemon), Some((vec![2], vec![3, 4])));
-    assert_eq!(next(&mut daemon), Some((vec![3], vec![])));
+    assert_eq!(next(&mut daemon), Some((vec![(1, 1)], vec![1, 2])));
+    assert_eq!(next(&mut daemon), Some((vec![(1, 2)], vec![3, 4])));
+    assert_eq!(next(&mut daemon), Some((vec![(1, 3)], vec![])));
     // Its session ends: what waited for a frame that never comes is gone with it.
     daemon.drained.end_session(1);
     daemon.clock.advance(200 * MS);
     assert_eq!(next(&mut daemon), Some((vec![], vec![])));
     *daemon.drained.push() = sim(9);
-    assert_eq!(next(&mut daemon), Some((vec![9], vec![])));
+    assert_eq!(next(&mut daemon), Some((vec![(1, 9)], vec![])));
     let mut daemon = Daemon::of(Mode::Rate(100.0));
-    vertices(&mut daemon, "sim", 7, 1);
+    bend(&mut daemon, "sim", 1, 7, 1);
     assert_eq!(next(&mut daemon), Some((vec![], vec![1])));
 }
 
@@ -603,26 +608,12 @@ fn law_4_2_bug_vertices_of_another_session_wait_for_the_frames_of_the_one_in_for
     for seq in 2..=4 {
         *daemon.drained.push() = robot(seq);
     }
-    let header = &mut daemon.drained.push_vertices().header;
-    (header.session, header.schema) = (77, WIRE_VERSION);
-    header.source = sweepd::wire::name_bytes("robot");
-    let now_ns = daemon.clock.boottime_ns();
-    daemon
-        .pacer
-        .take(&mut daemon.drained, &daemon.world, now_ns);
-    let due = (daemon.pacer).due(now_ns + HEARTBEAT_NS, false, None, &mut daemon.inbox);
-    assert_eq!(due.unwrap().cause, TickCause::Heartbeat);
-    assert!(daemon.inbox.vertices().is_empty());
+    bend(&mut daemon, "robot", 77, 0, 7);
+    daemon.clock.advance(HEARTBEAT_NS);
+    assert_eq!(next(&mut daemon), Some((vec![], vec![])));
     *daemon.drained.push() = sim(2);
-    daemon
-        .pacer
-        .take(&mut daemon.drained, &daemon.world, now_ns);
-    (daemon.pacer)
-        .due(now_ns, false, None, &mut daemon.inbox)
-        .unwrap();
     // The newest of the robot's, and the lead's.
-    assert_eq!(daemon.inbox.frames().len(), 2);
-    assert_eq!(daemon.inbox.vertices().len(), 1);
+    assert_eq!(next(&mut daemon), Some((vec![(1, 4), (1, 2)], vec![7])));
 }
 
 #[test]
@@ -676,28 +667,6 @@ fn law_4_2_bug_what_is_of_another_boot_begins_no_round() {
     assert_eq!((tick.at_ms, tick.frames.len()), (11.0, 3));
 }
 
-/// Vertices of the lead, to be drained next.
-fn bend(daemon: &mut Daemon, session: u64, seq: u64, version: u64) {
-    let header = &mut daemon.drained.push_vertices().header;
-    (header.session, header.seq, header.version) = (session, seq, version);
-    (header.source, header.schema) = (sweepd::wire::name_bytes("sim"), WIRE_VERSION);
-}
-
-/// What the next tick takes once what was drained is with the pacer: `(session, seq)` of frames, versions of vertices.
-fn taken(daemon: &mut Daemon) -> (Vec<(u64, u64)>, Vec<u64>) {
-    let now_ns = daemon.clock.boottime_ns();
-    daemon
-        .pacer
-        .take(&mut daemon.drained, &daemon.world, now_ns);
-    (daemon.pacer)
-        .due(now_ns, false, None, &mut daemon.inbox)
-        .unwrap();
-    let frames = daemon.inbox.frames().iter();
-    let frames = frames.map(|f| (f.header.session, f.header.seq)).collect();
-    let versions = daemon.inbox.vertices().iter().map(|v| v.header.version);
-    (frames, versions.collect())
-}
-
 #[test]
 fn law_4_4_bug_vertices_go_with_their_frame_whoever_else_sends() {
     let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
@@ -705,29 +674,29 @@ fn law_4_4_bug_vertices_go_with_their_frame_whoever_else_sends() {
     let mut foreign = sim(1);
     foreign.header.session = 77;
     // A stranger's frame behind, then before.
-    bend(&mut daemon, 1, 1, 1);
+    bend(&mut daemon, "sim", 1, 1, 1);
     *daemon.drained.push() = sim(1);
     *daemon.drained.push() = foreign.clone();
     // Those of the stranger are refused, and that is told soon.
-    bend(&mut daemon, 77, 2, 70);
-    assert_eq!(taken(&mut daemon), (vec![(1, 1)], vec![1, 70]));
-    bend(&mut daemon, 1, 2, 2);
+    bend(&mut daemon, "sim", 77, 2, 70);
+    assert_eq!(next(&mut daemon), Some((vec![(1, 1)], vec![1, 70])));
+    bend(&mut daemon, "sim", 1, 2, 2);
     *daemon.drained.push() = sim(2);
     // It makes no tick of its own.
-    assert_eq!(taken(&mut daemon), (vec![(77, 1), (1, 2)], vec![2]));
+    assert_eq!(next(&mut daemon), Some((vec![(77, 1), (1, 2)], vec![2])));
     // A number that is too high is the frame's that comes next, with what was sent before it and after.
-    bend(&mut daemon, 1, 10, 3);
-    bend(&mut daemon, 1, 3, 4);
+    bend(&mut daemon, "sim", 1, 10, 3);
+    bend(&mut daemon, "sim", 1, 3, 4);
     *daemon.drained.push() = sim(3);
-    assert_eq!(taken(&mut daemon), (vec![(1, 3)], vec![3, 4]));
+    assert_eq!(next(&mut daemon), Some((vec![(1, 3)], vec![3, 4])));
     // Who comes after one that has left waits for its own frame.
     daemon.drained.end_session(1);
-    bend(&mut daemon, 78, 1, 80);
+    bend(&mut daemon, "sim", 78, 1, 80);
     *daemon.drained.push() = sim(4);
-    assert_eq!(taken(&mut daemon), (vec![(1, 4)], vec![]));
+    assert_eq!(next(&mut daemon), Some((vec![(1, 4)], vec![])));
     (foreign.header.session, foreign.header.seq) = (78, 1);
     *daemon.drained.push() = foreign;
-    assert_eq!(taken(&mut daemon), (vec![(78, 1)], vec![80]));
+    assert_eq!(next(&mut daemon), Some((vec![(78, 1)], vec![80])));
 }
 
 #[test]
@@ -740,7 +709,7 @@ fn law_4_2_bug_a_stranger_that_floods_pushes_no_frame_of_the_lead_out() {
         *frame = sim(seq);
         frame.header.session = 77;
     }
-    let (frames, _) = taken(&mut daemon);
+    let (frames, _) = next(&mut daemon).unwrap();
     assert_eq!(frames, [(1, 2)]);
     // Those that wait are refused with the next heartbeat, and what was too many is told.
     daemon.run(110.0, Vec::new());

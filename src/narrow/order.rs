@@ -79,18 +79,21 @@ impl RankCost {
 
     /// No list was ranked, for it might have taken too long: what was learned once does not hold for ever.
     pub(super) fn forget(&mut self, gaze: bool) {
-        let at = usize::from(gaze);
-        let now = self.ns[at];
-        self.ns[at] = (now - now.div_ceil(32)).max(RANK_NS[at]);
+        self.set(0, gaze);
     }
 
     fn learn(&mut self, took_ns: u64, pairs: usize, gaze: bool) {
         if took_ns == 0 || pairs < RANK_LEARN_MIN {
             return;
         }
+        self.set(took_ns / pairs as u64, gaze);
+    }
+
+    /// Upwards at once, downwards a little.
+    fn set(&mut self, each_ns: u64, gaze: bool) {
         let at = usize::from(gaze);
         let (least, now) = (RANK_NS[at], self.ns[at]);
-        let each_ns = (took_ns / pairs as u64).max(now - now.div_ceil(32));
+        let each_ns = each_ns.max(now - now.div_ceil(32));
         self.ns[at] = each_ns.clamp(least, RANK_TIMES_MAX * least);
     }
 }

@@ -35,10 +35,12 @@ impl Narrow {
         // To rank them all takes a while too. Where nothing could be done in what is left then, they come as they
         // stand: by the last ranking, then the new ones.
         let ranked = meter.has_ns(self.rank_cost.of(work.len(), gaze.is_some()));
-        let order = if ranked { order } else { Order::AsFound };
-        if !ranked {
+        let order = if ranked {
+            order
+        } else {
             self.rank_cost.forget(gaze.is_some());
-        }
+            Order::AsFound
+        };
         let mut line = self.line_up(&work, order, world, gaze, meter);
         while !work.is_empty() && meter.open() {
             let (mut at, mut left) = (0, 0);

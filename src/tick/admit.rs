@@ -3,10 +3,7 @@
 //! In: a tick's input. Out: the world of this tick, and the end of its time as its frames ask for it.
 
 use super::{EditOutcome, Engine, TickInput};
-use crate::ids::SourceSlot;
-use crate::limits::SOURCES_MAX;
-use crate::wire::{Frame, FrameHeader, Inbox, SOURCE_NAME_LEN};
-use crate::world::Admission;
+use crate::wire::{Frame, Inbox, SOURCE_NAME_LEN};
 
 impl Engine {
     pub(super) fn admit(&mut self, input: &TickInput<'_>) {
@@ -35,13 +32,6 @@ impl Engine {
 
     fn admit_frames(&mut self, inbox: &Inbox, now_ns: u64) {
         let frames = inbox.frames();
-        // Of each source the newest: the result of the others is told to nobody.
-        let mut newest = [None; SOURCES_MAX];
-        let mut note = |source: SourceSlot, header: &FrameHeader, received_ns| {
-            if let Some(newest) = newest.get_mut(source.index()) {
-                *newest = Some((*header, received_ns));
-            }
-        };
         for (at, frame) in frames.iter().enumerate() {
             self.end_before(
                 &frame.header.source,
@@ -49,11 +39,7 @@ impl Engine {
                 inbox,
                 &frames[at..],
             );
-            let admission = self.world.admit(frame, now_ns);
-            self.world.tell_waited(&mut note);
-            if let Admission::Admitted { source, .. } = admission {
-                note(source, &frame.header, frame.received_ns);
-            }
+            self.world.admit(frame, now_ns);
         }
         for vertices in inbox.vertices() {
             let header = &vertices.header;
@@ -65,10 +51,10 @@ impl Engine {
             self.world.end_session(session);
         }
         self.world.age(now_ns);
-        self.world.tell_waited(&mut note);
-        for (header, received_ns) in newest.iter().flatten() {
-            self.end.shorten(header, *received_ns, now_ns);
-        }
+        // Of each source the newest: the result of the others is told to nobody.
+        let end = &mut self.end;
+        self.world
+            .tell_admitted(|header, received_ns| end.shorten(header, received_ns, now_ns));
     }
 
     /// Ends the session in force of a source before another one speaks for it, where its client is gone: what it has

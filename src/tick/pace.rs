@@ -21,7 +21,7 @@ use crate::config::Config;
 use crate::error::Result;
 use crate::ids::SourceSlot;
 use crate::scene::SourceSpec;
-use crate::wire::{Inbox, TickCause, name_bytes, name_str};
+use crate::wire::{Frame, Inbox, TickCause, name_bytes, name_str};
 use crate::world::World;
 
 /// A tick that is due.
@@ -92,15 +92,28 @@ impl Pacer {
         }
     }
 
-    /// Learns from the world what has become of the frames that it was given: who speaks for each source, and whose
-    /// frames move continuous bodies. To be called after each tick.
+    /// Learns from the world what has become of the frames that it was given: who speaks for each source. The frames
+    /// that wait are heard anew on top of that: what seemed a stranger's may count now, and what seemed to count may
+    /// not. To be called after each tick.
     pub fn learn(&mut self, world: &World) {
         for (place, source) in self.sources.iter_mut().enumerate() {
-            source.followed = world.is_followed(place);
             let in_force = world.in_force(place);
-            source.in_force = in_force.map(|(session, heard_ns)| Speaker { session, heard_ns });
+            source.speaker = in_force.map(|(session, heard_ns)| Speaker { session, heard_ns });
+            source.sent = false;
         }
-        self.hear_anew(world);
+        let mut first_ns = None;
+        for held in self.queue.frames_mut() {
+            let whose = &mut held.whose;
+            hear(&mut self.sources, &held.frame, whose, &self.ended, world);
+            first_ns = first_ns.or(whose.speaks.then_some(whose.received_ns));
+        }
+        let ended = &self.ended;
+        for source in &mut self.sources {
+            source.speaker = source.speaker.filter(|by| !ended.contains(&by.session));
+        }
+        if let Beat::OnAll { since_ns, .. } = &mut self.beat {
+            *since_ns = first_ns.map(|first_ns| since_ns.unwrap_or(first_ns));
+        }
     }
 
     /// Takes everything out of an inbox and leaves it empty.
@@ -121,20 +134,14 @@ impl Pacer {
                 received_ns,
                 speaks: false,
             };
-            let good = place.filter(|_| !world.would_refuse(frame));
-            if let Some(source) = good.and_then(|p| self.sources.get_mut(p)) {
-                whose.speaks = source.hear(frame.header.session, received_ns, &self.ended);
-                if whose.speaks {
-                    source.passed += source.lost_before(&frame.header);
-                }
-            }
+            hear(&mut self.sources, frame, &mut whose, &self.ended, world);
             if let Beat::OnAll { since_ns, .. } = &mut self.beat
                 && whose.speaks
             {
                 since_ns.get_or_insert(received_ns);
             }
             let leads = |at| matches!(self.beat, Beat::OnFrame(lead) if at == lead);
-            let alone = place.is_some_and(|at| leads(at) || self.sources[at].followed);
+            let alone = place.is_some_and(|at| leads(at) || world.is_followed(at));
             let passed = self.queue.put(frame, whose, alone);
             let source = place.and_then(|p| self.sources.get_mut(p));
             *source.map_or(&mut self.passed_of_none, |source| &mut source.passed) += passed;
@@ -145,7 +152,7 @@ impl Pacer {
             self.vertices.put(frame, place);
         }
         if !inbox.ended().is_empty() {
-            self.hear_anew(world);
+            self.learn(world);
         }
         inbox.clear();
     }
@@ -235,8 +242,8 @@ impl Pacer {
                 self.queue.take(into, |held: &Held| {
                     let whose = &held.whose;
                     // A stranger's before it goes along, to be refused.
-                    let leads = whose.source == Some(lead) && whose.speaks;
-                    whose.source != Some(lead) || first && (!leads || std::mem::take(&mut first))
+                    whose.source != Some(lead)
+                        || first && (!whose.speaks || std::mem::take(&mut first))
                 });
                 Some(by_frame(Some(slot(lead))))
             }
@@ -316,36 +323,6 @@ impl Pacer {
         };
     }
 
-    /// Hears the frames that wait anew, on top of what the world has: what seemed a stranger's may count now, and what
-    /// seemed to count may not.
-    fn hear_anew(&mut self, world: &World) {
-        for source in &mut self.sources {
-            (source.speaker, source.sent) = (source.in_force, false);
-        }
-        let mut first_ns = None;
-        for held in self.queue.frames_mut() {
-            let whose = &mut held.whose;
-            let before = std::mem::take(&mut whose.speaks);
-            let good = whose.source.filter(|_| !world.would_refuse(&held.frame));
-            let Some(source) = good.and_then(|place| self.sources.get_mut(place)) else {
-                continue;
-            };
-            let session = held.frame.header.session;
-            whose.speaks = source.hear(session, whose.received_ns, &self.ended);
-            if whose.speaks && !before {
-                source.passed += source.lost_before(&held.frame.header);
-            }
-            first_ns = first_ns.or(whose.speaks.then_some(whose.received_ns));
-        }
-        let ended = &self.ended;
-        for source in &mut self.sources {
-            source.speaker = source.speaker.filter(|by| !ended.contains(&by.session));
-        }
-        if let Beat::OnAll { since_ns, .. } = &mut self.beat {
-            *since_ns = first_ns.map(|first_ns| since_ns.unwrap_or(first_ns));
-        }
-    }
-
     /// Sessions that ended go out with, or after, the last of their frames.
     fn hand_over_ended(&mut self, into: &mut Inbox) {
         let waiting = self.queue.frames();
@@ -357,6 +334,21 @@ impl Pacer {
             }
             waits
         });
+    }
+}
+
+/// Hears whether a frame counts for its source: the world will take it, as far as can be told here.
+///
+/// * `ended` - sessions that are over with the last of their frames.
+fn hear(sources: &mut [Source], frame: &Frame, whose: &mut Whose, ended: &[u64], world: &World) {
+    let before = std::mem::take(&mut whose.speaks);
+    let good = whose.source.filter(|_| !world.would_refuse(frame));
+    let Some(source) = good.and_then(|place| sources.get_mut(place)) else {
+        return;
+    };
+    whose.speaks = source.hear(frame.header.session, whose.received_ns, ended);
+    if whose.speaks && !before {
+        source.passed += source.lost_before(&frame.header);
     }
 }
 

@@ -74,8 +74,10 @@ impl World {
     #[must_use]
     pub fn would_refuse(&self, frame: &Frame) -> bool {
         let session = frame.header.session;
-        let checked = self.check_frame(frame);
-        checked.is_err() || checked.is_ok_and(|source| self.over.holds(source, session))
+        self.check_frame(frame).ok().is_none_or(|source| {
+            // The session in force is not over.
+            self.sources[source.index()].session != session && self.over.holds(source, session)
+        })
     }
 
     /// Layout, flags, counts and source: what can be said without looking at sessions.
@@ -173,6 +175,7 @@ impl World {
         let state = &mut self.sources[source.index()];
         state.frames += 1;
         state.newest = Some(frame.header);
+        state.admitted = Some((frame.header, times.received_ns));
         state.since_ns = times.since_ns;
         state.alive = self.now_ns.saturating_sub(times.since_ns) < state.timeout_ns;
         if frame.header.flags == frame_flags::PAUSED {
@@ -287,12 +290,12 @@ impl World {
         self.settle(slot, false);
     }
 
-    /// Tells source, header and receipt (`CLOCK_BOOTTIME`, nanoseconds) of each frame that had to wait and was admitted
+    /// Tells header and receipt (`CLOCK_BOOTTIME`, nanoseconds) of the newest frame of each source that was admitted
     /// since the last call.
-    pub fn tell_waited(&mut self, mut tell: impl FnMut(SourceSlot, &FrameHeader, u64)) {
-        for (slot, source) in (0..).map(SourceSlot).zip(&mut self.sources) {
-            if let Some((header, received_ns)) = source.waiting.admitted.take() {
-                tell(slot, &header, received_ns);
+    pub fn tell_admitted(&mut self, mut tell: impl FnMut(&FrameHeader, u64)) {
+        for source in &mut self.sources {
+            if let Some((header, received_ns)) = source.admitted.take() {
+                tell(&header, received_ns);
             }
         }
     }
@@ -308,9 +311,7 @@ impl World {
             let frame = std::mem::take(&mut state.waiting.frame);
             let times = self.times_of(&frame);
             self.take(source, &frame, times);
-            let waiting = &mut self.sources[source.index()].waiting;
-            waiting.admitted = Some((frame.header, times.received_ns));
-            waiting.frame = frame;
+            self.sources[source.index()].waiting.frame = frame;
         } else if until_ns <= self.now_ns {
             state.waiting.until_ns = None;
             state.refused += 1;

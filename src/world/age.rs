@@ -4,8 +4,8 @@
 //! nearest time-out, the oldest and newest stamp in use.
 
 use super::World;
-use super::census::slot_at;
-use crate::ids::{BodySlot, SourceSlot};
+use super::census::{slot_at, source_at};
+use crate::ids::BodySlot;
 use crate::wire::BodyStatus;
 
 /// No deadline, no stamp.
@@ -78,19 +78,21 @@ impl World {
     /// Sets the time-out of a source: from the next tick on it is what every age is judged by, also of what was sent
     /// before.
     pub fn set_timeout(&mut self, source: usize, timeout_ns: u64) {
-        if source < self.sources.len() {
-            self.timeouts
-                .push((SourceSlot(slot_at(source).0), timeout_ns));
+        if let Some(source) = self.sources.get_mut(source) {
+            source.next_timeout_ns = Some(timeout_ns);
         }
     }
 
     /// A tick begins with the time-outs that were set since the last: whom one concerns [`World::age`] judges anew.
     pub(super) fn take_timeouts(&mut self) {
-        for (source, timeout_ns) in std::mem::take(&mut self.timeouts) {
-            self.sources[source.index()].timeout_ns = timeout_ns;
+        for (place, state) in self.sources.iter_mut().enumerate() {
+            let Some(timeout_ns) = state.next_timeout_ns.take() else {
+                continue;
+            };
+            state.timeout_ns = timeout_ns;
             for (_, slot) in &self.order {
                 let body = self.bodies[slot.index()].as_ref();
-                if body.is_some_and(|body| body.source == Some(source)) {
+                if body.is_some_and(|body| body.source == Some(source_at(place))) {
                     self.ages.set_due(*slot);
                 }
             }
@@ -102,7 +104,7 @@ impl World {
     pub fn age(&mut self, now_boot_ns: u64) {
         self.now_ns = self.now_ns.max(now_boot_ns);
         for place in 0..self.sources.len() {
-            self.flush_waiting(SourceSlot(slot_at(place).0));
+            self.flush_waiting(source_at(place));
             let source = &mut self.sources[place];
             let age_ns = self.now_ns.saturating_sub(source.since_ns);
             source.alive = source.newest.is_some() && age_ns < source.timeout_ns;

@@ -149,9 +149,11 @@ impl World {
             self.lose_vertices(source);
         }
         // Who may not bend it ends nobody's session.
-        if header.session != self.sources[source.index()].session {
-            self.find_bendable(source, header.body)
-                .map_err(|reason| (Some(source), reason))?;
+        let found = self.find_bendable(source, header.body);
+        if header.session != self.sources[source.index()].session
+            && let Err(reason) = found
+        {
+            return refused(reason);
         }
         let received_ns = match frame.received_ns {
             0 => self.now_ns,
@@ -168,7 +170,6 @@ impl World {
             }
             Standing::Next => {}
         }
-        let found = self.find_bendable(source, header.body);
         found.map_or_else(refused, |slot| Ok((source, slot)))
     }
 

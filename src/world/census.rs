@@ -14,7 +14,7 @@ use super::filters::{
 };
 use super::names::{NameId, Names};
 use super::rules::{SIDE_A, SIDE_B, ignores};
-use crate::ids::{BodySlot, PairKey};
+use crate::ids::{BodySlot, PairKey, SourceSlot};
 
 /// Most pairs one rule may force to be candidates; a rule with more widens the boxes of its bodies instead.
 pub(super) const FORCED_PER_RULE_MAX: usize = 1 << 12;
@@ -279,6 +279,11 @@ fn pairs_of(count_a: u64, count_b: u64, same: bool) -> u64 {
     } else {
         count_a * count_b
     }
+}
+
+/// As [`slot_at`], of a source.
+pub(super) fn source_at(place: usize) -> SourceSlot {
+    SourceSlot(slot_at(place).0)
 }
 
 /// Slots are u32.

@@ -6,14 +6,14 @@
 use std::sync::Arc;
 
 use super::World;
-use super::census::slot_at;
+use super::census::{slot_at, source_at};
 use super::edit_links::Places;
 use super::edit_same::Touch;
 use super::filters::{ENABLED, Hot, LIVE, MOVES, NO_GROUP, UNBOUNDED};
 use super::names::NameId;
 use super::parts::Parts;
 use super::place::{Entry, new_body};
-use crate::ids::{BodyId, BodySlot, SourceSlot};
+use crate::ids::{BodyId, BodySlot};
 use crate::math::Pose;
 use crate::scene::{BodySpec, PairRule};
 use crate::wire::EndCause;
@@ -103,6 +103,15 @@ struct After {
     places: Places,
 }
 
+impl After {
+    /// Another body is in a slot, or none.
+    fn take_slot(&mut self, slot: BodySlot) {
+        self.slots.push(slot);
+        self.links = true;
+        self.places.forget();
+    }
+}
+
 impl World {
     /// Applies one request: all of its edits in their order, or none.
     ///
@@ -152,22 +161,8 @@ impl World {
 
     fn apply_one(&mut self, edit: &Edit, after: &mut After) {
         let changed = match edit {
-            Edit::Put { body, shapes } => {
-                let put = self.put(body, shapes, after);
-                if put {
-                    after.links = true;
-                    after.places.forget();
-                }
-                put
-            }
-            Edit::Remove { name } => {
-                let removed = self.remove(name, after);
-                if removed {
-                    after.links = true;
-                    after.places.forget();
-                }
-                removed
-            }
+            Edit::Put { body, shapes } => self.put(body, shapes, after),
+            Edit::Remove { name } => self.remove(name, after),
             Edit::Enable { name, enabled } => self.enable(name, *enabled),
             Edit::Filter { name, group, mask } => self.filter(name, *group, *mask),
             Edit::Margin {
@@ -211,7 +206,7 @@ impl World {
         kept.generation += 1;
         let (mut body, tight) = new_body(spec, shapes.clone(), kept.generation);
         body.id = id;
-        body.source = spec.source.map(|s| SourceSlot(slot_at(s).0));
+        body.source = spec.source.map(source_at);
         let mut entry = Entry::gone(slot);
         entry.enabled = spec.enabled;
         entry.has_pose = !spec.moves;
@@ -243,7 +238,7 @@ impl World {
         };
         self.by_status[usize::from(body.status.code())] += 1;
         self.bodies[slot.index()] = Some(body);
-        after.slots.push(slot);
+        after.take_slot(slot);
         self.names_changed = true;
         self.settle(slot, true);
         true
@@ -319,7 +314,7 @@ impl World {
             return false;
         };
         self.clear_slot(slot, EndCause::Removed);
-        after.slots.push(slot);
+        after.take_slot(slot);
         self.resting.push(slot);
         true
     }

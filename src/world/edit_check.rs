@@ -8,6 +8,7 @@ mod rules;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::World;
+use super::chain::Chain;
 use super::edit::Edit;
 use super::edit_same::Touch;
 use super::parts::PlacedShape;
@@ -28,9 +29,7 @@ struct Draft<'a> {
     /// Bodies that the request puts, hangs, lets go or removes (`None`).
     bodies: BTreeMap<&'a str, Option<Sketch<'a>>>,
     /// Whether the place of bodies is known; without those of which it may be otherwise by now.
-    placed: BTreeMap<&'a str, bool>,
-    /// Of those: on which body each hangs, and that one in turn; the upper first.
-    below: BTreeSet<(&'a str, &'a str)>,
+    placed: Chain<&'a str, bool>,
     /// What the request makes of bodies beside where they are.
     touched: BTreeMap<&'a str, Touch>,
     /// How near the pairs of all bodies are told, as of `Touch`, but for those told of since.
@@ -67,8 +66,7 @@ impl World {
         let mut draft = Draft {
             world: self,
             bodies: BTreeMap::new(),
-            placed: BTreeMap::new(),
-            below: BTreeSet::new(),
+            placed: Chain::default(),
             touched: BTreeMap::new(),
             all_within_m: None,
             at: 0,
@@ -103,14 +101,14 @@ impl<'a> Draft<'a> {
                 if !self.is_there(body, shapes) {
                     self.bodies
                         .insert(&body.name, Some(Sketch::of_put(body, self.at)));
-                    self.forget_place(&body.name);
+                    self.placed.forget(&body.name);
                 }
                 Ok(())
             }
             Edit::Remove { name } => {
                 self.must_have(name)?;
                 self.bodies.insert(name, None);
-                self.forget_place(name);
+                self.placed.forget(name);
                 self.matched.clear();
                 self.len -= 1;
                 Ok(())
@@ -189,7 +187,6 @@ impl<'a> Draft<'a> {
             }
         }
         self.placed.clear();
-        self.below.clear();
         Ok(())
     }
 

@@ -2,13 +2,14 @@
 //!
 //! In: attachments by name, after an edit. Out: roots and root poses, and each body settled whose root is another now.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use super::World;
 use super::body::Body;
-use super::census::slot_at;
+use super::census::{slot_at, source_at};
+use super::chain::Chain;
 use super::filters::MOVES;
-use crate::ids::{BodySlot, SourceSlot};
+use crate::ids::BodySlot;
 use crate::math::{Pose, relative};
 
 /// Where bodies are after the edits of a request so far, as far as that was asked.
@@ -17,9 +18,7 @@ pub(super) struct Places {
     /// Whether some may be elsewhere than before the request.
     any_moved: bool,
     /// The root of bodies that hang on others, and their pose there.
-    roots: BTreeMap<BodySlot, (BodySlot, Pose)>,
-    /// Of those: on which body each hangs, and that one in turn; the upper first.
-    below: BTreeSet<(BodySlot, BodySlot)>,
+    roots: Chain<BodySlot, (BodySlot, Pose)>,
 }
 
 impl Places {
@@ -27,22 +26,6 @@ impl Places {
     pub(super) fn forget(&mut self) {
         self.any_moved = true;
         self.roots.clear();
-        self.below.clear();
-    }
-
-    /// A body hangs elsewhere by now, and with it what hangs on it.
-    fn forget_root(&mut self, slot: BodySlot) {
-        let mut all = vec![slot];
-        while let Some(at) = all.pop() {
-            self.roots.remove(&at);
-            let first = (at, BodySlot(0));
-            while let Some(&(upper, lower)) = self.below.range(first..).next()
-                && upper == at
-            {
-                self.below.remove(&(upper, lower));
-                all.push(lower);
-            }
-        }
     }
 }
 
@@ -74,7 +57,7 @@ impl World {
             return false;
         }
         entry.attach = Some(attach);
-        places.forget_root(slot);
+        places.roots.forget(slot);
         places.any_moved |= pose.is_some();
         true
     }
@@ -98,10 +81,10 @@ impl World {
     ///
     /// Cost: the bodies above it; each of them once, until it hangs elsewhere.
     fn root_by_now(&self, slot: BodySlot, places: &mut Places) -> (BodySlot, Pose) {
-        let root = self.root_among(slot, &mut places.roots);
+        let root = self.root_among(slot, &mut places.roots.known);
         let mut at = slot;
         while let Some((to, _)) = self.hold_of(at)
-            && places.below.insert((to, at))
+            && places.roots.hang(to, at)
         {
             at = to;
         }
@@ -128,7 +111,7 @@ impl World {
             return false;
         };
         entry.attach = None;
-        places.forget_root(slot);
+        places.roots.forget(slot);
         entry.has_pose = has_pose || !moves;
         entry.refused = refused && moves;
         entry.raw = [f64::NAN; 7];
@@ -255,7 +238,7 @@ impl World {
             return false;
         };
         let source = spec.source.filter(|_| spec.moves);
-        let source = source.map(|source| SourceSlot(slot_at(source).0));
+        let source = source.map(source_at);
         let Some(body) = self.bodies[slot.index()].as_mut() else {
             return false;
         };

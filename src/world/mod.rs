@@ -13,6 +13,7 @@ mod ahead;
 mod bend;
 mod body;
 mod census;
+mod chain;
 mod edit;
 mod edit_check;
 mod edit_links;
@@ -57,7 +58,7 @@ use crate::math::Aabb;
 use crate::scene::Scene;
 use crate::wire::{BodyStatus, REJECTS_LEN, Reason, RejectReason};
 use age::Ages;
-use census::slot_at;
+use census::source_at;
 use lists::Lists;
 use names::Names;
 use place::Entry;
@@ -91,8 +92,6 @@ pub struct World {
     rigid_groups: Names,
     sources: Vec<SourceState>,
     over: SessionsOver,
-    /// Time-outs set since the last tick.
-    timeouts: Vec<(SourceSlot, u64)>,
     /// Low half of the boot id; 0: not said.
     boot: u32,
     /// Slots free for another body.
@@ -192,7 +191,6 @@ impl World {
             rigid_groups: Names::default(),
             sources: Vec::new(),
             over: SessionsOver::new(),
-            timeouts: Vec::new(),
             boot: 0,
             free: Vec::new(),
             resting: Vec::new(),
@@ -290,7 +288,7 @@ impl World {
     #[must_use]
     pub fn source_named(&self, name: &str) -> Option<SourceSlot> {
         let place = self.sources.iter().position(|s| s.name == name)?;
-        Some(SourceSlot(slot_at(place).0))
+        Some(source_at(place))
     }
 
     /// Refusals in this boot, by `RejectReason`.
@@ -388,7 +386,7 @@ impl World {
     pub fn end_session(&mut self, session: u64) {
         for (place, state) in self.sources.iter_mut().enumerate() {
             if session != 0 && state.session == session {
-                self.over.put(SourceSlot(slot_at(place).0), session);
+                self.over.put(source_at(place), session);
                 state.session = 0;
                 state.order = None;
                 state.pass_over_waiting();

@@ -19,6 +19,8 @@ pub struct SourceState {
     pub name: String,
     /// Without a frame for this long it is no longer alive and its bodies are stale, nanoseconds.
     pub timeout_ns: u64,
+    /// The same from the next tick on, where it was set.
+    pub(super) next_timeout_ns: Option<u64>,
     /// Session in force; 0: none.
     pub session: u64,
     /// Newest `(epoch, seq)` taken note of, waiting frames included.
@@ -27,6 +29,8 @@ pub struct SourceState {
     pub(super) bent: u64,
     /// Header of the newest frame admitted of the session in force, or of the last one.
     pub(super) newest: Option<FrameHeader>,
+    /// Header and receipt (`CLOCK_BOOTTIME`, nanoseconds) of the newest frame admitted, until somebody was told.
+    pub(super) admitted: Option<(FrameHeader, u64)>,
     /// When the age of that frame starts, nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) since_ns: u64,
     /// When the session in force was last heard, nanoseconds of `CLOCK_BOOTTIME`.
@@ -52,8 +56,6 @@ pub(super) struct Waiting {
     pub(super) frame: Frame,
     /// When its wait ends, nanoseconds of `CLOCK_BOOTTIME`; `None`: no frame waits.
     pub(super) until_ns: Option<u64>,
-    /// Header and receipt (`CLOCK_BOOTTIME`, nanoseconds) of the last one that was admitted, until somebody was told.
-    pub(super) admitted: Option<(FrameHeader, u64)>,
 }
 
 impl SourceState {
@@ -61,10 +63,12 @@ impl SourceState {
         Self {
             name: spec.name.clone(),
             timeout_ns: spec.timeout_ns,
+            next_timeout_ns: None,
             session: 0,
             order: None,
             bent: 0,
             newest: None,
+            admitted: None,
             since_ns: 0,
             heard_ns: 0,
             alive: false,

@@ -93,10 +93,10 @@ impl Narrow {
         wanted: Wanted,
         meter: &mut Meter<'_>,
     ) {
-        let ranked_ns = self.rank_cost.of(self.active.len(), true);
         if !wanted.regions || !meter.open() {
             return;
         }
+        let ranked_ns = self.rank_cost.of(self.active.len(), true);
         if !meter.has_ns(ranked_ns + CLOSING_NS) {
             return self.rank_cost.forget(true);
         }

@@ -65,21 +65,16 @@ impl Queue {
         }
         let of_source = |old: &Held| old.whose.source == whose.source;
         if self.frames.iter().filter(|old| of_source(old)).count() >= FRAMES_PER_DRAIN_MAX {
+            passed += 1;
             // What the world would refuse makes room first, be it the newest.
             let stranger = |old: &Held| of_source(old) && !old.whose.speaks;
-            passed += 1;
-            match self.frames.iter().position(stranger) {
-                Some(oldest) => self.drop_at(oldest),
-                None if !whose.speaks => {
-                    self.spare.push(held);
-                    return passed;
-                }
-                None => {
-                    if let Some(oldest) = self.frames.iter().position(of_source) {
-                        self.drop_at(oldest);
-                    }
-                }
-            }
+            let crowded_out = self.frames.iter().position(stranger);
+            let oldest = || whose.speaks.then(|| self.frames.iter().position(of_source));
+            let Some(at) = crowded_out.or_else(|| oldest().flatten()) else {
+                self.spare.push(held);
+                return passed;
+            };
+            self.drop_at(at);
         }
         let end = self.frames.len();
         self.frames.insert(place.unwrap_or(end).min(end), held);
@@ -130,9 +125,15 @@ impl Queue {
 pub(super) struct Vertices {
     waiting: Vec<Bent>,
     spare: Vec<VertexFrame>,
-    /// Sessions of which a message goes out with the tick that is being made, and so what was sent before it.
-    going: Vec<(Option<usize>, u64)>,
+    /// Sessions of which a message goes out with its frame in the tick that is being made, and the place of the last
+    /// one: what was sent before it goes, too.
+    going: Vec<(Whom, usize)>,
+    /// Sessions of which a message waits on: so does what was sent after it.
+    staying: Vec<Whom>,
 }
+
+/// Place of a source, and a session.
+type Whom = (Option<usize>, u64);
 
 /// The source each of whose frames makes a tick of its own.
 #[derive(Clone, Copy, Debug)]
@@ -149,8 +150,6 @@ struct Bent {
     frame: VertexFrame,
     /// Place of its source.
     source: Option<usize>,
-    /// It goes out with its frame, or what was sent after it does.
-    goes: bool,
 }
 
 impl Vertices {
@@ -164,7 +163,6 @@ impl Vertices {
         let mut held = Bent {
             frame: self.spare.pop().unwrap_or_default(),
             source,
-            goes: false,
         };
         std::mem::swap(&mut held.frame, frame);
         self.waiting.push(held);
@@ -190,18 +188,25 @@ impl Vertices {
     /// * `frames` - those that go on waiting.
     pub(super) fn take(&mut self, into: &mut Inbox, lead: Option<Lead>, frames: &[Held]) {
         self.going.clear();
-        for held in self.waiting.iter_mut().rev() {
-            let (header, session) = (&held.frame.header, held.session());
+        self.staying.clear();
+        for (at, held) in self.waiting.iter().enumerate().rev() {
+            let header = &held.frame.header;
+            let is_told = self.going.iter().any(|(whom, _)| *whom == held.whom());
             let of_tick = || into.frames().iter().any(|frame| belongs(header, frame));
-            held.goes = self.going.contains(&session);
-            if !held.goes && header.seq != 0 && of_tick() {
-                held.goes = true;
-                self.going.push(session);
+            if !is_told && header.seq != 0 && of_tick() {
+                self.going.push((held.whom(), at));
             }
         }
         let mut kept = 0;
         for at in 0..self.waiting.len() {
-            if self.waiting[at].waits(&self.waiting[..kept], into, lead, frames) {
+            let held = &self.waiting[at];
+            let whom = held.whom();
+            let goes = |(of, last): &(Whom, usize)| *of == whom && at <= *last;
+            let is_behind = self.staying.contains(&whom);
+            if !self.going.iter().any(goes) && (is_behind || held.waits(into, lead, frames)) {
+                if !is_behind {
+                    self.staying.push(whom);
+                }
                 self.waiting.swap(kept, at);
                 kept += 1;
             } else {
@@ -226,13 +231,13 @@ impl Vertices {
 }
 
 impl Bent {
-    /// Place of its source, and its session.
-    fn session(&self) -> (Option<usize>, u64) {
+    fn whom(&self) -> Whom {
         (self.source, self.frame.header.session)
     }
 
-    /// Whether it waits on, by what [`Vertices::take`] is given and what of it was `kept` so far.
-    fn waits(&self, kept: &[Self], into: &Inbox, lead: Option<Lead>, frames: &[Held]) -> bool {
+    /// Whether it waits for a frame of its own, or for those of the session before, by what [`Vertices::take`] is
+    /// given.
+    fn waits(&self, into: &Inbox, lead: Option<Lead>, frames: &[Held]) -> bool {
         let header = &self.frame.header;
         let own = |frame: &Frame| frame.header.session == header.session;
         let before = |held: &Held| {
@@ -242,11 +247,8 @@ impl Bent {
             let nobody_else = |session| session == header.session;
             self.source == Some(lead.source) && lead.session.is_none_or(nobody_else)
         };
-        let awaits_frame = header.seq != 0 && lead.is_some_and(speaks);
-        !self.goes
-            && (awaits_frame
-                || kept.iter().any(|held| held.session() == self.session())
-                || frames.iter().any(before) && !into.frames().iter().any(own))
+        header.seq != 0 && lead.is_some_and(speaks)
+            || frames.iter().any(before) && !into.frames().iter().any(own)
     }
 }
 

@@ -16,9 +16,7 @@ pub(super) struct Speaker {
 pub(super) struct Source {
     pub(super) name: [u8; SOURCE_NAME_LEN],
     pub(super) timeout_ns: u64,
-    /// Who speaks for it, as the world has it.
-    pub(super) in_force: Option<Speaker>,
-    /// The same once the world has the frames that wait, too; `None`: nobody, or its session ended.
+    /// Who speaks for it once the world has the frames that wait, too; `None`: nobody, or its session ended.
     pub(super) speaker: Option<Speaker>,
     /// Session, epoch and number of its newest frame.
     newest: (u64, u64, u64),
@@ -26,8 +24,6 @@ pub(super) struct Source {
     pub(super) sent: bool,
     /// It was late for a round and is not waited for until its next frame.
     pub(super) late: bool,
-    /// Each of its frames counts: none is passed over for a newer one.
-    pub(super) followed: bool,
     /// Frames that no tick has used and will use, until somebody was told.
     pub(super) passed: u64,
 }
@@ -37,12 +33,10 @@ impl Source {
         Self {
             name: name_bytes(&spec.name),
             timeout_ns: spec.timeout_ns,
-            in_force: None,
             speaker: None,
             newest: (0, 0, 0),
             sent: false,
             late: false,
-            followed: false,
             passed: 0,
         }
     }

@@ -58,7 +58,7 @@ impl<'a> Draft<'a> {
         let mut way = Vec::new();
         // No longer than the longest chain there can be: they may hang on each other by now.
         let is_placed = loop {
-            if let Some(known) = self.placed.get(at) {
+            if let Some(known) = self.placed.known.get(at) {
                 break *known;
             }
             let Some(body) = self.body(at).filter(|_| way.len() <= self.len) else {
@@ -67,29 +67,16 @@ impl<'a> Draft<'a> {
             way.push(at);
             match body.hangs.filter(|to| self.has(to)) {
                 Some(to) => {
-                    self.below.insert((to, at));
+                    self.placed.hang(to, at);
                     at = to;
                 }
                 None => break body.has_place && !self.is_forgotten(&body),
             }
         };
         self.placed
+            .known
             .extend(way.into_iter().map(|at| (at, is_placed)));
         is_placed
-    }
-
-    /// A body is put elsewhere or hangs elsewhere by now, and with it what hangs on it.
-    pub(super) fn forget_place(&mut self, name: &'a str) {
-        let mut all = vec![name];
-        while let Some(at) = all.pop() {
-            self.placed.remove(at);
-            while let Some(&(upper, lower)) = self.below.range((at, "")..).next()
-                && upper == at
-            {
-                self.below.remove(&(upper, lower));
-                all.push(lower);
-            }
-        }
     }
 
     fn is_forgotten(&self, body: &Sketch<'_>) -> bool {
@@ -122,7 +109,7 @@ impl<'a> Draft<'a> {
                 "it is not known where `{name}` is seen from `{to}`: say where (`position`), or wait for their frames"
             ));
         }
-        self.forget_place(name);
+        self.placed.forget(name);
         let hung = Sketch {
             hangs: Some(to),
             has_place: body.has_place && pose.is_none(),
@@ -165,7 +152,7 @@ impl<'a> Draft<'a> {
             ..*body
         };
         if free.has_place != placed {
-            self.forget_place(name);
+            self.placed.forget(name);
         }
         self.bodies.insert(name, Some(free));
         Ok(())
