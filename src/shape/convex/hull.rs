@@ -5,9 +5,10 @@
 
 use super::facets::{Facet, corners_of, facets_of, is_exact};
 use super::flat;
-use crate::limits::{EXTENT_MAX_M, EXTENT_MIN_M, HULL_VERTICES_MAX};
-use crate::math::{Aabb, Point, Vec3};
+use crate::limits::{EXTENT_MAX_M, HULL_VERTICES_MAX};
+use crate::math::{Point, Vec3};
 use crate::shape::ShapeError;
+use crate::shape::check::spread;
 
 /// What lies this near to the plane of a large triangle is of its face, as a share of the hull's size.
 const FACE_THICK: f64 = 1e-9;
@@ -55,17 +56,20 @@ pub(super) fn check_point(place: usize, point: &Vec3) -> Result<(), ShapeError> 
 impl Hull {
     /// The hull of at least one point.
     pub(super) fn build(given: &[Point]) -> Result<Self, ShapeError> {
-        Self::of_places(&places(given)?)
+        let points = places(given)?;
+        let (_, size_m) = thickness(&points);
+        Self::of_places(&points, size_m)
     }
 
     /// The hull of points that span a volume.
     pub(super) fn build_solid(given: &[Point]) -> Result<Self, ShapeError> {
         let points = places(given)?;
-        check_volume(&points)?;
-        Self::of_places(&points)
+        let size_m = check_volume(&points)?;
+        Self::of_places(&points, size_m)
     }
 
-    fn of_places(points: &[Point]) -> Result<Self, ShapeError> {
+    /// * `size_m` - the points' greatest extent.
+    fn of_places(points: &[Point], size_m: f64) -> Result<Self, ShapeError> {
         let facets = facets_of(points).unwrap_or_default();
         let is_corner = match facets[..] {
             // Without a surface every query works, and manifolds have one point.
@@ -91,7 +95,6 @@ impl Hull {
             faces: Vec::new(),
             corners: Vec::new(),
         };
-        let (_, size_m) = thickness(points);
         for (normal, corners) in faces_of(points, &facets, size_m) {
             let named = corners.into_iter().map(|k| new_place[k as usize]);
             hull.push_face(normal, named.filter(|k| *k != u32::MAX).collect());
@@ -169,12 +172,15 @@ fn places(given: &[Point]) -> Result<Vec<Point>, ShapeError> {
     if points.is_empty() {
         return Err(ShapeError::TooFewPoints { given: 0 });
     }
-    check_extent(&points)?;
+    spread(
+        "the extent of the hull",
+        points.iter().map(|p| p.coords.as_ref()),
+    )?;
     Ok(points)
 }
 
-/// Refuses points that span no volume.
-fn check_volume(points: &[Point]) -> Result<(), ShapeError> {
+/// Refuses points that span no volume; their greatest extent, metres.
+fn check_volume(points: &[Point]) -> Result<f64, ShapeError> {
     if points.len() < 4 {
         return Err(ShapeError::TooFewPoints {
             given: points.len(),
@@ -184,7 +190,7 @@ fn check_volume(points: &[Point]) -> Result<(), ShapeError> {
     if thickness_m <= 1e-13 * size_m {
         return Err(ShapeError::FlatHull { thickness_m });
     }
-    Ok(())
+    Ok(size_m)
 }
 
 /// Greatest distance of a point from the plane of a large triangle of points, and the greatest extent: both 0 for a
@@ -207,19 +213,6 @@ fn thickness(points: &[Point]) -> (f64, f64) {
     }
     let fourth = far(&|p| normal.dot(&(p - first)).abs());
     (normal.dot(&(fourth - first)).abs() / length, along.norm())
-}
-
-/// Refuses points that lie in more than one place but nearer to each other than can be computed with.
-fn check_extent(points: &[Point]) -> Result<(), ShapeError> {
-    let bounds = Aabb::of(points);
-    let extent_m = (bounds.max - bounds.min).amax();
-    if extent_m == 0.0 || extent_m >= EXTENT_MIN_M {
-        return Ok(());
-    }
-    Err(ShapeError::Extent {
-        what: "the extent of the hull".to_owned(),
-        value_m: extent_m,
-    })
 }
 
 /// Plane faces: facets beside each other that lie in the plane of the largest of them. Normal, outward, and corners in
@@ -292,6 +285,7 @@ fn order_around(points: &[Vec3], normal: &Vec3, corners: &mut [u32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::limits::EXTENT_MIN_M;
 
     #[test]
     fn bug_a_cube_with_points_all_over_its_faces_has_eight_corners_and_six_faces() {
