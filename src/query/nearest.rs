@@ -81,6 +81,8 @@ impl Nearest {
 /// What is asked for in groups of neighbours with a box around each: who is far from a group is far from all of it, so
 /// that many parts among many bodies are not held against each other one by one.
 pub(super) struct Groups {
+    /// The box around all.
+    pub(super) whole: Aabb,
     /// Places of what is asked for, group by group.
     places: Vec<usize>,
     /// The box around each group, and where it ends in `places`.
@@ -102,7 +104,11 @@ impl Groups {
             (around(members.iter().map(|place| &asked[*place])), end)
         };
         let boxes = places.chunks(size).map(group).collect();
-        Self { places, boxes }
+        Self {
+            whole,
+            places,
+            boxes,
+        }
     }
 
     /// Places of those whose box may be as near as this, metres.

@@ -16,7 +16,7 @@ use super::nearest::{Groups, Hit, Nearest};
 use super::unknown::Unknown;
 use crate::ids::BodySlot;
 use crate::limits::TOUCHING_ROWS_MAX;
-use crate::math::{Aabb, Pose, ROUND};
+use crate::math::{Pose, ROUND};
 use crate::scene::{Subject, Touching};
 use crate::shape::Geometry;
 use crate::time::{Clock, Meter};
@@ -110,23 +110,19 @@ impl TouchingQuestion {
     /// Finds who may be near by the boxes, and counts who is not to be looked at or cannot be.
     fn look_around(&mut self, world: &World, asked: &Touching, slots: &[BodySlot]) -> Nearest {
         let (mut hits, mut unknown) = (Nearest::new(TOUCHING_ROWS_MAX), Unknown::default());
-        // One box around all: most bodies are far from it.
-        let whole = self
-            .asked
-            .iter()
-            .fold(Aabb::empty(), |all, body| all.merged(&body.proxy));
         let groups = Groups::of(&self.asked);
         for (slot, other) in world.bodies_ahead() {
             let is_lost = other.reach_m.is_infinite() && other.status != BodyStatus::Disabled;
-            if !is_lost && whole.distance(&other.proxy) > self.within_m || slots.contains(&slot) {
-                continue;
-            }
-            let mut is_asked = false;
             let reach_m = if is_lost {
                 f64::INFINITY
             } else {
                 self.within_m
             };
+            // Most bodies are far from all.
+            if groups.whole.distance(&other.proxy) > reach_m || slots.contains(&slot) {
+                continue;
+            }
+            let mut is_asked = false;
             for place in groups.near(&other.proxy, reach_m) {
                 let part = &self.asked[place];
                 let bound_m = bound_m(part, other);
