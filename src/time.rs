@@ -4,8 +4,10 @@
 //! and `monotonic` for deadlines. Nothing else in the crate reads a clock.
 
 mod meter;
+mod seldom;
 
 pub use meter::{Meter, Pause, Reserve, Share};
+pub use seldom::Seldom;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

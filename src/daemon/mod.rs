@@ -9,7 +9,6 @@ mod requests;
 mod settings;
 #[cfg(test)]
 mod tests;
-mod unsent;
 mod watchdog;
 
 use std::collections::VecDeque;
@@ -22,13 +21,12 @@ use crate::record::{Ask, Between, Recorder};
 use crate::scene::Scene;
 use crate::tick::pace::{Due, Pacer};
 use crate::tick::{EditBatch, Engine, TickInput};
-use crate::time::{Budget, Clock};
+use crate::time::{Budget, Clock, Seldom};
 use crate::transport::{Door, RequestToken, Wake};
 use crate::wire::{Inbox, TickRow};
 use crate::world::TreeOf;
 
 use builder::{Asking, Builder, Done, TREE};
-use unsent::Unsent;
 
 pub use crate::tick::build::{Shapes, build_shapes};
 pub use notes::body_note;
@@ -63,7 +61,7 @@ pub struct Daemon<'a> {
     progress: Arc<AtomicU64>,
     /// Who writes down what the engine is given and says.
     recorder: Option<Recorder>,
-    unsent: Unsent,
+    unsent: Seldom,
 }
 
 impl std::fmt::Debug for Daemon<'_> {
@@ -101,7 +99,7 @@ impl<'a> Daemon<'a> {
             tree_asked: None,
             progress: Arc::default(),
             recorder: None,
-            unsent: Unsent::default(),
+            unsent: Seldom::default(),
         };
         daemon.pacer.learn(daemon.engine.world());
         Ok(daemon)

@@ -32,7 +32,7 @@ use super::process::process;
 use super::qos::{self, Ipc, Open, events, failed};
 use crate::error::{Error, Result};
 use crate::limits;
-use crate::time::Clock;
+use crate::time::{Clock, Seldom};
 use crate::transport::patience::Patience;
 use crate::transport::{Door, ICEORYX2_VERSION, RequestToken, Wake};
 use crate::wire::{
@@ -146,13 +146,9 @@ pub struct Server {
     patience: Patience,
     demand: Demand,
     next_token: u64,
-    /// Receives that failed since somebody was told, and when that was.
-    receive_errors: u64,
-    errors_told_ns: u64,
+    /// Receives that failed.
+    errors: Seldom,
 }
-
-/// Time between two lines on messages that cannot be received, nanoseconds.
-const ERRORS_TOLD_NS: u64 = 10_000_000_000;
 
 /// Services whose ports are held elsewhere; they stay open as long as the server.
 struct Services {
@@ -247,8 +243,7 @@ impl Server {
             patience: Patience::new(options.spin_ns),
             demand: Demand::default(),
             next_token: 1,
-            receive_errors: 0,
-            errors_told_ns: 0,
+            errors: Seldom::default(),
             options,
         };
         server.say_hello()?;
@@ -257,14 +252,11 @@ impl Server {
 
     /// Says that messages could not be received, now and then while it goes on: what is behind them is lost.
     fn tell_receive_errors(&mut self, now_ns: u64) {
-        let due = now_ns.saturating_sub(self.errors_told_ns) >= ERRORS_TOLD_NS;
-        if self.receive_errors > 0 && (self.errors_told_ns == 0 || due) {
+        if let Some(times) = self.errors.note(0, now_ns) {
             tracing::warn!(
-                "{} times messages of clients could not be received: a client died in the middle of one, or its files in \
-                 shared memory are damaged; see `sweepd doctor`",
-                std::mem::take(&mut self.receive_errors)
+                "{times} times messages of clients could not be received: a client died in the middle of one, or its files in \
+                 shared memory are damaged; see `sweepd doctor`"
             );
-            self.errors_told_ns = now_ns;
         }
     }
 }

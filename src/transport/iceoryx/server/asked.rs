@@ -17,7 +17,7 @@ impl Server {
                 Ok(Some(request)) => request,
                 Ok(None) => return,
                 Err(_) => {
-                    self.receive_errors += 1;
+                    self.errors.add(1);
                     return;
                 }
             };

@@ -172,7 +172,7 @@ impl Server {
             transforms_vel,
             vertices,
             sessions,
-            receive_errors,
+            errors,
             options,
             ..
         } = self;
@@ -187,7 +187,7 @@ impl Server {
             let of_motions = transforms_vel.drain(rows_max, sessions, |header, rows| {
                 stamp.take(inbox, header, rows, Frame::set_transforms_vel)
             });
-            *receive_errors += of_poses.errors + of_motions.errors;
+            errors.add(of_poses.errors + of_motions.errors);
             poses += of_poses.frames;
             motions += of_motions.frames;
             if of_poses.frames + of_motions.frames == 0 {
@@ -206,7 +206,7 @@ impl Server {
             stamp.take_vertices(inbox, header, rows)
         });
         vertices.release();
-        *receive_errors += of_vertices.errors;
+        errors.add(of_vertices.errors);
         // who came and left between the look and the drain must be looked at again
         self.peers_changed |= self.sessions.len() > known;
         self.tell_receive_errors(now_ns);
