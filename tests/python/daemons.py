@@ -7,6 +7,20 @@ import time
 
 import pytest
 
+NO_TURN = (1.0, 0.0, 0.0, 0.0)
+
+# The first scene of README.md.
+FIRST = """
+[[source]]
+name = "sim"
+[[body]]
+name = "cart"
+shape = { type = "box", half_extents = [0.3, 0.2, 0.1] }
+[[body]]
+name = "post"
+shape = { type = "capsule", radius = 0.1, half_height = 0.5 }
+"""
+
 
 @pytest.fixture
 def started(tmp_path):

@@ -6,7 +6,7 @@ Needs `SWEEPD=path/to/sweepd` and the package of msgs/python with its wheels.
 import os
 
 import pytest
-from daemons import started  # noqa: F401
+from daemons import FIRST, NO_TURN, started  # noqa: F401
 from needed import needed
 
 np = needed("numpy")
@@ -14,24 +14,12 @@ sweepd = needed("sweepd")
 
 SWEEPD = os.environ.get("SWEEPD")
 pytestmark = pytest.mark.skipif(not SWEEPD, reason="SWEEPD names no binary")
-NO_TURN = (1.0, 0.0, 0.0, 0.0)
 POSES = {"cart": ((0.0, 0.0, 0.0), NO_TURN), "post": ((5.0, 0.0, 0.0), NO_TURN)}
-
-SCENE = """
-[[source]]
-name = "sim"
-[[body]]
-name = "cart"
-shape = { type = "box", half_extents = [0.3, 0.2, 0.1] }
-[[body]]
-name = "post"
-shape = { type = "capsule", radius = 0.1, half_height = 0.5 }
-"""
 
 
 @pytest.fixture
 def instance(started):  # noqa: F811
-    return started(SCENE)
+    return started(FIRST)
 
 
 @pytest.fixture

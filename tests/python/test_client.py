@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
-from daemons import started  # noqa: F401
+from daemons import NO_TURN, started  # noqa: F401
 from needed import needed
 
 np = needed("numpy")
@@ -21,7 +21,6 @@ sweepd = needed("sweepd")
 SWEEPD = os.environ.get("SWEEPD")
 pytestmark = pytest.mark.skipif(not SWEEPD, reason="SWEEPD names no binary")
 ROOT = Path(__file__).resolve().parents[2]
-NO_TURN = (1.0, 0.0, 0.0, 0.0)
 
 SCENE = """
 frame_id = "world"

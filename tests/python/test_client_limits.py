@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 import pytest
-from daemons import started  # noqa: F401
+from daemons import FIRST, NO_TURN, started  # noqa: F401
 from needed import needed
 
 sweepd = needed("sweepd")
@@ -22,27 +22,14 @@ from sweepd import layout, ports  # noqa: E402
 SWEEPD = os.environ.get("SWEEPD")
 pytestmark = pytest.mark.skipif(not SWEEPD, reason="SWEEPD names no binary")
 ROOT = Path(__file__).resolve().parents[2]
-NO_TURN = (1.0, 0.0, 0.0, 0.0)
 STILL = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-
-# The first scene of README.md.
-SCENE = """
-[[source]]
-name = "sim"
-[[body]]
-name = "cart"
-shape = { type = "box", half_extents = [0.3, 0.2, 0.1] }
-[[body]]
-name = "post"
-shape = { type = "capsule", radius = 0.1, half_height = 0.5 }
-"""
 PLACES = {"cart": (0.0, 0.0, 0.0), "post": (5.0, 0.0, 0.0)}
 
 
 @pytest.fixture
 def start(started):  # noqa: F811
     """Starts a daemon with a scene; the name of its instance."""
-    return lambda text=SCENE: started(text)
+    return lambda text=FIRST: started(text)
 
 
 def poses(velocities=False, only=tuple(PLACES), x=0.0):
@@ -135,7 +122,7 @@ def test_a_frame_that_is_late_has_the_least_time_and_not_all_of_it(start, monkey
 
 def test_bug_frames_with_and_without_velocities_in_turn_are_taken_in_their_order(start):
     # few ticks: the daemon finds several frames at once
-    instance = start("[run]\nrate = 10\n" + SCENE)
+    instance = start("[run]\nrate = 10\n" + FIRST)
     with sweepd.Client(instance, "sim", quat_order="wxyz", listen=("bodies",)) as client:
         for round in range(1, 6):
             for turn, moving in enumerate((True, False, True)):
@@ -149,7 +136,7 @@ def test_bug_frames_with_and_without_velocities_in_turn_are_taken_in_their_order
 
 
 def test_a_pause_does_not_overtake_a_frame_with_velocities(start):
-    instance = start("[run]\nrate = 10\n" + SCENE)
+    instance = start("[run]\nrate = 10\n" + FIRST)
     with sweepd.Client(instance, "sim", quat_order="wxyz", listen=("bodies",)) as client:
         for x in range(1, 9):
             client.send(poses(True, x=float(x)))

@@ -4,11 +4,10 @@ Needs `SWEEPD=path/to/sweepd` and the package of msgs/python with its wheels.
 """
 
 import os
-import signal
-import subprocess
 import time
 
 import pytest
+from daemons import NO_TURN, started  # noqa: F401
 from needed import needed
 
 np = needed("numpy")
@@ -18,7 +17,6 @@ from sweepd import layout  # noqa: E402
 
 SWEEPD = os.environ.get("SWEEPD")
 pytestmark = pytest.mark.skipif(not SWEEPD, reason="SWEEPD names no binary")
-NO_TURN = (1.0, 0.0, 0.0, 0.0)
 CELLS = 20
 
 
@@ -57,14 +55,8 @@ shape = {{ type = "box", half_extents = [0.5, 0.5, 0.5] }}
 
 
 @pytest.fixture
-def instance(tmp_path):
-    path = tmp_path / "scene.toml"
-    path.write_text(scene())
-    name = f"bend_{os.getpid()}_{time.monotonic_ns() % 1_000_000}"
-    process = subprocess.Popen([SWEEPD, "--quiet", "run", str(path), "--instance", name])
-    yield name
-    process.send_signal(signal.SIGINT)
-    assert process.wait(timeout=10) == 0
+def instance(started):  # noqa: F811
+    return started(scene())
 
 
 POSES = {"cloth": ((0.0, 0.0, 1.0), NO_TURN), "box": ((0.0, 0.0, 0.0), NO_TURN)}
@@ -179,14 +171,10 @@ shape = { type = "box", half_extents = [0.5, 0.5, 0.5] }
 """
 
 
-def test_bug_vertices_that_the_queue_has_lost_are_never_taken_for_the_old_shape(tmp_path):
-    path = tmp_path / "two.toml"
-    path.write_text(TWO)
-    name = f"lose_{os.getpid()}_{time.monotonic_ns() % 1_000_000}"
-    process = subprocess.Popen([SWEEPD, "--quiet", "run", str(path), "--instance", name])
+def test_bug_vertices_that_the_queue_has_lost_are_never_taken_for_the_old_shape(started):  # noqa: F811
     flat = np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0]], dtype=float)
     poses = {"cloth": ((0, 0, 2), NO_TURN), "veil": ((9, 0, 2), NO_TURN), "box": ((0, 0, 0), NO_TURN)}
-    with sweepd.Client(name, "sim", quat_order="wxyz", listen=LISTEN) as client:
+    with sweepd.Client(started(TWO), "sim", quat_order="wxyz", listen=LISTEN) as client:
         lost = 0
         for _ in range(10):
             client.send_vertices("cloth", flat)
@@ -204,5 +192,3 @@ def test_bug_vertices_that_the_queue_has_lost_are_never_taken_for_the_old_shape(
                 assert status(client, result, "cloth") == wrong
                 assert status(client, result, "veil")[0] == layout.BodyStatus.KNOWN
         assert lost > 0
-    process.send_signal(signal.SIGINT)
-    assert process.wait(timeout=10) == 0

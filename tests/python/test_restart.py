@@ -9,6 +9,7 @@ import subprocess
 import time
 
 import pytest
+from daemons import NO_TURN
 from needed import needed
 
 np = needed("numpy")
@@ -17,7 +18,6 @@ layout = needed("sweepd.layout")
 
 SWEEPD = os.environ.get("SWEEPD")
 pytestmark = pytest.mark.skipif(not SWEEPD, reason="SWEEPD names no binary")
-NO_TURN = (1.0, 0.0, 0.0, 0.0)
 PLACES = {"left": 0.0, "right": 5.0}
 TRIANGLES = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], "faces": [[0, 1, 2], [1, 3, 2]]}
 
