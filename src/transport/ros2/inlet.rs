@@ -32,8 +32,8 @@ use frames::fill;
 const SLEEP: Duration = Duration::from_nanos(SLEEP_NS);
 /// [`SLEEP`], nanoseconds.
 const SLEEP_NS: u64 = 100_000_000;
-/// As [`SLEEP`], while frames or answers wait for names of which nobody tells that they have come.
-const SLEEP_WAITING: Duration = Duration::from_millis(5);
+/// Shortest sleep until a frame has waited for its names for its time-out, nanoseconds.
+const SLEEP_LEAST_NS: u64 = 5_000_000;
 /// Samples taken from one subscription in one go, so that a flooder starves nobody.
 const TAKES_MAX: usize = 256;
 /// Samples that cannot be decoded, in one go.
@@ -117,9 +117,7 @@ impl Inlet {
         let mut round_ns = SystemClock.boottime_ns();
         let mut more = false;
         while !self.shared.stopped() {
-            let waits = self.services.wait() || !self.early.is_empty();
-            let sleep = if waits { SLEEP_WAITING } else { SLEEP };
-            let sleep = if more { Duration::ZERO } else { sleep };
+            let sleep = if more { Duration::ZERO } else { self.sleep() };
             if let Err(e) = self.poll.poll(&mut events, Some(sleep))
                 && e.kind() != std::io::ErrorKind::Interrupted
             {
@@ -137,6 +135,14 @@ impl Inlet {
             round_ns = now_ns;
             more = self.round(receipt);
         }
+    }
+
+    /// How long to sleep where nobody wakes: who tells of new names does.
+    fn sleep(&self) -> Duration {
+        self.early.until_ns().map_or(SLEEP, |until_ns| {
+            let left_ns = until_ns.saturating_sub(SystemClock.boottime_ns());
+            Duration::from_nanos(left_ns.clamp(SLEEP_LEAST_NS, SLEEP_NS))
+        })
     }
 
     /// Takes what is there; whether there may be more.

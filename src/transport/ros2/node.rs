@@ -108,10 +108,7 @@ impl RosNode {
         // Before any writer, so that no reader of one is missed.
         let readers = Readers::of(&context);
         let sources = Source::of(scene);
-        let shelf = Arc::new(Shelf::default());
-        for source in &sources {
-            shelf.add_group(source.name, options.session, source.bodies());
-        }
+        let shelf = Arc::new(shelf(&sources, options.session));
         let heartbeat_ns = scene.config.heartbeat_ns;
         let publishers = Publishers::create(
             (&mut node, &context, &mut names),
@@ -142,6 +139,7 @@ impl RosNode {
             publishers,
             parcels: Arc::clone(&parcels),
             shared: Arc::clone(&shared),
+            waker: Arc::clone(&waker),
             speaker: Speaker {
                 frame_id: scene.frame_id.clone(),
                 book,
@@ -244,6 +242,15 @@ impl Drop for RosNode {
     fn drop(&mut self) {
         self.close();
     }
+}
+
+/// A shelf with the bodies of common topics.
+fn shelf(sources: &[Source], session: u64) -> Shelf {
+    let shelf = Shelf::default();
+    for source in sources {
+        shelf.add_group(source.name, session, source.bodies());
+    }
+    shelf
 }
 
 /// The boxes of bodies that have an end.

@@ -13,6 +13,7 @@ use std::time::Duration;
 pub(super) use heard::Topics;
 pub(super) use publishers::Publishers;
 use ros2_client::{Context, Node, Publisher};
+use rustdds::mio1::Waker;
 use serde::Serialize;
 
 use super::diagnose::Diagnoser;
@@ -48,6 +49,8 @@ pub(super) struct Outlet {
     pub(super) publishers: Publishers,
     pub(super) parcels: Arc<Parcels>,
     pub(super) shared: Arc<Shared>,
+    /// Of the receiving thread.
+    pub(super) waker: Arc<Waker>,
     pub(super) speaker: Speaker,
     pub(super) boot_id: u64,
     /// The node's full name.
@@ -109,8 +112,9 @@ impl Outlet {
                         self.take_names(scene_rev, &rows);
                     }
                     // Names come with the first tick that has them, or with one before.
-                    if parcel.done {
-                        self.shared.set_names_rev(parcel.tick.header.scene_rev);
+                    if parcel.done && self.shared.set_names_rev(parcel.tick.header.scene_rev) {
+                        // Frames and answers may wait for them.
+                        let _gone_already = self.waker.wake();
                     }
                     let now = self.shared.now();
                     self.speaker.stamp = Some(stamp_of(&parcel.tick, now));
@@ -167,8 +171,9 @@ impl Outlet {
 
     fn look_who_listens(&mut self) {
         let reliable = self.shared.reliable();
-        self.publishers
-            .set_reliable(&mut self.node, &self.context, reliable);
+        let readers = &mut self.readers;
+        let mut pen = Pen::of(&mut self.node, &self.context, &self.shared, readers);
+        self.publishers.set_reliable(&mut pen.means, reliable);
         self.readers.hear(SystemClock.boottime_ns());
         let (out, readers) = (&self.publishers, &self.readers);
         let markers = self.shared.markers_period_ns().is_some() && out.markers.is_read(readers);

@@ -65,6 +65,11 @@ impl Readers {
         self.of.remove(&writer);
     }
 
+    #[cfg(test)]
+    pub(super) fn knows(&self, writer: &GUID) -> bool {
+        self.of.contains_key(writer)
+    }
+
     fn lose(&mut self, gone: impl Fn(&GUID) -> bool) {
         self.of.retain(|_, matched| {
             matched.readers.retain(|reader| !gone(reader));

@@ -200,11 +200,6 @@ impl Services {
         came
     }
 
-    /// Whether answers wait for names.
-    pub(super) fn wait(&self) -> bool {
-        !self.late.is_empty()
-    }
-
     fn token(&mut self) -> u64 {
         self.next += 1;
         self.next

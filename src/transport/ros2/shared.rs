@@ -309,9 +309,10 @@ impl Shared {
         self.names_rev.load(Ordering::Acquire)
     }
 
-    /// The book holds the names of this scene revision.
-    pub(super) fn set_names_rev(&self, scene_rev: u64) {
-        self.names_rev.fetch_max(scene_rev, Ordering::Release);
+    /// The book holds the names of this scene revision; whether it is a newer one.
+    #[must_use]
+    pub(super) fn set_names_rev(&self, scene_rev: u64) -> bool {
+        self.names_rev.fetch_max(scene_rev, Ordering::Release) < scene_rev
     }
 
     /// What is wrong with what comes in, in words.

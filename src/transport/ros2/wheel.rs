@@ -116,15 +116,18 @@ impl<M: Serialize> Wheel<M> {
 
     /// Sets whether lost messages are sent again, which a writer keeps for its life: another one takes its place. Where
     /// DDS makes none, the old one stays until the next call.
-    pub(super) fn set_reliable(&mut self, node: &mut Node, context: &Context, reliable: bool) {
+    pub(super) fn set_reliable(&mut self, with: &mut Means<'_>, reliable: bool) {
         if self.out.reliable == reliable {
             return;
         }
         self.out.reliable = reliable;
-        match self.make(node, context) {
+        match self.make(with.node, with.context) {
             Some(writer) => {
-                self.current = writer;
-                (self.before, self.next) = (None, None);
+                let old = std::mem::replace(&mut self.current, writer);
+                let beside = self.before.take().into_iter().chain(self.next.take());
+                for gone in beside.chain([old]) {
+                    with.readers.forget(gone.guid());
+                }
                 (self.stuck, self.sent, self.full_ns) = (false, 0, None);
             }
             None => self.out.reliable = !reliable,

@@ -25,9 +25,10 @@ pub(super) struct Early {
 }
 
 impl Early {
-    /// Whether none waits.
-    pub(super) fn is_empty(&self) -> bool {
-        self.waiting.is_empty()
+    /// When the first of those that wait has waited for its time-out, nanoseconds of `CLOCK_BOOTTIME`; `None`: none
+    /// waits.
+    pub(super) fn until_ns(&self) -> Option<u64> {
+        self.waiting.iter().map(|one| one.until_ns).min()
     }
 
     /// Takes a message: one that must wait, or that comes behind one of its session that does, is kept; any other goes
@@ -182,7 +183,7 @@ mod tests {
         assert_eq!(out(&mut early, 20, 4), []);
         let both = [("sim".to_owned(), 2), ("sim".to_owned(), 3)];
         assert_eq!(out(&mut early, 20, 5), both);
-        assert!(early.is_empty());
+        assert_eq!(early.until_ns(), None);
     }
 
     #[test]
@@ -214,8 +215,10 @@ mod tests {
         let mut early = Early::default();
         take(&mut early, frame("sim", 1, 9), 10, Some(100));
         take(&mut early, frame("sim", 2, 9), 60, Some(100));
+        assert_eq!(early.until_ns(), Some(110));
         assert_eq!(out(&mut early, 109, 4), []);
         assert_eq!(out(&mut early, 110, 4), [("sim".to_owned(), 1)]);
+        assert_eq!(early.until_ns(), Some(160));
         assert_eq!(out(&mut early, 160, 4), [("sim".to_owned(), 2)]);
         let unknown = take(&mut early, frame("nobody", 1, 9), 10, None);
         assert_eq!(unknown, [(1, None)], "refused for its source");

@@ -6,7 +6,7 @@ use ros2_client::{Context, Node, Publisher};
 
 use super::super::names::Names;
 use super::super::topics::{Out, publisher};
-use super::super::wheel::Wheel;
+use super::super::wheel::{Means, Wheel};
 use super::owed::Owed;
 use crate::error::{Error, Result};
 use crate::wire::ros;
@@ -141,9 +141,9 @@ impl Publishers {
     }
 
     /// Sets whether pairs and contacts that were lost are sent again.
-    pub(super) fn set_reliable(&mut self, node: &mut Node, context: &Context, reliable: bool) {
-        self.pairs.set_reliable(node, context, reliable);
-        self.contacts.set_reliable(node, context, reliable);
-        self.collisions.set_reliable(node, context, reliable);
+    pub(super) fn set_reliable(&mut self, with: &mut Means<'_>, reliable: bool) {
+        self.pairs.set_reliable(with, reliable);
+        self.contacts.set_reliable(with, reliable);
+        self.collisions.set_reliable(with, reliable);
     }
 }

@@ -5,17 +5,12 @@ use serde_json::{Value, json};
 use super::super::told::brief;
 use crate::wire::ros::{AttachBody, Pose, PutBody, SetFilter, SolidPrimitive};
 
-/// The head of an edit, for the log.
-fn short(edit: &Value) -> String {
-    edit.to_string().chars().take(120).collect()
-}
-
 /// An edit for the log: its verb, and the body it names.
 pub(super) fn in_words(edit: &Value) -> String {
     let entry = edit.as_object().and_then(|edit| edit.iter().next());
     let verb = entry.map_or("", |(verb, _)| verb.as_str());
     let body = entry.and_then(|(_, what)| what.get("name"));
-    let body = body.map_or_else(|| short(edit), ToString::to_string);
+    let body = body.map_or_else(|| edit.to_string(), ToString::to_string);
     format!("edit over ROS 2: {verb} {}", brief(&body))
 }
 

@@ -222,6 +222,22 @@ fn a_reader_that_stops_turns_the_writer_and_the_others_go_on() {
     assert_eq!(rig.sent.given_up, (rig.turns - 1) * window);
     assert!(rig.heard.is_sorted(), "in their order");
     assert_eq!(rig.missing(), [0; 0], "of {}", rig.next);
+    // One of another kind takes the place of them all, whose readers are forgotten with them.
+    let beside = rig.wheel.before.iter().chain(&rig.wheel.next);
+    let all: Vec<_> = beside
+        .chain([&rig.wheel.current])
+        .map(Publisher::guid)
+        .collect();
+    let known = |rig: &Rig| all.iter().filter(|guid| rig.readers.knows(guid)).count();
+    assert!(all.len() >= 2 && known(&rig) >= 2, "{all:?}");
+    let mut means = Means {
+        node: &mut rig.node,
+        context: &rig.context,
+        readers: &mut rig.readers,
+        now_ns: 0,
+    };
+    rig.wheel.set_reliable(&mut means, false);
+    assert_eq!(known(&rig), 0);
 }
 
 #[test]
