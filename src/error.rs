@@ -46,6 +46,18 @@ impl Error {
         }
     }
 
+    /// What it says, with what each layer beneath said, from the top down.
+    #[must_use]
+    pub fn with_causes(&self) -> String {
+        let mut text = self.to_string();
+        let mut cause = self.source();
+        while let Some(beneath) = cause {
+            text += &format!(": {beneath}");
+            cause = beneath.source();
+        }
+        text
+    }
+
     /// The exit code of the process: 1 a check failed, 2 usage, 3 timed out, 4 refused or could not run.
     #[must_use]
     pub fn exit_code(&self) -> u8 {

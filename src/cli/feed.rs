@@ -2,8 +2,7 @@
 
 mod cadence;
 
-use std::fs::File;
-use std::io::{ErrorKind, Write as _};
+use std::io::Write as _;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -16,6 +15,7 @@ use crate::wire::{REJECTS_LEN, RejectReason, TransformRow, name_str};
 
 use super::args::FeedArgs;
 use super::connect;
+use super::files::open_new;
 use super::out::Out;
 
 /// Bodies of a written scene when no count is given.
@@ -65,23 +65,11 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
     Ok(true)
 }
 
-/// Writes a scene; one that is there is somebody's work.
+/// Writes a scene.
 fn write_scene(path: &Path, text: &str, over: bool) -> Result<()> {
-    let mut how = File::options();
-    how.write(true)
-        .create(over)
-        .create_new(!over)
-        .truncate(true);
-    let written = how
-        .open(path)
-        .and_then(|mut file| file.write_all(text.as_bytes()));
-    written.map_err(|e| match e.kind() {
-        ErrorKind::AlreadyExists => Error::Refused(format!(
-            "{} is there already: name another file, or write over it with --force",
-            path.display()
-        )),
-        _ => Error::io(format!("cannot write {}", path.display()), e),
-    })
+    open_new(path, over, "a scene")?
+        .write_all(text.as_bytes())
+        .map_err(|e| Error::io(format!("cannot write {}", path.display()), e))
 }
 
 /// Sends frame after frame at the rate, until stopped or for the frames asked for.

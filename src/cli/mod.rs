@@ -11,6 +11,7 @@ mod check;
 mod doctor;
 mod feed;
 mod figures;
+mod files;
 mod list;
 mod manual;
 mod monitor;
@@ -56,13 +57,7 @@ pub fn main() -> ExitCode {
     match dispatch(cli.command, ros_words.as_deref()) {
         Ok(code) => code,
         Err(error) => {
-            let mut text = error.to_string();
-            let mut cause = std::error::Error::source(&error);
-            while let Some(beneath) = cause {
-                text += &format!(": {beneath}");
-                cause = beneath.source();
-            }
-            out::complain(&text);
+            out::complain(&error.with_causes());
             ExitCode::from(error.exit_code())
         }
     }

@@ -326,25 +326,17 @@ pub(super) fn unknown_word(body: &BodyRow) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use clap::Parser as _;
 
     use super::super::args::{Cli, Command};
     use super::*;
     use crate::transport::Door as _;
-    use crate::transport::client::Client;
-    use crate::transport::memory::{Hub, MemoryServer};
+    use crate::transport::memory::trial::{SECOND_NS, met, under_way};
     use crate::wire::Outbox;
-
-    const SECOND_NS: u64 = 1_000_000_000;
 
     #[test]
     fn bug_where_lines_are_counted_a_tick_under_way_has_none() {
-        let hub = Hub::new();
-        let mut server = MemoryServer::open(&hub, 7, SECOND_NS).unwrap();
-        let link = Box::new(hub.link());
-        let mut client = Client::over(link, Arc::new(SystemClock), None, SECOND_NS).unwrap();
+        let (mut server, mut client) = met();
         let args = |text: &str| match Cli::try_parse_from(text.split(' ')).unwrap().command {
             Command::Monitor(args) => args,
             other => panic!("{other:?}"),
@@ -356,10 +348,7 @@ mod tests {
         let mut out = Outbox::default();
         out.tick.header.boot_id = 7;
         out.tick.header.tick = 1;
-        let mut under_way = out.tick;
-        under_way.header.state = State::Unknown.code();
-        under_way.reasons = Reason::Undecided.bit();
-        server.publish_tick(&under_way).unwrap();
+        server.publish_tick(&under_way(1)).unwrap();
         assert_eq!(client.wait_tick(SECOND_NS).unwrap(), Heard::Tick);
         assert_eq!(shown(client.view()), [true, true, true, false]);
         out.tick.sent_ns = 1;

@@ -13,6 +13,8 @@ pub(super) use heard::record;
 use std::path::PathBuf;
 
 use super::args::RunArgs;
+#[cfg(feature = "mcap")]
+use super::files::open_new;
 use crate::daemon::Daemon;
 #[cfg(not(feature = "mcap"))]
 use crate::error::Error;
@@ -21,9 +23,13 @@ use crate::scene::Scene;
 use crate::shape::{Contents, Library};
 
 #[cfg(feature = "mcap")]
-use crate::record::file::{McapSink, create};
+use crate::record::file::{McapSink, buffered};
 #[cfg(feature = "mcap")]
 use crate::record::{Recorder, Start};
+
+/// What a file is opened for.
+#[cfg(feature = "mcap")]
+const WHAT: &str = "a recording";
 
 /// What this build says that cannot record or replay.
 #[cfg(not(feature = "mcap"))]
@@ -83,9 +89,9 @@ impl Tape {
         let Some((path, over)) = self.file else {
             return Ok(());
         };
-        let (file, name) = (create(&path, over)?, path.display().to_string());
+        let (file, name) = (open_new(&path, over, WHAT)?, path.display().to_string());
         let start = Start::of(scene, text, files, boot_id, daemon.engine().now_ns());
-        let sink = McapSink::new(file, &name, &scene.frame_id, &start)?;
+        let sink = McapSink::new(buffered(file), &name, &scene.frame_id, &start)?;
         daemon.record(Recorder::start(Box::new(sink))?);
         tracing::info!("recording to {name}");
         Ok(())

@@ -256,12 +256,7 @@ impl Drop for Recorder {
 /// The writer's thread.
 fn write(desk: &Desk, mut sink: Box<dyn Sink>) {
     if let Err(error) = write_all(desk, sink.as_mut()) {
-        let mut text = error.to_string();
-        let mut cause = std::error::Error::source(&error);
-        while let Some(beneath) = cause {
-            text += &format!(": {beneath}");
-            cause = beneath.source();
-        }
+        let text = error.with_causes();
         tracing::error!("the recording ends, the daemon goes on: {text}");
         let mut state = desk.lock();
         state.waiting.clear();

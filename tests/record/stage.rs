@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 
 use sweepd::daemon::Daemon;
 use sweepd::error::Result;
-use sweepd::record::file::{Ending, McapSink, Read, Reader, create};
+use sweepd::record::file::{Ending, McapSink, Read, Reader, buffered};
 use sweepd::record::{Difference, Recorder, Replay, Sink, Start, Tally, TickRecord};
 use sweepd::scene::Scene;
 use sweepd::shape::Library;
@@ -125,7 +125,7 @@ pub fn run(
     let sink = match sink {
         Some(sink) => sink(&start),
         None => {
-            let file = create(&folder.file(), true).unwrap();
+            let file = buffered(std::fs::File::create(folder.file()).unwrap());
             Box::new(McapSink::new(file, "run.mcap", &scene.frame_id, &start).unwrap())
         }
     };

@@ -26,8 +26,7 @@ const NAMES_WAIT_NS: u64 = 1_000_000_000;
 /// What the text of a fault may begin with: which question.
 const KINDS: [&str; 4] = ["gap: ", "touching: ", "ray: ", "impact: "];
 /// The flags that keys of questions are told by.
-const FLAGS: [(&str, &str); 12] = [
-    ("shape", "--shape"),
+const FLAGS: [(&str, &str); 11] = [
     ("position", "--at"),
     ("orientation", "--at"),
     ("within_m", "--within"),
@@ -43,17 +42,18 @@ const FLAGS: [(&str, &str); 12] = [
 
 /// Reads a question as the daemon will: what is wrong with it is the user's, and needs no daemon to be told.
 fn check(question: &Value) -> Result<()> {
+    let of_shape = |why: &str| Error::Usage(format!("--shape: {}", bare(why)));
+    // What is wrong with a shape begins with the number that is, which other flags may have, too: it is read alone.
+    if let Some(shape) = question["touching"].get("shape") {
+        let alone = json!({ "touching": { "shape": shape } }).to_string();
+        Request::parse(alone.as_bytes(), &[]).map_err(|why| of_shape(&why))?;
+    }
     let wrong = |why: String| {
-        let said = KINDS.iter().find_map(|kind| why.strip_prefix(kind));
-        let said = said.unwrap_or(&why);
+        let said = bare(&why);
         let word = said.split([' ', ':', '.']).next().unwrap_or_default();
         let word = word.trim_matches('`');
         match FLAGS.iter().find(|(key, _)| *key == word) {
             Some((_, flag)) => Error::Usage(format!("{flag}: {said}")),
-            // What is wrong with a shape begins with the number that is.
-            None if question["touching"]["shape"].is_object() => {
-                Error::Usage(format!("--shape: {said}"))
-            }
             None => Error::Usage(said.to_owned()),
         }
     };
@@ -68,10 +68,16 @@ fn check(question: &Value) -> Result<()> {
             ShapeSpec::Convex { file: Some(_), .. } | ShapeSpec::Trimesh { file: Some(_), .. }
         );
         if !is_elsewhere {
-            build(&spec.shape, Path::new("")).map_err(|e| wrong(format!("shape: {e}")))?;
+            build(&spec.shape, Path::new("")).map_err(|e| of_shape(&e.to_string()))?;
         }
     }
     Ok(())
+}
+
+/// What a fault says, without which question it is of.
+fn bare(why: &str) -> &str {
+    let said = KINDS.iter().find_map(|kind| why.strip_prefix(kind));
+    said.unwrap_or(why)
 }
 
 /// Asks and waits.
@@ -279,7 +285,25 @@ mod tests {
             ),
             (
                 json!({ "touching": { "shape": { "type": "sphere", "radius": -1.0 } } }),
-                "--shape: ",
+                "--shape: radius is -1",
+            ),
+            (
+                json!({ "touching": { "shape": { "type": "convex",
+                    "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]] } } }),
+                "--shape: the hull",
+            ),
+            (
+                json!({ "touching": { "position": [0, 0, 0],
+                    "shape": { "type": "sphere", "radius": 1.0, "position": [1e13, 0, 0] } } }),
+                "--shape: position holds",
+            ),
+            (
+                json!({ "touching": { "position": [1e13, 0, 0], "shape": { "type": "sphere", "radius": 1.0 } } }),
+                "--at: position holds",
+            ),
+            (
+                json!({ "touching": { "shape": [] } }),
+                "--shape: `shape` is",
             ),
             (
                 json!({ "touching": { "body": "a", "position": [1e13, 0, 0] } }),

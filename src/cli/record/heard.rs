@@ -9,10 +9,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::cli::args_tools::{RecordArgs, Recorded};
 use crate::cli::connect;
+use crate::cli::files::open_new;
 use crate::cli::out::Out;
 use crate::error::{Error, Result};
 use crate::record::FLUSH_NS;
-use crate::record::file::{McapLog, Shown, create};
+use crate::record::file::{McapLog, Shown, buffered};
 use crate::time::{Clock, SystemClock};
 use crate::transport::client::{Client, Heard, Message, Restarted, Topics, View};
 use crate::wire::{MessageHeader, TickRow};
@@ -47,7 +48,7 @@ pub(in crate::cli) fn record(args: &RecordArgs, out: &mut Out, stop: &AtomicBool
         return Ok(true);
     };
     let (clock, name) = (SystemClock, args.file.display().to_string());
-    let file = create(&args.file, args.force)?;
+    let file = buffered(open_new(&args.file, args.force, super::WHAT)?);
     let since_1970_ns = clock.realtime_ns().saturating_sub(clock.boottime_ns());
     let mut log = McapLog::new(file, &name, &args.frame_id, since_1970_ns)?;
     let only = |topic| args.only.is_empty() || args.only.contains(&topic);
@@ -161,31 +162,22 @@ fn parts<T>(message: &Message<T>) -> (&MessageHeader, &[T]) {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
     use crate::transport::Door as _;
-    use crate::transport::memory::{Hub, MemoryServer};
-    use crate::wire::{Outbox, Reason, State};
-
-    const SECOND_NS: u64 = 1_000_000_000;
+    use crate::transport::memory::trial::{SECOND_NS, met, under_way};
+    use crate::wire::Outbox;
 
     #[test]
     fn bug_a_tick_that_is_under_way_is_written_and_counts_once_it_has_ended() {
-        let hub = Hub::new();
-        let mut server = MemoryServer::open(&hub, 7, SECOND_NS).unwrap();
-        let link = Box::new(hub.link());
-        let mut client = Client::over(link, Arc::new(SystemClock), None, SECOND_NS).unwrap();
+        let (mut server, mut client) = met();
         let path = std::env::temp_dir().join(format!("sweepd_heard_{}.mcap", std::process::id()));
-        let mut log = McapLog::new(create(&path, true).unwrap(), "heard", "world", 0).unwrap();
+        let file = buffered(File::create(&path).unwrap());
+        let mut log = McapLog::new(file, "heard", "world", 0).unwrap();
         let mut tally = Tally::default();
         let mut out = Outbox::default();
         out.tick.header.boot_id = 7;
         out.tick.header.tick = 1;
-        let mut under_way = out.tick;
-        under_way.header.state = State::Unknown.code();
-        under_way.reasons = Reason::Undecided.bit();
-        server.publish_tick(&under_way).unwrap();
+        server.publish_tick(&under_way(1)).unwrap();
         out.tick.sent_ns = 1;
         for ticks in 0..=1 {
             assert_eq!(client.wait_tick(SECOND_NS).unwrap(), Heard::Tick);
@@ -195,11 +187,11 @@ mod tests {
         }
         // One whose end is overtaken is missed.
         for (tick, is_whole, missed) in [(2, false, 0), (3, true, 1), (4, false, 1), (6, true, 3)] {
-            (under_way.header.tick, out.tick.header.tick) = (tick, tick);
+            out.tick.header.tick = tick;
             if is_whole {
                 server.publish(&out).unwrap();
             } else {
-                server.publish_tick(&under_way).unwrap();
+                server.publish_tick(&under_way(tick)).unwrap();
             }
             assert_eq!(client.wait_tick(SECOND_NS).unwrap(), Heard::Tick);
             tally.tick(&mut log, client.view()).unwrap();

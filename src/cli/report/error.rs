@@ -7,7 +7,7 @@ use crate::cli::args_report::ErrorArgs;
 use crate::cli::out::Out;
 use crate::daemon::build_shapes;
 use crate::error::{Error, Result};
-use crate::report::error::columns::{COLUMNS, Column};
+use crate::report::error::columns::{Column, columns};
 use crate::report::error::page::{html, summary};
 use crate::report::error::{Report, Setup, Sweep, run};
 use crate::scene::Scene;
@@ -91,10 +91,8 @@ fn table(report: &Report, scene: &str, out: &mut Out) -> Result<()> {
         report.rate_hz,
         report.seed
     ))?;
-    let timed = report.limited == "time";
-    let shown = || COLUMNS.iter().filter(|column| timed || !column.timed);
     let line = |cell: &dyn Fn(&Column) -> String| {
-        let cells: Vec<String> = shown()
+        let cells: Vec<String> = columns(report)
             .map(|column| format!("{:>1$}", cell(column), column.width))
             .collect();
         cells.join(" ")

@@ -14,7 +14,7 @@ mod write;
 pub use heard::McapLog;
 pub use read::{Ending, Read, Reader};
 pub use shown::Shown;
-pub use tape::create;
+pub use tape::buffered;
 pub use write::McapSink;
 
 /// Topics of our own: the start, then what went in and what came out, bit by bit.

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Seek, Write};
-use std::path::Path;
 
 use byteorder::LittleEndian;
 use mcap::records::{MessageHeader, Metadata};
@@ -19,32 +18,10 @@ const CHUNK_BYTES: u64 = 1 << 20;
 /// Bytes that are collected for one call of the system.
 const BUFFER_BYTES: usize = 1 << 16;
 
-/// Opens a new file for a recording.
-///
-/// * `over` - whether one that is there is written over.
-///
-/// # Errors
-/// `Error::Refused` when it is there, `Error::Io` when it cannot be opened.
-pub fn create(path: &Path, over: bool) -> Result<BufWriter<File>> {
-    let mut how = File::options();
-    how.write(true)
-        .create(over)
-        .create_new(!over)
-        .truncate(true);
-    let file = how.open(path).map_err(|e| match e.kind() {
-        std::io::ErrorKind::AlreadyExists => Error::Refused(format!(
-            "{} is there already: name another file, or write over it with --force",
-            path.display()
-        )),
-        _ => Error::io(
-            format!(
-                "cannot open {} for a recording; give a file in a folder that exists and that you may write to",
-                path.display()
-            ),
-            e,
-        ),
-    })?;
-    Ok(BufWriter::with_capacity(BUFFER_BYTES, file))
+/// An open file for a recording: what is written is collected for few calls of the system.
+#[must_use]
+pub fn buffered(file: File) -> BufWriter<File> {
+    BufWriter::with_capacity(BUFFER_BYTES, file)
 }
 
 /// A file whose topics are known.

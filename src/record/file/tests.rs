@@ -1,5 +1,7 @@
 //! Files that are whole, cut off, damaged, of others.
 
+use std::fs::File;
+use std::io::BufWriter;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -24,6 +26,10 @@ impl Scrap {
         let scrap = Self::new();
         std::fs::write(&scrap.0, bytes).unwrap();
         scrap
+    }
+
+    fn create(&self) -> BufWriter<File> {
+        buffered(File::create_new(&self.0).unwrap())
     }
 }
 
@@ -55,7 +61,7 @@ fn record(tick: u64) -> TickRecord {
 /// A recording of so many ticks, a chunk each ten.
 fn written(ticks: u64, why: Option<&str>) -> Scrap {
     let scrap = Scrap::new();
-    let file = create(&scrap.0, false).unwrap();
+    let file = scrap.create();
     let mut sink = McapSink::new(file, "scrap", "world", &start()).unwrap();
     for tick in 1..=ticks {
         sink.tick(&record(tick), false).unwrap();
@@ -115,7 +121,7 @@ fn a_file_that_is_cut_off_is_read_as_far_as_its_chunks_are_whole() {
 #[test]
 fn a_missing_tick_ends_the_reading_before_it() {
     let scrap = Scrap::new();
-    let file = create(&scrap.0, false).unwrap();
+    let file = scrap.create();
     let mut sink = McapSink::new(file, "scrap", "world", &start()).unwrap();
     for tick in (1..=5).chain(7..=10) {
         sink.tick(&record(tick), false).unwrap();
@@ -217,7 +223,7 @@ fn what_is_no_recording_of_ours_is_refused_by_name() {
     assert!(text.contains("is no MCAP file"), "{text}");
     // An MCAP file of others.
     let scrap = Scrap::new();
-    let mut writer = mcap::Writer::new(create(&scrap.0, false).unwrap()).unwrap();
+    let mut writer = mcap::Writer::new(scrap.create()).unwrap();
     writer.finish().unwrap();
     drop(writer);
     let text = error(&scrap);
@@ -228,7 +234,7 @@ fn what_is_no_recording_of_ours_is_refused_by_name() {
 #[test]
 fn in_a_hurry_what_is_for_people_is_left_out_and_counted_and_all_that_is_replayed_is_there() {
     let scrap = Scrap::new();
-    let file = create(&scrap.0, false).unwrap();
+    let file = scrap.create();
     let mut sink = McapSink::new(file, "scrap", "world", &start()).unwrap();
     for tick in 1..=30 {
         let mut record = record(tick);
@@ -260,15 +266,4 @@ fn in_a_hurry_what_is_for_people_is_left_out_and_counted_and_all_that_is_replaye
         _ => None,
     });
     assert_eq!(left_out.as_deref(), Some("9"));
-}
-
-#[test]
-fn a_file_that_is_there_is_not_written_over_unless_asked_for() {
-    let scrap = Scrap::of(b"mine");
-    let error = create(&scrap.0, false).unwrap_err();
-    assert_eq!(error.exit_code(), 4);
-    assert!(error.to_string().contains("--force"), "{error}");
-    assert_eq!(std::fs::read(&scrap.0).unwrap(), b"mine");
-    create(&scrap.0, true).unwrap();
-    assert_eq!(std::fs::read(&scrap.0).unwrap(), b"");
 }

@@ -1,5 +1,6 @@
 //! The columns of the report's tables, on a terminal and on a page: one list for both.
 
+use super::Report;
 use super::page::name;
 use super::tally::Row;
 
@@ -55,7 +56,7 @@ const fn must_be_0(of: Column) -> Column {
 }
 
 /// All, in their order.
-pub const COLUMNS: [Column; 16] = [
+const COLUMNS: [Column; 16] = [
     column(("budget", ""), 13, name),
     column(("undecided", "%"), 9, |row| {
         format!("{:.2}", 100.0 * row.undecided_share)
@@ -91,6 +92,12 @@ pub const COLUMNS: [Column; 16] = [
     must_be_0(column(("wrong", ""), 6, |row| row.wrong.to_string())),
     must_be_0(column(("excluded", ""), 8, |row| row.excluded.to_string())),
 ];
+
+/// Those of a report, in their order: of times only where time is limited.
+pub fn columns(report: &Report) -> impl Iterator<Item = &'static Column> {
+    let timed = report.limited == "time";
+    COLUMNS.iter().filter(move |column| timed || !column.timed)
+}
 
 fn metres(m: Option<f64>) -> String {
     or_none(m.map(|m| format!("{m:.2e}")))

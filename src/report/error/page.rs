@@ -3,7 +3,7 @@
 //! In: a [`Report`]. Out: HTML.
 
 use super::Report;
-use super::columns::{COLUMNS, Column};
+use super::columns::{Column, columns};
 use super::tally::Row;
 use crate::report::plot::{Axis, Plot, Series};
 use crate::report::sheet::{escaped, figure, must_be_0, page, table};
@@ -32,9 +32,7 @@ pub fn html(report: &Report, scene: &str) -> String {
         report.excluded,
         escaped(&summary(report))
     );
-    let timed = report.limited == "time";
-    let shown = || COLUMNS.iter().filter(|column| timed || !column.timed);
-    let heads: Vec<String> = shown()
+    let heads: Vec<String> = columns(report)
         .map(|column| format!("{} {}", column.name, column.unit))
         .collect();
     let cell = |column: &Column, row: &Row| {
@@ -48,7 +46,7 @@ pub fn html(report: &Report, scene: &str) -> String {
     let rows: Vec<Vec<String>> = report
         .rows
         .iter()
-        .map(|row| shown().map(|column| cell(column, row)).collect())
+        .map(|row| columns(report).map(|column| cell(column, row)).collect())
         .collect();
     let heads: Vec<&str> = heads.iter().map(|head| head.trim_end()).collect();
     body += &table(&heads, &rows);

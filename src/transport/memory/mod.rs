@@ -5,6 +5,8 @@
 
 mod link;
 mod server;
+#[cfg(test)]
+pub(crate) mod trial;
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
