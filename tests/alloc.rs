@@ -1,6 +1,7 @@
-//! Goal: no allocation in a tick after warm-up at constant scene size. Method: a counting allocator around the
-//! system's; a motion is played over and over, and one of its rounds must come without an allocation: a later one may still
-//! need more of something than any before.
+//! Goal: no allocation in a tick after warm-up at constant scene size; and memory that comes back when most bodies leave.
+//! Method: a counting allocator around the system's; a motion is played over and over, and one of its rounds must come
+//! without an allocation: a later one may still need more of something than any before. What the thread holds is counted
+//! at a crowd's peak, once few are left, and at the next peak.
 //! `SWEEPD_ALLOC_TRACE=1` prints where each of the last round was made.
 
 #![allow(unsafe_code, reason = "a counting allocator has no safe form")]
@@ -24,8 +25,8 @@ use sweepd::ids::BodySlot;
 use sweepd::math::{Aabb, Point, Vec3};
 use sweepd::pairs::{PairDelta, PairSet};
 use sweepd::time::Budget;
-use sweepd::wire::Demand;
-use sweepd::world::ChangeSet;
+use sweepd::wire::{Demand, EndCause};
+use sweepd::world::{ChangeSet, Removed};
 
 /// Rounds of a motion of which one must come without an allocation: what the scene needs is there then.
 const ROUNDS: u64 = 12;
@@ -36,6 +37,14 @@ thread_local! {
     static ARMED: Cell<bool> = const { Cell::new(false) };
     static TRACED: Cell<bool> = const { Cell::new(false) };
     static COUNT: Cell<u64> = const { Cell::new(0) };
+    /// Bytes that the thread has taken and not given back.
+    static HELD: Cell<i64> = const { Cell::new(0) };
+}
+
+fn hold(more: usize, less: usize) {
+    let sizes = [more, less].map(|size| i64::try_from(size).unwrap_or(i64::MAX));
+    // A thread that ends has no cell any more.
+    let _gone = HELD.try_with(|held| held.set(held.get() + sizes[0] - sizes[1]));
 }
 
 fn note() {
@@ -52,22 +61,25 @@ fn note() {
     });
 }
 
-// SAFETY: every call goes to the system's allocator unchanged; counting touches two thread-local cells that need no
+// SAFETY: every call goes to the system's allocator unchanged; counting touches thread-local cells that need no
 // memory of their own.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         note();
+        hold(layout.size(), 0);
         // SAFETY: the caller's promise about `layout` is passed on.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        hold(0, layout.size());
         // SAFETY: `pointer` came from `alloc` above with this layout.
         unsafe { System.dealloc(pointer, layout) }
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
         note();
+        hold(size, layout.size());
         // SAFETY: as in `dealloc`, and the caller's promise about `size` is passed on.
         unsafe { System.realloc(pointer, layout, size) }
     }
@@ -147,11 +159,12 @@ fn swept(scene: &str) -> String {
     scene.replace("moves = true\n", "moves = true\ncontinuous = true\n")
 }
 
-/// Boxes go round in circles, some of them into others.
-fn circle(boxes: &mut [Aabb], tick: u32) {
+/// Boxes in rows of so many go round in circles, some of them into others.
+fn circle(boxes: &mut [Aabb], row: u32, tick: u32) {
     for (at, aabb) in (0_u32..).zip(boxes) {
         let angle = f64::from(at) + f64::from(tick) * 0.05;
-        let from = [f64::from(at % 50), f64::from(at / 50 % 50), angle.sin()];
+        let from = [at % row, at / row % row].map(f64::from);
+        let from = [from[0], from[1], angle.sin()];
         aabb.min = Point::from(from) + Vec3::new(angle.cos(), angle.sin(), 0.0);
         aabb.max = aabb.min + Vec3::new(1.0, 1.0, 1.0);
     }
@@ -170,7 +183,7 @@ fn a_search_shared_by_threads_allocates_nothing_in_the_tick_thread_after_warm_up
     for round in 0..ROUNDS {
         COUNT.with(|count| count.set(0));
         for tick in 0..126 {
-            circle(&mut boxes.all, tick);
+            circle(&mut boxes.all, 50, tick);
             ARMED.with(|armed| armed.set(round > 0));
             broad.update(&changes, &boxes, &Everything, &mut pairs, &mut delta);
             ARMED.with(|armed| armed.set(false));
@@ -184,6 +197,63 @@ fn a_search_shared_by_threads_allocates_nothing_in_the_tick_thread_after_warm_up
     }
     assert!(pairs.len() > 3_000);
     assert_eq!(last, 0, "allocations in the last round");
+}
+
+/// Ticks of a crowd that comes, moves, leaves but for a few, comes again, and leaves wholly; bytes held in each of these
+/// times, without the caller's.
+fn crowd(broad: &mut BroadPhase, many: u32, few: u32) -> [i64; 4] {
+    let mut boxes = Boxes::new(many as usize);
+    let (mut pairs, mut delta) = (PairSet::new(1 << 20), PairDelta::default());
+    let mut changes = ChangeSet::default();
+    let before = HELD.with(Cell::get);
+    let (mut inside, mut told) = (0, 0);
+    [many, few, many, 0].map(|count| {
+        for step in 0..12 {
+            circle(&mut boxes.all, 200, step);
+            changes.clear();
+            let cause = EndCause::Removed;
+            let left = (count..inside).map(|at| Removed {
+                slot: BodySlot(at),
+                cause,
+            });
+            changes.removed.extend(left);
+            changes.inserted.extend((inside..count).map(BodySlot));
+            changes.moved.extend((0..inside.min(count)).map(BodySlot));
+            inside = count;
+            broad.update(&changes, &boxes, &Everything, &mut pairs, &mut delta);
+            told = told + delta.began.len() - delta.ended.len();
+            assert_eq!(told, pairs.len(), "events tell of all pairs");
+        }
+        broad.validate(&boxes, &Everything, &pairs).unwrap();
+        assert!(
+            2 * pairs.len() >= count as usize,
+            "{}, {count}",
+            pairs.len()
+        );
+        let slots = changes.moved.capacity() + changes.inserted.capacity();
+        let removed = changes.removed.capacity() * size_of::<Removed>();
+        let callers = slots * size_of::<BodySlot>() + removed;
+        HELD.with(Cell::get) - before - i64::try_from(callers).unwrap()
+    })
+}
+
+#[test]
+fn bug_the_memory_of_a_crowd_comes_back_when_it_leaves() {
+    let methods = Method::NAMED.iter().map(|(method, _)| *method);
+    let methods = methods.filter(|method| *method != Method::BruteForce);
+    for (method, afresh) in methods
+        .map(|method| (method, false))
+        .chain([(Method::Order, true)])
+    {
+        let mut broad = BroadPhase::new(method);
+        broad.use_afresh(afresh);
+        let [peak, few, again, none] = crowd(&mut broad, 40_000, 100);
+        assert!(peak > 1_000_000, "{method:?} holds {peak} bytes");
+        // Pairs keep their slots, be they high.
+        assert!(few * 8 < peak, "{method:?} holds {few} bytes of {peak}");
+        assert!(again < peak * 2, "{method:?}: {again} bytes after {peak}");
+        assert!(none * 40 < peak, "{method:?} holds {none} bytes for nobody");
+    }
 }
 
 /// Fails where a tick of a scene allocates, without a budget and, where `limited`, within small ones. Builds with debug

@@ -100,6 +100,20 @@ impl Members {
         give_back(&mut self.touched, self.bounded.len());
     }
 
+    /// Gives the memory of slots behind those of all who are in back, before anybody is touched.
+    pub(super) fn give_back(&mut self) {
+        let last = self.flags.iter().rposition(|flags| flags & IN != 0);
+        let len = last.map_or(0, |last| last + 1);
+        shorten(&mut self.bounds, len);
+        shorten(&mut self.ids, len);
+        shorten(&mut self.flags, len);
+        shorten(&mut self.place, len);
+        self.descents = descents(&self.ids);
+        for list in [&mut self.bounded, &mut self.unbounded, &mut self.touched] {
+            list.shrink_to_fit();
+        }
+    }
+
     /// Takes a body out; `false` when it is not in.
     pub(super) fn leave(&mut self, slot: BodySlot) -> bool {
         if !self.has(slot, IN) {
@@ -289,6 +303,12 @@ impl Members {
         }
         Ok(())
     }
+}
+
+/// Cuts a list off, and gives the memory of the rest back.
+fn shorten<T>(list: &mut Vec<T>, len: usize) {
+    list.truncate(len);
+    list.shrink_to_fit();
 }
 
 /// How many ids are not above the one before.

@@ -21,6 +21,7 @@ use crate::world::ChangeSet;
 
 mod brute;
 mod commit;
+mod engine;
 mod forced;
 mod grid;
 mod keys;
@@ -33,11 +34,10 @@ mod touched;
 pub use crate::config::BroadMethod as Method;
 
 use commit::{Found, Judge};
+use engine::Engine;
 use forced::Forced;
-use grid::{Grid, Kind};
 use members::{ASKED, IN, Members, REFILTERED};
-use order::{Order, Tick, give_back};
-use sap::Sap;
+use order::{Tick, give_back, is_thrifty};
 
 /// The boxes, as the world has them.
 pub trait Proxies {
@@ -70,14 +70,9 @@ pub struct Work {
     pub way: Option<(BroadMode, BroadCause)>,
 }
 
-/// The method at work.
-#[derive(Clone, Debug)]
-enum Engine {
-    Brute,
-    Sap(Box<Sap>),
-    Order(Box<Order>),
-    Grid(Box<Grid>),
-}
+/// So far must the number of bodies fall for their memory to be given back: to show those that are left to a new method
+/// takes less than a tick of all did.
+const FALLEN: usize = 16;
 
 /// The broad phase.
 #[derive(Clone, Debug)]
@@ -88,6 +83,8 @@ pub struct BroadPhase {
     members: Members,
     forced: Forced,
     found: Found,
+    /// Most bodies there were since memory was given back.
+    most: usize,
     /// By body: cause of its removal in this update.
     causes: Vec<EndCause>,
     /// Bodies with a box that left in this update.
@@ -95,24 +92,6 @@ pub struct BroadPhase {
     /// Pairs whose boxes parted in this update.
     parted: Vec<PairKey>,
     work: Work,
-}
-
-impl Engine {
-    fn new(method: Method) -> Self {
-        match method {
-            Method::BruteForce => Self::Brute,
-            Method::SweepAndPrune => Self::Sap(Box::default()),
-            Method::Order => Self::Order(Box::default()),
-            Method::UniformGrid => Self::Grid(Box::new(Grid::new(Kind::Uniform))),
-            Method::SpatialHash => Self::Grid(Box::new(Grid::new(Kind::Hash))),
-            Method::HierarchicalGrid => Self::Grid(Box::new(Grid::new(Kind::Levels))),
-        }
-    }
-
-    /// Whether it goes through copies of the boxes.
-    fn copies_boxes(&self) -> bool {
-        matches!(self, Self::Sap(_) | Self::Grid(_))
-    }
 }
 
 impl BroadPhase {
@@ -126,6 +105,7 @@ impl BroadPhase {
             is_new: false,
             forced: Forced::default(),
             found: Found::default(),
+            most: 0,
             causes: Vec::new(),
             left: Vec::new(),
             parted: Vec::new(),
@@ -209,6 +189,7 @@ impl BroadPhase {
         give_back(&mut delta.began, self.len());
         give_back(&mut delta.ended, self.len());
         self.members.open_tick();
+        self.give_back(pairs, delta);
         self.work = Work::default();
         self.leave(changes, pairs);
         self.enter(changes, proxies);
@@ -237,6 +218,23 @@ impl BroadPhase {
         let bodies = self.len();
         self.found.close_tick(bodies);
         give_back(&mut self.parted, bodies);
+    }
+
+    /// Of very many bodies few are left: gives the memory of the others back.
+    fn give_back(&mut self, pairs: &mut PairSet, delta: &mut PairDelta) {
+        let bodies = self.len();
+        self.most = self.most.max(bodies);
+        if !is_thrifty(self.most) || self.most / FALLEN < bodies {
+            return;
+        }
+        self.most = bodies;
+        self.engine = self.engine.anew();
+        self.is_new = true;
+        self.members.give_back();
+        self.found = Found::default();
+        (self.causes, self.left, self.parted) = (Vec::new(), Vec::new(), Vec::new());
+        pairs.give_back();
+        *delta = PairDelta::default();
     }
 
     /// Lets the method find what has begun, or may have, and what has parted.

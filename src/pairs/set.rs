@@ -163,6 +163,32 @@ impl PairSet {
         }
     }
 
+    /// Gives the memory of many more pairs than there are back, right after a tick was opened. Slots of pairs stay.
+    pub(crate) fn give_back(&mut self) {
+        debug_assert!(
+            self.resting.is_empty(),
+            "a slot that rests is not to be used anew"
+        );
+        let last = self.keys.iter().rposition(|key| *key != PairKey::NOBODY);
+        self.keys.truncate(last.map_or(0, |last| last + 1));
+        self.keys.shrink_to_fit();
+        self.resting = Vec::new();
+        (self.lists, self.index, self.free) = Default::default();
+        self.free.cover(self.keys.len());
+        let room = self.len + (self.len / GROWTH).max(LEAST);
+        for (slot, key) in (0..).zip(&self.keys) {
+            if *key == PairKey::NOBODY {
+                self.free.put(slot);
+            } else {
+                self.index.insert(key.bits(), slot, room);
+            }
+        }
+        self.truncated.shrink_to_fit();
+        let last = self.truncated.iter().map(|body| body.index() + 1).max();
+        self.is_truncated.truncate(last.unwrap_or(0));
+        self.is_truncated.shrink_to_fit();
+    }
+
     /// Makes room for so many pairs more, as far as they may be stored. Pairs that begin together are told together, so
     /// that memory grows once by what they need and not by doubling.
     fn reserve(&mut self, more: usize) {

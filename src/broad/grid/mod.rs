@@ -92,6 +92,11 @@ pub(super) struct Grid {
 }
 
 impl Grid {
+    /// Which of the three it is.
+    pub(super) fn kind(&self) -> Kind {
+        self.kind
+    }
+
     /// Without bodies.
     pub(super) fn new(kind: Kind) -> Self {
         Self {

@@ -224,6 +224,15 @@ impl Order {
         }
     }
 
+    /// Without bodies, with the settings of this one.
+    pub(super) fn anew(&self) -> Self {
+        let mut order = Self::new(self.level);
+        order.use_afresh(self.afresh.gear.forced);
+        let (most, least) = self.afresh.team.sizes();
+        order.use_threads(most, least);
+        order
+    }
+
     /// Bodies with a box left (and may be about to come again). Their pairs are ended by the caller.
     pub(super) fn leave(&mut self, left: &[BodySlot]) {
         if self.afresh.on {

@@ -153,6 +153,11 @@ impl Team {
         self.mates.truncate(self.most - 1);
     }
 
+    /// As [`Team::set`] took them.
+    pub(super) fn sizes(&self) -> (usize, u64) {
+        (self.most, self.least)
+    }
+
     /// Room for another search among so many blocks and bodies.
     pub(super) fn reserve(&mut self, blocks: usize, bodies: usize) {
         for mate in &mut self.mates {
