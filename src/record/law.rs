@@ -127,9 +127,10 @@ fn both(one: &PairRow, two: &PairRow, judged: &mut Judged) -> Option<Spot> {
 /// What is said of the way to this tick's poses.
 fn swept(one: &PairRow, two: &PairRow) -> Option<Spot> {
     let (hit, open) = (pair_flags::SWEPT_HIT, pair_flags::SWEPT_OPEN);
-    // Decided in the replay, and said otherwise in the recording.
-    let denied = has(two, hit) && !has(one, hit) && !has(one, open);
-    let invented = has(one, hit) && !has(two, hit) && !has(two, open);
+    // Decided in the replay, and said otherwise in the recording. Who collides now has touched: that it did so on the
+    // way is no news where it collided before, which one may have certified a tick earlier than the other.
+    let denied = has(two, hit) && !touches(one) && !has(one, open);
+    let invented = has(one, hit) && !touches(two) && !has(two, open);
     let apart =
         has(one, hit) && has(two, hit) && (one.toi_min > two.toi_max || two.toi_min > one.toi_max);
     let show = |row: &PairRow| match (has(row, hit), has(row, open)) {
@@ -237,6 +238,23 @@ mod tests {
         let mut hit = near;
         hit.flags = pair_flags::SWEPT_HIT;
         assert_eq!(field(vec![near], vec![hit]), Some("way".to_owned()));
+        assert_eq!(field(vec![hit], vec![near]), Some("way".to_owned()));
+    }
+
+    #[test]
+    fn bug_a_touch_on_the_way_of_what_collides_now_is_news_in_one_tick_or_another() {
+        let known = row(3, Verdict::Colliding, -0.1, -0.1);
+        let mut news = known;
+        news.flags = pair_flags::SWEPT_HIT;
+        for toi_max in [0.0, 1.0] {
+            (news.toi_min, news.toi_max) = (0.0, toi_max);
+            assert_eq!(field(vec![news], vec![known]), None);
+            assert_eq!(field(vec![known], vec![news]), None);
+        }
+        let (mut early, mut late) = (news, news);
+        (early.toi_min, early.toi_max) = (0.1, 0.2);
+        (late.toi_min, late.toi_max) = (0.3, 0.4);
+        assert_eq!(field(vec![early], vec![late]), Some("way".to_owned()));
     }
 
     #[test]
