@@ -101,7 +101,7 @@ enum {
     SWEEPD_BROAD_MODE_WHOLE = 0,
     /* Few bodies moved: their candidates were compared one by one. */
     SWEEPD_BROAD_MODE_SPARSE = 1,
-    /* Many moved: all candidates were compared, as a list. */
+    /* Many moved: all candidates were compared, or what lists them for some ticks, as a list. */
     SWEEPD_BROAD_MODE_LIST = 2,
     /* All bodies were sorted anew, and their candidates found anew. */
     SWEEPD_BROAD_MODE_SORT = 3,
@@ -129,7 +129,7 @@ enum {
     SWEEPD_BROAD_CAUSE_TRIAL = 7,
     /* Few have moved for some ticks: candidates will last. */
     SWEEPD_BROAD_CAUSE_CALM = 8,
-    /* It was asked for. */
+    /* It was asked for, which no daemon does. */
     SWEEPD_BROAD_CAUSE_FORCED = 9,
 };
 
@@ -288,7 +288,7 @@ enum {
 enum {
     /* Finished, and 0 lies inside the rounding interval: touching counts as colliding. */
     SWEEPD_PAIR_FLAGS_TOUCHING = 1,
-    /* gap_best_m, gap_max_m or the contacts are estimates, not proved. */
+    /* gap_best_m or the contacts are estimates; the interval is proved all the same. */
     SWEEPD_PAIR_FLAGS_ESTIMATE = 2,
     /* A body of the pair is unknown or stale. */
     SWEEPD_PAIR_FLAGS_UNKNOWN_BODY = 4,
@@ -478,9 +478,9 @@ typedef struct sweepd_message_header {
     uint64_t tick;
     /* Scene revision the tick used. */
     uint64_t scene_rev;
-    /* Oldest sender's stamp among the poses used, nanoseconds. */
+    /* Oldest sender's stamp among the poses used, nanoseconds; of no meaning where sources have clocks of their own. */
     uint64_t oldest_stamp_ns;
-    /* Newest sender's stamp among the poses used, nanoseconds. */
+    /* Newest sender's stamp among the poses used, nanoseconds; of no meaning where sources have clocks of their own. */
     uint64_t newest_stamp_ns;
     /* Rows that did not fit into this message. */
     uint64_t truncated;
@@ -591,7 +591,7 @@ SWEEPD_ASSERT(sizeof(sweepd_pair_row) == 120);
 /* Type name "sweepd.v1.Contact", 192 bytes. One point of contact, or the closest points of a
  * near pair. */
 typedef struct sweepd_contact_row {
-    /* Stays while the contact does. */
+    /* Stays while the contact does; 0: the kind `closest`, of which a pair has one at most. */
     uint64_t id;
     /* Smaller body id. */
     uint64_t body_a;

@@ -115,7 +115,7 @@ code! {
         Whole = 0 => "whole",
         /// Few bodies moved: their candidates were compared one by one.
         Sparse = 1 => "sparse",
-        /// Many moved: all candidates were compared, as a list.
+        /// Many moved: all candidates were compared, or what lists them for some ticks, as a list.
         List = 2 => "list",
         /// All bodies were sorted anew, and their candidates found anew.
         Sort = 3 => "sort",
@@ -145,7 +145,7 @@ code! {
         Trial = 7 => "trial",
         /// Few have moved for some ticks: candidates will last.
         Calm = 8 => "calm",
-        /// It was asked for.
+        /// It was asked for, which no daemon does.
         Forced = 9 => "forced",
     }
 }
@@ -315,7 +315,7 @@ pub mod vertex_flags {
 pub mod pair_flags {
     /// Finished, and 0 lies inside the rounding interval: touching counts as colliding.
     pub const TOUCHING: u8 = 1;
-    /// `gap_best_m`, `gap_max_m` or the contacts are estimates, not proved.
+    /// `gap_best_m` or the contacts are estimates; the interval is proved all the same.
     pub const ESTIMATE: u8 = 2;
     /// A body of the pair is unknown or stale.
     pub const UNKNOWN_BODY: u8 = 4;

@@ -86,9 +86,9 @@ pub struct MessageHeader {
     pub tick: u64,
     /// Scene revision the tick used.
     pub scene_rev: u64,
-    /// Oldest sender's stamp among the poses used, nanoseconds.
+    /// Oldest sender's stamp among the poses used, nanoseconds; of no meaning where sources have clocks of their own.
     pub oldest_stamp_ns: u64,
-    /// Newest sender's stamp among the poses used, nanoseconds.
+    /// Newest sender's stamp among the poses used, nanoseconds; of no meaning where sources have clocks of their own.
     pub newest_stamp_ns: u64,
     /// Rows that did not fit into this message.
     pub truncated: u64,
@@ -155,7 +155,7 @@ pub struct PairRow {
 #[repr(C)]
 #[type_name("sweepd.v1.Contact")]
 pub struct ContactRow {
-    /// Stays while the contact does.
+    /// Stays while the contact does; 0: the kind `closest`, of which a pair has one at most.
     pub id: u64,
     /// Smaller body id.
     pub body_a: u64,

@@ -156,9 +156,9 @@ class MessageHeader(_Row):
         ("tick", ctypes.c_uint64),
         # Scene revision the tick used.
         ("scene_rev", ctypes.c_uint64),
-        # Oldest sender's stamp among the poses used, nanoseconds.
+        # Oldest sender's stamp among the poses used, nanoseconds; of no meaning where sources have clocks of their own.
         ("oldest_stamp_ns", ctypes.c_uint64),
-        # Newest sender's stamp among the poses used, nanoseconds.
+        # Newest sender's stamp among the poses used, nanoseconds; of no meaning where sources have clocks of their own.
         ("newest_stamp_ns", ctypes.c_uint64),
         # Rows that did not fit into this message.
         ("truncated", ctypes.c_uint64),
@@ -241,7 +241,7 @@ class ContactRow(_Row):
 
     TYPE_NAME = "sweepd.v1.Contact"
     _fields_ = [
-        # Stays while the contact does.
+        # Stays while the contact does; 0: the kind `closest`, of which a pair has one at most.
         ("id", ctypes.c_uint64),
         # Smaller body id.
         ("body_a", ctypes.c_uint64),
@@ -607,7 +607,7 @@ class BroadMode(IntEnum):
     WHOLE = 0
     # Few bodies moved: their candidates were compared one by one.
     SPARSE = 1
-    # Many moved: all candidates were compared, as a list.
+    # Many moved: all candidates were compared, or what lists them for some ticks, as a list.
     LIST = 2
     # All bodies were sorted anew, and their candidates found anew.
     SORT = 3
@@ -636,7 +636,7 @@ class BroadCause(IntEnum):
     TRIAL = 7
     # Few have moved for some ticks: candidates will last.
     CALM = 8
-    # It was asked for.
+    # It was asked for, which no daemon does.
     FORCED = 9
 
 
@@ -803,7 +803,7 @@ class PairFlags(IntFlag):
 
     # Finished, and 0 lies inside the rounding interval: touching counts as colliding.
     TOUCHING = 1
-    # gap_best_m, gap_max_m or the contacts are estimates, not proved.
+    # gap_best_m or the contacts are estimates; the interval is proved all the same.
     ESTIMATE = 2
     # A body of the pair is unknown or stale.
     UNKNOWN_BODY = 4

@@ -14,9 +14,9 @@ pub struct TickHeader {
     pub tick: u64,
     /// Scene revision the tick used.
     pub scene_rev: u64,
-    /// Oldest sender's stamp among the poses used, nanoseconds.
+    /// Oldest sender's stamp among the poses used, nanoseconds; of no meaning where sources have clocks of their own.
     pub oldest_stamp_ns: u64,
-    /// Newest sender's stamp among the poses used, nanoseconds.
+    /// Newest sender's stamp among the poses used, nanoseconds; of no meaning where sources have clocks of their own.
     pub newest_stamp_ns: u64,
     /// Rows that did not fit.
     pub truncated: u64,
@@ -137,7 +137,7 @@ pub struct Pairs {
 /// `sweepd_msgs/Contact`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
-    /// Stays while the contact does.
+    /// Stays while the contact does; 0: the kind `closest`, of which a pair has one at most.
     pub id: u64,
     /// Name of A.
     pub name_a: String,
