@@ -244,6 +244,7 @@ fn check_says_what_the_daemon_would_do_as_text_and_as_json() {
         (&2.into(), &1.into())
     );
     assert_eq!(json["ignored"][0][0], "a");
+    assert_eq!(json["ignored_left_out"], 0);
     let odd = "rule 1: no body has the name \"ghost\"";
     assert!(text.contains(&format!("warning: {odd}")), "{text}");
     assert_eq!(json["warnings"], serde_json::json!([odd]));

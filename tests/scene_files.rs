@@ -434,6 +434,10 @@ fn odd_but_legal_things_are_notes() {
     assert!(still[0].contains("cannot move"), "{still:?}");
     let unread = notes(&ball("a", "teleport_m = 1.0"));
     assert!(unread[0].contains("teleport_m"), "{unread:?}");
+    let hung = ball("a", "") + &ball("b", "attached_to = \"a\"\non_stale = \"hold\"");
+    assert!(notes(&hung)[0].contains("on_stale"), "{:?}", notes(&hung));
+    let run = "[run]\nbroad_phase = \"sap\"\nthreads = 2\n".to_owned() + &ball("a", "");
+    assert!(notes(&run)[0].contains("threads"), "{:?}", notes(&run));
     let plane = "shape = { type = \"half_space\", normal = [0, 0, 1] }";
     let two = format!(
         "[[body]]\nname = \"a\"\nmoves = false\n{plane}\n[[body]]\nname = \"b\"\nmoves = false\n{plane}\n"

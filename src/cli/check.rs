@@ -31,14 +31,17 @@ pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
                 .map(|(a, b, why)| json!([a, b, why]))
                 .collect::<Vec<_>>()
         });
+        let count = world.ignored_pairs_count();
+        let listed = ignored.as_ref().map(|listed| listed.len() as u64);
         let line = json!({
             "scene": args.scene.display().to_string(),
             "frame_id": scene.frame_id,
             "bodies": scene.bodies.len(),
             "sources": scene.sources.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(),
             "plan": plan,
-            "ignored_pairs": world.ignored_pairs_count(),
+            "ignored_pairs": count,
             "ignored": ignored,
+            "ignored_left_out": listed.map(|listed| count.saturating_sub(listed)),
             "warnings": warnings,
         });
         out.line(&line.to_string())?;

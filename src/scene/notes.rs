@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::config::{BroadMethod, OnStale};
 use crate::scene::table::shortened;
 use crate::scene::{BodySpec, PairRule, Scene, is_pattern, pattern_matches};
 use crate::shape::ShapeSpec;
@@ -39,7 +40,7 @@ impl Scene {
     }
 
     /// What is odd but legal, one sentence each: nothing to watch, rules and sources without a body, half-spaces,
-    /// continuous bodies.
+    /// continuous bodies, what is never read.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
@@ -47,6 +48,7 @@ impl Scene {
             notes.push("the scene has no body: its state is never clear, add [[body]]".to_owned());
         }
         self.note_continuous(&mut notes);
+        self.note_unread(&mut notes);
         let unbounded: Vec<&str> = self
             .bodies
             .iter()
@@ -81,12 +83,33 @@ impl Scene {
                 ));
             }
         }
+    }
+
+    /// What is said and never read.
+    fn note_unread(&self, notes: &mut Vec<String>) {
         let unread = |body: &&BodySpec| body.teleport_m.is_some() && !body.continuous;
         if let Some(body) = self.bodies.iter().find(unread) {
             notes.push(format!(
                 "body \"{}\" has teleport_m, which only a body with continuous = true reads",
                 shortened(&body.name)
             ));
+        }
+        let unread =
+            |body: &&BodySpec| body.attached_to.is_some() && body.on_stale != OnStale::default();
+        if let Some(body) = self.bodies.iter().find(unread) {
+            notes.push(format!(
+                "body \"{}\" has on_stale, but is attached: that of the body it hangs on counts",
+                shortened(&body.name)
+            ));
+        }
+        let one_thread = |method| method != BroadMethod::Order;
+        if self.config.threads.is_some_and(|threads| threads > 1)
+            && self.config.broad_phase.is_some_and(one_thread)
+        {
+            notes.push(
+                "threads is more than 1, which only broad_phase = \"order\" makes use of"
+                    .to_owned(),
+            );
         }
     }
 
