@@ -99,7 +99,7 @@ mod tests {
         fn publish_tick(&mut self, _: &TickRow) -> Result<()> {
             Ok(())
         }
-        fn requests(&mut self, _: &mut dyn FnMut(RequestToken, RequestHeader, &[u8])) {}
+        fn requests(&mut self, _: &mut dyn FnMut(RequestToken, RequestHeader, Vec<u8>)) {}
         fn answer(&mut self, _: RequestToken, _: bool, _: &str) -> Result<()> {
             Ok(())
         }

@@ -1,8 +1,8 @@
 //! Histories whose slots were lost, because the pair set was built anew, until their pairs are found again.
 //!
-//! In: the pair set as it is now, what left the world in this tick. Out: a history at its pair's new slot, or an end with
-//! its cause. Of a pair that is not there because nothing is known of it (a place is unknown, the set is full) nothing is
-//! told until something is.
+//! In: the pair set as it is now, what left the world in this tick. Out: a history at its pair's new slot, or an end
+//! with its cause. Of a pair that is not there because nothing is known of it (a place is unknown, the set is full)
+//! nothing is told until something is.
 
 use std::collections::BTreeMap;
 
@@ -34,7 +34,9 @@ impl Adrift {
         };
         let (low, high) = key.slots();
         let filters = world.filters();
-        let gone = [low, high].into_iter().filter_map(|slot| removed.get(&slot));
+        let gone = [low, high]
+            .into_iter()
+            .filter_map(|slot| removed.get(&slot));
         if let Some(cause) = gone.min() {
             Some(*cause)
         } else if !filters.allows(low, high) {
