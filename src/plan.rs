@@ -1,7 +1,7 @@
 //! The plan: which methods a scene gets, and what is left out because it does not need it.
 //!
 //! In: the world's bodies and the configuration. Out: a [`Plan`] that `check` prints and the daemon publishes when it
-//! changes. It decides again when the scene changes, never in the middle of a tick.
+//! changes. It decides again when the scene or the kind of budget changes, never in the middle of a tick.
 
 use serde::Serialize;
 
@@ -255,7 +255,7 @@ fn choices(facts: &Facts, method: Method, config: &Config) -> Vec<Choice> {
             ),
         });
     }
-    let limited = config.budget.time_ns.is_some() || config.budget.units.is_some();
+    let limited = config.budget.is_limited();
     choices.push(Choice {
         part: "order of work",
         chosen: if limited {
@@ -267,7 +267,7 @@ fn choices(facts: &Facts, method: Method, config: &Config) -> Vec<Choice> {
         why: if limited {
             "the budget is limited"
         } else {
-            "the budget is not limited"
+            "the budget is not limited; oldest first all the same where a frame says when it must be answered"
         }
         .to_owned(),
     });

@@ -118,6 +118,12 @@ impl Budget {
         units: None,
     };
 
+    /// Whether time or units are limited.
+    #[must_use]
+    pub fn is_limited(self) -> bool {
+        self.time_ns.is_some() || self.units.is_some()
+    }
+
     /// Limited by counted work alone, so that a run replays bit for bit.
     #[must_use]
     pub fn units(units: u64) -> Self {

@@ -24,7 +24,9 @@ use sweepd::transport::iceoryx::{
     Cleaned, IoxLink, Place, Server, ServerOptions, Waker, clean_leftovers, leftovers,
     list_instances, spawn_cleaner,
 };
-use sweepd::wire::{FrameHeader, Hello, Inbox, TransformRow, TransformVelRow};
+use sweepd::wire::{
+    FrameHeader, Hello, Inbox, RequestHeader, TransformRow, TransformVelRow, WIRE_VERSION,
+};
 use transport_support::{Files, Manners, SECOND_NS, StandIn, poses, until};
 
 /// Says to the child program which part it plays, and where.
@@ -573,4 +575,43 @@ fn what_a_killed_daemon_leaves_is_seen_and_cleaned_on_demand_and_a_living_one_go
     assert_eq!(unmapped.bytes, 8192);
     drop(client);
     daemon.stop();
+}
+
+#[test]
+fn bug_frames_waited_until_a_large_request_was_copied() {
+    let files = Files::new();
+    let mut server = server(&files, 0);
+    let mut link = IoxLink::open(&files.place, &SystemClock, u64::MAX).unwrap();
+    let header = |request| RequestHeader {
+        json_len: 2,
+        request,
+        schema: WIRE_VERSION,
+        reserved: 0,
+    };
+    let blob: Vec<u8> = (0..3_u32 << 20).map(|at| (at % 251) as u8).collect();
+    link.request(&header(1), b"{}", &[&blob]).unwrap();
+    link.request(&header(2), b"[]", &[]).unwrap();
+    let (mut looks, mut frames, mut asked) = (0, 0, Vec::new());
+    let mut inbox = Inbox::default();
+    until("both requests", || {
+        Link::send(
+            &mut link,
+            &FrameHeader::default(),
+            Rows::Poses(&poses(1, 0.0)),
+        )
+        .unwrap();
+        // While some of it is not copied yet no wait lasts.
+        let wake = server.wait(60 * SECOND_NS, &SystemClock).unwrap();
+        assert!(wake.notified);
+        inbox.clear();
+        server.receive(&mut inbox, &SystemClock);
+        frames += inbox.frames().len();
+        looks += 1;
+        server.requests(&mut |_, header, bytes| asked.push((header.request, bytes)));
+        asked.len() == 2
+    });
+    assert!(looks >= 10, "3 MiB were copied in {looks} looks");
+    assert_eq!(frames, looks, "each look found its frame");
+    assert_eq!(asked[0].1[2..], blob[..]);
+    assert_eq!((asked[0].0, &asked[1]), (1, &(2, b"[]".to_vec())));
 }

@@ -9,7 +9,7 @@ use std::thread::JoinHandle;
 
 use crate::error::{Error, Result};
 use crate::query::Query;
-use crate::record::Asked;
+use crate::record::{Asked, Origin};
 use crate::scene::{Question, Request, Scene};
 use crate::shape::Library;
 use crate::tick::EditBatch;
@@ -26,8 +26,13 @@ const INTERNAL: &str =
 /// Stands for the asker of a tree: the daemon itself.
 pub(super) const TREE: RequestToken = RequestToken(u64::MAX);
 
-/// What is on its way to the worker, and who waits for it.
-struct Job(RequestToken, Work);
+/// What is on its way to the worker.
+enum Job {
+    /// Something to do, and who waits for it.
+    Do(RequestToken, Work),
+    /// What is needed no more.
+    Forget(Origin),
+}
 
 enum Work {
     /// A request to be read: its payload, of which so many bytes are JSON.
@@ -83,11 +88,18 @@ impl Builder {
         let ended = Arc::new(AtomicBool::new(false));
         let told = Arc::clone(&ended);
         let work = move || {
-            for Job(token, work) in requests {
+            for job in requests {
                 // What still waits at the end is not built any more.
                 if told.load(Ordering::Relaxed) {
                     return;
                 }
+                let (token, work) = match job {
+                    Job::Do(token, work) => (token, work),
+                    Job::Forget(origin) => {
+                        drop(origin);
+                        continue;
+                    }
+                };
                 // Whatever goes wrong, its asker gets an answer and the next request is built.
                 let answer = catch_unwind(AssertUnwindSafe(|| against.work(token, work)))
                     .unwrap_or_else(|_| Err(INTERNAL.to_owned()));
@@ -110,8 +122,15 @@ impl Builder {
     }
 
     /// Hands over a request.
-    pub(super) fn ask(&mut self, token: RequestToken, json_len: usize, payload: &[u8]) {
-        self.hand(token, Work::Read(json_len, payload.to_vec()));
+    pub(super) fn ask(&mut self, token: RequestToken, json_len: usize, payload: Vec<u8>) {
+        self.hand(token, Work::Read(json_len, payload));
+    }
+
+    /// Hands over what is needed no more: to give the memory of a large request back takes as long as a tick.
+    pub(super) fn forget(&self, origin: Origin) {
+        if let Some(asked) = &self.asked {
+            let _gone_anyway = asked.send(Job::Forget(origin));
+        }
     }
 
     /// Hands over a question.
@@ -126,7 +145,7 @@ impl Builder {
 
     fn hand(&mut self, token: RequestToken, work: Work) {
         let asked = self.asked.as_ref();
-        let sent = asked.is_some_and(|asked| asked.send(Job(token, work)).is_ok());
+        let sent = asked.is_some_and(|asked| asked.send(Job::Do(token, work)).is_ok());
         self.open += usize::from(sent);
     }
 

@@ -31,8 +31,12 @@ impl Daemon<'_> {
     /// An edit of the next tick, and what it was made of.
     pub(super) fn edit(&mut self, batch: EditBatch, origin: Origin) {
         self.ready.push(batch);
-        if let Some(recorder) = &mut self.recorder {
-            recorder.note_edit(origin);
+        let unused = match &mut self.recorder {
+            Some(recorder) => recorder.note_edit(origin),
+            None => Some(origin),
+        };
+        if let Some(origin) = unused {
+            self.builder.forget(origin);
         }
     }
 

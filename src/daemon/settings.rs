@@ -82,6 +82,8 @@ mod tests {
     struct Panel {
         settings: Vec<Setting>,
         ticks: Vec<TickRow>,
+        /// Plans that were told.
+        plans: Vec<String>,
     }
 
     impl Door for Panel {
@@ -94,12 +96,15 @@ mod tests {
         }
         fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
             self.ticks.push(outbox.tick);
+            if outbox.plan_changed {
+                self.plans.push(outbox.plan.clone());
+            }
             Ok(0)
         }
         fn publish_tick(&mut self, _: &TickRow) -> Result<()> {
             Ok(())
         }
-        fn requests(&mut self, _: &mut dyn FnMut(RequestToken, RequestHeader, &[u8])) {}
+        fn requests(&mut self, _: &mut dyn FnMut(RequestToken, RequestHeader, Vec<u8>)) {}
         fn answer(&mut self, _: RequestToken, _: bool, _: &str) -> Result<()> {
             Ok(())
         }
@@ -111,7 +116,11 @@ mod tests {
 
     /// One setting, then rounds over 100 ms of time; the ticks that came of it.
     fn after(settings: Vec<Setting>) -> Vec<TickRow> {
-        let scene = Scene::parse(SCENE, "s.toml", Path::new("")).unwrap();
+        played(settings, SCENE).ticks
+    }
+
+    fn played(settings: Vec<Setting>, scene: &str) -> Panel {
+        let scene = Scene::parse(scene, "s.toml", Path::new("")).unwrap();
         let shapes = build_shapes(&scene).unwrap();
         let clock = Arc::new(ManualClock::new(1_000_000_000));
         let mut panel = Panel {
@@ -125,7 +134,7 @@ mod tests {
             clock.advance(1_000_000);
         }
         drop(daemon);
-        panel.ticks
+        panel
     }
 
     fn causes(ticks: &[TickRow], cause: TickCause) -> usize {
@@ -145,6 +154,24 @@ mod tests {
             (ticks[0].budget_ns, ticks[0].budget_units),
             (u64::MAX, u64::MAX)
         );
+    }
+
+    #[test]
+    fn bug_the_plan_went_on_telling_the_order_of_work_of_the_budget_before() {
+        let limited = SCENE.replace("[run]", "[run]\nbudget_ms = 3.0");
+        let on_frame = limited.replace("mode = \"on_all\"", "on_frame = \"sim\"");
+        let order = |plan: &str| plan.contains("oldest undecided first");
+        for (scene, set, told) in [
+            (SCENE, Some(3_000_000), true),
+            (&limited, None, false),
+            (&limited, Some(1_000_000), true),
+            // Of ticks that judge ages alone none tells what the frames' ticks may take.
+            (&on_frame, None, true),
+        ] {
+            let panel = played(vec![Setting::BudgetTime(set), Setting::TickNow], scene);
+            let plan = panel.plans.last().unwrap();
+            assert_eq!(order(plan), told, "{plan}");
+        }
     }
 
     #[test]

@@ -4,11 +4,15 @@
 //! does not fit into a message waits here with its range, also after its pair is gone. A touch on the way of a
 //! continuous body that is over at this tick's poses is a begin and an end of one tick: a pass.
 
-use crate::ids::{BodyId, PairKey, PairSlot};
+mod adrift;
+
+use crate::ids::{BodyId, PairSlot};
 use crate::narrow::{Finding, Narrow, Passage};
-use crate::pairs::{PairDelta, PairSet};
+use crate::pairs::PairDelta;
 use crate::wire::{EndCause, Verdict};
 use crate::world::World;
+
+use adrift::Adrift;
 
 /// A pair by its bodies' ids, the smaller first.
 pub(super) type Ids = (BodyId, BodyId);
@@ -77,7 +81,7 @@ pub(super) struct Events {
     /// By `PairSlot`.
     histories: Vec<History>,
     /// Histories whose slots were lost, until they are found again.
-    adrift: Vec<History>,
+    adrift: Vec<Adrift>,
     /// By ids; one entry a pair after [`Events::merge`].
     waiting: Vec<PairEvent>,
     seq: u64,
@@ -88,47 +92,6 @@ pub(super) struct Events {
 }
 
 impl Events {
-    /// The slots of all pairs are void.
-    pub(super) fn forget_slots(&mut self) {
-        let seen = self.histories.drain(..).filter(|history| history.born != 0);
-        self.adrift.extend(seen);
-    }
-
-    /// Gives the histories whose slots were lost to the same pairs' new slots; where there is no such pair any more,
-    /// its collision has ended.
-    pub(super) fn find_slots(
-        &mut self,
-        tick: u64,
-        world: &World,
-        pairs: &PairSet,
-        narrow: &Narrow,
-    ) {
-        for mut history in std::mem::take(&mut self.adrift) {
-            history.go_on_to(tick - 1);
-            let (a, b) = (world.slot_of(history.ids.0), world.slot_of(history.ids.1));
-            let bodies = a.zip(b);
-            if let Some(slot) = bodies.and_then(|(a, b)| pairs.find(PairKey::new(a, b))) {
-                if self.histories.len() <= slot.index() {
-                    self.histories.resize(slot.index() + 1, History::NONE);
-                }
-                self.histories[slot.index()] = history;
-                if let Some(finding) = narrow.finding(slot) {
-                    self.certify(tick, slot, &finding, history.ids, narrow);
-                }
-            } else if history.colliding {
-                let cause = match bodies {
-                    Some(_) => EndCause::Separated,
-                    None => EndCause::Removed,
-                };
-                let ticks = Ticks {
-                    first: history.tick + 1,
-                    last: tick,
-                };
-                self.push(history.ids, Some((ticks, cause)), None);
-            }
-        }
-    }
-
     /// Whether a touch on the way is news: a collision that was told before goes on from the last tick's poses.
     pub(super) fn is_news(&self, slot: PairSlot, passage: Passage) -> bool {
         match passage {

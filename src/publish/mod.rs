@@ -108,9 +108,11 @@ impl Publisher {
         }
     }
 
-    /// The pair set was built anew: what is remembered goes on by body ids.
-    pub fn forget_slots(&mut self) {
-        self.events.forget_slots();
+    /// The pair set is built anew: what is remembered goes on by body ids.
+    ///
+    /// * `last` - the last tick, which `world` is still that of.
+    pub fn forget_slots(&mut self, last: u64, world: &World) {
+        self.events.forget_slots(last, world);
         self.listing.forget_slots();
         self.chain.break_off();
         self.survey = Survey::default();

@@ -160,11 +160,13 @@ impl Recorder {
         }
     }
 
-    /// What the next batch of the next tick's edits was made of.
-    pub fn note_edit(&mut self, origin: Origin) {
-        if !self.over {
-            self.origins.push(origin);
+    /// What the next batch of the next tick's edits was made of; given back when the recording is over.
+    pub fn note_edit(&mut self, origin: Origin) -> Option<Origin> {
+        if self.over {
+            return Some(origin);
         }
+        self.origins.push(origin);
+        None
     }
 
     /// Records a tick: what the engine was given for it, and what it said.
@@ -279,11 +281,14 @@ fn write_all(desk: &Desk, sink: &mut dyn Sink) -> Result<()> {
         let hurried = state.bytes > RECORD_QUEUE_BYTES_MAX / 2;
         let ending = state.ending.clone();
         drop(state);
-        if let Some(record) = next {
+        if let Some(mut record) = next {
             sink.tick(&record, hurried)?;
             is_dirty = true;
+            let bytes = record.bytes();
+            // Requests are large and seldom: their memory is given back here, and not where a tick waits for it.
+            record.edits.clear();
             let mut state = desk.lock();
-            state.bytes = state.bytes.saturating_sub(record.bytes());
+            state.bytes = state.bytes.saturating_sub(bytes);
             if state.spare.len() < SPARE_MAX {
                 state.spare.push(record);
             }

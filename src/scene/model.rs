@@ -122,6 +122,52 @@ impl BodySpec {
             enabled: true,
         }
     }
+
+    /// Whether another says the same of everything but the id and the shapes.
+    #[must_use]
+    pub(crate) fn reads_as(&self, other: &Self) -> bool {
+        let Self {
+            id: _,
+            shapes: _,
+            name,
+            pose,
+            moves,
+            deforms,
+            continuous,
+            teleport_m,
+            source,
+            ros_frame,
+            ros_topic,
+            group,
+            mask,
+            parent,
+            attached_to,
+            rigid_group,
+            report_within_m,
+            max_speed_mps,
+            priority,
+            on_stale,
+            enabled,
+        } = self;
+        *name == other.name
+            && *pose == other.pose
+            && *moves == other.moves
+            && *deforms == other.deforms
+            && *continuous == other.continuous
+            && *teleport_m == other.teleport_m
+            && *source == other.source
+            && *ros_frame == other.ros_frame
+            && *ros_topic == other.ros_topic
+            && *group == other.group
+            && *mask == other.mask
+            && *parent == other.parent
+            && *attached_to == other.attached_to
+            && *rigid_group == other.rigid_group
+            && *max_speed_mps == other.max_speed_mps
+            && (*report_within_m, *priority) == (other.report_within_m, other.priority)
+            && *on_stale == other.on_stale
+            && *enabled == other.enabled
+    }
 }
 
 /// A shape at its place in a body.

@@ -3,7 +3,7 @@
 //! In: a tick's input. Out: the world of this tick, and the end of its time as its frames ask for it.
 
 use super::{EditOutcome, Engine, TickInput};
-use crate::wire::{Frame, Inbox, SOURCE_NAME_LEN};
+use crate::wire::{Frame, Inbox, SOURCE_NAME_LEN, TickCause};
 
 impl Engine {
     pub(super) fn admit(&mut self, input: &TickInput<'_>) {
@@ -25,7 +25,13 @@ impl Engine {
             });
         }
         self.admit_frames(input.inbox, now_ns);
-        if !input.edits.is_empty() {
+        let limited = self.config.budget.is_limited();
+        // Who has no time because only ages are judged says nothing of what the others will have.
+        let ages_only = input.budget.units == Some(0) && input.cause != TickCause::Frame;
+        if !ages_only {
+            self.config.budget = input.budget;
+        }
+        if !input.edits.is_empty() || limited != self.config.budget.is_limited() {
             self.replan();
         }
     }

@@ -21,7 +21,7 @@ use std::sync::Arc;
 use crate::broad::{BroadPhase, Method};
 use crate::config::Config;
 use crate::error::Result;
-use crate::ids::SourceSlot;
+use crate::ids::{PairKey, SourceSlot};
 use crate::limits;
 use crate::narrow::{Narrow, Wanted};
 use crate::pairs::{PairDelta, PairSet};
@@ -49,6 +49,9 @@ pub struct Engine {
     method: Method,
     /// The broad phase is to be built anew in this tick.
     renew: bool,
+    /// The pairs of before: those of a body whose place is not known go on, though no boxes say so. And the pairs that
+    /// were forced in that tick.
+    carried: Vec<PairKey>,
     /// The last tick that left structures which were checked and held; 0: none was.
     checked: u64,
     /// All bodies as inserted: how a broad phase is built anew.
@@ -113,6 +116,7 @@ impl Engine {
             broad,
             method: plan.method(),
             renew: false,
+            carried: Vec::new(),
             checked: 0,
             whole: ChangeSet::default(),
             pairs: PairSet::new(limits.pairs),
@@ -199,6 +203,10 @@ impl Engine {
         // Taken whatever the method does: else a tick in which both hold would be followed by a second renewal.
         let renew = std::mem::take(&mut self.renew);
         if renew {
+            self.carried.retain(|key| {
+                let (low, high) = key.slots();
+                filters.keeps(low) || filters.keeps(high)
+            });
             self.broad = BroadPhase::new(method);
             self.whole.clear();
             let inside = world.bodies().filter(|(_, body)| body.in_broad);
@@ -210,7 +218,11 @@ impl Engine {
             self.method = method;
             share(&mut self.broad, &self.config);
         }
-        if renew || world.scene_changed() {
+        if renew {
+            self.carried.extend_from_slice(filters.forced_pairs());
+            self.broad.force(&self.carried);
+        } else if !self.carried.is_empty() || world.scene_changed() {
+            self.carried = Vec::new();
             self.broad.force(filters.forced_pairs());
         }
         let changes = if renew { &self.whole } else { world.changes() };

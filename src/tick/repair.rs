@@ -37,6 +37,7 @@ impl Engine {
         tracing::error!("a structure does not hold and is built anew: {why}");
         self.rebuilds += 1;
         self.renew = true;
+        self.carried = self.pairs.iter().map(|(_, key)| key).collect();
         let limits = self.config.limits;
         self.pairs = PairSet::new(limits.pairs);
         self.narrow = Narrow::renewed(
@@ -47,7 +48,7 @@ impl Engine {
         );
         self.narrow
             .set_search(self.config.mesh_search.unwrap_or_default());
-        self.publisher.forget_slots();
+        self.publisher.forget_slots(self.tick - 1, &self.world);
         Some(format!(
             "a structure did not hold and was built anew: {why}"
         ))
@@ -66,9 +67,11 @@ mod tests {
     use crate::tick::{EditBatch, TickInput};
     use crate::time::{Budget, Clock, ManualClock};
     use crate::wire::{
-        Demand, Event, FrameHeader, Inbox, TickCause, TransformRow, WIRE_VERSION, frame_flags,
-        name_bytes,
+        Demand, EndCause, Event, FrameHeader, Inbox, TickCause, TransformRow, Verdict,
+        WIRE_VERSION, frame_flags, name_bytes,
     };
+
+    use crate::world::Edit;
 
     /// A row of balls of radius 0.5 along x.
     struct Rig {
@@ -76,6 +79,7 @@ mod tests {
         clock: Arc<ManualClock>,
         x_m: [f64; 4],
         seq: u64,
+        edits: Vec<Edit>,
     }
 
     impl Rig {
@@ -101,6 +105,7 @@ mod tests {
                 clock,
                 x_m: [0.0, 0.9, 5.0, 9.0],
                 seq: 0,
+                edits: Vec::new(),
             }
         }
 
@@ -129,7 +134,7 @@ mod tests {
             frame.set_transforms(&rows);
             let batch = EditBatch {
                 token: 1,
-                edits: Vec::new(),
+                edits: std::mem::take(&mut self.edits),
                 validate,
                 warnings: Vec::new(),
             };
@@ -185,6 +190,70 @@ mod tests {
         let row = rig.engine.outbox().pairs[0];
         assert_eq!((row.end_first_tick, row.end_last_tick), (2, 2));
         assert_eq!(rig.engine.outbox().tick.colliding, 0);
+    }
+
+    #[test]
+    fn bug_a_repair_while_a_place_was_not_known_told_its_collision_as_separated() {
+        let mut rig = Rig::new();
+        // Refused in the tick before the repair, or in its own; then it still collides, or does not.
+        for (before, x_m) in [(true, 0.9), (false, 3.0)] {
+            rig.tick(false);
+            rig.x_m[1] = f64::NAN;
+            if before {
+                assert!(rig.tick(false).is_empty());
+            }
+            rig.engine.broad = BroadPhase::new(rig.engine.method);
+            for _ in 0..3 {
+                assert!(rig.tick(true).is_empty());
+                let row = rig.engine.outbox().pairs[0];
+                assert_eq!((row.body_a, row.body_b), (1, 2));
+                assert_eq!(row.verdict, Verdict::Possible.code());
+                assert_eq!(row.certified_verdict, Verdict::Colliding.code());
+                rig.engine.validate().unwrap();
+            }
+            rig.x_m[1] = x_m;
+            let told = rig.tick(true);
+            if before {
+                assert!(told.is_empty());
+            } else {
+                assert_eq!(told, [(1, 2, Event::End.bit(), 0)]);
+            }
+        }
+        assert_eq!(rig.engine.outbox().tick.rebuilds, 2);
+        rig.engine.validate().unwrap();
+    }
+
+    #[test]
+    fn bug_a_pair_that_left_in_the_tick_of_a_repair_ended_as_separated() {
+        let name = String::from("b1");
+        let edits = [
+            (
+                Edit::Enable {
+                    name: name.clone(),
+                    enabled: false,
+                },
+                EndCause::Disabled,
+            ),
+            (Edit::Reset { source: None }, EndCause::Reset),
+            (
+                Edit::Filter {
+                    name,
+                    group: None,
+                    mask: Some(0),
+                },
+                EndCause::Filtered,
+            ),
+        ];
+        for (edit, cause) in edits {
+            let mut rig = Rig::new();
+            rig.tick(false);
+            rig.engine.broad = BroadPhase::new(rig.engine.method);
+            rig.edits.push(edit);
+            let told = rig.tick(true);
+            assert!(told[0].2 & Event::End.bit() != 0, "{cause}: {told:?}");
+            assert_eq!(rig.engine.outbox().pairs[0].end_cause, cause.code());
+            rig.engine.validate().unwrap();
+        }
     }
 
     #[test]

@@ -59,7 +59,7 @@ impl Door for Both<'_> {
         self.beside.publish_tick(tick)
     }
 
-    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, &[u8])) {
+    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, Vec<u8>)) {
         self.first.requests(take);
         self.beside.requests(&mut |token, header, payload| {
             take(RequestToken(token.0 | BESIDE), header, payload);
@@ -136,7 +136,7 @@ mod tests {
         fn publish_tick(&mut self, tick: &TickRow) -> Result<()> {
             self.door.publish_tick(tick)
         }
-        fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, &[u8])) {
+        fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, Vec<u8>)) {
             self.door.requests(take);
         }
         fn answer(&mut self, token: RequestToken, ok: bool, json: &str) -> Result<()> {
@@ -212,7 +212,7 @@ mod tests {
         while open.len() < 2 {
             both.wait(1_000_000, &SystemClock).unwrap();
             both.requests(&mut |token, _, bytes| {
-                open.push((token, String::from_utf8_lossy(bytes).into_owned()));
+                open.push((token, String::from_utf8(bytes).unwrap()));
             });
         }
         assert_ne!(open[0].0, open[1].0, "told apart");

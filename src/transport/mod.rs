@@ -130,9 +130,11 @@ pub trait Door {
     /// As [`Door::publish`].
     fn publish_tick(&mut self, tick: &TickRow) -> Result<()>;
 
-    /// Hands over each new request: its token, header and payload (`json_len` bytes of JSON, then blobs; checked to
-    /// fit). It stays open until it is answered. A request that cannot be read is answered here.
-    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, &[u8]));
+    /// Hands over each new request that is whole: its token, header and payload (`json_len` bytes of JSON, then blobs;
+    /// checked to fit). It stays open until it is answered. A request that cannot be read is answered here.
+    ///
+    /// A large one is copied by so much a call that no call takes long; while there is more, `wait` comes back at once.
+    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, Vec<u8>));
 
     /// Answers a request with JSON; a client that has left is no error.
     ///

@@ -38,29 +38,28 @@ impl World {
         let (Some(old), Some(body)) = (&entry.spec, self.body(slot)) else {
             return false;
         };
-        let same_words = if spec.id == BodyId(0) || old.id == BodyId(0) {
-            let with_id = |s: &BodySpec| BodySpec {
-                id: body.id,
-                ..s.clone()
-            };
-            with_id(old) == with_id(spec)
-        } else {
-            **old == *spec
-        };
+        let same_words = (spec.id == BodyId(0) || spec.id == body.id) && old.reads_as(spec);
         // A file may have changed under the same name.
         let measures = |placed: &PlacedShape| match &body.vertices {
             // As it was put: what its sender made of it since is no other shape.
             Some(vertices) => vertices.rest,
             None => (placed.shape.aabb, placed.shape.radius),
         };
-        let same_shapes = body.shapes.len() == shapes.len()
-            && body.shapes.iter().zip(shapes).all(|(a, b)| {
-                let (aabb, radius) = measures(a);
-                Arc::ptr_eq(&a.shape, &b.shape)
-                    || aabb == b.shape.aabb
-                        && radius.to_bits() == b.shape.radius.to_bits()
-                        && a.shape.is_built_alike(&b.shape, body.vertices.is_some())
-            });
+        let words = old.shapes.iter().zip(&spec.shapes);
+        let same_shapes = old.shapes.len() == spec.shapes.len()
+            && body.shapes.len() == shapes.len()
+            && (body.shapes.iter().zip(shapes))
+                .zip(words)
+                .all(|((a, b), (was, is))| {
+                    let (aabb, radius) = measures(a);
+                    // One shape has one spec, which may hold all corners of a mesh: they are not gone through again.
+                    let same = Arc::ptr_eq(&a.shape, &b.shape)
+                        || was.shape == is.shape
+                            && aabb == b.shape.aabb
+                            && radius.to_bits() == b.shape.radius.to_bits()
+                            && a.shape.is_built_alike(&b.shape, body.vertices.is_some());
+                    same && was.pose == is.pose
+                });
         same_words && same_shapes && self.is_as_put(slot, spec, touch)
     }
 

@@ -81,7 +81,7 @@ impl Door for Desk {
     fn publish_tick(&mut self, tick: &TickRow) -> Result<()> {
         self.inner.publish_tick(tick)
     }
-    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, &[u8])) {
+    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, Vec<u8>)) {
         self.inner.requests(take);
     }
     fn answer(&mut self, token: RequestToken, ok: bool, json: &str) -> Result<()> {

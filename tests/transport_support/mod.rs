@@ -248,7 +248,7 @@ fn answer(door: &mut dyn Door, log: &Mutex<Log>) {
     let mut asked: Vec<(RequestToken, String)> = Vec::new();
     door.requests(&mut |token, header, bytes| {
         let json = &bytes[..usize::try_from(header.json_len).unwrap()];
-        log.lock().unwrap().requests.push(bytes.to_vec());
+        log.lock().unwrap().requests.push(bytes.clone());
         let text = format!(
             "{{\"ok\":true,\"scene_rev\":{},\"warnings\":[{:?}]}}",
             bytes.len(),

@@ -5,7 +5,8 @@ use rustix::fs::statvfs;
 
 use super::lock::LOCK_DIR;
 use crate::config::Limits;
-use crate::wire::{BodyRow, ContactRow, NameRow, PairRow, TransformRow};
+use crate::limits::REGIONS_PER_PAIR_MAX;
+use crate::wire::{BodyRow, ContactRow, NameRow, PairRow, RegionRow, TransformVelRow};
 
 /// Messages of a topic that are there at once: one that is written, one kept for late joiners, one that is read. Where
 /// readers are slow there are more.
@@ -22,14 +23,22 @@ pub fn bytes_needed(limits: &Limits, bodies: usize, sources: usize) -> u64 {
     let pairs = bodies.saturating_mul(bodies.saturating_sub(1)) / 2;
     let pairs = pairs.min(most(limits.pair_rows));
     let contacts = pairs.saturating_mul(most(limits.contacts_per_pair));
-    let contacts = contacts.min(most(limits.contact_rows));
+    // Whatever the limit is, the deepest pair goes out whole.
+    let contacts = contacts.min(most(limits.contact_rows.max(limits.contacts_per_pair)));
+    let regions = pairs.saturating_mul(most(REGIONS_PER_PAIR_MAX));
+    let regions = regions.min(most(limits.region_rows.max(REGIONS_PER_PAIR_MAX)));
     [
         message::<PairRow>(pairs),
+        // `changes`, which begin with the whole list.
+        message::<PairRow>(pairs),
         message::<ContactRow>(contacts),
+        message::<RegionRow>(regions),
         message::<BodyRow>(bodies),
         message::<NameRow>(bodies),
+        // Verdicts, a byte each.
+        message::<u8>(bodies),
         // Any source may hold all bodies but those of others: together they hold each once.
-        message::<TransformRow>(bodies).saturating_add(sources << 12),
+        message::<TransformVelRow>(bodies).saturating_add(sources << 12),
     ]
     .iter()
     .fold(BASE, |all, bytes| {
@@ -84,6 +93,25 @@ mod tests {
             ..limits
         };
         assert!(bytes_needed(&small, 100_000, 2) < many);
+        // The deepest pair goes out whole where it alone has more rows than the limit.
+        let one = Limits {
+            contact_rows: 1,
+            contacts_per_pair: 16,
+            ..small
+        };
+        let none = Limits {
+            contact_rows: 1,
+            contacts_per_pair: 1,
+            ..small
+        };
+        let more = bytes_needed(&one, 100, 1) - bytes_needed(&none, 100, 1);
+        let rows = 15 * size_of::<ContactRow>() as u64;
+        assert_eq!(more, MESSAGES * rows);
+        let regions = Limits {
+            region_rows: 1,
+            ..limits
+        };
+        assert!(bytes_needed(&regions, 100_000, 2) < many);
         assert_eq!(told(few, few), None);
         let text = told(60 << 20, 100 << 20).unwrap();
         assert!(

@@ -9,6 +9,7 @@ mod waiting;
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 
+use asked::Arrivals;
 use frames::In;
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::port::event_id::EventId;
@@ -109,6 +110,7 @@ type Asked = ActiveRequest<Ipc, [u8], RequestHeader, [u8], AnswerHeader>;
 /// Fields drop in this order, and the order matters: open requests and ports, then services, then the node, then the
 /// locks; a killed process leaves what it had to the clean-up of any other node.
 pub struct Server {
+    arrivals: Arrivals,
     asked: BTreeMap<RequestToken, Asked>,
     answers: RequestServer<Ipc, [u8], RequestHeader, [u8], AnswerHeader>,
     transforms: In<TransformRow>,
@@ -193,6 +195,7 @@ impl Server {
         let tick = qos::ticks(&node, place, Open::Create).map_err(held)?;
         let hello = qos::hellos(&node, place, Open::Create).map_err(held)?;
         let mut server = Self {
+            arrivals: Arrivals::default(),
             asked: BTreeMap::new(),
             answers,
             transforms: In::open(&node, place, "transforms").map_err(held)?,
@@ -297,7 +300,7 @@ impl Door for Server {
         self.send_tick(tick)
     }
 
-    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, &[u8])) {
+    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, Vec<u8>)) {
         self.take_requests(take);
     }
 

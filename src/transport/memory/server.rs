@@ -225,7 +225,7 @@ impl Door for MemoryServer {
         Ok(())
     }
 
-    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, &[u8])) {
+    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, Vec<u8>)) {
         loop {
             let token = RequestToken(self.next_token);
             let mut state = self.shared.lock();
@@ -239,7 +239,7 @@ impl Door for MemoryServer {
                 let _in_memory = self.answer(token, false, &refusal(error));
                 continue;
             }
-            take(token, header, &bytes);
+            take(token, header, bytes);
         }
     }
 

@@ -215,7 +215,7 @@ impl Door for LastingNode {
         }
     }
 
-    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, &[u8])) {
+    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, Vec<u8>)) {
         let number = self.number << NODE_SHIFT;
         if let Some(node) = &mut self.live {
             node.requests(&mut |token, header, payload| {

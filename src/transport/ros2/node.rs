@@ -318,7 +318,7 @@ impl Door for RosNode {
         Ok(())
     }
 
-    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, &[u8])) {
+    fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, Vec<u8>)) {
         let asked = std::mem::take(&mut *open(&self.shared.desk.asked));
         for (token, json) in asked {
             let header = RequestHeader {
@@ -327,7 +327,7 @@ impl Door for RosNode {
                 schema: WIRE_VERSION,
                 reserved: 0,
             };
-            take(RequestToken(token), header, &json);
+            take(RequestToken(token), header, json);
         }
     }
 

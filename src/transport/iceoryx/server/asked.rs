@@ -7,31 +7,73 @@ use crate::error::Result;
 use crate::transport::request::{refusal, unreadable};
 use crate::wire::WIRE_VERSION;
 
+/// Most bytes that one look at the requests copies: some 0.1 ms. All of the largest request took 150 ms and more, and
+/// frames that wait for so long are taken for old ones.
+const COPIED_MAX: usize = 1 << 18;
+
+/// Requests that are on their way in.
+#[derive(Default)]
+pub(super) struct Arrivals {
+    /// The one of which a part is copied.
+    part: Option<(Asked, Vec<u8>)>,
+    /// The last look ended before all was copied.
+    is_more: bool,
+}
+
+impl Arrivals {
+    /// Whether there is more to copy than was.
+    pub(super) fn is_more(&self) -> bool {
+        self.is_more
+    }
+}
+
 impl Server {
     pub(super) fn take_requests(
         &mut self,
-        take: &mut dyn FnMut(RequestToken, RequestHeader, &[u8]),
+        take: &mut dyn FnMut(RequestToken, RequestHeader, Vec<u8>),
     ) {
+        let mut left = COPIED_MAX;
+        while left > 0 {
+            let next = self.arrivals.part.take().or_else(|| self.next_request());
+            let Some((request, mut payload)) = next else {
+                self.arrivals.is_more = false;
+                return;
+            };
+            let rest = request.payload().get(payload.len()..).unwrap_or_default();
+            let (now, later) = rest.split_at(rest.len().min(left));
+            payload.extend_from_slice(now);
+            left -= now.len();
+            if later.is_empty() {
+                let token = RequestToken(self.next_token);
+                self.next_token += 1;
+                take(token, *request.user_header(), payload);
+                self.asked.insert(token, request);
+            } else {
+                self.arrivals.part = Some((request, payload));
+            }
+        }
+        self.arrivals.is_more = true;
+    }
+
+    /// The next request that can be read, with memory for its payload.
+    fn next_request(&mut self) -> Option<(Asked, Vec<u8>)> {
         loop {
             let request = match self.answers.receive() {
-                Ok(Some(request)) => request,
-                Ok(None) => return,
+                Ok(request) => request?,
                 Err(_) => {
                     self.errors.add(1);
-                    return;
+                    return None;
                 }
             };
-            let header = *request.user_header();
             // the count is the sender's word: checked before it makes a slice
             let len = usize::try_from(request.header().number_of_elements()).unwrap_or(usize::MAX);
-            let token = RequestToken(self.next_token);
-            self.next_token += 1;
-            if let Some(error) = unreadable(&header, len) {
-                let _client_left = reply(&request, self.options.boot_id, false, &refusal(error));
-                continue;
+            match unreadable(request.user_header(), len) {
+                None => return Some((request, Vec::with_capacity(len))),
+                Some(why) => {
+                    let text = refusal(why);
+                    let _client_left = reply(&request, self.options.boot_id, false, &text);
+                }
             }
-            take(token, header, request.payload());
-            self.asked.insert(token, request);
         }
     }
 

@@ -39,6 +39,12 @@ impl Server {
     /// The notices of what a spin has found stay in the port: while they do, neither side pays a system call for more,
     /// and the next sleep ends at once for nothing.
     pub(super) fn spin_then_sleep(&mut self, timeout_ns: u64, clock: &dyn Clock) -> Result<Wake> {
+        // A large request is copied part by part, with looks at what else has come between them.
+        if self.arrivals.is_more() {
+            let mut wake = self.listen()?;
+            wake.notified = true;
+            return Ok(wake);
+        }
         let mut now_ns = clock.monotonic_ns();
         let until_ns = now_ns.saturating_add(timeout_ns);
         // A glance is no wait: it says nothing of how soon the other side answers.
