@@ -60,12 +60,14 @@ impl Server {
             truncated: 0,
             ..*header
         };
-        if outbox.names_changed {
-            failures += send(&self.names.publisher, &whole, &outbox.names);
-        }
-        if outbox.plan_changed {
-            failures += send(&self.plan.publisher, &whole, outbox.plan.as_bytes());
-        }
+        // What a tick has once stays in the outbox until it is new again.
+        let Owed { names, plan } = &mut self.owed;
+        failures += names.send(outbox.names_changed, || {
+            send(&self.names.publisher, &whole, &outbox.names)
+        });
+        failures += plan.send(outbox.plan_changed, || {
+            send(&self.plan.publisher, &whole, outbox.plan.as_bytes())
+        });
         self.update_connections();
         self.send_tick(&outbox.tick)?;
         Ok(failures)
@@ -88,6 +90,32 @@ impl Server {
     }
 }
 
+/// Messages that one tick has and no later one, where they could not be handed over: readers would have old ones until
+/// the scene changes again.
+#[derive(Debug, Default)]
+pub(super) struct Owed {
+    names: Debt,
+    plan: Debt,
+}
+
+/// Whether a message is still to be handed over.
+#[derive(Debug, Default)]
+struct Debt(bool);
+
+impl Debt {
+    /// Sends what is new, or owed.
+    ///
+    /// * `send` - as [`send`] returns.
+    fn send(&mut self, is_new: bool, send: impl FnOnce() -> u64) -> u64 {
+        if !is_new && !self.0 {
+            return 0;
+        }
+        let failures = send();
+        self.0 = failures > 0;
+        failures
+    }
+}
+
 /// One message.
 ///
 /// * returns - 1 when it could not be handed over.
@@ -101,4 +129,20 @@ where
     };
     *sample.user_header_mut() = *header;
     u64::from(sample.write_from_slice(rows).send().is_err())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bug_names_that_could_not_be_handed_over_came_with_the_next_edit_only() {
+        let mut debt = Debt::default();
+        let never = || panic!("nothing to send");
+        assert_eq!(debt.send(false, never), 0);
+        assert_eq!(debt.send(true, || 1), 1);
+        assert_eq!(debt.send(false, || 1), 1);
+        assert_eq!(debt.send(false, || 0), 0);
+        assert_eq!(debt.send(false, never), 0);
+    }
 }
