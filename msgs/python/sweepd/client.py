@@ -10,7 +10,7 @@ import numpy as np
 
 from . import layout
 from .errors import Refused, Restarted, Skipped, SweepdError, TimedOut
-from .frames import MOVING, POSE, array, columns_of, rows_of, seconds, time_left, whole
+from .frames import MOVING, POSE, array, blank, columns_of, rows_of, seconds, time_left, whole
 from .pairlist import PairList
 from .ports import Ports
 
@@ -209,8 +209,8 @@ class Client:
         * ``poses``: ``{name: (position, quaternion)}``, or ``(ids, positions, quaternions)`` as arrays of shape
           ``(n,)``, ``(n, 3)``, ``(n, 4)``; metres, quaternions in the order you said. With velocities, of all bodies or
           of none: ``{name: (position, quaternion, linear, angular)}``, or two more arrays of shape ``(n, 3)``; metres
-          and radians a second, in the scene's frame. An array made by ``rows()`` is copied once, as it is; one made by
-          ``loan()`` lies where it is read, and goes out without a copy.
+          and radians a second, in the scene's frame. An array made by ``rows()`` or ``loan()`` is copied once, as it
+          is.
         * ``partial``: these are some bodies of the source only.
         * ``time_left_ns``: of the tick, from receipt; 0 says nothing, and less than 0, too late already, leaves it nothing.
 
@@ -386,14 +386,16 @@ class Client:
         return rows
 
     def loan(self, count, *, velocities=False):
-        """An array of ``count`` rows that lies in shared memory, for one frame: fill every field and send or step it.
+        """An array of ``count`` rows to be filled: ``body``, ``position`` and ``orientation`` of each.
 
-        TransformRow, or with ``velocities`` TransformVelRow. What was in it is anything. ``orientation`` is x, y, z, w,
-        whatever order was said. Once sent it is the daemon's and read-only; there is one loan at a time, and a new one
-        takes the place of one that was not sent.
+        TransformRow, or with ``velocities`` TransformVelRow, whose velocities are 0 at first. ``orientation`` is
+        x, y, z, w, whatever order was said. A row that is not filled is no pose, and refused by the daemon.
+
+        The rows are yours: each ``send`` or ``step`` copies them as they are then, and they may be changed and sent
+        again. A view of a field is one of this array alone; rows of another call have their own memory.
         """
-        topic, row = _MOTION if velocities else _POSES
-        rows = self._ports.loan(topic, row, layout.FrameHeader, whole("count", count, 32))
+        self._ports.check_open("rows cannot be made")
+        rows = blank(count, velocities)
         rows.boot_id = self._boot
         return rows
 

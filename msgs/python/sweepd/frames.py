@@ -10,6 +10,8 @@ from .errors import SweepdError
 
 POSE = np.dtype(layout.TransformRow)
 MOVING = np.dtype(layout.TransformVelRow)
+#: Rows that the daemon takes in a frame.
+_ROWS_MAX = 1 << 20
 
 
 class Rows(np.ndarray):
@@ -40,6 +42,16 @@ def rows_of(ids, columns, wxyz, names=None):
     pose["orientation"] = np.roll(columns[1], -1, axis=-1) if wxyz else columns[1]
     if moving:
         rows["linear"], rows["angular"] = columns[2:]
+    return rows.view(Rows)
+
+
+def blank(count, moving):
+    """Rows without poses: what is not written is refused by the daemon, and never a pose that some memory held."""
+    count = whole("count", count)
+    if count > _ROWS_MAX:
+        raise SweepdError(f"count={count}: a frame has at most {_ROWS_MAX} rows")
+    rows = np.zeros(count, MOVING if moving else POSE)
+    (rows["transform"] if moving else rows)["position"] = np.nan
     return rows.view(Rows)
 
 
