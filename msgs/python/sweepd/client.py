@@ -13,6 +13,7 @@ from .errors import Refused, Restarted, Skipped, SweepdError, TimedOut
 from .frames import MOVING, POSE, array, blank, columns_of, rows_of, seconds, time_left, whole
 from .pairlist import PairList
 from .ports import Ports
+from .refusals import source_row, why_no_result
 
 _LOOK_AGAIN_S = 0.05
 _BOOTS_OVER_MAX = 16
@@ -31,10 +32,6 @@ _HEADERS = {"changes": layout.ChangesHeader}
 _VERTEX = np.dtype(layout.VertexRow)
 _POSES = ("transforms", layout.TransformRow)
 _MOTION = ("transforms_vel", layout.TransformVelRow)
-
-
-def _text(chars):
-    return bytes(chars).split(b"\0")[0].decode("utf-8", "replace")
 
 
 def _bytes_of(source):
@@ -305,7 +302,7 @@ class Client:
         seq = self.send(poses, **fields)
         while True:
             if not self._next(until):
-                raise TimedOut(self._why_no_result(seq, before, timeout_s))
+                raise TimedOut(self._why_no_result(seq, before, timeout_s, fields.get("scene_rev", 0)))
             row = self._row(self._tick)
             if row is None or row.session != self.session:
                 continue
@@ -323,7 +320,7 @@ class Client:
         """The :class:`Result` of the next tick; raises TimedOut or Restarted."""
         timeout_s = seconds(timeout_s)
         if not self._next(time.monotonic() + timeout_s):
-            raise TimedOut(f"no tick within {timeout_s} s; is the daemon running?")
+            raise TimedOut(f"no tick within {timeout_s} s; {self._ports.silence()}")
         return self._result()
 
     def request(self, edits, blobs=(), timeout_s=5.0):
@@ -357,8 +354,8 @@ class Client:
             left = until - time.monotonic()
             if left <= 0:
                 raise TimedOut(
-                    f"no answer within {timeout_s} s: is the daemon running (`sweepd list`)? A large request may take"
-                    " longer: give it more by timeout_s"
+                    f"no answer within {timeout_s} s: a large request may take longer, give it more by timeout_s;"
+                    f" {self._ports.silence()}"
                 )
             self._ports.wait(min(left, _LOOK_AGAIN_S))
 
@@ -451,10 +448,7 @@ class Client:
         header.boot = self._boot & 0xFFFFFFFF
 
     def _row(self, tick):
-        for row in tick.sources[: tick.sources_len]:
-            if _text(row.name) == self._source:
-                return row
-        return None
+        return source_row(tick, self._source)
 
     def _wait_names(self, timeout_s):
         """Names come with the newest state, a moment after the connection."""
@@ -575,23 +569,9 @@ class Client:
             messages["changes"] = self._now["changes"]
         return Result(self._tick, messages, self._list)
 
-    @staticmethod
-    def _is_under_way(tick):
-        # no tick that has ended says so: undecided pairs alone are no reason for unknown
-        return tick.header.state == layout.State.UNKNOWN and tick.reasons == 1 << layout.Reason.UNDECIDED
-
-    def _why_no_result(self, seq, before, timeout_s):
-        text = f"no result of frame {seq} of `{self._source}` within {timeout_s} s"
+    def _why_no_result(self, seq, before, timeout_s, scene_rev):
+        told = f"no result of frame {seq} of `{self._source}` within {timeout_s} s"
         tick = self._tick
         if tick is None or (before is not None and tick.header.tick == before.header.tick):
-            return f"{text}: no tick came at all; is the daemon running?"
-        if self._is_under_way(tick):
-            text += "; a tick is still under way"
-        elif self._row(tick) is None:
-            known = ", ".join(_text(row.name) for row in tick.sources[: tick.sources_len])
-            text += f"; the scene has no such source, it has: {known}"
-        for reason in layout.RejectReason:
-            refused = tick.rejects[reason] - (before.rejects[reason] if before else 0)
-            if refused > 0:
-                text += f"; {refused} refused as {reason.name.lower()}"
-        return text
+            return f"{told}: no tick came at all; {self._ports.silence()}"
+        return told + why_no_result(tick, before, self._source, scene_rev)

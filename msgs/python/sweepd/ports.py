@@ -14,6 +14,7 @@ import numpy as np
 
 from . import layout
 from .errors import Refused, SweepdError, TimedOut
+from .refusals import text
 
 #: Event ids of ``wake`` and ``ready``.
 SENT, ASKED = 1, 2
@@ -69,6 +70,9 @@ def _ours(what):
             try:
                 return method(self, *args, **kwargs)
             except _FOREIGN as e:
+                if str(e) == "DoesNotExist":
+                    # a port that was not needed yet, of a daemon that has ended meanwhile
+                    raise TimedOut(f"{what}: {self._nobody(e)}") from e
                 raise SweepdError(f"{what}: {_why(e)}") from e
 
         return call
@@ -171,8 +175,19 @@ class Ports:
 
     def _nobody(self, why):
         return (
-            f"no daemon runs as instance `{self._instance}` ({why}); start one with `sweepd run`, "
+            f"no daemon runs as instance `{self._instance}` ({why}); start one with `{self._run()}`, "
             "`sweepd list` shows who is there"
+        )
+
+    def _run(self):
+        of_it = "" if self._instance == "default" else f" --instance {self._instance}"
+        return f"sweepd run SCENE{of_it}"
+
+    def silence(self):
+        """What it means that the daemon says nothing, and what to do."""
+        return (
+            f"if that lasts, the daemon was killed or is stopped: `sweepd doctor --instance {self._instance}` says which,"
+            f" `{self._run()}` starts a new one"
         )
 
     def _open(self):
@@ -205,7 +220,9 @@ class Ports:
                 _check_hello(hello)
                 return hello
             if time.monotonic() >= until:
-                raise TimedOut("the instance's services are there, but no daemon says hello; is it running?")
+                raise TimedOut(
+                    f"the services of instance `{self._instance}` are there, but no daemon says hello; {self.silence()}"
+                )
             self.wait(0.005)
 
     def _newest_hello(self):
@@ -355,14 +372,10 @@ class Ports:
         self._client = self._tick = self._hello = self._ready = self._wake = self._node = None
 
 
-def _text(chars):
-    return bytes(chars).split(b"\0")[0].decode("utf-8", "replace")
-
-
 def _check_hello(hello):
     from . import __version__
 
-    theirs, iceoryx2 = _text(hello.sweepd_version), _text(hello.iceoryx2_version)
+    theirs, iceoryx2 = text(hello.sweepd_version), text(hello.iceoryx2_version)
     if bytes(hello.magic) != b"sweepd\0\0" or hello.wire_version != layout.WIRE_VERSION or iceoryx2 != "0.10.0":
         raise Refused(
             f"the daemon is sweepd {theirs} (wire version {hello.wire_version}, iceoryx2 {iceoryx2}), this client "
