@@ -178,6 +178,7 @@ class Client:
     @property
     def names(self):
         """Name to id of every body in the scene, as of the newest tick heard. Ids are those of one start of the daemon."""
+        self._ports.check_open("names cannot be told")
         message = self._now.get("names")
         if message is None or message[0].boot_id != self._boot:
             return {}

@@ -8,6 +8,7 @@ import ctypes
 import functools
 import os
 import time
+import weakref
 
 import iceoryx2 as iox2
 import numpy as np
@@ -23,6 +24,25 @@ _SLICE_LEN_START = 256
 _REQUEST_LEN_START = 1 << 14
 _ROWS_MAX = 1 << 26
 _FOREIGN = tuple(kind for kind in vars(iox2).values() if isinstance(kind, type) and issubclass(kind, Exception))
+
+# What has ports or samples of iceoryx2.
+_LIVING = weakref.WeakSet()
+_keep = ctypes.pythonapi.Py_IncRef
+_keep.argtypes, _keep.restype = (ctypes.py_object,), None
+
+
+def _leave_to_parent():
+    """In a forked child: ports and samples are the parent's, and never given back here, not at the child's end either.
+
+    iceoryx2 would remove the parent's files, and hand its samples back a second time.
+    """
+    for one in list(_LIVING):
+        for value in vars(one).values():
+            _keep(value)
+        one.forked = True
+
+
+os.register_at_fork(after_in_child=_leave_to_parent)
 
 
 def dtype(row):
@@ -41,6 +61,7 @@ class _Held:
             "shape": (count * kind.itemsize,),
             "typestr": "|u1",
         }
+        _LIVING.add(self)
 
 
 def _view(sample, kind):
@@ -152,6 +173,9 @@ class Ports:
         self._client = None
         self._pending = []
         self._closed = False
+        #: Whether this is a forked process, and the ports are those of its parent.
+        self.forked = False
+        _LIVING.add(self)
         until = time.monotonic() + timeout_s
         try:
             _patiently(self._open, until)
@@ -169,7 +193,9 @@ class Ports:
         self._boot = self.hello.boot_id
 
     def check_open(self, what):
-        """Raises where the client is closed."""
+        """Raises where the client is closed, or another process's."""
+        if self.forked:
+            raise SweepdError(f"{what}: this client is that of the process that forked this one; make a client after the fork")
         if self._closed:
             raise SweepdError(f"{what}: this client is closed; make a new one")
 
