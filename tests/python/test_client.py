@@ -158,6 +158,28 @@ def test_a_list_that_missed_a_message_is_not_shown_until_the_whole_of_it_came(st
         assert after.changes_header.base_tick != 0 and len(after.listed) == after.changes_header.listed
 
 
+@pytest.mark.parametrize("waiting", [False, True])
+def test_bug_three_results_may_be_kept_and_stay_as_they_are(started, waiting):
+    topics = ("pairs", "contacts", "regions", "bodies", "changes")
+    with sweepd.Client(started(MANY), "sim", quat_order="wxyz", listen=topics) as client:
+        old = [client.step(crowd(step), timeout_s=5) for step in range(3)]
+        new, copies = [], []
+        for step in range(30):
+            if waiting and step % 5 == 0:
+                # ticks of some heartbeats
+                time.sleep(0.5)
+            result = client.step(crowd(step), timeout_s=5)
+            assert result.pairs is not None and result.bodies is not None
+            if step < 10:
+                result = None
+                continue
+            # the last three, from here on
+            old.clear()
+            new, copies = [*new[-2:], result], [*copies[-2:], result.pairs.copy()]
+            result = None
+            assert all(kept.pairs.tobytes() == copy.tobytes() for kept, copy in zip(new, copies))
+
+
 def test_bug_a_list_whose_place_another_reader_took_is_asked_for_again(started, monkeypatch):
     with sweepd.Client(started(MANY), "sim", quat_order="wxyz", listen=("changes",)) as client:
         client.step(crowd(0), timeout_s=5)

@@ -513,13 +513,24 @@ class Client:
         self._advance("names", tick.header)
         raise Restarted(old.boot_id, tick.header.boot_id, ends)
 
+    def _receive(self, topic):
+        """The next message. A reader may hold four: three are the caller's, and what was kept here gives way as a copy."""
+        try:
+            return self._ports.message(topic)
+        except SweepdError:
+            if self._now[topic] is None:
+                raise
+        header, rows = self._now[topic]
+        self._now[topic] = (header, rows.copy())
+        del rows
+        return self._ports.message(topic)
+
     def _advance(self, topic, tick):
         """Takes messages up to the tick; one of a later tick or boot is kept for then."""
         while True:
             ahead = self._ahead[topic]
             if ahead is None:
-                # nothing is held that is not needed: four messages are all a reader may hold
-                ahead = self._ahead[topic] = self._ports.message(topic)
+                ahead = self._ahead[topic] = self._receive(topic)
             if ahead is None:
                 return
             header = ahead[0]
@@ -530,6 +541,9 @@ class Client:
                 if now is None or now[0].boot_id != header.boot_id or now[0].tick < header.tick:
                     self._now[topic] = ahead
                 self._ahead[topic] = None
+                if header.tick == tick.tick:
+                    # nothing is held that is not needed, and no more is of this tick
+                    return
             else:
                 return
             ahead = None
@@ -540,7 +554,7 @@ class Client:
             # the place went to another reader when the port was to be renewed
             self._renew_list()
         while True:
-            ahead, self._ahead["changes"] = self._ahead["changes"] or self._ports.message("changes"), None
+            ahead, self._ahead["changes"] = self._ahead["changes"] or self._receive("changes"), None
             if ahead is None:
                 return
             header = ahead[0].message
@@ -555,6 +569,9 @@ class Client:
                 self._renew_list()
             elif self._list.is_whole:
                 self._now["changes"] = ahead
+            if header.tick == tick.tick:
+                return
+            ahead = None
 
     def _renew_list(self):
         self._ports.renew("changes", layout.PairRow, layout.ChangesHeader)
