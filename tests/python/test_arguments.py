@@ -88,6 +88,8 @@ def test_bug_a_pose_that_does_not_fit_is_told_by_the_name_of_its_body(client):
         refused("vertices", client.send_vertices, 1, wrong)
     refused("no JSON", client.request, {"edits": [np.zeros(3)]})
     refused("no JSON", client.request, {"edits": []}, [3])
+    for wrong in (float("nan"), float("inf")):
+        refused("no JSON.* JSON compliant", client.request, {"touching": {"body": "cart", "within_m": wrong}})
     refused("give an id", client.name_of, "cart")
     assert client._seq == 0, "nothing that was refused went out"
     assert client.step(POSES, timeout_s=5).state == "clear"
@@ -106,6 +108,11 @@ def test_bug_a_time_that_is_no_number_of_seconds_is_refused(client, instance):
             for _ in range(100):
                 client.wait(timeout_s=late)
     client._ports.wait(nan)
+    frames = client._seq
+    for call in (client.step, client.request):
+        with pytest.raises(sweepd.TimedOut, match="timeout_s=-1.0: the time was over before anything was sent"):
+            call(POSES, timeout_s=-1)
+    assert (client._seq, client._requests) == (frames, 0)
     assert client.step(POSES, timeout_s=float("inf")).state == "clear"
 
 

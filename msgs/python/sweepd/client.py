@@ -10,7 +10,7 @@ import numpy as np
 
 from . import layout
 from .errors import Refused, Restarted, Skipped, SweepdError, TimedOut
-from .frames import MOVING, POSE, array, blank, columns_of, rows_of, seconds, time_left, whole
+from .frames import MOVING, POSE, array, blank, columns_of, rows_of, seconds, seconds_to_send, time_left, whole
 from .pairlist import PairList
 from .ports import Ports
 from .refusals import source_row, why_no_result
@@ -295,7 +295,7 @@ class Client:
 
         Raises TimedOut (with what was refused meanwhile), Restarted or Skipped.
         """
-        timeout_s = seconds(timeout_s)
+        timeout_s = seconds_to_send(timeout_s)
         until = time.monotonic() + timeout_s
         self._drain()
         self._settle(until)
@@ -330,9 +330,10 @@ class Client:
         Raises Refused with the daemon's words when it refused, TimedOut when it is silent. After an edit ``names`` are
         those of the scene as it is then: as ``latest()`` does, the client goes on to the newest tick.
         """
-        timeout_s = seconds(timeout_s)
+        timeout_s = seconds_to_send(timeout_s)
         try:
-            text = json.dumps(edits).encode()
+            # what Python writes for NaN and infinity is no JSON
+            text = json.dumps(edits, allow_nan=False).encode()
             payload = b"".join([text, *(bytes(memoryview(blob)) for blob in blobs)])
         except (TypeError, ValueError, RecursionError) as e:
             raise SweepdError(f"the request is no JSON with blobs of bytes after it: {e}") from e

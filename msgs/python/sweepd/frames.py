@@ -6,7 +6,7 @@ import operator
 import numpy as np
 
 from . import layout
-from .errors import SweepdError
+from .errors import SweepdError, TimedOut
 
 POSE = np.dtype(layout.TransformRow)
 MOVING = np.dtype(layout.TransformVelRow)
@@ -148,6 +148,14 @@ def time_left(value):
     except (TypeError, ValueError):
         late = False
     return 1 if late else whole("time_left_ns", value)
+
+
+def seconds_to_send(timeout_s):
+    """As ``seconds``; but where the time is over already, nothing is to be sent."""
+    left = seconds(timeout_s)
+    if left < 0:
+        raise TimedOut(f"timeout_s={left}: the time was over before anything was sent, and nothing was")
+    return left
 
 
 def seconds(timeout_s):
