@@ -14,6 +14,7 @@ from .frames import MOVING, POSE, array, blank, columns_of, rows_of, seconds, se
 from .pairlist import PairList
 from .ports import Ports
 from .refusals import source_row, why_no_result
+from .turns import Turns, in_turn
 
 _LOOK_AGAIN_S = 0.05
 _BOOTS_OVER_MAX = 16
@@ -63,9 +64,9 @@ class Result:
     whose ``base_tick`` is 0 the whole list; None also where the list is not whole (yet, or again).
     """
 
-    def __init__(self, tick, messages, listing=None):
+    def __init__(self, tick, messages, listing, turns):
         self.tick = tick
-        self._list = listing
+        self._list, self._turns = listing, turns
         self.changes_header, self.changes = messages.pop("changes", (None, None))
         self.pairs = messages.get("pairs")
         self.contacts = messages.get("contacts")
@@ -79,6 +80,7 @@ class Result:
         return layout.State(self.tick.header.state).name.lower()
 
     @property
+    @in_turn
     def listed(self):
         """What ``pairs`` would hold, kept from ``changes``: an array of its own; None where ``changes`` is.
 
@@ -104,6 +106,9 @@ class Result:
 class Client:
     """A client of one instance: a source of frames, or with ``source=None`` a reader.
 
+    For one thread at a time: what another one asks in the midst of a call is refused, but for ``names``. It waits without
+    Python's lock, so other threads go on. Of a forked process it is the parent's: make another one there.
+
     * ``quat_order``: how you write quaternions, ``"xyzw"`` (ROS) or ``"wxyz"`` (MuJoCo). It must be said.
     * ``listen``: the messages to listen to, or one; the daemon computes what somebody listens to.
     * ``timeout_s``: how long to look for a daemon.
@@ -123,6 +128,7 @@ class Client:
     ):
         if quat_order not in ("xyzw", "wxyz"):
             raise SweepdError(f'quat_order={quat_order!r}: say "xyzw" or "wxyz"')
+        self._turns = Turns()
         self._wxyz = quat_order == "wxyz"
         self._source = source
         if source is not None and not 1 <= _bytes_of(source) < layout.SOURCE_NAME_LEN:
@@ -165,6 +171,7 @@ class Client:
     def __exit__(self, *_exception):
         self.close()
 
+    @in_turn
     def close(self):
         """Frees the ports; the session is over."""
         self._ahead, self._now, self._held = {}, {}, None
@@ -199,6 +206,7 @@ class Client:
         except (TypeError, ValueError, OverflowError):
             raise SweepdError(f"body {body!r}: give an id, as rows have it") from None
 
+    @in_turn
     def send(
         self, poses, *, stamp_ns=0, clock_id=0, scene_rev=0, deadline_ns=0, time_left_ns=0, partial=False
     ):
@@ -232,16 +240,19 @@ class Client:
             )
         return self._send(rows, flags, fields)
 
+    @in_turn
     def pause(self):
         """Says that the world stands still: the ages of its bodies are renewed for one time-out."""
         return self._send(np.empty(0, POSE), layout.FrameFlags.PAUSED, {})
 
+    @in_turn
     def reset_epoch(self):
         """Says that the world was reset: with the next frame every pair of the source's bodies ends."""
         self._epoch += 1
         # what the daemon had of vertices is void with it
         self._versions = {}
 
+    @in_turn
     def send_vertices(self, body, vertices, *, first=None, total=None):
         """Sends vertices of a body that deforms; they belong with the frame that is sent next. Returns their version.
 
@@ -290,6 +301,7 @@ class Client:
         self._bent += 1
         return base + 1
 
+    @in_turn
     def step(self, poses, timeout_s=1.0, **fields):
         """Sends a frame and returns the :class:`Result` of exactly that frame.
 
@@ -312,11 +324,13 @@ class Client:
                     return self._result()
                 raise Skipped(seq)
 
+    @in_turn
     def latest(self):
         """The newest :class:`Result` there is, without waiting; None before the first tick."""
         self._drain()
         return None if self._tick is None else self._result()
 
+    @in_turn
     def wait(self, timeout_s=1.0):
         """The :class:`Result` of the next tick; raises TimedOut or Restarted."""
         timeout_s = seconds(timeout_s)
@@ -324,6 +338,7 @@ class Client:
             raise TimedOut(f"no tick within {timeout_s} s; {self._ports.silence()}")
         return self._result()
 
+    @in_turn
     def request(self, edits, blobs=(), timeout_s=5.0):
         """Sends a scene edit or a query (anything ``json`` can write) and returns the daemon's answer as a dict.
 
@@ -361,6 +376,7 @@ class Client:
                 )
             self._ports.wait(min(left, _LOOK_AGAIN_S))
 
+    @in_turn
     def rows(self, poses):
         """Poses as an array of TransformRow, to be filled once and changed in place for later frames.
 
@@ -586,7 +602,7 @@ class Client:
         }
         if self._now.get("changes") is not None and self._list.is_of(tick):
             messages["changes"] = self._now["changes"]
-        return Result(self._tick, messages, self._list)
+        return Result(self._tick, messages, self._list, self._turns)
 
     def _why_no_result(self, seq, before, timeout_s, scene_rev):
         told = f"no result of frame {seq} of `{self._source}` within {timeout_s} s"

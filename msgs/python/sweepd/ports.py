@@ -161,7 +161,7 @@ def _check_owner(config):
 
 
 class Ports:
-    """The ports of one client. Use it from one thread."""
+    """The ports of one client. For one thread at a time, as the client sees to."""
 
     def __init__(self, instance, timeout_s, root=None, prefix=None):
         check_name(instance)
