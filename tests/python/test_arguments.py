@@ -90,7 +90,9 @@ def test_bug_a_pose_that_does_not_fit_is_told_by_the_name_of_its_body(client):
     refused("no JSON", client.request, {"edits": []}, [3])
     for wrong in (float("nan"), float("inf")):
         refused("no JSON.* JSON compliant", client.request, {"touching": {"body": "cart", "within_m": wrong}})
-    refused("give an id", client.name_of, "cart")
+    for wrong in ("cart", None, 1.5, [1]):
+        refused("give an id", client.name_of, wrong)
+    assert client.name_of(np.uint64(client.names["cart"])) == "cart"
     assert client._seq == 0, "nothing that was refused went out"
     assert client.step(POSES, timeout_s=5).state == "clear"
 
@@ -123,7 +125,7 @@ def test_bug_what_a_client_is_opened_with_is_looked_at(instance):
         assert result.pairs is not None and result.contacts is None
     for wrong in ("pair", ["pairs", 3], None, 3, [["pairs"]]):
         refused(r"listen=\[.*\]: there are pairs, ", sweepd.Client, instance, quat_order="wxyz", listen=wrong)
-    for wrong in ("", "x" * 32, 3, "\ud800"):
+    for wrong in ("", "x" * 32, 3, "\ud800", "a\0b", b"sim"):
         refused("source name", sweepd.Client, instance, wrong, quat_order="wxyz")
     refused("no file names", sweepd.Client, instance, quat_order="wxyz", prefix="a/b", timeout_s=0.1)
     with pytest.raises(sweepd.Refused, match="instance name 3"):
@@ -146,6 +148,7 @@ def test_bug_a_client_that_is_closed_says_so(instance):
         client.wait,
         client.latest,
         lambda: client.names,
+        lambda: client.plan,
         lambda: client.name_of(1),
         lambda: client.rows(POSES),
     )

@@ -3,8 +3,10 @@
 Needs `SWEEPD=path/to/sweepd` and the package of msgs/python with its wheels.
 """
 
+import copy
 import math
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -178,6 +180,37 @@ def test_bug_three_results_may_be_kept_and_stay_as_they_are(started, waiting):
             new, copies = [*new[-2:], result], [*copies[-2:], result.pairs.copy()]
             result = None
             assert all(kept.pairs.tobytes() == copy.tobytes() for kept, copy in zip(new, copies))
+
+
+def test_a_copy_of_a_result_is_free_of_shared_memory_and_can_be_pickled(started):
+    with sweepd.Client(started(MANY), "sim", quat_order="wxyz", listen=("pairs", "changes", "bodies")) as client:
+        kept = []
+        for step in range(12):
+            result = client.step(crowd(step), timeout_s=5)
+            pairs, tick = result.pairs.copy(), result.tick.header.tick
+            for copied in (copy.deepcopy(result), pickle.loads(pickle.dumps(result))):
+                kept.append((copied, pairs, tick))
+    for copied, pairs, tick in kept:
+        assert copied.tick.header.tick == tick
+        assert copied.pairs.tobytes() == copied.listed.tobytes() == pairs.tobytes()
+
+
+def test_bug_errors_can_be_pickled():
+    for error in (sweepd.Restarted(1, 2, np.empty((0, 2))), sweepd.Skipped(7), sweepd.TimedOut("late")):
+        copied = pickle.loads(pickle.dumps(error))
+        assert (type(copied), str(copied)) == (type(error), str(error))
+    assert "Client" in dir(sweepd)
+
+
+def test_bug_who_listens_to_the_plan_is_told_it(daemon):
+    with sweepd.Client(daemon[0], None, quat_order="wxyz", listen="plan") as client:
+        until = time.monotonic() + 10
+        while client.plan is None:
+            assert time.monotonic() < until
+            client.wait(timeout_s=5)
+        assert client.plan["bodies"] == 3 and client.plan["left_out"]
+    with sweepd.Client(daemon[0], None, quat_order="wxyz") as client:
+        assert client.plan is None
 
 
 def test_bug_a_list_whose_place_another_reader_took_is_asked_for_again(started, monkeypatch):

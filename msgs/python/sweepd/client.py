@@ -3,6 +3,7 @@
 import ctypes
 import difflib
 import json
+import operator
 import secrets
 import time
 
@@ -36,9 +37,10 @@ _MOTION = ("transforms_vel", layout.TransformVelRow)
 
 
 def _bytes_of(source):
+    """Length of what can be a name; 0 where it cannot."""
     try:
-        return len(source.encode())
-    except (AttributeError, UnicodeEncodeError):
+        return 0 if "\0" in source else len(source.encode())
+    except (AttributeError, TypeError, UnicodeEncodeError):
         return 0
 
 
@@ -59,9 +61,10 @@ class Result:
     """A tick and what belongs to it.
 
     ``tick`` is a structure (see ``msgs/README.md``); ``pairs``, ``contacts``, ``regions`` and ``bodies`` are numpy
-    structured arrays over shared memory, None where the client did not listen or a newer one overtook it. Keep at most three
-    results, or copy what you keep. ``changes`` are the rows that changed since the tick before, under ``changes_header``
-    whose ``base_tick`` is 0 the whole list; None also where the list is not whole (yet, or again).
+    structured arrays over shared memory, None where the client did not listen or a newer one overtook it. Keep at most
+    three results, or copy what you keep (``copy.deepcopy(result)`` is all of it, and can be pickled). ``changes`` are the
+    rows that changed since the tick before, under ``changes_header`` whose ``base_tick`` is 0 the whole list; None also
+    where the list is not whole (yet, or again).
     """
 
     def __init__(self, tick, messages, listing, turns):
@@ -106,11 +109,12 @@ class Result:
 class Client:
     """A client of one instance: a source of frames, or with ``source=None`` a reader.
 
-    For one thread at a time: what another one asks in the midst of a call is refused, but for ``names``. It waits without
-    Python's lock, so other threads go on. Of a forked process it is the parent's: make another one there.
+    For one thread at a time: what another one asks in the midst of a call is refused, but for ``names`` and ``plan``. It
+    waits without Python's lock, so other threads go on. In a forked process it is the parent's: make another one there.
 
     * ``quat_order``: how you write quaternions, ``"xyzw"`` (ROS) or ``"wxyz"`` (MuJoCo). It must be said.
-    * ``listen``: the messages to listen to, or one; the daemon computes what somebody listens to.
+    * ``listen``: the messages to listen to, or one, of ``pairs``, ``changes``, ``contacts``, ``regions``, ``bodies``,
+      ``body_verdicts``, ``plan``; the daemon computes what somebody listens to. ``names`` are always.
     * ``timeout_s``: how long to look for a daemon.
     * ``root``, ``prefix``: other files than iceoryx2's default ones; the daemon's must be the same.
     """
@@ -132,7 +136,9 @@ class Client:
         self._wxyz = quat_order == "wxyz"
         self._source = source
         if source is not None and not 1 <= _bytes_of(source) < layout.SOURCE_NAME_LEN:
-            raise SweepdError(f"source name {source!r}: a text of 1 to {layout.SOURCE_NAME_LEN - 1} bytes of UTF-8")
+            raise SweepdError(
+                f"source name {source!r}: a text of 1 to {layout.SOURCE_NAME_LEN - 1} bytes of UTF-8, without NUL"
+            )
         listen = _topics_of(listen)
         timeout_s = seconds(timeout_s)
         until = time.monotonic() + timeout_s
@@ -196,14 +202,23 @@ class Client:
             self._names = (key, ids)
         return self._names[1]
 
+    @property
+    def plan(self):
+        """What the daemon chose for the scene, left out, and why: a dict; None where the client does not listen to ``plan``."""
+        self._ports.check_open("the plan cannot be told")
+        message = self._now.get("plan")
+        if message is None or message[0].boot_id != self._boot:
+            return None
+        return json.loads(message[1].tobytes())
+
     def name_of(self, body):
         """The name of a body by its id, as rows have it; None where the scene has none (any more)."""
         names = self.names
         if self._named[0] != self._names[0]:
             self._named = (self._names[0], {id_: name for name, id_ in names.items()})
         try:
-            return self._named[1].get(int(body))
-        except (TypeError, ValueError, OverflowError):
+            return self._named[1].get(operator.index(body))
+        except TypeError:
             raise SweepdError(f"body {body!r}: give an id, as rows have it") from None
 
     @in_turn

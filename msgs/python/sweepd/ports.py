@@ -108,6 +108,8 @@ def _why(e):
             f"every place is taken ({why}); end a client that is not needed (`sweepd list` counts them, msgs/README.md has"
             " the limits). One that was killed gives its place back within two seconds"
         )
+    if why == "ExceedsMaxActiveRequests":
+        return f"those asked before are not answered yet ({why}): ask again in a moment"
     return why
 
 

@@ -12,6 +12,10 @@ class Turns:
     def __init__(self):
         self._lock = threading.RLock()
 
+    def __reduce__(self):
+        # a copy of what has turns is another thing, and has its own
+        return Turns, ()
+
     def __enter__(self):
         if not self._lock.acquire(blocking=False):
             raise SweepdError(
