@@ -61,10 +61,10 @@ class Result:
     """A tick and what belongs to it.
 
     ``tick`` is a structure (see ``msgs/README.md``); ``pairs``, ``contacts``, ``regions`` and ``bodies`` are numpy
-    structured arrays over shared memory, None where the client did not listen or a newer one overtook it. Keep at most
-    three results, or copy what you keep (``copy.deepcopy(result)`` is all of it, and can be pickled). ``changes`` are the
-    rows that changed since the tick before, under ``changes_header`` whose ``base_tick`` is 0 the whole list; None also
-    where the list is not whole (yet, or again).
+    structured arrays over shared memory, None where the client did not listen or a newer one overtook it. Keep as many
+    results as you like: where three arrays of a kind are still there, the next one is a copy. ``changes`` are the rows that
+    changed since the tick before, under ``changes_header`` whose ``base_tick`` is 0 the whole list; None also where the
+    list is not whole (yet, or again). Copies (``copy.deepcopy``) and pickles are whole.
     """
 
     def __init__(self, tick, messages, listing, turns):
@@ -545,24 +545,12 @@ class Client:
         self._advance("names", tick.header)
         raise Restarted(old.boot_id, tick.header.boot_id, ends)
 
-    def _receive(self, topic):
-        """The next message. A reader may hold four: three are the caller's, and what was kept here gives way as a copy."""
-        try:
-            return self._ports.message(topic)
-        except SweepdError:
-            if self._now[topic] is None:
-                raise
-        header, rows = self._now[topic]
-        self._now[topic] = (header, rows.copy())
-        del rows
-        return self._ports.message(topic)
-
     def _advance(self, topic, tick):
         """Takes messages up to the tick; one of a later tick or boot is kept for then."""
         while True:
             ahead = self._ahead[topic]
             if ahead is None:
-                ahead = self._ahead[topic] = self._receive(topic)
+                ahead = self._ahead[topic] = self._ports.message(topic)
             if ahead is None:
                 return
             header = ahead[0]
@@ -574,7 +562,7 @@ class Client:
                     self._now[topic] = ahead
                 self._ahead[topic] = None
                 if header.tick == tick.tick:
-                    # nothing is held that is not needed, and no more is of this tick
+                    # no more is of this tick
                     return
             else:
                 return
@@ -586,7 +574,7 @@ class Client:
             # the place went to another reader when the port was to be renewed
             self._renew_list()
         while True:
-            ahead, self._ahead["changes"] = self._ahead["changes"] or self._receive("changes"), None
+            ahead, self._ahead["changes"] = self._ahead["changes"] or self._ports.message("changes"), None
             if ahead is None:
                 return
             header = ahead[0].message
@@ -619,7 +607,7 @@ class Client:
             messages["changes"] = self._now["changes"]
         return Result(self._tick, messages, self._list, self._turns)
 
-    def _why_no_result(self, seq, before, timeout_s, scene_rev):
+    def _why_no_result(self, seq, before, timeout_s, scene_rev=0):
         told = f"no result of frame {seq} of `{self._source}` within {timeout_s} s"
         tick = self._tick
         if tick is None or (before is not None and tick.header.tick == before.header.tick):

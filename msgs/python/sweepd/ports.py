@@ -1,7 +1,7 @@
 """Shared memory: iceoryx2's ports of one client, as numpy arrays without copies.
 
-An array over a received message keeps its sample alive, and with it the place in shared memory; a reader may hold
-four messages of a kind, so copy what you keep.
+An array over a received message keeps its sample alive, and with it the place in shared memory. A reader may hold four
+messages of a kind: where three are held, the next one is copied.
 """
 
 import ctypes
@@ -20,6 +20,8 @@ from .refusals import text
 #: Event ids of ``wake`` and ``ready``.
 SENT, ASKED = 1, 2
 _RETRY_S = 0.05
+# One less than a reader may hold, for the one that is copied.
+_HELD_MAX = 3
 _SLICE_LEN_START = 256
 _REQUEST_LEN_START = 1 << 14
 _ROWS_MAX = 1 << 26
@@ -64,14 +66,22 @@ class _Held:
         _LIVING.add(self)
 
 
-def _view(sample, kind):
+def _view(sample, kind, held):
+    """Rows over a sample, or a copy where others are held."""
     # the header's count: a slice's own length counted bytes in iceoryx2 0.10.0 (issue 1533)
     count = sample.header.number_of_elements
     if count == 0:
         return np.empty(0, kind)
     if count > _ROWS_MAX:
         raise SweepdError(f"a message says that it has {count} rows")
-    return np.asarray(_Held(sample, sample.payload_ptr, count, kind)).view(kind)
+    one = _Held(sample, sample.payload_ptr, count, kind)
+    rows = np.asarray(one).view(kind)
+    if len(held) >= _HELD_MAX:
+        rows = rows.copy()
+        rows.flags.writeable = False
+    else:
+        held.add(one)
+    return rows
 
 
 def _fill(address, rows):
@@ -294,7 +304,7 @@ class Ports:
             return service.subscriber_builder().create()
 
         try:
-            self._readers[topic] = (_patiently(port, until), np.dtype(row), header)
+            self._readers[topic] = (_patiently(port, until), np.dtype(row), header, weakref.WeakSet())
         except _FOREIGN as e:
             raise Refused(f"`{topic}` of instance `{self._instance}` cannot be read: {_why(e)}") from e
         self.wake(14)
@@ -320,20 +330,15 @@ class Ports:
             return None
         return layout.TickRow.from_buffer_copy(sample.payload().contents)
 
+    @_ours("a message cannot be received")
     def message(self, topic):
-        """The next message of a kind as ``(header, rows)``, or None; the rows lie in shared memory."""
-        reader, kind, header = self._readers[topic]
-        try:
-            sample = reader.receive()
-        except Exception as e:
-            raise SweepdError(
-                f"{topic} cannot be received ({e}); where four results are still held, copy what you keep "
-                "(`result.pairs.copy()`)"
-            ) from e
+        """The next message of a kind as ``(header, rows)``, or None; the rows mostly lie in shared memory."""
+        reader, kind, header, held = self._readers[topic]
+        sample = reader.receive()
         if sample is None:
             return None
         header = header.from_buffer_copy(sample.user_header().contents)
-        return header, _view(sample, kind)
+        return header, _view(sample, kind, held)
 
     def _sender(self, topic, row, header, count):
         if topic not in self._senders:
