@@ -8,6 +8,16 @@ log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 fail() { cat "$log"; echo "demo: $*" >&2; exit 1; }
 
+# What cannot be meant is said before anything is built.
+for script in demo ros2_demo; do
+  for wrong in "--seconds abc" "--seconds 0" "--seconds" "--second 4"; do
+    code=0
+    # shellcheck disable=SC2086
+    ./launch-free-scripts/$script.sh $wrong >"$log" 2>&1 || code=$?
+    [ "$code" = 2 ] && head -1 "$log" | grep -q "^$script.sh: .*--second" || fail "$script.sh $wrong ended with $code"
+  done
+done
+
 ./launch-free-scripts/demo.sh --seconds 4 | tee "$log" || fail "it failed"
 grep -Eq 'with colliding pairs: [1-9][0-9]*; with contacts: [1-9]' "$log" || fail "no collisions, or no contacts"
 

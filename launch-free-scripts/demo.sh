@@ -14,11 +14,17 @@ set -euo pipefail
 
 usage() { sed -n '2,/^set /p' "$0" | sed '$d; s/^# \{0,1\}//'; }
 
+# What follows an option, which is to be a whole number from 1 on.
+number() {
+  [[ ${2:-} =~ ^[1-9][0-9]{0,8}$ ]] || { echo "demo.sh: $1${2:+ $2}: give a whole number from 1 on" >&2; exit 2; }
+  echo "$2"
+}
+
 seconds=10 count='' kind=pool deadline='' mujoco='' model=''
 while [ $# -gt 0 ]; do
   case "$1" in
-    --seconds) seconds=${2:?--seconds needs a number}; shift 2 ;;
-    --count) count=${2:?--count needs a number}; shift 2 ;;
+    --seconds) seconds=$(number "$@"); shift 2 ;;
+    --count) count=$(number "$@"); shift 2 ;;
     --pile) kind=pile; shift ;;
     --deadline) deadline=yes; shift ;;
     --mujoco) mujoco=yes; shift; if [ $# -gt 0 ] && [ "${1#-}" = "$1" ]; then model=$1; shift; fi ;;

@@ -13,10 +13,16 @@ set -euo pipefail
 
 usage() { sed -n '2,/^set /p' "$0" | sed '$d; s/^# \{0,1\}//'; }
 
+# What follows an option, which is to be a whole number from 1 on.
+number() {
+  [[ ${2:-} =~ ^[1-9][0-9]{0,8}$ ]] || { echo "ros2_demo.sh: $1${2:+ $2}: give a whole number from 1 on" >&2; exit 2; }
+  echo "$2"
+}
+
 seconds=15
 while [ $# -gt 0 ]; do
   case "$1" in
-    --seconds) seconds=${2:?--seconds needs a number}; shift 2 ;;
+    --seconds) seconds=$(number "$@"); shift 2 ;;
     -h|--help) usage; exit 0 ;;
     *) echo "ros2_demo.sh: unknown option $1" >&2; usage >&2; exit 2 ;;
   esac

@@ -6,6 +6,12 @@
 #   ./launch-free-scripts/test.sh [--rust-only]
 set -euo pipefail
 
+case "$*" in
+  ''|--rust-only) ;;
+  -h|--help) sed -n '2,/^set /p' "$0" | sed '$d; s/^# \{0,1\}//'; exit 0 ;;
+  *) echo "test.sh: $*: there is --rust-only, and nothing else" >&2; exit 2 ;;
+esac
+
 here=$(cd "$(dirname "$0")" && pwd)
 root=$(dirname "$here")
 cd "$root"

@@ -1,6 +1,10 @@
-"""What the programs of the demo are told on their command line."""
+"""What the programs of the demo are told, on their command line and by Ctrl-C."""
 
 import argparse
+import signal
+
+import rclpy
+from rclpy.signals import SignalHandlerOptions
 
 
 def arguments():
@@ -9,3 +13,16 @@ def arguments():
     parser.add_argument("--seconds", type=float, default=60)
     parser.add_argument("--node", default="sweepd", help="name of sweepd's node")
     return parser.parse_args()
+
+
+def begin():
+    """Begins ROS; returns a list that is empty until Ctrl-C.
+
+    An exception out of a signal's handler, as Python has it for Ctrl-C, may come up in the middle of rclpy's conversions,
+    which make another error of it; and rclpy's own handler takes the context away from who publishes.
+    """
+    over = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: over.append(True))
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    return over

@@ -8,7 +8,7 @@ import secrets
 import time
 
 import rclpy
-from arguments import arguments
+from arguments import arguments, begin
 from geometry_msgs.msg import TransformStamped
 from sweepd_msgs.msg import BodyTransform, BodyTransforms
 from tf2_msgs.msg import TFMessage
@@ -51,14 +51,14 @@ def write(pose_position, pose_orientation, at, turn):
 
 def main():
     args = arguments()
-    rclpy.init()
+    over = begin()
     node = rclpy.create_node("move_robots")
     frames = node.create_publisher(BodyTransforms, f"/{args.node}/transforms", 1)
     tf = node.create_publisher(TFMessage, "/tf", 10)
     frame = BodyTransforms(source="robot_a", session=secrets.randbits(63) + 1, flags=BodyTransforms.FULL)
     frame.header.frame_id = "world"
     start = time.monotonic()
-    while rclpy.ok() and (elapsed := time.monotonic() - start) < args.seconds:
+    while not over and (elapsed := time.monotonic() - start) < args.seconds:
         now = node.get_clock().now().to_msg()
         # Robot a: all its bodies in one message, in the fixed frame.
         frame.header.stamp = now
@@ -84,7 +84,4 @@ def main():
 
 
 if __name__ == "__main__":
-    try:
-        main()
-    except KeyboardInterrupt:
-        pass
+    main()

@@ -2,13 +2,13 @@
 
     python print_pairs.py [--seconds N] [--node NAME]
 
-Exits 0 when at least one collision began and ended, 1 when not.
+Exits 0 when at least one collision began and ended, 1 when not; 0 at Ctrl-C.
 """
 
 import time
 
 import rclpy
-from arguments import arguments
+from arguments import arguments, begin
 from rclpy.executors import SingleThreadedExecutor
 from sweepd_msgs.msg import Pair, Pairs, State
 
@@ -46,20 +46,19 @@ class Printer:
 
 def main():
     args = arguments()
-    rclpy.init()
+    over = begin()
     node = rclpy.create_node("print_pairs")
     printer = Printer(node, args.node)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     until = time.monotonic() + args.seconds
-    while rclpy.ok() and time.monotonic() < until:
+    while not over and time.monotonic() < until:
         executor.spin_once(timeout_sec=0.1)
+    if over:
+        return 0
     print(f"{printer.begun} collisions began, {printer.ended} ended")
     return 0 if printer.begun and printer.ended else 1
 
 
 if __name__ == "__main__":
-    try:
-        raise SystemExit(main())
-    except KeyboardInterrupt:
-        pass
+    raise SystemExit(main())

@@ -88,7 +88,11 @@ def test_bug_a_pose_that_does_not_fit_is_told_by_the_name_of_its_body(client):
         refused("vertices", client.send_vertices, 1, wrong)
     refused("no JSON", client.request, {"edits": [np.zeros(3)]})
     refused("no JSON", client.request, {"edits": []}, [3])
-    refused("give an id", client.name_of, "cart")
+    for wrong in (float("nan"), float("inf")):
+        refused("no JSON.* JSON compliant", client.request, {"touching": {"body": "cart", "within_m": wrong}})
+    for wrong in ("cart", None, 1.5, [1]):
+        refused("give an id", client.name_of, wrong)
+    assert client.name_of(np.uint64(client.names["cart"])) == "cart"
     assert client._seq == 0, "nothing that was refused went out"
     assert client.step(POSES, timeout_s=5).state == "clear"
 
@@ -106,6 +110,11 @@ def test_bug_a_time_that_is_no_number_of_seconds_is_refused(client, instance):
             for _ in range(100):
                 client.wait(timeout_s=late)
     client._ports.wait(nan)
+    frames = client._seq
+    for call in (client.step, client.request):
+        with pytest.raises(sweepd.TimedOut, match="timeout_s=-1.0: the time was over before anything was sent"):
+            call(POSES, timeout_s=-1)
+    assert (client._seq, client._requests) == (frames, 0)
     assert client.step(POSES, timeout_s=float("inf")).state == "clear"
 
 
@@ -116,7 +125,7 @@ def test_bug_what_a_client_is_opened_with_is_looked_at(instance):
         assert result.pairs is not None and result.contacts is None
     for wrong in ("pair", ["pairs", 3], None, 3, [["pairs"]]):
         refused(r"listen=\[.*\]: there are pairs, ", sweepd.Client, instance, quat_order="wxyz", listen=wrong)
-    for wrong in ("", "x" * 32, 3, "\ud800"):
+    for wrong in ("", "x" * 32, 3, "\ud800", "a\0b", b"sim"):
         refused("source name", sweepd.Client, instance, wrong, quat_order="wxyz")
     refused("no file names", sweepd.Client, instance, quat_order="wxyz", prefix="a/b", timeout_s=0.1)
     with pytest.raises(sweepd.Refused, match="instance name 3"):
@@ -138,10 +147,13 @@ def test_bug_a_client_that_is_closed_says_so(instance):
         client.pause,
         client.wait,
         client.latest,
+        lambda: client.names,
+        lambda: client.plan,
+        lambda: client.name_of(1),
+        lambda: client.rows(POSES),
     )
     for call in calls:
         refused("this client is closed", call)
-    assert client.names == {}
 
 
 def test_poses_that_the_daemon_refuses_are_counted_in_the_tick(client):

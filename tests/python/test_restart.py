@@ -110,6 +110,7 @@ def test_a_loan_of_before_a_restart_is_refused(daemon):
     with sweepd.Client(daemon.instance, "sim", quat_order="wxyz") as client:
         loan = client.loan(2)
         loan["body"] = client.names["left"], client.names["right"]
+        client.send(poses())
         daemon.stop()
         daemon.start("right", "left")
         until_restarted(lambda: client.send(poses()))

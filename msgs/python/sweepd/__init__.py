@@ -20,3 +20,7 @@ def __getattr__(name):
 
         return getattr(errors, name)
     raise AttributeError(f"module 'sweepd' has no attribute {name!r}")
+
+
+def __dir__():
+    return sorted({*globals(), *__all__})

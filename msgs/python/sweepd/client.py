@@ -3,6 +3,7 @@
 import ctypes
 import difflib
 import json
+import operator
 import secrets
 import time
 
@@ -10,9 +11,11 @@ import numpy as np
 
 from . import layout
 from .errors import Refused, Restarted, Skipped, SweepdError, TimedOut
-from .frames import MOVING, POSE, array, columns_of, rows_of, seconds, time_left, whole
+from .frames import MOVING, POSE, array, blank, columns_of, rows_of, seconds, seconds_to_send, time_left, whole
 from .pairlist import PairList
 from .ports import Ports
+from .refusals import source_row, why_no_result
+from .turns import Turns, in_turn
 
 _LOOK_AGAIN_S = 0.05
 _BOOTS_OVER_MAX = 16
@@ -33,14 +36,11 @@ _POSES = ("transforms", layout.TransformRow)
 _MOTION = ("transforms_vel", layout.TransformVelRow)
 
 
-def _text(chars):
-    return bytes(chars).split(b"\0")[0].decode("utf-8", "replace")
-
-
 def _bytes_of(source):
+    """Length of what can be a name; 0 where it cannot."""
     try:
-        return len(source.encode())
-    except (AttributeError, UnicodeEncodeError):
+        return 0 if "\0" in source else len(source.encode())
+    except (AttributeError, TypeError, UnicodeEncodeError):
         return 0
 
 
@@ -61,14 +61,15 @@ class Result:
     """A tick and what belongs to it.
 
     ``tick`` is a structure (see ``msgs/README.md``); ``pairs``, ``contacts``, ``regions`` and ``bodies`` are numpy
-    structured arrays over shared memory, None where the client did not listen or a newer one overtook it. Keep at most three
-    results, or copy what you keep. ``changes`` are the rows that changed since the tick before, under ``changes_header``
-    whose ``base_tick`` is 0 the whole list; None also where the list is not whole (yet, or again).
+    structured arrays over shared memory, None where the client did not listen or a newer one overtook it. Keep as many
+    results as you like: where three arrays of a kind are still there, the next one is a copy. ``changes`` are the rows that
+    changed since the tick before, under ``changes_header`` whose ``base_tick`` is 0 the whole list; None also where the
+    list is not whole (yet, or again). Copies (``copy.deepcopy``) and pickles are whole.
     """
 
-    def __init__(self, tick, messages, listing=None):
+    def __init__(self, tick, messages, listing, turns):
         self.tick = tick
-        self._list = listing
+        self._list, self._turns = listing, turns
         self.changes_header, self.changes = messages.pop("changes", (None, None))
         self.pairs = messages.get("pairs")
         self.contacts = messages.get("contacts")
@@ -82,6 +83,7 @@ class Result:
         return layout.State(self.tick.header.state).name.lower()
 
     @property
+    @in_turn
     def listed(self):
         """What ``pairs`` would hold, kept from ``changes``: an array of its own; None where ``changes`` is.
 
@@ -107,8 +109,12 @@ class Result:
 class Client:
     """A client of one instance: a source of frames, or with ``source=None`` a reader.
 
+    For one thread at a time: what another one asks in the midst of a call is refused, but for ``names`` and ``plan``. It
+    waits without Python's lock, so other threads go on. In a forked process it is the parent's: make another one there.
+
     * ``quat_order``: how you write quaternions, ``"xyzw"`` (ROS) or ``"wxyz"`` (MuJoCo). It must be said.
-    * ``listen``: the messages to listen to, or one; the daemon computes what somebody listens to.
+    * ``listen``: the messages to listen to, or one, of ``pairs``, ``changes``, ``contacts``, ``regions``, ``bodies``,
+      ``body_verdicts``, ``plan``; the daemon computes what somebody listens to. ``names`` are always.
     * ``timeout_s``: how long to look for a daemon.
     * ``root``, ``prefix``: other files than iceoryx2's default ones; the daemon's must be the same.
     """
@@ -126,10 +132,13 @@ class Client:
     ):
         if quat_order not in ("xyzw", "wxyz"):
             raise SweepdError(f'quat_order={quat_order!r}: say "xyzw" or "wxyz"')
+        self._turns = Turns()
         self._wxyz = quat_order == "wxyz"
         self._source = source
         if source is not None and not 1 <= _bytes_of(source) < layout.SOURCE_NAME_LEN:
-            raise SweepdError(f"source name {source!r}: a text of 1 to {layout.SOURCE_NAME_LEN - 1} bytes of UTF-8")
+            raise SweepdError(
+                f"source name {source!r}: a text of 1 to {layout.SOURCE_NAME_LEN - 1} bytes of UTF-8, without NUL"
+            )
         listen = _topics_of(listen)
         timeout_s = seconds(timeout_s)
         until = time.monotonic() + timeout_s
@@ -168,6 +177,7 @@ class Client:
     def __exit__(self, *_exception):
         self.close()
 
+    @in_turn
     def close(self):
         """Frees the ports; the session is over."""
         self._ahead, self._now, self._held = {}, {}, None
@@ -181,6 +191,7 @@ class Client:
     @property
     def names(self):
         """Name to id of every body in the scene, as of the newest tick heard. Ids are those of one start of the daemon."""
+        self._ports.check_open("names cannot be told")
         message = self._now.get("names")
         if message is None or message[0].boot_id != self._boot:
             return {}
@@ -191,16 +202,26 @@ class Client:
             self._names = (key, ids)
         return self._names[1]
 
+    @property
+    def plan(self):
+        """What the daemon chose for the scene, left out, and why: a dict; None where the client does not listen to ``plan``."""
+        self._ports.check_open("the plan cannot be told")
+        message = self._now.get("plan")
+        if message is None or message[0].boot_id != self._boot:
+            return None
+        return json.loads(message[1].tobytes())
+
     def name_of(self, body):
         """The name of a body by its id, as rows have it; None where the scene has none (any more)."""
         names = self.names
         if self._named[0] != self._names[0]:
             self._named = (self._names[0], {id_: name for name, id_ in names.items()})
         try:
-            return self._named[1].get(int(body))
-        except (TypeError, ValueError, OverflowError):
+            return self._named[1].get(operator.index(body))
+        except TypeError:
             raise SweepdError(f"body {body!r}: give an id, as rows have it") from None
 
+    @in_turn
     def send(
         self, poses, *, stamp_ns=0, clock_id=0, scene_rev=0, deadline_ns=0, time_left_ns=0, partial=False
     ):
@@ -209,8 +230,8 @@ class Client:
         * ``poses``: ``{name: (position, quaternion)}``, or ``(ids, positions, quaternions)`` as arrays of shape
           ``(n,)``, ``(n, 3)``, ``(n, 4)``; metres, quaternions in the order you said. With velocities, of all bodies or
           of none: ``{name: (position, quaternion, linear, angular)}``, or two more arrays of shape ``(n, 3)``; metres
-          and radians a second, in the scene's frame. An array made by ``rows()`` is copied once, as it is; one made by
-          ``loan()`` lies where it is read, and goes out without a copy.
+          and radians a second, in the scene's frame. An array made by ``rows()`` or ``loan()`` is copied once, as it
+          is.
         * ``partial``: these are some bodies of the source only.
         * ``time_left_ns``: of the tick, from receipt; 0 says nothing, and less than 0, too late already, leaves it nothing.
 
@@ -234,16 +255,19 @@ class Client:
             )
         return self._send(rows, flags, fields)
 
+    @in_turn
     def pause(self):
         """Says that the world stands still: the ages of its bodies are renewed for one time-out."""
         return self._send(np.empty(0, POSE), layout.FrameFlags.PAUSED, {})
 
+    @in_turn
     def reset_epoch(self):
         """Says that the world was reset: with the next frame every pair of the source's bodies ends."""
         self._epoch += 1
         # what the daemon had of vertices is void with it
         self._versions = {}
 
+    @in_turn
     def send_vertices(self, body, vertices, *, first=None, total=None):
         """Sends vertices of a body that deforms; they belong with the frame that is sent next. Returns their version.
 
@@ -292,12 +316,13 @@ class Client:
         self._bent += 1
         return base + 1
 
+    @in_turn
     def step(self, poses, timeout_s=1.0, **fields):
         """Sends a frame and returns the :class:`Result` of exactly that frame.
 
         Raises TimedOut (with what was refused meanwhile), Restarted or Skipped.
         """
-        timeout_s = seconds(timeout_s)
+        timeout_s = seconds_to_send(timeout_s)
         until = time.monotonic() + timeout_s
         self._drain()
         self._settle(until)
@@ -305,7 +330,7 @@ class Client:
         seq = self.send(poses, **fields)
         while True:
             if not self._next(until):
-                raise TimedOut(self._why_no_result(seq, before, timeout_s))
+                raise TimedOut(self._why_no_result(seq, before, timeout_s, fields.get("scene_rev", 0)))
             row = self._row(self._tick)
             if row is None or row.session != self.session:
                 continue
@@ -314,27 +339,31 @@ class Client:
                     return self._result()
                 raise Skipped(seq)
 
+    @in_turn
     def latest(self):
         """The newest :class:`Result` there is, without waiting; None before the first tick."""
         self._drain()
         return None if self._tick is None else self._result()
 
+    @in_turn
     def wait(self, timeout_s=1.0):
         """The :class:`Result` of the next tick; raises TimedOut or Restarted."""
         timeout_s = seconds(timeout_s)
         if not self._next(time.monotonic() + timeout_s):
-            raise TimedOut(f"no tick within {timeout_s} s; is the daemon running?")
+            raise TimedOut(f"no tick within {timeout_s} s; {self._ports.silence()}")
         return self._result()
 
+    @in_turn
     def request(self, edits, blobs=(), timeout_s=5.0):
         """Sends a scene edit or a query (anything ``json`` can write) and returns the daemon's answer as a dict.
 
         Raises Refused with the daemon's words when it refused, TimedOut when it is silent. After an edit ``names`` are
         those of the scene as it is then: as ``latest()`` does, the client goes on to the newest tick.
         """
-        timeout_s = seconds(timeout_s)
+        timeout_s = seconds_to_send(timeout_s)
         try:
-            text = json.dumps(edits).encode()
+            # what Python writes for NaN and infinity is no JSON
+            text = json.dumps(edits, allow_nan=False).encode()
             payload = b"".join([text, *(bytes(memoryview(blob)) for blob in blobs)])
         except (TypeError, ValueError, RecursionError) as e:
             raise SweepdError(f"the request is no JSON with blobs of bytes after it: {e}") from e
@@ -357,11 +386,12 @@ class Client:
             left = until - time.monotonic()
             if left <= 0:
                 raise TimedOut(
-                    f"no answer within {timeout_s} s: is the daemon running (`sweepd list`)? A large request may take"
-                    " longer: give it more by timeout_s"
+                    f"no answer within {timeout_s} s: a large request may take longer, give it more by timeout_s;"
+                    f" {self._ports.silence()}"
                 )
             self._ports.wait(min(left, _LOOK_AGAIN_S))
 
+    @in_turn
     def rows(self, poses):
         """Poses as an array of TransformRow, to be filled once and changed in place for later frames.
 
@@ -386,14 +416,16 @@ class Client:
         return rows
 
     def loan(self, count, *, velocities=False):
-        """An array of ``count`` rows that lies in shared memory, for one frame: fill every field and send or step it.
+        """An array of ``count`` rows to be filled: ``body``, ``position`` and ``orientation`` of each.
 
-        TransformRow, or with ``velocities`` TransformVelRow. What was in it is anything. ``orientation`` is x, y, z, w,
-        whatever order was said. Once sent it is the daemon's and read-only; there is one loan at a time, and a new one
-        takes the place of one that was not sent.
+        TransformRow, or with ``velocities`` TransformVelRow, whose velocities are 0 at first. ``orientation`` is
+        x, y, z, w, whatever order was said. A row that is not filled is no pose, and refused by the daemon.
+
+        The rows are yours: each ``send`` or ``step`` copies them as they are then, and they may be changed and sent
+        again. A view of a field is one of this array alone; rows of another call have their own memory.
         """
-        topic, row = _MOTION if velocities else _POSES
-        rows = self._ports.loan(topic, row, layout.FrameHeader, whole("count", count, 32))
+        self._ports.check_open("rows cannot be made")
+        rows = blank(count, velocities)
         rows.boot_id = self._boot
         return rows
 
@@ -449,10 +481,7 @@ class Client:
         header.boot = self._boot & 0xFFFFFFFF
 
     def _row(self, tick):
-        for row in tick.sources[: tick.sources_len]:
-            if _text(row.name) == self._source:
-                return row
-        return None
+        return source_row(tick, self._source)
 
     def _wait_names(self, timeout_s):
         """Names come with the newest state, a moment after the connection."""
@@ -521,7 +550,6 @@ class Client:
         while True:
             ahead = self._ahead[topic]
             if ahead is None:
-                # nothing is held that is not needed: four messages are all a reader may hold
                 ahead = self._ahead[topic] = self._ports.message(topic)
             if ahead is None:
                 return
@@ -533,6 +561,9 @@ class Client:
                 if now is None or now[0].boot_id != header.boot_id or now[0].tick < header.tick:
                     self._now[topic] = ahead
                 self._ahead[topic] = None
+                if header.tick == tick.tick:
+                    # no more is of this tick
+                    return
             else:
                 return
             ahead = None
@@ -558,6 +589,9 @@ class Client:
                 self._renew_list()
             elif self._list.is_whole:
                 self._now["changes"] = ahead
+            if header.tick == tick.tick:
+                return
+            ahead = None
 
     def _renew_list(self):
         self._ports.renew("changes", layout.PairRow, layout.ChangesHeader)
@@ -571,25 +605,11 @@ class Client:
         }
         if self._now.get("changes") is not None and self._list.is_of(tick):
             messages["changes"] = self._now["changes"]
-        return Result(self._tick, messages, self._list)
+        return Result(self._tick, messages, self._list, self._turns)
 
-    @staticmethod
-    def _is_under_way(tick):
-        # no tick that has ended says so: undecided pairs alone are no reason for unknown
-        return tick.header.state == layout.State.UNKNOWN and tick.reasons == 1 << layout.Reason.UNDECIDED
-
-    def _why_no_result(self, seq, before, timeout_s):
-        text = f"no result of frame {seq} of `{self._source}` within {timeout_s} s"
+    def _why_no_result(self, seq, before, timeout_s, scene_rev=0):
+        told = f"no result of frame {seq} of `{self._source}` within {timeout_s} s"
         tick = self._tick
         if tick is None or (before is not None and tick.header.tick == before.header.tick):
-            return f"{text}: no tick came at all; is the daemon running?"
-        if self._is_under_way(tick):
-            text += "; a tick is still under way"
-        elif self._row(tick) is None:
-            known = ", ".join(_text(row.name) for row in tick.sources[: tick.sources_len])
-            text += f"; the scene has no such source, it has: {known}"
-        for reason in layout.RejectReason:
-            refused = tick.rejects[reason] - (before.rejects[reason] if before else 0)
-            if refused > 0:
-                text += f"; {refused} refused as {reason.name.lower()}"
-        return text
+            return f"{told}: no tick came at all; {self._ports.silence()}"
+        return told + why_no_result(tick, before, self._source, scene_rev)

@@ -21,19 +21,26 @@ class Restarted(SweepdError):
     """
 
     def __init__(self, old_boot, new_boot, ends):
-        super().__init__(f"the daemon restarted (boot {old_boot:x} is over, {new_boot:x} began)")
+        # as they were given, for copies and pickles are made of these
+        super().__init__(old_boot, new_boot, ends)
         self.old_boot = old_boot
         self.new_boot = new_boot
         #: ``(body_a, body_b)`` of each pair that was certified colliding when last heard of.
         self.ends = ends
+
+    def __str__(self):
+        return f"the daemon restarted (boot {self.old_boot:x} is over, {self.new_boot:x} began)"
 
 
 class Skipped(SweepdError):
     """A tick used a newer frame of this source; this one has no result of its own."""
 
     def __init__(self, seq):
-        super().__init__(
-            f"frame {seq} was passed over: a tick used a newer frame of the source."
+        super().__init__(seq)
+        self.seq = seq
+
+    def __str__(self):
+        return (
+            f"frame {self.seq} was passed over: a tick used a newer frame of the source."
             ' For a result of each frame, send one when that of the last is there, or write on_frame = "SOURCE" into [run] of the scene'
         )
-        self.seq = seq

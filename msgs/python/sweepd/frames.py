@@ -6,10 +6,12 @@ import operator
 import numpy as np
 
 from . import layout
-from .errors import SweepdError
+from .errors import SweepdError, TimedOut
 
 POSE = np.dtype(layout.TransformRow)
 MOVING = np.dtype(layout.TransformVelRow)
+#: Rows that the daemon takes in a frame.
+_ROWS_MAX = 1 << 20
 
 
 class Rows(np.ndarray):
@@ -40,6 +42,16 @@ def rows_of(ids, columns, wxyz, names=None):
     pose["orientation"] = np.roll(columns[1], -1, axis=-1) if wxyz else columns[1]
     if moving:
         rows["linear"], rows["angular"] = columns[2:]
+    return rows.view(Rows)
+
+
+def blank(count, moving):
+    """Rows without poses: what is not written is refused by the daemon, and never a pose that some memory held."""
+    count = whole("count", count)
+    if count > _ROWS_MAX:
+        raise SweepdError(f"count={count}: a frame has at most {_ROWS_MAX} rows")
+    rows = np.zeros(count, MOVING if moving else POSE)
+    (rows["transform"] if moving else rows)["position"] = np.nan
     return rows.view(Rows)
 
 
@@ -136,6 +148,14 @@ def time_left(value):
     except (TypeError, ValueError):
         late = False
     return 1 if late else whole("time_left_ns", value)
+
+
+def seconds_to_send(timeout_s):
+    """As ``seconds``; but where the time is over already, nothing is to be sent."""
+    left = seconds(timeout_s)
+    if left < 0:
+        raise TimedOut(f"timeout_s={left}: the time was over before anything was sent, and nothing was")
+    return left
 
 
 def seconds(timeout_s):

@@ -1,28 +1,50 @@
 """Shared memory: iceoryx2's ports of one client, as numpy arrays without copies.
 
-An array over a received message keeps its sample alive, and with it the place in shared memory; a reader may hold
-four messages of a kind, so copy what you keep.
+An array over a received message keeps its sample alive, and with it the place in shared memory. A reader may hold four
+messages of a kind: where three are held, the next one is copied.
 """
 
 import ctypes
 import functools
 import os
 import time
+import weakref
 
 import iceoryx2 as iox2
 import numpy as np
 
 from . import layout
 from .errors import Refused, SweepdError, TimedOut
-from .frames import Rows
+from .refusals import text
 
 #: Event ids of ``wake`` and ``ready``.
 SENT, ASKED = 1, 2
 _RETRY_S = 0.05
+# One less than a reader may hold, for the one that is copied.
+_HELD_MAX = 3
 _SLICE_LEN_START = 256
 _REQUEST_LEN_START = 1 << 14
 _ROWS_MAX = 1 << 26
 _FOREIGN = tuple(kind for kind in vars(iox2).values() if isinstance(kind, type) and issubclass(kind, Exception))
+
+# What has ports or samples of iceoryx2.
+_LIVING = weakref.WeakSet()
+_keep = ctypes.pythonapi.Py_IncRef
+_keep.argtypes, _keep.restype = (ctypes.py_object,), None
+
+
+def _leave_to_parent():
+    """In a forked child: ports and samples are the parent's, and never given back here, not at the child's end either.
+
+    iceoryx2 would remove the parent's files, and hand its samples back a second time.
+    """
+    for one in list(_LIVING):
+        for value in vars(one).values():
+            _keep(value)
+        one.forked = True
+
+
+os.register_at_fork(after_in_child=_leave_to_parent)
 
 
 def dtype(row):
@@ -41,23 +63,32 @@ class _Held:
             "shape": (count * kind.itemsize,),
             "typestr": "|u1",
         }
+        _LIVING.add(self)
 
 
-def _view(sample, kind):
+def _view(sample, kind, held):
+    """Rows over a sample, or a copy where others are held."""
     # the header's count: a slice's own length counted bytes in iceoryx2 0.10.0 (issue 1533)
     count = sample.header.number_of_elements
     if count == 0:
         return np.empty(0, kind)
     if count > _ROWS_MAX:
         raise SweepdError(f"a message says that it has {count} rows")
-    return np.asarray(_Held(sample, sample.payload_ptr, count, kind)).view(kind)
+    one = _Held(sample, sample.payload_ptr, count, kind)
+    rows = np.asarray(one).view(kind)
+    if len(held) >= _HELD_MAX:
+        rows = rows.copy()
+        rows.flags.writeable = False
+    else:
+        held.add(one)
+    return rows
 
 
-def _fill(address, kind, rows):
+def _fill(address, rows):
     """Copies rows into shared memory; one copy, the only one on this side."""
-    if len(rows):
-        memory = (ctypes.c_uint8 * (len(rows) * kind.itemsize)).from_address(address)
-        np.frombuffer(memory, dtype=kind)[:] = rows
+    # as bytes: field by field, as numpy assigns rows, takes three times as long
+    rows = np.ascontiguousarray(rows)
+    ctypes.memmove(address, rows.ctypes.data, rows.nbytes)
 
 
 def _ours(what):
@@ -66,11 +97,13 @@ def _ours(what):
     def wrap(method):
         @functools.wraps(method)
         def call(self, *args, **kwargs):
-            if self._closed:
-                raise SweepdError(f"{what}: this client is closed; make a new one")
+            self.check_open(what)
             try:
                 return method(self, *args, **kwargs)
             except _FOREIGN as e:
+                if str(e) == "DoesNotExist":
+                    # a port that was not needed yet, of a daemon that has ended meanwhile
+                    raise TimedOut(f"{what}: {self._nobody(e)}") from e
                 raise SweepdError(f"{what}: {_why(e)}") from e
 
         return call
@@ -85,6 +118,8 @@ def _why(e):
             f"every place is taken ({why}); end a client that is not needed (`sweepd list` counts them, msgs/README.md has"
             " the limits). One that was killed gives its place back within two seconds"
         )
+    if why == "ExceedsMaxActiveRequests":
+        return f"those asked before are not answered yet ({why}): ask again in a moment"
     return why
 
 
@@ -138,7 +173,7 @@ def _check_owner(config):
 
 
 class Ports:
-    """The ports of one client. Use it from one thread."""
+    """The ports of one client. For one thread at a time, as the client sees to."""
 
     def __init__(self, instance, timeout_s, root=None, prefix=None):
         check_name(instance)
@@ -149,8 +184,10 @@ class Ports:
         self._readers = {}
         self._client = None
         self._pending = []
-        self._loaned = None
         self._closed = False
+        #: Whether this is a forked process, and the ports are those of its parent.
+        self.forked = False
+        _LIVING.add(self)
         until = time.monotonic() + timeout_s
         try:
             _patiently(self._open, until)
@@ -167,10 +204,28 @@ class Ports:
             raise
         self._boot = self.hello.boot_id
 
+    def check_open(self, what):
+        """Raises where the client is closed, or another process's."""
+        if self.forked:
+            raise SweepdError(f"{what}: this client is that of the process that forked this one; make a client after the fork")
+        if self._closed:
+            raise SweepdError(f"{what}: this client is closed; make a new one")
+
     def _nobody(self, why):
         return (
-            f"no daemon runs as instance `{self._instance}` ({why}); start one with `sweepd run`, "
+            f"no daemon runs as instance `{self._instance}` ({why}); start one with `{self._run()}`, "
             "`sweepd list` shows who is there"
+        )
+
+    def _run(self):
+        of_it = "" if self._instance == "default" else f" --instance {self._instance}"
+        return f"sweepd run SCENE{of_it}"
+
+    def silence(self):
+        """What it means that the daemon says nothing, and what to do."""
+        return (
+            f"if that lasts, the daemon was killed or is stopped: `sweepd doctor --instance {self._instance}` says which,"
+            f" `{self._run()}` starts a new one"
         )
 
     def _open(self):
@@ -203,7 +258,9 @@ class Ports:
                 _check_hello(hello)
                 return hello
             if time.monotonic() >= until:
-                raise TimedOut("the instance's services are there, but no daemon says hello; is it running?")
+                raise TimedOut(
+                    f"the services of instance `{self._instance}` are there, but no daemon says hello; {self.silence()}"
+                )
             self.wait(0.005)
 
     def _newest_hello(self):
@@ -247,7 +304,7 @@ class Ports:
             return service.subscriber_builder().create()
 
         try:
-            self._readers[topic] = (_patiently(port, until), np.dtype(row), header)
+            self._readers[topic] = (_patiently(port, until), np.dtype(row), header, weakref.WeakSet())
         except _FOREIGN as e:
             raise Refused(f"`{topic}` of instance `{self._instance}` cannot be read: {_why(e)}") from e
         self.wake(14)
@@ -273,20 +330,15 @@ class Ports:
             return None
         return layout.TickRow.from_buffer_copy(sample.payload().contents)
 
+    @_ours("a message cannot be received")
     def message(self, topic):
-        """The next message of a kind as ``(header, rows)``, or None; the rows lie in shared memory."""
-        reader, kind, header = self._readers[topic]
-        try:
-            sample = reader.receive()
-        except Exception as e:
-            raise SweepdError(
-                f"{topic} cannot be received ({e}); where four results are still held, copy what you keep "
-                "(`result.pairs.copy()`)"
-            ) from e
+        """The next message of a kind as ``(header, rows)``, or None; the rows mostly lie in shared memory."""
+        reader, kind, header, held = self._readers[topic]
+        sample = reader.receive()
         if sample is None:
             return None
         header = header.from_buffer_copy(sample.user_header().contents)
-        return header, _view(sample, kind)
+        return header, _view(sample, kind, held)
 
     def _sender(self, topic, row, header, count):
         if topic not in self._senders:
@@ -301,26 +353,11 @@ class Ports:
             )
         return self._senders[topic]
 
-    @_ours("a frame cannot be made")
-    def loan(self, topic, row, header, count):
-        """Rows in shared memory that :meth:`send` hands over as they are; the loan before is given back."""
-        self._loaned = None
-        sample = self._sender(topic, row, header, count).loan_slice_uninit(count)
-        kind = np.dtype(row)
-        memory = (ctypes.c_uint8 * (count * kind.itemsize)).from_address(sample.payload_ptr) if count else b""
-        rows = np.frombuffer(memory, dtype=kind).view(Rows)
-        self._loaned = (rows, sample)
-        return rows
-
     @_ours("a frame cannot be sent")
     def send(self, topic, row, header, rows, wake=True):
         """Hands rows over and, where said, wakes the daemon."""
-        if self._loaned is not None and rows is self._loaned[0]:
-            sample, self._loaned = self._loaned[1], None
-            rows.flags.writeable = False
-        else:
-            sample = self._sender(topic, row, type(header), len(rows)).loan_slice_uninit(len(rows))
-            _fill(sample.payload_ptr, np.dtype(row), rows)
+        sample = self._sender(topic, row, type(header), len(rows)).loan_slice_uninit(len(rows))
+        _fill(sample.payload_ptr, rows)
         ctypes.memmove(sample.user_header_ptr, ctypes.byref(header), ctypes.sizeof(header))
         sample.assume_init().send()
         if wake:
@@ -363,20 +400,15 @@ class Ports:
 
     def close(self):
         """Frees the ports: samples and ports first, the node last."""
-        self._loaned = None
         self._closed = True
         self._pending, self._senders, self._readers = [], {}, {}
         self._client = self._tick = self._hello = self._ready = self._wake = self._node = None
 
 
-def _text(chars):
-    return bytes(chars).split(b"\0")[0].decode("utf-8", "replace")
-
-
 def _check_hello(hello):
     from . import __version__
 
-    theirs, iceoryx2 = _text(hello.sweepd_version), _text(hello.iceoryx2_version)
+    theirs, iceoryx2 = text(hello.sweepd_version), text(hello.iceoryx2_version)
     if bytes(hello.magic) != b"sweepd\0\0" or hello.wire_version != layout.WIRE_VERSION or iceoryx2 != "0.10.0":
         raise Refused(
             f"the daemon is sweepd {theirs} (wire version {hello.wire_version}, iceoryx2 {iceoryx2}), this client "
