@@ -135,13 +135,6 @@ impl Cover {
         self.drift.left_m(self.lumped_expiry_m) > 0.0
     }
 
-    /// How many groups are no longer proved apart.
-    fn expired_len(&self, entries: &Entries) -> usize {
-        let gone = |group: &&Group| self.drift.left_m(group.expiry_m) <= 0.0;
-        let proved = entries.groups.all(&self.proved.heap);
-        proved.iter().filter(gone).count()
-    }
-
     /// The pair has come to another pose: what held at the one before alone is asked again.
     pub(super) fn arrive(&mut self, entries: &mut Entries) {
         self.ask_touching_again(entries);

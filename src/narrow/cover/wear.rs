@@ -53,13 +53,44 @@ impl Wear {
             || drift.path_m > PATH_MAX * size_m
             || drift.last_m > LEAP * a.min(b)
             || settled && cover.len() > STALE_TIMES * self.fresh_len + STALE_MORE
-            || settled && WORN_TIMES * cover.expired_len(entries) > self.fresh_steps
+            || settled && cover.has_more_expired_than(entries, self.fresh_steps / WORN_TIMES)
+    }
+}
+
+impl Cover {
+    /// Whether more than so many groups are no longer proved apart.
+    ///
+    /// Cost: a look at each that is not and at the two below it, up to so many: of 100,000 groups few expire in a tick.
+    fn has_more_expired_than(&self, entries: &Entries, most: usize) -> bool {
+        let heap = entries.groups.all(&self.proved.heap);
+        let (mut at, mut count) = (0, 0);
+        loop {
+            if (heap.get(at)).is_some_and(|group| self.drift.left_m(group.expiry_m) <= 0.0) {
+                count += 1;
+                if count > most {
+                    return true;
+                }
+                at = 2 * at + 1;
+                continue;
+            }
+            // All below it holds longer: on to what is beside it, or beside one above.
+            while at % 2 == 0 {
+                if at == 0 {
+                    return false;
+                }
+                at = at / 2 - 1;
+            }
+            at += 1;
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::builtin::Random;
+    use crate::narrow::cover::Group;
+    use crate::shape::BoxId;
 
     #[test]
     fn a_long_way_wears_out_what_is_proved_also_beside_what_has_no_end() {
@@ -69,5 +100,28 @@ mod tests {
         assert!(!wear.is_worn_out(&cover, &entries, radii_m));
         cover.drift.path_m = PATH_MAX + 1.0;
         assert!(wear.is_worn_out(&cover, &entries, radii_m));
+    }
+    #[test]
+    fn expired_groups_are_counted_without_a_look_at_those_that_hold() {
+        let mut random = Random::new(3);
+        for len in [0, 1, 2, 3, 100, 1000] {
+            let (mut cover, mut entries) = (Cover::default(), Entries::with_room(1 << 16, 0));
+            for place in 0..len {
+                let mut group = Group::of_leaves(BoxId(place), BoxId(place));
+                group.expiry_m = random.unit();
+                assert!(cover.proved.push(&mut entries.groups, group));
+                if random.unit() < 0.3 {
+                    cover.proved.pop(&mut entries.groups);
+                }
+            }
+            for path_m in [0.0, 0.01, 0.5, 2.0] {
+                cover.drift.path_m = path_m;
+                let groups = entries.groups.all(&cover.proved.heap).iter();
+                let gone = groups.filter(|group| cover.drift.left_m(group.expiry_m) <= 0.0);
+                let count = gone.count();
+                assert!(!cover.has_more_expired_than(&entries, count));
+                assert!(count == 0 || cover.has_more_expired_than(&entries, count - 1));
+            }
+        }
     }
 }
