@@ -60,11 +60,18 @@ impl Server {
             truncated: 0,
             ..*header
         };
-        if outbox.names_changed {
-            failures += send(&self.names.publisher, &whole, &outbox.names);
+        // Told once: what could not be handed over is owed.
+        self.names_owed |= outbox.names_changed;
+        if self.names_owed {
+            let lost = send(&self.names.publisher, &whole, &outbox.names);
+            self.names_owed = lost > 0;
+            failures += lost;
         }
-        if outbox.plan_changed {
-            failures += send(&self.plan.publisher, &whole, outbox.plan.as_bytes());
+        self.plan_owed |= outbox.plan_changed;
+        if self.plan_owed {
+            let lost = send(&self.plan.publisher, &whole, outbox.plan.as_bytes());
+            self.plan_owed = lost > 0;
+            failures += lost;
         }
         self.update_connections();
         self.send_tick(&outbox.tick)?;
@@ -101,4 +108,55 @@ where
     };
     *sample.user_header_mut() = *header;
     u64::from(sample.write_from_slice(rows).send().is_err())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::SystemClock;
+    use crate::transport::Door as _;
+    use crate::transport::client::{Link, Message, Topics};
+    use crate::transport::iceoryx::{IoxLink, Place, ServerOptions};
+    use crate::wire::NameRow;
+
+    #[test]
+    fn bug_names_and_plan_that_could_not_be_handed_over_were_never_told() {
+        let place = Place::new(&format!("owed_{}", std::process::id())).unwrap();
+        let mut server = Server::open(ServerOptions::new(place.clone(), 7)).unwrap();
+        let mut link = IoxLink::open(&place, &SystemClock, u64::MAX).unwrap();
+        link.subscribe(Topics {
+            names: true,
+            plan: true,
+            ..Topics::default()
+        })
+        .unwrap();
+        let mut outbox = Outbox {
+            names: vec![NameRow::default()],
+            names_changed: true,
+            plan: "{}".to_owned(),
+            plan_changed: true,
+            ..Outbox::default()
+        };
+        // As with no memory left: none is lent while others are out.
+        let mut names = Vec::new();
+        while let Ok(sample) = server.names.publisher.loan_slice_uninit(1) {
+            names.push(sample);
+        }
+        let mut plans = Vec::new();
+        while let Ok(sample) = server.plan.publisher.loan_slice_uninit(1) {
+            plans.push(sample);
+        }
+        server.demand();
+        assert_eq!(server.publish(&outbox).unwrap(), 2);
+        (outbox.names_changed, outbox.plan_changed) = (false, false);
+        assert_eq!(server.publish(&outbox).unwrap(), 2);
+        drop((names, plans));
+        assert_eq!(server.publish(&outbox).unwrap(), 0);
+        let mut heard = Message::<NameRow>::default();
+        let mut plan = Message::<u8>::default();
+        assert!(link.names(&mut heard).unwrap() && link.plan(&mut plan).unwrap());
+        assert_eq!((heard.rows.len(), &*plan.rows), (1, b"{}".as_slice()));
+        assert_eq!(server.publish(&outbox).unwrap(), 0);
+        assert!(!link.names(&mut heard).unwrap() && !link.plan(&mut plan).unwrap());
+    }
 }
