@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from daemons import FIRST, NO_TURN, started  # noqa: F401
@@ -155,3 +156,39 @@ def test_the_smallest_example_prints_what_touches_in_the_first_scene(start):
     lines = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout.splitlines()
     assert lines[0] == "0 clear []"
     assert lines[-1] == "99 colliding [('cart', 'post')]"
+
+
+def test_bug_a_look_at_what_is_there_never_ended_where_ticks_came_faster_than_they_were_read():
+    class Endless:
+        taken = 0
+
+        def _take(self):
+            self.taken += 1
+            assert self.taken < 1000
+            return True
+
+    endless = Endless()
+    sweepd.Client._drain(endless)
+    assert endless.taken > 8, "more than wait in any queue"
+
+
+def test_bug_what_a_boot_that_came_and_went_unseen_left_was_followed_for_ever():
+    ticks = [(1, 1, 10), (3, 1, 30), (2, 1, 20), (3, 2, 31)]
+
+    def tick():
+        if not ticks:
+            return None
+        row = layout.TickRow()
+        row.header.boot_id, row.header.tick, row.sent_ns = ticks.pop(0)
+        return row
+
+    client = sweepd.Client.__new__(sweepd.Client)
+    client._held = client._tick = None
+    client._boots_over, client._topics, client._now, client._ahead = [], {}, {}, {"names": None}
+    client._list = SimpleNamespace(boot_id=0)
+    client._ports = SimpleNamespace(tick=tick, message=lambda topic: None, close=lambda: None)
+    assert client._take()
+    with pytest.raises(sweepd.Restarted):
+        client._take()
+    assert client._take() and client._take() and not client._take()
+    assert (client._tick.header.boot_id, client._tick.header.tick) == (3, 2)

@@ -19,6 +19,8 @@ from .turns import Turns, in_turn
 
 _LOOK_AGAIN_S = 0.05
 _BOOTS_OVER_MAX = 16
+# ticks that one look takes at most: more than wait in its queues
+_DRAINED_MAX = 32
 _NAMES_TOLD = 5
 _TOPICS = {
     "pairs": layout.PairRow,
@@ -491,8 +493,10 @@ class Client:
 
     def _drain(self):
         """Takes what is there, up to the newest tick; raises Restarted."""
-        while self._take():
-            pass
+        # where a tick takes longer to read than the next one takes to come, there is always one
+        for _ in range(_DRAINED_MAX):
+            if not self._take():
+                return
 
     def _next(self, until):
         """The next newer tick and all that belongs to it; False when the time is up."""
@@ -514,6 +518,10 @@ class Client:
                 continue
             old = self._tick and self._tick.header
             if old and old.boot_id != new.boot_id:
+                # there is one daemon at a time: what is left of one that came and went unseen is older
+                if tick.sent_ns < self._tick.sent_ns:
+                    self._boots_over = [*self._boots_over[1 - _BOOTS_OVER_MAX :], new.boot_id]
+                    continue
                 self._restart(old, tick)
             # a tick that takes longer than a heartbeat is told of under its own number before it is there itself
             if old and (new.tick, tick.sent_ns) <= (old.tick, self._tick.sent_ns):

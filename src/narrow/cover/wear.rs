@@ -57,6 +57,34 @@ impl Wear {
     }
 }
 
+impl Cover {
+    /// Whether more than so many groups are no longer proved apart.
+    ///
+    /// Cost: a look at each that is not and at the two below it, up to so many: of 100,000 groups few expire in a tick.
+    fn has_more_expired_than(&self, entries: &Entries, most: usize) -> bool {
+        let heap = entries.groups.all(&self.proved.heap);
+        let (mut at, mut count) = (0, 0);
+        loop {
+            if (heap.get(at)).is_some_and(|group| self.drift.left_m(group.expiry_m) <= 0.0) {
+                count += 1;
+                if count > most {
+                    return true;
+                }
+                at = 2 * at + 1;
+                continue;
+            }
+            // All below it holds longer: on to what is beside it, or beside one above.
+            while at % 2 == 0 {
+                if at == 0 {
+                    return false;
+                }
+                at = at / 2 - 1;
+            }
+            at += 1;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

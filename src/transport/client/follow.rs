@@ -8,6 +8,10 @@ use crate::wire::{
     BodyRow, ContactRow, MessageHeader, NameRow, PairRow, Reason, RegionRow, State, TickRow,
 };
 
+/// Ticks of the boot in force that may still come while a message of the next one is there: what a queue holds, twice.
+/// A message that waits for its tick for longer is of a boot that came and went unseen.
+const TICKS_LEFT_MAX: u32 = 16;
+
 /// A message as it was received.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Message<T, H = MessageHeader> {
@@ -109,6 +113,37 @@ struct Stream<T> {
     now: Message<T>,
     ahead: Message<T>,
     has_ahead: bool,
+    wait: Wait,
+}
+
+/// How long the message that came early has waited.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Wait(u32);
+
+impl Wait {
+    /// It is of another boot than the tick that has come: whether it waits in vain.
+    pub(super) fn is_in_vain(&mut self, boot_id: u64, boots_over: &mut Vec<u64>) -> bool {
+        self.0 += 1;
+        let in_vain = self.0 > TICKS_LEFT_MAX;
+        if in_vain {
+            self.0 = 0;
+            note_over(boots_over, boot_id);
+        }
+        in_vain
+    }
+
+    /// Another message is there.
+    pub(super) fn begin(&mut self) {
+        self.0 = 0;
+    }
+}
+
+/// Remembers a boot as over.
+fn note_over(boots_over: &mut Vec<u64>, boot_id: u64) {
+    if boots_over.len() == BOOTS_OVER_MAX {
+        boots_over.remove(0);
+    }
+    boots_over.push(boot_id);
 }
 
 impl<T> Stream<T> {
@@ -124,7 +159,7 @@ impl<T> Stream<T> {
     fn advance(
         &mut self,
         tick: &MessageHeader,
-        boots_over: &[u64],
+        boots_over: &mut Vec<u64>,
         mut read: impl FnMut(&mut Message<T>) -> Result<bool>,
     ) -> Result<()> {
         loop {
@@ -133,6 +168,7 @@ impl<T> Stream<T> {
                     return Ok(());
                 }
                 self.has_ahead = true;
+                self.wait.begin();
             }
             let header = &self.ahead.header;
             let same_boot = header.boot_id == tick.boot_id;
@@ -145,7 +181,7 @@ impl<T> Stream<T> {
                     std::mem::swap(&mut self.now, &mut self.ahead);
                 }
                 self.has_ahead = false;
-            } else {
+            } else if same_boot || !self.wait.is_in_vain(header.boot_id, boots_over) {
                 return Ok(());
             }
         }
@@ -178,6 +214,11 @@ impl Follow {
                 continue;
             }
             if old.boot_id != 0 && old.boot_id != new.boot_id {
+                // There is one daemon at a time: what is left of one that came and went unseen is older.
+                if tick.sent_ns < self.view.tick.sent_ns {
+                    note_over(&mut self.boots_over, new.boot_id);
+                    continue;
+                }
                 return Ok(Heard::Restarted(self.restart(tick)));
             }
             // A tick that takes longer than a heartbeat is told of under its own number before it is there itself.
@@ -193,10 +234,7 @@ impl Follow {
 
     fn restart(&mut self, tick: TickRow) -> Restarted {
         let old_boot = self.view.tick.header.boot_id;
-        if self.boots_over.len() == BOOTS_OVER_MAX {
-            self.boots_over.remove(0);
-        }
-        self.boots_over.push(old_boot);
+        note_over(&mut self.boots_over, old_boot);
         let (pairs, list) = (&self.view.pairs.now, &self.view.list);
         let ends = if pairs.header.boot_id == old_boot {
             ends_of(pairs.header.tick, pairs.rows.iter().copied())
@@ -216,7 +254,7 @@ impl Follow {
 
     /// What belongs to the tick was sent before it, so it is already there.
     fn gather(&mut self, link: &mut dyn Link, tick: &MessageHeader) -> Result<()> {
-        let (view, over) = (&mut self.view, &self.boots_over);
+        let (view, over) = (&mut self.view, &mut self.boots_over);
         view.contacts.advance(tick, over, |m| link.contacts(m))?;
         view.regions.advance(tick, over, |m| link.regions(m))?;
         view.pairs.advance(tick, over, |m| link.pairs(m))?;
@@ -228,3 +266,6 @@ impl Follow {
         view.plan.advance(tick, over, |m| link.plan(m))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use super::follow::Message;
+use super::follow::{Message, Wait};
 use super::link::Link;
 use crate::error::Result;
 use crate::wire::{ChangesHeader, MessageHeader, PairRow};
@@ -22,6 +22,7 @@ pub struct PairList {
     /// One that came early.
     ahead: Message<PairRow, ChangesHeader>,
     has_ahead: bool,
+    wait: Wait,
     /// By ids: the tick that sent the row, and the row.
     rows: BTreeMap<(u64, u64), (u64, PairRow)>,
     is_whole: bool,
@@ -84,7 +85,7 @@ impl PairList {
     pub(super) fn advance(
         &mut self,
         tick: &MessageHeader,
-        boots_over: &[u64],
+        boots_over: &mut Vec<u64>,
         link: &mut dyn Link,
     ) -> Result<()> {
         loop {
@@ -93,11 +94,16 @@ impl PairList {
                     return Ok(());
                 }
                 self.has_ahead = true;
+                self.wait.begin();
             }
             let header = &self.ahead.header.message;
             let is_over = boots_over.contains(&header.boot_id);
-            if !is_over && (header.boot_id != tick.boot_id || header.tick > tick.tick) {
-                return Ok(());
+            let same_boot = header.boot_id == tick.boot_id;
+            if !is_over && (!same_boot || header.tick > tick.tick) {
+                if same_boot || !self.wait.is_in_vain(header.boot_id, boots_over) {
+                    return Ok(());
+                }
+                continue;
             }
             self.has_ahead = false;
             if !is_over && self.take() {

@@ -31,6 +31,9 @@ use crate::wire::{
 
 /// Longest sleep between two looks at the ports: where an event got lost, nothing waits longer than this.
 const LOOK_AGAIN_NS: u64 = 50_000_000;
+/// Ticks that one look at what is there takes at most: more than its queues hold, so that the newest at its begin is
+/// among them. Where what belongs to a tick takes longer to read than the next tick takes to come, there is always one.
+const LATEST_MAX: usize = 32;
 /// Boots remembered as over, so that what is left of them in a queue is known to be old.
 const BOOTS_OVER_MAX: usize = 16;
 
@@ -286,13 +289,14 @@ impl Client {
     /// As [`Client::wait_tick`].
     pub fn latest(&mut self) -> Result<Heard> {
         let mut newest = Heard::Silence;
-        loop {
+        for _ in 0..LATEST_MAX {
             match self.next_heard()? {
-                Heard::Silence => return Ok(newest),
+                Heard::Silence => break,
                 restarted @ Heard::Restarted(_) => return Ok(restarted),
                 Heard::Tick => newest = Heard::Tick,
             }
         }
+        Ok(newest)
     }
 
     /// Asks the daemon and waits for its answer.

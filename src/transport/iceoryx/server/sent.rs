@@ -60,14 +60,19 @@ impl Server {
             truncated: 0,
             ..*header
         };
-        // What a tick has once stays in the outbox until it is new again.
-        let Owed { names, plan } = &mut self.owed;
-        failures += names.send(outbox.names_changed, || {
-            send(&self.names.publisher, &whole, &outbox.names)
-        });
-        failures += plan.send(outbox.plan_changed, || {
-            send(&self.plan.publisher, &whole, outbox.plan.as_bytes())
-        });
+        // Told once: what could not be handed over is owed.
+        self.names_owed |= outbox.names_changed;
+        if self.names_owed {
+            let lost = send(&self.names.publisher, &whole, &outbox.names);
+            self.names_owed = lost > 0;
+            failures += lost;
+        }
+        self.plan_owed |= outbox.plan_changed;
+        if self.plan_owed {
+            let lost = send(&self.plan.publisher, &whole, outbox.plan.as_bytes());
+            self.plan_owed = lost > 0;
+            failures += lost;
+        }
         self.update_connections();
         self.send_tick(&outbox.tick)?;
         Ok(failures)
@@ -90,32 +95,6 @@ impl Server {
     }
 }
 
-/// Messages that one tick has and no later one, where they could not be handed over: readers would have old ones until
-/// the scene changes again.
-#[derive(Debug, Default)]
-pub(super) struct Owed {
-    names: Debt,
-    plan: Debt,
-}
-
-/// Whether a message is still to be handed over.
-#[derive(Debug, Default)]
-struct Debt(bool);
-
-impl Debt {
-    /// Sends what is new, or owed.
-    ///
-    /// * `send` - as [`send`] returns.
-    fn send(&mut self, is_new: bool, send: impl FnOnce() -> u64) -> u64 {
-        if !is_new && !self.0 {
-            return 0;
-        }
-        let failures = send();
-        self.0 = failures > 0;
-        failures
-    }
-}
-
 /// One message.
 ///
 /// * returns - 1 when it could not be handed over.
@@ -134,15 +113,50 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::time::SystemClock;
+    use crate::transport::Door as _;
+    use crate::transport::client::{Link, Message, Topics};
+    use crate::transport::iceoryx::{IoxLink, Place, ServerOptions};
+    use crate::wire::NameRow;
 
     #[test]
-    fn bug_names_that_could_not_be_handed_over_came_with_the_next_edit_only() {
-        let mut debt = Debt::default();
-        let never = || panic!("nothing to send");
-        assert_eq!(debt.send(false, never), 0);
-        assert_eq!(debt.send(true, || 1), 1);
-        assert_eq!(debt.send(false, || 1), 1);
-        assert_eq!(debt.send(false, || 0), 0);
-        assert_eq!(debt.send(false, never), 0);
+    fn bug_names_and_plan_that_could_not_be_handed_over_were_never_told() {
+        let place = Place::new(&format!("owed_{}", std::process::id())).unwrap();
+        let mut server = Server::open(ServerOptions::new(place.clone(), 7)).unwrap();
+        let mut link = IoxLink::open(&place, &SystemClock, u64::MAX).unwrap();
+        link.subscribe(Topics {
+            names: true,
+            plan: true,
+            ..Topics::default()
+        })
+        .unwrap();
+        let mut outbox = Outbox {
+            names: vec![NameRow::default()],
+            names_changed: true,
+            plan: "{}".to_owned(),
+            plan_changed: true,
+            ..Outbox::default()
+        };
+        // As with no memory left: none is lent while others are out.
+        let mut names = Vec::new();
+        while let Ok(sample) = server.names.publisher.loan_slice_uninit(1) {
+            names.push(sample);
+        }
+        let mut plans = Vec::new();
+        while let Ok(sample) = server.plan.publisher.loan_slice_uninit(1) {
+            plans.push(sample);
+        }
+        server.demand();
+        assert_eq!(server.publish(&outbox).unwrap(), 2);
+        (outbox.names_changed, outbox.plan_changed) = (false, false);
+        assert_eq!(server.publish(&outbox).unwrap(), 2);
+        drop((names, plans));
+        assert_eq!(server.publish(&outbox).unwrap(), 0);
+        let mut heard = Message::<NameRow>::default();
+        let mut plan = Message::<u8>::default();
+        assert!(link.names(&mut heard).unwrap() && link.plan(&mut plan).unwrap());
+        assert_eq!((heard.rows.len(), &*plan.rows), (1, b"{}".as_slice()));
+        assert_eq!(server.publish(&outbox).unwrap(), 0);
+        assert!(!link.names(&mut heard).unwrap() && !link.plan(&mut plan).unwrap());
     }
 }
