@@ -8,7 +8,7 @@ use crate::world::{Body, PlacedShape};
 use super::contacts::Contact;
 use super::exact::{
     Closest, ManifoldPoint, Shell, Warm, convex_gap, convex_gap_along, gap_to_half_space,
-    half_space_gap, touching_points,
+    half_space_gap, points_on_plane, touching_points,
 };
 use super::memo::Witness;
 use super::mesh::{LeafContact, retest_witness};
@@ -105,10 +105,17 @@ pub(super) fn add_manifold(
     let take = |p: &ManifoldPoint| {
         found.push(contact(p.point_a, p.point_b, p.gap_m, p.feature));
     };
-    if let (Geometry::Convex(first), Geometry::Convex(second)) =
-        (&one.shape.geometry, &other.shape.geometry)
-    {
-        touching_points(first, second, pos12, closest, take);
+    match (&one.shape.geometry, &other.shape.geometry) {
+        (Geometry::Convex(first), Geometry::Convex(second)) => {
+            touching_points(first, second, pos12, closest, take);
+        }
+        (Geometry::HalfSpace { .. }, Geometry::Convex(second)) => {
+            points_on_plane(second, Some(pos12), closest, take);
+        }
+        (Geometry::Convex(first), Geometry::HalfSpace { .. }) => {
+            points_on_plane(first, None, closest, take);
+        }
+        _ => {}
     }
     if found.len() == before {
         let (best_m, at) = (closest.best_m, (closest.point_a, closest.point_b));

@@ -128,3 +128,127 @@ fn bug_a_box_at_rest_on_another_lost_corners_to_rounding() {
         }
     }
 }
+
+/// A floor with its top at z = 0, and a body of id 2 with a shape.
+fn on_floor(floor: u64, shape: &str) -> Rig {
+    let plane = "{ type = \"half_space\", normal = [0, 0, 1], offset = 0 }";
+    let floor = format!("name = \"floor\"\nid = {floor}\nmoves = false\nshape = {plane}\n");
+    Rig::new(&scene("", &[floor, body(2, [0.0; 3], shape, "")]))
+}
+
+/// Upright with a regular hexagon of radius 1 m below and above, 1 m high.
+fn hexagons() -> String {
+    let corners = (0..12).map(|k| {
+        let angle = f64::from(k % 6) * std::f64::consts::FRAC_PI_3;
+        let z = if k < 6 { -0.5 } else { 0.5 };
+        format!("[{:?}, {:?}, {z:?}]", angle.cos(), angle.sin())
+    });
+    let corners: Vec<String> = corners.collect();
+    format!(
+        "{{ type = \"convex\", vertices = [{}] }}",
+        corners.join(", ")
+    )
+}
+
+#[test]
+fn bug_a_body_at_rest_on_a_half_space_had_one_contact_that_jumped() {
+    let mut rng = Rng::new(8);
+    let cylinder = "{ type = \"cylinder\", radius = 0.4, half_height = 0.5 }";
+    let cone = "{ type = \"cone\", radius = 0.4, half_height = 0.5 }";
+    let capsule = "{ type = \"capsule\", radius = 0.2, half_height = 0.5 }";
+    let (x, tip) = (Vec3::x(), (0.5_f64 / 0.75_f64.sqrt()).acos());
+    let lying = Quat::from_scaled_axis(x * FRAC_PI_2);
+    let upright = Quat::identity();
+    let edge = Quat::from_scaled_axis(x * FRAC_PI_4);
+    let corner = Quat::from_scaled_axis(x * tip) * Quat::from_scaled_axis(Vec3::z() * FRAC_PI_4);
+    let slant = Quat::from_scaled_axis(x * -(FRAC_PI_2 + 0.4_f64.atan2(1.0)));
+    let cases = [
+        ("box", block(0.5, false), upright, 0.5, 4),
+        ("hull", block(0.5, true), upright, 0.5, 4),
+        ("hexagon", hexagons(), upright, 0.5, 4),
+        ("cylinder", cylinder.to_owned(), upright, 0.5, 4),
+        ("cone", cone.to_owned(), upright, 0.5, 4),
+        (
+            "box on its edge",
+            block(0.5, false),
+            edge,
+            0.5_f64.sqrt(),
+            2,
+        ),
+        (
+            "hull on its edge",
+            block(0.5, true),
+            edge,
+            0.5_f64.sqrt(),
+            2,
+        ),
+        (
+            "box on its corner",
+            block(0.5, false),
+            corner,
+            0.75_f64.sqrt(),
+            1,
+        ),
+        ("lying cylinder", cylinder.to_owned(), lying, 0.4, 2),
+        ("lying capsule", capsule.to_owned(), lying, 0.2, 2),
+        ("standing capsule", capsule.to_owned(), upright, 0.7, 1),
+        (
+            "lying cone",
+            cone.to_owned(),
+            slant,
+            0.5 * (0.4_f64.atan2(1.0)).sin(),
+            2,
+        ),
+    ];
+    for floor in [1, 9] {
+        for (what, shape, turn, height, contacts) in &cases {
+            for yaw in [0.0, 0.3] {
+                let turn = Quat::from_scaled_axis(Vec3::z() * yaw) * turn;
+                let pose = Pose::from_parts(Vec3::new(0.3, -0.2, *height).into(), turn);
+                for by in TREMBLES {
+                    let mut rig = on_floor(floor, shape);
+                    assert_stays(&mut rig, what, *contacts, &mut rng, (&pose, by));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn contacts_on_a_half_space_are_on_both_and_none_is_deeper_than_the_gap() {
+    let mut rng = Rng::new(9);
+    let cylinder = "{ type = \"cylinder\", radius = 0.4, half_height = 0.5 }";
+    let shapes = [block(0.5, false), hexagons(), cylinder.to_owned()];
+    for case in 0..200 {
+        let mut rig = on_floor([1, 9][case % 2], &shapes[case % 3]);
+        let lean = 10.0_f64.powf(rng.range(-7.0, -0.5));
+        let lean = Quat::from_scaled_axis(rng.vector(lean));
+        let at = Vec3::new(rng.range(-1.0, 1.0), rng.range(-1.0, 1.0), 0.45);
+        rig.place(2, &Pose::from_parts(at.into(), lean));
+        rig.send(ALL);
+        let gap_m = rig.out.pairs[0].gap_best_m;
+        let rows = &rig.out.contacts;
+        let least = rows.iter().map(|r| r.gap_m).fold(f64::INFINITY, f64::min);
+        assert!((1..=4).contains(&rows.len()), "{case}: {rows:?}");
+        assert!((least - gap_m).abs() < 1e-5, "{case}: {least} {gap_m}");
+        assert!(least >= rig.out.pairs[0].gap_min_m - 1e-12, "{case}");
+        for row in rows {
+            let (below, on) = if row.body_a == 2 {
+                (row.point_a, row.point_b)
+            } else {
+                (row.point_b, row.point_a)
+            };
+            assert!(on[2].abs() < 1e-12 && row.gap_m <= 1e-6, "{case}: {row:?}");
+            assert!((below[2] - row.gap_m).abs() < 1e-12, "{case}: {row:?}");
+            let [x, y, z] = if row.body_a == 2 {
+                row.point_a_body
+            } else {
+                row.point_b_body
+            };
+            assert!(
+                x.hypot(y) < 1.01 && (z + 0.5).abs() < 1e-12,
+                "{case}: {row:?}"
+            );
+        }
+    }
+}

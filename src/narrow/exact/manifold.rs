@@ -7,9 +7,11 @@
 //! gaps are measured along the normal. The deepest point is always among those that come out.
 
 mod clipped;
+mod plane;
 mod shared;
 mod triangles;
 
+pub(in crate::narrow) use plane::points_on_plane;
 pub(in crate::narrow) use shared::shared_points;
 pub(in crate::narrow) use triangles::shared_by_triangles;
 
@@ -162,7 +164,18 @@ struct Found {
 impl Found {
     #[inline]
     fn new(pair: &Pair<'_>, closest: &Closest, prediction_m: f64) -> Self {
-        let (margin_a, margin_b) = (pair.a.margin(), pair.b.margin());
+        let margins = (pair.a.margin(), pair.b.margin());
+        let same = SAME * (pair.scale + margins.0 + margins.1);
+        Self::with(closest, margins, prediction_m, same)
+    }
+
+    #[inline]
+    fn with(
+        closest: &Closest,
+        (margin_a, margin_b): (f64, f64),
+        prediction_m: f64,
+        same: f64,
+    ) -> Self {
         let witness = ManifoldPoint {
             point_a: closest.point_a,
             point_b: closest.point_b,
@@ -177,7 +190,7 @@ impl Found {
             margin_b,
             prediction_m,
             witness,
-            same: SAME * (pair.scale + margin_a + margin_b),
+            same,
         }
     }
 

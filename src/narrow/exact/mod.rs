@@ -44,7 +44,7 @@ use crate::shape::Convex;
 
 pub use manifold::{Manifold, ManifoldPoint, manifold};
 pub(in crate::narrow) use manifold::{
-    PREDICTION, shared_by_triangles, shared_points, touching_points,
+    PREDICTION, points_on_plane, shared_by_triangles, shared_points, touching_points,
 };
 
 use pair::{CoreGap, Held, Pair};
