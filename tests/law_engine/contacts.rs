@@ -3,6 +3,8 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use sweepd::math::{Pose, Quat, Vec3};
+use sweepd::time::Budget;
+use sweepd::wire::Verdict;
 
 use crate::oracle::rng::Rng;
 use crate::rig::{ALL, Rig, body, scene};
@@ -115,7 +117,8 @@ fn bug_a_box_at_rest_on_another_lost_corners_to_rounding() {
     for (half, x) in [(1.0, 0.05), (0.5, 0.0), (0.5, 0.05), (0.3, -0.05)] {
         for hulls in 0..4 {
             let shapes = [block(0.5, hulls & 1 == 1), block(half, hulls & 2 == 2)];
-            let bodies = [1, 2].map(|id| body(id, [0.0; 3], &shapes[id as usize - 1], ""));
+            let bodies =
+                [(1, &shapes[0]), (2, &shapes[1])].map(|(id, shape)| body(id, [0.0; 3], shape, ""));
             for yaw in [0.0, 0.1, FRAC_PI_4, 1.0, FRAC_PI_2] {
                 let turn = Quat::from_scaled_axis(Vec3::z() * yaw);
                 let pose = Pose::from_parts(Vec3::new(x, 0.0, 1.0).into(), turn);
@@ -250,5 +253,46 @@ fn contacts_on_a_half_space_are_on_both_and_none_is_deeper_than_the_gap() {
                 "{case}: {row:?}"
             );
         }
+    }
+}
+
+#[test]
+fn bug_a_begin_within_a_tight_budget_showed_contacts_of_a_collision_long_over() {
+    // What holds the budget up is a unit too few for contacts: the witness is asked again, and no more.
+    let bodies = [cuboid(1, 0.5), cuboid(2, 0.5)].map(|body| body + "report_within_m = 1.0\n");
+    for (away, goes_on) in [(2, true), (50, false)] {
+        let mut rig = Rig::new(&scene("", &bodies));
+        let at = |rig: &mut Rig, x: f64, z: f64| {
+            rig.place(1, &Pose::identity());
+            rig.place(2, &Pose::translation(x, 0.0, z));
+        };
+        at(&mut rig, 0.0, 0.999);
+        rig.send(ALL);
+        let ids: Vec<u64> = rig.out.contacts.iter().map(|row| row.id).collect();
+        assert_eq!(ids.len(), 4);
+        for tick in 0..away {
+            at(&mut rig, 0.004 * f64::from(tick), 1.001);
+            rig.send(ALL);
+            assert_eq!(rig.pair(1, 2).unwrap().verdict, Verdict::Near.code());
+        }
+        let x = 0.004 * f64::from(away);
+        at(&mut rig, x, 0.999);
+        for units in [1, 2] {
+            rig.send(Budget {
+                time_ns: None,
+                units: Some(units),
+            });
+            let colliding = rig.pair(1, 2).unwrap().verdict == Verdict::Colliding.code();
+            for row in rig.out.contacts.iter().filter(|_| colliding) {
+                assert!(
+                    row.gap_m < 0.0 && row.flags == 0,
+                    "{away}, {units}: {row:?}"
+                );
+            }
+        }
+        rig.send(ALL);
+        let again: Vec<u64> = rig.out.contacts.iter().map(|row| row.id).collect();
+        assert_eq!(again.len(), 4);
+        assert_eq!(again == ids, goes_on, "{away}: {ids:?} {again:?}");
     }
 }
