@@ -71,6 +71,9 @@ pub(super) const SAME_NORMAL: f64 = 0.99;
 /// What was kept in the tick before counts as this much farther away: without it two equally good points would take
 /// turns, and ids with them.
 const KEPT_BEFORE: f64 = 1.25;
+/// Ticks for which ids outlive a collision whose bodies stay near: a body that trembles at rest keeps them, one that
+/// comes back makes new contacts.
+pub(super) const TREMBLE_TICKS: u64 = 8;
 /// Cosine of 45 degrees: a contact whose normal has turned by more is another one.
 const SAME_SIDE: f64 = 0.7;
 
@@ -146,10 +149,12 @@ impl Contact {
 }
 
 impl Narrow {
-    /// The contacts of a pair, deepest first; empty when none were asked for. With them the tick of their poses.
+    /// The contacts of a pair, deepest first; empty when none were asked for, or what is known is of a collision that
+    /// has ended. With them the tick of their poses.
     #[must_use]
     pub fn contacts(&self, slot: PairSlot) -> (&[Contact], u64) {
-        let Some(memo) = self.memos.get(slot.index()) else {
+        let memo = self.memos.get(slot.index());
+        let Some(memo) = memo.filter(|memo| !memo.contacts_are_over()) else {
             return (&[], 0);
         };
         let set = self.contact_sets.get(memo.contacts);

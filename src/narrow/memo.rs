@@ -77,6 +77,8 @@ pub(super) struct Memo {
     pub(super) query_ns: u32,
     /// Tick of the poses the contacts belong to.
     pub(super) contacts_tick: u64,
+    /// First tick after those in which the pair was certified not to touch; 0: none.
+    pub(super) parted: u64,
     pub(super) active_at: u32,
     /// The surface that proved the last depth.
     pub(super) shell: u32,
@@ -134,6 +136,7 @@ impl Memo {
             warm: Warm::default(),
             query_ns: 0,
             contacts_tick: 0,
+            parted: 0,
             active_at: NONE,
             shell: NONE,
             cursor: NONE,
@@ -148,6 +151,11 @@ impl Memo {
     /// Finished at just these poses, and 0 cannot be told from the gap.
     pub(super) fn touching(&self) -> bool {
         self.finished && self.widened_m == 0.0 && self.gap.contains(0.0)
+    }
+
+    /// Whether the contacts are of a collision that has ended since: their ids may go on, their points are no more.
+    pub(super) fn contacts_are_over(&self) -> bool {
+        self.parted > self.contacts_tick
     }
 
     /// The verdict that the interval of this tick allows.
@@ -321,6 +329,9 @@ impl Narrow {
         }
         self.counts[usize::from(before.code())] -= 1;
         self.counts[usize::from(verdict.code())] += 1;
+        if verdict == Verdict::Near && !memo.contacts_are_over() {
+            memo.parted = self.tick;
+        }
         if verdict == Verdict::Apart {
             self.contact_sets.give(&mut memo.contacts);
             self.kept.give(&mut memo.regions);

@@ -7,8 +7,8 @@ use crate::world::{Body, PlacedShape};
 
 use super::contacts::Contact;
 use super::exact::{
-    Closest, Manifold, Shell, Warm, convex_gap, convex_gap_along, gap_to_half_space,
-    half_space_gap, manifold,
+    Closest, ManifoldPoint, Shell, Warm, convex_gap, convex_gap_along, gap_to_half_space,
+    half_space_gap, points_on_plane, touching_points,
 };
 use super::memo::Witness;
 use super::mesh::{LeafContact, retest_witness};
@@ -70,7 +70,8 @@ pub(super) fn witness_of(
     }
 }
 
-/// Appends the manifold of a colliding shape pair to `found`.
+/// Appends the contact points of a colliding shape pair to `found`: all of them, of which the pair's contact set keeps
+/// four.
 ///
 /// * `gap` - of the answer, as it holds for the bodies: see [`sound`].
 pub(super) fn add_manifold(
@@ -100,22 +101,25 @@ pub(super) fn add_manifold(
         gap_m,
         gap,
     };
-    let mut points = Manifold::default();
-    if let (Geometry::Convex(first), Geometry::Convex(second)) =
-        (&one.shape.geometry, &other.shape.geometry)
-    {
-        manifold(first, second, pos12, closest, 0.0, &mut points);
-    }
-    if points.is_empty() {
-        found.push(contact(
-            closest.point_a,
-            closest.point_b,
-            closest.best_m,
-            NO_INDEX,
-        ));
-    }
-    for p in points.points() {
+    let before = found.len();
+    let take = |p: &ManifoldPoint| {
         found.push(contact(p.point_a, p.point_b, p.gap_m, p.feature));
+    };
+    match (&one.shape.geometry, &other.shape.geometry) {
+        (Geometry::Convex(first), Geometry::Convex(second)) => {
+            touching_points(first, second, pos12, closest, take);
+        }
+        (Geometry::HalfSpace { .. }, Geometry::Convex(second)) => {
+            points_on_plane(second, Some(pos12), closest, take);
+        }
+        (Geometry::Convex(first), Geometry::HalfSpace { .. }) => {
+            points_on_plane(first, None, closest, take);
+        }
+        _ => {}
+    }
+    if found.len() == before {
+        let (best_m, at) = (closest.best_m, (closest.point_a, closest.point_b));
+        found.push(contact(at.0, at.1, best_m, NO_INDEX));
     }
 }
 

@@ -7,7 +7,7 @@ use crate::wire::Verdict;
 use crate::world::{Body, PlacedShape, World};
 
 use super::bent::Bent;
-use super::contacts::ContactSet;
+use super::contacts::{ContactSet, TREMBLE_TICKS};
 use super::cursor::{Room, Turn};
 use super::memo::{Witness, changed_since};
 use super::mesh::{Goal, has_front};
@@ -310,8 +310,12 @@ impl Narrow {
                 set.clear();
             }
         }
+        let long_over = memo.contacts_are_over() && self.tick - memo.parted >= TREMBLE_TICKS;
         memo.contacts_tick = memo.tested;
         if let Some(set) = self.contact_sets.get_mut(memo.contacts) {
+            if long_over {
+                set.clear();
+            }
             set.replace(&mut self.found, most, radius, &mut self.before);
         }
     }

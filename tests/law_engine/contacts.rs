@@ -1,6 +1,10 @@
-//! What contact rows say of convex bodies: corners, intervals.
+//! What contact rows say of convex bodies: corners, intervals, ids.
+
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use sweepd::math::{Pose, Quat, Vec3};
+use sweepd::time::Budget;
+use sweepd::wire::Verdict;
 
 use crate::oracle::rng::Rng;
 use crate::rig::{ALL, Rig, body, scene};
@@ -54,5 +58,241 @@ fn bug_contacts_of_shapes_far_from_their_bodies_had_intervals_without_the_truth(
         };
         let told = (contact.gap_min_m, contact.gap_max_m);
         assert_eq!(told, (pair.gap_min_m, pair.gap_max_m), "{case}");
+    }
+}
+
+/// How far a body moves and turns from tick to tick, metres and radians.
+const TREMBLES: [f64; 5] = [0.0, 1e-16, 1e-15, 1e-14, 1e-12];
+
+/// A box with a side of 2 `half`, as a box or as the hull of its corners.
+fn block(half: f64, hull: bool) -> String {
+    if !hull {
+        return format!("{{ type = \"box\", half_extents = [{half}, {half}, 0.5] }}");
+    }
+    let corners = (0..8).map(|k| {
+        let side = |bit: u32, size: f64| if k >> bit & 1 == 1 { size } else { -size };
+        format!("[{}, {}, {}]", side(0, half), side(1, half), side(2, 0.5))
+    });
+    let corners: Vec<String> = corners.collect();
+    format!(
+        "{{ type = \"convex\", vertices = [{}] }}",
+        corners.join(", ")
+    )
+}
+
+/// Sends one frame after the other in which body 2 is at a pose, but for this much; its contacts are so many in each,
+/// with the same ids.
+fn assert_stays(
+    rig: &mut Rig,
+    what: &str,
+    contacts: usize,
+    rng: &mut Rng,
+    (pose, by): (&Pose, f64),
+) {
+    let what = format!("{what}, by {by:e}");
+    let mut before = Vec::new();
+    for tick in 0..40 {
+        let mut at = pose.translation.vector + rng.vector(by);
+        // Beyond rounding it sinks in, or the two would be apart.
+        at.z -= if by > 1e-15 { 2.0 * by } else { 0.0 };
+        let turn = Quat::from_scaled_axis(rng.vector(by)) * pose.rotation;
+        rig.place(2, &Pose::from_parts(at.into(), turn));
+        rig.send(ALL);
+        let rows = rig.out.contacts.iter();
+        let seen: Vec<_> = rows.map(|r| (r.id, r.point_a_body, r.gap_m)).collect();
+        let mut ids: Vec<u64> = seen.iter().map(|row| row.0).collect();
+        ids.sort_unstable();
+        assert_eq!(ids.len(), contacts, "{what}, tick {tick}: {seen:?}");
+        assert!(
+            before.is_empty() || before == ids,
+            "{what}, tick {tick}: {before:?} {seen:?}"
+        );
+        before = ids;
+    }
+}
+
+#[test]
+fn bug_a_box_at_rest_on_another_lost_corners_to_rounding() {
+    let mut rng = Rng::new(7);
+    for (half, x) in [(1.0, 0.05), (0.5, 0.0), (0.5, 0.05), (0.3, -0.05)] {
+        for hulls in 0..4 {
+            let shapes = [block(0.5, hulls & 1 == 1), block(half, hulls & 2 == 2)];
+            let bodies =
+                [(1, &shapes[0]), (2, &shapes[1])].map(|(id, shape)| body(id, [0.0; 3], shape, ""));
+            for yaw in [0.0, 0.1, FRAC_PI_4, 1.0, FRAC_PI_2] {
+                let turn = Quat::from_scaled_axis(Vec3::z() * yaw);
+                let pose = Pose::from_parts(Vec3::new(x, 0.0, 1.0).into(), turn);
+                let what = format!("{half}, {x}, hulls {hulls}, yaw {yaw}");
+                for by in TREMBLES {
+                    let mut rig = Rig::new(&scene("", &bodies));
+                    assert_stays(&mut rig, &what, 4, &mut rng, (&pose, by));
+                }
+            }
+        }
+    }
+}
+
+/// A floor with its top at z = 0, and a body of id 2 with a shape.
+fn on_floor(floor: u64, shape: &str) -> Rig {
+    let plane = "{ type = \"half_space\", normal = [0, 0, 1], offset = 0 }";
+    let floor = format!("name = \"floor\"\nid = {floor}\nmoves = false\nshape = {plane}\n");
+    Rig::new(&scene("", &[floor, body(2, [0.0; 3], shape, "")]))
+}
+
+/// Upright with a regular hexagon of radius 1 m below and above, 1 m high.
+fn hexagons() -> String {
+    let corners = (0..12).map(|k| {
+        let angle = f64::from(k % 6) * std::f64::consts::FRAC_PI_3;
+        let z = if k < 6 { -0.5 } else { 0.5 };
+        format!("[{:?}, {:?}, {z:?}]", angle.cos(), angle.sin())
+    });
+    let corners: Vec<String> = corners.collect();
+    format!(
+        "{{ type = \"convex\", vertices = [{}] }}",
+        corners.join(", ")
+    )
+}
+
+#[test]
+fn bug_a_body_at_rest_on_a_half_space_had_one_contact_that_jumped() {
+    let mut rng = Rng::new(8);
+    let cylinder = "{ type = \"cylinder\", radius = 0.4, half_height = 0.5 }";
+    let cone = "{ type = \"cone\", radius = 0.4, half_height = 0.5 }";
+    let capsule = "{ type = \"capsule\", radius = 0.2, half_height = 0.5 }";
+    let (x, tip) = (Vec3::x(), (0.5_f64 / 0.75_f64.sqrt()).acos());
+    let lying = Quat::from_scaled_axis(x * FRAC_PI_2);
+    let upright = Quat::identity();
+    let edge = Quat::from_scaled_axis(x * FRAC_PI_4);
+    let corner = Quat::from_scaled_axis(x * tip) * Quat::from_scaled_axis(Vec3::z() * FRAC_PI_4);
+    let slant = Quat::from_scaled_axis(x * -(FRAC_PI_2 + 0.4_f64.atan2(1.0)));
+    let cases = [
+        ("box", block(0.5, false), upright, 0.5, 4),
+        ("hull", block(0.5, true), upright, 0.5, 4),
+        ("hexagon", hexagons(), upright, 0.5, 4),
+        ("cylinder", cylinder.to_owned(), upright, 0.5, 4),
+        ("cone", cone.to_owned(), upright, 0.5, 4),
+        (
+            "box on its edge",
+            block(0.5, false),
+            edge,
+            0.5_f64.sqrt(),
+            2,
+        ),
+        (
+            "hull on its edge",
+            block(0.5, true),
+            edge,
+            0.5_f64.sqrt(),
+            2,
+        ),
+        (
+            "box on its corner",
+            block(0.5, false),
+            corner,
+            0.75_f64.sqrt(),
+            1,
+        ),
+        ("lying cylinder", cylinder.to_owned(), lying, 0.4, 2),
+        ("lying capsule", capsule.to_owned(), lying, 0.2, 2),
+        ("standing capsule", capsule.to_owned(), upright, 0.7, 1),
+        (
+            "lying cone",
+            cone.to_owned(),
+            slant,
+            0.5 * (0.4_f64.atan2(1.0)).sin(),
+            2,
+        ),
+    ];
+    for floor in [1, 9] {
+        for (what, shape, turn, height, contacts) in &cases {
+            for yaw in [0.0, 0.3] {
+                let turn = Quat::from_scaled_axis(Vec3::z() * yaw) * turn;
+                let pose = Pose::from_parts(Vec3::new(0.3, -0.2, *height).into(), turn);
+                for by in TREMBLES {
+                    let mut rig = on_floor(floor, shape);
+                    assert_stays(&mut rig, what, *contacts, &mut rng, (&pose, by));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn contacts_on_a_half_space_are_on_both_and_none_is_deeper_than_the_gap() {
+    let mut rng = Rng::new(9);
+    let cylinder = "{ type = \"cylinder\", radius = 0.4, half_height = 0.5 }";
+    let shapes = [block(0.5, false), hexagons(), cylinder.to_owned()];
+    for case in 0..200 {
+        let mut rig = on_floor([1, 9][case % 2], &shapes[case % 3]);
+        let lean = 10.0_f64.powf(rng.range(-7.0, -0.5));
+        let lean = Quat::from_scaled_axis(rng.vector(lean));
+        let at = Vec3::new(rng.range(-1.0, 1.0), rng.range(-1.0, 1.0), 0.45);
+        rig.place(2, &Pose::from_parts(at.into(), lean));
+        rig.send(ALL);
+        let gap_m = rig.out.pairs[0].gap_best_m;
+        let rows = &rig.out.contacts;
+        let least = rows.iter().map(|r| r.gap_m).fold(f64::INFINITY, f64::min);
+        assert!((1..=4).contains(&rows.len()), "{case}: {rows:?}");
+        assert!((least - gap_m).abs() < 1e-5, "{case}: {least} {gap_m}");
+        assert!(least >= rig.out.pairs[0].gap_min_m - 1e-12, "{case}");
+        for row in rows {
+            let (below, on) = if row.body_a == 2 {
+                (row.point_a, row.point_b)
+            } else {
+                (row.point_b, row.point_a)
+            };
+            assert!(on[2].abs() < 1e-12 && row.gap_m <= 1e-6, "{case}: {row:?}");
+            assert!((below[2] - row.gap_m).abs() < 1e-12, "{case}: {row:?}");
+            let [x, y, z] = if row.body_a == 2 {
+                row.point_a_body
+            } else {
+                row.point_b_body
+            };
+            assert!(
+                x.hypot(y) < 1.01 && (z + 0.5).abs() < 1e-12,
+                "{case}: {row:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn bug_a_begin_within_a_tight_budget_showed_contacts_of_a_collision_long_over() {
+    // What holds the budget up is a unit too few for contacts: the witness is asked again, and no more.
+    let bodies = [cuboid(1, 0.5), cuboid(2, 0.5)].map(|body| body + "report_within_m = 1.0\n");
+    for (away, goes_on) in [(2, true), (50, false)] {
+        let mut rig = Rig::new(&scene("", &bodies));
+        let at = |rig: &mut Rig, x: f64, z: f64| {
+            rig.place(1, &Pose::identity());
+            rig.place(2, &Pose::translation(x, 0.0, z));
+        };
+        at(&mut rig, 0.0, 0.999);
+        rig.send(ALL);
+        let ids: Vec<u64> = rig.out.contacts.iter().map(|row| row.id).collect();
+        assert_eq!(ids.len(), 4);
+        for tick in 0..away {
+            at(&mut rig, 0.004 * f64::from(tick), 1.001);
+            rig.send(ALL);
+            assert_eq!(rig.pair(1, 2).unwrap().verdict, Verdict::Near.code());
+        }
+        let x = 0.004 * f64::from(away);
+        at(&mut rig, x, 0.999);
+        for units in [1, 2] {
+            rig.send(Budget {
+                time_ns: None,
+                units: Some(units),
+            });
+            let colliding = rig.pair(1, 2).unwrap().verdict == Verdict::Colliding.code();
+            for row in rig.out.contacts.iter().filter(|_| colliding) {
+                assert!(
+                    row.gap_m < 0.0 && row.flags == 0,
+                    "{away}, {units}: {row:?}"
+                );
+            }
+        }
+        rig.send(ALL);
+        let again: Vec<u64> = rig.out.contacts.iter().map(|row| row.id).collect();
+        assert_eq!(again.len(), 4);
+        assert_eq!(again == ids, goes_on, "{away}: {ids:?} {again:?}");
     }
 }

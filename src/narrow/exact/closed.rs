@@ -53,13 +53,13 @@ fn with_lower(pair: &Pair<'_>, normal: Vec3, gap: f64, point_a: Vec3, point_b: V
 }
 
 /// Where a point stands to a core, in the core's frame.
-struct Near {
+pub(super) struct Near {
     /// Closest point of the surface.
     surface: Vec3,
     /// Unit, outward.
     outward: Vec3,
     /// Signed: negative inside.
-    distance: f64,
+    pub(super) distance: f64,
 }
 
 impl Near {
@@ -82,7 +82,8 @@ impl Near {
     }
 }
 
-fn nearest(core: &Core, point: &Vec3) -> Option<Near> {
+/// Where a point stands to a core, in the core's frame; `None` for a hull or triangle.
+pub(super) fn nearest(core: &Core, point: &Vec3) -> Option<Near> {
     match core {
         Core::Point => Some(Near::outside(point, Vec3::zeros(), Vec3::z())),
         Core::Segment { half_m } => {

@@ -3,7 +3,7 @@
 //! In: a core and the contact normal. Out: corners in A's frame with ids, and the plane they lie in.
 
 use super::pair::Pair;
-use crate::math::{Vec3, across_z};
+use crate::math::{Pose, Vec3, across_z};
 use crate::shape::Core;
 
 /// Corners of one feature; faces of hulls with more are thinned out (a manifold keeps four points anyway).
@@ -32,19 +32,34 @@ impl Feature {
         }
     }
 
+    /// What a core shows along a direction, its own frame.
+    #[inline]
+    pub(super) fn towards(core: &Core, dir: &Vec3) -> Self {
+        let mut feature = Self::empty();
+        feature.fill(core, dir);
+        feature
+    }
+
+    /// The same of a core at a pose, seen from outside.
+    pub(super) fn seen(core: &Core, pose: &Pose, dir: &Vec3) -> Self {
+        let mut feature = Self::towards(core, &pose.inverse_transform_vector(dir));
+        for corner in &mut feature.corners[..feature.count] {
+            *corner = pose.rotation * *corner + pose.translation.vector;
+        }
+        feature.normal = pose.rotation * feature.normal;
+        feature
+    }
+
     /// What A shows towards B.
     #[inline]
     pub(super) fn of_a(pair: &Pair<'_>, normal: &Vec3) -> Self {
-        let mut feature = Self::empty();
-        feature.fill(pair.a.core(), normal);
-        feature
+        Self::towards(pair.a.core(), normal)
     }
 
     /// What B shows towards A, in A's frame.
     #[inline]
     pub(super) fn of_b(pair: &Pair<'_>, normal: &Vec3) -> Self {
-        let mut feature = Self::empty();
-        feature.fill(pair.b.core(), &-pair.to_b(normal));
+        let mut feature = Self::towards(pair.b.core(), &-pair.to_b(normal));
         for corner in &mut feature.corners[..feature.count] {
             *corner = pair.rotation * *corner + pair.at;
         }

@@ -7,9 +7,11 @@
 //! gaps are measured along the normal. The deepest point is always among those that come out.
 
 mod clipped;
+mod plane;
 mod shared;
 mod triangles;
 
+pub(in crate::narrow) use plane::points_on_plane;
 pub(in crate::narrow) use shared::shared_points;
 pub(in crate::narrow) use triangles::shared_by_triangles;
 
@@ -24,6 +26,12 @@ use crate::shape::Core;
 
 /// Faces that lean further from the normal than this (cosine) share no patch worth clipping.
 const FACING: f64 = 0.7;
+/// Cosine by which B's face has to look more along the normal than A's to be the one that is clipped onto: of faces
+/// that lie flat on one another rounding does not choose, for the names of the points hang on it.
+const RATHER: f64 = 1e-9;
+/// Points so far apart still count as contacts, as a share of the smaller one's radius: of a body at rest all corners
+/// do, though rounding lifts some.
+pub(in crate::narrow) const PREDICTION: f64 = 1e-6;
 /// Points nearer than this share of the pair's scale are one.
 const SAME: f64 = 1e-6;
 /// Id of the closest points themselves, where no clipped point stands for them.
@@ -86,28 +94,24 @@ pub fn manifold(
     if !(pair.scale.is_finite() && closest.best_m <= prediction_m) {
         return;
     }
-    let normal = closest.normal;
-    if matches!(a.core(), Core::Point) || matches!(b.core(), Core::Point) {
-        out.points[0] = Some(ManifoldPoint {
-            point_a: closest.point_a,
-            point_b: closest.point_b,
-            gap_m: closest.best_m,
-            feature: WITNESS,
-        });
-        return;
+    Found::of(&pair, closest, prediction_m).write(out);
+}
+
+/// Hands over all contact points of two shapes that touch, up to 16: which four are kept is decided by who knows which
+/// were kept before. As [`manifold`] else; points up to [`PREDICTION`] apart count.
+pub(in crate::narrow) fn touching_points(
+    a: &Convex,
+    b: &Convex,
+    pos12: &Pose,
+    closest: &Closest,
+    take: impl FnMut(&ManifoldPoint),
+) {
+    let pair = Pair::new(a, b, pos12);
+    let prediction_m = (2.0 * pair.pad()).max(PREDICTION * a.radius().min(b.radius()));
+    if pair.scale.is_finite() && closest.best_m <= prediction_m {
+        let mut found = Found::of(&pair, closest, prediction_m);
+        found.all().iter().for_each(take);
     }
-    let of_a = Feature::of_a(&pair, &normal);
-    let of_b = Feature::of_b(&pair, &normal);
-    let mut found = Found::new(&pair, closest, prediction_m);
-    let (side_a, side_b) = (of_a.facing(&normal), of_b.facing(&normal));
-    if side_a >= FACING && side_a >= side_b {
-        clip_onto(&of_a, &of_b, &normal, false, &mut found);
-    } else if side_b >= FACING {
-        clip_onto(&of_b, &of_a, &normal, true, &mut found);
-    } else if of_a.count == 2 && of_b.count == 2 {
-        overlap_lines(&of_a, &of_b, &normal, &mut found);
-    }
-    found.write(out);
 }
 
 /// The middle of what two cores share along `normal` once B has moved out by `-gap`: clipped features, least points
@@ -160,7 +164,18 @@ struct Found {
 impl Found {
     #[inline]
     fn new(pair: &Pair<'_>, closest: &Closest, prediction_m: f64) -> Self {
-        let (margin_a, margin_b) = (pair.a.margin(), pair.b.margin());
+        let margins = (pair.a.margin(), pair.b.margin());
+        let same = SAME * (pair.scale + margins.0 + margins.1);
+        Self::with(closest, margins, prediction_m, same)
+    }
+
+    #[inline]
+    fn with(
+        closest: &Closest,
+        (margin_a, margin_b): (f64, f64),
+        prediction_m: f64,
+        same: f64,
+    ) -> Self {
         let witness = ManifoldPoint {
             point_a: closest.point_a,
             point_b: closest.point_b,
@@ -175,8 +190,29 @@ impl Found {
             margin_b,
             prediction_m,
             witness,
-            same: SAME * (pair.scale + margin_a + margin_b),
+            same,
         }
+    }
+
+    /// All points of a pair that the features along the answer's normal share.
+    fn of(pair: &Pair<'_>, closest: &Closest, prediction_m: f64) -> Self {
+        let normal = closest.normal;
+        let mut found = Self::new(pair, closest, prediction_m);
+        if matches!(pair.a.core(), Core::Point) || matches!(pair.b.core(), Core::Point) {
+            found.count = 1;
+            return found;
+        }
+        let of_a = Feature::of_a(pair, &normal);
+        let of_b = Feature::of_b(pair, &normal);
+        let (side_a, side_b) = (of_a.facing(&normal), of_b.facing(&normal));
+        if side_a >= FACING && side_a >= side_b - RATHER {
+            clip_onto(&of_a, &of_b, &normal, false, &mut found);
+        } else if side_b >= FACING {
+            clip_onto(&of_b, &of_a, &normal, true, &mut found);
+        } else if of_a.count == 2 && of_b.count == 2 {
+            overlap_lines(&of_a, &of_b, &normal, &mut found);
+        }
+        found
     }
 
     /// Takes a pair of points on the cores.
@@ -200,8 +236,8 @@ impl Found {
         }
     }
 
-    /// At most four: the deepest, the farthest from it, and the two that span the most area.
-    fn write(&mut self, out: &mut Manifold) {
+    /// All that were found, and the answer's own where none is as deep.
+    fn all(&mut self) -> &[ManifoldPoint] {
         let deepest = self.points[..self.count]
             .iter()
             .map(|p| p.gap_m)
@@ -210,13 +246,19 @@ impl Found {
             self.points[self.count] = self.witness;
             self.count += 1;
         }
-        let points = &self.points[..self.count];
+        &self.points[..self.count]
+    }
+
+    /// At most four: the deepest, the farthest from it, and the two that span the most area.
+    fn write(&mut self, out: &mut Manifold) {
+        let normal = self.normal;
+        let points = self.all();
         let mut chosen = [0; MANIFOLD_POINTS_MAX];
         let count = if points.len() <= MANIFOLD_POINTS_MAX {
             chosen = [0, 1, 2, 3];
             points.len()
         } else {
-            spread(points, &self.normal, &mut chosen);
+            spread(points, &normal, &mut chosen);
             MANIFOLD_POINTS_MAX
         };
         let mut picked = chosen.map(|k| points.get(k).copied());
@@ -262,7 +304,8 @@ fn clip_onto(
     base_is_b: bool,
     found: &mut Found,
 ) {
-    let clipped = Clipped::onto(base, incident, normal);
+    let base = base.spread();
+    let clipped = Clipped::onto(&base, incident, normal);
     let corners = base.used();
     let steep = base.normal.dot(normal);
     let side = if base_is_b { 1 << 31 } else { 0 };

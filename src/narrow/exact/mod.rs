@@ -43,7 +43,9 @@ use crate::math::{Interval, Point, Pose, Vec3};
 use crate::shape::Convex;
 
 pub use manifold::{Manifold, ManifoldPoint, manifold};
-pub(in crate::narrow) use manifold::{shared_by_triangles, shared_points};
+pub(in crate::narrow) use manifold::{
+    PREDICTION, points_on_plane, shared_by_triangles, shared_points, touching_points,
+};
 
 use pair::{CoreGap, Held, Pair};
 pub use polytope::Shell;

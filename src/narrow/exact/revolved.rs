@@ -19,6 +19,7 @@ mod outline;
 
 use std::f64::consts::PI;
 
+use super::closed::{Near, nearest};
 use super::newton::{self, Refined};
 use super::pair::{CoreGap, Held, Pair, unit};
 use crate::math::Vec3;
@@ -35,6 +36,8 @@ const STIFF: f64 = 1e-3;
 const PLANES_MAX: usize = 512;
 /// Planes that wait, at most: beyond 2^40 parts of the whole they could not be told apart.
 const WAITING_MAX: usize = 40;
+/// Corners as far along a normal as the farthest but for this are its edge, in parts of the size.
+const SAME: f64 = 5e-7;
 /// How far aside of a normal its features are asked for.
 const ASIDE: f64 = 1e-2;
 
@@ -283,25 +286,66 @@ impl<'a> Planes<'a> {
         }
         // Newton may know the direction, and not where on a cap the two would touch.
         if best.refined.is_none() || !gap.is_straight(self.pair) {
-            (gap.point_a, gap.point_b) = self.witnesses(best.plane, &(gap.normal * gap.lower));
+            (gap.point_a, gap.point_b) = self.witnesses(best, &gap);
         }
         gap
     }
 
-    /// Points straight across from each other: the middle of what the features that would touch share in their plane,
-    /// on the shorter one of the two.
-    fn witnesses(&self, (angle, flat): (f64, Flat), across: &Vec3) -> (Vec3, Vec3) {
+    /// Points straight across from each other: where edges would touch, or a corner, if that lies better on both cores.
+    fn witnesses(&self, best: &Best, gap: &CoreGap) -> (Vec3, Vec3) {
+        let across = gap.normal * gap.lower;
+        let corner = self.pair.support(&gap.normal);
+        let (a, b) = self.shared(best.plane, &across);
+        let mut least = (self.off_cores(&a, &b), (a, b));
+        let of_b = corner.b - across;
+        for (a, b) in [(corner.a, corner.a + across), (of_b, corner.b)] {
+            let off = self.off_cores(&a, &b);
+            if off + self.pair.tolerance() < least.0 {
+                least = (off, (a, b));
+            }
+        }
+        least.1
+    }
+
+    /// How far two points are from the surface of A and that of B, metres.
+    fn off_cores(&self, a: &Vec3, b: &Vec3) -> f64 {
+        let pair = self.pair;
+        let of_a = nearest(pair.a.core(), a);
+        let of_b = nearest(pair.b.core(), &pair.to_b(&(b - pair.at)));
+        let off = |near: Option<Near>| near.map_or(f64::INFINITY, |near| near.distance.abs());
+        off(of_a).max(off(of_b))
+    }
+
+    /// The middle of what the features that would touch share in their plane, on the shorter one of the two.
+    fn shared(&self, (angle, flat): (f64, Flat), across: &Vec3) -> (Vec3, Vec3) {
         let along = self.along(angle);
         let of_b = self.of_b.along([along.dot(&self.axis), self.axis.z]);
         let tangent = [-flat[1], flat[0]];
-        let same = 1e-12 * self.pair.scale;
+        let same = SAME * self.pair.scale;
         let lift = dot([self.off * angle.cos(), self.pair.at.z], tangent);
         let shown_a = self.of_a.shown(flat, tangent, same);
         let shown_b = of_b.shown([-flat[0], -flat[1]], tangent, same);
         let spread = |shown: [(f64, usize); 2]| shown[1].0 - shown[0].0;
         let low = shown_a[0].0.max(shown_b[0].0 + lift);
         let high = shown_a[1].0.min(shown_b[1].0 + lift);
-        let middle = (low + high) / 2.0;
+        // A corner of B as it is, with what leans out of the plane.
+        let side = self.axis.cross(&along.cross(&self.axis)).normalize();
+        let side = side * self.axis.z.signum();
+        let on_b = |corner: usize| {
+            let [r, z] = self.of_b.corners()[corner];
+            self.pair.at + side * r + self.axis * z
+        };
+        // Where an edge of B goes through the plane.
+        let beyond = along.cross(&Vec3::z());
+        let [start, end] = shown_b.map(|(_, corner)| on_b(corner).dot(&beyond));
+        let part = start / (start - end);
+        let middle = if (0.0..=1.0).contains(&part) {
+            (lift + shown_b[0].0 + spread(shown_b) * part)
+                .max(low)
+                .min(high)
+        } else {
+            (low + high) / 2.0
+        };
         if spread(shown_a) < spread(shown_b) {
             let on_a = |corner: usize| {
                 let [x, z] = self.of_a.corners()[corner];
@@ -310,13 +354,6 @@ impl<'a> Planes<'a> {
             let point = between(shown_a, middle, on_a);
             (point, point + across)
         } else {
-            // A corner of B as it is, with what leans out of the plane.
-            let side = self.axis.cross(&along.cross(&self.axis)).normalize();
-            let side = side * self.axis.z.signum();
-            let on_b = |corner: usize| {
-                let [r, z] = self.of_b.corners()[corner];
-                self.pair.at + side * r + self.axis * z
-            };
             let point = between(shown_b, middle - lift, on_b);
             (point - across, point)
         }

@@ -4,11 +4,11 @@
 //! ball in the solid about a point under the plane reaches down to a point of the solid at least its radius deeper.
 
 use super::contacts::LeafContact;
-use super::manifold::PREDICTION;
 use super::patches::Patches;
 use super::{Closest, Goal};
 use crate::math::{Interval, Point, Pose, ROUND, Vec3};
 use crate::narrow::arena::Arena;
+use crate::narrow::exact::PREDICTION;
 use crate::shape::{Below, Mesh, NODES_WAITING_MAX};
 use crate::time::Meter;
 

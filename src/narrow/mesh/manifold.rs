@@ -24,12 +24,9 @@ use super::placed::Placed;
 use super::side::Side;
 use crate::math::{Interval, Point, Vec3};
 use crate::narrow::arena::Arena;
-use crate::narrow::exact::{ManifoldPoint, shared_by_triangles, shared_points};
+use crate::narrow::exact::{ManifoldPoint, PREDICTION, shared_by_triangles, shared_points};
 use crate::shape::{Climb, Mesh, Trails};
 
-/// Points so far apart still count as contacts, as a share of the smaller one's radius: of a body at rest all corners
-/// do, though rounding lifts some.
-pub(super) const PREDICTION: f64 = 1e-6;
 /// An own normal this close to a face's (cosine of 0.1 degrees) is the face's.
 const FACE: f64 = 0.999_998;
 /// A solid's surface does not push inwards (cosine; a little more than a right angle is rounding).

@@ -39,7 +39,7 @@ pub(in crate::narrow) fn shared_points(
     } else {
         (&of_a, &of_b)
     };
-    clip_onto(&base.spread(), incident, normal, base_is_b, &mut found);
+    clip_onto(base, incident, normal, base_is_b, &mut found);
     for point in &found.points[..found.count] {
         take(point, base_is_b);
     }

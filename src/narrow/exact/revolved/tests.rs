@@ -1,7 +1,8 @@
 //! Bounds between planes, against the planes in between.
 
 use super::*;
-use crate::math::{Pose, Quat};
+use crate::math::{Point, Pose, Quat};
+use crate::narrow::exact::{Warm, convex_gap};
 use crate::shape::Convex;
 
 /// Numbers without a pattern, 0 to 1.
@@ -56,4 +57,57 @@ fn no_plane_between_two_shows_a_greater_gap_than_their_bound() {
         asked > 3000 && close > asked / 3,
         "{asked} asked, {close} close"
     );
+}
+
+/// Numbers without a pattern, 0 to 1, of all steps. Source: Steele et al. 2014, Fast splittable pseudorandom numbers.
+fn hashed(k: u64) -> f64 {
+    let z = (k + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ z >> 31) >> 11) as f64 / 9_007_199_254_740_992.0
+}
+
+/// How far a point lies outside a shape, metres; negative inside.
+fn outside(shape: &Convex, point: Point) -> f64 {
+    let at = Pose::from_parts(point.coords.into(), Quat::identity());
+    convex_gap(shape, &Convex::sphere(0.0), &at, &mut Warm::default()).best_m
+}
+
+#[test]
+fn bug_closest_points_of_shapes_on_nearly_one_axis_were_off_them() {
+    let mut asked = 0;
+    for k in 0..20_000 {
+        let at = |step: u64| hashed(64 * k + step);
+        let shape = |which: f64, size: f64, long: f64| {
+            if which < 0.5 {
+                Convex::cylinder(0.1 + size, 0.1 + long)
+            } else {
+                Convex::cone(0.1 + size, 0.1 + long)
+            }
+        };
+        let [a, b] = [0, 3].map(|from| shape(at(from), at(from + 1), at(from + 2)));
+        let lean = 0.3 * 10.0_f64.powf(-9.0 * at(6));
+        let over = if k % 2 == 0 { 0.0 } else { PI };
+        let turn = Quat::from_axis_angle(&Vec3::z_axis(), 6.0 * at(7))
+            * Quat::from_axis_angle(&Vec3::x_axis(), lean + over)
+            * Quat::from_axis_angle(&Vec3::z_axis(), 6.0 * at(8));
+        let (off, aside) = (0.3 * 10.0_f64.powf(-9.0 * at(9)), 6.3 * at(10));
+        let place = Vec3::new(off * aside.cos(), off * aside.sin(), at(11) - 0.5);
+        let pose = Pose::from_parts(place.into(), turn);
+        let found = convex_gap(&a, &b, &pose, &mut Warm::default());
+        if found.gap.max >= 0.0 {
+            continue;
+        }
+        asked += 1;
+        let on_b = pose.inverse() * found.point_b;
+        let off = outside(&a, found.point_a)
+            .abs()
+            .max(outside(&b, on_b).abs());
+        let size = a.reach() + b.reach() + place.norm();
+        assert!(
+            off <= 1e-5 * size,
+            "{k}: {off:e} {a:?} {b:?} {pose:?} {found:?}"
+        );
+    }
+    assert!(asked > 10_000, "{asked} asked");
 }
