@@ -236,7 +236,9 @@ pub(super) struct MonitorArgs {
     pub(super) which: Which,
     /// One JSON object a tick instead of a screen: gaps in metres, times in nanoseconds.
     ///
-    /// An open end of a gap's interval is null. `pairs_shown` is [rows in this line, rows published].
+    /// An open end of a gap's interval is null. `pairs_shown` is [rows in this line, rows published]. `pairs` is there
+    /// with the rows of the same tick, `contacts` with --contacts, `worst` where a pair is near. Where the daemon has
+    /// started anew there is a line `{"restarted": {"boots": [old, new], "ends": [pairs that ended by that]}}`.
     #[arg(long)]
     pub(super) json: bool,
     /// End after so many ticks; until a signal otherwise. With --json those that are under way, of which there is word

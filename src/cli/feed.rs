@@ -92,6 +92,8 @@ fn stream(
             stamp_ns,
             ..FrameInfo::default()
         };
+        // A frame for a daemon that is no more would be refused by the next one.
+        while client.latest()? != Heard::Silence {}
         client.send(&info, Rows::Poses(&bodies.rows))?;
         frame += 1;
         let next_ns = start_ns.saturating_add(moment(frame, args.course.rate).1);
@@ -155,7 +157,14 @@ impl Heeded {
         }
         if self.boot_id != 0 && boot_id != self.boot_id {
             tracing::warn!("the daemon restarted");
-            *self = Self::default();
+            // Its first tick may have been made before a frame came.
+            *self = Self {
+                boot_id,
+                tick: number,
+                rejects: tick.rejects,
+                ..Self::default()
+            };
+            return Ok(());
         }
         let own = tick.sources.iter().take(usize::from(tick.sources_len));
         let own = own

@@ -115,9 +115,10 @@ fn tell(found: &Found, out: &mut Out) -> Result<()> {
     }
     match &found.difference {
         Some(difference) => out.line(&format!("first difference: {difference}")),
-        None if found.compared() == 0 => {
-            out.line("nothing was compared: no tick of the recording was asked for")
-        }
+        None if found.compared() == 0 => out.line(match found.ticks {
+            0 => "nothing was compared: no tick could be read",
+            _ => "nothing was compared: no tick of the recording was asked for",
+        }),
         None => out.line("no difference"),
     }
 }

@@ -31,7 +31,7 @@ pub(super) fn look(place: &Place, instance: Option<&str>, clean: bool) -> Vec<Fi
         }
     }
     match leftovers(place) {
-        Ok(left) => found.extend(judge(&left, mend(clean, instance))),
+        Ok(left) => found.extend(judge(&left, instance, mend(clean, instance))),
         Err(e) => found.push(Finding::wrong(check, e.to_string(), "")),
     }
     found
@@ -169,17 +169,16 @@ fn mend(clean: bool, instance: Option<&str>) -> &'static str {
     }
 }
 
-fn judge(left: &Leftovers, mend: &str) -> Vec<Finding> {
+/// * `instance` - the one that is asked about; `None`: all.
+fn judge(left: &Leftovers, instance: Option<&str>, mend: &str) -> Vec<Finding> {
     let check = "leftovers";
     let mut found = Vec::new();
     if !left.dead.is_empty() {
         found.push(Finding::warning(check, nodes(&left.dead), mend));
     }
-    for lock in &left.locks {
-        let what = format!(
-            "a lock of `{}` that nobody holds: its daemon was killed",
-            lock.instance
-        );
+    let names = left.locks.iter().map(|lock| lock.instance.as_str());
+    let names = names.filter(|name| instance.is_none_or(|asked| asked == *name));
+    if let Some(what) = locks(&names.collect::<Vec<_>>()) {
         found.push(Finding::warning(check, what, mend));
     }
     if left.unclear > 0 {
@@ -238,10 +237,41 @@ fn nodes(owners: &[NodeOwner]) -> String {
     format!("{count} ({}{more})", named.join("; "))
 }
 
+/// What is told of locks that nobody holds; `None`: there is none.
+fn locks(instances: &[&str]) -> Option<String> {
+    let named: Vec<String> = (instances.iter().take(NAMED))
+        .map(|name| format!("`{name}`"))
+        .collect();
+    match (instances, instances.len().saturating_sub(NAMED)) {
+        ([], _) => None,
+        ([_], _) => Some(format!(
+            "a lock of {} that nobody holds: its daemon was killed",
+            named[0]
+        )),
+        (_, more) => Some(format!(
+            "{} locks that nobody holds, of {}{}: their daemons were killed",
+            instances.len(),
+            named.join(", "),
+            if more > 0 { ", .." } else { "" }
+        )),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::Level;
     use super::*;
+
+    #[test]
+    fn bug_many_locks_that_nobody_holds_are_one_line() {
+        assert_eq!(locks(&[]), None);
+        assert!(locks(&["a"]).unwrap().starts_with("a lock of `a` that"));
+        let many = locks(&["a", "b", "c", "d"]).unwrap();
+        assert!(
+            many.starts_with("4 locks that nobody holds, of `a`, `b`, `c`, ..:"),
+            "{many}"
+        );
+    }
 
     #[test]
     fn rights_are_judged_by_owner_kind_and_mode() {
@@ -269,16 +299,16 @@ mod tests {
     #[test]
     fn what_is_left_is_a_warning_and_nothing_is_fine() {
         let mut left = Leftovers::default();
-        assert_eq!(judge(&left, mend(false, None))[0].level, Level::Ok);
+        assert_eq!(judge(&left, None, mend(false, None))[0].level, Level::Ok);
         left.dead = vec![NodeOwner::default(); 5];
-        let found = judge(&left, mend(false, None));
+        let found = judge(&left, None, mend(false, None));
         assert_eq!((found.len(), found[0].level), (1, Level::Warning));
         assert!(found[0].text().contains("5 nodes") && found[0].text().contains("2 more"));
         left.dead.clear();
         left.unmapped.files = 2;
         left.unmapped.example = Some("/dev/shm/x".into());
         assert!(
-            judge(&left, mend(false, None))[0]
+            judge(&left, None, mend(false, None))[0]
                 .text()
                 .contains("/dev/shm/x")
         );

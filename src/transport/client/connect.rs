@@ -103,7 +103,8 @@ impl Client {
             let now_ns = self.clock.monotonic_ns();
             if now_ns >= until_ns {
                 return Err(Error::TimedOut(
-                    "the instance's services are there, but no daemon says hello; is it running?"
+                    "the instance's services are there, but no daemon says hello: it was killed, or is stopped; \
+                     `sweepd doctor` says which, `sweepd run` starts one"
                         .to_owned(),
                 ));
             }

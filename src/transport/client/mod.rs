@@ -7,6 +7,7 @@ mod connect;
 mod follow;
 mod link;
 mod list;
+mod remedies;
 mod step;
 mod vertices;
 

@@ -179,7 +179,7 @@ impl IoxLink {
 fn not_found(place: &Place, why: &Error) -> Error {
     let Some(holder) = lock::holder(place) else {
         return Error::TimedOut(format!(
-            "no daemon runs as instance `{}` ({why}); start one with `sweepd run`; `sweepd list` shows who is there, `sweepd doctor` what is wrong",
+            "no daemon runs as instance `{0}` ({why}); start one with `sweepd run SCENE --instance {0}`; `sweepd list` shows who is there, `sweepd doctor` what is wrong",
             place.instance()
         ));
     };
