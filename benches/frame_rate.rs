@@ -127,6 +127,7 @@ fn serve(root: &str, budget_ns: &str) {
     let built = Shapes {
         bodies: placed,
         warnings: Vec::new(),
+        notes: Vec::new(),
         library: Library::new(),
     };
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);

@@ -2,7 +2,11 @@
 //!
 //! Rooms keep small errors of their own and turn them into this one at their door; it names no room.
 
+mod nearest;
+
 use std::error::Error as StdError;
+
+pub(crate) use nearest::nearest;
 
 /// The cause beneath an [`Error`], as another library or an inner room reported it.
 pub type Source = Box<dyn StdError + Send + Sync + 'static>;

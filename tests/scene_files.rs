@@ -393,6 +393,33 @@ fn a_mesh_that_fails_when_it_is_built_names_file_line_and_body() {
 }
 
 #[test]
+fn bug_that_a_mesh_is_what_the_scene_says_or_a_closed_one_a_solid_is_no_warning() {
+    let tetra = "[[0,1,2],[0,3,1],[1,3,2],[0,2,3]]";
+    let built = |faces: &str, solid: &str| {
+        let corners = "vertices = [[0,0,0],[0,1,0],[1,0,0],[0,0,1]]";
+        let shape = format!("type = \"trimesh\", {corners}, faces = {faces}{solid}");
+        let scene = Scene::parse(&shaped(&shape), "scene.toml", Path::new("")).unwrap();
+        let built = scene.build_shapes(&mut Library::new(), |_, _| {}).unwrap();
+        (built.warnings, built.notes)
+    };
+    let line = "scene.toml:4: body \"b\": ";
+    let solid = format!("{line}solid, because it is closed and consistently oriented");
+    assert_eq!(built(tetra, ""), (vec![], vec![solid]));
+    for said in [", solid = true", ", solid = false"] {
+        assert_eq!(built(tetra, said), (vec![], vec![]));
+    }
+    let open = "[[0,1,2],[0,3,1],[1,3,2]]";
+    assert_eq!(built(open, ", solid = false"), (vec![], vec![]));
+    let (warnings, notes) = built(open, "");
+    assert_eq!((warnings.len(), notes.len()), (1, 0), "{warnings:?}");
+    assert!(
+        warnings[0].starts_with(&format!("{line}surface, because it has 3 open edges"))
+            && warnings[0].ends_with("close it, or say solid = false"),
+        "{warnings:?}"
+    );
+}
+
+#[test]
 fn a_flat_hull_and_odd_sizes_are_told_when_they_are_built() {
     let built = |shape: &str| {
         let scene = Scene::parse(&shaped(shape), "scene.toml", Path::new("")).unwrap();

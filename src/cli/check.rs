@@ -43,6 +43,7 @@ pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
             "ignored": ignored,
             "ignored_left_out": listed.map(|listed| count.saturating_sub(listed)),
             "warnings": warnings,
+            "notes": shapes.notes,
         });
         out.line(&line.to_string())?;
         out.flush()?;
@@ -86,6 +87,9 @@ pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
                 "    .. and no more than {IGNORED_SHOWN} are listed"
             ))?;
         }
+    }
+    for note in &shapes.notes {
+        out.line(&format!("note: {note}"))?;
     }
     for warning in &warnings {
         out.line(&format!("warning: {warning}"))?;

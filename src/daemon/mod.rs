@@ -5,6 +5,7 @@
 mod builder;
 mod notes;
 mod record;
+mod refusals;
 mod requests;
 mod settings;
 #[cfg(test)]
@@ -27,6 +28,7 @@ use crate::wire::{Inbox, TickRow};
 use crate::world::TreeOf;
 
 use builder::{Asking, Builder, Done, TREE};
+use refusals::Refusals;
 
 pub use crate::tick::build::{Shapes, build_shapes};
 pub use notes::body_note;
@@ -62,6 +64,7 @@ pub struct Daemon<'a> {
     /// Who writes down what the engine is given and says.
     recorder: Option<Recorder>,
     unsent: Seldom,
+    refusals: Refusals,
 }
 
 impl std::fmt::Debug for Daemon<'_> {
@@ -100,6 +103,7 @@ impl<'a> Daemon<'a> {
             progress: Arc::default(),
             recorder: None,
             unsent: Seldom::default(),
+            refusals: Refusals::default(),
         };
         daemon.pacer.learn(daemon.engine.world());
         Ok(daemon)
@@ -288,6 +292,9 @@ impl<'a> Daemon<'a> {
                  `sweepd doctor`",
                 self.engine.ticks()
             );
+        }
+        if let Some(words) = self.refusals.words(self.engine.world(), start_ns) {
+            tracing::warn!("{words}");
         }
         self.engine.note_sent(send_ns);
         self.pacer.learn(self.engine.world());

@@ -15,7 +15,12 @@ pub struct BuiltShapes {
     pub shapes: Vec<Vec<Arc<Shape>>>,
     /// Things to know, one line each, naming file, line and body; each shape is spoken of once.
     pub warnings: Vec<String>,
+    /// What was settled where the scene does not say it, one line each, as the warnings.
+    pub notes: Vec<String>,
 }
+
+/// Where a shape is spoken of, its warnings, its note, and how many more bodies have it.
+type Spoken = (String, Vec<String>, Option<&'static str>, usize);
 
 impl Scene {
     /// Builds all shapes; equal ones are shared.
@@ -32,9 +37,10 @@ impl Scene {
         let mut all = BuiltShapes {
             shapes: Vec::with_capacity(self.bodies.len()),
             warnings: Vec::new(),
+            notes: Vec::new(),
         };
-        // By address of the shared shape: its first body, its warnings, how many more bodies have it.
-        let mut spoken: BTreeMap<usize, (String, Vec<String>, usize)> = BTreeMap::new();
+        // By address of the shared shape: its first body, its warnings and note, how many more bodies have it.
+        let mut spoken: BTreeMap<usize, Spoken> = BTreeMap::new();
         let mut order = Vec::new();
         for (place, body) in self.bodies.iter().enumerate() {
             let mut shapes = Vec::with_capacity(body.shapes.len());
@@ -42,15 +48,15 @@ impl Scene {
                 let built = library
                     .get(&placed.shape, &self.origin.base)
                     .map_err(|error| self.shape_error(place, nth, &error))?;
-                if !built.warnings.is_empty() {
+                if !built.warnings.is_empty() || built.note.is_some() {
                     let address = Arc::as_ptr(&built.shape).addr();
                     let known = spoken.get_mut(&address);
-                    if let Some((_, _, more)) = known {
+                    if let Some((_, _, _, more)) = known {
                         *more += 1;
                     } else {
                         order.push(address);
                         let prefix = self.prefix(place, nth);
-                        spoken.insert(address, (prefix, built.warnings, 0));
+                        spoken.insert(address, (prefix, built.warnings, built.note, 0));
                     }
                 }
                 shapes.push(if body.deforms {
@@ -64,7 +70,7 @@ impl Scene {
             progress(place + 1, self.bodies.len());
         }
         for address in order {
-            let Some((prefix, warnings, more)) = spoken.remove(&address) else {
+            let Some((prefix, warnings, note, more)) = spoken.remove(&address) else {
                 continue;
             };
             let more = match more {
@@ -75,6 +81,8 @@ impl Scene {
                 .iter()
                 .map(|warning| format!("{prefix}{warning}{more}"));
             all.warnings.extend(lines);
+            all.notes
+                .extend(note.map(|note| format!("{prefix}{note}{more}")));
         }
         Ok(all)
     }

@@ -28,4 +28,3 @@ pub use question::{Impact, Question, Ray, Subject, Touching, Velocity};
 pub use read_body::{BODY_NAME_BYTES_MAX, BodyDraft, SOURCE_NAME_BYTES_MAX};
 pub(crate) use read_ros::no_lockstep;
 pub use request::{EDITS_MAX, Edit, EditRequest, Request};
-pub(crate) use table::nearest;

@@ -2,11 +2,12 @@
 //!
 //! In: a node of a scene file or of a request. Out: a checked `PlacedSpec`; files are named, not opened.
 
+use crate::error::nearest;
 use crate::limits::{COORDINATE_MAX_M, QUATERNION_NORM_TOLERANCE, REQUEST_BYTES_MAX};
 use crate::math::{Pose, pose_from};
 use crate::scene::PlacedSpec;
 use crate::scene::node::{Fault, Node, Value};
-use crate::scene::table::{Table, list, nearest, real, reals};
+use crate::scene::table::{Table, list, real, reals};
 use crate::shape::ShapeSpec;
 
 /// Every type and its keys.

@@ -29,6 +29,7 @@
 
 use std::path::Path;
 
+use crate::error::nearest;
 use crate::limits::EXTENT_MAX_M;
 use crate::math::Pose;
 use crate::scene::node::{Fault, Node, Value};
@@ -40,7 +41,7 @@ use crate::scene::read_ros::check_ros;
 use crate::scene::read_rule::read_rule;
 use crate::scene::read_shape::read_pose;
 use crate::scene::resolve::{check_files, settle_source};
-use crate::scene::table::{Table, list, nearest, shortened};
+use crate::scene::table::{Table, list, shortened};
 use crate::scene::{BodySpec, PairRule, SourceSpec};
 
 /// Edits in one request; more are to be sent in several.

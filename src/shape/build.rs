@@ -19,7 +19,12 @@ pub struct Built {
     pub shape: Arc<Shape>,
     /// Things to know that did not stop it, each a sentence without the body's name.
     pub warnings: Vec<String>,
+    /// What was settled where the spec does not say it: nothing to change.
+    pub note: Option<&'static str>,
 }
+
+/// Of a mesh of which the spec does not say whether it is one (law 3.3).
+const SOLID: &str = "solid, because it is closed and consistently oriented";
 
 /// Builds a shape.
 ///
@@ -69,9 +74,12 @@ pub(super) fn build_by(spec: &ShapeSpec, read: &mut Read<'_>) -> Result<Built, S
         _ => convex(spec, read, &mut warnings)?,
     };
     warnings.extend(size_warning(&shape));
+    let settled = matches!(spec, ShapeSpec::Trimesh { solid: None, .. });
+    let is_solid = matches!(&shape.geometry, Geometry::Mesh(mesh) if mesh.is_solid());
     Ok(Built {
         shape: Arc::new(shape),
         warnings,
+        note: (settled && is_solid).then_some(SOLID),
     })
 }
 

@@ -338,20 +338,18 @@ fn settle(
         defects.open, defects.inconsistent
     );
     let solid = match (said, defects.closed()) {
-        (None, true) => {
-            warnings.push("solid, because it is closed and consistently oriented".to_owned());
-            true
-        }
+        (None, true) => true,
         (None, false) => {
-            warnings.push(format!("surface, because it has {why}"));
+            let mend = if defects.open > 0 {
+                "close it, or say solid = false"
+            } else {
+                "say solid = true to have faces turned, or solid = false"
+            };
+            warnings.push(format!("surface, because it has {why}: {mend}"));
             false
         }
-        (Some(false), _) => {
-            warnings.push("surface, because the scene says so".to_owned());
-            false
-        }
-        (Some(true), true) => true,
-        (Some(true), false) => {
+        (Some(said), _) if !said || defects.closed() => said,
+        (Some(_), _) => {
             let Some(turned) = topology.orient(vertices, faces) else {
                 return Err(ShapeError::Setting(format!(
                     "solid = true, but the mesh has {why}: close it, or say solid = false"

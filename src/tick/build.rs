@@ -18,6 +18,8 @@ pub struct Shapes {
     pub bodies: Vec<Parts>,
     /// What `check` shows: sizes, open meshes, turned shells.
     pub warnings: Vec<String>,
+    /// What `check` shows beside: which meshes are solids without the scene saying so.
+    pub notes: Vec<String>,
     /// The shapes by spec, for edits that use them again.
     pub library: Library,
 }
@@ -51,6 +53,7 @@ pub fn build_shapes_in(
     Ok(Shapes {
         bodies,
         warnings: built.warnings,
+        notes: built.notes,
         library,
     })
 }

@@ -176,7 +176,9 @@ impl Engine {
     pub fn note_skipped(&mut self, source: Option<SourceSlot>, frames: u64) {
         match source {
             Some(source) => self.world.note_skipped(source, frames),
-            None => (0..frames).for_each(|_| self.world.note_reject(RejectReason::UnknownSource)),
+            None => {
+                (0..frames).for_each(|_| self.world.note_reject(RejectReason::UnknownSource, None))
+            }
         }
     }
 

@@ -6,6 +6,7 @@ mod answers;
 mod changes;
 mod codes;
 mod frame;
+mod mend;
 mod outbox;
 mod region;
 mod request;

@@ -62,10 +62,7 @@ impl World {
                 .map_err(|reason| (Some(source), reason))
         });
         checked.unwrap_or_else(|(source, reason)| {
-            self.note_reject(reason);
-            if let Some(source) = source {
-                self.sources[source.index()].refused += 1;
-            }
+            self.note_refused(reason, source, &frame.header.source);
             Admission::Refused { source, reason }
         })
     }
@@ -239,7 +236,7 @@ impl World {
                 }
                 Err(reason) => {
                     *place = NO_BODY;
-                    self.note_reject(reason);
+                    self.note_reject(reason, Some(source));
                     refused += 1;
                 }
             }
@@ -315,7 +312,7 @@ impl World {
         } else if until_ns <= self.now_ns {
             state.waiting.until_ns = None;
             state.refused += 1;
-            self.note_reject(RejectReason::SceneRevision);
+            self.note_reject(RejectReason::SceneRevision, Some(source));
         }
     }
 }

@@ -64,7 +64,7 @@ impl World {
                     }
                 }
                 Err(reason) => {
-                    self.note_reject(reason);
+                    self.note_reject(reason, Some(source));
                     self.refuse_pose(slot, reason);
                     refused += 1;
                 }
@@ -76,7 +76,7 @@ impl World {
     /// Bodies of this source whose newest pose the transport could not make out.
     pub(super) fn refuse_bodies(&mut self, source: SourceSlot, frame: &Frame) -> u64 {
         for &(body, reason) in &frame.refused_bodies {
-            self.note_reject(reason);
+            self.note_reject(reason, Some(source));
             let slot = self.slot_of(BodyId(body));
             if let Some(slot) = slot.filter(|slot| self.may_move(source, *slot).is_ok()) {
                 self.refuse_pose(slot, reason);

@@ -119,10 +119,7 @@ impl World {
             })
         });
         taken.unwrap_or_else(|(source, reason)| {
-            self.note_reject(reason);
-            if let Some(source) = source {
-                self.sources[source.index()].refused += 1;
-            }
+            self.note_refused(reason, source, &frame.header.source);
             Admission::Refused { source, reason }
         })
     }

@@ -27,6 +27,7 @@ mod names;
 mod parts;
 mod path;
 mod place;
+mod refusals;
 mod rule_draft;
 mod rules;
 mod source;
@@ -56,12 +57,13 @@ use crate::error::{Error, Result};
 use crate::ids::{BodyId, BodySlot, SourceSlot};
 use crate::math::Aabb;
 use crate::scene::Scene;
-use crate::wire::{BodyStatus, REJECTS_LEN, Reason, RejectReason};
+use crate::wire::{BodyStatus, Reason};
 use age::Ages;
 use census::source_at;
 use lists::Lists;
 use names::Names;
 use place::Entry;
+use refusals::Refusals;
 use source::SessionsOver;
 use tag::Tags;
 
@@ -107,7 +109,7 @@ pub struct World {
     /// Bodies that deform.
     deforming: Vec<BodySlot>,
     lists: Lists,
-    rejects: [u64; REJECTS_LEN],
+    refusals: Refusals,
     by_status: [u64; BodyStatus::ALL.len()],
     /// Number given to the newest pose frame of any source.
     pose_frames: u64,
@@ -199,7 +201,7 @@ impl World {
             travelled: Vec::new(),
             deforming: Vec::new(),
             lists: Lists::default(),
-            rejects: [0; REJECTS_LEN],
+            refusals: Refusals::default(),
             by_status: [0; BodyStatus::ALL.len()],
             pose_frames: 0,
             scene_rev: 0,
@@ -291,12 +293,6 @@ impl World {
         Some(source_at(place))
     }
 
-    /// Refusals in this boot, by `RejectReason`.
-    #[must_use]
-    pub fn rejects(&self) -> &[u64; REJECTS_LEN] {
-        &self.rejects
-    }
-
     /// Revision of the scene: 1 at the start, raised by each request that changed something.
     #[must_use]
     pub fn scene_rev(&self) -> u64 {
@@ -374,11 +370,6 @@ impl World {
         if let Some(source) = self.sources.get_mut(source.index()) {
             source.skipped += frames;
         }
-    }
-
-    /// Counts a refusal that the transport found before a frame could be made of it.
-    pub fn note_reject(&mut self, reason: RejectReason) {
-        self.rejects[usize::from(reason.code())] += 1;
     }
 
     /// The client that had this session is dead (its node is gone): it is over for whichever sources it speaks for, and

@@ -5,6 +5,7 @@
 mod early;
 mod frames;
 mod roster;
+mod wrong;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -25,8 +26,9 @@ use crate::transport::Setting;
 use crate::wire::RejectReason;
 use crate::wire::ros::{BodyTransforms, Book};
 use early::Early;
-pub(super) use frames::Local;
 use frames::fill;
+pub(super) use wrong::Local;
+use wrong::Wrongs;
 
 /// Longest sleep: how soon the end, and chains that never change, are seen.
 const SLEEP: Duration = Duration::from_nanos(SLEEP_NS);
@@ -64,7 +66,7 @@ pub(super) struct Inlet {
     poll: Poll,
     updates: Vec<Update>,
     looked_ns: u64,
-    frame_fault: Option<(String, u64)>,
+    wrongs: Wrongs,
 }
 
 impl Inlet {
@@ -106,7 +108,7 @@ impl Inlet {
             poll,
             updates: Vec::new(),
             looked_ns: SystemClock.boottime_ns() + QUIET_NS,
-            frame_fault: None,
+            wrongs: Wrongs::default(),
         };
         Ok((inlet, waker))
     }
@@ -188,7 +190,7 @@ impl Inlet {
             shared,
             local,
             early,
-            frame_fault,
+            wrongs,
             ..
         } = self;
         let Some(line) = lines.get_mut(at) else {
@@ -210,10 +212,8 @@ impl Inlet {
                 taken
             }
             Line::Transforms(from) => {
-                let (came, more, fault) = take_frames(from, (shelf, shared), local, early, receipt);
-                let fault = fault.map(|text| (text, receipt.now_ns));
-                *frame_fault = fault.or(frame_fault.take());
-                (came, more)
+                let held = (&*local, wrongs);
+                take_frames(from, (shelf, shared), held, early, receipt)
             }
             Line::Links {
                 from,
@@ -270,10 +270,8 @@ impl Inlet {
     }
 
     fn tell_faults(&mut self, now_ns: u64) {
-        let mut all = Vec::new();
-        let fresh = |(_, at): &(String, u64)| now_ns.saturating_sub(*at) < 4 * FAULTS_NS;
-        all.extend(self.frame_fault.take_if(|fault| !fresh(fault)).and(None));
-        all.extend(self.frame_fault.as_ref().map(|(text, _)| text.clone()));
+        let book = self.shared.book();
+        let mut all = self.wrongs.words(&book, now_ns, 4 * FAULTS_NS);
         let feeders = self.lines.iter().filter_map(Line::feeder);
         all.extend(feeders.filter_map(|feeder| feeder.fault(now_ns)));
         all.extend(self.shared_topics());
@@ -287,21 +285,20 @@ impl Inlet {
 
 /// Takes frames of `~/transforms`, and those that came before and whose time has come.
 ///
-/// * returns - whether some came, whether there may be more, and what is odd about them.
+/// * returns - whether some came, and whether there may be more.
 fn take_frames(
     from: &Subscription<BodyTransforms>,
     (shelf, shared): (&Shelf, &Shared),
-    local: &Local,
+    (local, wrongs): (&Local, &mut Wrongs),
     early: &mut Early,
     receipt: Receipt,
-) -> (bool, bool, Option<String>) {
+) -> (bool, bool) {
     // The revision first: the book is never older than what it is taken for.
     let names_rev = shared.names_rev();
     let book = shared.book();
-    let mut odd = None;
     let mut put = |message: &BodyTransforms, receipt, refused| {
-        let fault = put_frame((shelf, shared), local, (message, receipt, refused), &book);
-        odd = fault.or(odd.take());
+        let held = (local, &mut *wrongs);
+        put_frame((shelf, shared), held, (message, receipt, refused), &book);
     };
     let mut released = false;
     while let Some((message, receipt)) = early.next(receipt.now_ns, names_rev) {
@@ -313,25 +310,26 @@ fn take_frames(
         let timeout_ns = place.map(|place| shared.timeout_ns(place));
         early.take(message, receipt, names_rev, timeout_ns, &mut put);
     });
-    (came || released, more, odd)
+    (came || released, more)
 }
 
-/// Puts a frame of `~/transforms` on the shelf; what is odd about it.
+/// Puts a frame of `~/transforms` on the shelf, and takes note of what is wrong with it.
 fn put_frame(
     (shelf, shared): (&Shelf, &Shared),
-    local: &Local,
+    (local, wrongs): (&Local, &mut Wrongs),
     (message, receipt, refused): (&BodyTransforms, Receipt, Option<RejectReason>),
     book: &Book,
-) -> Option<String> {
+) {
     let mut frame = shelf.spare();
     fill(&mut frame, message, book, receipt);
-    let fault = local.fault(message);
-    if let Some(reason) = fault.as_ref().map(|(reason, _)| *reason).or(refused) {
+    let own = local.refuse(message);
+    if let Some(reason) = own.as_ref().map(|(reason, _)| *reason).or(refused) {
         shared.note_refused(1);
         frame.refused = Some(reason);
     }
     shelf.put(local.place(&message.source), frame);
-    fault.map_or_else(|| local.odd(message, receipt, book), |(_, text)| Some(text))
+    let own = own.as_ref().map(|(_, text)| text.as_str());
+    wrongs.note(local, (message, own), receipt, book);
 }
 
 /// Takes a message of one body.

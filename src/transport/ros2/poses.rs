@@ -14,7 +14,7 @@ use ros2_client::Gid;
 
 use super::RosScene;
 use super::shelf::Update;
-use super::tf::{Missing, Taken, Tree, plain, sound};
+use super::tf::{Missing, Taken, Tree, no_pose, plain, sound};
 use super::told::brief;
 use crate::config::RosKind;
 use crate::math::{Quat, Vec3, pose_from};
@@ -331,7 +331,7 @@ impl Source {
         let mut result = sound(row.position, row.orientation).map(|_| row);
         member.fault = result
             .err()
-            .map(|reason| format!("its pose is no pose: {reason}"));
+            .map(|reason| format!("its pose is {}", no_pose(reason)));
         if plain(frame) != plain(&self.root.0) {
             result = Err(RejectReason::BadChain);
             member.fault = Some(format!(

@@ -287,5 +287,10 @@ pub(super) fn sound(position: [f64; 3], orientation: [f64; 4]) -> Result<Pose, R
     pose_from(position, orientation).ok_or(RejectReason::BadQuaternion)
 }
 
+/// Words for numbers that are no pose, and what to write instead.
+pub(super) fn no_pose(reason: RejectReason) -> String {
+    format!("no pose: {reason}: {}", reason.mend())
+}
+
 #[cfg(test)]
 mod tests;

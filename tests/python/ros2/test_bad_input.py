@@ -222,6 +222,30 @@ def test_stamps_of_another_clock_are_carried_and_not_told_as_odd(room):
     assert not [log.msg for log in desk.logs if "source sim" in log.msg and "clock" in log.msg]
 
 
+def test_bug_frames_that_are_refused_for_their_head_or_their_names_are_told_with_what_to_write(room):
+    desk = Desk(room)
+    sim = desk.feeder.sim
+
+    def wrong(name, **fields):
+        def feed():
+            desk.feeder()
+            message = sim.frame({name: (4.0, 0.0, 0.0)}, flags=BodyTransforms.PARTIAL)
+            for field, value in fields.items():
+                setattr(message, field, value)
+            sim.publisher.publish(message)
+
+        return feed
+
+    desk.told('source "nosuch"', "no such source, it has", "sim", feed=wrong("box", source="nosuch"))
+    desk.told("source sim", "session 0", "random number", feed=wrong("box", session=0))
+    desk.told("source sim", "flags 0", "FULL, PARTIAL or PAUSED", feed=wrong("box", flags=0))
+    desk.told("source sim", "raise seq", feed=wrong("box", seq=1))
+    desk.told('body "bxo"', 'did you mean "box"?', feed=wrong("bxo"))
+    desk.word("clear")
+    # The daemon's own line: seldom, of all that was refused.
+    assert "frames or poses are refused: " in desk.daemon.log
+
+
 def test_two_nodes_of_one_name_are_told(room):
     first = room.daemon(HANDS)
     room.node()

@@ -1,6 +1,6 @@
 //! What a chain of links says of its body. Pure.
 
-use super::super::tf::{Found, Missing};
+use super::super::tf::{Found, Missing, no_pose};
 use super::super::told::brief;
 use super::seconds;
 use crate::wire::{RejectReason, TransformRow};
@@ -55,8 +55,9 @@ pub(super) fn judge(
         Err(Missing::Bad(frame, reason)) => (
             Some(Err(*reason)),
             Some(format!(
-                "the link of frame \"{}\" is no pose: {reason}",
-                brief(frame)
+                "the link of frame \"{}\" is {}",
+                brief(frame),
+                no_pose(*reason)
             )),
         ),
     }

@@ -1,0 +1,264 @@
+//! What is wrong with frames of `~/transforms`, in words, and what to write instead: all that a sender is told of them.
+//!
+//! In: messages, what the scene has. Out: why the node refuses one, and the newest fault of each source.
+
+use std::collections::BTreeMap;
+
+use super::super::RosScene;
+use super::super::poses::{Receipt, off};
+use super::super::tf::{no_pose, plain, sound};
+use super::super::told::brief;
+use super::frames::{id, velocity};
+use crate::error::nearest;
+use crate::limits::FRAME_ROWS_MAX;
+use crate::wire::ros::{BodyTransform, BodyTransforms, Book, Twist};
+use crate::wire::{RejectReason, frame_flags};
+
+/// Sources named at most where one is missing.
+const SOURCES_TOLD_MAX: usize = 8;
+/// Names of bodies that a missing one is compared with at most: half a millisecond or so each thousand.
+const NAMES_COMPARED_MAX: usize = 4096;
+
+/// What is wrong with a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Wrong {
+    /// In words.
+    Said(String),
+    /// A name that no body has, and who sends it: the nearest is looked for when it is told, not frame by frame.
+    NoBody { name: String, source: String },
+}
+
+impl Wrong {
+    fn words(&self, book: &Book) -> String {
+        let (name, source) = match self {
+            Self::Said(text) => return text.clone(),
+            Self::NoBody { name, source } => (name, source),
+        };
+        let names = book.rows().map(|row| book.name(row.body));
+        let names: Vec<&str> = names.take(NAMES_COMPARED_MAX).collect();
+        let mend = match nearest(name, &names) {
+            Some(nearest) => format!("did you mean \"{}\"?", brief(nearest)),
+            None => "its names are on ~/names".to_owned(),
+        };
+        let (name, source) = (brief(name), brief(source));
+        format!("body \"{name}\" of source {source}: the scene has no such body: {mend}")
+    }
+}
+
+/// What frames are held against.
+#[derive(Clone, Debug, Default)]
+pub(in super::super) struct Local {
+    /// The scene's frame.
+    pub(super) frame_id: String,
+    /// The scene's sources by name, in its order.
+    pub(super) sources: Vec<String>,
+    /// This run of the daemon.
+    pub(super) boot_id: u64,
+}
+
+impl Local {
+    /// Of a scene, in this run of the daemon.
+    pub(in super::super) fn of(scene: &RosScene, boot_id: u64) -> Self {
+        let sources = scene.sources.iter();
+        Self {
+            frame_id: scene.frame_id.clone(),
+            sources: sources.map(|source| source.name.clone()).collect(),
+            boot_id,
+        }
+    }
+
+    /// The place of a source in the scene.
+    pub(super) fn place(&self, source: &str) -> Option<usize> {
+        self.sources.iter().position(|own| own == source)
+    }
+
+    /// Why the node refuses a frame as a whole: it is not in the scene's frame, or names bodies by ids that are of
+    /// another run of the daemon, where they may be other bodies'.
+    pub(super) fn refuse(&self, message: &BodyTransforms) -> Option<(RejectReason, String)> {
+        let source = brief(&message.source);
+        let given = plain(&message.header.frame_id);
+        if !given.is_empty() && given != plain(&self.frame_id) {
+            let text = format!(
+                "frames of source {source} are in \"{}\", not in the scene's frame \"{}\": they are refused",
+                brief(given),
+                self.frame_id
+            );
+            return Some((RejectReason::BadChain, text));
+        }
+        let by_id = message.transforms.iter().any(|body| body.name.is_empty());
+        if !by_id || message.boot_id == self.boot_id {
+            return None;
+        }
+        let text = format!(
+            "frames of source {source} say bodies by id with boot_id {}, and this run of the daemon is {}: they are refused; send names, or ids with the boot_id of the ~/names they are from",
+            message.boot_id, self.boot_id
+        );
+        Some((RejectReason::SessionOver, text))
+    }
+
+    /// Why the daemon refuses a frame as a whole, as far as its head says it.
+    pub(super) fn fault(&self, message: &BodyTransforms) -> Option<String> {
+        let source = brief(&message.source);
+        if self.place(&message.source).is_none() {
+            let known = self.sources.iter().take(SOURCES_TOLD_MAX);
+            let mut known: Vec<&str> = known.map(String::as_str).collect();
+            if self.sources.len() > SOURCES_TOLD_MAX {
+                known.push("..");
+            }
+            let has = match known.as_slice() {
+                [] => "none".to_owned(),
+                known => known.join(", "),
+            };
+            return Some(format!(
+                "frames of source \"{source}\": the scene has no such source, it has {has}"
+            ));
+        }
+        let paused = message.flags == frame_flags::PAUSED;
+        let (poses, speeds) = (message.transforms.len(), message.velocities.len());
+        let what = if message.session == 0 {
+            "session 0: draw a random number at start".to_owned()
+        } else if !paused && !matches!(message.flags, frame_flags::FULL | frame_flags::PARTIAL) {
+            format!("flags {}: write FULL, PARTIAL or PAUSED", message.flags)
+        } else if paused && poses > 0 {
+            "PAUSED with poses: leave them out, or write FULL or PARTIAL".to_owned()
+        } else if speeds > 0 && speeds != poses {
+            "velocities: send one for each of the transforms, or none".to_owned()
+        } else if poses > FRAME_ROWS_MAX {
+            format!("more than {FRAME_ROWS_MAX} poses: send them in several, with PARTIAL")
+        } else {
+            return None;
+        };
+        Some(format!("frames of source {source} are refused: {what}"))
+    }
+
+    /// What is wrong with a frame whose other bodies are taken as they come: a pose that is none, a body that the scene
+    /// lacks or another source moves, or a stamp far from the node's clock where it is said to be of that.
+    pub(super) fn odd(
+        &self,
+        message: &BodyTransforms,
+        receipt: Receipt,
+        book: &Book,
+    ) -> Option<Wrong> {
+        let place = self.place(&message.source)?;
+        let source = brief(&message.source);
+        let mut speeds = message.velocities.iter();
+        let mut bodies = message.transforms.iter();
+        let odd =
+            bodies.find_map(|body| self.odd_body((place, &source), body, speeds.next(), book));
+        if odd.is_some() || message.clock_id != 0 {
+            return odd;
+        }
+        let text = off(
+            ("source", &source),
+            message.header.stamp.to_ns(),
+            receipt,
+            0,
+        )?;
+        let mend = "frames of another clock have a clock_id other than 0";
+        Some(Wrong::Said(format!("{text}; {mend}")))
+    }
+
+    fn odd_body(
+        &self,
+        (place, source): (usize, &str),
+        body: &BodyTransform,
+        speed: Option<&Twist>,
+        book: &Book,
+    ) -> Option<Wrong> {
+        let id = id(body, book);
+        let name = match body.name.as_str() {
+            "" => body.body.to_string(),
+            name => brief(name).into_owned(),
+        };
+        if !book.holds(id) {
+            return Some(match body.name.as_str() {
+                "" => Wrong::Said(format!(
+                    "body {name} of source {source}: the scene has no body of this id: send names, or the ids of the newest ~/names"
+                )),
+                name => Wrong::NoBody {
+                    name: name.to_owned(),
+                    source: source.to_owned(),
+                },
+            });
+        }
+        let (position, orientation) = (body.pose.position.into(), body.pose.orientation.into());
+        if let Err(reason) = sound(position, orientation) {
+            let what = no_pose(reason);
+            return Some(Wrong::Said(format!(
+                "body {name}: its pose from source {source} is {what}"
+            )));
+        }
+        if speed.is_some_and(|speed| !velocity(speed).iter().all(|v| v.is_finite())) {
+            let (reason, mend) = (RejectReason::NotFinite, RejectReason::NotFinite.mend());
+            return Some(Wrong::Said(format!(
+                "body {name}: its velocity from source {source} is {reason}: {mend}"
+            )));
+        }
+        let text = match book.source(id) {
+            Some(owner) if owner == place => return None,
+            Some(owner) => {
+                let owner = self.sources.get(owner).map_or("?", String::as_str);
+                format!(
+                    "body {name}: source {source} sends it on ~/transforms, but the scene has source {owner} move it: what {source} says of it is refused"
+                )
+            }
+            None => format!(
+                "body {name}: source {source} sends it, but the scene has no source move it: what {source} says of it is refused; give it a source there"
+            ),
+        };
+        Some(Wrong::Said(text))
+    }
+}
+
+/// The newest that is wrong with the frames of each source; of all that the scene lacks as of one.
+#[derive(Debug, Default)]
+pub(super) struct Wrongs {
+    newest: BTreeMap<Option<usize>, (Wrong, u64)>,
+    orders: BTreeMap<usize, (u64, (u64, u64))>,
+}
+
+impl Wrongs {
+    /// Takes note of a frame, and of what is wrong with it.
+    pub(super) fn note(
+        &mut self,
+        local: &Local,
+        (message, refused): (&BodyTransforms, Option<&str>),
+        receipt: Receipt,
+        book: &Book,
+    ) {
+        let place = local.place(&message.source);
+        let said = local.fault(message).or_else(|| refused.map(str::to_owned));
+        let said = said.or_else(|| self.old(place?, message));
+        let wrong = said.map(Wrong::Said);
+        if let Some(wrong) = wrong.or_else(|| local.odd(message, receipt, book)) {
+            self.newest.insert(place, (wrong, receipt.now_ns));
+        }
+    }
+
+    /// Words for a frame that is not newer than the one before of its session.
+    fn old(&mut self, place: usize, message: &BodyTransforms) -> Option<String> {
+        let order = (message.epoch, message.seq);
+        let (session, newest) = self.orders.entry(place).or_insert((0, order));
+        if *session == message.session && order <= *newest {
+            let (source, mend) = (brief(&message.source), RejectReason::OldFrame.mend());
+            return Some(format!(
+                "frames of source {source} are refused: not newer than the one before: {mend}"
+            ));
+        }
+        (*session, *newest) = (message.session, order);
+        None
+    }
+
+    /// What is wrong now, in words.
+    ///
+    /// * `young_ns` - what is older than this is over, nanoseconds.
+    pub(super) fn words(&mut self, book: &Book, now_ns: u64, young_ns: u64) -> Vec<String> {
+        let is_young = |at_ns: u64| now_ns.saturating_sub(at_ns) < young_ns;
+        self.newest.retain(|_, (_, at_ns)| is_young(*at_ns));
+        let newest = self.newest.values();
+        newest.map(|(wrong, _)| wrong.words(book)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,57 @@
+//! What was refused: counted by reason, with the source that the last of each reason was of.
+
+use super::World;
+use crate::ids::SourceSlot;
+use crate::wire::{REJECTS_LEN, RejectReason, SOURCE_NAME_LEN, name_str};
+
+/// Refusals in this boot.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Refusals {
+    counts: [u64; REJECTS_LEN],
+    last: [Option<SourceSlot>; REJECTS_LEN],
+    /// The name that the last frame of no source of the scene had.
+    stranger: [u8; SOURCE_NAME_LEN],
+}
+
+impl World {
+    /// Refusals in this boot, by `RejectReason`.
+    #[must_use]
+    pub fn rejects(&self) -> &[u64; REJECTS_LEN] {
+        &self.refusals.counts
+    }
+
+    /// The source of which something was refused last for a reason, as far as that is known; of frames of no source of
+    /// the scene the name that they have.
+    #[must_use]
+    pub fn refused_of(&self, reason: RejectReason) -> Option<&str> {
+        let refusals = &self.refusals;
+        match refusals.last[usize::from(reason.code())] {
+            Some(source) => self.sources.get(source.index()).map(|s| s.name.as_str()),
+            None if reason == RejectReason::UnknownSource => name_str(&refusals.stranger),
+            None => None,
+        }
+    }
+
+    /// Counts a refusal.
+    ///
+    /// * `source` - whose; `None`: of no source of the scene, or not known.
+    pub fn note_reject(&mut self, reason: RejectReason, source: Option<SourceSlot>) {
+        let place = usize::from(reason.code());
+        self.refusals.counts[place] += 1;
+        self.refusals.last[place] = source;
+    }
+
+    /// Counts a message that is refused as a whole.
+    pub(super) fn note_refused(
+        &mut self,
+        reason: RejectReason,
+        source: Option<SourceSlot>,
+        name: &[u8; SOURCE_NAME_LEN],
+    ) {
+        self.note_reject(reason, source);
+        match source {
+            Some(source) => self.sources[source.index()].refused += 1,
+            None => self.refusals.stranger = *name,
+        }
+    }
+}
