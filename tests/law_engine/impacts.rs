@@ -344,3 +344,54 @@ shape = { type = "cylinder", radius = 0.2, half_height = 1 }"#,
     let (low, high) = (found.t_min_s, found.t_max_s.unwrap());
     assert!(0.32 < low && high - low < 1e-6, "{found:?}");
 }
+
+/// Far out the gap is known so badly that its slope means nothing.
+#[test]
+fn bug_what_goes_right_through_another_far_out_is_hit() {
+    let bodies = [
+        r#"name = "a"
+moves = false
+position = [32317.989288008353, 65020.8713232141, 21937.974492601374]
+orientation = [-0.3810960213406204, -0.6135250711968664, 0.3289898365820283, 0.6083736491309922]
+shape = { type = "box", half_extents = [0.8412680055272448, 0.5579724967206058, 0.8184758442832489] }"#,
+        r#"name = "b"
+moves = false
+position = [32318.05416372216, 65019.300189348214, 21941.652444411448]
+orientation = [0.16160683283154714, -0.2776781931373851, 0.6946104489993907, 0.6436570335038515]
+shape = { type = "box", half_extents = [0.4552041465036235, 0.21622489485308055, 0.1612796005065167] }"#,
+    ];
+    let rig = rig(&bodies.map(str::to_owned));
+    let found = ask(
+        rig.engine.world(),
+        r#"{"a": "a", "b": "b", "within_s": 1.5,
+            "linear_a": [0.06487571380893808, -1.571133865889413, 3.6779518100721726]}"#,
+    );
+    assert_eq!(found.verdict, Verdict::Colliding.code(), "{found:?}");
+    // All meet head-on.
+    let (mut open, mut wide) = (0, 0.0_f64);
+    for seed in 0..600 {
+        let mut rng = Rng::new(seed);
+        let far = [1e4, 1e5, 1e6][rng.below(3)];
+        let (at, way) = (rng.vector(far), rng.direction());
+        let bodies = [
+            body(1, [0.0; 3], SHAPES[rng.below(4)], ""),
+            body(2, [0.0; 3], SHAPES[rng.below(3)], ""),
+        ];
+        let mut rig = Rig::new(&scene("", &bodies));
+        for (id, place) in [(1, at), (2, at + way * 4.0)] {
+            let pose = rng.pose(place);
+            rig.place(id, &pose);
+        }
+        rig.send(ALL);
+        let [x, y, z] = (way * 4.0).into();
+        let json = format!(
+            r#"{{"a": "b1", "b": "b2", "linear_a": [{x:?}, {y:?}, {z:?}], "within_s": 1.5}}"#
+        );
+        let found = ask(rig.engine.world(), &json);
+        match found.t_max_s {
+            Some(until) => wide = wide.max((until - found.t_min_s) / far),
+            None => open += 1,
+        }
+    }
+    assert!(open == 0 && wide < 1e-12, "{open} {wide}");
+}
