@@ -63,6 +63,9 @@ pub const VERTEX_ROWS_WAITING_MAX: usize = 64 * DEFORMING_VERTICES_MAX;
 pub const FRAMES_PER_DRAIN_MAX: usize = 64;
 /// Largest coordinate of a pose, metres: beyond it f64 has a spacing of 0.1 mm and no contact means anything.
 pub const COORDINATE_MAX_M: f64 = 1e12;
+/// Longest ray, and how far one goes where nothing is said, metres: nothing but a half-space is farther from any place,
+/// and two corners of all that there may be are `2 sqrt(3)` times the largest coordinate apart.
+pub const RAY_MAX_M: f64 = 4.0 * COORDINATE_MAX_M;
 /// Largest extent of a shape, metres.
 pub const EXTENT_MAX_M: f64 = 1e9;
 /// Smallest extent of a shape, metres; a capsule's half height may be 0.
@@ -114,4 +117,5 @@ const _: () = {
     assert!(PAIRS_DEFAULT < u32::MAX as usize);
     assert!(CONTACTS_PER_PAIR_MAX >= MANIFOLD_POINTS_MAX);
     assert!(SOURCES_MAX <= 255);
+    assert!(RAY_MAX_M > 3.5 * (COORDINATE_MAX_M + EXTENT_MAX_M));
 };

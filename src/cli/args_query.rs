@@ -94,7 +94,7 @@ pub(super) struct RayArgs {
         conflicts_with_all = ["a", "b", "touching", "shape"]
     )]
     pub(super) ray: Option<Numbers<6>>,
-    /// How far the ray goes, such as `10m`; by default as far as there may be anything.
+    /// How far the ray goes, such as `10m`; by default 4e12 m, farther than anything that has an end.
     #[arg(
         long,
         value_name = "LENGTH",

@@ -78,7 +78,7 @@ struct Sweep {
     free: f64,
     /// A share at which they are known to touch; infinite: none is known.
     hit: f64,
-    /// Rounding hides at `free` whether they touch: it goes no farther.
+    /// Rounding hides at `free` whether they touch, or for how long they do not: it goes no farther.
     stuck: bool,
     /// The share asked last at which no touch was found, behind `free` and before `hit`.
     missed: f64,
@@ -322,12 +322,13 @@ impl Sweep {
                     self.done = true;
                     return;
                 }
-                Ahead::Unsure => {
-                    (self.stuck, self.missed) = (true, self.free);
-                    0.0
-                }
+                Ahead::Unsure => 0.0,
                 Ahead::Free { time, gap_m } => self.go_on(&moment, time, gap_m),
             };
+            if step <= 0.0 {
+                // It would ask the same again, and what was looked for ahead is looked for anew.
+                (self.stuck, self.missed, self.probes) = (true, self.free, 0);
+            }
             self.close_in(bodies, step, work);
         }
     }
@@ -336,7 +337,8 @@ impl Sweep {
     fn go_on(&mut self, moment: &Moment, time: f64, gap_m: f64) -> f64 {
         let here = self.free;
         let (last_s, last_m) = self.last;
-        if here > last_s && gap_m < last_m {
+        // What is but rounding of the way tells no slope.
+        if here > last_s && gap_m < last_m - moment.slop {
             self.slope = (last_m - gap_m) / (here - last_s);
         }
         self.last = (here, gap_m);

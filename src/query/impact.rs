@@ -10,6 +10,7 @@ use crate::limits::LEG_TURNS_MAX;
 use crate::math::Vec3;
 use crate::narrow::{Passage, touch_on_way};
 use crate::scene::{Impact, Velocity};
+use crate::shape::{Core, Geometry};
 use crate::time::{Clock, Meter};
 use crate::wire::{ImpactFound, MessageHeader, Verdict};
 use crate::world::{Body, World};
@@ -106,6 +107,13 @@ fn velocity(body: &Body, asked: &Velocity, warnings: &mut Vec<String>) -> (Vec3,
 
 fn on_way(body: &Body, (linear, angular): (Vec3, Vec3), within_s: f64) -> Result<Body, String> {
     let name = &body.name;
+    let (linear, angular) = if is_ball(body) {
+        // What turns about its middle stays where it is, and no bound need allow for the turn.
+        let arm = body.pose.rotation * body.centre.coords;
+        (linear + angular.cross(&arm), Vec3::zeros())
+    } else {
+        (linear, angular)
+    };
     if linear == Vec3::zeros() && angular == Vec3::zeros() {
         return Ok(body.still());
     }
@@ -120,4 +128,15 @@ fn on_way(body: &Body, (linear, angular): (Vec3, Vec3), within_s: f64) -> Result
         ));
     }
     Ok(body.on_way(linear, angular, within_s))
+}
+
+/// One sphere, about whose middle the body turns.
+fn is_ball(body: &Body) -> bool {
+    let [placed] = &*body.shapes else {
+        return false;
+    };
+    let Geometry::Convex(convex) = &placed.shape.geometry else {
+        return false;
+    };
+    matches!(convex.core(), Core::Point) && placed.pose.translation.vector == body.centre.coords
 }

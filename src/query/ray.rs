@@ -65,8 +65,10 @@ struct Cast {
     free_m: f64,
     /// Known to be hit by here, metres; infinite: no hit is known.
     hit_m: f64,
-    /// The first place that rounding does not tell from a touch, metres: the hit, where it is certified farther on.
+    /// The end of the first piece that rounding does not tell from a touch, metres; infinite: none is known.
     touch_m: f64,
+    /// The end of the first piece that is not known to be free, metres: what it meets first lies in it.
+    until_m: f64,
     inside: bool,
     /// Not hit at all.
     misses: bool,
@@ -246,7 +248,7 @@ impl RayQuestion {
         found: &mut RayFound,
     ) {
         // How deep a piece is in a round shape is known to some 1e-8 of its size, where it touches to some 1e-12.
-        let end_m = cast.hit_m.min(cast.touch_m).max(cast.free_m);
+        let end_m = cast.hit_m.min(cast.until_m).max(cast.free_m);
         let at_m = cast.free_m + (end_m - cast.free_m) / 2.0;
         found.body = Some(near.body.name.clone());
         found.t_max_m = Some(cast.hit_m);
@@ -281,6 +283,7 @@ impl RayQuestion {
             free_m: near.enter_m,
             hit_m: f64::INFINITY,
             touch_m: f64::INFINITY,
+            until_m: end_m,
             inside: false,
             misses: false,
         };
@@ -291,20 +294,24 @@ impl RayQuestion {
                 return cast;
             }
         }
-        // The end of the first piece that is not known to be free.
-        let mut until_m = end_m;
         let mut whole = true;
         for _ in 0..LOOKS_MAX {
-            if cast.free_m >= until_m && until_m >= end_m.min(cast.hit_m) {
-                // Each piece by itself is free, so all of it is.
-                cast.misses = cast.hit_m == f64::INFINITY;
-                break;
+            if cast.free_m >= cast.touch_m {
+                // Finer looks found that nothing is touched there.
+                cast.touch_m = f64::INFINITY;
             }
-            until_m = if cast.free_m >= until_m {
-                end_m.min(cast.hit_m)
-            } else {
-                until_m
-            };
+            let last_m = end_m.min(cast.hit_m).min(cast.touch_m);
+            if cast.free_m >= cast.until_m {
+                if cast.until_m >= last_m {
+                    // Each piece by itself is free, so all of it is.
+                    cast.misses = cast.hit_m == f64::INFINITY;
+                    break;
+                }
+                cast.until_m = last_m;
+                // What is too short to be halved is looked at as it is.
+                whole = last_m - cast.free_m <= 4.0 * self.slop_m(last_m);
+            }
+            let until_m = cast.until_m;
             if until_m - cast.free_m <= 4.0 * self.slop_m(until_m) && !whole || !meter.open() {
                 break;
             }
@@ -318,14 +325,14 @@ impl RayQuestion {
             let slop_m = self.slop_m(middle_m);
             if seen.gap.min > slop_m {
                 cast.free_m = middle_m + (seen.gap.min - slop_m).next_down();
-            } else {
-                until_m = middle_m;
-                // What is but within rounding of a touch may still be in front of it.
-                if seen.gap.max <= 0.0 {
-                    cast.hit_m = middle_m;
-                } else if seen.touching {
-                    cast.touch_m = cast.touch_m.min(middle_m);
-                }
+                continue;
+            }
+            cast.until_m = middle_m;
+            // What is but within rounding of a touch may still be in front of it.
+            if seen.gap.max <= 0.0 {
+                cast.hit_m = middle_m;
+            } else if seen.touching || seen.gap.max <= 2.0 * slop_m {
+                cast.touch_m = middle_m;
             }
         }
         // A ray that grazes touches, and touching counts as a hit.

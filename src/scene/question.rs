@@ -11,7 +11,7 @@
 //! { "touching": { "shape": { "type": "sphere", "radius": 0.5 }, "position": [0, 0, 1], "group": 1, "mask": 6 } }
 //! ```
 
-use crate::limits::{COORDINATE_MAX_M, EXTENT_MAX_M};
+use crate::limits::{COORDINATE_MAX_M, EXTENT_MAX_M, RAY_MAX_M};
 use crate::math::Pose;
 use crate::scene::PlacedSpec;
 use crate::scene::node::{Fault, Node, Value};
@@ -197,8 +197,8 @@ fn read_ray(node: Node) -> Result<Ray, Fault> {
         from,
         direction,
         max_m: table
-            .number_within("max_m", 0.0, EXTENT_MAX_M)?
-            .unwrap_or(EXTENT_MAX_M),
+            .number_within("max_m", 0.0, RAY_MAX_M)?
+            .unwrap_or(RAY_MAX_M),
         mask: table.bits("mask")?.unwrap_or(u32::MAX),
     })
 }

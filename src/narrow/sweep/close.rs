@@ -72,7 +72,10 @@ impl Sweep {
     /// farther, to the end of the way where it will not do without.
     fn behind(&self, step: f64) -> f64 {
         let gap_m = self.last.1.max(0.0);
-        let ahead = if self.slope > 0.0 {
+        let ahead = if self.stuck {
+            // So near that rounding hides it: what the slope says would be rounding, too.
+            0.0
+        } else if self.slope > 0.0 {
             gap_m / self.slope
         } else {
             step
