@@ -7,7 +7,6 @@ mod connect;
 mod follow;
 mod link;
 mod list;
-mod remedies;
 mod step;
 mod vertices;
 

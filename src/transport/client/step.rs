@@ -1,6 +1,5 @@
 //! Lockstep: send a frame, get the result of exactly that frame.
 
-use super::remedies::remedy;
 use super::{Client, FrameId, FrameInfo, Heard, Restarted, Rows};
 use crate::error::{Error, Result};
 use crate::wire::{RejectReason, SourceRow, TickRow, name_str};
@@ -145,7 +144,7 @@ impl Client {
             let count = |tick: &TickRow| tick.rejects.get(at).copied().unwrap_or(0);
             let refused = count(tick).saturating_sub(count(before));
             if refused > 0 {
-                why += &format!("; {refused} refused as {reason} ({})", remedy(*reason));
+                why += &format!("; {refused} refused as {reason} ({})", reason.mend());
             }
         }
         why
