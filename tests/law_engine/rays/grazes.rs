@@ -87,7 +87,7 @@ fn bug_the_point_where_a_ray_passes_the_rim_of_a_sheet_is_on_it() {
     ];
     let pose = pose_from([0.0; 3], turn).unwrap();
     let from = Vec3::new(
-        -0.351_483_555_659_378_25,
+        -0.351_483_555_659_378_3,
         3.097_771_870_390_983,
         1.497_978_470_000_918_9,
     );
@@ -116,7 +116,7 @@ fn grazed(kind: usize, rng: &mut Rng) -> (String, fn(&Vec3) -> f64, Vec3, Vec3) 
             (BALL.to_owned(), |p| (p.norm() - 1.0).max(0.0), at, way)
         }
         1 => {
-            let angle = rng.range(0.0, 6.28);
+            let angle = rng.range(0.0, std::f64::consts::TAU);
             let at = Vec3::new(angle.cos(), angle.sin(), rng.range(-0.01, 0.01));
             let way = Vec3::new(-angle.sin(), angle.cos(), 0.0);
             let shape = "{ type = \"capsule\", radius = 1, half_height = 0.01 }";
