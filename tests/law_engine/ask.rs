@@ -108,3 +108,76 @@ fn an_answer_is_that_of_the_pair_at_the_tick_s_poses() {
         );
     }
 }
+
+/// A cube of side 1, each side in `n` times `n` squares of two triangles.
+fn cube(n: usize) -> String {
+    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+    for axis in 0..3 {
+        for side in [-0.5, 0.5] {
+            let first = vertices.len();
+            for place in 0..(n + 1) * (n + 1) {
+                let step = |k: usize| k as f64 / n as f64 - 0.5;
+                let mut corner = [side; 3];
+                corner[(axis + 1) % 3] = step(place % (n + 1));
+                corner[(axis + 2) % 3] = step(place / (n + 1));
+                vertices.push(corner);
+            }
+            for square in 0..n * n {
+                let p = first + square / n * (n + 1) + square % n;
+                let (right, up) = (p + 1, p + n + 1);
+                let mut halves = [[p, right, up + 1], [p, up + 1, up]];
+                if side < 0.0 {
+                    halves = halves.map(|[a, b, c]| [a, c, b]);
+                }
+                faces.extend(halves);
+            }
+        }
+    }
+    format!("{{ type = \"trimesh\", solid = true, vertices = {vertices:?}, faces = {faces:?} }}")
+}
+
+#[test]
+fn bug_solids_that_overlap_along_faces_in_line_are_no_touch() {
+    let corner = "{ type = \"trimesh\", solid = true, vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] }";
+    let octahedron = "{ type = \"trimesh\", solid = true, vertices = [[0.5, 0, 0], [-0.5, 0, 0], [0, 0.5, 0], [0, -0.5, 0], [0, 0, 0.5], [0, 0, -0.5]], faces = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]] }";
+    let (plain, fine) = (&*cube(1), &*cube(4));
+    let boxy = "{ type = \"box\", half_extents = [0.5, 0.5, 0.5] }";
+    // Shapes, where the second one is, and how deep they are at most; 0: they touch.
+    let cases = [
+        (plain, plain, [0.0; 3], 0.5),
+        (plain, plain, [0.5, 0.0, 0.0], 0.5),
+        (plain, plain, [0.25, 0.25, 0.0], 0.5),
+        (plain, plain, [0.95, 0.0, 0.0], 0.05),
+        (plain, plain, [0.95, 0.95, 0.0], 0.05),
+        (plain, plain, [0.999, 0.999, 0.999], 0.001),
+        (fine, fine, [0.25, 0.25, 0.0], 0.5),
+        (fine, fine, [0.975, 0.0, 0.0], 0.025),
+        (plain, fine, [0.9, 0.5, 0.0], 0.1),
+        (corner, octahedron, [0.0; 3], 0.5 / 3.0_f64.sqrt()),
+        (plain, boxy, [0.0; 3], 0.5),
+        (plain, boxy, [0.95, 0.0, 0.0], 0.05),
+        (plain, plain, [1.0, 0.0, 0.0], 0.0),
+        (fine, fine, [1.0, 0.25, 0.0], 0.0),
+        (plain, plain, [1.0, 1.0, 1.0], 0.0),
+    ];
+    for (first, second, at, depth) in cases {
+        let mut rig = rig(&[body(1, [0.0; 3], first, ""), body(2, at, second, "")]);
+        let mut meter = Meter::unlimited(&SystemClock);
+        let asked = {
+            let (a, b) = two(&rig);
+            gap_between(a, b, 0.0, &mut meter)
+        };
+        let what = format!("{at:?}: {asked:?} in {} units", meter.spent());
+        assert_eq!(asked.verdict, Verdict::Colliding, "{what}");
+        assert!(asked.finished && asked.gap.min <= -depth + 1e-9, "{what}");
+        assert_eq!(asked.touching, depth == 0.0, "{what}");
+        assert_eq!(asked.gap.max <= 0.0, depth > 0.0, "{what}");
+        assert!(asked.gap.max >= -depth - 1e-9, "{what}");
+        // And so from tick to tick.
+        rig.send(ALL);
+        assert_eq!(rig.verdict(1, 2), Verdict::Colliding, "{what}");
+        let row = rig.pair(1, 2).unwrap();
+        assert_eq!(row.gap_max_m <= 0.0, depth > 0.0, "{what} {row:?}");
+        assert!(row.gap_best_m.is_nan() || row.gap_best_m <= row.gap_max_m);
+    }
+}

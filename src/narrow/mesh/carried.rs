@@ -26,6 +26,7 @@ use super::bound::Frame;
 use super::contacts::LeafContact;
 use super::containment::{Containment, ShellTests};
 use super::deep::Deep;
+use super::lack::Lack;
 use super::parting::Parting;
 use super::patches::Patches;
 use super::placed::{Placed, lag_of, moved};
@@ -40,6 +41,7 @@ use crate::shape::{BoxId, Obb, Shape};
 use crate::time::Meter;
 
 mod count;
+mod fathom;
 mod glance;
 mod known;
 mod leaves;
@@ -83,6 +85,8 @@ pub struct CarriedFront {
     crossing: Option<Crossing>,
     parting: Parting,
     deep: Deep,
+    /// Where a search for an overlap of leaves that only just touch was in vain.
+    vain: Lack,
     contacts: Patches,
     /// What the two had deformed when they were last looked at.
     bent: Bent,
@@ -115,6 +119,7 @@ impl CarriedFront {
         self.started = true;
         self.at = Placed::of(a, b, pos12);
         (self.last, self.crossing) = (None, None);
+        self.vain = Lack::default();
         self.start_over(store, a, b);
     }
 
@@ -219,7 +224,9 @@ impl CarriedFront {
             if meter.spent() >= end || !meter.open() {
                 return false;
             }
-            self.step(store, (side_a, side_b), goal, meter);
+            if !self.fathom((a, b), meter) {
+                self.step(store, (side_a, side_b), goal, meter);
+            }
         }
     }
 

@@ -39,7 +39,7 @@ const SLIVER: f64 = 1e-4;
 
 /// On the way to a ball a point of the surface is near enough when none is nearer than this share of its distance:
 /// at 0.9 a quarter fewer overlaps are told; ...
-const NEARLY: f64 = 0.97;
+pub(super) const NEARLY: f64 = 0.97;
 /// ... or when so many boxes have been looked into: about the middle of a ball all of it is equally near.
 const NEAR_BOXES_MAX: usize = 2_048;
 /// Boxes that are looked into for the radius of a ball that is kept.
@@ -166,13 +166,18 @@ impl Mesh {
         let grown = grown.iter().map(|ball| self.grow(ball));
         found.extend(grown.filter(|ball| inside.run(self, ball.centre, |_| true) != 0));
         let mut chosen = self.choose(&found, BALLS_MAX);
-        let spare_m = SPARE * self.radius + 64.0 * ROUND * self.centre.coords.amax();
+        let spare_m = self.spare_m();
         for ball in &mut chosen {
             ball.radius_m = self.clear(&ball.centre) - spare_m;
         }
         chosen.retain(|ball| ball.radius_m > 0.0);
         chosen.sort_by(|one, other| other.radius_m.total_cmp(&one.radius_m));
         (!chosen.is_empty()).then(|| Box::new(Balls::new(chosen, &self.centre)))
+    }
+
+    /// What a distance from its surface is made smaller by, metres.
+    pub(super) fn spare_m(&self) -> f64 {
+        SPARE * self.radius + 64.0 * ROUND * self.centre.coords.amax()
     }
 
     /// The largest ball, then each that reaches farthest out of those before, at most so many.
@@ -237,10 +242,15 @@ impl Mesh {
 
     /// A point of the surface that is nearly the nearest to a point, and its distance, metres.
     fn near(&self, point: &Point) -> (f64, Point) {
+        self.near_within(point, NEAR_BOXES_MAX).0
+    }
+
+    /// The same after a look into so many boxes at most, and whether none that could hold a nearer one was left.
+    pub(super) fn near_within(&self, point: &Point, boxes: usize) -> ((f64, Point), bool) {
         let nodes = self.tree.nodes();
         let from = point - self.tree.origin();
         let mut waiting = [(0_u32, 0.0_f64); NODES_WAITING_MAX];
-        let (mut len, mut left) = (1, NEAR_BOXES_MAX);
+        let (mut len, mut left) = (1, boxes);
         let mut best = (f64::INFINITY, *point);
         while len > 0 && left > 0 {
             len -= 1;
@@ -269,7 +279,7 @@ impl Mesh {
                 }
             }
         }
-        best
+        (best, len == 0)
     }
 
     /// A lower bound on the distance of a point from the surface, metres, but for rounding: the nearest boxes are

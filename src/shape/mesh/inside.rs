@@ -10,6 +10,7 @@
 use std::cmp::Ordering;
 
 use super::Mesh;
+use super::balls::NEARLY;
 use super::predicates::{side, turn_yz};
 use super::tree::{Below, NODES_WAITING_MAX};
 use crate::math::Point;
@@ -109,6 +110,27 @@ impl Inside {
             // On the surface itself: the distance is zero and decides.
             _ => {}
         }
+    }
+}
+
+impl Mesh {
+    /// A lower bound on the depth of a point under the surface of a solid that does not deform, own frame, metres,
+    /// positive; `None`: it is not inside, or twice so many boxes do not tell.
+    pub(crate) fn depth_of(&self, point: &Point, boxes: usize) -> Option<f64> {
+        if !self.solid || self.is_deforming() {
+            return None;
+        }
+        let mut inside = Inside::default();
+        inside.start(*point);
+        for _ in 0..boxes {
+            inside.step(self, |_| true);
+        }
+        if !inside.finished() || inside.winding() == 0 {
+            return None;
+        }
+        let ((near_m, _), whole) = self.near_within(point, boxes);
+        let depth_m = near_m * NEARLY - self.spare_m();
+        (whole && depth_m > 0.0).then_some(depth_m)
     }
 }
 

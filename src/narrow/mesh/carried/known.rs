@@ -1,5 +1,6 @@
 //! What a front knows of the pair at the pose it is at.
 
+use super::fathom::Fathomed;
 use super::store::FrontStore;
 use super::{CarriedFront, Containment, Goal, LeafContact};
 use crate::math::Interval;
@@ -25,6 +26,8 @@ pub(super) struct Known {
     pub(super) walks: Option<u64>,
     /// Times that the points of the last leaves were cut off.
     pub(super) cuts: u32,
+    /// What was done to learn how deep leaves overlap that only just touch.
+    pub(super) fathomed: Fathomed,
 }
 
 impl Default for Known {
@@ -40,6 +43,7 @@ impl Default for Known {
             floor_m: f64::NEG_INFINITY,
             walks: None,
             cuts: 0,
+            fathomed: Fathomed::default(),
         }
     }
 }
@@ -128,8 +132,8 @@ impl CarriedFront {
 
     pub(super) fn reached(&self, goal: Goal) -> bool {
         if self.known.touches {
-            return goal < Goal::Contacts
-                || (self.cover.open.is_empty() && !self.cover.has_expired());
+            let all = self.cover.open.is_empty() && !self.cover.has_expired();
+            return !self.is_fathoming() && (all || goal < Goal::Contacts);
         }
         if !self.cover.open.is_empty() || self.cover.has_expired() {
             return false;

@@ -72,6 +72,7 @@ impl CarriedFront {
                 self.crossing = corners.map(|corners| Crossing::at([i, j], corners));
             }
             self.known.touches = true;
+            self.fathom_at([i, j], (a, b), meter);
             if self.known.points_wanted {
                 let patches = (&mut self.contacts, &mut store.contacts);
                 let walks = &mut store.walks;

@@ -19,6 +19,7 @@ impl CarriedFront {
     ) {
         let gap_wanted = goal > Goal::Verdict;
         self.wear.note_step();
+        self.note_fathoming((a, b));
         if gap_wanted && !std::mem::replace(&mut self.known.asked_last, true) {
             self.bound_by_last(a, b);
             meter.charge_weighted(1, LEAF_COST);
