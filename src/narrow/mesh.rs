@@ -11,8 +11,8 @@
 //!
 //! Before any of the first two searches, a plane that parts the two as wholes is looked for (`parting`), balls within
 //! the two that overlap (`deep`), and of a pair that touched last the triangles that did, and those beside them
-//! (`carried/touch`). Where solids are found to touch, and by their leaves no more than that, some more is done to learn
-//! whether they overlap (`carried/fathom`).
+//! (`carried/touch`). Where solids are found to touch, and by their leaves no more than that, some more is done to
+//! learn whether they overlap (`carried/fathom`).
 //!
 //! Of a walk every pair of triangles is covered by exactly one entry at any time: on the stack (boxes that may touch),
 //! in the heap (boxes proved apart by so much), or settled (queried, or proved farther than the best distance known).
