@@ -161,14 +161,21 @@ fn gap(
     }
     // Closed forms begin from nothing, and leave nothing behind.
     if let Some(core) = closed::gap(&pair) {
-        return finish(&pair, &core);
+        return finish(&pair, &core, core.along());
     }
     let core = iterate(&pair, warm, shell);
     *warm = Warm {
         normal: core.normal,
         held: core.held,
     };
-    finish(&pair, &core)
+    // Where a whole arc of directions is as good as the best a polytope comes to no end, and the points of its faces
+    // are off by as much as its own end is: then the other end is the nearer one.
+    let estimate = if core.upper < -pair.tiny() {
+        core.lower
+    } else {
+        core.along()
+    };
+    finish(&pair, &core, estimate)
 }
 
 /// GJK, and what follows from its verdict.
@@ -210,15 +217,14 @@ fn iterate(pair: &Pair<'_>, warm: &Warm, mut shell: Option<&mut Shell>) -> CoreG
     }
 }
 
-/// From the gap of the cores to that of the shapes.
-fn finish(pair: &Pair<'_>, core: &CoreGap) -> Closest {
+/// From the gap of the cores, of which there is an estimate, to that of the shapes.
+fn finish(pair: &Pair<'_>, core: &CoreGap, estimate: f64) -> Closest {
     let (ra, rb) = (pair.a.margin(), pair.b.margin());
     let margins = ra + rb;
     let pad = pair.pad() + 4.0 * f64::EPSILON * margins;
     let low = (core.lower - margins - pad).next_down();
     let high = (core.upper - margins + pad).next_up().max(low);
-    let along = core.normal.dot(&(core.point_b - core.point_a));
-    let best_m = (along - margins).clamp(low, high);
+    let best_m = (estimate - margins).clamp(low, high);
     // Straight across from each other; where a method ends at 1e-7 the points give way by as much.
     let middle = (core.point_a + core.point_b) / 2.0;
     let half = core.normal * ((best_m + margins) / 2.0);

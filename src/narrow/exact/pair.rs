@@ -95,6 +95,11 @@ impl CoreGap {
         self.upper - self.lower <= LOOSE * pair.scale
     }
 
+    /// How far the closest points are apart along the normal, metres.
+    pub(super) fn along(&self) -> f64 {
+        self.normal.dot(&(self.point_b - self.point_a))
+    }
+
     /// How far the closest points are from straight across from each other, metres.
     pub(super) fn off(&self) -> f64 {
         (self.point_b - self.point_a - self.normal * self.lower).norm()

@@ -225,3 +225,20 @@ fn a_shell_is_the_surface_it_was_left_by_or_nothing() {
     }
     assert!(same > 100 && broken > 50, "{same} {broken}");
 }
+
+/// Their estimate was the depth of a polytope with no more than so many faces, which is off by 1e-4.
+#[test]
+fn bug_a_post_within_the_edge_of_a_box_had_a_poor_estimate() {
+    let half = Vec3::new(1.0, 1.0, 1.0);
+    let post = Convex::cylinder(0.5, 2.0);
+    for lean in [0.0, 1e-9, 1e-6] {
+        let turn = Quat::from_axis_angle(&Vec3::x_axis(), lean);
+        let at = Pose::from_parts(Vec3::new(1.0, 1.0, 0.0).into(), turn);
+        let c = convex_gap(&Convex::cuboid(half), &post, &at, &mut Warm::default());
+        // Every direction between the two faces is as good: the radius.
+        assert!((c.best_m + 0.5).abs() <= 2.0 * lean + 1e-9, "{lean}: {c:?}");
+        assert!(c.gap.contains(c.best_m), "{lean}: {c:?}");
+        let along = c.normal.dot(&(c.point_b - c.point_a));
+        assert!((along - c.best_m).abs() <= 1e-12, "{lean}: {c:?}");
+    }
+}
