@@ -105,8 +105,10 @@ fn sentence(row: &TouchingRow) -> String {
     } else {
         ""
     };
+    // Words have no unit.
+    let unit = row.known.gap_best_m.map_or("", |_| " m");
     format!(
-        "{}{}{touching}: gap {} m, proved {} .. {}",
+        "{}{}{touching}: gap {}{unit}, proved {} .. {}",
         of.unwrap_or_default(),
         clean(&row.b),
         end(row.known.gap_best_m, "not known"),
@@ -140,7 +142,7 @@ mod tests {
         };
         let text = as_text(&found, &[]);
         for words in [
-            "possible    evil?[2J: gap not known m, proved no lower end .. no upper end",
+            "possible    evil?[2J: gap not known, proved no lower end .. no upper end",
             "unknown     arm (stale)",
             "3 pairs",
             "complete    no",
