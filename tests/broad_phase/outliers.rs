@@ -84,3 +84,26 @@ fn bug_two_groups_far_apart_stood_in_a_cell_each_of_the_curve() {
         compare(&format!("two groups {far:e} m apart"), 2.5, groups);
     }
 }
+
+#[test]
+fn bug_a_crowd_that_came_beyond_the_array_of_a_few_was_compared_each_with_each() {
+    let mut world = World::new(5, BODIES);
+    let mut broad = BroadPhase::new(Method::UniformGrid);
+    let (mut pairs, mut delta) = (PairSet::new(NO_LIMIT), PairDelta::default());
+    // A few close together, and then all the others wherever.
+    for (bodies, reach) in [(0..100, 1.0), (100..BODIES, 10.0)] {
+        for i in bodies {
+            // Boxes of one size to the last bit: a larger one has all laid out anew.
+            let centre = world.random_vec(reach).map(|c| (c * 64.0).round() / 64.0);
+            world.bodies[i].aabb = at(centre, [0.25; 3]);
+            world.bodies[i].inside = true;
+            world.changes.inserted.push(World::slot(i));
+        }
+        delta.clear();
+        broad.update(&world.changes, &world, &world, &mut pairs, &mut delta);
+        world.changes.clear();
+    }
+    let tests = broad.work().tests;
+    let usual = 16 * BODIES as u64;
+    assert!(tests < usual, "{tests} comparisons, {usual} at most");
+}

@@ -42,6 +42,8 @@ pub(super) enum Kind {
 const COVERED_MAX: u64 = 64;
 /// Bodies placed at the edge of the array because they lie beyond it, one in so many, until it is laid out anew.
 const STRAYED: usize = 8;
+/// So many times as many bodies as the array was laid out for, and it is laid out anew.
+const GROWN: usize = 2;
 /// Cells twice as large as the largest box needs are laid out anew; looked at when so many boxes a body were placed.
 const SHRINK: f64 = 2.0;
 
@@ -89,6 +91,8 @@ pub(super) struct Grid {
     /// Boxes placed since then, and those of them beyond the edge.
     placed: usize,
     strayed: usize,
+    /// Bodies that the cells were laid out for.
+    laid: usize,
 }
 
 impl Grid {
@@ -108,6 +112,7 @@ impl Grid {
             largest_m: 0.0,
             placed: 0,
             strayed: 0,
+            laid: 0,
         }
     }
 
@@ -154,6 +159,10 @@ impl Grid {
         if self.strayed * STRAYED > bodies.len() {
             return true;
         }
+        // Before they stray: as many in the cells at the rim are all compared with one another.
+        if self.kind == Kind::Uniform && bodies.len() > GROWN * self.laid {
+            return true;
+        }
         if self.placed <= bodies.len() {
             return false;
         }
@@ -190,7 +199,7 @@ impl Grid {
         for slot in bodies {
             self.put(*slot, members, work);
         }
-        (self.placed, self.strayed) = (0, 0);
+        (self.placed, self.strayed, self.laid) = (0, 0, bodies.len());
     }
 
     /// Where a box stands: its level and its cells there; `None` for one that is compared with all.
