@@ -3,6 +3,7 @@
 //! In: a tick's input. Out: the world of this tick, and the end of its time as its frames ask for it.
 
 use super::{EditOutcome, Engine, TickInput};
+use crate::plan::Seen;
 use crate::wire::{Frame, Inbox, SOURCE_NAME_LEN, TickCause};
 
 impl Engine {
@@ -31,8 +32,20 @@ impl Engine {
         if !ages_only {
             self.config.budget = input.budget;
         }
-        if !input.edits.is_empty() || limited != self.config.budget.is_limited() {
+        let seen = self.see(input);
+        let is_news = seen != std::mem::replace(&mut self.seen, seen);
+        if is_news || !input.edits.is_empty() || limited != self.config.budget.is_limited() {
             self.replan();
+        }
+    }
+
+    /// What the plan is made for beside the scene: who has listened lately, and what the broad phase measured.
+    fn see(&mut self, input: &TickInput<'_>) -> Seen {
+        let axes = self.broad.work().axes;
+        let one_left_out = axes.iter().filter(|kept| **kept).count() == 2;
+        Seen {
+            demand: self.audience.note(input.demand),
+            skipped_axis: axes.iter().position(|kept| one_left_out && !kept),
         }
     }
 

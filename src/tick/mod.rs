@@ -4,6 +4,7 @@
 //! In: [`TickInput`] (frames, edits, demand, budget, and why this tick). Out: a filled [`Outbox`].
 
 mod admit;
+mod audience;
 pub mod build;
 mod end;
 mod floor;
@@ -25,7 +26,7 @@ use crate::ids::{PairKey, SourceSlot};
 use crate::limits;
 use crate::narrow::{Narrow, Wanted};
 use crate::pairs::{PairDelta, PairSet};
-use crate::plan::Plan;
+use crate::plan::{Plan, Seen};
 use crate::publish::{Publisher, View};
 use crate::scene::Scene;
 use crate::time::{Clock, Meter};
@@ -35,6 +36,7 @@ use crate::wire::{
 };
 use crate::world::{ChangeSet, Parts, World};
 
+use audience::Audience;
 use end::End;
 use floor::{Began, Floor, Laps};
 use rest::Rest;
@@ -61,6 +63,9 @@ pub struct Engine {
     narrow: Narrow,
     publisher: Publisher,
     plan: Plan,
+    audience: Audience,
+    /// What the plan in force was made for, beside the scene.
+    seen: Seen,
     out: Outbox,
     outcomes: Vec<EditOutcome>,
     clock: Arc<dyn Clock>,
@@ -139,6 +144,8 @@ impl Engine {
             rebuilds: 0,
             world,
             plan,
+            audience: Audience::default(),
+            seen: Seen::default(),
             clock,
             boot_id,
         })
@@ -191,7 +198,7 @@ impl Engine {
     }
 
     fn replan(&mut self) {
-        let plan = Plan::after(Some(&self.plan), &self.world, &self.config);
+        let plan = Plan::after(Some(&self.plan), &self.world, &self.config, self.seen);
         if plan != self.plan {
             self.out.plan = plan.to_json();
             self.out.plan_changed = true;

@@ -215,6 +215,12 @@ impl Filters {
         self.ignored
     }
 
+    /// How many rules of pairs there are.
+    #[must_use]
+    pub fn rules_count(&self) -> usize {
+        self.rules.list().len()
+    }
+
     /// Marks what the rules say of a slot's name, after the rules or the slot changed.
     pub(super) fn mark_ruled(&mut self, slot: usize) {
         let hot = &mut self.bodies[slot];

@@ -24,6 +24,7 @@ mod impacts;
 mod limits;
 mod motion;
 mod order;
+mod plan;
 mod pulse;
 mod rays;
 mod rest;
