@@ -1,6 +1,7 @@
 //! Names, numbers and times in few columns, for people. In: what the daemon says. Out: text without control characters.
 
 /// A name in so many columns at most; the end, which tells alike names apart, stays.
+#[cfg(any(feature = "tui", test))]
 pub(super) fn cut(name: &str, width: usize) -> String {
     let len = name.chars().count();
     // A name is the sender's word: what would move the cursor is not shown.
@@ -17,6 +18,7 @@ pub(super) fn cut(name: &str, width: usize) -> String {
 }
 
 /// A number in few columns; what is not known is a dash, what has no end says so.
+#[cfg(any(feature = "tui", test))]
 pub(super) fn number(value: f64, digits: usize) -> String {
     if value.is_nan() {
         "-".to_owned()

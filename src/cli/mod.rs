@@ -24,6 +24,7 @@ mod replay;
 mod report;
 mod ros;
 mod run;
+#[cfg(feature = "tui")]
 mod screen;
 mod worst;
 

@@ -69,22 +69,7 @@ pub(super) fn coloured_stderr() -> bool {
     std::io::stderr().is_terminal() && colours_wanted()
 }
 
-/// Whether stdout wants colours.
-pub(super) fn coloured_stdout() -> bool {
-    drawn_stdout() && colours_wanted()
-}
-
-/// Whether stdout is a screen that can be drawn on in place.
-pub(super) fn drawn_stdout() -> bool {
-    std::io::stdout().is_terminal() && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
-}
-
-/// Lines of the terminal behind stdout.
-pub(super) fn stdout_lines() -> Option<usize> {
-    let size = rustix::termios::tcgetwinsize(std::io::stdout()).ok()?;
-    (size.ws_row > 0).then(|| usize::from(size.ws_row))
-}
-
-fn colours_wanted() -> bool {
+/// Whether the environment leaves colours on.
+pub(super) fn colours_wanted() -> bool {
     std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty())
 }

@@ -1,17 +1,19 @@
 //! The screen of `sweepd monitor`: redrawn in place on a terminal, at most ten times a second; plain text elsewhere.
 
 use std::fmt::Write as _;
+use std::io::IsTerminal as _;
 
 use crate::error::Result;
 use crate::time::{Clock, SystemClock};
 use crate::transport::client::View;
 use crate::wire::{
-    EndCause, Event, PairRow, Stage, TickCause, TickRow, Verdict, name_str, pair_flags,
+    BodyRow, BodyStatus, EndCause, Event, PairRow, Stage, TickCause, TickRow, Verdict, name_str,
+    pair_flags,
 };
 
 use super::figures::{cut, number, seconds, time};
-use super::monitor::{Names, reasons, rejects, state_word, unknown_word};
-use super::out::{Out, coloured_stdout, drawn_stdout, stdout_lines};
+use super::monitor::{Names, reasons, rejects, state_word};
+use super::out::{Out, colours_wanted};
 use super::worst;
 
 /// Time between two drawings, nanoseconds: faster cannot be read, and would cost the daemon's machine a core.
@@ -350,5 +352,29 @@ impl Screen {
             events.join(", ")
         );
         self.paint(colour, line.trim_end())
+    }
+}
+
+/// Whether stdout wants colours.
+fn coloured_stdout() -> bool {
+    drawn_stdout() && colours_wanted()
+}
+
+/// Whether stdout is a screen that can be drawn on in place.
+fn drawn_stdout() -> bool {
+    std::io::stdout().is_terminal() && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
+}
+
+/// Lines of the terminal behind stdout.
+fn stdout_lines() -> Option<usize> {
+    let size = rustix::termios::tcgetwinsize(std::io::stdout()).ok()?;
+    (size.ws_row > 0).then(|| usize::from(size.ws_row))
+}
+
+/// The word of a body's status, when its place is not known.
+fn unknown_word(body: &BodyRow) -> Option<&'static str> {
+    match BodyStatus::from_code(body.status) {
+        Some(BodyStatus::Known | BodyStatus::Disabled) | None => None,
+        Some(status) => Some(status.word()),
     }
 }

@@ -1,0 +1,108 @@
+//! Where what is heard goes: JSON lines, or the screen.
+//!
+//! A build without the feature `tui` has no screen, and says so.
+
+use super::Names;
+use super::json;
+use crate::cli::args::MonitorArgs;
+use crate::cli::out::Out;
+#[cfg(feature = "tui")]
+use crate::cli::screen::Screen;
+use crate::error::Result;
+use crate::transport::client::{Restarted, View};
+
+/// Lines, or the screen.
+pub(super) enum Face {
+    /// A line of JSON a tick.
+    Lines,
+    /// Drawn in place on a terminal.
+    #[cfg(feature = "tui")]
+    Screen(Screen),
+}
+
+impl Face {
+    /// What was asked for.
+    #[cfg(feature = "tui")]
+    #[allow(
+        clippy::unnecessary_wraps,
+        reason = "without the feature it may be refused"
+    )]
+    pub(super) fn of(args: &MonitorArgs) -> Result<Self> {
+        if args.json {
+            return Ok(Self::Lines);
+        }
+        let screen = Screen::new(args.which.instance.clone(), args.pairs);
+        Ok(Self::Screen(screen))
+    }
+
+    /// Refuses what this build does not have.
+    #[cfg(not(feature = "tui"))]
+    pub(super) fn of(args: &MonitorArgs) -> Result<Self> {
+        use crate::error::Error;
+
+        if args.json {
+            return Ok(Self::Lines);
+        }
+        Err(Error::Usage(
+            "this sweepd was built without the screen of `monitor`: add --json for a line a tick, or build it with the feature `tui` (it is on by default)"
+                .to_owned(),
+        ))
+    }
+
+    pub(super) fn tick(
+        &mut self,
+        view: &View,
+        names: &Names,
+        args: &MonitorArgs,
+        out: &mut Out,
+    ) -> Result<()> {
+        match self {
+            Self::Lines => {
+                out.line(&json::tick(view, names, args).to_string())?;
+                out.flush()
+            }
+            #[cfg(feature = "tui")]
+            Self::Screen(screen) => screen.show(view, names, out),
+        }
+    }
+
+    /// The daemon began anew.
+    pub(super) fn restart(&mut self, news: &Restarted, names: &Names, out: &mut Out) -> Result<()> {
+        match self {
+            Self::Lines => {
+                out.line(&json::restart(news, names).to_string())?;
+                out.flush()
+            }
+            #[cfg(feature = "tui")]
+            Self::Screen(screen) => {
+                screen.note_restart();
+                Ok(())
+            }
+        }
+    }
+
+    /// Nothing has been heard for so long. In lines silence is silence.
+    #[cfg_attr(
+        not(feature = "tui"),
+        expect(unused_variables, reason = "lines do not say it")
+    )]
+    pub(super) fn silence(&mut self, silent_ns: u64, out: &mut Out) -> Result<()> {
+        match self {
+            Self::Lines => Ok(()),
+            #[cfg(feature = "tui")]
+            Self::Screen(screen) => screen.show_silence(silent_ns, out),
+        }
+    }
+
+    #[cfg_attr(
+        not(feature = "tui"),
+        expect(unused_variables, reason = "lines do not say it")
+    )]
+    pub(super) fn end(&self, out: &mut Out) -> Result<()> {
+        match self {
+            Self::Lines => Ok(()),
+            #[cfg(feature = "tui")]
+            Self::Screen(screen) => screen.end(out),
+        }
+    }
+}
