@@ -63,6 +63,7 @@ pub fn scene(bodies: Vec<BodySpec>) -> Scene {
         sources: vec![SourceSpec {
             name: "feed".to_owned(),
             timeout_ns: 1 << 60,
+            on_stale: Default::default(),
             ros2: None,
         }],
         bodies,

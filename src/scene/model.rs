@@ -42,6 +42,8 @@ pub struct SourceSpec {
     pub name: String,
     /// Without a frame for this long it is no longer alive and its bodies are stale, nanoseconds.
     pub timeout_ns: u64,
+    /// What happens to its bodies that are too old, where they do not say it themselves.
+    pub on_stale: OnStale,
     /// Which ROS 2 topics it is; `None`: a client over shared memory or on `~/transforms`.
     pub ros2: Option<RosSource>,
 }
@@ -88,8 +90,8 @@ pub struct BodySpec {
     pub max_speed_mps: Option<f64>,
     /// Weight of its pairs in the order of work, `limits::PRIORITY_MIN` to `PRIORITY_MAX`; 1: as any other.
     pub priority: f64,
-    /// What happens when it is too old.
-    pub on_stale: OnStale,
+    /// What happens when it is too old; `None`: what its source says.
+    pub on_stale: Option<OnStale>,
     /// Whether it takes part.
     pub enabled: bool,
 }
@@ -118,7 +120,7 @@ impl BodySpec {
             report_within_m: 0.0,
             max_speed_mps: None,
             priority: 1.0,
-            on_stale: OnStale::default(),
+            on_stale: None,
             enabled: true,
         }
     }

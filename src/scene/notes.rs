@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::config::{BroadMethod, OnStale};
+use crate::config::BroadMethod;
 use crate::scene::table::shortened;
 use crate::scene::{BodySpec, PairRule, Scene, is_pattern, pattern_matches};
 use crate::shape::ShapeSpec;
@@ -94,8 +94,7 @@ impl Scene {
                 shortened(&body.name)
             ));
         }
-        let unread =
-            |body: &&BodySpec| body.attached_to.is_some() && body.on_stale != OnStale::default();
+        let unread = |body: &&BodySpec| body.attached_to.is_some() && body.on_stale.is_some();
         if let Some(body) = self.bodies.iter().find(unread) {
             notes.push(format!(
                 "body \"{}\" has on_stale, but is attached: that of the body it hangs on counts",

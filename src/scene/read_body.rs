@@ -130,7 +130,7 @@ pub(crate) fn read_body(node: Node, blobs: Option<&[u8]>) -> Result<BodyDraft, F
         priority: table
             .number_within("priority", PRIORITY_MIN, PRIORITY_MAX)?
             .unwrap_or(plain.priority),
-        on_stale: read_on_stale(&mut table)?.unwrap_or(plain.on_stale),
+        on_stale: read_on_stale(&mut table)?,
         enabled: table.flag("enabled")?.unwrap_or(plain.enabled),
         ..plain
     };
@@ -173,7 +173,8 @@ fn check_deforms(spec: &BodySpec) -> Result<(), &'static str> {
     Ok(())
 }
 
-fn read_on_stale(table: &mut Table) -> Result<Option<OnStale>, Fault> {
+/// What happens to what is too old.
+pub(super) fn read_on_stale(table: &mut Table) -> Result<Option<OnStale>, Fault> {
     let at = table.at("on_stale");
     let Some(word) = table.text("on_stale")? else {
         return Ok(None);

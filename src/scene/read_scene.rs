@@ -8,7 +8,7 @@ use crate::config::{BroadMethod, Config, Limits, MeshSearch, Mode};
 use crate::error::{Error, Result};
 use crate::limits;
 use crate::scene::node::{Fault, Node, Value};
-use crate::scene::read_body::{BodyDraft, SOURCE_NAME_BYTES_MAX, read_body, title};
+use crate::scene::read_body::{BodyDraft, SOURCE_NAME_BYTES_MAX, read_body, read_on_stale, title};
 use crate::scene::read_ros::{no_lockstep, read_ros};
 use crate::scene::read_rule::read_rule;
 use crate::scene::read_viewpoint::read_viewpoint;
@@ -192,7 +192,11 @@ fn read_sources(node: Option<Node>) -> std::result::Result<Vec<SourceSpec>, Faul
     let mut sources: Vec<SourceSpec> = Vec::new();
     for node in items(node, "source")? {
         let at = node.at;
-        let mut table = Table::open(node, "a source", &["name", "timeout_ms", "ros2"])?;
+        let mut table = Table::open(
+            node,
+            "a source",
+            &["name", "timeout_ms", "on_stale", "ros2"],
+        )?;
         let at_name = table.at("name");
         let Some(name) = table.name("name", SOURCE_NAME_BYTES_MAX)? else {
             return Err(Fault::new(at, "a source needs `name`: add it"));
@@ -212,11 +216,15 @@ fn read_sources(node: Option<Node>) -> std::result::Result<Vec<SourceSpec>, Faul
         let timeout_ns = time_ns(&mut table, "timeout_ms", 1e-3)
             .map_err(|fault| fault.within(&format!("source \"{shown}\"")))?
             .unwrap_or(limits::TIMEOUT_MS_DEFAULT * 1_000_000);
+        let on_stale = read_on_stale(&mut table)
+            .map_err(|fault| fault.within(&format!("source \"{shown}\"")))?
+            .unwrap_or_default();
         let ros2 = read_ros(table.take("ros2"))
             .map_err(|fault| fault.within(&format!("source \"{shown}\"")))?;
         sources.push(SourceSpec {
             name,
             timeout_ns,
+            on_stale,
             ros2,
         });
     }

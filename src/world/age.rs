@@ -4,7 +4,10 @@
 //! nearest time-out, the oldest and newest stamp in use.
 
 use super::World;
+use super::body::Body;
 use super::census::{slot_at, source_at};
+use super::source::SourceState;
+use crate::config::OnStale;
 use crate::ids::BodySlot;
 use crate::wire::BodyStatus;
 
@@ -184,5 +187,20 @@ impl World {
             }
             self.settle(slot, moved);
         }
+    }
+
+    fn source_of(&self, body: &Body) -> Option<&SourceState> {
+        body.source.and_then(|s| self.sources.get(s.index()))
+    }
+
+    /// The time-out of a body's source; none for a body without one, which cannot move.
+    pub(super) fn timeout_of(&self, body: &Body) -> u64 {
+        self.source_of(body).map_or(u64::MAX, |s| s.timeout_ns)
+    }
+
+    /// What happens to a body that is too old, as it or its source says.
+    pub(super) fn on_stale_of(&self, body: &Body) -> OnStale {
+        let of_source = self.source_of(body).map(|s| s.on_stale);
+        body.on_stale.or(of_source).unwrap_or_default()
     }
 }

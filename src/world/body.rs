@@ -62,8 +62,8 @@ pub struct Body {
     pub max_speed_mps: Option<f64>,
     /// Weight of its pairs in the order of work; 1: as any other.
     pub priority: f64,
-    /// What happens when it is too old.
-    pub on_stale: OnStale,
+    /// What happens when it is too old; `None`: what its source says.
+    pub on_stale: Option<OnStale>,
     /// Whether it has a proxy in the broad phase.
     pub in_broad: bool,
 }

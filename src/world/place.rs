@@ -127,7 +127,7 @@ impl World {
         if age_ns < self.timeout_of(root_body) {
             return (BodyStatus::Known, 0.0);
         }
-        match root_body.on_stale {
+        match self.on_stale_of(root_body) {
             OnStale::Hold => (BodyStatus::Held, 0.0),
             OnStale::Remove => (BodyStatus::RemovedByAge, f64::INFINITY),
             OnStale::Unknown => {
@@ -143,12 +143,6 @@ impl World {
                 )
             }
         }
-    }
-
-    /// The time-out of a body's source; none for a body without one, which cannot move.
-    pub(super) fn timeout_of(&self, body: &Body) -> u64 {
-        let source = body.source.and_then(|s| self.sources.get(s.index()));
-        source.map_or(u64::MAX, |s| s.timeout_ns)
     }
 
     /// Puts a body at a pose and takes its motion and tight box with it.

@@ -4,6 +4,7 @@
 //! over stay over for this boot.
 
 use super::body::Body;
+use crate::config::OnStale;
 use crate::ids::{BodySlot, SourceSlot};
 use crate::limits::SESSIONS_OVER_MAX;
 use crate::scene::SourceSpec;
@@ -21,6 +22,8 @@ pub struct SourceState {
     pub timeout_ns: u64,
     /// The same from the next tick on, where it was set.
     pub(super) next_timeout_ns: Option<u64>,
+    /// What happens to its bodies that are too old, where they do not say it themselves.
+    pub on_stale: OnStale,
     /// Session in force; 0: none.
     pub session: u64,
     /// Newest `(epoch, seq)` taken note of, waiting frames included.
@@ -63,6 +66,7 @@ impl SourceState {
         Self {
             name: spec.name.clone(),
             timeout_ns: spec.timeout_ns,
+            on_stale: spec.on_stale,
             next_timeout_ns: None,
             session: 0,
             order: None,

@@ -226,10 +226,10 @@ impl Draw {
         spec.continuous = !solid.is_half_space && rng.below(3) == 0;
         spec.max_speed_mps = (rng.below(2) > 0).then_some(1.0);
         spec.on_stale = [
-            OnStale::Unknown,
-            OnStale::Unknown,
-            OnStale::Hold,
-            OnStale::Remove,
+            None,
+            Some(OnStale::Unknown),
+            Some(OnStale::Hold),
+            Some(OnStale::Remove),
         ][rng.below(4)];
         spec.report_within_m = [0.0, 0.3][rng.below(2)];
         spec.enabled = rng.below(8) > 0;

@@ -95,7 +95,7 @@ impl World {
         } else if age_ns < TIMEOUT_NS {
             BodyStatus::Known
         } else {
-            match root.solid.spec.on_stale {
+            match root.solid.spec.on_stale.unwrap_or_default() {
                 OnStale::Hold => BodyStatus::Held,
                 OnStale::Remove => BodyStatus::RemovedByAge,
                 OnStale::Unknown => BodyStatus::Stale,

@@ -21,7 +21,12 @@ fn spec(rng: &mut Rng, id: u64) -> BodySpec {
     BodySpec {
         source: Some(rng.below(2)),
         max_speed_mps: rng.once_in(2).then_some(1.0),
-        on_stale: [OnStale::Unknown, OnStale::Hold, OnStale::Remove][rng.below(3)],
+        on_stale: [
+            None,
+            Some(OnStale::Unknown),
+            Some(OnStale::Hold),
+            Some(OnStale::Remove),
+        ][rng.below(4)],
         report_within_m: if rng.once_in(3) { 0.25 } else { 0.0 },
         ..moving(&name, id)
     }

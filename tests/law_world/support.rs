@@ -114,6 +114,7 @@ pub(crate) fn scene(bodies: Vec<BodySpec>, rules: Vec<PairRule>) -> Scene {
     let source = |name: &str| SourceSpec {
         name: name.to_owned(),
         timeout_ns: TIMEOUT_NS,
+        on_stale: Default::default(),
         ros2: None,
     };
     Scene {
@@ -164,8 +165,12 @@ impl Bench {
     }
 
     pub(crate) fn with_rules(bodies: Vec<BodySpec>, rules: Vec<PairRule>) -> Self {
-        let shapes = bodies.iter().map(|_| cube()).collect();
-        let world = World::new(&scene(bodies, rules), shapes, START_NS).unwrap();
+        Self::with(&scene(bodies, rules))
+    }
+
+    pub(crate) fn with(scene: &Scene) -> Self {
+        let shapes = scene.bodies.iter().map(|_| cube()).collect();
+        let world = World::new(scene, shapes, START_NS).unwrap();
         let mut bench = Self {
             world,
             now_ns: START_NS,

@@ -5,7 +5,7 @@ use sweepd::math::Pose;
 use sweepd::scene::BodySpec;
 use sweepd::wire::{BodyStatus, EndCause, Reason, RejectReason, TransformRow};
 
-use crate::support::{Bench, MS, TIMEOUT_NS, admitted, fixed, frame, moving, row};
+use crate::support::{Bench, MS, TIMEOUT_NS, admitted, fixed, frame, moving, row, scene};
 
 #[test]
 fn law_3_7_a_start_pose_is_never_evidence() {
@@ -161,7 +161,7 @@ fn law_3_7_the_reaches_of_two_stale_bodies_that_approach_add() {
 #[test]
 fn law_3_7_on_stale_hold_keeps_the_pose_and_says_so() {
     let held = BodySpec {
-        on_stale: OnStale::Hold,
+        on_stale: Some(OnStale::Hold),
         ..moving("a", 1)
     };
     let mut bench = Bench::of(vec![held]);
@@ -178,7 +178,7 @@ fn law_3_7_on_stale_hold_keeps_the_pose_and_says_so() {
 #[test]
 fn law_3_7_on_stale_remove_takes_it_out_and_the_next_good_pose_brings_it_back() {
     let lost = BodySpec {
-        on_stale: OnStale::Remove,
+        on_stale: Some(OnStale::Remove),
         ..moving("a", 1)
     };
     let mut bench = Bench::of(vec![lost]);
@@ -190,6 +190,31 @@ fn law_3_7_on_stale_remove_takes_it_out_and_the_next_good_pose_brings_it_back() 
     bench.send(MS, "sim", 2, &[row(1, 0.0)]);
     assert_eq!(bench.status("a"), BodyStatus::Known);
     assert!(bench.inserted("a"));
+}
+
+#[test]
+fn law_3_7_on_stale_of_a_source_counts_for_its_bodies_that_do_not_say_it_themselves() {
+    let own = BodySpec {
+        on_stale: Some(OnStale::Unknown),
+        ..moving("own", 2)
+    };
+    let other = BodySpec {
+        source: Some(1),
+        ..moving("other", 3)
+    };
+    let hung = BodySpec {
+        attached_to: Some("a".to_owned()),
+        ..moving("hung", 4)
+    };
+    let mut scene = scene(vec![moving("a", 1), own, other, hung], Vec::new());
+    scene.sources[0].on_stale = OnStale::Hold;
+    let mut bench = Bench::with(&scene);
+    bench.send(MS, "sim", 1, &[row(1, 0.0), row(2, 5.0)]);
+    bench.send(MS, "robot", 1, &[row(3, 10.0)]);
+    bench.wait(TIMEOUT_NS);
+    let all = ["a", "own", "other", "hung"].map(|name| bench.status(name));
+    let (held, stale) = (BodyStatus::Held, BodyStatus::Stale);
+    assert_eq!(all, [held, stale, stale, held]);
 }
 
 #[test]
@@ -263,7 +288,7 @@ fn a_body_that_does_not_move_costs_no_entry_in_any_list() {
 #[test]
 fn bug_a_time_out_that_was_set_and_the_ages_of_before_did_not_agree() {
     let gone = BodySpec {
-        on_stale: OnStale::Remove,
+        on_stale: Some(OnStale::Remove),
         ..moving("b", 2)
     };
     let mut bench = Bench::of(vec![moving("a", 1), gone]);

@@ -163,6 +163,7 @@ impl Stage {
             sources: vec![SourceSpec {
                 name: "feed".to_owned(),
                 timeout_ns: 1 << 60,
+                on_stale: Default::default(),
                 ros2: None,
             }],
             bodies: ids.map(|id| body(id, report_m)).collect(),

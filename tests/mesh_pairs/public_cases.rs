@@ -154,6 +154,7 @@ fn by_engine([a, b]: [&Arc<Shape>; 2], poses: [&Pose; 2]) -> Said {
         sources: vec![SourceSpec {
             name: "feed".to_owned(),
             timeout_ns: 1 << 60,
+            on_stale: Default::default(),
             ros2: None,
         }],
         bodies: vec![body(1, REPORT_M), body(2, REPORT_M)],

@@ -334,6 +334,7 @@ pub fn any_scene(rng: &mut Rng, kinds: &[(usize, usize)]) -> (Vec<Couple>, Scene
         sources: vec![SourceSpec {
             name: "feed".to_owned(),
             timeout_ns: 1 << 40,
+            on_stale: Default::default(),
             ros2: None,
         }],
         bodies: specs,

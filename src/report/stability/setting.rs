@@ -29,6 +29,7 @@ pub(super) fn scene(case: &Case, truths: &[Vec<Truth>]) -> Scene {
         sources: vec![SourceSpec {
             name: "report".to_owned(),
             timeout_ns: 3_600_000_000_000,
+            on_stale: Default::default(),
             ros2: None,
         }],
         ..Scene::default()

@@ -39,6 +39,7 @@ fn every_edit_is_read() {
     let sources = ["other", "sim"].map(|name| SourceSpec {
         name: name.to_owned(),
         timeout_ns: 1,
+        on_stale: Default::default(),
         ros2: None,
     });
     let spec = draft.settle(&sources, Some(Path::new(""))).unwrap();
