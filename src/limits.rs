@@ -96,6 +96,8 @@ pub const HEARTBEAT_MS_DEFAULT: u64 = 100;
 pub const SPIN_US_DEFAULT: u64 = 50;
 /// Default time-out of a source, milliseconds.
 pub const TIMEOUT_MS_DEFAULT: u64 = 500;
+/// Files that a daemon must be allowed to open: it has some 80 open from its start on.
+pub const OPEN_FILES_LEAST: u64 = 96;
 /// Bytes of one scene edit request.
 pub const REQUEST_BYTES_MAX: usize = 1 << 29;
 /// Remembered sessions that are over, per daemon; beyond it the oldest is forgotten, and its client could come back.

@@ -384,3 +384,29 @@ fn bug_what_is_too_small_for_its_squares_is_refused_or_allowed_for() {
         assert_eq!(answers[0]["colliding"], truth < 1e-150, "{answers:?}");
     }
 }
+
+#[test]
+fn what_is_wrong_in_a_line_is_told_with_the_part_it_stands_in() {
+    let ball = json!({"type": "sphere", "radius": 1.0});
+    let good: Value = serde_json::from_str(&line("a", &ball, &ball, [0.0; 3])).unwrap();
+    let wrong = |change: &dyn Fn(&mut Value)| {
+        let mut text = good.clone();
+        change(&mut text);
+        let (whole, rows) = ask(text.to_string().as_bytes());
+        assert!(!whole);
+        rows[0]["error"].as_str().unwrap().to_owned()
+    };
+    let misspelt = wrong(&|line| line["b"] = json!({"type": "sphere", "raduis": 1.0}));
+    assert!(
+        misspelt.starts_with("line 1: b: unknown field `raduis`"),
+        "{misspelt}"
+    );
+    let short = wrong(&|line| line["pose_b"]["t"] = json!([0.0, 0.0]));
+    assert!(short.starts_with("line 1: pose_b: "), "{short}");
+    let renamed =
+        wrong(&|line| line["pose"] = line.as_object_mut().unwrap().remove("pose_a").unwrap());
+    assert_eq!(renamed, "line 1: it has no `pose_a`; is `pose` meant?");
+    let (_, rows) = ask(b"[1, 2]");
+    let listed = rows[0]["error"].as_str().unwrap();
+    assert!(listed.starts_with("line 1: it is no object"), "{listed}");
+}

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::time::{Clock, SystemClock};
 use crate::transport::client::{Client, FrameInfo, Heard, Rows};
-use crate::wire::{REJECTS_LEN, RejectReason, TransformRow, name_str};
+use crate::wire::{REJECTS_LEN, RejectReason, TickRow, TransformRow, name_str};
 
 use super::args::FeedArgs;
 use super::connect;
@@ -109,7 +109,40 @@ fn stream(
         }
         sleep_until(&clock, next_ns, stop);
     }
+    if args.frames.is_some() && frame > 0 && !stop.load(Ordering::Relaxed) {
+        conclude(client, source, frame)?;
+    }
     Ok(())
+}
+
+/// After the last of a number of frames: that none was used is no good end.
+fn conclude(client: &mut Client, source: &str, sent: u64) -> Result<()> {
+    let clock = SystemClock;
+    let until_ns = clock.monotonic_ns().saturating_add(HEED_NS);
+    loop {
+        // A tick that is under way tells no sources.
+        let view = client.view();
+        if !view.is_under_way()
+            && used(view.tick(), client.session(), source).is_some_and(|n| n > 0)
+        {
+            return Ok(());
+        }
+        if clock.monotonic_ns() >= until_ns {
+            break;
+        }
+        client.wait_tick(LOOK_NS)?;
+    }
+    Err(Error::Refused(format!(
+        "the daemon used none of the {sent} frames of `{source}`: look at its log, and at the `rejects` of \
+         `sweepd monitor --json`; does it run the same scene, and no other feed of this source?"
+    )))
+}
+
+/// Frames of this session that the daemon has used; `None`: another session speaks for the source, or none.
+fn used(tick: &TickRow, session: u64, source: &str) -> Option<u64> {
+    let mut own = tick.sources.iter().take(usize::from(tick.sources_len));
+    own.find(|row| name_str(&row.name) == Some(source) && row.session == session)
+        .map(|row| row.frames)
 }
 
 /// When a frame is, from the start: seconds and nanoseconds.
@@ -166,11 +199,7 @@ impl Heeded {
             };
             return Ok(());
         }
-        let own = tick.sources.iter().take(usize::from(tick.sources_len));
-        let own = own
-            .filter(|row| name_str(&row.name) == Some(source) && row.session == client.session())
-            .map(|row| row.frames)
-            .next();
+        let own = used(&tick, client.session(), source);
         let unused = !silent && own.is_none_or(|frames| frames == self.frames);
         let refused: Vec<String> = RejectReason::ALL
             .iter()

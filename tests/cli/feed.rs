@@ -133,6 +133,22 @@ fn it_sends_so_many_frames_and_moves_so_many_bodies_the_same_for_a_seed() {
 }
 
 #[test]
+fn bug_frames_of_which_none_was_used_are_no_good_end() {
+    let desk = Desk::new();
+    let path = pool(&desk, "12");
+    let _daemon = desk.start("run", &[&path]);
+    let mut client = desk.source("nobody");
+    let _first = desk.start("feed", &[&path, "--rate", "100"]);
+    tick_until(&mut client, "the first feed", |tick| {
+        tick.sources[0].seq >= 1
+    });
+    let mut second = desk.start("feed", &[&path, "--rate", "100", "--frames", "20"]);
+    assert_eq!(second.end().0.code(), Some(4), "{}", second.stderr());
+    let said = second.stderr();
+    assert!(said.contains("used none of the 20 frames"), "{said}");
+}
+
+#[test]
 fn with_work_of_its_own_it_leaves_the_rest_of_each_frame_to_the_daemon_and_tells_how_that_went() {
     let desk = Desk::new();
     let path = pool(&desk, "12");

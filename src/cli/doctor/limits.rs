@@ -3,6 +3,7 @@
 use rustix::process::{Resource, getrlimit};
 
 use super::{Finding, bytes};
+use crate::limits::OPEN_FILES_LEAST;
 
 /// A limit, and what is needed of it.
 struct Need {
@@ -26,7 +27,7 @@ const NEEDS: [Need; 3] = [
         what: "open files",
         flag: "-n",
         unit: 1,
-        least: 96,
+        least: OPEN_FILES_LEAST,
         wished: 1024,
         why: "a daemon has some 80 open, and some 7 more with each client",
         show: |count| count.to_string(),

@@ -1,6 +1,7 @@
 //! Shared memory and clocks: is there room, may this user write, do ages count.
 
 use rustix::fs::{Access, AtFlags, CWD, accessat, statfs, statvfs};
+use rustix::io::Errno;
 use rustix::time::{DynamicClockId, clock_gettime_dynamic};
 
 use super::{Finding, bytes};
@@ -44,7 +45,7 @@ fn room() -> Vec<Finding> {
         found.push(Finding::wrong(
             check,
             format!("this user may not make files in {SHARED} ({e})"),
-            "let it: `chmod 1777 /dev/shm`",
+            let_in(e),
         ));
     }
     if statfs(SHARED).is_ok_and(|stat| stat.f_type != TMPFS) {
@@ -55,6 +56,15 @@ fn room() -> Vec<Finding> {
         ));
     }
     found
+}
+
+/// What to do where no file can be made.
+fn let_in(because: Errno) -> &'static str {
+    if because == Errno::ROFS {
+        "it is mounted read-only: `mount -o remount,rw /dev/shm`, or start the container with a writable one"
+    } else {
+        "let it: `chmod 1777 /dev/shm`"
+    }
 }
 
 /// * `entries` - files that can still be made; `None`: no limit.

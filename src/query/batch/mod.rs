@@ -8,9 +8,9 @@ mod pieces;
 use std::io::{BufRead, ErrorKind, Read, Write};
 
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Map, Value};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, nearest};
 use crate::limits::REQUEST_BYTES_MAX;
 use crate::math::{Pose, Vec3, pose_from, relative};
 use crate::narrow::exact::Closest;
@@ -18,8 +18,10 @@ use crate::shape::ShapeSpec;
 
 use pieces::{Kind, Pieces, gap};
 
+/// What a case is made of.
+const PARTS: [&str; 5] = ["id", "a", "b", "pose_a", "pose_b"];
+
 /// A case as it is written.
-#[derive(Deserialize)]
 struct Case {
     a: ShapeSpec,
     b: ShapeSpec,
@@ -137,11 +139,7 @@ fn answer_line(text: &[u8]) -> std::result::Result<Answer, (Value, String)> {
     let mut value: Value =
         serde_json::from_slice(text).map_err(|e| (Value::Null, format!("not JSON: {e}")))?;
     let id = value.get_mut("id").map_or(Value::Null, Value::take);
-    let case: Case = match Case::deserialize(&value) {
-        Ok(case) => case,
-        Err(e) => return Err((id, e.to_string())),
-    };
-    match answer(&case) {
+    match Case::read(&value).and_then(|case| answer(&case)) {
         Ok(answer) => Ok(Answer { id, ..answer }),
         Err(why) => Err((id, why)),
     }
@@ -178,6 +176,36 @@ fn shown(closest: &Closest, pose_a: &Pose, surface: bool) -> Answer {
         point_b_rel: b.into(),
         colliding: closest.collides(),
     }
+}
+
+impl Case {
+    /// Part by part, so that what is wrong is told with where it stands.
+    fn read(line: &Value) -> std::result::Result<Self, String> {
+        let Value::Object(parts) = line else {
+            return Err("it is no object: write {\"id\": .., \"a\": .., \"b\": .., \"pose_a\": .., \"pose_b\": ..}".to_owned());
+        };
+        Ok(Self {
+            a: part(parts, "a")?,
+            b: part(parts, "b")?,
+            pose_a: part(parts, "pose_a")?,
+            pose_b: part(parts, "pose_b")?,
+        })
+    }
+}
+
+/// One part of a case.
+fn part<'a, T: Deserialize<'a>>(
+    parts: &'a Map<String, Value>,
+    key: &str,
+) -> std::result::Result<T, String> {
+    let Some(value) = parts.get(key) else {
+        let others = parts.keys().map(String::as_str);
+        let others: Vec<&str> = others.filter(|other| !PARTS.contains(other)).collect();
+        let meant = nearest(key, &others);
+        let meant = meant.map_or(String::new(), |other| format!("; is `{other}` meant?"));
+        return Err(format!("it has no `{key}`{meant}"));
+    };
+    T::deserialize(value).map_err(|e| format!("{key}: {e}"))
 }
 
 impl Placed {

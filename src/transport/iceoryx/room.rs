@@ -1,11 +1,13 @@
 //! Whether shared memory has room for a scene's messages: who writes beyond its end is killed (SIGBUS), with no error
-//! to handle. In: the scene's sizes. Out: bytes, and what to say.
+//! to handle. In: the scene's sizes. Out: bytes, and what to say. And whether so many files may be open as it takes.
 
 use rustix::fs::statvfs;
+use rustix::process::{Resource, getrlimit};
 
 use super::lock::LOCK_DIR;
 use crate::config::Limits;
-use crate::limits::REGIONS_PER_PAIR_MAX;
+use crate::error::{Error, Result};
+use crate::limits::{OPEN_FILES_LEAST, REGIONS_PER_PAIR_MAX};
 use crate::wire::{BodyRow, ContactRow, NameRow, PairRow, RegionRow, TransformVelRow};
 
 /// Messages of a topic that are there at once: one that is written, one kept for late joiners, one that is read. Where
@@ -73,6 +75,25 @@ fn told(free: u64, needed: u64) -> Option<String> {
     })
 }
 
+/// Refuses to begin where it would end halfway, with an error that names no cause.
+///
+/// # Errors
+/// `Error::Refused` when this process may open fewer files than a daemon needs.
+pub(super) fn enough_files() -> Result<()> {
+    enough(getrlimit(Resource::Nofile).current)
+}
+
+/// * `files` - that may be open; `None`: any number.
+fn enough(files: Option<u64>) -> Result<()> {
+    match files {
+        Some(files) if files < OPEN_FILES_LEAST => Err(Error::Refused(format!(
+            "this process may open {files} files, and a daemon needs {OPEN_FILES_LEAST} and some 7 more with each \
+             client: `ulimit -n 1024` in the shell that starts it, or in its service's unit"
+        ))),
+        _ => Ok(()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -119,5 +140,15 @@ mod tests {
             "{text}"
         );
         assert_eq!(scarce(0), None);
+    }
+
+    #[test]
+    fn bug_too_few_files_were_told_as_clients_of_another_version() {
+        let error = enough(Some(60)).unwrap_err().to_string();
+        assert!(
+            error.contains("ulimit -n") && error.contains("60 files"),
+            "{error}"
+        );
+        assert!(enough(Some(OPEN_FILES_LEAST)).is_ok() && enough(None).is_ok());
     }
 }

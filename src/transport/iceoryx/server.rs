@@ -31,6 +31,7 @@ use super::lock::{Holder, InstanceLock, RootLock};
 use super::place::Place;
 use super::process::process;
 use super::qos::{self, Ipc, Open, events, failed};
+use super::room::enough_files;
 use crate::error::{Error, Result};
 use crate::limits;
 use crate::time::{Clock, Seldom};
@@ -180,6 +181,7 @@ impl Server {
     pub fn open(options: ServerOptions) -> Result<Self> {
         let place = &options.place;
         place.check_owner()?;
+        enough_files()?;
         let lock = InstanceLock::take(place, &holder(&options))?;
         let root = RootLock::hold(place)?;
         let node = qos::node(place, "daemon")?;
