@@ -185,6 +185,7 @@ def test_bug_what_a_boot_that_came_and_went_unseen_left_was_followed_for_ever():
     client = sweepd.Client.__new__(sweepd.Client)
     client._held = client._tick = None
     client._boots_over, client._topics, client._now, client._ahead = [], {}, {}, {"names": None}
+    client._waited = {"names": 0}
     client._list = SimpleNamespace(boot_id=0)
     client._ports = SimpleNamespace(tick=tick, message=lambda topic: None, close=lambda: None)
     assert client._take()
@@ -192,3 +193,20 @@ def test_bug_what_a_boot_that_came_and_went_unseen_left_was_followed_for_ever():
         client._take()
     assert client._take() and client._take() and not client._take()
     assert (client._tick.header.boot_id, client._tick.header.tick) == (3, 2)
+
+
+def test_bug_a_message_of_a_boot_that_went_unseen_held_back_those_of_the_boot_after_it():
+    def header(boot_id, tick):
+        return layout.MessageHeader(boot_id=boot_id, tick=tick)
+
+    queue = [(header(2, 5), "of a boot between"), (header(3, 1), "of the boot in force")]
+    client = sweepd.Client.__new__(sweepd.Client)
+    client._boots_over, client._now, client._ahead, client._waited = [1], {"names": None}, {"names": None}, {"names": 0}
+    client._ports = SimpleNamespace(message=lambda topic: queue.pop(0) if queue else None, close=lambda: None)
+    for tick in range(1, 16):
+        client._advance("names", header(3, tick))
+        assert client._now["names"] is None, "ticks of the boot between may still come"
+    for tick in range(16, 20):
+        client._advance("names", header(3, tick))
+    assert client._now["names"][1] == "of the boot in force"
+    assert client._boots_over == [1, 2]

@@ -19,6 +19,8 @@ from .turns import Turns, in_turn
 
 _LOOK_AGAIN_S = 0.05
 _BOOTS_OVER_MAX = 16
+# ticks of the boot in force that may still come while a message of the next one is there: what a queue holds, twice
+_TICKS_LEFT_MAX = 16
 # ticks that one look takes at most: more than wait in its queues
 _DRAINED_MAX = 32
 _NAMES_TOLD = 5
@@ -154,6 +156,7 @@ class Client:
             self._ports.close()
             raise
         self._ahead = {topic: None for topic in self._topics}
+        self._waited = {topic: 0 for topic in self._topics}
         self._now = {topic: None for topic in self._topics}
         self._list = PairList()
         #: This client's session, drawn at its start.
@@ -520,7 +523,7 @@ class Client:
             if old and old.boot_id != new.boot_id:
                 # there is one daemon at a time: what is left of one that came and went unseen is older
                 if tick.sent_ns < self._tick.sent_ns:
-                    self._boots_over = [*self._boots_over[1 - _BOOTS_OVER_MAX :], new.boot_id]
+                    self._note_over(new.boot_id)
                     continue
                 self._restart(old, tick)
             # a tick that takes longer than a heartbeat is told of under its own number before it is there itself
@@ -535,7 +538,7 @@ class Client:
             return True
 
     def _restart(self, old, tick):
-        self._boots_over = [*self._boots_over[1 - _BOOTS_OVER_MAX :], old.boot_id]
+        self._note_over(old.boot_id)
         ends = np.empty((0, 2), np.uint64)
         pairs, rows = self._now.get("pairs"), None
         if pairs is not None and pairs[0].boot_id == old.boot_id:
@@ -553,12 +556,25 @@ class Client:
         self._advance("names", tick.header)
         raise Restarted(old.boot_id, tick.header.boot_id, ends)
 
+    def _note_over(self, boot_id):
+        self._boots_over = [*self._boots_over[1 - _BOOTS_OVER_MAX :], boot_id]
+
+    def _is_in_vain(self, topic, boot_id):
+        """Whether a message of another boot than the tick's waits for a tick that no longer comes: that boot went unseen."""
+        self._waited[topic] += 1
+        in_vain = self._waited[topic] > _TICKS_LEFT_MAX
+        if in_vain:
+            self._waited[topic] = 0
+            self._note_over(boot_id)
+        return in_vain
+
     def _advance(self, topic, tick):
         """Takes messages up to the tick; one of a later tick or boot is kept for then."""
         while True:
             ahead = self._ahead[topic]
             if ahead is None:
                 ahead = self._ahead[topic] = self._ports.message(topic)
+                self._waited[topic] = 0
             if ahead is None:
                 return
             header = ahead[0]
@@ -572,7 +588,7 @@ class Client:
                 if header.tick == tick.tick:
                     # no more is of this tick
                     return
-            else:
+            elif header.boot_id == tick.boot_id or not self._is_in_vain(topic, header.boot_id):
                 return
             ahead = None
 
@@ -582,7 +598,9 @@ class Client:
             # the place went to another reader when the port was to be renewed
             self._renew_list()
         while True:
-            ahead, self._ahead["changes"] = self._ahead["changes"] or self._ports.message("changes"), None
+            ahead, self._ahead["changes"] = self._ahead["changes"], None
+            if ahead is None:
+                ahead, self._waited["changes"] = self._ports.message("changes"), 0
             if ahead is None:
                 return
             header = ahead[0].message
@@ -590,7 +608,9 @@ class Client:
                 continue
             if header.boot_id != tick.boot_id or header.tick > tick.tick:
                 self._ahead["changes"] = ahead
-                return
+                if header.boot_id == tick.boot_id or not self._is_in_vain("changes", header.boot_id):
+                    return
+                continue
             self._now["changes"] = None
             if self._list.take(*ahead):
                 ahead = None
