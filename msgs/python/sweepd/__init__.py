@@ -4,7 +4,13 @@
 when it is first named.
 """
 
+from typing import TYPE_CHECKING
+
 from . import layout
+
+if TYPE_CHECKING:
+    from .client import Client, Result
+    from .errors import Refused, Restarted, Skipped, SweepdError, TimedOut
 
 __all__ = ["Client", "Refused", "Restarted", "Result", "Skipped", "SweepdError", "TimedOut", "layout"]
 __version__ = "0.1.0"

@@ -1,13 +1,17 @@
 """The client: poses out, the result of exactly that frame in."""
 
+from __future__ import annotations
+
 import ctypes
 import difflib
 import json
 import operator
 import secrets
 import time
+from typing import Any, Iterable, Mapping, Optional, Sequence, Union
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import layout
 from .errors import Refused, Restarted, Skipped, SweepdError, TimedOut
@@ -36,6 +40,8 @@ _TOPICS = {
 }
 _HEADERS = {"changes": layout.ChangesHeader}
 _VERTEX = np.dtype(layout.VertexRow)
+#: Poses of bodies as ``Client.send`` describes them: by name, columns, or rows.
+Poses = Union[Mapping[str, Sequence[ArrayLike]], Sequence[ArrayLike], np.ndarray]
 _POSES = ("transforms", layout.TransformRow)
 _MOTION = ("transforms_vel", layout.TransformVelRow)
 
@@ -71,24 +77,26 @@ class Result:
     list is not whole (yet, or again). Copies (``copy.deepcopy``) and pickles are whole.
     """
 
-    def __init__(self, tick, messages, listing, turns):
+    def __init__(self, tick: layout.TickRow, messages: dict[str, Any], listing: PairList, turns: Turns) -> None:
         self.tick = tick
         self._list, self._turns = listing, turns
+        self.changes_header: Optional[layout.ChangesHeader]
+        self.changes: Optional[np.ndarray]
         self.changes_header, self.changes = messages.pop("changes", (None, None))
-        self.pairs = messages.get("pairs")
-        self.contacts = messages.get("contacts")
-        self.regions = messages.get("regions")
-        self.bodies = messages.get("bodies")
-        self.body_verdicts = messages.get("body_verdicts")
+        self.pairs: Optional[np.ndarray] = messages.get("pairs")
+        self.contacts: Optional[np.ndarray] = messages.get("contacts")
+        self.regions: Optional[np.ndarray] = messages.get("regions")
+        self.bodies: Optional[np.ndarray] = messages.get("bodies")
+        self.body_verdicts: Optional[np.ndarray] = messages.get("body_verdicts")
 
     @property
-    def state(self):
+    def state(self) -> str:
         """The tick in one word: clear, near, possible, unknown or colliding."""
         return layout.State(self.tick.header.state).name.lower()
 
     @property
     @in_turn
-    def listed(self):
+    def listed(self) -> Optional[np.ndarray]:
         """What ``pairs`` would hold, kept from ``changes``: an array of its own; None where ``changes`` is.
 
         Made when it is asked for, which is to be before the client goes on to the next tick.
@@ -100,7 +108,7 @@ class Result:
         return self._list.rows()
 
     @property
-    def colliding(self):
+    def colliding(self) -> np.ndarray:
         """``(n, 2)`` ids of the pairs certified colliding at the poses of this tick, by id."""
         rows = self.listed if self.pairs is None else self.pairs
         if rows is None:
@@ -125,15 +133,15 @@ class Client:
 
     def __init__(
         self,
-        instance="default",
-        source="sim",
+        instance: str = "default",
+        source: Optional[str] = "sim",
         *,
-        quat_order,
-        timeout_s=5.0,
-        listen=("pairs", "contacts"),
-        root=None,
-        prefix=None,
-    ):
+        quat_order: str,
+        timeout_s: float = 5.0,
+        listen: Union[str, Iterable[str]] = ("pairs", "contacts"),
+        root: Optional[str] = None,
+        prefix: Optional[str] = None,
+    ) -> None:
         if quat_order not in ("xyzw", "wxyz"):
             raise SweepdError(f'quat_order={quat_order!r}: say "xyzw" or "wxyz"')
         self._turns = Turns()
@@ -160,10 +168,10 @@ class Client:
         self._now = {topic: None for topic in self._topics}
         self._list = PairList()
         #: This client's session, drawn at its start.
-        self.session = secrets.randbits(64) or 1
+        self.session: int = secrets.randbits(64) or 1
         self._epoch = 0
         self._seq = 0
-        self._versions = {}
+        self._versions: dict[int, int] = {}
         # messages of vertices of this session
         self._bent = 0
         self._requests = 0
@@ -171,30 +179,30 @@ class Client:
         self._held = None
         # of the daemon whose ids the names are
         self._boot = self._ports.hello.boot_id
-        self._boots_over = []
-        self._names = (None, {})
-        self._named = (None, {})
+        self._boots_over: list[int] = []
+        self._names: tuple[Any, dict[str, int]] = (None, {})
+        self._named: tuple[Any, dict[int, str]] = (None, {})
         self._wait_names(timeout_s)
 
-    def __enter__(self):
+    def __enter__(self) -> Client:
         return self
 
-    def __exit__(self, *_exception):
+    def __exit__(self, *_exception: Any) -> None:
         self.close()
 
     @in_turn
-    def close(self):
+    def close(self) -> None:
         """Frees the ports; the session is over."""
         self._ahead, self._now, self._held = {}, {}, None
         self._ports.close()
 
     @property
-    def hello(self):
+    def hello(self) -> layout.Hello:
         """What the daemon said of itself at the connection."""
         return self._ports.hello
 
     @property
-    def names(self):
+    def names(self) -> dict[str, int]:
         """Name to id of every body in the scene, as of the newest tick heard. Ids are those of one start of the daemon."""
         self._ports.check_open("names cannot be told")
         message = self._now.get("names")
@@ -208,7 +216,7 @@ class Client:
         return self._names[1]
 
     @property
-    def plan(self):
+    def plan(self) -> Optional[dict[str, Any]]:
         """What the daemon chose for the scene, left out, and why: a dict; None where the client does not listen to ``plan``."""
         self._ports.check_open("the plan cannot be told")
         message = self._now.get("plan")
@@ -216,7 +224,7 @@ class Client:
             return None
         return json.loads(message[1].tobytes())
 
-    def name_of(self, body):
+    def name_of(self, body: int) -> Optional[str]:
         """The name of a body by its id, as rows have it; None where the scene has none (any more)."""
         names = self.names
         if self._named[0] != self._names[0]:
@@ -228,8 +236,16 @@ class Client:
 
     @in_turn
     def send(
-        self, poses, *, stamp_ns=0, clock_id=0, scene_rev=0, deadline_ns=0, time_left_ns=0, partial=False
-    ):
+        self,
+        poses: Poses,
+        *,
+        stamp_ns: int = 0,
+        clock_id: int = 0,
+        scene_rev: int = 0,
+        deadline_ns: int = 0,
+        time_left_ns: int = 0,
+        partial: bool = False,
+    ) -> int:
         """Sends a frame and does not wait. Returns its number.
 
         * ``poses``: ``{name: (position, quaternion)}``, or ``(ids, positions, quaternions)`` as arrays of shape
@@ -261,19 +277,26 @@ class Client:
         return self._send(rows, flags, fields)
 
     @in_turn
-    def pause(self):
+    def pause(self) -> int:
         """Says that the world stands still: the ages of its bodies are renewed for one time-out."""
         return self._send(np.empty(0, POSE), layout.FrameFlags.PAUSED, {})
 
     @in_turn
-    def reset_epoch(self):
+    def reset_epoch(self) -> None:
         """Says that the world was reset: with the next frame every pair of the source's bodies ends."""
         self._epoch += 1
         # what the daemon had of vertices is void with it
         self._versions = {}
 
     @in_turn
-    def send_vertices(self, body, vertices, *, first=None, total=None):
+    def send_vertices(
+        self,
+        body: Union[str, int],
+        vertices: ArrayLike,
+        *,
+        first: Optional[int] = None,
+        total: Optional[int] = None,
+    ) -> int:
         """Sends vertices of a body that deforms; they belong with the frame that is sent next. Returns their version.
 
         * ``body``: name or id.
@@ -286,15 +309,15 @@ class Client:
         """
         if (first is None) != (total is None):
             raise SweepdError("a range of vertices needs first and total")
-        vertices = array("vertices", vertices)
-        if vertices.ndim != 2 or vertices.shape[1] != 3 or vertices.dtype.kind not in "fiu":
+        given: np.ndarray = array("vertices", vertices)
+        if given.ndim != 2 or given.shape[1] != 3 or given.dtype.kind not in "fiu":
             raise SweepdError(
-                f"vertices of shape {vertices.shape} and dtype {vertices.dtype}: give real numbers of shape (n, 3)"
+                f"vertices of shape {given.shape} and dtype {given.dtype}: give real numbers of shape (n, 3)"
             )
-        vertices = np.ascontiguousarray(vertices, dtype=np.float32)
+        moved = np.ascontiguousarray(given, dtype=np.float32)
         self._settle(0.0)
-        body = self._ids([body])[0] if isinstance(body, str) else whole("body", body)
-        base = self._versions.get(body)
+        id_: int = self._ids([body])[0] if isinstance(body, str) else whole("body", body)
+        base = self._versions.get(id_)
         if first is not None and base is None:
             raise SweepdError("a range of vertices changes those sent before: send all of them first")
         base = base or 0
@@ -304,25 +327,25 @@ class Client:
             epoch=self._epoch,
             seq=self._seq + 1,
             sent_ns=time.clock_gettime_ns(time.CLOCK_BOOTTIME),
-            body=body,
+            body=id_,
             version=base + 1,
             base_version=base,
             number=self._bent + 1,
             first=whole("first", first or 0, 32),
-            count=len(vertices),
-            total=len(vertices) if total is None else whole("total", total, 32),
+            count=len(moved),
+            total=len(moved) if total is None else whole("total", total, 32),
             flags=flags,
             schema=layout.WIRE_VERSION,
         )
         self._name(header)
-        rows = vertices.view(_VERTEX).reshape(len(vertices))
+        rows = moved.view(_VERTEX).reshape(len(moved))
         self._ports.send("vertices", layout.VertexRow, header, rows, wake=False)
-        self._versions[body] = base + 1
+        self._versions[id_] = base + 1
         self._bent += 1
         return base + 1
 
     @in_turn
-    def step(self, poses, timeout_s=1.0, **fields):
+    def step(self, poses: Poses, timeout_s: float = 1.0, **fields: Any) -> Result:
         """Sends a frame and returns the :class:`Result` of exactly that frame.
 
         Raises TimedOut (with what was refused meanwhile), Restarted or Skipped.
@@ -345,13 +368,13 @@ class Client:
                 raise Skipped(seq)
 
     @in_turn
-    def latest(self):
+    def latest(self) -> Optional[Result]:
         """The newest :class:`Result` there is, without waiting; None before the first tick."""
         self._drain()
         return None if self._tick is None else self._result()
 
     @in_turn
-    def wait(self, timeout_s=1.0):
+    def wait(self, timeout_s: float = 1.0) -> Result:
         """The :class:`Result` of the next tick; raises TimedOut or Restarted."""
         timeout_s = seconds(timeout_s)
         if not self._next(time.monotonic() + timeout_s):
@@ -359,7 +382,7 @@ class Client:
         return self._result()
 
     @in_turn
-    def request(self, edits, blobs=(), timeout_s=5.0):
+    def request(self, edits: Any, blobs: Iterable[Any] = (), timeout_s: float = 5.0) -> dict[str, Any]:
         """Sends a scene edit or a query (anything ``json`` can write) and returns the daemon's answer as a dict.
 
         Raises Refused with the daemon's words when it refused, TimedOut when it is silent. After an edit ``names`` are
@@ -397,7 +420,7 @@ class Client:
             self._ports.wait(min(left, _LOOK_AGAIN_S))
 
     @in_turn
-    def rows(self, poses):
+    def rows(self, poses: Poses) -> np.ndarray:
         """Poses as an array of TransformRow, to be filled once and changed in place for later frames.
 
         With velocities (see ``send``) of TransformVelRow, whose field ``transform`` is the pose.
@@ -420,7 +443,7 @@ class Client:
         rows.boot_id = self._boot
         return rows
 
-    def loan(self, count, *, velocities=False):
+    def loan(self, count: int, *, velocities: bool = False) -> np.ndarray:
         """An array of ``count`` rows to be filled: ``body``, ``position`` and ``orientation`` of each.
 
         TransformRow, or with ``velocities`` TransformVelRow, whose velocities are 0 at first. ``orientation`` is

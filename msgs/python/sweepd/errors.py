@@ -1,5 +1,12 @@
 """What can go wrong for a client; every message says what to change."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+
 
 class SweepdError(Exception):
     """Any failure of this package."""
@@ -20,7 +27,7 @@ class Restarted(SweepdError):
     that you keep, and send all vertices of bodies that deform.
     """
 
-    def __init__(self, old_boot, new_boot, ends):
+    def __init__(self, old_boot: int, new_boot: int, ends: np.ndarray) -> None:
         # as they were given, for copies and pickles are made of these
         super().__init__(old_boot, new_boot, ends)
         self.old_boot = old_boot
@@ -28,18 +35,18 @@ class Restarted(SweepdError):
         #: ``(body_a, body_b)`` of each pair that was certified colliding when last heard of.
         self.ends = ends
 
-    def __str__(self):
+    def __str__(self) -> str:
         return f"the daemon restarted (boot {self.old_boot:x} is over, {self.new_boot:x} began)"
 
 
 class Skipped(SweepdError):
     """A tick used a newer frame of this source; this one has no result of its own."""
 
-    def __init__(self, seq):
+    def __init__(self, seq: int) -> None:
         super().__init__(seq)
         self.seq = seq
 
-    def __str__(self):
+    def __str__(self) -> str:
         return (
             f"frame {self.seq} was passed over: a tick used a newer frame of the source."
             ' For a result of each frame, send one when that of the last is there, or write on_frame = "SOURCE" into [run] of the scene'

@@ -28,7 +28,7 @@ _ROWS_MAX = 1 << 26
 _FOREIGN = tuple(kind for kind in vars(iox2).values() if isinstance(kind, type) and issubclass(kind, Exception))
 
 # What has ports or samples of iceoryx2.
-_LIVING = weakref.WeakSet()
+_LIVING: "weakref.WeakSet[object]" = weakref.WeakSet()
 _keep = ctypes.pythonapi.Py_IncRef
 _keep.argtypes, _keep.restype = (ctypes.py_object,), None
 

@@ -1,9 +1,14 @@
 """Who may use a client: one thread at a time."""
 
+from __future__ import annotations
+
 import functools
 import threading
+from typing import Any, Callable, TypeVar
 
 from .errors import SweepdError
+
+_Method = TypeVar("_Method", bound=Callable[..., Any])
 
 
 class Turns:
@@ -26,7 +31,7 @@ class Turns:
         self._lock.release()
 
 
-def in_turn(method):
+def in_turn(method: _Method) -> _Method:
     """A method of what has ``_turns``, for one thread at a time."""
 
     @functools.wraps(method)
@@ -34,4 +39,4 @@ def in_turn(method):
         with self._turns:
             return method(self, *args, **kwargs)
 
-    return call
+    return call  # type: ignore[return-value]
