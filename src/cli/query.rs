@@ -7,7 +7,7 @@ mod ray;
 mod touching;
 
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, IsTerminal as _, Read};
 use std::path::Path;
 
 use crate::error::{Error, Result};
@@ -15,6 +15,7 @@ use crate::query::batch;
 
 use super::args_query::QueryArgs;
 use super::out::Out;
+use super::progress::Progress;
 
 /// Answers what was asked; `false` when a line of a file could not be read.
 pub(super) fn query(args: &QueryArgs, out: &mut Out) -> Result<bool> {
@@ -52,9 +53,43 @@ fn of_file(path: &Path, out: &mut Out) -> Result<bool> {
                 path.display()
             ))
         })?;
-        Box::new(BufReader::new(file))
+        // Where the answers stand on the terminal themselves, they tell how far it is.
+        if std::io::stdout().is_terminal() {
+            Box::new(BufReader::new(file))
+        } else {
+            Box::new(BufReader::new(Followed::new(file)))
+        }
     };
     let all_read = batch::run(input, out.sink())?;
     out.flush()?;
     Ok(all_read)
+}
+
+/// A file of which it is told how much has been read.
+struct Followed {
+    file: File,
+    done: u64,
+    all: u64,
+    progress: Progress,
+}
+
+impl Followed {
+    fn new(file: File) -> Self {
+        Self {
+            all: file.metadata().map_or(0, |about| about.len()),
+            file,
+            done: 0,
+            progress: Progress::new(),
+        }
+    }
+}
+
+impl Read for Followed {
+    fn read(&mut self, to: &mut [u8]) -> std::io::Result<usize> {
+        let taken = self.file.read(to)?;
+        self.done += taken as u64;
+        self.progress
+            .tell(self.done, self.all, "bytes of cases read");
+        Ok(taken)
+    }
 }
