@@ -83,7 +83,7 @@ trap 'exit 143' TERM
 
 # The lean build: shared memory only.
 echo "building (the first time takes a few minutes)"
-cargo build --quiet --release --no-default-features --manifest-path "$root/Cargo.toml" --bin sweepd
+cargo build --quiet --release --no-default-features --features tui --manifest-path "$root/Cargo.toml" --bin sweepd
 sweepd=${CARGO_TARGET_DIR:-$root/target}/release/sweepd
 
 if [ -n "$mujoco" ]; then
