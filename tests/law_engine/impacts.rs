@@ -138,6 +138,42 @@ fn straight_ways_and_turns_end_where_formulas_say() {
     at(&ask(world, r#"{"a": "b1", "b": "b2"}"#), 0.0);
 }
 
+/// A wheel that turned beside a plate came to nothing but `possible`: each turn counted as a way of its surface.
+#[test]
+fn bug_what_spins_about_its_own_axis_goes_nowhere() {
+    let shapes = [
+        "{ type = \"cylinder\", radius = 1, half_height = 0.1 }",
+        "[{ type = \"cone\", radius = 1, half_height = 0.5 }, { type = \"sphere\", radius = 0.2, position = [0, 0, 0.5] }]",
+    ];
+    let plate = |gap: f64| {
+        let plate = "{ type = \"box\", half_extents = [1, 1, 0.1] }";
+        body(2, [2.0 + gap, 0.0, 0.0], plate, "")
+    };
+    for shape in shapes {
+        let near = rig(&[body(1, [0.0; 3], shape, ""), plate(1e-4)]);
+        let found = ask(
+            near.engine.world(),
+            r#"{"a": "b1", "b": "b2", "angular_a": [0, 0, 50], "within_s": 10}"#,
+        );
+        assert_eq!(found.verdict, Verdict::Apart.code(), "{found:?}");
+    }
+    let far = rig(&[body(1, [0.0; 3], shapes[0], ""), plate(1.0)]);
+    let found = ask(
+        far.engine.world(),
+        r#"{"a": "b1", "b": "b2", "linear_a": [0.5, 0, 0], "angular_a": [0, 0, 50], "within_s": 10}"#,
+    );
+    at(&found, 2.0);
+    // About any other axis it does.
+    let above = "{ type = \"box\", half_extents = [1, 1, 0.1] }";
+    let above = body(2, [0.0, 0.0, 0.5], above, "");
+    let near = rig(&[body(1, [0.0; 3], shapes[0], ""), above]);
+    let found = ask(
+        near.engine.world(),
+        r#"{"a": "b1", "b": "b2", "angular_a": [0, 1, 0], "within_s": 1}"#,
+    );
+    assert_eq!(found.verdict, Verdict::Colliding.code(), "{found:?}");
+}
+
 #[test]
 fn velocities_are_those_that_were_sent_where_none_are_said() {
     let mut rig = rig(&[ball(1, 0.0, ""), ball(2, 5.0, "")]);

@@ -7,7 +7,7 @@ use crate::support::{
     CASES, KINDS, any_convex, any_mesh, convex, is_surface, place, shape, truth_of,
 };
 use sweepd::math::{Pose, Quat, Vec3, relative};
-use sweepd::narrow::mesh::{CarriedFront, FrontStore, Search, overlap};
+use sweepd::narrow::mesh::{CarriedFront, FrontStore, Goal, MeshQuery, Search, overlap};
 use sweepd::shape::{Convex, Shape};
 use sweepd::time::{ManualClock, Meter};
 
@@ -142,4 +142,34 @@ fn balls_that_told_nothing_are_not_asked_again_before_the_pair_has_moved_enough(
     assert_eq!(asked(2.2), (false, 0));
     assert_eq!(asked(1.5), (true, 1));
     assert_eq!(asked(1.51), (true, 1));
+}
+
+/// A corner that reaches in by a thousand roundings makes leaves cross by that much and no more: `gap_max` was what is
+/// rounded.
+#[test]
+fn bug_a_corner_that_reaches_in_by_more_than_is_rounded_overlaps() {
+    let clock = ManualClock::new(0);
+    let mut rng = Rng::new(32_000_000);
+    for case in 0..CASES {
+        let half = [0.02, 1.0, 60.0][rng.below(3)];
+        let small = shape(&meshes::cuboid(Vec3::new(0.9, 1.0, 0.4) * half), None);
+        let large = shape(&meshes::cuboid(Vec3::new(4.0, 4.0, 4.0) * half), None);
+        let turn = rng.rotation();
+        let corner = [1.0, -1.0].map(|z| turn * (Vec3::new(0.9, 1.0, 0.4 * z) * half));
+        let out = corner[0].x.abs().max(corner[1].x.abs());
+        let out = (turn * Vec3::new(0.9, -1.0, 0.4) * half).x.abs().max(out);
+        let out = (turn * Vec3::new(-0.9, 1.0, 0.4) * half).x.abs().max(out);
+        let depth = 1e-12 * half;
+        let at = Vec3::new(4.0 * half + out - depth, 0.3 * half, -0.2 * half);
+        let pos12 = Pose::from_parts(at.into(), turn);
+        for (a, b, pos12) in [(&large, &small, pos12), (&small, &large, pos12.inverse())] {
+            let (mut store, mut query) = (FrontStore::default(), MeshQuery::default());
+            query.start(&mut store, a, b, &pos12);
+            let mut meter = Meter::unlimited(&clock);
+            assert!(query.advance(&mut store, (a, b), Goal::Contacts, u64::MAX, &mut meter));
+            let gap = query.interval();
+            assert!(gap.max <= 0.0, "case {case}: {gap:?} of {depth} m");
+            assert!(gap.contains(-depth), "case {case}: {gap:?} of {depth} m");
+        }
+    }
 }

@@ -21,6 +21,7 @@ use super::gjk;
 use super::newton::{self, Refined};
 use super::pair::{CoreGap, Held, Pair, Vertex, frame, unit};
 use super::polytope::Polytope;
+use super::sectors;
 use super::simplex::{Simplex, normal_of};
 use crate::math::Vec3;
 
@@ -51,6 +52,12 @@ pub(super) fn depth(pair: &Pair<'_>, simplex: &Simplex, warm: Option<Refined>) -
         let upright = [Vec3::x(), Vec3::y(), Vec3::z()];
         let gap = polytope.run(pair, simplex, &upright, warm);
         let mut gap = polytope.straight(pair, gap);
+        if !pair.polytopes
+            && !gap.is_tight(pair)
+            && let Some(other) = sectors::gap(pair, warm.as_ref())
+        {
+            gap = gap.meet(&other, pair);
+        }
         // A surface that breaks on slivers leaves the ends apart: other first corners make other slivers.
         for attempt in 0..ATTEMPTS_MAX {
             if gap.is_tight(pair) || polytope.faces.len() > FACES_MAX {

@@ -8,7 +8,8 @@
 //! * Point and segment pairs, and a point against anything, have closed forms (`closed`).
 //! * Two boxes try their separating axes (`sat`) first.
 //! * Else GJK (`gjk`) finds the features that are closest, or that the cores overlap; then an expanding polytope
-//!   (`epa`) gives the least translation, or planes through an axis do, where two axes nearly agree (`revolved`).
+//!   (`epa`) gives the least translation, or planes through an axis do, where two axes nearly agree (`revolved`) or one
+//!   core reaches less far from the axis of a round one than would show its rim (`sectors`).
 //! * Where a circle takes part both stop early and a Newton method on the features (`newton`) finishes: it finds the
 //!   normal that makes `f` greatest, outside and inside alike. It starts from the features of the last answer, and
 //!   where it says that they overlap the polytope begins around its closest point, without GJK, or under a cap of
@@ -37,6 +38,7 @@ mod polytope;
 pub mod raw;
 mod revolved;
 mod sat;
+mod sectors;
 mod simplex;
 
 use crate::math::{Interval, Point, Pose, Vec3};
@@ -47,6 +49,7 @@ pub(in crate::narrow) use manifold::{
     PREDICTION, points_on_plane, shared_by_triangles, shared_points, touching_points,
 };
 
+use newton::Refined;
 use pair::{CoreGap, Held, Pair};
 pub use polytope::Shell;
 
@@ -201,7 +204,7 @@ fn iterate(pair: &Pair<'_>, warm: &Warm, mut shell: Option<&mut Shell>) -> CoreG
     };
     let mut known = None;
     if let Some(found) = refined.as_ref().filter(|r| r.value < -pair.tiny()) {
-        known = revolved::gap(pair, Some(found));
+        known = around(pair, Some(found));
         let told = known.filter(|gap| gap.is_tight(pair));
         if let Some(gap) = told.or_else(|| epa::depth_around(pair, found, shell)) {
             return gap;
@@ -209,11 +212,23 @@ fn iterate(pair: &Pair<'_>, warm: &Warm, mut shell: Option<&mut Shell>) -> CoreG
     }
     match gjk::distance(pair, &start, &warm.held, refined.as_ref()) {
         gjk::Outcome::Apart(gap) => gap,
-        gjk::Outcome::Overlap(simplex) => match known.or_else(|| revolved::gap(pair, None)) {
+        gjk::Outcome::Overlap(simplex) => match known.or_else(|| around(pair, None)) {
             Some(gap) if gap.is_tight(pair) => gap,
             Some(gap) => gjk::better(&gap, &epa::depth(pair, &simplex, refined)),
             None => epa::depth(pair, &simplex, refined),
         },
+    }
+}
+
+/// By planes through an axis, where that takes less time than a polytope.
+fn around(pair: &Pair<'_>, warm: Option<&Refined>) -> Option<CoreGap> {
+    let gap = revolved::gap(pair, warm);
+    if gap.is_some_and(|gap| gap.is_tight(pair)) {
+        return gap;
+    }
+    match (gap, sectors::narrow_gap(pair, warm)) {
+        (Some(one), Some(other)) => Some(one.meet(&other, pair)),
+        (one, other) => one.or(other),
     }
 }
 

@@ -105,6 +105,19 @@ impl CoreGap {
         (self.point_b - self.point_a - self.normal * self.lower).norm()
     }
 
+    /// What two answers know of cores that overlap: normal and points of the other where its normal is better.
+    pub(super) fn meet(&self, other: &Self, pair: &Pair<'_>) -> Self {
+        let better = if other.lower > self.lower + pair.tiny() {
+            other
+        } else {
+            self
+        };
+        Self {
+            upper: self.upper.min(other.upper).max(better.lower),
+            ..*better
+        }
+    }
+
     pub(super) fn is_straight(&self, pair: &Pair<'_>) -> bool {
         self.off() <= STRAIGHT * pair.scale
     }

@@ -280,16 +280,10 @@ fn overlap(best: &Best, a: &Triangle, b: &Triangle, slop: f64) -> Closest {
     };
     let size = (a[1] - a[0]).norm() + (a[2] - a[0]).norm();
     let point_b = deepest(b, -best.axis);
+    // Rounding of the corners can part what only just crosses, and nothing else.
+    let surely = depth > 1e-9 * size + 4.0 * slop || surely_crosses(a, b, slop);
     Closest {
-        // Rounding of the corners can part what only just crosses, and nothing else.
-        gap: Interval::new(
-            -depth - slop,
-            if depth > 1e-9 * size + 4.0 * slop {
-                0.0
-            } else {
-                slop
-            },
-        ),
+        gap: Interval::new(-depth - slop, if surely { 0.0 } else { slop }),
         best_m: -depth,
         normal: best.axis,
         point_a: point_b + best.axis * depth,

@@ -4,6 +4,7 @@
 //! where this tick has it, all the way; of one that jumps nothing is asked meanwhile.
 
 use crate::math::{Point, Pose, ROUND, Vec3, relative};
+use crate::shape::{Core, Geometry};
 use crate::world::{Body, Leg, Path, PlacedShape};
 
 /// A body's motion for a while, per unit of the share: the pivot goes straight, the body turns about a fixed axis.
@@ -51,7 +52,7 @@ impl Span {
         let far = leg.from.translation.vector.amax();
         let far = far.max(leg.to.translation.vector.amax());
         let size = path.pivot().coords.amax() + (1.0 + leg.angle()) * path.reach();
-        Self {
+        let mut span = Self {
             until,
             pose,
             pivot: *path.pivot(),
@@ -64,7 +65,37 @@ impl Span {
             // Two sums of coordinates that far out; all else is of the size of the body and its way.
             slop: 16.0 * ROUND * far + 64.0 * ROUND * (size + per_share * leg.travel.amax()),
             told: path.is_told_at(share),
+        };
+        let astray = span.astray(body, leg.angle(), path.reach());
+        if let Some(off_m) = astray.filter(|off_m| *off_m <= span.slop) {
+            (span.spin, span.rate) = (Vec3::zeros(), 0.0);
+            span.slop += off_m;
         }
+        span
+    }
+
+    /// How far its surface is, in all of a leg's turn, from where it would be without it: nearly nothing where it spins
+    /// about its own axis; `None`: it does not turn about one axis, or is no solid of revolution.
+    fn astray(&self, body: &Body, angle: f64, reach_m: f64) -> Option<f64> {
+        let about = self.spin.try_normalize(0.0).filter(|_| !self.mixed)?;
+        let mut most_m = 0.0_f64;
+        for placed in &*body.shapes {
+            let Geometry::Convex(convex) = &placed.shape.geometry else {
+                return None;
+            };
+            let axis = match convex.core() {
+                Core::Point => about,
+                Core::Segment { .. } | Core::Cylinder { .. } | Core::Cone { .. } => {
+                    self.pose.rotation * (placed.pose.rotation * Vec3::z())
+                }
+                Core::Cuboid { .. } | Core::Hull(_) | Core::Triangle(_) => return None,
+            };
+            let arm = placed.pose * placed.shape.centre - self.pivot;
+            let off_m = axis.cross(&(self.pose.rotation * arm)).norm();
+            let rounded_m = 16.0 * ROUND * (reach_m + self.pivot.coords.amax());
+            most_m = most_m.max(off_m + axis.cross(&about).norm() * reach_m + rounded_m);
+        }
+        Some(angle * most_m)
     }
 
     fn rest(body: &Body) -> Self {

@@ -183,11 +183,7 @@ impl Crossing {
         *self = Self::at([i, j], [meshes[0].triangle(i), meshes[1].triangle(j)]);
         let leaves = ((Side::Mesh(meshes[0]), i), (Side::Mesh(meshes[1]), j));
         match side::leaf(leaves.0, leaves.1, at, 0.0) {
-            Ok(mut closest) => {
-                // They cross, though by no more than what the query of two leaves rounds.
-                closest.gap.max = closest.gap.max.min(0.0);
-                Walked::Found(contact(leaves.0, leaves.1, closest))
-            }
+            Ok(closest) => Walked::Found(contact(leaves.0, leaves.1, closest)),
             Err(_) => Walked::Nowhere,
         }
     }

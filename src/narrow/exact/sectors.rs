@@ -1,0 +1,395 @@
+//! Cores that overlap deep within a cylinder or cone, near its axis: a chip in a drum, a pin in a wide hole.
+//!
+//! In: a pair of which one core is a cylinder or a cone. Out: the gap of the cores, or `None` where no core is round or
+//! nothing is proved.
+//!
+//! Seen from the axis nearly all directions around it are alike, and an expanding polytope would have to resolve the
+//! rim: its error falls with the square of its faces, and ends at a thousandth. But in a plane through the axis the
+//! round core shows its outline, whatever the plane, so that only what the other core shows changes with the angle. A
+//! sector of planes is proved by a chain of points of the difference, each a point of the other core and a corner of
+//! the outline, from the top down:
+//! * A point's place along the plane is a constant and a sine of the angle, so within the sector not below the straight
+//!   line between its ends by more than its bend allows: by nothing where it lies on the plane's own side of the axis.
+//! * Places along the plane are linear then, and heights constant. A direction along which two points that follow each
+//!   other reach `d` at both ends of the sector does for them in between. So does the normal of the line through them
+//!   where it is `d` away at both ends: `p x q - d |q - p|` is linear less convex.
+//! * Then each point of the chain reaches `d` along the directions shared with either neighbour, so along all between
+//!   them; with the first one `d` high and the last one `d` low, these are all directions of the sector's half planes.
+//!
+//! Sectors are parted, where the other core's farthest corner changes if it does, until all of them are as deep as the
+//! best direction met.
+
+mod chain;
+
+use std::f64::consts::PI;
+
+use super::closed::nearest;
+use super::newton::{self, Refined};
+use super::pair::{CoreGap, Held, Pair};
+use crate::math::Vec3;
+use crate::shape::Core;
+use chain::{Chain, Flat, Least, Link, along, dot, out};
+
+/// Sectors looked at, at most; what is proved by then is sound, but wider.
+const SECTORS_MAX: usize = 512;
+/// Sectors that wait, at most.
+const WAITING_MAX: usize = 40;
+/// How far aside of the axis, and of square to it, a chain's first points are asked for: it takes those farther out of
+/// equal ones.
+const ASIDE: f64 = 1e-12;
+/// How far aside of the best normal its features are asked for.
+const FEATURES_ASIDE: f64 = 1e-2;
+/// What is rounded on the way from supports to a chain's bound, in parts of what cannot be told from 0.
+const ROUNDED: f64 = 4.0;
+/// A sector is not parted nearer to its ends, in parts of it.
+const EDGE: f64 = 1e-3;
+/// How far the other core reaches from the axis, in parts of the radius, up to which a polytope takes more time.
+const NARROW: f64 = 0.02;
+
+/// The best direction known.
+struct Best {
+    /// `f(normal)`.
+    value: f64,
+    normal: Vec3,
+    /// What Newton found, if that is the best one.
+    refined: Option<Refined>,
+    /// The plane that showed it, and where in it.
+    along: Vec3,
+    n: Flat,
+}
+
+/// The pair as it is seen from the round core.
+struct Around<'a> {
+    pair: &'a Pair<'a>,
+    a_is_round: bool,
+    /// Of its outline, turned half around its origin; the upper one is not nearer to the axis.
+    corners: [Flat; 2],
+}
+
+/// The gap of two overlapping cores of which one is round, best where the other reaches less far from its axis; its
+/// ends may stay apart.
+///
+/// * `warm` - what Newton made of the features of an earlier answer, if anything.
+///
+/// Cost: mostly 5 to 50 us.
+pub(super) fn gap(pair: &Pair<'_>, warm: Option<&Refined>) -> Option<CoreGap> {
+    Around::of(pair)?.gap(warm)
+}
+
+/// The same where it takes less time than a polytope.
+pub(super) fn narrow_gap(pair: &Pair<'_>, warm: Option<&Refined>) -> Option<CoreGap> {
+    let around = Around::of(pair)?;
+    if around.breadth() > NARROW * around.corners[0][0] {
+        return None;
+    }
+    around.gap(warm)
+}
+
+impl<'a> Around<'a> {
+    /// Around the core from whose axis the other one reaches less far.
+    fn of(pair: &'a Pair<'a>) -> Option<Self> {
+        let around = |core: &Core, a_is_round: bool| {
+            let corners = match *core {
+                Core::Cylinder {
+                    radius_m: r,
+                    half_m: h,
+                } => [[r, h], [r, -h]],
+                Core::Cone {
+                    radius_m: r,
+                    half_m: h,
+                } => [[r, h], [0.0, -h]],
+                _ => return None,
+            };
+            Some(Self {
+                pair,
+                a_is_round,
+                corners,
+            })
+        };
+        match (around(pair.a.core(), true), around(pair.b.core(), false)) {
+            (Some(one), Some(other)) => {
+                let part = |x: &Self| x.breadth() / x.corners[0][0];
+                Some(if part(&other) < part(&one) {
+                    other
+                } else {
+                    one
+                })
+            }
+            (one, other) => one.or(other),
+        }
+    }
+
+    /// How far the other core reaches from the axis, at most, metres.
+    fn breadth(&self) -> f64 {
+        let pair = self.pair;
+        let (middle, other) = if self.a_is_round {
+            (pair.rotation * pair.b.centre().coords + pair.at, pair.b)
+        } else {
+            (pair.to_b(&(pair.a.centre().coords - pair.at)), pair.a)
+        };
+        middle.x.hypot(middle.y) + other.radius() - other.margin()
+    }
+
+    /// From A to B, where this is the way out of the round core, its frame.
+    fn normal(&self, out: &Vec3) -> Vec3 {
+        if self.a_is_round {
+            -out
+        } else {
+            self.pair.rotation * out
+        }
+    }
+
+    /// The other core's farthest point along a direction, frame of the round one.
+    fn farthest(&self, out: &Vec3) -> Vec3 {
+        let pair = self.pair;
+        if self.a_is_round {
+            let (b, _) = pair.b.core().support(&pair.to_b(out));
+            pair.rotation * b + pair.at
+        } else {
+            let (a, _) = pair.a.core().support(&(pair.rotation * out));
+            pair.to_b(&(a - pair.at))
+        }
+    }
+
+    /// The farthest along a direction of a plane.
+    fn link(&self, along: &Vec3, n: Flat) -> Link {
+        let of_other = self.farthest(&out(along, n));
+        let [upper, lower] = self.corners;
+        let corner = if dot(lower, n) > dot(upper, n) {
+            lower
+        } else {
+            upper
+        };
+        Link { of_other, corner }
+    }
+
+    fn offer(&self, best: &mut Best, along: &Vec3, n: Flat) {
+        let normal = self.normal(&out(along, n));
+        let value = normal.dot(&self.pair.support(&normal).w);
+        if value > best.value {
+            (best.value, best.normal, best.refined) = (value, normal, None);
+            (best.along, best.n) = (*along, n);
+        }
+    }
+
+    /// A chain of what is farthest in a plane, as fine as the best direction known asks for.
+    fn chain(&self, along: &Vec3, best: &mut Best) -> Chain {
+        let mut chain = Chain::default();
+        for n in [[ASIDE, 1.0], [1.0, ASIDE], [1.0, -ASIDE], [ASIDE, -1.0]] {
+            chain.push(self.link(along, n), along);
+        }
+        loop {
+            let least = chain.least(along);
+            if least.depth >= -best.value {
+                break;
+            }
+            let link = self.link(along, least.n);
+            let reach = dot(least.n, link.at(along));
+            if reach < -best.value {
+                self.offer(best, along, least.n);
+            }
+            let farther = reach > least.depth + self.pair.tiny();
+            if !farther || !chain.insert(least.place + 1, link) {
+                break;
+            }
+        }
+        chain
+    }
+
+    fn gap(&self, warm: Option<&Refined>) -> Option<CoreGap> {
+        let mut best = Best {
+            value: f64::NEG_INFINITY,
+            normal: Vec3::z(),
+            refined: None,
+            along: Vec3::x(),
+            n: [0.0, 1.0],
+        };
+        for n in [[0.0, 1.0], [0.0, -1.0]] {
+            self.offer(&mut best, &Vec3::x(), n);
+        }
+        if let Some(found) = warm {
+            best.take(found, self.pair.tiny());
+        }
+        let depth = self.prove(&mut best);
+        self.refine(&mut best);
+        let depth = depth - ROUNDED * self.pair.tiny();
+        (depth > 0.0).then(|| self.answer(&best, -depth))
+    }
+
+    /// What is proved of the depth, all around.
+    fn prove(&self, best: &mut Best) -> f64 {
+        let close_m = self.pair.tolerance();
+        let mut waiting = [PI; WAITING_MAX];
+        waiting[1..4].copy_from_slice(&[PI / 2.0, 0.0, -PI / 2.0]);
+        let (mut count, mut looked_at, mut from) = (4, 4, -PI);
+        let mut depth = f64::INFINITY;
+        while count > 0 && depth > 0.0 {
+            let to = waiting[count - 1];
+            let width = to - from;
+            let (middle, ends) = (along(from + width / 2.0), [from, to].map(along));
+            let before = best.value;
+            let chain = self.chain(&middle, best);
+            let (least, end) = chain.bound(&middle, &ends, width);
+            let mut parting = None;
+            if least.depth < -best.value - close_m {
+                self.offer(best, &ends[end], least.n);
+                parting = Some(&ends[end]);
+            }
+            if best.value > before + close_m {
+                self.refine(best);
+            }
+            let close = least.depth >= -best.value - close_m;
+            match parting {
+                Some(at) if !close && looked_at < SECTORS_MAX && count < WAITING_MAX => {
+                    waiting[count] = self.change(&chain, &least, at, (from, to));
+                    count += 1;
+                    looked_at += 1;
+                }
+                _ => {
+                    depth = depth.min(least.depth);
+                    from = to;
+                    count -= 1;
+                }
+            }
+        }
+        depth
+    }
+
+    /// The angle to part a sector at: where the corner that is farthest at its end becomes so, or the middle.
+    fn change(&self, chain: &Chain, least: &Least, end: &Vec3, (from, to): (f64, f64)) -> f64 {
+        let middle = from + (to - from) / 2.0;
+        let other = if self.a_is_round {
+            self.pair.b
+        } else {
+            self.pair.a
+        };
+        if !other.core().is_polytope() {
+            return middle;
+        }
+        let farther = self.link(end, least.n).of_other;
+        let value = |p: &Vec3| out(end, least.n).dot(p);
+        let mut links = chain.links[least.place..chain.count].iter().take(2);
+        let nearer = links.find(|link| value(&farther) > value(&link.of_other) + self.pair.tiny());
+        let Some(nearer) = nearer else {
+            return middle;
+        };
+        let way = farther - nearer.of_other;
+        let share = -least.n[1] * way.z / (least.n[0] * way.x.hypot(way.y));
+        if !(-1.0..=1.0).contains(&share) {
+            return middle;
+        }
+        let (towards, aside) = (way.y.atan2(way.x), share.acos());
+        // One at the very end is known already.
+        let spare = EDGE * (to - from);
+        let inside = |angle: &f64| *angle > from + spare && *angle < to - spare;
+        let places = [-1.0, 0.0, 1.0].map(|turns| turns * 2.0 * PI + towards);
+        let mut all = places.into_iter().flat_map(|at| [at - aside, at + aside]);
+        all.find(inside).unwrap_or(middle)
+    }
+
+    /// Four small ways aside of the best direction: in its plane, and out of it.
+    fn ways(&self, best: &Best) -> [Vec3; 4] {
+        let (along, [x, z]) = (best.along, best.n);
+        let up = self.normal(&(along * -z + Vec3::z() * x)) * FEATURES_ASIDE;
+        let side = self.normal(&Vec3::new(-along.y, along.x, 0.0)) * FEATURES_ASIDE;
+        [up, -up, side, -side]
+    }
+
+    /// Newton on the features around the best direction, if a plane showed it.
+    fn refine(&self, best: &mut Best) {
+        if best.refined.is_some() {
+            return;
+        }
+        let mut found: Option<Refined> = None;
+        let ways = self.ways(best);
+        for two in [[ways[0], ways[1]], [ways[2], ways[3]]] {
+            let features = two.map(|way| self.pair.support(&(best.normal + way)));
+            let one = newton::solve(self.pair, &features, &[0.5, 0.5], &best.normal);
+            found = match (found, one) {
+                (Some(f), Some(o)) if f.value >= o.value => Some(f),
+                (found, one) => one.or(found),
+            };
+        }
+        if let Some(found) = found {
+            best.take(&found, self.pair.tiny());
+        }
+    }
+
+    fn answer(&self, best: &Best, upper: f64) -> CoreGap {
+        let (point_a, point_b, held) = match &best.refined {
+            Some(found) => (found.point_a, found.point_b, found.held),
+            None => {
+                let (a, b) = self.witnesses(best);
+                (a, b, Held::default())
+            }
+        };
+        CoreGap {
+            lower: best.value,
+            upper: upper.max(best.value),
+            normal: best.normal,
+            point_a,
+            point_b,
+            held,
+        }
+    }
+
+    /// Points straight across from each other: of what the other core shows, the one that is nearest to both surfaces.
+    fn witnesses(&self, best: &Best) -> (Vec3, Vec3) {
+        let pair = self.pair;
+        let (out, round) = if self.a_is_round {
+            (-best.normal, pair.a)
+        } else {
+            (pair.to_b(&best.normal), pair.b)
+        };
+        let across = out * -best.value;
+        let side = Vec3::new(-out.y, out.x, 0.0);
+        let half_m = self.corners[0][1];
+        let corner = self.farthest(&out);
+        let mut shown = [corner; 5];
+        for (point, way) in shown[1..].iter_mut().zip(self.ways(best)) {
+            let normal = best.normal + way;
+            *point = self.farthest(&if self.a_is_round {
+                -normal
+            } else {
+                pair.to_b(&normal)
+            });
+        }
+        let mut least = (f64::INFINITY, corner);
+        for (k, one) in shown.iter().enumerate() {
+            for other in &shown[k..] {
+                let (from, way) = (one - across, other - one);
+                let height = from.z.clamp(-half_m, half_m) - from.z;
+                // The one, the middle, where they cross the plane, and where they are as high as the round core.
+                for part in [0.0, 0.5, -from.dot(&side) / way.dot(&side), height / way.z] {
+                    let point = one + way * part.clamp(0.0, 1.0);
+                    let near = nearest(round.core(), &(point - across));
+                    let off = near.map_or(f64::INFINITY, |near| near.distance.abs());
+                    let off = off.max(out.dot(&(corner - point)));
+                    if off < least.0 {
+                        least = (off, point);
+                    }
+                }
+            }
+        }
+        let (of_other, of_round) = (least.1, least.1 - across);
+        if self.a_is_round {
+            (of_round, of_other)
+        } else {
+            let placed = |p: Vec3| pair.rotation * p + pair.at;
+            (placed(of_other), placed(of_round))
+        }
+    }
+}
+
+impl Best {
+    fn take(&mut self, found: &Refined, tiny: f64) {
+        // Of what is as good, too, the closest points are known.
+        if found.value >= self.value - tiny {
+            (self.value, self.normal) = (found.value, found.normal);
+            self.refined = Some(*found);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
