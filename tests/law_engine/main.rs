@@ -34,5 +34,6 @@ mod shapes;
 mod state;
 mod threads;
 mod touching;
+mod used;
 mod verdicts;
 mod vertices;
