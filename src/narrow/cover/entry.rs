@@ -290,3 +290,6 @@ impl Linked for Open {
         self.a.0
     }
 }
+
+#[cfg(test)]
+mod tests;
