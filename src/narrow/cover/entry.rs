@@ -291,5 +291,7 @@ impl Linked for Open {
     }
 }
 
+mod validate;
+
 #[cfg(test)]
 mod tests;

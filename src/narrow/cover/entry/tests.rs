@@ -71,3 +71,37 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn what_is_broken_in_an_open_list_is_found() {
+    for &(search, name) in Search::NAMED {
+        let (mut arena, mut list) = (Arena::new(1 << 10), OpenList::default());
+        list.clear(search);
+        for at in 0..9 {
+            let low = -f64::from(at * 7 % 5);
+            assert!(list.push(
+                &mut arena,
+                Open {
+                    low,
+                    a: BoxId(at),
+                    b: BoxId(at)
+                }
+            ));
+        }
+        list.pop(&mut arena);
+        list.validate(&arena).unwrap();
+        let head = list.head;
+        list.head = 9;
+        assert!(
+            list.validate(&arena).unwrap_err().contains("head"),
+            "{name}"
+        );
+        list.head = head;
+        arena.all_mut(&list.items)[0].low = 1.0;
+        assert_eq!(
+            list.validate(&arena).is_err(),
+            search == Search::Priority,
+            "{name}"
+        );
+    }
+}
