@@ -7,6 +7,10 @@ cargo fmt --all -- --check
 cargo fmt --manifest-path benches/peers/Cargo.toml -- --check
 cargo clippy --all-targets -- -D warnings
 cargo clippy --all-targets --no-default-features -- -D warnings
+# Each feature without the other: what one uses of the other's goes unseen where both are on, or none is.
+for feature in ros2 mcap; do
+  cargo clippy --all-targets --no-default-features --features "$feature" -- -D warnings
+done
 # The lean daemon links nothing of DDS, and records nothing.
 lean=$(cargo tree --no-default-features -e normal --prefix none)
 if grep -E '^(rustdds|ros2-client|mcap) ' <<<"$lean"; then echo "there without its feature" >&2; exit 1; fi

@@ -159,6 +159,12 @@ fn swept(scene: &str) -> String {
     scene.replace("moves = true\n", "moves = true\ncontinuous = true\n")
 }
 
+/// The same with a broad phase of this name.
+fn with_method(scene: &str, name: &str) -> String {
+    let run = format!("\n[run]\nbroad_phase = \"{name}\"\n\n[[source]]");
+    scene.replacen("\n[[source]]", &run, 1)
+}
+
 /// Boxes in rows of so many go round in circles, some of them into others.
 fn circle(boxes: &mut [Aabb], row: u32, tick: u32) {
     for (at, aabb) in (0_u32..).zip(boxes) {
@@ -276,6 +282,18 @@ fn a_tick_of_convex_bodies_allocates_nothing_after_warm_up() {
     check("pile", &pile(300, 2), true);
     check("swept pool", &swept(&pool(80, 1)), true);
     check("swept pile", &swept(&pile(80, 2)), true);
+}
+
+#[test]
+fn a_tick_allocates_nothing_after_warm_up_whatever_broad_phase_is_asked_for() {
+    for (method, name) in Method::NAMED {
+        for (scene, text) in [("pool", pool(300, 1)), ("pile", pile(300, 2))] {
+            let text = with_method(&text, name);
+            let drive = Drive::new(&text, Pattern::Wander, 3);
+            assert_eq!(drive.engine().plan().method(), *method);
+            check(&format!("{scene} with {name}"), &text, false);
+        }
+    }
 }
 
 #[test]

@@ -304,5 +304,7 @@ fn class_of(room: usize) -> usize {
     (room / BLOCK_MIN).trailing_zeros() as usize
 }
 
+mod validate;
+
 #[cfg(test)]
 mod tests;

@@ -34,6 +34,7 @@ use crate::world::Body;
 use super::arena::Run;
 use super::bent::Bent;
 use super::cover::{Cover, Group, Open, Wear};
+use super::holdings::Holdings;
 use super::memo::{Witness, relative_motion};
 use super::mesh::{CarriedFront, Goal, Placed, Search};
 use super::shelves::Shelves;
@@ -213,6 +214,17 @@ impl CompoundFront {
             inner.release(shelves);
         }
         self.started = false;
+    }
+
+    /// Tells what it holds beside the fronts and queries of its pairs of shapes.
+    pub(super) fn tell<'a>(&'a self, held: &mut Holdings<'a>) {
+        held.covers.push(&self.cover);
+        held.contacts.push(&self.found);
+    }
+
+    /// Places of the front and the query of each of its pairs of shapes, or `NONE`.
+    pub(super) fn places(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+        self.inner.iter().map(Inner::held)
     }
 
     /// Everything from the roots, at the pose it is at.

@@ -14,6 +14,7 @@
 
 mod drift;
 mod entry;
+mod validate;
 mod wear;
 
 pub(super) use drift::Drift;

@@ -14,6 +14,7 @@ use super::arena::{Arena, Run};
 use super::bent::Bent;
 use super::contacts::Contact;
 use super::exact::Warm;
+use super::holdings::Holdings;
 use super::memo::Witness;
 use super::mesh::{FrontStore, Goal, MeshQuery, Search, overlap, parted};
 use super::query::{
@@ -118,6 +119,12 @@ impl Cursor {
     pub(super) fn release(&mut self, fronts: &mut FrontStore, contacts: &mut Arena<Contact>) {
         self.meshes.release(fronts);
         contacts.release(&mut self.found);
+    }
+
+    /// Tells what it holds.
+    pub(super) fn tell<'a>(&'a self, held: &mut Holdings<'a>) {
+        self.meshes.tell(held);
+        held.contacts.push(&self.found);
     }
 
     /// The contacts found so far.

@@ -30,6 +30,7 @@ mod cover;
 mod cursor;
 mod finding;
 mod flags;
+mod holdings;
 mod memo;
 mod order;
 mod pass;
@@ -40,6 +41,7 @@ mod reports;
 mod shelves;
 mod spend;
 mod sweep;
+mod validate;
 mod widen;
 
 pub use approx::{Region, Regions};
@@ -338,39 +340,6 @@ impl Narrow {
         }
         self.short.clear();
         self.short.extend_from_slice(pairs.truncated());
-    }
-
-    /// Structure check: counts, lists and memories agree.
-    ///
-    /// # Errors
-    /// The first thing that does not agree, in words.
-    pub fn validate(&self, pairs: &PairSet) -> Result<(), String> {
-        let mut counts = [0; Verdict::ALL.len()];
-        for (slot, key) in pairs.iter() {
-            let Some(hot) = self.hot.get(slot.index()).filter(|hot| hot.live) else {
-                return Err(format!("pair {slot:?} has no memory"));
-            };
-            let (low, high) = key.slots();
-            if (hot.a, hot.b) != (low, high) && (hot.a, hot.b) != (high, low) {
-                return Err(format!("pair {slot:?} remembers other bodies"));
-            }
-            counts[usize::from(hot.verdict.code())] += 1;
-            let memo = &self.memos[slot.index()];
-            let listed = self.active.get(memo.active_at as usize) == Some(&slot);
-            if listed != (hot.verdict != Verdict::Apart) {
-                return Err(format!(
-                    "pair {slot:?} is {} but listed: {listed}",
-                    hot.verdict
-                ));
-            }
-        }
-        if counts != self.counts {
-            return Err(format!(
-                "verdict counts {:?}, by hand {counts:?}",
-                self.counts
-            ));
-        }
-        Ok(())
     }
 }
 

@@ -48,11 +48,63 @@ impl<T> Pool<T> {
         }
     }
 
+    /// All objects, those that were given back too.
+    pub(super) fn all(&self) -> &[T] {
+        &self.items
+    }
+
+    /// Structure check: each object is free, or of one owner.
+    ///
+    /// * `held` - the places of all who may hold one.
+    ///
+    /// # Errors
+    /// The first object of which this does not hold.
+    pub(super) fn validate(
+        &self,
+        what: &str,
+        held: impl Iterator<Item = u32>,
+    ) -> Result<(), String> {
+        let mut seen = vec![false; self.items.len()];
+        for at in (self.free.iter().copied()).chain(held.filter(|at| *at != NONE)) {
+            match seen.get_mut(at as usize) {
+                Some(seen) if !*seen => *seen = true,
+                Some(_) => return Err(format!("{at} is held twice, or free and held: {what}")),
+                None => return Err(format!("{at} is not there: {what}")),
+            }
+        }
+        match seen.iter().position(|seen| !seen) {
+            Some(at) => Err(format!("{at} is neither free nor held: {what}")),
+            None => Ok(()),
+        }
+    }
+
     pub(super) fn get(&self, at: u32) -> Option<&T> {
         self.items.get(at as usize)
     }
 
     pub(super) fn get_mut(&mut self, at: u32) -> Option<&mut T> {
         self.items.get_mut(at as usize)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_broken_in_a_pool_is_found() {
+        let mut pool: Pool<u8> = Pool::default();
+        let mut all: Vec<u32> = (0..7).map(|_| pool.take(|| 0)).collect();
+        pool.give(&mut all[3]);
+        let why = |pool: &Pool<u8>, held: &[u32]| {
+            let held = held.iter().copied();
+            pool.validate("bytes", held).err().unwrap_or_default()
+        };
+        assert_eq!(why(&pool, &all), "");
+        assert!(why(&pool, &all[1..]).contains("neither free nor held: bytes"));
+        assert!(why(&pool, &[&all[..], &all[..1]].concat()).contains("held twice"));
+        assert!(why(&pool, &[&all[..], &[99]].concat()).contains("99 is not there"));
+        pool.free.push(all[0]);
+        assert!(why(&pool, &all).contains("free and held"));
     }
 }

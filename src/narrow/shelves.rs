@@ -2,9 +2,12 @@
 
 use super::Narrow;
 use super::arena::Arena;
+use super::compound::CompoundFront;
 use super::contacts::Contact;
 use super::cursor::Cursor;
 use super::exact::Shell;
+use super::holdings::Holdings;
+use super::memo::Memo;
 use super::mesh::{CarriedFront, FrontStore};
 use super::pool::Pool;
 use crate::ids::PairSlot;
@@ -73,6 +76,41 @@ impl Shelves {
             cursor.release(&mut self.store, &mut self.contacts);
         }
         self.cursors.give(at);
+    }
+}
+
+impl Shelves {
+    /// Structure check of the pools, the arenas, and what each front and query has in them.
+    ///
+    /// # Errors
+    /// The first thing that does not hold, in words.
+    pub(super) fn validate(
+        &self,
+        memos: &[Memo],
+        compounds: &Pool<CompoundFront>,
+    ) -> Result<(), String> {
+        let inner = || compounds.all().iter().flat_map(CompoundFront::places);
+        let shells = memos.iter().map(|memo| memo.shell);
+        self.shells.validate("shells", shells)?;
+        let cursors = memos.iter().map(|memo| memo.cursor);
+        (self.cursors).validate("queries", cursors.chain(inner().map(|inner| inner.1)))?;
+        let fronts = memos.iter().map(|memo| memo.front);
+        (self.fronts).validate("fronts", fronts.chain(inner().map(|inner| inner.0)))?;
+        let mut held = Holdings::default();
+        self.fronts
+            .all()
+            .iter()
+            .for_each(|front| front.tell(&mut held));
+        self.cursors
+            .all()
+            .iter()
+            .for_each(|cursor| cursor.tell(&mut held));
+        compounds
+            .all()
+            .iter()
+            .for_each(|front| front.tell(&mut held));
+        self.contacts.validate(&held.contacts)?;
+        self.store.validate(&held)
     }
 }
 

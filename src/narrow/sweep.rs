@@ -227,6 +227,29 @@ impl Narrow {
     }
 }
 
+impl Sweeps {
+    /// Structure check: each sweep is where its pair says, and what they work with is theirs.
+    ///
+    /// # Errors
+    /// The first thing that does not hold, in words.
+    pub(super) fn validate(&self) -> Result<(), String> {
+        for (at, sweep) in (0..).zip(&self.list) {
+            if self.places.get(sweep.slot.index()) != Some(&at) {
+                return Err(format!(
+                    "the sweep of {:?} is not where its pair says",
+                    sweep.slot
+                ));
+            }
+        }
+        let placed = self.places.iter().filter(|at| **at != NONE).count();
+        if placed != self.list.len() {
+            let listed = self.list.len();
+            return Err(format!("{listed} sweeps, and {placed} pairs with one"));
+        }
+        self.tools.validate()
+    }
+}
+
 impl Sweep {
     /// A pair's sweep, and what is known of it before any look.
     fn begin(
@@ -344,5 +367,34 @@ impl Sweep {
         self.last = (here, gap_m);
         self.free = (here + time * SHORT).min(moment.until).max(here);
         self.free - here
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_broken_in_the_sweeps_is_found() {
+        let sweeps = || {
+            let mut all = Sweeps::default();
+            let fresh =
+                |slot| Sweep::fresh((PairSlot(slot), BodySlot(0), BodySlot(1)), Warm::default());
+            all.list.extend([4, 2].map(fresh));
+            all.places = vec![NONE, NONE, 1, NONE, 0];
+            all
+        };
+        sweeps().validate().unwrap();
+        let mut swapped = sweeps();
+        swapped.list.swap(0, 1);
+        assert!(
+            swapped
+                .validate()
+                .unwrap_err()
+                .contains("not where its pair says")
+        );
+        let mut more = sweeps();
+        more.places[1] = 0;
+        assert!(more.validate().unwrap_err().contains("3 pairs with one"));
     }
 }

@@ -37,6 +37,23 @@ impl Chain {
         }
     }
 
+    /// Structure check, between two ticks.
+    ///
+    /// # Errors
+    /// One sentence on the first thing that does not hold.
+    pub(super) fn validate(&self, tick: u64) -> Result<(), String> {
+        if self.base_tick > tick {
+            return Err(format!(
+                "changes build on the list of tick {}",
+                self.base_tick
+            ));
+        }
+        if !self.dropped.is_empty() && self.base_tick != 0 {
+            return Err("pairs that have left the list wait to be told of".into());
+        }
+        Ok(())
+    }
+
     /// The list is made anew, and nobody knows what is new in it.
     pub(super) fn break_off(&mut self) {
         self.base_tick = 0;
@@ -131,5 +148,28 @@ impl Publisher {
         let row = self.pair_row(view, &row);
         debug_assert!(row.has_left(), "what is new of {ids:?} is listed");
         row
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::BodyId;
+
+    #[test]
+    fn what_is_broken_in_a_chain_is_found() {
+        let chain = |base_tick, dropped: &[u64]| Chain {
+            base_tick,
+            dropped: dropped.iter().map(|id| (BodyId(*id), BodyId(9))).collect(),
+            places: Vec::new(),
+        };
+        chain(4, &[]).validate(4).unwrap();
+        assert!(chain(5, &[]).validate(4).unwrap_err().contains("tick 5"));
+        assert!(
+            chain(4, &[1])
+                .validate(4)
+                .unwrap_err()
+                .contains("wait to be told")
+        );
     }
 }

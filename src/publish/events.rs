@@ -5,6 +5,7 @@
 //! continuous body that is over at this tick's poses is a begin and an end of one tick: a pass.
 
 mod adrift;
+mod validate;
 
 use crate::ids::{BodyId, PairSlot};
 use crate::narrow::{Finding, Narrow, Passage};

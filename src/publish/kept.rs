@@ -138,6 +138,11 @@ impl<T: Copy> Kept<T> {
         }
     }
 
+    /// Rows that the last message had.
+    pub(super) fn rows(&self) -> usize {
+        self.at
+    }
+
     fn span(&mut self, len: usize) -> Span {
         let place = |rows: usize| u32::try_from(rows).unwrap_or(u32::MAX);
         let first = place(self.at);

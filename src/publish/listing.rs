@@ -7,6 +7,8 @@
 //!
 //! Rows stay where they are once made; what is sorted, and gone through in every tick, are marks of 24 bytes.
 
+mod validate;
+
 use std::cmp::Ordering;
 
 use super::kept::Span;

@@ -13,6 +13,7 @@ mod pairs;
 mod regions;
 mod review;
 mod state;
+mod validate;
 
 use crate::config::Limits;
 use crate::narrow::Narrow;

@@ -191,6 +191,29 @@ impl Survey {
         self.contacts
     }
 
+    /// Structure check, between two ticks: what is kept up is what all rows say.
+    ///
+    /// # Errors
+    /// What is not.
+    pub(super) fn validate<'a>(&self, rows: impl Iterator<Item = &'a Row>) -> Result<(), String> {
+        let (mut contacts, mut widest_m) = (0, 0.0_f64);
+        for row in rows {
+            contacts += row.contacts as usize;
+            widest_m = widest_m.max(row.gap.width());
+        }
+        if contacts != self.contacts {
+            let kept = self.contacts;
+            return Err(format!("{contacts} contacts of all rows, {kept} kept up"));
+        }
+        if widest_m.total_cmp(&self.widest_m).is_ne() {
+            let kept_m = self.widest_m;
+            return Err(format!(
+                "the widest interval is {widest_m} m, {kept_m} m kept up"
+            ));
+        }
+        Ok(())
+    }
+
     /// Takes since when a pair has had no verdict; 0: it has one.
     pub(super) fn wait(&mut self, tick: u64, undecided_since: u64) {
         if undecided_since != 0 {

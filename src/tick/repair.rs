@@ -13,7 +13,9 @@ impl Engine {
         self.world.validate()?;
         self.broad
             .validate(&self.world, self.world.filters(), &self.pairs)?;
-        self.narrow.validate(&self.pairs)
+        self.narrow.validate(&self.pairs)?;
+        let of = (&self.world, &self.pairs, &self.narrow);
+        self.publisher.validate(self.tick, of, &self.out)
     }
 
     /// Checks what the last tick left; if it does not hold, this tick builds all that is made from the world anew: the
@@ -178,6 +180,18 @@ mod tests {
         assert!(rig.tick(true).is_empty());
         assert_eq!(rig.engine.outbox().tick.rebuilds, 1);
         assert_eq!(rig.engine.outbox().tick.colliding, 3);
+    }
+
+    #[test]
+    fn a_message_that_lost_its_rows_is_found_and_made_anew_without_an_event() {
+        let mut rig = Rig::new();
+        rig.tick(false);
+        rig.engine.out.pairs.clear();
+        assert!(rig.engine.validate().unwrap_err().contains("rows of pairs"));
+        assert!(rig.tick(true).is_empty());
+        assert_eq!(rig.engine.outbox().tick.rebuilds, 1);
+        assert_eq!(rig.engine.outbox().pairs.len(), 1);
+        rig.engine.validate().unwrap();
     }
 
     #[test]

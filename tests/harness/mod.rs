@@ -125,7 +125,8 @@ impl Drive {
         armed.with(|armed| armed.set(false));
     }
 
-    fn place(&mut self, tick: u64) {
+    /// Moves all bodies to the poses of frame `tick`.
+    pub fn place(&mut self, tick: u64) {
         #[allow(clippy::cast_precision_loss, reason = "small counts")]
         let time_s = tick as f64 * 0.01;
         for at in 0..self.rows.len() {

@@ -35,5 +35,6 @@ mod shapes;
 mod state;
 mod threads;
 mod touching;
+mod used;
 mod verdicts;
 mod vertices;

@@ -37,6 +37,7 @@ proptest! {
                 _ => prop_assert_eq!(arena.pop_heap(run), twin.pop()),
             }
             prop_assert_eq!((arena.peek(run), run.len()), (twin.peek(), twin.len()));
+            prop_assert_eq!(arena.validate_heap(run), Ok(()));
         }
         for (mut run, mut twin) in runs {
             while let Some(item) = twin.pop() {
@@ -77,6 +78,7 @@ proptest! {
                 }
             }
             prop_assert_eq!(arena.all(run), twin.as_slice());
+            prop_assert_eq!(arena.validate(&runs.each_ref().map(|(run, _)| run)), Ok(()));
         }
     }
 }
@@ -145,4 +147,68 @@ fn memory_is_touched_ahead_a_little_at_a_time_and_nothing_is_in_it() {
     for (item, run) in (0..).zip(&runs) {
         assert_eq!(arena.all(run), [item]);
     }
+}
+
+/// Three runs that have grown beside one that was given back, and one that has nothing.
+fn grown() -> (Arena<u32>, [Run; 4]) {
+    let mut arena = Arena::new(1 << 10);
+    let mut runs: [Run; 4] = Default::default();
+    for item in 0..80 {
+        assert!(arena.push_heap(&mut runs[item % 4], small(item)));
+    }
+    let [mut gone, a, b, c] = runs;
+    arena.release(&mut gone);
+    (arena, [a, b, c, Run::default()])
+}
+
+/// What is broken, and what is told of it.
+type Fault = (&'static str, fn(&mut Arena<u32>, &mut [Run; 4]));
+
+const FAULTS: [Fault; 9] = [
+    ("is lost, or two overlap", |_, runs| {
+        runs[0] = Run::default()
+    }),
+    ("is lost, or two overlap", |arena, _| arena.free[0] = NONE),
+    ("is lost, or two overlap", |_, runs| runs[1].at += 4),
+    ("items in a block of", |_, runs| {
+        runs[2].len = runs[2].room + 1
+    }),
+    ("is lost, or two overlap", |_, runs| {
+        let Run { at, len, room } = runs[0];
+        runs[3] = Run { at, len, room };
+    }),
+    ("is there twice, or in no chunk", |_, runs| {
+        let at = 3 << PLACE_BITS;
+        runs[3] = Run {
+            at,
+            len: 0,
+            room: 4,
+        };
+    }),
+    ("go round in a circle", |arena, _| {
+        let first = arena.free[0];
+        *arena.item_mut(first) = first;
+    }),
+    ("is in no chunk", |arena, _| arena.free[2] = 1 << PLACE_BITS),
+    ("counted", |arena, _| arena.len += 4),
+];
+
+#[test]
+fn what_is_broken_in_an_arena_is_found() {
+    for (told, fault) in FAULTS {
+        let (mut arena, mut runs) = grown();
+        arena.validate(&runs.each_ref()).unwrap();
+        fault(&mut arena, &mut runs);
+        let why = arena.validate(&runs.each_ref()).unwrap_err();
+        assert!(why.contains(told), "{why}, not {told}");
+    }
+    let (mut arena, runs) = grown();
+    arena.validate_heap(&runs[0]).unwrap();
+    arena.all_mut(&runs[0]).swap(0, 1);
+    assert!(
+        arena
+            .validate_heap(&runs[0])
+            .unwrap_err()
+            .contains("item 1 of a heap")
+    );
 }

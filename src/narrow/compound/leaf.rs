@@ -65,6 +65,11 @@ impl Inner {
         }
     }
 
+    /// Places of its front and its query, or `NONE`.
+    pub(super) fn held(&self) -> (u32, u32) {
+        (self.front, self.cursor)
+    }
+
     /// Gives its memory back.
     pub(super) fn release(&mut self, shelves: &mut Shelves) {
         shelves.give_front(&mut self.front);

@@ -290,3 +290,8 @@ impl Linked for Open {
         self.a.0
     }
 }
+
+mod validate;
+
+#[cfg(test)]
+mod tests;

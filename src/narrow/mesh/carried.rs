@@ -37,6 +37,7 @@ use crate::math::{Pose, ROUND};
 use crate::narrow::bent::Bent;
 pub use crate::narrow::cover::Search;
 use crate::narrow::cover::{Cover, Wear};
+use crate::narrow::holdings::Holdings;
 use crate::shape::{BoxId, Obb, Shape};
 use crate::time::Meter;
 
@@ -131,6 +132,12 @@ impl CarriedFront {
         self.started = false;
         (self.last, self.crossing) = (None, None);
         (self.parting, self.deep) = (Parting::default(), Deep::default());
+    }
+
+    /// Tells what it holds.
+    pub(in crate::narrow) fn tell<'a>(&'a self, held: &mut Holdings<'a>) {
+        held.covers.push(&self.cover);
+        held.leaves.push(self.contacts.run());
     }
 
     /// Takes the pair to another pose, and to the vertices of now; what was proved is carried over as far as it holds.

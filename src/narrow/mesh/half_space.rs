@@ -7,7 +7,7 @@ use super::contacts::LeafContact;
 use super::patches::Patches;
 use super::{Closest, Goal};
 use crate::math::{Interval, Point, Pose, ROUND, Vec3};
-use crate::narrow::arena::Arena;
+use crate::narrow::arena::{Arena, Run};
 use crate::narrow::exact::PREDICTION;
 use crate::shape::{Below, Mesh, NODES_WAITING_MAX};
 use crate::time::Meter;
@@ -146,6 +146,11 @@ impl HalfSpaceWalk {
     }
 
     /// Gives its memory back.
+    /// The block that its contacts are in.
+    pub(super) fn run(&self) -> &Run {
+        self.contacts.run()
+    }
+
     pub(super) fn release(&mut self, arena: &mut Arena<LeafContact>) {
         self.contacts.release(arena);
     }

@@ -27,6 +27,11 @@ pub(super) struct Patches {
 }
 
 impl Patches {
+    /// The block that they are in.
+    pub(super) fn run(&self) -> &Run {
+        &self.kept
+    }
+
     pub(super) fn clear(&mut self) {
         self.kept.clear();
     }

@@ -6,6 +6,7 @@ use super::half_space::HalfSpaceWalk;
 use super::patches::numbered;
 use super::side::Side;
 use crate::math::{Interval, Pose};
+use crate::narrow::holdings::Holdings;
 use crate::shape::{Geometry, Mesh, Shape};
 use crate::time::Meter;
 
@@ -182,6 +183,12 @@ impl MeshQuery {
         self.kind = Kind::Idle;
         self.front.release(store);
         self.half_space.release(&mut store.contacts);
+    }
+
+    /// Tells what it holds.
+    pub(in crate::narrow) fn tell<'a>(&'a self, held: &mut Holdings<'a>) {
+        self.front.tell(held);
+        held.leaves.push(self.half_space.run());
     }
 
     /// A front's bound can be lower by rounding after it was stored: what was known at this pose stays known.

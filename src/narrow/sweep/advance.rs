@@ -15,6 +15,7 @@ use crate::math::{Interval, Pose, ROUND, Vec3};
 use crate::narrow::Counters;
 use crate::narrow::compound::{PairWalk, Waiting};
 use crate::narrow::exact::Warm;
+use crate::narrow::holdings::Holdings;
 use crate::narrow::mesh::{FrontStore, Goal, MeshQuery};
 use crate::narrow::query::{is_simple, shape_gap, shape_pose, sound, sphere_bound};
 use crate::shape::Geometry;
@@ -51,6 +52,14 @@ pub(super) struct Tools {
     fronts: FrontStore,
     meshes: MeshQuery,
     waiting: Waiting,
+}
+
+impl Tools {
+    pub(super) fn validate(&self) -> Result<(), String> {
+        let mut held = Holdings::default();
+        self.meshes.tell(&mut held);
+        self.fronts.validate(&held)
+    }
 }
 
 /// Where work is done.

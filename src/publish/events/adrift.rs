@@ -22,6 +22,10 @@ pub(super) struct Adrift {
 }
 
 impl Adrift {
+    pub(super) fn history(&self) -> &History {
+        &self.history
+    }
+
     /// Why its pair is not there any more; `None`: that is not known.
     fn cause(
         &self,

@@ -2,7 +2,8 @@
 //! nothing and what ended pairs gave back serves the others.
 
 use crate::narrow::arena::Arena;
-use crate::narrow::cover::Entries;
+use crate::narrow::cover::{Cover, Entries};
+use crate::narrow::holdings::Holdings;
 use crate::narrow::mesh::LeafContact;
 use crate::narrow::mesh::manifold::Walks;
 use crate::time::Meter;
@@ -45,6 +46,22 @@ impl FrontStore {
     pub(in crate::narrow) fn touch_ahead(&mut self, meter: &mut Meter<'_>) {
         self.entries.touch_ahead(meter);
         self.contacts.touch_ahead(meter);
+    }
+
+    /// Structure check of the arenas, and of each front's entries in them.
+    ///
+    /// # Errors
+    /// The first thing that does not hold, in words.
+    pub(in crate::narrow) fn validate(&self, held: &Holdings<'_>) -> Result<(), String> {
+        let covers = held.covers.iter();
+        let groups: Vec<_> = covers.clone().flat_map(|c| c.runs_of_groups()).collect();
+        let open: Vec<_> = covers.clone().flat_map(|c| c.runs_of_open()).collect();
+        self.entries.groups.validate(&groups)?;
+        self.entries.open.validate(&open)?;
+        self.contacts.validate(&held.leaves)?;
+        covers
+            .copied()
+            .try_for_each(|cover: &Cover| cover.validate(&self.entries))
     }
 
     /// Bytes in use by blocks, free ones included.

@@ -1,0 +1,159 @@
+//! Checks the histories of all pairs, and the events that wait.
+
+use super::{Events, History};
+use crate::ids::{PairKey, PairSlot};
+use crate::narrow::Narrow;
+use crate::pairs::PairSet;
+use crate::wire::Verdict;
+use crate::world::World;
+
+impl Events {
+    /// Structure check: one waiting entry a pair, by ids, of what has happened by `tick`; histories of the pairs that
+    /// there are, which say what is known of them.
+    ///
+    /// # Errors
+    /// One sentence on the first thing that does not hold.
+    pub(in crate::publish) fn validate(
+        &self,
+        tick: u64,
+        world: &World,
+        pairs: &PairSet,
+        narrow: &Narrow,
+    ) -> Result<(), String> {
+        self.validate_waiting(tick)?;
+        for (at, history) in (0..).zip(&self.histories) {
+            if history.born == 0 {
+                // Of a pair that nothing was said of.
+                if history.colliding || history.verdict != Verdict::None {
+                    return Err(format!("{:?} has no history and a verdict", history.ids));
+                }
+                continue;
+            }
+            let slot = PairSlot(at);
+            let bodies = world
+                .slot_of(history.ids.0)
+                .zip(world.slot_of(history.ids.1));
+            let (a, b) = (history.ids.0.0, history.ids.1.0);
+            let key = bodies.map(|(a, b)| PairKey::new(a, b));
+            if pairs.get(slot) != key || key.is_none() {
+                return Err(format!(
+                    "the history of {a} and {b} is that of another pair"
+                ));
+            }
+            if history.active.max(history.tick).max(history.born) > tick {
+                return Err(format!("the history of {a} and {b} is of ticks to come"));
+            }
+            history.validate(slot, narrow)?;
+        }
+        if self.adrift.iter().any(|lost| lost.history().born == 0) {
+            return Err("a history without a pair is of nothing".into());
+        }
+        Ok(())
+    }
+
+    /// Events that found no room.
+    fn validate_waiting(&self, tick: u64) -> Result<(), String> {
+        let waiting = &self.waiting;
+        if !waiting.is_sorted_by(|one, next| one.ids < next.ids) {
+            return Err("events that wait are not by ids, one a pair".into());
+        }
+        for event in waiting {
+            let (a, b) = (event.ids.0.0, event.ids.1.0);
+            let end = event.end.map(|(ticks, _)| ticks);
+            let mut ranges = [end, event.begin, event.pass].into_iter().flatten();
+            if a >= b || event.seq > self.seq || ranges.clone().next().is_none() {
+                return Err(format!("the event of {a} and {b} that waits is none"));
+            }
+            if ranges.any(|ticks| ticks.first > ticks.last || ticks.last > tick) {
+                return Err(format!(
+                    "the event of {a} and {b} that waits is of no ticks"
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl History {
+    /// What is certified of a pair that nothing happened to since is what is known of it.
+    fn validate(&self, slot: PairSlot, narrow: &Narrow) -> Result<(), String> {
+        let Some(finding) = narrow.finding(slot).filter(|_| !narrow.is_stirred(slot)) else {
+            return Ok(());
+        };
+        let colliding = match finding.verdict {
+            Verdict::Colliding => true,
+            Verdict::Near | Verdict::Apart => false,
+            Verdict::Possible | Verdict::None => return Ok(()),
+        };
+        if self.colliding != colliding {
+            let (a, b) = (self.ids.0.0, self.ids.1.0);
+            let verdict = finding.verdict;
+            return Err(format!(
+                "{a} and {b} are {verdict}, certified to collide: {}",
+                self.colliding
+            ));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::publish::validate::tests::Stage;
+
+    /// What is broken, and what is told of it; `tick` is 1.
+    type Fault = (&'static str, fn(&mut Events));
+
+    /// The first history of a pair that something was said of.
+    fn first(events: &mut Events) -> &mut History {
+        events
+            .histories
+            .iter_mut()
+            .find(|history| history.born != 0)
+            .unwrap()
+    }
+
+    const FAULTS: [Fault; 9] = [
+        ("one a pair", |events| {
+            events.waiting.push(events.waiting[0])
+        }),
+        ("not by ids", |events| events.waiting.swap(0, 1)),
+        ("that waits is none", |events| {
+            events.waiting[0].begin = None
+        }),
+        ("that waits is none", |events| events.seq = 0),
+        ("is of no ticks", |events| {
+            let begin = events.waiting[0].begin.as_mut().unwrap();
+            begin.last = 2;
+        }),
+        ("that of another pair", |events| {
+            let other = events.histories.iter().rfind(|history| history.born != 0);
+            let ids = other.unwrap().ids;
+            first(events).ids = ids;
+        }),
+        ("no history and a verdict", |events| first(events).born = 0),
+        ("of ticks to come", |events| first(events).tick = 2),
+        ("certified to collide: false", |events| {
+            first(events).colliding = false
+        }),
+    ];
+
+    #[test]
+    fn what_is_broken_in_the_events_is_found() {
+        for (told, fault) in FAULTS {
+            // Most begins find no room.
+            let mut stage = Stage::new(2);
+            let (events, world) = (&mut stage.publisher.events, &stage.world);
+            assert!(events.waiting.len() > 2);
+            events
+                .validate(1, world, &stage.pairs, &stage.narrow)
+                .unwrap();
+            fault(events);
+            let why = events
+                .validate(1, world, &stage.pairs, &stage.narrow)
+                .unwrap_err();
+            assert!(why.contains(told), "{why}, not {told}");
+        }
+    }
+}
