@@ -7,9 +7,9 @@ cargo fmt --all -- --check
 cargo fmt --manifest-path benches/peers/Cargo.toml -- --check
 cargo clippy --all-targets -- -D warnings
 cargo clippy --all-targets --no-default-features -- -D warnings
-# Each feature without the other: what one uses of the other's goes unseen where both are on, or none is.
-for feature in ros2 mcap; do
-  cargo clippy --all-targets --no-default-features --features "$feature" -- -D warnings
+# Each feature without the others: what one uses of another's goes unseen where all are on, or none is.
+for feature in ros2 mcap tui; do
+  cargo clippy --lib --bins --no-default-features --features "$feature" -- -D warnings
 done
 # The lean daemon links nothing of DDS, and records nothing.
 lean=$(cargo tree --no-default-features -e normal --prefix none)
