@@ -8,7 +8,6 @@ use serde::Serialize;
 
 use crate::broad::Method;
 use crate::config::Config;
-use crate::wire::Demand;
 use crate::world::World;
 
 mod choices;
@@ -50,6 +49,8 @@ pub struct LeftOut {
 pub struct Plan {
     #[serde(skip)]
     method: Method,
+    #[serde(skip)]
+    facts: Facts,
     /// Bodies in the scene.
     pub bodies: u64,
     /// Bodies that can move.
@@ -67,11 +68,22 @@ pub struct Plan {
     pub left_out: Vec<LeftOut>,
 }
 
+/// What is computed for readers, and whether somebody reads it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Readers {
+    /// Intervals narrower than a verdict needs: of `pairs`, `changes`, `contacts` or `regions`.
+    pub bounds: bool,
+    /// `contacts`.
+    pub contacts: bool,
+    /// `regions`.
+    pub regions: bool,
+}
+
 /// What is known beside the scene while a daemon runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Seen {
-    /// Who has listened lately.
-    pub demand: Demand,
+    /// What somebody has read lately.
+    pub readers: Readers,
     /// The axis that sweep-and-prune leaves out, because it has measured that nearly all overlap on it: 0 to 2.
     pub skipped_axis: Option<usize>,
 }
@@ -80,19 +92,26 @@ impl Plan {
     /// The plan for a world as it is now.
     #[must_use]
     pub fn of(world: &World, config: &Config) -> Self {
-        Self::after(None, world, config, Seen::default())
+        Self::decide(None, Facts::of(world), config, Seen::default())
     }
 
-    /// The plan for a world as it is now, with hysteresis against the one in force.
+    /// The plan after edits, with hysteresis against this one. Cost: a look at every body.
     #[must_use]
-    pub fn after(before: Option<&Self>, world: &World, config: &Config, seen: Seen) -> Self {
-        let facts = Facts::of(world);
-        let few = match before {
-            Some(Self {
-                method: Method::BruteForce,
-                ..
-            }) => BRUTE_FORCE_STAY_MAX,
-            _ => BRUTE_FORCE_MAX,
+    pub fn after_edits(&self, world: &World, config: &Config, seen: Seen) -> Self {
+        Self::decide(Some(self.method), Facts::of(world), config, seen)
+    }
+
+    /// The plan for the same bodies, where what else it is made for has changed.
+    #[must_use]
+    pub fn anew(&self, config: &Config, seen: Seen) -> Self {
+        Self::decide(Some(self.method), self.facts.clone(), config, seen)
+    }
+
+    fn decide(before: Option<Method>, facts: Facts, config: &Config, seen: Seen) -> Self {
+        let few = if before == Some(Method::BruteForce) {
+            BRUTE_FORCE_STAY_MAX
+        } else {
+            BRUTE_FORCE_MAX
         };
         let fitting = if facts.boxes <= few {
             Method::BruteForce
@@ -109,6 +128,7 @@ impl Plan {
             size_m: facts.size_m,
             choices: choices::of(&facts, method, config, seen),
             left_out: left_out::of(&facts, method, seen),
+            facts,
         }
     }
 

@@ -85,6 +85,7 @@ fn stream(
     let mut look_ns = start_ns.saturating_add(HEED_NS);
     let mut heeded = Heeded::default();
     let mut frame = 0_u64;
+    let mut is_used = false;
     while !stop.load(Ordering::Relaxed) && args.frames.is_none_or(|most| frame < most) {
         let (time_s, stamp_ns) = moment(frame, args.course.rate);
         bodies.move_to(time_s);
@@ -94,6 +95,7 @@ fn stream(
         };
         // A frame for a daemon that is no more would be refused by the next one.
         while client.latest()? != Heard::Silence {}
+        is_used = is_used || uses(client, source);
         client.send(&info, Rows::Poses(&bodies.rows))?;
         frame += 1;
         let next_ns = start_ns.saturating_add(moment(frame, args.course.rate).1);
@@ -109,33 +111,55 @@ fn stream(
         }
         sleep_until(&clock, next_ns, stop);
     }
-    if args.frames.is_some() && frame > 0 && !stop.load(Ordering::Relaxed) {
-        conclude(client, source, frame)?;
+    if args.frames.is_some() && frame > 0 && !is_used {
+        conclude(client, source, frame, stop)?;
     }
     Ok(())
 }
 
-/// After the last of a number of frames: that none was used is no good end.
-fn conclude(client: &mut Client, source: &str, sent: u64) -> Result<()> {
+/// After the last of a number of frames of which none was seen to be used: that none was is no good end.
+fn conclude(client: &mut Client, source: &str, sent: u64, stop: &AtomicBool) -> Result<()> {
     let clock = SystemClock;
-    let until_ns = clock.monotonic_ns().saturating_add(HEED_NS);
-    loop {
-        // A tick that is under way tells no sources.
-        let view = client.view();
-        if !view.is_under_way()
-            && used(view.tick(), client.session(), source).is_some_and(|n| n > 0)
-        {
+    let mut until_ns = clock.monotonic_ns().saturating_add(HEED_NS);
+    let mut is_heard = false;
+    while !uses(client, source) {
+        let now_ns = clock.monotonic_ns();
+        if stop.load(Ordering::Relaxed) {
             return Ok(());
         }
-        if clock.monotonic_ns() >= until_ns {
-            break;
+        if now_ns >= until_ns {
+            return Err(unused(source, sent, is_heard));
         }
-        client.wait_tick(LOOK_NS)?;
+        match client.wait_tick(LOOK_NS)? {
+            Heard::Silence => {}
+            // What takes long may still be the tick of these frames.
+            Heard::Tick if client.view().is_under_way() => {
+                until_ns = now_ns.saturating_add(HEED_NS);
+            }
+            Heard::Tick | Heard::Restarted(_) => is_heard = true,
+        }
     }
-    Err(Error::Refused(format!(
-        "the daemon used none of the {sent} frames of `{source}`: look at its log, and at the `rejects` of \
-         `sweepd monitor --json`; does it run the same scene, and no other feed of this source?"
-    )))
+    Ok(())
+}
+
+fn unused(source: &str, sent: u64, is_heard: bool) -> Error {
+    if is_heard {
+        Error::Refused(format!(
+            "the daemon used none of the {sent} frames of `{source}`: look at its log, and at the `rejects` of \
+             `sweepd monitor --json`; does it run the same scene, and no other feed of this source?"
+        ))
+    } else {
+        Error::TimedOut(format!(
+            "no tick since the last of {sent} frames of `{source}`, of which none was used: has the daemon ended?"
+        ))
+    }
+}
+
+/// Whether the daemon has used a frame of this session.
+fn uses(client: &Client, source: &str) -> bool {
+    let view = client.view();
+    // A tick that is under way tells no sources.
+    !view.is_under_way() && used(view.tick(), client.session(), source).is_some_and(|n| n > 0)
 }
 
 /// Frames of this session that the daemon has used; `None`: another session speaks for the source, or none.

@@ -129,7 +129,10 @@ fn filtered(facts: &Facts) -> Option<Choice> {
     (facts.rules > 0).then(|| Choice {
         part: "filters",
         chosen: "rules by name, looked up for bodies that one speaks of".to_owned(),
-        why: format!("{} rules, {} pairs ignored", facts.rules, facts.ignored),
+        why: format!(
+            "rules: {}; pairs ignored by them, as neighbours or in groups: {}",
+            facts.rules, facts.ignored
+        ),
     })
 }
 
@@ -173,13 +176,12 @@ fn ordered(config: &Config) -> Choice {
 
 /// What is computed because somebody reads it.
 fn listened(seen: Seen) -> impl Iterator<Item = Choice> {
-    let demand = seen.demand;
-    let manifolds = demand.contacts.then_some((
+    let manifolds = seen.readers.contacts.then_some((
         "contacts",
         "manifolds: points, normals and depths of pairs that touch",
         "somebody reads `contacts`",
     ));
-    let regions = demand.regions.then_some((
+    let regions = seen.readers.regions.then_some((
         "regions",
         "regions of contact with their radius, of pairs that touch",
         "somebody reads `regions`",

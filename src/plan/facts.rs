@@ -3,7 +3,7 @@
 use crate::shape::Geometry;
 use crate::world::World;
 
-#[derive(Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Facts {
     pub(super) bodies: u64,
     pub(super) moving: u64,

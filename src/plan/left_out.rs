@@ -69,15 +69,15 @@ pub(super) fn of(facts: &Facts, method: Method, seen: Seen) -> Vec<LeftOut> {
 
 /// What nobody reads is not computed.
 fn unread(seen: Seen, out: &mut impl FnMut(&'static str, String, u64)) {
-    let demand = seen.demand;
-    if !(demand.pairs || demand.changes || demand.contacts || demand.regions) {
+    let readers = seen.readers;
+    if !readers.bounds {
         out(
             "bounds narrower than a verdict needs, while nobody reads them",
             "computed on demand".to_owned(),
             0,
         );
     }
-    if !demand.contacts {
+    if !readers.contacts {
         out(
             "contacts and manifolds, while nobody reads them",
             "computed on demand; meshes keep 30 bytes a triangle for walks over their surface"
@@ -85,7 +85,7 @@ fn unread(seen: Seen, out: &mut impl FnMut(&'static str, String, u64)) {
             0,
         );
     }
-    if !demand.regions {
+    if !readers.regions {
         out(
             "regions of contact, while nobody reads them",
             "computed on demand; meshes keep 7 bytes a triangle for their normals".to_owned(),

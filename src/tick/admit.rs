@@ -34,8 +34,9 @@ impl Engine {
         }
         let seen = self.see(input);
         let is_news = seen != std::mem::replace(&mut self.seen, seen);
-        if is_news || !input.edits.is_empty() || limited != self.config.budget.is_limited() {
-            self.replan();
+        let is_edited = !input.edits.is_empty();
+        if is_edited || is_news || limited != self.config.budget.is_limited() {
+            self.replan(is_edited);
         }
     }
 
@@ -44,7 +45,7 @@ impl Engine {
         let axes = self.broad.work().axes;
         let one_left_out = axes.iter().filter(|kept| **kept).count() == 2;
         Seen {
-            demand: self.audience.note(input.demand),
+            readers: self.audience.note(input.demand),
             skipped_axis: axes.iter().position(|kept| one_left_out && !kept),
         }
     }

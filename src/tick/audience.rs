@@ -1,66 +1,80 @@
 //! Who has listened lately: what the plan says of readers.
 
+use crate::plan::Readers;
 use crate::wire::Demand;
 
 /// Ticks for which nobody must have read a message before the plan says so: a reader that comes back does not make the
 /// plan go to and fro.
 const QUIET_TICKS: u32 = 64;
 
-/// What somebody has listened to lately.
-#[derive(Clone, Copy, Debug, Default)]
+/// Ticks since somebody listened, of each thing that is computed for readers.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Audience {
-    lately: Demand,
-    /// Ticks since less than that is listened to.
-    quiet: u32,
+    bounds: u32,
+    contacts: u32,
+    regions: u32,
+}
+
+impl Default for Audience {
+    fn default() -> Self {
+        Self {
+            bounds: QUIET_TICKS,
+            contacts: QUIET_TICKS,
+            regions: QUIET_TICKS,
+        }
+    }
 }
 
 impl Audience {
-    /// Notes who listens to this tick; what somebody has listened to lately.
-    pub(super) fn note(&mut self, now: Demand) -> Demand {
-        let all = both(self.lately, now);
-        // The one that came anew is no part of it: it says what one message is to hold.
-        let now = both(now, Demand::default());
-        self.quiet = if all == now { 0 } else { self.quiet + 1 };
-        self.lately = if self.quiet < QUIET_TICKS { all } else { now };
-        self.lately
+    /// Notes who listens to this tick; what somebody has read lately.
+    pub(super) fn note(&mut self, now: Demand) -> Readers {
+        let whole = now.contacts || now.regions;
+        Readers {
+            bounds: lately(&mut self.bounds, now.pairs || now.changes || whole),
+            contacts: lately(&mut self.contacts, now.contacts),
+            regions: lately(&mut self.regions, now.regions),
+        }
     }
 }
 
-/// What the one or the other listens to.
-fn both(a: Demand, b: Demand) -> Demand {
-    Demand {
-        pairs: a.pairs || b.pairs,
-        contacts: a.contacts || b.contacts,
-        regions: a.regions || b.regions,
-        bodies: a.bodies || b.bodies,
-        body_verdicts: a.body_verdicts || b.body_verdicts,
-        changes: a.changes || b.changes,
-        changes_anew: false,
-    }
+fn lately(quiet: &mut u32, is_read: bool) -> bool {
+    *quiet = if is_read {
+        0
+    } else {
+        quiet.saturating_add(1).min(QUIET_TICKS)
+    };
+    *quiet < QUIET_TICKS
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn who_comes_counts_at_once_and_who_goes_after_a_while() {
-        let reads = Demand {
-            contacts: true,
+    fn reads(contacts: bool, pairs: bool) -> Demand {
+        Demand {
+            contacts,
+            pairs,
             changes_anew: true,
             ..Demand::default()
-        };
+        }
+    }
+
+    #[test]
+    fn who_comes_counts_at_once_and_who_goes_after_a_while_each_for_itself() {
         let mut audience = Audience::default();
-        assert!(audience.note(reads).contacts);
+        let nobody = Readers::default();
+        assert_eq!(audience.note(reads(false, false)), nobody);
+        let both = audience.note(reads(true, true));
+        assert!(both.contacts && both.bounds && !both.regions);
         for _ in 1..QUIET_TICKS {
-            assert!(audience.note(Demand::default()).contacts);
+            assert_eq!(audience.note(reads(false, true)), both);
         }
-        assert_eq!(audience.note(Demand::default()), Demand::default());
-        assert!(audience.note(reads).contacts);
-        for _ in 0..QUIET_TICKS - 1 {
-            audience.note(Demand::default());
+        // The reader of pairs is away just now, for this one tick.
+        let gone = audience.note(reads(false, false));
+        assert!(!gone.contacts && gone.bounds);
+        for _ in 1..QUIET_TICKS {
+            assert!(audience.note(reads(false, false)).bounds || audience.bounds == QUIET_TICKS);
         }
-        audience.note(reads);
-        assert!(audience.note(Demand::default()).contacts, "it came back");
+        assert_eq!(audience.note(reads(false, false)), nobody);
     }
 }

@@ -197,8 +197,13 @@ impl Engine {
         Laps::start(Arc::clone(&self.clock), input.woke_ns)
     }
 
-    fn replan(&mut self) {
-        let plan = Plan::after(Some(&self.plan), &self.world, &self.config, self.seen);
+    /// * `is_edited` - whether the bodies are other ones; else they are not looked at.
+    fn replan(&mut self, is_edited: bool) {
+        let plan = if is_edited {
+            self.plan.after_edits(&self.world, &self.config, self.seen)
+        } else {
+            self.plan.anew(&self.config, self.seen)
+        };
         if plan != self.plan {
             self.out.plan = plan.to_json();
             self.out.plan_changed = true;

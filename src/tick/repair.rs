@@ -10,12 +10,17 @@ impl Engine {
     /// # Errors
     /// The first thing that does not hold, in words.
     pub fn validate(&self) -> Result<(), String> {
+        self.check(self.tick)
+    }
+
+    /// * `last` - the tick that all of it was left by.
+    fn check(&self, last: u64) -> Result<(), String> {
         self.world.validate()?;
         self.broad
             .validate(&self.world, self.world.filters(), &self.pairs)?;
         self.narrow.validate(&self.pairs)?;
         let of = (&self.world, &self.pairs, &self.narrow);
-        self.publisher.validate(self.tick, of, &self.out)
+        self.publisher.validate(last, of, &self.out)
     }
 
     /// Checks what the last tick left; if it does not hold, this tick builds all that is made from the world anew: the
@@ -32,7 +37,8 @@ impl Engine {
                 "the world, from which all else is made, does not hold ({why}): restart the daemon"
             ));
         }
-        let Err(why) = self.validate() else {
+        // This one has begun, and done nothing yet.
+        let Err(why) = self.check(self.tick - 1) else {
             self.checked = self.tick - 1;
             return None;
         };

@@ -11,7 +11,7 @@ use super::{Bodies, moment, sleep_until};
 use crate::builtin::Random;
 use crate::cli::args::FeedArgs;
 use crate::cli::out::Out;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::time::{Clock, SystemClock};
 use crate::transport::client::{Client, FrameInfo, Rows, StepError};
 use crate::wire::Reason;
@@ -82,7 +82,14 @@ pub(super) fn keep(
         sleep_until(&clock, end_ns, stop);
         begin_ns = clock.monotonic_ns();
     }
-    times.tell(frame_ns, out)
+    times.tell(frame_ns, out)?;
+    let is_whole = args.frames == Some(frame) && frame > 0;
+    if is_whole && times.whole_ns.is_empty() {
+        return Err(Error::Refused(format!(
+            "none of {frame} frames had a result: the warnings say why"
+        )));
+    }
+    Ok(())
 }
 
 impl Times {

@@ -54,7 +54,7 @@ pub(super) fn depth(pair: &Pair<'_>, simplex: &Simplex, warm: Option<Refined>) -
         let mut gap = polytope.straight(pair, gap);
         if !pair.polytopes
             && !gap.is_tight(pair)
-            && let Some(other) = sectors::gap(pair, warm.as_ref())
+            && let Some(other) = sectors::wide_gap(pair, warm.as_ref())
         {
             gap = gap.meet(&other, pair);
         }

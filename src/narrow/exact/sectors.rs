@@ -19,26 +19,30 @@
 //! Sectors are parted, where the other core's farthest corner changes if it does, until all of them are as deep as the
 //! best direction met.
 
+mod answer;
 mod chain;
 
 use std::f64::consts::PI;
 
-use super::closed::nearest;
-use super::newton::{self, Refined};
-use super::pair::{CoreGap, Held, Pair};
+use super::newton::Refined;
+use super::pair::{CoreGap, Pair};
 use crate::math::Vec3;
-use crate::shape::Core;
+use crate::shape::{Convex, Core};
 use chain::{Chain, Flat, Least, Link, along, dot, out};
 
 /// Sectors looked at, at most; what is proved by then is sound, but wider.
 const SECTORS_MAX: usize = 512;
+/// Points of a hull looked at, at most, which takes some half a millisecond; who has more is not asked to its end.
+const POINTS_MAX: usize = 500_000;
+/// How often a sector asks for the farthest point, about.
+const ASKED: usize = 10;
+/// With fewer sectors nothing is proved that a polytope would not tell.
+const SECTORS_LEAST: usize = 64;
 /// Sectors that wait, at most.
 const WAITING_MAX: usize = 40;
 /// How far aside of the axis, and of square to it, a chain's first points are asked for: it takes those farther out of
 /// equal ones.
 const ASIDE: f64 = 1e-12;
-/// How far aside of the best normal its features are asked for.
-const FEATURES_ASIDE: f64 = 1e-2;
 /// What is rounded on the way from supports to a chain's bound, in parts of what cannot be told from 0.
 const ROUNDED: f64 = 4.0;
 /// A sector is not parted nearer to its ends, in parts of it.
@@ -66,23 +70,21 @@ struct Around<'a> {
     corners: [Flat; 2],
 }
 
-/// The gap of two overlapping cores of which one is round, best where the other reaches less far from its axis; its
-/// ends may stay apart.
+/// The gap of two overlapping cores of which one is round, where the other reaches so little far from its axis that a
+/// polytope takes more time; its ends may stay apart.
 ///
 /// * `warm` - what Newton made of the features of an earlier answer, if anything.
 ///
-/// Cost: mostly 5 to 50 us.
-pub(super) fn gap(pair: &Pair<'_>, warm: Option<&Refined>) -> Option<CoreGap> {
-    Around::of(pair)?.gap(warm)
-}
-
-/// The same where it takes less time than a polytope.
+/// Cost: mostly 5 to 50 us; with hulls of hundreds of points up to half a millisecond.
 pub(super) fn narrow_gap(pair: &Pair<'_>, warm: Option<&Refined>) -> Option<CoreGap> {
     let around = Around::of(pair)?;
-    if around.breadth() > NARROW * around.corners[0][0] {
-        return None;
-    }
-    around.gap(warm)
+    around.is_narrow().then(|| around.gap(warm)).flatten()
+}
+
+/// The same of the others.
+pub(super) fn wide_gap(pair: &Pair<'_>, warm: Option<&Refined>) -> Option<CoreGap> {
+    let around = Around::of(pair)?;
+    (!around.is_narrow()).then(|| around.gap(warm)).flatten()
 }
 
 impl<'a> Around<'a> {
@@ -116,6 +118,29 @@ impl<'a> Around<'a> {
                 })
             }
             (one, other) => one.or(other),
+        }
+    }
+
+    fn is_narrow(&self) -> bool {
+        self.breadth() <= NARROW * self.corners[0][0]
+    }
+
+    /// Sectors that may be looked at.
+    fn sectors_max(&self) -> usize {
+        match self.other().core() {
+            Core::Hull(hull) => {
+                (POINTS_MAX / (ASKED * hull.points().len().max(1))).min(SECTORS_MAX)
+            }
+            _ => SECTORS_MAX,
+        }
+    }
+
+    /// The core that is not the round one.
+    fn other(&self) -> &Convex {
+        if self.a_is_round {
+            self.pair.b
+        } else {
+            self.pair.a
         }
     }
 
@@ -197,6 +222,9 @@ impl<'a> Around<'a> {
     }
 
     fn gap(&self, warm: Option<&Refined>) -> Option<CoreGap> {
+        if self.sectors_max() < SECTORS_LEAST {
+            return None;
+        }
         let mut best = Best {
             value: f64::NEG_INFINITY,
             normal: Vec3::z(),
@@ -219,6 +247,7 @@ impl<'a> Around<'a> {
     /// What is proved of the depth, all around.
     fn prove(&self, best: &mut Best) -> f64 {
         let close_m = self.pair.tolerance();
+        let most = self.sectors_max();
         let mut waiting = [PI; WAITING_MAX];
         waiting[1..4].copy_from_slice(&[PI / 2.0, 0.0, -PI / 2.0]);
         let (mut count, mut looked_at, mut from) = (4, 4, -PI);
@@ -240,7 +269,9 @@ impl<'a> Around<'a> {
             }
             let close = least.depth >= -best.value - close_m;
             match parting {
-                Some(at) if !close && looked_at < SECTORS_MAX && count < WAITING_MAX => {
+                // Of a hull of many points nothing is known that a polytope would not tell sooner.
+                Some(_) if !close && looked_at == most && most < SECTORS_MAX => return 0.0,
+                Some(at) if !close && looked_at < most && count < WAITING_MAX => {
                     waiting[count] = self.change(&chain, &least, at, (from, to));
                     count += 1;
                     looked_at += 1;
@@ -258,12 +289,7 @@ impl<'a> Around<'a> {
     /// The angle to part a sector at: where the corner that is farthest at its end becomes so, or the middle.
     fn change(&self, chain: &Chain, least: &Least, end: &Vec3, (from, to): (f64, f64)) -> f64 {
         let middle = from + (to - from) / 2.0;
-        let other = if self.a_is_round {
-            self.pair.b
-        } else {
-            self.pair.a
-        };
-        if !other.core().is_polytope() {
+        if !self.other().core().is_polytope() {
             return middle;
         }
         let farther = self.link(end, least.n).of_other;
@@ -285,99 +311,6 @@ impl<'a> Around<'a> {
         let places = [-1.0, 0.0, 1.0].map(|turns| turns * 2.0 * PI + towards);
         let mut all = places.into_iter().flat_map(|at| [at - aside, at + aside]);
         all.find(inside).unwrap_or(middle)
-    }
-
-    /// Four small ways aside of the best direction: in its plane, and out of it.
-    fn ways(&self, best: &Best) -> [Vec3; 4] {
-        let (along, [x, z]) = (best.along, best.n);
-        let up = self.normal(&(along * -z + Vec3::z() * x)) * FEATURES_ASIDE;
-        let side = self.normal(&Vec3::new(-along.y, along.x, 0.0)) * FEATURES_ASIDE;
-        [up, -up, side, -side]
-    }
-
-    /// Newton on the features around the best direction, if a plane showed it.
-    fn refine(&self, best: &mut Best) {
-        if best.refined.is_some() {
-            return;
-        }
-        let mut found: Option<Refined> = None;
-        let ways = self.ways(best);
-        for two in [[ways[0], ways[1]], [ways[2], ways[3]]] {
-            let features = two.map(|way| self.pair.support(&(best.normal + way)));
-            let one = newton::solve(self.pair, &features, &[0.5, 0.5], &best.normal);
-            found = match (found, one) {
-                (Some(f), Some(o)) if f.value >= o.value => Some(f),
-                (found, one) => one.or(found),
-            };
-        }
-        if let Some(found) = found {
-            best.take(&found, self.pair.tiny());
-        }
-    }
-
-    fn answer(&self, best: &Best, upper: f64) -> CoreGap {
-        let (point_a, point_b, held) = match &best.refined {
-            Some(found) => (found.point_a, found.point_b, found.held),
-            None => {
-                let (a, b) = self.witnesses(best);
-                (a, b, Held::default())
-            }
-        };
-        CoreGap {
-            lower: best.value,
-            upper: upper.max(best.value),
-            normal: best.normal,
-            point_a,
-            point_b,
-            held,
-        }
-    }
-
-    /// Points straight across from each other: of what the other core shows, the one that is nearest to both surfaces.
-    fn witnesses(&self, best: &Best) -> (Vec3, Vec3) {
-        let pair = self.pair;
-        let (out, round) = if self.a_is_round {
-            (-best.normal, pair.a)
-        } else {
-            (pair.to_b(&best.normal), pair.b)
-        };
-        let across = out * -best.value;
-        let side = Vec3::new(-out.y, out.x, 0.0);
-        let half_m = self.corners[0][1];
-        let corner = self.farthest(&out);
-        let mut shown = [corner; 5];
-        for (point, way) in shown[1..].iter_mut().zip(self.ways(best)) {
-            let normal = best.normal + way;
-            *point = self.farthest(&if self.a_is_round {
-                -normal
-            } else {
-                pair.to_b(&normal)
-            });
-        }
-        let mut least = (f64::INFINITY, corner);
-        for (k, one) in shown.iter().enumerate() {
-            for other in &shown[k..] {
-                let (from, way) = (one - across, other - one);
-                let height = from.z.clamp(-half_m, half_m) - from.z;
-                // The one, the middle, where they cross the plane, and where they are as high as the round core.
-                for part in [0.0, 0.5, -from.dot(&side) / way.dot(&side), height / way.z] {
-                    let point = one + way * part.clamp(0.0, 1.0);
-                    let near = nearest(round.core(), &(point - across));
-                    let off = near.map_or(f64::INFINITY, |near| near.distance.abs());
-                    let off = off.max(out.dot(&(corner - point)));
-                    if off < least.0 {
-                        least = (off, point);
-                    }
-                }
-            }
-        }
-        let (of_other, of_round) = (least.1, least.1 - across);
-        if self.a_is_round {
-            (of_round, of_other)
-        } else {
-            let placed = |p: Vec3| pair.rotation * p + pair.at;
-            (placed(of_other), placed(of_round))
-        }
     }
 }
 

@@ -145,12 +145,12 @@ impl HalfSpaceWalk {
         self.contacts.all(arena)
     }
 
-    /// Gives its memory back.
     /// The block that its contacts are in.
     pub(super) fn run(&self) -> &Run {
         self.contacts.run()
     }
 
+    /// Gives its memory back.
     pub(super) fn release(&mut self, arena: &mut Arena<LeafContact>) {
         self.contacts.release(arena);
     }

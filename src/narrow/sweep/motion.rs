@@ -7,6 +7,9 @@ use crate::math::{Point, Pose, ROUND, Vec3, relative};
 use crate::shape::{Core, Geometry};
 use crate::world::{Body, Leg, Path, PlacedShape};
 
+/// Shapes of which it is asked whether all spin about one axis: a wheel has few, and this is asked at each look.
+const PARTS_MAX: usize = 8;
+
 /// A body's motion for a while, per unit of the share: the pivot goes straight, the body turns about a fixed axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Span {
@@ -66,18 +69,20 @@ impl Span {
             slop: 16.0 * ROUND * far + 64.0 * ROUND * (size + per_share * leg.travel.amax()),
             told: path.is_told_at(share),
         };
-        let astray = span.astray(body, leg.angle(), path.reach());
-        if let Some(off_m) = astray.filter(|off_m| *off_m <= span.slop) {
+        if let Some(off_m) = span.astray(body, leg.angle(), path.reach()) {
             (span.spin, span.rate) = (Vec3::zeros(), 0.0);
             span.slop += off_m;
         }
         span
     }
 
-    /// How far its surface is, in all of a leg's turn, from where it would be without it: nearly nothing where it spins
-    /// about its own axis; `None`: it does not turn about one axis, or is no solid of revolution.
+    /// How far its surface is, in all of a leg's turn, from where it would be without it, where that is no more than what
+    /// is rounded anyway; `None`: it does not turn, or not about its own axis, or is no solid of revolution.
     fn astray(&self, body: &Body, angle: f64, reach_m: f64) -> Option<f64> {
         let about = self.spin.try_normalize(0.0).filter(|_| !self.mixed)?;
+        if body.shapes.len() > PARTS_MAX {
+            return None;
+        }
         let mut most_m = 0.0_f64;
         for placed in &*body.shapes {
             let Geometry::Convex(convex) = &placed.shape.geometry else {
@@ -93,9 +98,13 @@ impl Span {
             let arm = placed.pose * placed.shape.centre - self.pivot;
             let off_m = axis.cross(&(self.pose.rotation * arm)).norm();
             let rounded_m = 16.0 * ROUND * (reach_m + self.pivot.coords.amax());
-            most_m = most_m.max(off_m + axis.cross(&about).norm() * reach_m + rounded_m);
+            let off_m = off_m + axis.cross(&about).norm() * reach_m + rounded_m;
+            most_m = most_m.max(angle * off_m);
+            if most_m.is_nan() || most_m > self.slop {
+                return None;
+            }
         }
-        Some(angle * most_m)
+        Some(most_m)
     }
 
     fn rest(body: &Body) -> Self {
