@@ -410,3 +410,25 @@ fn what_is_wrong_in_a_line_is_told_with_the_part_it_stands_in() {
     let listed = rows[0]["error"].as_str().unwrap();
     assert!(listed.starts_with("line 1: it is no object"), "{listed}");
 }
+
+/// How far apart is from exact rational arithmetic: what rounding takes for an overlap was told nearer than it is.
+#[test]
+fn bug_a_sliver_that_is_just_apart_was_told_nearer_than_it_is() {
+    let sliver = json!({"type": "triangle", "vertices": [
+        [-0.625, -0.75, 1.0], [-0.375, 0.0, -0.625], [-0.554935150738665, -0.5398054587597252, 0.5445784915412667],
+    ]});
+    let other = json!({"type": "triangle", "vertices": [[1.0, 0.5, -0.875], [0.5, 1.0, 0.625], [-1.0, -0.625, -0.375]]});
+    let t = [
+        -1.0079935920040402,
+        -1.3989807767762772,
+        -0.3855416519696748,
+    ];
+    let (whole, rows) = ask(line("sliver", &sliver, &other, t).as_bytes());
+    assert!(whole);
+    let end = |key: &str| rows[0][key].as_f64().unwrap();
+    let truth = 5.845403e-10;
+    assert!(
+        end("gap_min_m") <= truth && truth <= end("gap_max_m"),
+        "{rows:?}"
+    );
+}

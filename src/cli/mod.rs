@@ -106,6 +106,10 @@ fn stop() -> Result<Arc<AtomicBool>> {
             .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&stop)))
             .map_err(|e| Error::io("cannot listen for signals", e))?;
     }
+    // Beyond the largest file that is allowed a write fails then, and says so, in place of ending the process.
+    let too_large = rustix::process::Signal::XFSZ.as_raw();
+    signal_hook::flag::register(too_large, Arc::default())
+        .map_err(|e| Error::io("cannot listen for signals", e))?;
     Ok(stop)
 }
 

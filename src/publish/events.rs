@@ -177,7 +177,8 @@ impl Events {
         }
         history.go_on_to(tick - 1);
         history.ids = ids;
-        history.was_colliding = history.colliding;
+        // Told of the last tick's poses: of a collision that was not certified there, a touch at them is news.
+        history.was_colliding = history.colliding && history.tick + 1 == tick;
         // Not active in the tick before: proved apart there by its certificate or by its boxes, unless it is new and a
         // body of it was not in, not known, or not looked for there.
         let unseen = (finding.born == tick)
@@ -276,6 +277,15 @@ impl Events {
             if next.begin.is_some() {
                 kept.begin = next.begin;
             }
+            // A row has one cause: that the pair touched on its way as well is told by its flag.
+            if kept.pass.is_some()
+                && kept
+                    .end
+                    .is_some_and(|(_, cause)| cause != EndCause::Separated)
+            {
+                kept.pass = None;
+                *cancelled += 1;
+            }
             true
         });
         self.waiting
@@ -322,6 +332,26 @@ mod tests {
         assert_eq!(event.end, Some((ticks(5, 5), EndCause::Removed)));
         assert_eq!(event.begin, Some(ticks(6, 7)));
         assert_eq!(events.cancelled, 0);
+    }
+
+    #[test]
+    fn bug_an_end_by_cause_was_told_as_the_separated_end_of_a_pass() {
+        let ids = (BodyId(1), BodyId(2));
+        for cause in [EndCause::Reset, EndCause::Separated] {
+            let mut events = Events::default();
+            events.push(ids, Some((ticks(5, 5), cause)), None);
+            events.push_pass(ids, ticks(5, 5));
+            events.merge();
+            let [event] = events.waiting() else {
+                panic!("one row")
+            };
+            let by_cause = cause == EndCause::Reset;
+            assert_eq!(event.end, Some((ticks(5, 5), cause)));
+            assert_eq!(
+                (event.pass.is_none(), events.cancelled),
+                (by_cause, u64::from(by_cause))
+            );
+        }
     }
 
     #[test]

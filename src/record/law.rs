@@ -130,7 +130,7 @@ fn swept(one: &PairRow, two: &PairRow) -> Option<Spot> {
     // Decided in the replay, and said otherwise in the recording. Who collides now has touched: that it did so on the
     // way is no news where it collided before, which one may have certified a tick earlier than the other.
     let denied = has(two, hit) && !touches(one) && !has(one, open);
-    let invented = has(one, hit) && !touches(two) && !has(two, open);
+    let invented = has(one, hit) && !is_of_before(one) && !touches(two) && !has(two, open);
     let apart =
         has(one, hit) && has(two, hit) && (one.toi_min > two.toi_max || two.toi_min > one.toi_max);
     let show = |row: &PairRow| match (has(row, hit), has(row, open)) {
@@ -139,6 +139,12 @@ fn swept(one: &PairRow, two: &PairRow) -> Option<Spot> {
         _ => "no touch".to_owned(),
     };
     (denied || invented || apart).then(|| spot(one, "way", &show(one), &show(two)))
+}
+
+/// Whether it touched at the poses that its way begins with: the tick before may have certified that in the replay, and
+/// have left it open in the recording.
+fn is_of_before(row: &PairRow) -> bool {
+    has(row, pair_flags::SWEPT_HIT) && row.toi_max <= 0.0 && verdict(row) != Verdict::Colliding
 }
 
 /// A pair that the recording alone tells of: the replay proved it apart, and not near.
@@ -154,7 +160,11 @@ fn state(recorded: &Outbox, replayed: &Outbox) -> Option<Spot> {
     let (one, two) = (word(recorded)?, word(replayed)?);
     let safe = matches!(one, State::Clear | State::Near);
     let denied = safe && two == State::Colliding;
-    let invented = one == State::Colliding && matches!(two, State::Clear | State::Near);
+    let of_now = |row: &&PairRow| touches(row) && !is_of_before(row);
+    let of_before = recorded.pairs.iter().any(is_of_before);
+    let of_before = of_before && !recorded.pairs.iter().any(|row| of_now(&row));
+    let invented =
+        one == State::Colliding && matches!(two, State::Clear | State::Near) && !of_before;
     (denied || invented).then(|| Spot {
         field: "state".to_owned(),
         ..Spot::whole("tick", one.word(), two.word())
@@ -237,8 +247,25 @@ mod tests {
         assert_eq!(field(vec![wrong], vec![deep]), verdict);
         let mut hit = near;
         hit.flags = pair_flags::SWEPT_HIT;
+        hit.toi_max = 0.5;
         assert_eq!(field(vec![near], vec![hit]), Some("way".to_owned()));
         assert_eq!(field(vec![hit], vec![near]), Some("way".to_owned()));
+    }
+
+    #[test]
+    fn bug_a_touch_at_the_poses_before_is_news_where_they_were_not_decided() {
+        let near = row(3, Verdict::Near, 0.1, 0.2);
+        let mut hit = near;
+        hit.flags = pair_flags::SWEPT_HIT;
+        let (mut one, mut two) = (out(vec![hit]), out(vec![near]));
+        one.tick.header.state = State::Colliding.code();
+        two.tick.header.state = State::Near.code();
+        let judge = |one: &Outbox| judge(one, &two, Demand::ALL, &mut Judged::default());
+        assert_eq!(judge(&one), None);
+        // Missed in the recording it is a difference all the same, and so is one on the way.
+        assert_eq!(field(vec![near], vec![hit]), Some("way".to_owned()));
+        one.pairs[0].toi_max = 0.5;
+        assert_eq!(judge(&one).unwrap().field, "way");
     }
 
     #[test]

@@ -489,3 +489,31 @@ fn bug_a_ball_that_stops_a_nanometre_before_another_never_touched_it() {
         );
     }
 }
+
+/// What was certified colliding, then not decided, was taken for a collision that goes on.
+#[test]
+fn bug_a_touch_at_poses_that_were_not_decided_is_news() {
+    let ball = "{ type = \"sphere\", radius = 0.5 }";
+    for budget in [NONE, ALL] {
+        let mut rig = Rig::new(&scene(
+            "",
+            &[
+                body(1, [0.0; 3], ball, ""),
+                body(2, [-3.0, 0.0, 0.0], ball, SWEPT),
+            ],
+        ));
+        rig.send(ALL);
+        rig.move_x(2, -0.5);
+        rig.send(ALL);
+        assert_eq!(rig.state(), State::Colliding);
+        rig.move_x(1, 0.2);
+        rig.move_x(2, 3.0);
+        rig.send(budget);
+        // The one goes to where the other was, which goes on from there.
+        rig.move_x(1, 3.1);
+        rig.move_x(2, 9.0);
+        rig.send(ALL);
+        assert_eq!(rig.state(), State::Colliding, "{budget:?}");
+        assert!(hit(rig.pair(1, 2).unwrap()), "{budget:?}");
+    }
+}

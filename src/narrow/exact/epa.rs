@@ -77,6 +77,19 @@ pub(super) fn depth(pair: &Pair<'_>, simplex: &Simplex, warm: Option<Refined>) -
     })
 }
 
+/// The upper end of the gap.
+///
+/// * `fits` - radius of a ball around the origin that fits in; below 0 rounding told of an overlap that is none, and
+///   how far a plane is says nothing of how far its face is.
+/// * `apart_m` - between points of the two cores.
+fn upper(fits: f64, apart_m: f64) -> f64 {
+    if fits < 0.0 {
+        apart_m.max(-fits)
+    } else {
+        -fits
+    }
+}
+
 /// Best end found so far.
 struct Best {
     /// `f(normal)`.
@@ -157,9 +170,10 @@ impl Polytope {
         }
         let best = &mut state.best;
         if let Some(found) = state.refined.filter(|r| r.value >= best.lower) {
+            let apart_m = (found.point_b - found.point_a).norm();
             return CoreGap {
                 lower: best.lower,
-                upper: (-state.fits).max(best.lower),
+                upper: upper(state.fits, apart_m).max(best.lower),
                 normal: found.normal,
                 point_a: found.point_a,
                 point_b: found.point_b,
@@ -279,7 +293,7 @@ impl Polytope {
         }
         CoreGap {
             lower: best.lower,
-            upper: (-fits).max(best.lower),
+            upper: upper(fits, (point_b - point_a).norm()).max(best.lower),
             normal: best.normal,
             point_a,
             point_b,

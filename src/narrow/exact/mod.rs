@@ -123,8 +123,9 @@ const FINISHED: f64 = 1e-6;
 /// * `warm` - kept by the caller for this pair; changes only the time taken (and the last bits).
 /// * returns - see [`Closest`]; `unknown` when `pos12` is not finite.
 ///
-/// Cost: 20 ns (spheres) to some 5 us (overlapping cylinders), up to 50 us deep near the axis of a round one, bounded by
-/// the faces that a polytope may grow and the points that sectors may ask; no allocation after a thread's first calls.
+/// Cost: 20 ns (spheres) to some 5 us (overlapping cylinders), up to 50 us deep near the axis of a round one, bounded
+/// by the faces that a polytope may grow and the points that sectors may ask; no allocation after a thread's first
+/// calls.
 #[must_use]
 pub fn convex_gap(a: &Convex, b: &Convex, pos12: &Pose, warm: &mut Warm) -> Closest {
     gap(a, b, pos12, warm, None)

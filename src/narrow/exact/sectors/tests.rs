@@ -134,7 +134,7 @@ fn bug_what_lies_near_the_axis_of_a_drum_was_known_to_a_thousandth() {
 fn prism(sides: u32) -> Convex {
     let corners = (0..2 * sides).map(|k| {
         let at = along(f64::from(k % sides) * 2.0 * PI / f64::from(sides)) * 0.015;
-        Point::new(at.x, at.y, if k < sides { -0.3 } else { 0.3 })
+        Point::new(at.x, at.y, if k < sides { -0.005 } else { 0.005 })
     });
     Convex::hull(&corners.collect::<Vec<_>>()).unwrap()
 }
