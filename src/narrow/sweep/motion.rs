@@ -76,8 +76,8 @@ impl Span {
         span
     }
 
-    /// How far its surface is, in all of a leg's turn, from where it would be without it, where that is no more than what
-    /// is rounded anyway; `None`: it does not turn, or not about its own axis, or is no solid of revolution.
+    /// How far its surface is, in all of a leg's turn, from where it would be without it, where that is no more than
+    /// what is rounded anyway; `None`: it does not turn, or not about its own axis, or is no solid of revolution.
     fn astray(&self, body: &Body, angle: f64, reach_m: f64) -> Option<f64> {
         let about = self.spin.try_normalize(0.0).filter(|_| !self.mixed)?;
         if body.shapes.len() > PARTS_MAX {
