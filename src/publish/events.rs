@@ -47,8 +47,10 @@ pub(super) struct History {
     pub(super) tick: u64,
     /// Certified colliding, and not certified ended since.
     pub(super) colliding: bool,
-    /// `colliding` before this tick.
+    /// Certified colliding at the poses of the tick before.
     was_colliding: bool,
+    /// What was certified last is a touch on the way to poses that were not decided.
+    on_way: bool,
     /// Last tick in which the pair was seen to be more than plainly apart.
     active: u64,
     /// First tick in which it may have collided; 0: not seen yet.
@@ -62,6 +64,7 @@ impl History {
         tick: 0,
         colliding: false,
         was_colliding: false,
+        on_way: false,
         active: 0,
         born: 0,
     };
@@ -178,7 +181,7 @@ impl Events {
         history.go_on_to(tick - 1);
         history.ids = ids;
         // Told of the last tick's poses: of a collision that was not certified there, a touch at them is news.
-        history.was_colliding = history.colliding && history.tick + 1 == tick;
+        history.was_colliding = history.colliding && history.tick + 1 == tick && !history.on_way;
         // Not active in the tick before: proved apart there by its certificate or by its boxes, unless it is new and a
         // body of it was not in, not known, or not looked for there.
         let unseen = (finding.born == tick)
@@ -225,6 +228,7 @@ impl Events {
                     self.push(history.ids, None, Some(ticks));
                     history.colliding = true;
                     (history.verdict, history.tick) = (Verdict::Colliding, tick);
+                    history.on_way = true;
                 }
                 self.histories[slot.index()] = history;
                 return;
@@ -232,6 +236,7 @@ impl Events {
         }
         history.verdict = finding.verdict;
         history.tick = tick;
+        history.on_way = false;
         self.histories[slot.index()] = history;
     }
 

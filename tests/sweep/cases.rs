@@ -4,6 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use sweepd::limits::LEGS_MAX;
 use sweepd::math::{Pose, Quat, Vec3};
+use sweepd::time::Budget;
 use sweepd::wire::{Event, PairRow, Reason, State, Verdict, pair_flags};
 
 use crate::oracle::meshes::{cuboid, trimesh};
@@ -516,4 +517,24 @@ fn bug_a_touch_at_poses_that_were_not_decided_is_news() {
         assert_eq!(rig.state(), State::Colliding, "{budget:?}");
         assert!(hit(rig.pair(1, 2).unwrap()), "{budget:?}");
     }
+}
+
+/// So was a touch on the way to poses that were not decided.
+#[test]
+fn bug_a_touch_at_poses_that_a_way_led_to_undecided_is_news() {
+    let mut undecided = 0;
+    for units in 0..40 {
+        let mut rig = plate(SWEPT);
+        rig.place(2, &at(0.0, 0.0, -0.0104));
+        rig.send(Budget {
+            time_ns: None,
+            units: Some(units),
+        });
+        let is_open = rig.verdict(1, 2) == Verdict::Possible;
+        undecided += u32::from(is_open && hit(rig.pair(1, 2).unwrap()));
+        rig.place(2, &at(0.0, 0.0, -5.0));
+        rig.send(ALL);
+        assert_eq!(rig.state() == State::Colliding, is_open, "{units}");
+    }
+    assert!(undecided > 0);
 }
