@@ -23,6 +23,7 @@ mod boxes;
 mod budgets;
 mod cases;
 mod pairs;
+mod runs;
 mod sheets;
 mod truth;
 mod walls;
