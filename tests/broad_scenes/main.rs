@@ -383,6 +383,30 @@ fn bodies_that_wander_are_listed_and_so_are_those_that_go_on_again() {
     assert!(listed.iter().all(|ticks| *ticks > 400), "{listed:?}");
 }
 
+/// Each bounced out of its swept box some ticks after it turned back: 34 strays a tick, 2 of them at the rim.
+#[test]
+fn bug_who_bounces_in_a_layer_strayed() {
+    const BODIES: usize = 2000;
+    let mut scene = Scene::new(Kind::Sheet, BODIES, 17);
+    let mut rig = Rig::geared("from scratch", &[true], BODIES, false);
+    rig.start(&scene.boxes);
+    let (mut strays, mut listed) = (0, 0);
+    for frame in 0..400 {
+        scene.step();
+        rig.put(&scene.boxes, &scene.moved, &[]);
+        rig.tick(&exact::pairs(&scene.boxes), &format!("frame {frame}"));
+        if rig.work().way.is_some_and(|way| way.0 == BroadMode::List) {
+            listed += 1;
+            strays += rig.work().renewed;
+        }
+    }
+    println!("{strays} strays in {listed} ticks");
+    assert!(
+        listed > 300 && strays < 6 * listed,
+        "{strays} strays in {listed} ticks"
+    );
+}
+
 #[test]
 fn bodies_that_swerve_jump_come_and_leave_while_the_next_list_is_made_are_exact() {
     const BODIES: usize = 700;

@@ -6,6 +6,9 @@
 //! Where steps are alike a box is swept along the last one. Where each goes elsewhere, as what is pushed about does,
 //! the last one says how far bodies go and not where to: the box is padded on every side, by as much as steps without a
 //! direction come to, which grows with the root of their number.
+//!
+//! Along an axis that scarcely parts neighbours, as height in a layer, boxes are swept both ways: who bounces there
+//! stays in, and nobody else is met for it.
 
 use super::idle::shed;
 use super::links::room;
@@ -28,6 +31,8 @@ const ASTRAY: f32 = 0.25;
 const ALONG: f32 = 0.5;
 /// Fewer bodies tell nothing.
 const FEW: u32 = 8;
+/// An axis parts neighbours where fewer than such a share of them, some blocks from each other, overlap along it.
+const LAYERED: f32 = 0.9;
 /// Of so many blocks the bodies of one are watched.
 pub(super) const SAMPLE: usize = 8;
 
@@ -38,6 +43,8 @@ pub(super) struct Reach {
     along: f32,
     about: f32,
     step: f32,
+    /// By face: how far it is swept against a step, in parts of what it is along one.
+    back: [f32; 8],
 }
 
 impl Reach {
@@ -46,11 +53,12 @@ impl Reach {
         along: 0.0,
         about: 0.0,
         step: 0.0,
+        back: [0.0; 8],
     };
 
     /// The box of a body from its last place and this one.
     #[inline(always)]
-    pub(super) fn sweep(self, before: &Down, now: &Down) -> Down {
+    pub(super) fn sweep(&self, before: &Down, now: &Down) -> Down {
         let side = now.mean_side();
         let side = if side.is_finite() { side } else { 0.0 };
         let mut pad = side * PAD;
@@ -62,10 +70,12 @@ impl Reach {
         }
         let most = side * SWEEP_MAX;
         let mut swept = *now;
-        for (face, was) in swept.faces.iter_mut().zip(&before.faces) {
+        let faces = swept.faces.iter_mut().zip(&before.faces);
+        for ((face, was), back) in faces.zip(&self.back) {
             let step = *face - *was;
             let out = if step < 0.0 { -step } else { 0.0 };
-            let by = out * self.along + pad;
+            let against = if step > 0.0 { step } else { 0.0 };
+            let by = (out + against * back) * self.along + pad;
             *face -= if by < most { by } else { most };
         }
         swept
@@ -73,7 +83,7 @@ impl Reach {
 }
 
 /// What is known of the steps.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Course {
     /// The first boxes of those who are watched, by watched block.
     watched: Vec<[Down; WIDTH]>,
@@ -82,9 +92,32 @@ pub(super) struct Course {
     alike: f32,
     steps: f32,
     count: u32,
+    /// The boxes of the block watched before; by axis, how many overlap the one in their lane there, and of how many.
+    last: [Down; WIDTH],
+    level: [f32; 3],
+    beside: f32,
     wanders: bool,
     /// Mean longest step, in mean sides.
     step: f32,
+    /// By face, see [`Reach`].
+    back: [f32; 8],
+}
+
+impl Default for Course {
+    fn default() -> Self {
+        Self {
+            watched: Vec::new(),
+            alike: 0.0,
+            steps: 0.0,
+            count: 0,
+            last: [Down::EMPTY; WIDTH],
+            level: [0.0; 3],
+            beside: 0.0,
+            wanders: false,
+            step: 0.0,
+            back: [0.0; 8],
+        }
+    }
 }
 
 impl Course {
@@ -95,13 +128,14 @@ impl Course {
         if !self.wanders {
             return Reach {
                 along: ticks + SWERVE,
+                back: self.back,
                 ..Reach::NEW
             };
         }
         Reach {
-            along: 0.0,
             about: WANDER * 0.5 * ticks.sqrt(),
             step: self.step,
+            ..Reach::NEW
         }
     }
 
@@ -157,7 +191,29 @@ impl Course {
         if let Some(before) = self.watched.get(block / SAMPLE).copied() {
             for lane in ones(lanes) {
                 self.note_one(&before[lane], &then[lane], &now[lane]);
+                let last = self.last[lane];
+                self.note_beside(&last, &now[lane]);
             }
+            self.last = *now;
+        }
+    }
+
+    /// Takes the boxes of two bodies that are some blocks from each other.
+    fn note_beside(&mut self, one: &Down, other: &Down) {
+        let (mut apart, mut known) = ([false; 3], true);
+        for k in 0..one.faces.len() {
+            // Lower face of the one minus upper face of the other: above zero where they are apart.
+            let gap = one.faces[k] + other.faces[(k + 4) % 8];
+            known &= gap.is_finite();
+            if k % 4 < 3 {
+                apart[k % 4] |= gap > 0.0;
+            }
+        }
+        if known {
+            for (level, apart) in self.level.iter_mut().zip(apart) {
+                *level += f32::from(u8::from(!apart));
+            }
+            self.beside += 1.0;
         }
     }
 
@@ -191,8 +247,15 @@ impl Course {
             let least = if self.wanders { ALONG } else { ASTRAY };
             self.wanders = self.alike < least * count;
             self.step = self.steps / count;
+            let most = LAYERED * self.beside;
+            for (k, level) in self.level.into_iter().enumerate() {
+                let both = f32::from(u8::from(level > most));
+                (self.back[k], self.back[k + 4]) = (both, both);
+            }
         }
         (self.alike, self.steps, self.count) = (0.0, 0.0, 0);
+        (self.level, self.beside) = ([0.0; 3], 0.0);
+        self.last = [Down::EMPTY; WIDTH];
         self.clear();
     }
 }
@@ -209,121 +272,4 @@ fn longest(before: &Down, now: &Down) -> f32 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::builtin::Random;
-
-    /// A box of side 1 somewhere.
-    fn at([x, y, z]: [f32; 3]) -> Down {
-        Down::of([x, y, z, x + 1.0, y + 1.0, z + 1.0])
-    }
-
-    /// Three ticks of 16 bodies that step by 0.1 at most: each twice as before, or in a direction drawn anew.
-    fn run(course: &mut Course, random: &mut Random, alike: bool) {
-        #[allow(clippy::cast_possible_truncation, reason = "any step will do")]
-        let mut step = || [(); 3].map(|()| random.range(-0.1, 0.1) as f32);
-        let add = |p: [f32; 3], by: [f32; 3]| std::array::from_fn(|k| p[k] + by[k]);
-        let steps: [_; WIDTH] = std::array::from_fn(|_| {
-            let first = step();
-            [first, if alike { first } else { step() }]
-        });
-        let mut before = [at([5.0; 3]); WIDTH];
-        let then = steps.map(|[first, _]| at(add([5.0; 3], first)));
-        let mut now = steps.map(|[first, second]| at(add(add([5.0; 3], first), second)));
-        // Who came has no place before, and who has no end none at all.
-        before[3] = Down::EMPTY;
-        now[7].faces[1] = f32::NEG_INFINITY;
-        course.clear();
-        course.watch(u16::MAX, &before);
-        assert!(course.asks());
-        course.note(0, u16::MAX, &then, &now);
-        course.close();
-        assert!(!course.asks());
-    }
-
-    #[test]
-    fn steps_without_a_direction_widen_every_side_by_the_root_of_their_number() {
-        let (mut course, mut random) = (Course::default(), Random::new(1));
-        let (before, now) = (at([0.0; 3]), at([0.1, 0.0, 0.0]));
-        // Ahead, and behind.
-        let far = |course: &Course, ticks| {
-            let swept = course.reach(ticks).sweep(&before, &now).corners();
-            [swept[3] - 1.1, 0.1 - swept[0]]
-        };
-        run(&mut course, &mut random, true);
-        let [ahead, behind] = far(&course, 8);
-        assert!(!course.wanders && (ahead - 0.835).abs() < 1e-4 && (behind - PAD).abs() < 1e-4);
-        run(&mut course, &mut random, false);
-        let ([ahead, behind], [four, _]) = (far(&course, 16), far(&course, 4));
-        assert!(course.wanders && (ahead - behind).abs() < 1e-4);
-        assert!(((ahead - PAD) / (four - PAD) - 2.0).abs() < 1e-3);
-        // The mean of its own step and those of all, which are shorter.
-        assert!((0.2..0.4).contains(&(ahead / WANDER)), "{ahead}");
-        run(&mut course, &mut random, true);
-        assert!(!course.wanders);
-    }
-
-    #[test]
-    fn a_few_and_those_at_rest_tell_nothing() {
-        let mut course = Course {
-            wanders: true,
-            ..Course::default()
-        };
-        let rests = [at([0.0; 3]); WIDTH];
-        course.watch(u16::MAX, &rests);
-        course.note(0, u16::MAX, &rests, &rests);
-        course.close();
-        // These go on, but seven are too few: the others were not watched, or have another body's lane; and of a block
-        // that was not watched nothing is known.
-        course.watch(0xFF, &rests);
-        course.forget(0, 3);
-        let [then, now] = [1.0, 2.0].map(|x| [at([x; 3]); WIDTH]);
-        course.note(0, u16::MAX, &then, &now);
-        course.note(SAMPLE, u16::MAX, &then, &now);
-        course.close();
-        assert!(course.wanders);
-        course.watch(0xFF, &rests);
-        course.note(0, u16::MAX, &then, &now);
-        course.close();
-        assert!(!course.wanders);
-    }
-
-    #[test]
-    fn who_rests_is_not_padded_for_those_who_wander_and_who_hardly_moves_by_little() {
-        let wanders = Course {
-            wanders: true,
-            step: 0.1,
-            ..Course::default()
-        };
-        // A floor a thousand times as large as what trembles on it.
-        let floor = |x: f32| Down::of([x, 0.0, 0.0, x + 1000.0, 1000.0, 1000.0]);
-        let padded = |x: f32| {
-            let swept = wanders.reach(16).sweep(&floor(0.0), &floor(x)).corners();
-            swept[4] - 1000.0 - 1000.0 * PAD
-        };
-        assert!(padded(0.0).abs() < 1e-3);
-        let most = 0.1 * (1.0 + OTHERS_MAX) * WANDER * 2.0;
-        assert!((0.0..1.1 * most).contains(&padded(0.1)));
-    }
-
-    #[test]
-    fn what_has_no_end_or_no_place_before_is_swept_to_no_number() {
-        let endless = Down::of(std::array::from_fn(|k| {
-            if k < 3 {
-                f32::NEG_INFINITY
-            } else {
-                f32::INFINITY
-            }
-        }));
-        let wanders = Course {
-            wanders: true,
-            ..Course::default()
-        };
-        for reach in [Reach::NEW, wanders.reach(9), Course::default().reach(9)] {
-            let swept = reach.sweep(&endless, &endless).corners();
-            assert_eq!(swept.map(f32::to_bits), endless.corners().map(f32::to_bits));
-            let appeared = reach.sweep(&Down::EMPTY, &at([0.0; 3])).corners();
-            assert!(appeared.iter().all(|face| face.is_finite()));
-        }
-    }
-}
+mod tests;

@@ -12,6 +12,7 @@ use super::links::{room, spare};
 use super::sweep::Search;
 use super::{Order, Proxies, Tick, Work as Done, is_thrifty};
 use crate::ids::small;
+use crate::simd::boxes::WIDTH;
 
 impl Order {
     /// Begins the list, which is to be made in so many ticks. The first of several, in which all boxes are swept, has
@@ -84,7 +85,8 @@ impl Order {
         }
         room(&mut verlet.found, self.len);
         room(&mut verlet.strays, self.len);
-        room(&mut verlet.blocks, blocks);
+        room(&mut verlet.blocks, blocks + WIDTH);
+        room(&mut verlet.near, blocks + 1);
         verlet.course.reserve(blocks);
         finds.spare();
         team.reserve(blocks, self.len);

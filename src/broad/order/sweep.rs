@@ -10,6 +10,7 @@
 use crate::ids::small;
 use std::ops::Range;
 
+use super::bits::each_bit;
 use super::idle::shed;
 use super::links::{EMPTY, Matrix, room, spare};
 use super::met::Met;
@@ -134,7 +135,7 @@ impl Scratch {
     /// Room for a block that is near every other.
     fn reserve(&mut self, blocks: usize) {
         self.walk.reserve(blocks);
-        room(&mut self.near, blocks);
+        room(&mut self.near, blocks + WIDTH);
         self.hits.resize(TOGETHER * WIDTH + 1, Hit::default());
     }
 }
@@ -368,15 +369,14 @@ impl Scratch {
     /// Lists what was met.
     #[inline(always)]
     fn list(&self, Count { hits, .. }: Count, listed: &mut Vec<Near>) {
-        for hit in &self.hits[..hits] {
-            let side = &self.sides[usize::from(hit.side)];
+        let pairs = self.hits[..hits].iter().map(|hit| hit.met.count_ones());
+        let pairs = pairs.sum::<u32>() as usize;
+        let bits = each_bit(&self.hits[..=hits], pairs, |hit| u64::from(hit.met));
+        listed.extend(bits.map(|(hit, bit)| {
+            let side = &self.sides[usize::from(hit.side) % TOGETHER];
             let one = side.block * LANES + u32::from(hit.lane);
-            let (first, mut met) = (side.against * LANES, hit.met);
-            while met != 0 {
-                listed.push(Near::new(one, first + met.trailing_zeros()));
-                met &= met - 1;
-            }
-        }
+            Near::new(one, side.against * LANES + bit)
+        }));
     }
 
     /// Records the matrices that hold any overlap.

@@ -92,7 +92,7 @@ impl Order {
             order: self,
             proxies,
             phase,
-            reach,
+            reach: &reach,
             asks,
         });
         if asks {
@@ -122,7 +122,7 @@ struct TakeSwept<'a, P> {
     order: &'a mut Order,
     proxies: &'a P,
     phase: Phase,
-    reach: Reach,
+    reach: &'a Reach,
     asks: bool,
 }
 
@@ -215,7 +215,7 @@ impl<P: Proxies> Work for TakeSwept<'_, P> {
 /// Sweeps the boxes of some lanes anew, into their block; who has left the old one is held to the new alone.
 #[inline(always)]
 fn sweep_anew(
-    reach: Reach,
+    reach: &Reach,
     (lanes, out): (u16, u16),
     (before, now): (&[Down; WIDTH], &[Down; WIDTH]),
     (fat, swept): (&mut Boxes16, &mut [Down; WIDTH]),

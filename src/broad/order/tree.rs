@@ -1,7 +1,6 @@
 //! The implicit tree over blocks: each node holds the bounds of its sixteen children, the lowest nodes those of
 //! sixteen blocks. No pointers: child `i` of node `n` is node `16 n + i` one level down.
 
-use super::bits::each_bit;
 use super::links::room;
 use crate::simd::boxes::{Boxes16, LANES, Lanes, Portable, WIDTH};
 
@@ -40,8 +39,8 @@ struct Descent {
 
 impl Descent {
     fn reserve(&mut self, nodes: usize) {
-        room(&mut self.nodes, nodes);
-        room(&mut self.children, nodes + 1);
+        room(&mut self.nodes, nodes + WIDTH);
+        room(&mut self.children, nodes);
     }
 }
 
@@ -59,7 +58,7 @@ impl Walk {
     pub(super) fn reserve(&mut self, blocks: usize) {
         let nodes = nodes_above(blocks);
         self.descent.reserve(nodes);
-        room(&mut self.nodes, nodes);
+        room(&mut self.nodes, nodes + WIDTH);
         room(&mut self.askers, nodes);
     }
 }
@@ -199,10 +198,10 @@ impl Tree {
             let first = first >> (4 * (level - floor));
             let count = self.meet_children(lanes, one, (level, first), descent);
             descent.nodes.clear();
-            unfold(&descent.children, count, &mut descent.nodes);
+            unfold(lanes, &descent.children, count, &mut descent.nodes);
         }
         let count = self.meet_children(lanes, one, (floor, first), descent);
-        unfold(&descent.children, count, found);
+        unfold(lanes, &descent.children, count, found);
     }
 
     /// Notes which children of the nodes at hand, of some level, meet a box; returns how many. None before the first.
@@ -218,8 +217,7 @@ impl Tree {
         // A copy, which no list can change: it stays in registers.
         let one = *one;
         children.clear();
-        // One more: what stands behind the last has none.
-        children.resize(nodes.len() + 1, (0, 0));
+        children.resize(nodes.len(), (0, 0));
         let (level, mut kept, mut count) = (&self.levels[level], 0, 0);
         for node in nodes.iter() {
             let early = first.saturating_sub(node * LANES);
@@ -229,6 +227,7 @@ impl Tree {
             kept += usize::from(hits != 0);
             count += hits.count_ones() as usize;
         }
+        children.truncate(kept);
         count
     }
 
@@ -290,7 +289,7 @@ impl Tree {
         met.truncate(kept);
         let count = self.meet_children(lanes, bound, (0, block), descent);
         found.clear();
-        unfold(&descent.children, count, found);
+        unfold(lanes, &descent.children, count, found);
     }
 
     /// Checks every node against the blocks' boxes.
@@ -317,12 +316,21 @@ impl Tree {
     }
 }
 
-/// Appends so many children: all that a list names, as the first child of a node and which are meant. It ends with one
-/// that names none.
+/// Appends so many children: all that a list names, as the first child of a node and which are meant.
 #[inline(always)]
-fn unfold(children: &[(u32, u16)], count: usize, found: &mut Vec<u32>) {
-    let met = each_bit(children, count, |(_, met)| u64::from(*met));
-    found.extend(met.map(|((first, _), child)| first + child));
+fn unfold<L: Lanes>(lanes: L, children: &[(u32, u16)], count: usize, found: &mut Vec<u32>) {
+    let mut at = found.len();
+    let end = at + count;
+    // How many of a node there are is a guess that fails: all sixteen places are written, those behind to be written
+    // over.
+    found.resize(end + WIDTH, 0);
+    for (first, met) in children {
+        if let Some(place) = found[at..].first_chunk_mut() {
+            lanes.number(*met, *first, place);
+        }
+        at += met.count_ones() as usize;
+    }
+    found.truncate(end);
 }
 
 /// Whether two bounds are the same; without a branch a face.

@@ -18,6 +18,7 @@
 //! Source: Verlet 1967; swept boxes in place of his spheres, so that a list lasts as long for what flies fast.
 
 use super::afresh::Afresh;
+use super::bits::each_bit;
 use super::cost::list_worth;
 use super::course::{Course, Reach};
 use super::fatten::outward;
@@ -54,8 +55,9 @@ pub(super) struct Verlet {
     pub(super) late: Vec<u16>,
     /// Whether all bodies have drifted so far from the origin that they are to be measured from another.
     pub(super) adrift: bool,
-    /// Memory kept over calls.
+    /// Memory kept over calls: blocks, and what of each is near a stray: its first rank, and lanes.
     pub(super) blocks: Vec<u32>,
+    pub(super) near: Vec<(u32, u16)>,
     pub(super) pace: Pace,
     pub(super) course: Course,
 }
@@ -356,6 +358,7 @@ impl Work for Seek<'_> {
     fn run<L: Lanes>(self, lanes: L) {
         let order = self.order;
         let mut blocks = std::mem::take(&mut order.afresh.verlet.blocks);
+        let mut near = std::mem::take(&mut order.afresh.verlet.near);
         for at in 0..order.afresh.verlet.strays.len() {
             let rank = order.afresh.verlet.strays[at];
             if !is_among(&order.live, rank as usize) {
@@ -365,22 +368,28 @@ impl Work for Seek<'_> {
             let one = order.fat[block].get(lane);
             blocks.clear();
             order.tree.query(lanes, &one, &mut blocks);
+            near.clear();
+            // One more: it is read, and nothing is made of it.
+            near.resize(blocks.len() + 1, (0, 0));
+            let verlet = &mut order.afresh.verlet;
+            let (mut kept, mut pairs) = (0, 0);
             for other in &blocks {
                 let theirs = *other as usize;
-                let mut met = lanes.meets(&order.fat[theirs], &one);
-                let verlet = &mut order.afresh.verlet;
+                let met = lanes.meets(&order.fat[theirs], &one);
                 // Two strays list each other once, and none itself.
                 let first = small(theirs * WIDTH);
                 let upto = (rank + 1).saturating_sub(first).min(LANES);
                 let before = u16::MAX.checked_shr(LANES - upto).unwrap_or(0);
-                met &= !(verlet.fresh[theirs] & before);
-                while met != 0 {
-                    let near = first + met.trailing_zeros();
-                    verlet.entries.push(Near::new(rank, near));
-                    met &= met - 1;
-                }
+                let met = met & !(verlet.fresh[theirs] & before);
+                near[kept] = (first, met);
+                kept += usize::from(met != 0);
+                pairs += met.count_ones() as usize;
             }
+            let bits = each_bit(&near, pairs, |(_, met)| u64::from(*met));
+            let entries = bits.map(|((first, _), lane)| Near::new(rank, first + lane));
+            verlet.entries.extend(entries);
         }
         order.afresh.verlet.blocks = blocks;
+        order.afresh.verlet.near = near;
     }
 }

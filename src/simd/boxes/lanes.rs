@@ -161,6 +161,10 @@ pub(crate) trait Lanes: Copy {
 
     /// A matrix with all bits in some rows.
     fn spread(self, rows: u16) -> [u16; WIDTH];
+
+    /// Writes the numbers of some lanes, the first lane being `first`, ascending to the front of a place; what stands
+    /// behind them then is anything.
+    fn number(self, lanes: u16, first: u32, place: &mut [u32; WIDTH]);
 }
 
 /// Plain Rust.
@@ -272,5 +276,15 @@ impl Lanes for Portable {
     #[inline(always)]
     fn spread(self, rows: u16) -> [u16; WIDTH] {
         std::array::from_fn(|row| if rows >> row & 1 == 1 { u16::MAX } else { 0 })
+    }
+
+    #[inline(always)]
+    fn number(self, lanes: u16, first: u32, place: &mut [u32; WIDTH]) {
+        let mut at = 0;
+        for (lane, number) in (first..).take(WIDTH).enumerate() {
+            // Written over where the lane is not meant: no branch is taken on it.
+            place[at % WIDTH] = number;
+            at += usize::from(lanes >> lane & 1);
+        }
     }
 }

@@ -127,6 +127,34 @@ fn every_level_fills_the_rows_that_are_named() {
     }
 }
 
+/// Numbers some lanes.
+struct Numbered(u16, u32);
+
+impl Work for Numbered {
+    type Out = Vec<u32>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) -> Vec<u32> {
+        let mut place = [7; WIDTH];
+        lanes.number(self.0, self.1, &mut place);
+        place[..self.0.count_ones() as usize].to_vec()
+    }
+}
+
+#[test]
+fn every_level_numbers_the_lanes_that_are_meant_in_their_order() {
+    for lanes in (0..=u16::MAX).step_by(if cfg!(miri) { 4093 } else { 1 }) {
+        let wanted: Vec<u32> = (0..16).filter(|lane| lanes >> lane & 1 == 1).collect();
+        for first in [0, 1 << 20] {
+            for level in Level::available() {
+                let got = level.run(Numbered(lanes, first));
+                let wanted: Vec<u32> = wanted.iter().map(|lane| first + lane).collect();
+                assert_eq!(got, wanted, "{lanes:x}, {level:?}");
+            }
+        }
+    }
+}
+
 /// Takes a box and tells whether it keeps to a hold.
 struct Taken<'a>([&'a [f64; 3]; 2], &'a [f64; 3], &'a Hold);
 

@@ -1,6 +1,8 @@
 //! The kernels in AVX2 and AVX-512. Only sums, products, compares and maxima, in the order of the twin, so that every
 //! bit is the twin's.
 
+mod number;
+
 use std::arch::asm;
 use std::arch::x86_64::{
     __m256, __m256d, __m256i, __m512, _CMP_GT_OQ, _CMP_LE_OQ, _CMP_LT_OQ, _CMP_NLT_UQ,
@@ -19,6 +21,7 @@ use std::arch::x86_64::{
 
 use super::Work;
 use super::lanes::{Boxes16, Down, Hold, LEAST, Lanes, SLACK_LEAST, SLACK_SHARE, STEP, WIDTH};
+use number::{number_avx2, number_avx512};
 
 /// Two halves of eight lanes or, where `WIDE`, sixteen at once for what gains by it. Only [`run_avx2`] and
 /// [`run_avx512`] make one: where one is, AVX2 is, and where a wide one is, AVX-512 F, BW, DQ and VL are too.
@@ -355,6 +358,17 @@ impl<const WIDE: bool> Lanes for Vectors<WIDE> {
         } else {
             // SAFETY: a `Vectors` is made only where AVX2 is.
             unsafe { spread_avx2(rows) }
+        }
+    }
+
+    #[inline(always)]
+    fn number(self, lanes: u16, first: u32, place: &mut [u32; WIDTH]) {
+        if WIDE {
+            // SAFETY: a wide one is made only where AVX-512 F is.
+            unsafe { number_avx512(lanes, first, place) }
+        } else {
+            // SAFETY: a `Vectors` is made only where AVX2 is.
+            unsafe { number_avx2(lanes, first, place) }
         }
     }
 }

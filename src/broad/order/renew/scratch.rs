@@ -2,6 +2,7 @@
 
 use crate::broad::order::NONE;
 use crate::broad::order::links::room;
+use crate::simd::boxes::WIDTH;
 
 /// Memory of the queries, kept over ticks.
 #[derive(Clone, Debug, Default)]
@@ -31,7 +32,7 @@ impl Scratch {
 
     /// Room for a query that meets every block.
     pub(in crate::broad::order) fn reserve(&mut self, blocks: usize) {
-        room(&mut self.near, blocks);
+        room(&mut self.near, blocks + WIDTH);
         room(&mut self.close, blocks);
         room(&mut self.have, blocks);
         room(&mut self.mark, blocks);
