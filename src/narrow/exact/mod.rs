@@ -10,6 +10,7 @@
 //! * Else GJK (`gjk`) finds the features that are closest, or that the cores overlap; then an expanding polytope
 //!   (`epa`) gives the least translation, or planes through an axis do, where two axes nearly agree (`revolved`) or one
 //!   core reaches less far from the axis of a round one than would show its rim (`sectors`).
+//! * Slivers that are apart by less than the rounding of those methods are parted by planes along their edges (`part`).
 //! * Where a circle takes part both stop early and a Newton method on the features (`newton`) finishes: it finds the
 //!   normal that makes `f` greatest, outside and inside alike. It starts from the features of the last answer, and
 //!   where it says that they overlap the polytope begins around its closest point, without GJK, or under a cap of
@@ -34,6 +35,7 @@ mod gjk;
 mod manifold;
 mod newton;
 mod pair;
+mod part;
 mod polytope;
 pub mod raw;
 mod revolved;
@@ -167,7 +169,7 @@ fn gap(
     if let Some(core) = closed::gap(&pair) {
         return finish(&pair, &core, core.along());
     }
-    let core = iterate(&pair, warm, shell);
+    let core = part::part(&pair, iterate(&pair, warm, shell));
     *warm = Warm {
         normal: core.normal,
         held: core.held,
