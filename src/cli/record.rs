@@ -13,8 +13,9 @@ pub(super) use heard::record;
 use std::path::PathBuf;
 
 use super::args::RunArgs;
+use super::files::Input;
 #[cfg(feature = "mcap")]
-use super::files::open_new;
+use super::files::{check_inputs, open_new};
 use crate::daemon::Daemon;
 #[cfg(not(feature = "mcap"))]
 use crate::error::Error;
@@ -47,19 +48,20 @@ pub(super) struct Tape {
 
 impl Tape {
     /// What was asked for. Nothing is touched yet: a daemon that may not start leaves no file, and harms none.
+    ///
+    /// * `read` - files that are not to be recorded over.
     #[cfg(feature = "mcap")]
-    #[allow(
-        clippy::unnecessary_wraps,
-        reason = "without the feature it may be refused"
-    )]
-    pub(super) fn of(args: &RunArgs) -> Result<Self> {
+    pub(super) fn of(args: &RunArgs, read: &[Input]) -> Result<Self> {
+        if let Some(path) = &args.record {
+            check_inputs("--record", path, read)?;
+        }
         let file = args.record.clone().map(|path| (path, args.force));
         Ok(Self { file })
     }
 
     /// Refuses what this build does not have.
     #[cfg(not(feature = "mcap"))]
-    pub(super) fn of(args: &RunArgs) -> Result<Self> {
+    pub(super) fn of(args: &RunArgs, _: &[Input]) -> Result<Self> {
         match args.record {
             Some(_) => Err(unable("--record")),
             None => Ok(Self {}),

@@ -15,6 +15,7 @@ use crate::transport::iceoryx::{
 use crate::transport::{Both, Door};
 
 use super::args::{Limit, RunArgs};
+use super::files::inputs;
 use super::progress::shapes_of;
 use super::record::Tape;
 use super::ros;
@@ -34,7 +35,9 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     apply(args, &mut scene)?;
     asked.check(&scene)?;
     check_watchdog(args, &scene)?;
-    let tape = Tape::of(args)?;
+    let mut read = inputs(&args.scene, &scene);
+    read.extend(ros::inputs(ros_words));
+    let tape = Tape::of(args, &read)?;
     let mut shapes = shapes_of(&scene, tape.library())?;
     let given = (text, shapes.library.take_kept());
     for warning in scene.notes().iter().chain(&shapes.warnings) {
