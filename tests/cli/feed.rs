@@ -75,6 +75,7 @@ fn bug_a_scene_that_is_there_is_not_written_over_and_flags_that_say_nothing_are_
     for more in [
         &["--rate", "50"][..],
         &["--frames", "9"],
+        &["--work", "1ms..2ms"],
         &["--source", "feed"],
         &[&path],
     ] {
@@ -199,6 +200,45 @@ fn with_work_of_its_own_it_leaves_the_rest_of_each_frame_to_the_daemon_and_tells
     assert!(count(" of 40 frames over 50.0 ms") <= 8, "{text}");
     assert!(count(" stopped with pairs undecided") <= 8, "{text}");
     assert!(text.contains("; 0 without a result"), "{text}");
+}
+
+#[test]
+fn with_work_of_its_own_a_feed_of_which_no_frame_had_a_result_is_no_good_end_and_one_result_is_enough()
+ {
+    let desk = Desk::new();
+    let path = pool(&desk, "12");
+    let _daemon = desk.start("run", &[&path]);
+    let mut client = desk.source("nobody");
+    let mut first = desk.start("feed", &[&path, "--rate", "100"]);
+    tick_until(&mut client, "the first feed", |tick| {
+        tick.sources[0].seq >= 1
+    });
+    let work = |frames: &str| {
+        let args = ["--rate", "20", "--work", "1ms..2ms", "--frames", frames];
+        desk.start("feed", &[&[path.as_str()], &args[..]].concat())
+    };
+    // Each frame waits a second for its result.
+    let mut second = work("2");
+    assert_eq!(second.end().0.code(), Some(4), "{}", second.stderr());
+    let said = second.stderr();
+    assert!(said.contains("none of 2 frames had a result"), "{said}");
+    assert!(
+        said.contains("source_taken"),
+        "the warnings say why: {said}"
+    );
+    assert!(
+        second.stdout().contains("0 of 0 frames over"),
+        "{}",
+        second.stdout()
+    );
+    // The place is free in the middle of the next one.
+    let mut third = work("12");
+    until("told", || third.stderr().contains("source_taken"));
+    assert_eq!(first.stop().0.code(), Some(0));
+    assert_eq!(third.end().0.code(), Some(0), "{}", third.stderr());
+    // None was asked for, so none is missing; and a stop is no refusal.
+    let mut none = work("0");
+    assert_eq!(none.end().0.code(), Some(0), "{}", none.stderr());
 }
 
 #[test]

@@ -146,16 +146,31 @@ pub fn sweepd() -> Command {
     command
 }
 
-/// Runs the binary to its end.
-pub fn output(args: &[&str]) -> Output {
-    let child = sweepd()
+/// The binary under a limit, by the words of a shell: `ulimit -n 20`. Files that clients of this test program have open
+/// would be its own, too, and are closed before.
+pub fn limited(limit: &str) -> Command {
+    let close =
+        r#"for f in /proc/self/fd/*; do f=${f##*/}; [ "$f" -gt 2 ] && eval "exec $f>&-"; done"#;
+    let mut command = Command::new("bash");
+    command
+        .args(["-c", &format!("{close}; {limit} && exec \"$@\""), "bash"])
+        .arg(env!("CARGO_BIN_EXE_sweepd"));
+    command
+}
+
+/// Runs a command to its end.
+pub fn run_out(mut command: Command, args: &[&str]) -> Output {
+    command
         .args(args)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    finish(child)
+        .stderr(Stdio::piped());
+    finish(command.spawn().unwrap())
+}
+
+/// Runs the binary to its end.
+pub fn output(args: &[&str]) -> Output {
+    run_out(sweepd(), args)
 }
 
 /// Waits for a child with piped output; kills it when it takes far too long.
