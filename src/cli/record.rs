@@ -13,6 +13,8 @@ pub(super) use heard::record;
 use std::path::PathBuf;
 
 use super::args::RunArgs;
+#[cfg(feature = "mcap")]
+use super::figures::bytes;
 use super::files::Input;
 #[cfg(feature = "mcap")]
 use super::files::{check_inputs, open_new};
@@ -31,6 +33,18 @@ use crate::record::{Recorder, Start};
 /// What a file is opened for.
 #[cfg(feature = "mcap")]
 const WHAT: &str = "a recording";
+
+/// Says beforehand where a recording will end.
+#[cfg(feature = "mcap")]
+fn tell_limit(name: &str) {
+    if let Some(most) = rustix::process::getrlimit(rustix::process::Resource::Fsize).current {
+        tracing::warn!(
+            "the recording {name} ends when it is {} long, for a file of this process may not be longer: `ulimit -f \
+             unlimited` in the shell that starts it, or in its service's unit",
+            bytes(most)
+        );
+    }
+}
 
 /// What this build says that cannot record or replay.
 #[cfg(not(feature = "mcap"))]
@@ -92,6 +106,7 @@ impl Tape {
             return Ok(());
         };
         let (file, name) = (open_new(&path, over, WHAT)?, path.display().to_string());
+        tell_limit(&name);
         let start = Start::of(scene, text, files, boot_id, daemon.engine().now_ns());
         let sink = McapSink::new(buffered(file), &name, &scene.frame_id, &start)?;
         daemon.record(Recorder::start(Box::new(sink))?);

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::time::{Clock, SystemClock};
 use crate::transport::iceoryx::{
-    Place, Server, ServerOptions, bytes_needed, scarce, spawn_cleaner,
+    Place, Server, ServerOptions, bytes_needed, cramped, scarce, spawn_cleaner,
 };
 use crate::transport::{Both, Door};
 
@@ -55,6 +55,9 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     let mut server = Server::open(options)?;
     let (bodies, sources) = (scene.bodies.len(), scene.sources.len());
     if let Some(warning) = scarce(bytes_needed(&scene.config.limits, bodies, sources)) {
+        tracing::warn!("{warning}");
+    }
+    if let Some(warning) = cramped(&scene.config.limits, bodies) {
         tracing::warn!("{warning}");
     }
     // Dead clients are cleaned up beside the tick, never in it.

@@ -18,7 +18,7 @@ use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{Pid, Resource, Rlimit, Signal, getrlimit, kill_process, prlimit};
 use sweepd::transport::client::{Client, FrameInfo, Heard, Rows, Topics};
 use sweepd::wire::{RejectReason, State, TickRow, TransformRow};
 
@@ -216,6 +216,17 @@ pub struct Running {
 impl Running {
     pub fn pid(&self) -> u32 {
         self.child.id()
+    }
+
+    /// Sets what it may have of something from now on.
+    pub fn limit(&self, what: Resource, most: u64) {
+        let pid = Some(Pid::from_child(&self.child));
+        let maximum = getrlimit(what).maximum;
+        let limit = Rlimit {
+            current: Some(most),
+            maximum,
+        };
+        prlimit(pid, what, limit).unwrap();
     }
 
     pub fn signal(&self, signal: Signal) {

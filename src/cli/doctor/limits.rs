@@ -3,7 +3,7 @@
 use rustix::process::{Resource, getrlimit};
 
 use super::{Finding, bytes};
-use crate::limits::OPEN_FILES_LEAST;
+use crate::limits::{FILE_BYTES_LEAST, OPEN_FILES_LEAST};
 
 /// A limit, and what is needed of it.
 struct Need {
@@ -37,9 +37,9 @@ const NEEDS: [Need; 3] = [
         what: "size of a file",
         flag: "-f",
         unit: 1024,
-        least: 64 << 20,
+        least: FILE_BYTES_LEAST,
         wished: 1 << 30,
-        why: "shared memory is files, and who makes a larger one is killed (SIGXFSZ)",
+        why: "shared memory is files, and messages of large scenes need larger ones",
         show: bytes,
     },
     Need {

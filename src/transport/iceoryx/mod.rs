@@ -28,6 +28,6 @@ pub use list::{InstanceInfo, list_instances};
 pub use lock::{Holder, Lock, locks};
 pub use place::Place;
 pub use process::{Process, process, shares};
-pub use room::{bytes_needed, scarce};
+pub use room::{bytes_needed, cramped, scarce};
 pub use server::{Server, ServerOptions};
 pub use waker::Waker;

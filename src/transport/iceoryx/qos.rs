@@ -48,6 +48,9 @@ const RESULT_SUBSCRIBERS_MAX: usize = 32;
 const RESULT_BUFFER: usize = 8;
 /// Messages a reader may hold.
 const RESULT_BORROWED: usize = 4;
+/// Places of one result message in shared memory: all that readers may hold, one for who comes late, two being written.
+pub(super) const RESULT_PLACES: u64 =
+    (RESULT_SUBSCRIBERS_MAX * (RESULT_BUFFER + RESULT_BORROWED) + 3) as u64;
 /// Nodes on one service.
 const NODES_MAX: usize = 64;
 /// Clients that may ask.

@@ -31,7 +31,7 @@ use super::lock::{Holder, InstanceLock, RootLock};
 use super::place::Place;
 use super::process::process;
 use super::qos::{self, Ipc, Open, events, failed};
-use super::room::enough_files;
+use super::room::check_limits;
 use crate::error::{Error, Result};
 use crate::limits;
 use crate::time::{Clock, Seldom};
@@ -181,7 +181,7 @@ impl Server {
     pub fn open(options: ServerOptions) -> Result<Self> {
         let place = &options.place;
         place.check_owner()?;
-        enough_files()?;
+        check_limits()?;
         let lock = InstanceLock::take(place, &holder(&options))?;
         let root = RootLock::hold(place)?;
         let node = qos::node(place, "daemon")?;
