@@ -115,6 +115,11 @@ pub(super) fn doctor(args: &DoctorArgs, out: &mut Out) -> Result<bool> {
     };
     tell(memory::look())?;
     tell(limits::look())?;
+    // Who cannot open files takes what is there for missing.
+    if let Some(blind) = limits::blind() {
+        tell(vec![blind])?;
+        return Ok(false);
+    }
     tell(files::look(&place, name, args.clean))?;
     for instance in instances(&place, name) {
         tell(instance::look(&place, &instance))?;

@@ -4,6 +4,7 @@ use rustix::process::{Resource, getrlimit};
 
 use super::{Finding, bytes};
 use crate::limits::{FILE_BYTES_LEAST, OPEN_FILES_LEAST};
+use crate::transport::open_files::OpenFiles;
 
 /// A limit, and what is needed of it.
 struct Need {
@@ -57,6 +58,16 @@ const NEEDS: [Need; 3] = [
 pub(super) fn look() -> Vec<Finding> {
     let limit = |need: &Need| getrlimit(need.resource).current;
     NEEDS.iter().map(|need| judge(need, limit(need))).collect()
+}
+
+/// What is said in place of all that needs files to be looked at; `None`: there are enough.
+pub(super) fn blind() -> Option<Finding> {
+    let files = OpenFiles::own().filter(|files| !files.are_enough_for_a_client())?;
+    Some(Finding::wrong(
+        "limits",
+        format!("this process has {files}: too few to look at leftovers and instances"),
+        files.mend(),
+    ))
 }
 
 /// * `limit` - `None`: there is none.

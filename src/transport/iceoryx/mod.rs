@@ -17,6 +17,7 @@ mod process;
 mod qos;
 mod room;
 mod server;
+mod unmet;
 mod waker;
 
 pub use cleaner::{Cleaner, spawn_cleaner};
