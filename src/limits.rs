@@ -98,6 +98,14 @@ pub const SPIN_US_DEFAULT: u64 = 50;
 pub const TIMEOUT_MS_DEFAULT: u64 = 500;
 /// Files that a daemon must be allowed to open: it has some 80 open from its start on.
 pub const OPEN_FILES_LEAST: u64 = 96;
+/// Bytes that a file of a daemon must be allowed to have: the memory for answers is some 24 MiB from its start on.
+pub const FILE_BYTES_LEAST: u64 = 32 << 20;
+/// Files that a client takes of a daemon: 7 or 8 where it listens to some messages or sends poses, twice as many where
+/// it does all that there is.
+pub const FILES_A_CLIENT: u64 = 8;
+/// Files that a process must be allowed to open beside those that it has, to be a client: `monitor` opens 42, `record`
+/// 49, one that listens to everything and sends some 80.
+pub const CLIENT_FILES_LEAST: u64 = 56;
 /// Bytes of one scene edit request.
 pub const REQUEST_BYTES_MAX: usize = 1 << 29;
 /// Remembered sessions that are over, per daemon; beyond it the oldest is forgotten, and its client could come back.

@@ -14,6 +14,8 @@ mod live;
 mod doctor;
 #[path = "cli/feed.rs"]
 mod feed;
+#[path = "cli/limits.rs"]
+mod limits;
 #[path = "cli/manual.rs"]
 mod manual;
 #[path = "cli/monitor.rs"]

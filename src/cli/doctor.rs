@@ -14,6 +14,7 @@ use crate::error::Result;
 use crate::transport::iceoryx::{InstanceInfo, Place, list_instances, locks};
 
 use super::args_tools::DoctorArgs;
+use super::figures::bytes;
 use super::out::Out;
 
 /// How much a finding matters.
@@ -114,6 +115,11 @@ pub(super) fn doctor(args: &DoctorArgs, out: &mut Out) -> Result<bool> {
     };
     tell(memory::look())?;
     tell(limits::look())?;
+    // Who cannot open files takes what is there for missing.
+    if let Some(blind) = limits::blind() {
+        tell(vec![blind])?;
+        return Ok(false);
+    }
     tell(files::look(&place, name, args.clean))?;
     for instance in instances(&place, name) {
         tell(instance::look(&place, &instance))?;
@@ -151,18 +157,6 @@ fn instances(place: &Place, name: Option<&str>) -> Vec<InstanceInfo> {
     all
 }
 
-/// Bytes for people.
-fn bytes(count: u64) -> String {
-    #[allow(clippy::cast_precision_loss, reason = "shown with four digits")]
-    let size = count as f64;
-    match count {
-        0..1024 => format!("{count} bytes"),
-        1024..1_048_576 => format!("{:.1} KiB", size / 1024.0),
-        1_048_576..1_073_741_824 => format!("{:.1} MiB", size / 1_048_576.0),
-        _ => format!("{:.1} GiB", size / 1_073_741_824.0),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -179,13 +173,5 @@ mod tests {
         let fine: serde_json::Value =
             serde_json::from_str(&Finding::ok("limits", "enough").json()).unwrap();
         assert_eq!((&fine["level"], fine["do"].is_null()), (&"ok".into(), true));
-    }
-
-    #[test]
-    fn bytes_are_told_in_the_unit_that_fits() {
-        assert_eq!(bytes(0), "0 bytes");
-        assert_eq!(bytes(1536), "1.5 KiB");
-        assert_eq!(bytes(64 << 20), "64.0 MiB");
-        assert_eq!(bytes(3 << 30), "3.0 GiB");
     }
 }

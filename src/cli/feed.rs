@@ -1,6 +1,7 @@
 //! `sweepd feed`: a built-in source of moving bodies, and the maker of scenes for it.
 
 mod cadence;
+mod same;
 
 use std::io::Write as _;
 use std::path::Path;
@@ -17,6 +18,7 @@ use super::args::FeedArgs;
 use super::connect;
 use super::files::open_new;
 use super::out::Out;
+use same::Same;
 
 /// Bodies of a written scene when no count is given.
 const COUNT_DEFAULT: usize = 200;
@@ -52,6 +54,10 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
     let Some(mut client) = connect(&args.which.instance, Some(&name), args.wait, stop)? else {
         return Ok(true);
     };
+    Same::subscribe(&mut client)?;
+    if bodies.same.meet(&mut client, args, stop)?.is_none() {
+        return Ok(true);
+    }
     tracing::info!(
         "feeding {} bodies ({} of them moving) as `{name}` at {} Hz",
         bodies.rows.len(),
@@ -93,8 +99,10 @@ fn stream(
             stamp_ns,
             ..FrameInfo::default()
         };
-        // A frame for a daemon that is no more would be refused by the next one.
-        while client.latest()? != Heard::Silence {}
+        let Some(met) = bodies.same.meet(client, args, stop)? else {
+            break;
+        };
+        start_ns = start_ns.saturating_add(met.waited_ns);
         is_used = is_used || uses(client, source);
         client.send(&info, Rows::Poses(&bodies.rows))?;
         frame += 1;
@@ -285,6 +293,7 @@ fn source_of(scene: &Scene, name: Option<&str>) -> Result<usize> {
 
 /// The rows to send and how they move.
 struct Bodies {
+    same: Same,
     rows: Vec<TransformRow>,
     motions: Vec<Motion>,
     moving: usize,
@@ -297,6 +306,7 @@ impl Bodies {
             .bodies
             .iter()
             .filter(|b| b.moves && b.source == Some(source) && b.attached_to.is_none());
+        let same = Same::new(own.clone().map(|b| (b.id.0, b.name.clone())).collect());
         let (rows, motions): (Vec<_>, Vec<_>) = own
             .map(|body| {
                 let row = TransformRow {
@@ -308,6 +318,7 @@ impl Bodies {
             .unzip();
         let moving = args.count.unwrap_or(rows.len()).min(rows.len());
         let mut bodies = Self {
+            same,
             rows,
             motions,
             moving,

@@ -57,6 +57,18 @@ pub(super) fn time(ns: u64) -> String {
     }
 }
 
+/// Bytes for people.
+pub(super) fn bytes(count: u64) -> String {
+    #[allow(clippy::cast_precision_loss, reason = "shown with four digits")]
+    let size = count as f64;
+    match count {
+        0..1024 => format!("{count} bytes"),
+        1024..1_048_576 => format!("{:.1} KiB", size / 1024.0),
+        1_048_576..1_073_741_824 => format!("{:.1} MiB", size / 1_048_576.0),
+        _ => format!("{:.1} GiB", size / 1_073_741_824.0),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -88,5 +100,13 @@ mod tests {
         for value in [0.0, -9_999.999_999, 1e300, f64::NEG_INFINITY, f64::NAN] {
             assert!(number(value, 6).len() <= 12, "{}", number(value, 6));
         }
+    }
+
+    #[test]
+    fn bytes_are_told_in_the_unit_that_fits() {
+        assert_eq!(bytes(0), "0 bytes");
+        assert_eq!(bytes(1536), "1.5 KiB");
+        assert_eq!(bytes(64 << 20), "64.0 MiB");
+        assert_eq!(bytes(3 << 30), "3.0 GiB");
     }
 }

@@ -1,10 +1,49 @@
-//! Files that commands write. In: a path of a user. Out: an open file, or why there is none.
+//! Files that commands write. In: a path of a user. Out: an open file, or why there is none. What a command reads it
+//! does not write over.
 
 use std::fs::File;
 use std::io::ErrorKind;
-use std::path::Path;
+use std::os::unix::fs::MetadataExt as _;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+use crate::scene::Scene;
+
+/// A file that a command reads: what it is to it, in words, and its path.
+pub(super) type Input = (&'static str, PathBuf);
+
+/// The files that a scene is read from.
+pub(super) fn inputs(path: &Path, scene: &Scene) -> Vec<Input> {
+    let meshes = scene.mesh_files().into_iter();
+    std::iter::once(("the scene file", path.to_owned()))
+        .chain(meshes.map(|mesh| ("a mesh file of the scene", mesh)))
+        .collect()
+}
+
+/// Refuses to write over what is read, by whatever name: another spelling, a symbolic link or a hard link.
+///
+/// * `flag` - that names the file `to`.
+///
+/// # Errors
+/// `Error::Usage` with the names of both.
+pub(super) fn check_inputs(flag: &str, to: &Path, inputs: &[Input]) -> Result<()> {
+    let there = place(to);
+    let is_same = |(_, path): &&Input| there.is_some() && place(path) == there;
+    match inputs.iter().find(is_same) {
+        None => Ok(()),
+        Some((what, path)) => Err(Error::Usage(format!(
+            "{flag} {}: this is {what} {}, which would be written over; name another file",
+            to.display(),
+            path.display()
+        ))),
+    }
+}
+
+/// Which file a path leads to; `None`: there is none, or what keeps nothing (a device, a pipe).
+fn place(path: &Path) -> Option<(u64, u64)> {
+    let meta = std::fs::metadata(path).ok()?;
+    meta.is_file().then(|| (meta.dev(), meta.ino()))
+}
 
 /// Opens a new file; one that is there is somebody's work.
 ///
@@ -37,6 +76,43 @@ pub(super) fn open_new(path: &Path, over: bool, what: &str) -> Result<File> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn bug_what_is_read_was_written_over_under_any_of_its_names() {
+        let folder = std::env::temp_dir().join(format!("sweepd_inputs_{}", std::process::id()));
+        std::fs::create_dir_all(folder.join("in")).unwrap();
+        let at = |name: &str| folder.join(name);
+        for name in ["scene.toml", "mesh.stl", "other"] {
+            std::fs::write(at(name), name).unwrap();
+        }
+        std::os::unix::fs::symlink("../scene.toml", at("in/symbolic")).unwrap();
+        std::fs::hard_link(at("scene.toml"), at("hard")).unwrap();
+        let read = [
+            ("the scene file", at("scene.toml")),
+            ("a mesh file of the scene", at("mesh.stl")),
+            ("a file that is gone", at("gone")),
+        ];
+        for (name, what) in [
+            ("scene.toml", "the scene file"),
+            ("in/../scene.toml", "the scene file"),
+            ("in/symbolic", "the scene file"),
+            ("hard", "the scene file"),
+            ("mesh.stl", "a mesh file"),
+        ] {
+            let error = check_inputs("--record", &at(name), &read).unwrap_err();
+            assert_eq!(error.exit_code(), 2, "{error}");
+            let text = error.to_string();
+            let begin = format!("--record {}: this is {what}", at(name).display());
+            assert!(text.starts_with(&begin), "{text}");
+        }
+        for name in ["other", "new", "gone"] {
+            check_inputs("--record", &at(name), &read).unwrap();
+        }
+        // A device keeps nothing, so that nothing of it is lost.
+        let null = [("the scene file", PathBuf::from("/dev/null"))];
+        check_inputs("--record", Path::new("/dev/null"), &null).unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
 
     #[test]
     fn a_file_that_is_there_is_not_written_over_unless_asked_for() {

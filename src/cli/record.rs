@@ -14,7 +14,10 @@ use std::path::PathBuf;
 
 use super::args::RunArgs;
 #[cfg(feature = "mcap")]
-use super::files::open_new;
+use super::figures::bytes;
+use super::files::Input;
+#[cfg(feature = "mcap")]
+use super::files::{check_inputs, open_new};
 use crate::daemon::Daemon;
 #[cfg(not(feature = "mcap"))]
 use crate::error::Error;
@@ -30,6 +33,18 @@ use crate::record::{Recorder, Start};
 /// What a file is opened for.
 #[cfg(feature = "mcap")]
 const WHAT: &str = "a recording";
+
+/// Says beforehand where a recording will end.
+#[cfg(feature = "mcap")]
+fn tell_limit(name: &str) {
+    if let Some(most) = rustix::process::getrlimit(rustix::process::Resource::Fsize).current {
+        tracing::warn!(
+            "the recording {name} ends when it is {} long, for a file of this process may not be longer: `ulimit -f \
+             unlimited` in the shell that starts it, or in its service's unit",
+            bytes(most)
+        );
+    }
+}
 
 /// What this build says that cannot record or replay.
 #[cfg(not(feature = "mcap"))]
@@ -47,19 +62,20 @@ pub(super) struct Tape {
 
 impl Tape {
     /// What was asked for. Nothing is touched yet: a daemon that may not start leaves no file, and harms none.
+    ///
+    /// * `read` - files that are not to be recorded over.
     #[cfg(feature = "mcap")]
-    #[allow(
-        clippy::unnecessary_wraps,
-        reason = "without the feature it may be refused"
-    )]
-    pub(super) fn of(args: &RunArgs) -> Result<Self> {
+    pub(super) fn of(args: &RunArgs, read: &[Input]) -> Result<Self> {
+        if let Some(path) = &args.record {
+            check_inputs("--record", path, read)?;
+        }
         let file = args.record.clone().map(|path| (path, args.force));
         Ok(Self { file })
     }
 
     /// Refuses what this build does not have.
     #[cfg(not(feature = "mcap"))]
-    pub(super) fn of(args: &RunArgs) -> Result<Self> {
+    pub(super) fn of(args: &RunArgs, _: &[Input]) -> Result<Self> {
         match args.record {
             Some(_) => Err(unable("--record")),
             None => Ok(Self {}),
@@ -90,6 +106,7 @@ impl Tape {
             return Ok(());
         };
         let (file, name) = (open_new(&path, over, WHAT)?, path.display().to_string());
+        tell_limit(&name);
         let start = Start::of(scene, text, files, boot_id, daemon.engine().now_ns());
         let sink = McapSink::new(buffered(file), &name, &scene.frame_id, &start)?;
         daemon.record(Recorder::start(Box::new(sink))?);

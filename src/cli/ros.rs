@@ -15,6 +15,7 @@ use crate::transport::Door;
 use crate::transport::iceoryx::Place;
 
 use super::args::RunArgs;
+use super::files::Input;
 
 #[cfg(feature = "ros2")]
 use crate::transport::ros2::{
@@ -45,6 +46,15 @@ pub(super) fn split(words: impl Iterator<Item = OsString>) -> (Vec<OsString>, Op
         }
     }
     (plain, ros)
+}
+
+/// The files that ROS arguments name.
+pub(super) fn inputs(ros_words: Option<&[String]>) -> impl Iterator<Item = Input> {
+    let pairs = ros_words.unwrap_or_default().windows(2);
+    pairs.filter_map(|pair| match pair {
+        [flag, file] if flag == "--params-file" => Some(("a file of --ros-args", file.into())),
+        _ => None,
+    })
 }
 
 /// The level of the log that `--log-level` asks for; words that cannot be read are refused later.

@@ -10,11 +10,12 @@ use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::time::{Clock, SystemClock};
 use crate::transport::iceoryx::{
-    Place, Server, ServerOptions, bytes_needed, scarce, spawn_cleaner,
+    Place, Server, ServerOptions, bytes_needed, cramped, scarce, spawn_cleaner,
 };
 use crate::transport::{Both, Door};
 
 use super::args::{Limit, RunArgs};
+use super::files::inputs;
 use super::progress::shapes_of;
 use super::record::Tape;
 use super::ros;
@@ -34,7 +35,9 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     apply(args, &mut scene)?;
     asked.check(&scene)?;
     check_watchdog(args, &scene)?;
-    let tape = Tape::of(args)?;
+    let mut read = inputs(&args.scene, &scene);
+    read.extend(ros::inputs(ros_words));
+    let tape = Tape::of(args, &read)?;
     let mut shapes = shapes_of(&scene, tape.library())?;
     let given = (text, shapes.library.take_kept());
     for warning in scene.notes().iter().chain(&shapes.warnings) {
@@ -52,6 +55,9 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     let mut server = Server::open(options)?;
     let (bodies, sources) = (scene.bodies.len(), scene.sources.len());
     if let Some(warning) = scarce(bytes_needed(&scene.config.limits, bodies, sources)) {
+        tracing::warn!("{warning}");
+    }
+    if let Some(warning) = cramped(&scene.config.limits, bodies) {
         tracing::warn!("{warning}");
     }
     // Dead clients are cleaned up beside the tick, never in it.

@@ -1,6 +1,7 @@
 //! Builds the shapes of a scene, and says which body a shape's trouble belongs to.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
@@ -117,6 +118,15 @@ impl Scene {
             text.push_str(&format!("shape {}: ", shape + 1));
         }
         text
+    }
+
+    /// The files of its meshes, each once.
+    #[must_use]
+    pub fn mesh_files(&self) -> Vec<PathBuf> {
+        let shapes = self.bodies.iter().flat_map(|body| &body.shapes);
+        let files: BTreeSet<&str> = shapes.filter_map(|placed| placed.shape.file()).collect();
+        let base = &self.origin.base;
+        files.into_iter().map(|file| base.join(file)).collect()
     }
 
     /// The body of a name.

@@ -66,7 +66,7 @@ impl Library {
         let Files::Kept(all) = &mut self.files else {
             return;
         };
-        let stays = |entry: &Entry| file_of(&entry.spec).is_none_or(|f| !contents.contains_key(f));
+        let stays = |entry: &Entry| entry.spec.file().is_none_or(|f| !contents.contains_key(f));
         (self.shelves.values_mut()).for_each(|shelf| shelf.retain(stays));
         all.extend(contents);
     }
@@ -76,7 +76,7 @@ impl Library {
     /// # Errors
     /// As [`build`](crate::shape::build).
     pub fn get(&mut self, spec: &ShapeSpec, base: &Path) -> Result<Built, ShapeError> {
-        let name = file_of(spec);
+        let name = spec.file();
         let file = name.map(|name| self.files.mark(base, name)).transpose()?;
         let known = (name.zip(file.as_ref())).is_none_or(|(name, m)| self.files.knows(name, m));
         let shelf = self.shelves.entry(digest(spec)).or_default();
@@ -112,14 +112,6 @@ impl Library {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
-    }
-}
-
-/// The mesh file that a spec names.
-fn file_of(spec: &ShapeSpec) -> Option<&str> {
-    match spec {
-        ShapeSpec::Convex { file, .. } | ShapeSpec::Trimesh { file, .. } => file.as_deref(),
-        _ => None,
     }
 }
 

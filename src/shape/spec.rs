@@ -90,3 +90,14 @@ pub enum ShapeSpec {
         base_m: f64,
     },
 }
+
+impl ShapeSpec {
+    /// The mesh file that it names, as it says it.
+    #[must_use]
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            Self::Convex { file, .. } | Self::Trimesh { file, .. } => file.as_deref(),
+            _ => None,
+        }
+    }
+}

@@ -60,20 +60,31 @@ mod tests {
     }
 
     #[test]
-    fn who_comes_counts_at_once_and_who_goes_after_a_while_each_for_itself() {
+    fn who_comes_counts_at_once_and_who_goes_for_63_ticks_more_each_for_itself() {
         let mut audience = Audience::default();
         let nobody = Readers::default();
         assert_eq!(audience.note(reads(false, false)), nobody);
         let both = audience.note(reads(true, true));
         assert!(both.contacts && both.bounds && !both.regions);
-        for _ in 1..QUIET_TICKS {
-            assert_eq!(audience.note(reads(false, true)), both);
+        // The contract says 64 ticks (`msgs/README.md`, Plan): the 64th without a reader is the first that says so.
+        for tick in 1..64 {
+            assert_eq!(audience.note(reads(false, true)), both, "tick {tick}");
         }
-        // The reader of pairs is away just now, for this one tick.
-        let gone = audience.note(reads(false, false));
-        assert!(!gone.contacts && gone.bounds);
-        for _ in 1..QUIET_TICKS {
-            assert!(audience.note(reads(false, false)).bounds || audience.bounds == QUIET_TICKS);
+        // The reader of pairs is away from here on: this is its first tick.
+        let pairs = Readers {
+            bounds: true,
+            ..nobody
+        };
+        assert_eq!(audience.note(reads(false, false)), pairs);
+        for tick in 2..64 {
+            assert_eq!(audience.note(reads(false, false)), pairs, "tick {tick}");
+        }
+        assert_eq!(audience.note(reads(false, false)), nobody);
+        assert_eq!(audience.note(reads(false, false)), nobody);
+        // One that looks in begins the count anew.
+        assert_eq!(audience.note(reads(false, true)), pairs);
+        for tick in 1..64 {
+            assert_eq!(audience.note(reads(false, false)), pairs, "tick {tick}");
         }
         assert_eq!(audience.note(reads(false, false)), nobody);
     }

@@ -9,6 +9,7 @@ pub mod client;
 mod hello;
 pub mod iceoryx;
 pub mod memory;
+pub mod open_files;
 mod patience;
 mod request;
 #[cfg(feature = "ros2")]

@@ -4,6 +4,7 @@
 use std::fs::File;
 use std::os::fd::AsFd as _;
 use std::path::PathBuf;
+use std::process::Command;
 
 use rustix::fs::{FlockOperation, flock};
 use rustix::process::Signal;
@@ -11,7 +12,7 @@ use serde_json::Value;
 use sweepd::transport::client::Topics;
 
 use super::{code, err, head, out};
-use crate::live::{Desk, TWO_SPHERES, at, output, step};
+use crate::live::{Desk, TWO_SPHERES, at, output, run_out, step};
 
 /// The findings of a run, and whether it ended as they say it must.
 fn look(desk: &Desk, args: &[&str]) -> Vec<Value> {
@@ -206,4 +207,33 @@ fn a_name_that_is_held_without_an_answer_is_wrong_and_says_by_whom() {
     drop(file);
     look(&desk, &["--clean"]);
     assert!(!path.exists());
+}
+
+#[test]
+fn bug_shared_memory_that_is_mounted_read_only_is_told_as_that() {
+    let desk = Desk::new();
+    let apart = |words: &str| {
+        let mut command = Command::new("unshare");
+        command.args(["--user", "--map-root-user", "--mount", "sh", "-c"]);
+        command.arg(format!("mount -o remount,bind,ro /dev/shm && {words}"));
+        command
+    };
+    if !apart("true").status().is_ok_and(|status| status.success()) {
+        eprintln!("left out: this machine lets nobody mount in a namespace of his own");
+        return;
+    }
+    let mut command = apart("exec \"$@\"");
+    command.args(["sh", env!("CARGO_BIN_EXE_sweepd")]);
+    let ended = run_out(command, &["doctor", "--json", "--instance", &desk.instance]);
+    assert_eq!(code(&ended), Some(1), "{}", err(&ended));
+    let lines = out(&ended);
+    let findings = lines
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap());
+    let findings: Vec<Value> = findings.collect();
+    let shut = of(&findings, "shared memory", "may not make files in /dev/shm");
+    assert_eq!((shut.len(), &shut[0]["level"]), (1, &"wrong".into()));
+    let mend = shut[0]["do"].as_str().unwrap();
+    assert!(mend.contains("mount -o remount,rw /dev/shm"), "{mend}");
+    assert!(!mend.contains("chmod"), "{mend}");
 }

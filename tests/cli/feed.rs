@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rustix::process::Signal;
 use sweepd::transport::client::{Client, Heard};
-use sweepd::wire::{State, TickCause};
+use sweepd::wire::{State, TickCause, name_str};
 
 use super::{code, err};
 use crate::live::{Desk, SECOND_NS, TWO_SPHERES, output, state, tick_until, until};
@@ -75,6 +75,7 @@ fn bug_a_scene_that_is_there_is_not_written_over_and_flags_that_say_nothing_are_
     for more in [
         &["--rate", "50"][..],
         &["--frames", "9"],
+        &["--work", "1ms..2ms"],
         &["--source", "feed"],
         &[&path],
     ] {
@@ -202,6 +203,45 @@ fn with_work_of_its_own_it_leaves_the_rest_of_each_frame_to_the_daemon_and_tells
 }
 
 #[test]
+fn with_work_of_its_own_a_feed_of_which_no_frame_had_a_result_is_no_good_end_and_one_result_is_enough()
+ {
+    let desk = Desk::new();
+    let path = pool(&desk, "12");
+    let _daemon = desk.start("run", &[&path]);
+    let mut client = desk.source("nobody");
+    let mut first = desk.start("feed", &[&path, "--rate", "100"]);
+    tick_until(&mut client, "the first feed", |tick| {
+        tick.sources[0].seq >= 1
+    });
+    let work = |frames: &str| {
+        let args = ["--rate", "20", "--work", "1ms..2ms", "--frames", frames];
+        desk.start("feed", &[&[path.as_str()], &args[..]].concat())
+    };
+    // Each frame waits a second for its result.
+    let mut second = work("2");
+    assert_eq!(second.end().0.code(), Some(4), "{}", second.stderr());
+    let said = second.stderr();
+    assert!(said.contains("none of 2 frames had a result"), "{said}");
+    assert!(
+        said.contains("source_taken"),
+        "the warnings say why: {said}"
+    );
+    assert!(
+        second.stdout().contains("0 of 0 frames over"),
+        "{}",
+        second.stdout()
+    );
+    // The place is free in the middle of the next one.
+    let mut third = work("12");
+    until("told", || third.stderr().contains("source_taken"));
+    assert_eq!(first.stop().0.code(), Some(0));
+    assert_eq!(third.end().0.code(), Some(0), "{}", third.stderr());
+    // None was asked for, so none is missing; and a stop is no refusal.
+    let mut none = work("0");
+    assert_eq!(none.end().0.code(), Some(0), "{}", none.stderr());
+}
+
+#[test]
 fn a_signal_ends_it_with_code_0_also_while_it_waits_for_a_daemon() {
     let desk = Desk::new();
     let scene = desk.scene(TWO_SPHERES);
@@ -290,14 +330,76 @@ fn a_second_feed_of_the_same_source_is_told_that_it_is_not_used() {
 }
 
 #[test]
-fn a_feed_of_another_scene_is_told_what_is_refused() {
+fn what_is_refused_of_a_body_that_an_edit_has_removed_is_told() {
     let desk = Desk::new();
     let path = pool(&desk, "10");
     let _daemon = desk.start("run", &[&path]);
-    let _up = desk.client(None);
-    let other = pool(&desk, "20");
-    let feed = desk.start("feed", &[&other]);
+    let mut feed = desk.start("feed", &[&path]);
+    let mut client = desk.source("nobody");
+    tick_until(&mut client, "frames", |tick| tick.sources[0].frames > 5);
+    until("names", || {
+        client.wait_tick(SECOND_NS).unwrap();
+        client.view().names().is_some()
+    });
+    let row = client.view().names().unwrap().rows[4];
+    let (id, name) = (row.body, name_str(&row.name).unwrap());
+    let edit = format!(r#"{{"edits": [{{"remove": "{name}"}}]}}"#);
+    assert!(client.request(&edit, &[], 30 * SECOND_NS).unwrap().ok);
     until("told", || feed.stderr().contains("unknown_body"));
+    assert_eq!(feed.ended(), None, "{}", feed.stderr());
+    // Its id is kept for its name in this boot: no other body is moved in its place.
+    let edit = format!(
+        r#"{{"edits": [{{"put": {{"name": "another", "source": "feed", "id": {id},
+        "shape": {{"type": "sphere", "radius": 0.1}}}}}}]}}"#
+    );
+    let answer = client.request(&edit, &[], 30 * SECOND_NS).unwrap();
+    assert!(!answer.ok, "{answer:?}");
+}
+
+#[test]
+fn bug_a_feed_of_another_scene_moved_the_bodies_that_had_its_ids() {
+    let desk = Desk::new();
+    let swapped = TWO_SPHERES
+        .replace("\"a\"", "\"c\"")
+        .replace("\"b\"", "\"a\"");
+    let other = desk.write("other.toml", &swapped);
+    let other = other.to_str().unwrap();
+    let mut daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("nobody");
+    for more in [
+        &["--frames", "5"][..],
+        &["--frames", "5", "--rate", "20", "--work", "1ms..2ms"],
+    ] {
+        let mut feed = desk.start("feed", &[&[other], more].concat());
+        assert_eq!(feed.end().0.code(), Some(4), "{}", feed.stderr());
+        let said = feed.stderr();
+        for word in [
+            "other.toml",
+            "of the 2 bodies to be sent 2 are",
+            "id 1 is \"c\" in the file and \"a\" in the daemon",
+        ] {
+            assert!(said.contains(word), "{word}: {said}");
+        }
+    }
+    tick_until(&mut client, "a tick after them", |_| true);
+    let source = client.view().tick().sources[0];
+    assert_eq!((source.frames, source.refused), (0, 0), "nothing was sent");
+    // One that runs ends when the next daemon's scene is another.
+    let scene = desk.dir.join("scene.toml");
+    let mut feed = desk.start("feed", &[scene.to_str().unwrap(), "--rate", "50"]);
+    tick_until(&mut client, "frames", |tick| tick.sources[0].frames > 5);
+    daemon.kill();
+    let _next = desk.run(&swapped, &[]);
+    assert_eq!(feed.end().0.code(), Some(4), "{}", feed.stderr());
+    assert!(
+        feed.stderr().contains("runs another scene"),
+        "{}",
+        feed.stderr()
+    );
+    tick_until(&mut client, "the next one's ticks", |tick| {
+        tick.header.boot_id != 0 && tick.header.tick > 3
+    });
+    assert_eq!(client.view().tick().sources[0].frames, 0);
 }
 
 #[test]

@@ -172,6 +172,54 @@ fn a_file_that_cannot_be_is_refused_before_the_daemon_runs() {
 }
 
 #[test]
+fn bug_a_recording_was_written_over_the_scene_and_the_meshes_it_is_of() {
+    let desk = Desk::new();
+    let mesh = desk.write("ball.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n");
+    let body = r#"shape = { type = "convex", file = "ball.obj" }"#;
+    let scene = desk
+        .scene(&super::TWO_SPHERES.replace(r#"shape = { type = "sphere", radius = 0.5 }"#, body));
+    let params = desk.write(
+        "params.yaml",
+        "sweepd:\n  ros__parameters:\n    budget_ms: 2.0\n",
+    );
+    let (linked, hard) = (desk.dir.join("link.mcap"), desk.dir.join("hard.mcap"));
+    std::os::unix::fs::symlink("scene.toml", &linked).unwrap();
+    std::fs::hard_link(&scene, &hard).unwrap();
+    let spelt = desk.dir.join("../").join(desk.dir.file_name().unwrap());
+    let read = [&scene, &mesh, &params].map(|file| std::fs::read(file).unwrap());
+    let mut files = vec![
+        scene.clone(),
+        spelt.join("scene.toml"),
+        linked,
+        hard,
+        mesh.clone(),
+    ];
+    let mut args = vec!["run", path(&scene), "--instance", &desk.instance, "--force"];
+    if cfg!(feature = "ros2") {
+        files.push(params.clone());
+        args.splice(2..2, ["--ros-args", "--params-file", path(&params), "--"]);
+    }
+    for file in files {
+        let mut all = args.clone();
+        all.extend(["--ticks", "1", "--record", path(&file)]);
+        let ended = output(&all);
+        assert_eq!(code(&ended), Some(2), "{}", err(&ended));
+        let said = err(&ended);
+        let begin = format!("--record {}: this is ", path(&file));
+        assert!(
+            said.contains(&begin) && said.contains("name another file"),
+            "{said}"
+        );
+        // Nothing was begun.
+        assert_eq!(desk.files(), Vec::<PathBuf>::new());
+        assert_eq!(
+            [&scene, &mesh, &params].map(|file| std::fs::read(file).unwrap()),
+            read
+        );
+    }
+}
+
+#[test]
 fn a_daemon_whose_name_is_taken_touches_no_recording() {
     let desk = Desk::new();
     let (scene, file) = pool(&desk, "10");

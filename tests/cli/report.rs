@@ -294,7 +294,7 @@ fn what_cannot_be_meant_is_refused_with_what_to_change() {
     let path = scene(&desk);
     let nowhere = desk.dir.join("no/such/page.html");
     let nowhere = nowhere.to_str().unwrap();
-    let bad: [(&[&str], &str); 9] = [
+    let bad: [(&[&str], &str); 10] = [
         (&["stability", "--family", "fast"], "--list"),
         (
             &["stability", "--family", "gap", "--html", nowhere],
@@ -309,14 +309,17 @@ fn what_cannot_be_meant_is_refused_with_what_to_change() {
         (&["error", &path, "--ticks", "0"], "1..="),
         (&["error", &path, "--rate", "nan"], "frames a second"),
         (&["error", &path, "--html", nowhere], "folder that exists"),
+        (&["error", &path, "--html", &path], "this is the scene file"),
         (&["error", "missing.toml"], "missing.toml"),
     ];
+    let text = std::fs::read(&path).unwrap();
     for (args, wanted) in bad {
         let ended = output(&[&["report"], args].concat());
         assert_eq!(code(&ended), Some(2), "{args:?} {}", err(&ended));
         assert!(err(&ended).contains(wanted), "{args:?}: {}", err(&ended));
         assert!(ended.stdout.is_empty(), "{args:?}");
     }
+    assert_eq!(std::fs::read(&path).unwrap(), text);
     assert_eq!(code(&output(&["report"])), Some(2));
     for command in ["error", "stability"] {
         let help = ["report", command, "--help"];

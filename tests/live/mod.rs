@@ -18,7 +18,7 @@ use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{Pid, Resource, Rlimit, Signal, getrlimit, kill_process, prlimit};
 use sweepd::transport::client::{Client, FrameInfo, Heard, Rows, Topics};
 use sweepd::wire::{RejectReason, State, TickRow, TransformRow};
 
@@ -146,16 +146,31 @@ pub fn sweepd() -> Command {
     command
 }
 
-/// Runs the binary to its end.
-pub fn output(args: &[&str]) -> Output {
-    let child = sweepd()
+/// The binary under a limit, by the words of a shell: `ulimit -n 20`. Files that clients of this test program have open
+/// would be its own, too, and are closed before.
+pub fn limited(limit: &str) -> Command {
+    let close =
+        r#"for f in /proc/self/fd/*; do f=${f##*/}; [ "$f" -gt 2 ] && eval "exec $f>&-"; done"#;
+    let mut command = Command::new("bash");
+    command
+        .args(["-c", &format!("{close}; {limit} && exec \"$@\""), "bash"])
+        .arg(env!("CARGO_BIN_EXE_sweepd"));
+    command
+}
+
+/// Runs a command to its end.
+pub fn run_out(mut command: Command, args: &[&str]) -> Output {
+    command
         .args(args)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    finish(child)
+        .stderr(Stdio::piped());
+    finish(command.spawn().unwrap())
+}
+
+/// Runs the binary to its end.
+pub fn output(args: &[&str]) -> Output {
+    run_out(sweepd(), args)
 }
 
 /// Waits for a child with piped output; kills it when it takes far too long.
@@ -201,6 +216,17 @@ pub struct Running {
 impl Running {
     pub fn pid(&self) -> u32 {
         self.child.id()
+    }
+
+    /// Sets what it may have of something from now on.
+    pub fn limit(&self, what: Resource, most: u64) {
+        let pid = Some(Pid::from_child(&self.child));
+        let maximum = getrlimit(what).maximum;
+        let limit = Rlimit {
+            current: Some(most),
+            maximum,
+        };
+        prlimit(pid, what, limit).unwrap();
     }
 
     pub fn signal(&self, signal: Signal) {

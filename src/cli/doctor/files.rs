@@ -173,8 +173,21 @@ fn mend(clean: bool, instance: Option<&str>) -> &'static str {
 fn judge(left: &Leftovers, instance: Option<&str>, mend: &str) -> Vec<Finding> {
     let check = "leftovers";
     let mut found = Vec::new();
-    if !left.dead.is_empty() {
-        found.push(Finding::warning(check, nodes(&left.dead), mend));
+    let (unknown, dead): (Vec<_>, Vec<_>) =
+        left.dead.iter().cloned().partition(NodeOwner::is_unknown);
+    if !dead.is_empty() {
+        found.push(Finding::warning(check, nodes(&dead), mend));
+    }
+    // iceoryx2 does not clean them, and nobody needs it to.
+    if !unknown.is_empty() {
+        let what = format!(
+            "{} that processes left which ended while they came or went: nothing is theirs any more",
+            match unknown.len() {
+                1 => "an entry".to_owned(),
+                some => format!("{some} entries"),
+            }
+        );
+        found.push(Finding::ok(check, what));
     }
     let names = left.locks.iter().map(|lock| lock.instance.as_str());
     let names = names.filter(|name| instance.is_none_or(|asked| asked == *name));
@@ -191,7 +204,7 @@ fn judge(left: &Leftovers, instance: Option<&str>, mend: &str) -> Vec<Finding> {
     found.extend(left.alive.iter().filter_map(zombie));
     let unmapped = &left.unmapped;
     // Files of dead nodes are told with their nodes.
-    if let (true, Some(example)) = (left.dead.is_empty(), &unmapped.example) {
+    if let (true, Some(example)) = (dead.is_empty(), &unmapped.example) {
         found.push(Finding::warning(
             check,
             format!(
@@ -300,10 +313,18 @@ mod tests {
     fn what_is_left_is_a_warning_and_nothing_is_fine() {
         let mut left = Leftovers::default();
         assert_eq!(judge(&left, None, mend(false, None))[0].level, Level::Ok);
-        left.dead = vec![NodeOwner::default(); 5];
+        let owner = NodeOwner {
+            name: "sweepd/cell/client".to_owned(),
+            ..NodeOwner::default()
+        };
+        left.dead = vec![owner; 5];
         let found = judge(&left, None, mend(false, None));
         assert_eq!((found.len(), found[0].level), (1, Level::Warning));
         assert!(found[0].text().contains("5 nodes") && found[0].text().contains("2 more"));
+        left.dead = vec![NodeOwner::default()];
+        let found = judge(&left, None, mend(false, None));
+        assert_eq!((found.len(), found[0].level), (1, Level::Ok));
+        assert!(found[0].what.starts_with("an entry"), "{}", found[0].what);
         left.dead.clear();
         left.unmapped.files = 2;
         left.unmapped.example = Some("/dev/shm/x".into());

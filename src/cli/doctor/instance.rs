@@ -6,6 +6,7 @@ use crate::time::{Clock as _, SystemClock};
 use crate::transport::ICEORYX2_VERSION;
 use crate::transport::client::{ClientOptions, Heard};
 use crate::transport::iceoryx::{Holder, InstanceInfo, Lock, Place, locks, process, shares};
+use crate::transport::open_files::OpenFiles;
 use crate::wire::{SourceRow, TickRow, WIRE_VERSION, name_str};
 
 use super::Finding;
@@ -71,9 +72,16 @@ fn held(place: &Place, lock: &Lock, holder: &Holder) -> Vec<Finding> {
         },
         Err(e) => return vec![Finding::wrong(CHECK, e.to_string(), "")],
     };
+    let full = || {
+        let files = OpenFiles::of(holder.pid)?;
+        files.is_short().then(|| crowded(&who, files))
+    };
     let mut client = match options.connect() {
         Ok(client) => client,
-        Err(why) => return vec![silent(&who, place, lock, holder, &why)],
+        Err(why) => {
+            let silent = || silent(&who, place, lock, holder, &why);
+            return vec![full().unwrap_or_else(silent)];
+        }
     };
     let mut found: Vec<Finding> = namespace(&who, holder).into_iter().collect();
     match client.wait_tick(WAIT_NS) {
@@ -89,19 +97,22 @@ fn held(place: &Place, lock: &Lock, holder: &Holder) -> Vec<Finding> {
                 ),
             ));
             found.extend(sources(&lock.instance, tick));
+            found.extend(full());
         }
-        Ok(_) => found.push(Finding::warning(
-            CHECK,
-            format!(
-                "{who}: it says hello, and no tick came for {}",
-                time(WAIT_NS)
-            ),
-            "`heartbeat_ms` of its scene may be longer; if not, end it and start it again",
-        )),
+        Ok(_) => found.push(full().unwrap_or_else(|| {
+            Finding::warning(
+                CHECK,
+                format!(
+                    "{who}: it says hello, and no tick came for {}",
+                    time(WAIT_NS)
+                ),
+                "`heartbeat_ms` of its scene may be longer; if not, see its log, and where that stands still start it again",
+            )
+        })),
         Err(e) => found.push(Finding::wrong(
             CHECK,
             format!("{who}: {e}"),
-            "end it and start it again",
+            "try again; if it stays so, see its log",
         )),
     }
     found
@@ -156,11 +167,26 @@ fn silent(who: &str, place: &Place, lock: &Lock, holder: &Holder, why: &Error) -
         Some(_) => (
             format!("{who}, which does not answer ({why})"),
             format!(
-                "wait a little where it has just been started; else end it, `kill {pid}`, and start it again"
+                "wait a little where it has just been started, and see its log; where that stands still, end it, `kill \
+                 {pid}`, and start it again"
             ),
         ),
     };
     Finding::wrong(CHECK, what, mend)
+}
+
+/// It has no files left for clients that come: it serves those that it has, and is not to be ended for that.
+fn crowded(who: &str, files: OpenFiles) -> Finding {
+    Finding::wrong(
+        CHECK,
+        format!(
+            "{who}: it has {files}; it serves the clients that it has, and has none left for others"
+        ),
+        format!(
+            "end clients that are not needed; for more of them start it, when that suits, with more: {}",
+            files.mend()
+        ),
+    )
 }
 
 /// Clocks of another namespace may be shifted: ages are then off by as much.
@@ -288,6 +314,22 @@ mod tests {
             text.contains("no hello") && text.contains("start it again"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn bug_a_daemon_that_works_and_has_no_files_left_was_to_be_ended() {
+        let files = OpenFiles {
+            open: 109,
+            most: 110,
+        };
+        let found = crowded("who", files);
+        assert_eq!(found.level, Level::Wrong);
+        let text = found.text();
+        assert!(
+            text.contains("109 of the 110 files") && text.contains("`ulimit -n 1024`"),
+            "{text}"
+        );
+        assert!(!text.contains("kill"), "{text}");
     }
 
     #[test]

@@ -3,7 +3,8 @@
 use rustix::process::{Resource, getrlimit};
 
 use super::{Finding, bytes};
-use crate::limits::OPEN_FILES_LEAST;
+use crate::limits::{FILE_BYTES_LEAST, OPEN_FILES_LEAST};
+use crate::transport::open_files::OpenFiles;
 
 /// A limit, and what is needed of it.
 struct Need {
@@ -37,9 +38,9 @@ const NEEDS: [Need; 3] = [
         what: "size of a file",
         flag: "-f",
         unit: 1024,
-        least: 64 << 20,
+        least: FILE_BYTES_LEAST,
         wished: 1 << 30,
-        why: "shared memory is files, and who makes a larger one is killed (SIGXFSZ)",
+        why: "shared memory is files, and messages of large scenes need larger ones",
         show: bytes,
     },
     Need {
@@ -57,6 +58,16 @@ const NEEDS: [Need; 3] = [
 pub(super) fn look() -> Vec<Finding> {
     let limit = |need: &Need| getrlimit(need.resource).current;
     NEEDS.iter().map(|need| judge(need, limit(need))).collect()
+}
+
+/// What is said in place of all that needs files to be looked at; `None`: there are enough.
+pub(super) fn blind() -> Option<Finding> {
+    let files = OpenFiles::own().filter(|files| !files.are_enough_for_a_client())?;
+    Some(Finding::wrong(
+        "limits",
+        format!("this process has {files}: too few to look at leftovers and instances"),
+        files.mend(),
+    ))
 }
 
 /// * `limit` - `None`: there is none.

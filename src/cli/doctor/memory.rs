@@ -42,11 +42,7 @@ fn room() -> Vec<Finding> {
     let mut found = vec![judge(of(stat.f_bavail), of(stat.f_blocks), entries)];
     let may = Access::READ_OK | Access::WRITE_OK | Access::EXEC_OK;
     if let Err(e) = accessat(CWD, SHARED, may, AtFlags::EACCESS) {
-        found.push(Finding::wrong(
-            check,
-            format!("this user may not make files in {SHARED} ({e})"),
-            let_in(e),
-        ));
+        found.push(shut(e));
     }
     if statfs(SHARED).is_ok_and(|stat| stat.f_type != TMPFS) {
         found.push(Finding::warning(
@@ -58,13 +54,18 @@ fn room() -> Vec<Finding> {
     found
 }
 
-/// What to do where no file can be made.
-fn let_in(because: Errno) -> &'static str {
-    if because == Errno::ROFS {
+/// What is said where no file can be made.
+fn shut(because: Errno) -> Finding {
+    let mend = if because == Errno::ROFS {
         "it is mounted read-only: `mount -o remount,rw /dev/shm`, or start the container with a writable one"
     } else {
         "let it: `chmod 1777 /dev/shm`"
-    }
+    };
+    Finding::wrong(
+        "shared memory",
+        format!("this user may not make files in {SHARED} ({because})"),
+        mend,
+    )
 }
 
 /// * `entries` - files that can still be made; `None`: no limit.
@@ -129,6 +130,21 @@ mod tests {
             assert_eq!(found.level, level, "{}", found.text());
             assert_eq!(found.mend.is_empty(), level == Level::Ok);
         }
+    }
+
+    #[test]
+    fn bug_rights_of_shared_memory_that_is_mounted_read_only_were_to_be_changed() {
+        let text = shut(Errno::ROFS).text();
+        assert!(
+            text.starts_with("wrong ") && text.contains("`mount -o remount,rw /dev/shm`"),
+            "{text}"
+        );
+        assert!(!text.contains("chmod"), "{text}");
+        let text = shut(Errno::ACCESS).text();
+        assert!(
+            text.contains("`chmod 1777 /dev/shm`") && !text.contains("read-only"),
+            "{text}"
+        );
     }
 
     #[test]

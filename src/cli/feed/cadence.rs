@@ -49,6 +49,13 @@ pub(super) fn keep(
     let mut begin_ns = clock.monotonic_ns();
     let mut frame = 0_u64;
     while !stop.load(Ordering::Relaxed) && args.frames.is_none_or(|most| frame < most) {
+        let Some(met) = bodies.same.meet(client, args, stop)? else {
+            break;
+        };
+        if met.is_another {
+            tracing::warn!("the daemon restarted");
+        }
+        begin_ns = begin_ns.saturating_add(met.waited_ns);
         let end_ns = begin_ns.saturating_add(frame_ns);
         let own_ns = work_ns.0 + random.bits() % (work_ns.1 - work_ns.0 + 1);
         let (time_s, stamp_ns) = moment(frame, args.course.rate);

@@ -49,6 +49,7 @@ pub(in crate::cli) fn record(args: &RecordArgs, out: &mut Out, stop: &AtomicBool
     };
     let (clock, name) = (SystemClock, args.file.display().to_string());
     let file = buffered(open_new(&args.file, args.force, super::WHAT)?);
+    super::tell_limit(&name);
     let since_1970_ns = clock.realtime_ns().saturating_sub(clock.boottime_ns());
     let mut log = McapLog::new(file, &name, &args.frame_id, since_1970_ns)?;
     let only = |topic| args.only.is_empty() || args.only.contains(&topic);

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::cli::args::Limit;
 use crate::cli::args_report::ErrorArgs;
+use crate::cli::files::{check_inputs, inputs};
 use crate::cli::out::Out;
 use crate::daemon::build_shapes;
 use crate::error::{Error, Result};
@@ -23,6 +24,9 @@ pub(super) fn error(args: &ErrorArgs, out: &mut Out, stop: &AtomicBool) -> Resul
     args.course.check()?;
     let sweep = sweep(args)?;
     let scene = Scene::load(&args.scene)?;
+    if let Some(html) = &args.html {
+        check_inputs("--html", html, &inputs(&args.scene, &scene))?;
+    }
     let shapes = build_shapes(&scene)?;
     let page = args.html.as_deref().map(Page::open).transpose()?;
     let setup = Setup {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufWriter, Seek, Write};
+use std::io::{BufWriter, ErrorKind, Seek, Write};
 
 use byteorder::LittleEndian;
 use mcap::records::{MessageHeader, Metadata};
@@ -146,8 +146,12 @@ impl<W: Write + Seek> Tape<W> {
 }
 
 fn failed(name: &str, error: McapError) -> Error {
-    Error::io(
-        format!("cannot write the recording {name}; is the disk full?"),
-        error,
-    )
+    let why = match &error {
+        McapError::Io(e) if e.kind() == ErrorKind::FileTooLarge => {
+            "it is as long as a file of this process may be: `ulimit -f unlimited` in the shell that starts it, or in \
+             its service's unit"
+        }
+        _ => "is the disk full?",
+    };
+    Error::io(format!("cannot write the recording {name}; {why}"), error)
 }

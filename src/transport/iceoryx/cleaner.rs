@@ -1,9 +1,11 @@
 //! Frees what dead clients left behind, off the tick thread: one cleaning costs 7 to 30 ms when there is work.
 
+use std::path::Path;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use super::leftovers::{Stuck, stuck};
 use super::place::Place;
 use super::qos::{self, Ipc};
 use crate::error::{Error, Result};
@@ -11,6 +13,8 @@ use iceoryx2::prelude::Node;
 
 /// Between two looks. An idle look costs 0.5 ms; a dead source's slot is free within this and one cleaning.
 const PERIOD: Duration = Duration::from_millis(500);
+/// Nodes that are named in a line.
+const NAMED: usize = 3;
 
 /// The cleaning thread; dropping it ends and joins the thread.
 #[derive(Debug)]
@@ -24,11 +28,11 @@ pub struct Cleaner {
 /// # Errors
 /// `Error::Io` when no node or thread can be made.
 pub fn spawn_cleaner(place: &Place) -> Result<Cleaner> {
-    let node = qos::node(place, "cleaner")?;
+    let (node, place) = (qos::node(place, "cleaner")?, place.clone());
     let (stop, stopped) = channel();
     let thread = std::thread::Builder::new()
         .name("sweepd-cleaner".to_owned())
-        .spawn(move || clean_until(&node, &stopped))
+        .spawn(move || clean_until(&node, &place, &stopped))
         .map_err(|e| Error::io("the cleaning thread could not be started", e))?;
     Ok(Cleaner {
         stop: Some(stop),
@@ -36,28 +40,83 @@ pub fn spawn_cleaner(place: &Place) -> Result<Cleaner> {
     })
 }
 
-fn clean_until(node: &Node<Ipc>, stopped: &Receiver<()>) {
-    let mut failed = 0;
+fn clean_until(node: &Node<Ipc>, place: &Place, stopped: &Receiver<()>) {
+    let mut failures = Failures::default();
     while let Err(RecvTimeoutError::Timeout) = stopped.recv_timeout(PERIOD) {
         let state = node.try_cleanup_dead_nodes();
-        if is_news(state.cleanups, state.failed_cleanups, &mut failed) {
-            tracing::info!(
-                cleaned = state.cleanups,
-                failed = state.failed_cleanups,
-                "cleaned up after dead clients"
-            );
+        match state.cleanups {
+            0 => {}
+            1 => tracing::info!("cleaned up what a dead process left in shared memory"),
+            some => tracing::info!(
+                "cleaned up what {some} nodes of dead processes left in shared memory"
+            ),
+        }
+        if !failures.are_news(state.failed_cleanups) {
+            continue;
+        }
+        match stuck(place) {
+            Ok(stuck) => stuck.tell(place),
+            Err(e) => tracing::warn!(
+                "what dead processes left cannot be looked at: {}",
+                e.with_causes()
+            ),
         }
     }
 }
 
-/// Whether a look's outcome is worth a line. A process killed while it made its node leaves something that iceoryx2
-/// does not clean, and every look from then on finds it: it is told once.
-///
-/// * `before` - failures of the last look; takes those of this one.
-fn is_news(cleaned: u64, failed: u64, before: &mut u64) -> bool {
-    let more = failed > *before;
-    *before = failed;
-    cleaned > 0 || more
+/// Nodes that could not be cleaned up.
+#[derive(Debug, Default)]
+struct Failures {
+    /// At the look before.
+    before: u64,
+    told: u64,
+}
+
+impl Failures {
+    /// Whether there are more than were told: of those that the look before had, too, for one that another process is
+    /// just cleaning up is gone by the next look. What stays is told once, and not with every look.
+    fn are_news(&mut self, failed: u64) -> bool {
+        let lasting = failed.min(self.before);
+        self.before = failed;
+        let told = std::mem::replace(&mut self.told, lasting);
+        lasting > told
+    }
+}
+
+impl Stuck {
+    /// Says what stays, why, and whether that matters.
+    fn tell(&self, place: &Place) {
+        if !self.nodes.is_empty() {
+            tracing::warn!("{}", self.words());
+        }
+        if self.unmade > 0 {
+            tracing::info!("{}", self.unmade_words(&place.root()));
+        }
+    }
+
+    fn words(&self) -> String {
+        let named: Vec<&str> = self.nodes.iter().take(NAMED).map(String::as_str).collect();
+        let more = match self.nodes.len().saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!("; and {more} more"),
+        };
+        format!(
+            "what dead processes left cannot be cleaned up: {}{more}. They keep their places among the clients, and their \
+             shared memory; `sweepd doctor --clean` tries again, and tells what is in its way",
+            named.join("; ")
+        )
+    }
+
+    fn unmade_words(&self, root: &Path) -> String {
+        let who = match self.unmade {
+            1 => "a process that ended while it came or went left an entry".to_owned(),
+            some => format!("processes that ended while they came or went left {some} entries"),
+        };
+        format!(
+            "{who} in {} that cannot be cleaned up: nothing is theirs any more, and that does no harm",
+            root.join("nodes").display()
+        )
+    }
 }
 
 impl Drop for Cleaner {
@@ -76,19 +135,58 @@ mod tests {
 
     #[test]
     fn bug_what_cannot_be_cleaned_is_told_once_and_not_with_every_look() {
-        let mut before = 0;
+        let mut failures = Failures::default();
         let looks = [
-            (0, 0, false),
-            (0, 2, true),
-            (0, 2, false),
-            (1, 2, true),
-            (0, 2, false),
-            (0, 3, true),
-            (0, 0, false),
-            (0, 1, true),
+            (0, false),
+            // Somebody else may be just at it.
+            (2, false),
+            (2, true),
+            (2, false),
+            (3, false),
+            (3, true),
+            (2, false),
+            (0, false),
+            (1, false),
+            (0, false),
+            (1, false),
+            (1, true),
         ];
-        for (cleaned, failed, told) in looks {
-            assert_eq!(is_news(cleaned, failed, &mut before), told);
+        for (at, (failed, told)) in looks.into_iter().enumerate() {
+            assert_eq!(failures.are_news(failed), told, "look {at}");
         }
+    }
+
+    #[test]
+    fn bug_what_was_not_cleaned_up_was_said_to_be_and_without_a_reason() {
+        let mut stuck = Stuck {
+            nodes: vec![
+                "sweepd/x/client of feed, process 7: its files are another user's".to_owned(),
+            ],
+            unmade: 1,
+        };
+        let text = stuck.words();
+        assert!(
+            text.contains("cannot be cleaned up: sweepd/x/client of feed, process 7: "),
+            "{text}"
+        );
+        assert!(
+            text.contains("keep their places") && !text.contains("more"),
+            "{text}"
+        );
+        let root = Path::new("/tmp/iceoryx2");
+        let text = stuck.unmade_words(root);
+        assert!(
+            text.contains("left an entry in /tmp/iceoryx2/nodes"),
+            "{text}"
+        );
+        assert!(text.ends_with("does no harm"), "{text}");
+        stuck.nodes.resize(5, "another".to_owned());
+        stuck.unmade = 3;
+        assert!(
+            stuck.words().contains("; and 2 more. They"),
+            "{}",
+            stuck.words()
+        );
+        assert!(stuck.unmade_words(root).contains("left 3 entries"));
     }
 }

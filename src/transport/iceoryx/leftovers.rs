@@ -8,7 +8,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use iceoryx2::node::{DeadNodeView, NodeView};
+use iceoryx2::node::{DeadNodeView, NodeCleanupFailure, NodeView};
 use iceoryx2::prelude::{CallbackProgression, Node, NodeState};
 
 use super::lock::{self, LOCK_DIR, Lock};
@@ -16,6 +16,7 @@ use super::place::Place;
 use super::process::process;
 use super::qos::{Ipc, failed};
 use crate::error::Result;
+use crate::transport::open_files::short;
 
 /// How long to wait for another process that is cleaning up the same node.
 const OTHERS: Duration = Duration::from_secs(1);
@@ -142,6 +143,12 @@ pub fn clean_leftovers(place: &Place, instance: Option<&str>) -> Result<Cleaned>
 }
 
 impl NodeOwner {
+    /// Whether the node does not say whose it is: its process ended while it came or went, and nothing is its any more.
+    #[must_use]
+    pub fn is_unknown(&self) -> bool {
+        *self == Self::default()
+    }
+
     /// Whether it is a node of this instance's daemon or of one of its clients.
     #[must_use]
     pub fn is_of(&self, instance: &str) -> bool {
@@ -181,6 +188,37 @@ fn owner(node: &impl NodeView) -> NodeOwner {
     })
 }
 
+/// Dead nodes that stay.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Stuck {
+    /// Which, and why.
+    pub(super) nodes: Vec<String>,
+    /// Those that do not say whose they are: their processes ended while they came or went.
+    pub(super) unmade: usize,
+}
+
+/// Tries once more to remove what dead processes left under a place's files; what stays.
+///
+/// # Errors
+/// `Error::Io` when the nodes cannot be listed.
+pub(super) fn stuck(place: &Place) -> Result<Stuck> {
+    let (mut stuck, mut dead) = (Stuck::default(), Vec::new());
+    each_node(place, |node| {
+        if let NodeState::Dead(node) = node {
+            dead.push(node);
+        }
+    })?;
+    for node in dead {
+        let owner = owner(&node);
+        if node.details().is_none() {
+            stuck.unmade += 1;
+        } else if let Err(why) = remove(node) {
+            stuck.nodes.push(format!("{owner}: {why}"));
+        }
+    }
+    Ok(stuck)
+}
+
 fn remove(node: DeadNodeView<Ipc>) -> std::result::Result<(), String> {
     // iceoryx2 would look for its files where its default ones are.
     if node.details().is_none() {
@@ -189,8 +227,24 @@ fn remove(node: DeadNodeView<Ipc>) -> std::result::Result<(), String> {
                 .to_owned(),
         );
     }
-    node.blocking_remove_stale_resources(OTHERS)
-        .map_err(|e| e.to_string())
+    node.blocking_remove_stale_resources(OTHERS).map_err(why)
+}
+
+/// Why a dead node stays, in words.
+fn why(failure: NodeCleanupFailure) -> String {
+    let text = match failure {
+        NodeCleanupFailure::InsufficientPermissions => "this user may not remove its files",
+        NodeCleanupFailure::VersionMismatch => "it was made by another version of iceoryx2",
+        NodeCleanupFailure::AnotherInstanceIsCleaningUpTheNode => {
+            "another process is cleaning it up, or was killed while it did"
+        }
+        NodeCleanupFailure::Interrupt => "a signal cut the cleaning",
+        NodeCleanupFailure::ResourcesAlreadyCleanedUp => "it has just gone",
+        NodeCleanupFailure::InternalError => {
+            return short().unwrap_or_else(|| "its files are damaged".to_owned());
+        }
+    };
+    text.to_owned()
 }
 
 /// This user's files in shared memory with this prefix that are in no process's map.

@@ -1,6 +1,8 @@
 //! A client's ports over shared memory. It only opens what a daemon has made.
 
 mod read;
+mod send;
+mod why;
 
 use std::time::Duration;
 
@@ -13,14 +15,17 @@ use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{AllocationStrategy, EventId, Node, ZeroCopySend};
 
 use read::{Reader, read};
+use send::send_frame;
+use why::{not_found, opened, out_of_files};
 
-use super::lock;
 use super::place::Place;
 use super::qos::{self, Ipc, Open, SLEEP_MIN, events, failed};
+use super::unmet::Unmet;
 use crate::error::{Error, Result};
 use crate::limits;
 use crate::time::Clock;
 use crate::transport::client::{Link, Message, Rows, Topics};
+use crate::transport::open_files::check_client;
 use crate::wire::{
     AnswerHeader, BodyRow, ChangesHeader, ContactRow, FrameHeader, Hello, MessageHeader, NameRow,
     PairRow, RegionRow, RequestHeader, TickRow, TransformRow, TransformVelRow, VertexHeader,
@@ -59,6 +64,7 @@ pub struct IoxLink {
     body_verdicts: Reader<u8>,
     names: Reader<NameRow>,
     plan: Reader<u8>,
+    unmet: Unmet,
     node: Node<Ipc>,
     place: Place,
 }
@@ -75,8 +81,10 @@ impl IoxLink {
     /// Opens the instance's services, again and again until they are there or `until_ns` (monotonic) is reached.
     ///
     /// # Errors
-    /// `Error::Refused` when the files are another user's or of another iceoryx2; `Error::TimedOut` otherwise.
+    /// `Error::Refused` when the files are another user's or of another iceoryx2, or this process may open too few;
+    /// `Error::TimedOut` otherwise.
     pub fn open(place: &Place, clock: &dyn Clock, until_ns: u64) -> Result<Self> {
+        check_client()?;
         loop {
             // a node of ours would make a missing root, which is the daemon's to make
             let tried = if place.check_owner()? {
@@ -99,13 +107,16 @@ impl IoxLink {
     }
 
     fn try_open(place: &Place) -> Result<Self> {
+        let unmet = Unmet::default();
         let node = qos::node(place, "client")?;
         let hello = qos::hellos(&node, place, Open::Existing)?
             .subscriber_builder()
+            .set_degradation_handler(unmet.handler())
             .create()
             .map_err(|e| failed("hello", e))?;
         let tick = qos::ticks(&node, place, Open::Existing)?
             .subscriber_builder()
+            .set_degradation_handler(unmet.handler())
             .create()
             .map_err(|e| failed("tick", e))?;
         let ready = qos::event(&node, place, "ready", Open::Existing)?
@@ -137,9 +148,18 @@ impl IoxLink {
             body_verdicts: None,
             names: None,
             plan: None,
+            unmet,
             node,
             place: place.clone(),
         })
+    }
+
+    /// Says that what is sent to or by this client does not pass for want of open files: nothing else would.
+    fn check_met(&self) -> Result<()> {
+        match self.unmet.take() {
+            0 => Ok(()),
+            _ => out_of_files().map_or(Ok(()), Err),
+        }
     }
 
     fn wake(&self, event: usize) {
@@ -151,15 +171,22 @@ impl IoxLink {
         &self,
         topic: &str,
     ) -> Result<Subscriber<Ipc, [T], MessageHeader>> {
-        qos::results::<T>(&self.node, &self.place, topic, Open::Existing)?
-            .subscriber_builder()
-            .create()
-            .map_err(|e| failed(topic, e))
+        let open = || {
+            qos::results::<T>(&self.node, &self.place, topic, Open::Existing)?
+                .subscriber_builder()
+                .set_degradation_handler(self.unmet.handler())
+                .create()
+                .map_err(|e| failed(topic, e))
+        };
+        opened(open())
     }
 
     fn open_changes(&mut self) -> Result<()> {
         let service = qos::changes(&self.node, &self.place, Open::Existing)?;
-        let reader = service.subscriber_builder().create();
+        let reader = service
+            .subscriber_builder()
+            .set_degradation_handler(self.unmet.handler())
+            .create();
         self.changes = Some(reader.map_err(|e| failed("changes", e))?);
         Ok(())
     }
@@ -169,45 +196,16 @@ impl IoxLink {
         topic: &str,
         rows: usize,
     ) -> Result<Publisher<Ipc, [T], FrameHeader>> {
-        let service = qos::frames::<T>(&self.node, &self.place, topic, Open::Existing)?;
+        let service = opened(qos::frames::<T>(
+            &self.node,
+            &self.place,
+            topic,
+            Open::Existing,
+        ))?;
         // room for the first frame: a sample sent right after a growth is lost if its sender ends before it is mapped
-        qos::slice_publisher(&service, rows.max(qos::SLICE_LEN_START))
+        let rows = rows.max(qos::SLICE_LEN_START);
+        opened(qos::slice_publisher(&service, rows, &self.unmet))
     }
-}
-
-/// Why there is no daemon to talk to, with both versions where the holder of the instance says another one.
-fn not_found(place: &Place, why: &Error) -> Error {
-    let Some(holder) = lock::holder(place) else {
-        return Error::TimedOut(format!(
-            "no daemon runs as instance `{0}` ({why}); start one with `sweepd run SCENE --instance {0}`; `sweepd list` shows who is there, `sweepd doctor` what is wrong",
-            place.instance()
-        ));
-    };
-    Error::Refused(format!(
-        "instance `{}` is process {}, sweepd {} with iceoryx2 {}, this client is sweepd {} with iceoryx2 {}: {why}",
-        place.instance(),
-        holder.pid,
-        holder.sweepd_version,
-        holder.iceoryx2_version,
-        env!("CARGO_PKG_VERSION"),
-        crate::transport::ICEORYX2_VERSION
-    ))
-}
-
-fn send_frame<T, H>(publisher: &Publisher<Ipc, [T], H>, header: &H, rows: &[T]) -> Result<()>
-where
-    T: std::fmt::Debug + ZeroCopySend + Copy,
-    H: std::fmt::Debug + ZeroCopySend + Copy + Default,
-{
-    let mut sample = publisher
-        .loan_slice_uninit(rows.len())
-        .map_err(|e| failed("frame", e))?;
-    *sample.user_header_mut() = *header;
-    sample
-        .write_from_slice(rows)
-        .send()
-        .map(|_| ())
-        .map_err(|e| failed("frame", e))
 }
 
 impl Link for IoxLink {
@@ -238,7 +236,7 @@ impl Link for IoxLink {
         }
         // the daemon then gives us the newest names and plan
         self.wake(events::CREATED);
-        Ok(())
+        self.check_met()
     }
 
     fn send(&mut self, header: &FrameHeader, rows: Rows<'_>) -> Result<()> {
@@ -261,14 +259,14 @@ impl Link for IoxLink {
             }
         }
         self.wake(events::SENT);
-        Ok(())
+        self.check_met()
     }
 
     fn send_vertices(&mut self, header: &VertexHeader, rows: &[VertexRow]) -> Result<()> {
         if self.vertices.is_none() {
             let service = qos::vertices(&self.node, &self.place, Open::Existing)?;
             let rows = rows.len().max(qos::SLICE_LEN_START);
-            self.vertices = Some(qos::slice_publisher(&service, rows)?);
+            self.vertices = Some(qos::slice_publisher(&service, rows, &self.unmet)?);
         }
         if let Some(port) = &self.vertices {
             send_frame(port, header, rows)?;
@@ -278,6 +276,7 @@ impl Link for IoxLink {
     }
 
     fn wait(&mut self, timeout_ns: u64) -> Result<()> {
+        self.check_met()?;
         let timeout = Duration::from_nanos(timeout_ns);
         let heard = if timeout < SLEEP_MIN {
             self.ready.try_wait(|_| {})

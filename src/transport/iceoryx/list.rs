@@ -8,6 +8,7 @@ use super::lock;
 use super::place::Place;
 use super::qos::{self, Ipc, Open, failed};
 use crate::error::Result;
+use crate::transport::open_files::check_client;
 use crate::wire::{ContactRow, PairRow, TransformRow, TransformVelRow};
 
 /// An instance as its services show it.
@@ -36,8 +37,11 @@ pub struct InstanceInfo {
 /// The instances of this wire version under a place's root; the place's own name does not matter.
 ///
 /// # Errors
-/// `Error::Refused` when the root is another user's, `Error::Io` when it cannot be read.
+/// `Error::Refused` when the root is another user's or this process may open too few files, `Error::Io` when it cannot
+/// be read.
 pub fn list_instances(place: &Place) -> Result<Vec<InstanceInfo>> {
+    // Who cannot open them takes instances for ones that nobody serves.
+    check_client()?;
     if !place.check_owner()? {
         return Ok(Vec::new());
     }

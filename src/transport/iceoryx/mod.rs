@@ -17,6 +17,7 @@ mod process;
 mod qos;
 mod room;
 mod server;
+mod unmet;
 mod waker;
 
 pub use cleaner::{Cleaner, spawn_cleaner};
@@ -28,6 +29,6 @@ pub use list::{InstanceInfo, list_instances};
 pub use lock::{Holder, Lock, locks};
 pub use place::Place;
 pub use process::{Process, process, shares};
-pub use room::{bytes_needed, scarce};
+pub use room::{bytes_needed, cramped, scarce};
 pub use server::{Server, ServerOptions};
 pub use waker::Waker;

@@ -17,6 +17,7 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory as PubSub;
 use iceoryx2::service::port_factory::request_response::PortFactory as ReqRes;
 
 use super::place::Place;
+use super::unmet::Unmet;
 use crate::error::{Error, Result};
 use crate::limits::SOURCES_MAX;
 use crate::wire::{
@@ -48,6 +49,9 @@ const RESULT_SUBSCRIBERS_MAX: usize = 32;
 const RESULT_BUFFER: usize = 8;
 /// Messages a reader may hold.
 const RESULT_BORROWED: usize = 4;
+/// Places of one result message in shared memory: all that readers may hold, one for who comes late, two being written.
+pub(super) const RESULT_PLACES: u64 =
+    (RESULT_SUBSCRIBERS_MAX * (RESULT_BUFFER + RESULT_BORROWED) + 3) as u64;
 /// Nodes on one service.
 const NODES_MAX: usize = 64;
 /// Clients that may ask.
@@ -336,6 +340,7 @@ pub(super) fn requests(node: &Node<Ipc>, place: &Place, open: Open) -> Result<Re
 pub(super) fn slice_publisher<T, H>(
     service: &PubSub<Ipc, [T], H>,
     len_start: usize,
+    unmet: &Unmet,
 ) -> Result<Publisher<Ipc, [T], H>>
 where
     T: Debug + ZeroCopySend,
@@ -346,6 +351,7 @@ where
         .initial_max_slice_len(len_start)
         .allocation_strategy(AllocationStrategy::PowerOfTwo)
         .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .set_degradation_handler(unmet.handler())
         .create()
         .map_err(|e| failed("publisher", e))
 }

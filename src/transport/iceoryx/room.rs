@@ -1,13 +1,15 @@
 //! Whether shared memory has room for a scene's messages: who writes beyond its end is killed (SIGBUS), with no error
-//! to handle. In: the scene's sizes. Out: bytes, and what to say. And whether so many files may be open as it takes.
+//! to handle. In: the scene's sizes. Out: bytes, and what to say. And whether this process may have as many files as it
+//! takes, and as large ones: shared memory is files.
 
 use rustix::fs::statvfs;
 use rustix::process::{Resource, getrlimit};
 
 use super::lock::LOCK_DIR;
+use super::qos;
 use crate::config::Limits;
 use crate::error::{Error, Result};
-use crate::limits::{OPEN_FILES_LEAST, REGIONS_PER_PAIR_MAX};
+use crate::limits::{FILE_BYTES_LEAST, FILES_A_CLIENT, OPEN_FILES_LEAST, REGIONS_PER_PAIR_MAX};
 use crate::wire::{BodyRow, ContactRow, NameRow, PairRow, RegionRow, TransformVelRow};
 
 /// Messages of a topic that are there at once: one that is written, one kept for late joiners, one that is read. Where
@@ -15,20 +17,19 @@ use crate::wire::{BodyRow, ContactRow, NameRow, PairRow, RegionRow, TransformVel
 const MESSAGES: u64 = 3;
 /// What a daemon and some clients take before any message, bytes.
 const BASE: u64 = 4 << 20;
+/// Headers of a message at most, bytes: those of iceoryx2 and ours.
+const HEADERS: u64 = 256;
 
 /// Bytes of shared memory that the messages of a scene may take at its limits, while its readers keep up.
 #[must_use]
 pub fn bytes_needed(limits: &Limits, bodies: usize, sources: usize) -> u64 {
-    let bodies = u64::try_from(bodies).unwrap_or(u64::MAX);
     let sources = u64::try_from(sources).unwrap_or(u64::MAX);
-    let most = |limit: usize| u64::try_from(limit).unwrap_or(u64::MAX);
-    let pairs = bodies.saturating_mul(bodies.saturating_sub(1)) / 2;
-    let pairs = pairs.min(most(limits.pair_rows));
-    let contacts = pairs.saturating_mul(most(limits.contacts_per_pair));
-    // Whatever the limit is, the deepest pair goes out whole.
-    let contacts = contacts.min(most(limits.contact_rows.max(limits.contacts_per_pair)));
-    let regions = pairs.saturating_mul(most(REGIONS_PER_PAIR_MAX));
-    let regions = regions.min(most(limits.region_rows.max(REGIONS_PER_PAIR_MAX)));
+    let Rows {
+        bodies,
+        pairs,
+        contacts,
+        regions,
+    } = most_rows(limits, bodies);
     [
         message::<PairRow>(pairs),
         // `changes`, which begin with the whole list.
@@ -48,6 +49,30 @@ pub fn bytes_needed(limits: &Limits, bodies: usize, sources: usize) -> u64 {
     })
 }
 
+/// Rows of each message at a scene's limits.
+struct Rows {
+    bodies: u64,
+    pairs: u64,
+    contacts: u64,
+    regions: u64,
+}
+
+fn most_rows(limits: &Limits, bodies: usize) -> Rows {
+    let bodies = u64::try_from(bodies).unwrap_or(u64::MAX);
+    let most = |limit: usize| u64::try_from(limit).unwrap_or(u64::MAX);
+    let pairs = bodies.saturating_mul(bodies.saturating_sub(1)) / 2;
+    let pairs = pairs.min(most(limits.pair_rows));
+    let contacts = pairs.saturating_mul(most(limits.contacts_per_pair));
+    let regions = pairs.saturating_mul(most(REGIONS_PER_PAIR_MAX));
+    Rows {
+        bodies,
+        pairs,
+        // Whatever the limit is, the deepest pair goes out whole.
+        contacts: contacts.min(most(limits.contact_rows.max(limits.contacts_per_pair))),
+        regions: regions.min(most(limits.region_rows.max(REGIONS_PER_PAIR_MAX))),
+    }
+}
+
 /// Messages grow by powers of two, but only what is written takes memory.
 fn message<T>(rows: u64) -> u64 {
     rows.saturating_mul(u64::try_from(size_of::<T>()).unwrap_or(u64::MAX))
@@ -62,11 +87,10 @@ pub fn scarce(needed: u64) -> Option<String> {
 }
 
 fn told(free: u64, needed: u64) -> Option<String> {
-    let mib = |bytes: u64| bytes.div_ceil(1 << 20);
-    let size = mib(needed).next_power_of_two();
+    let size = needed.div_ceil(1 << 20).next_power_of_two();
     (free < needed).then(|| {
         format!(
-            "{LOCK_DIR} has {} MiB free, messages of this scene may take {} MiB, and who writes beyond the end is killed \
+            "{LOCK_DIR} has {} MiB free, messages of this scene may take {}, and who writes beyond the end is killed \
              (SIGBUS): make it larger (in a container `--shm-size={size}m`, else `mount -o remount,size={size}m \
              {LOCK_DIR}`) or lower the scene's `[limits]`",
             free >> 20,
@@ -78,25 +102,92 @@ fn told(free: u64, needed: u64) -> Option<String> {
 /// Refuses to begin where it would end halfway, with an error that names no cause.
 ///
 /// # Errors
-/// `Error::Refused` when this process may open fewer files than a daemon needs.
-pub(super) fn enough_files() -> Result<()> {
-    enough(getrlimit(Resource::Nofile).current)
+/// `Error::Refused` when this process may open fewer files than a daemon needs, or not make as large ones.
+pub(super) fn check_limits() -> Result<()> {
+    let limit = |resource| getrlimit(resource).current;
+    enough_files(limit(Resource::Nofile))?;
+    large_enough(limit(Resource::Fsize))
 }
 
 /// * `files` - that may be open; `None`: any number.
-fn enough(files: Option<u64>) -> Result<()> {
+fn enough_files(files: Option<u64>) -> Result<()> {
     match files {
         Some(files) if files < OPEN_FILES_LEAST => Err(Error::Refused(format!(
-            "this process may open {files} files, and a daemon needs {OPEN_FILES_LEAST} and some 7 more with each \
-             client: `ulimit -n 1024` in the shell that starts it, or in its service's unit"
+            "this process may open {files} files, and a daemon needs {OPEN_FILES_LEAST} and some {FILES_A_CLIENT} more \
+             with each client: `ulimit -n 1024` in the shell that starts it, or in its service's unit"
         ))),
         _ => Ok(()),
+    }
+}
+
+/// * `bytes` - that a file may have; `None`: any number.
+fn large_enough(bytes: Option<u64>) -> Result<()> {
+    match bytes {
+        Some(bytes) if bytes < FILE_BYTES_LEAST => Err(Error::Refused(format!(
+            "this process may make files of {} at most, and a daemon needs {}, for shared memory is files: `ulimit -f \
+             unlimited` in the shell that starts it, or in its service's unit",
+            mib(bytes),
+            mib(FILE_BYTES_LEAST)
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// What to say where this process may not make as large files as a scene's messages may need; `None`: it may.
+#[must_use]
+pub fn cramped(limits: &Limits, bodies: usize) -> Option<String> {
+    cramped_by(
+        getrlimit(Resource::Fsize).current?,
+        largest_file(limits, bodies),
+    )
+}
+
+fn cramped_by(bytes: u64, needed: u64) -> Option<String> {
+    (bytes < needed).then(|| {
+        format!(
+            "this process may make files of {} at most, and shared memory for messages of this scene may need {}: what \
+             does not fit is not handed over. `ulimit -f unlimited` in the shell that starts it, or in its service's \
+             unit, or lower the scene's `[limits]`",
+            mib(bytes),
+            mib(needed)
+        )
+    })
+}
+
+/// Bytes of the largest file that the messages of a scene may need at its limits: a file has places for all that
+/// readers may hold of one kind, of which those in use alone take memory.
+fn largest_file(limits: &Limits, bodies: usize) -> u64 {
+    let rows = most_rows(limits, bodies);
+    [
+        file::<PairRow>(rows.pairs),
+        file::<ContactRow>(rows.contacts),
+        file::<RegionRow>(rows.regions),
+        file::<BodyRow>(rows.bodies),
+        file::<NameRow>(rows.bodies),
+    ]
+    .into_iter()
+    .fold(FILE_BYTES_LEAST, u64::max)
+}
+
+/// A message is as long as the next power of two.
+fn file<T>(rows: u64) -> u64 {
+    let message = message::<T>(rows).saturating_add(HEADERS);
+    let whole = message.checked_next_power_of_two().unwrap_or(u64::MAX);
+    whole.saturating_mul(qos::RESULT_PLACES)
+}
+
+/// For people.
+fn mib(bytes: u64) -> String {
+    match bytes.div_ceil(1 << 20) {
+        0 | 1 if bytes < 1 << 20 => format!("{bytes} bytes"),
+        mib => format!("{mib} MiB"),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::transport::iceoryx::{Place, Server, ServerOptions};
 
     #[test]
     fn bug_scarce_shared_memory_is_told_with_what_to_change() {
@@ -144,11 +235,65 @@ mod tests {
 
     #[test]
     fn bug_too_few_files_were_told_as_clients_of_another_version() {
-        let error = enough(Some(60)).unwrap_err().to_string();
+        let error = enough_files(Some(60)).unwrap_err().to_string();
         assert!(
             error.contains("ulimit -n") && error.contains("60 files"),
             "{error}"
         );
-        assert!(enough(Some(OPEN_FILES_LEAST)).is_ok() && enough(None).is_ok());
+        assert!(enough_files(Some(OPEN_FILES_LEAST)).is_ok() && enough_files(None).is_ok());
+    }
+
+    #[test]
+    fn bug_a_limit_of_the_size_of_files_was_met_in_the_middle_of_a_run() {
+        let error = large_enough(Some(1 << 20)).unwrap_err();
+        assert_eq!(error.exit_code(), 4);
+        let text = error.to_string();
+        assert!(
+            text.contains("files of 1 MiB") && text.contains("`ulimit -f unlimited`"),
+            "{text}"
+        );
+        let text = large_enough(Some(4096)).unwrap_err().to_string();
+        assert!(text.contains("4096 bytes"), "{text}");
+        assert!(large_enough(Some(FILE_BYTES_LEAST)).is_ok() && large_enough(None).is_ok());
+        // What a scene may need beyond that is a warning: few scenes are at their limits.
+        let limits = Limits::default();
+        let (few, many) = (largest_file(&limits, 5), largest_file(&limits, 100_000));
+        assert_eq!(
+            (few, cramped_by(FILE_BYTES_LEAST, few)),
+            (FILE_BYTES_LEAST, None)
+        );
+        let text = cramped_by(FILE_BYTES_LEAST, many).unwrap();
+        assert!(text.contains("`ulimit -f unlimited`"), "{text}");
+        let small = Limits {
+            pair_rows: 10,
+            contact_rows: 10,
+            region_rows: 10,
+            ..limits
+        };
+        assert!(largest_file(&small, 2000) < largest_file(&limits, 2000));
+        assert!(largest_file(&limits, usize::MAX) > many);
+    }
+
+    #[test]
+    fn the_least_size_of_a_file_is_that_of_the_largest_that_a_daemon_makes_at_its_start() {
+        let (root, prefix) = (
+            std::env::temp_dir(),
+            format!("size_{}_", std::process::id()),
+        );
+        let root = root.join(format!("sweepd_size_{}", std::process::id()));
+        let place = Place::new("size").unwrap().under(&root, &prefix);
+        let server = Server::open(ServerOptions::new(place, 7)).unwrap();
+        let files = std::fs::read_dir(LOCK_DIR).unwrap().flatten();
+        let ours = files.filter(|file| file.file_name().to_string_lossy().starts_with(&prefix));
+        let largest = ours
+            .map(|file| file.metadata().unwrap().len())
+            .max()
+            .unwrap();
+        drop(server);
+        std::fs::remove_dir_all(&root).unwrap();
+        assert!(
+            (FILE_BYTES_LEAST / 2..=FILE_BYTES_LEAST).contains(&largest),
+            "{largest}"
+        );
     }
 }

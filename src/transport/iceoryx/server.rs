@@ -4,6 +4,7 @@ mod asked;
 mod frames;
 mod readers;
 mod sent;
+mod troubles;
 mod waiting;
 
 use std::collections::BTreeMap;
@@ -25,16 +26,18 @@ use iceoryx2::service::port_factory::event::PortFactory as EventFactory;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory as PubSub;
 use iceoryx2::waitset::{WaitSet, WaitSetBuilder};
 use readers::Changes;
+use troubles::Troubles;
 
 use super::leftovers::{leftovers, unreaped_by};
 use super::lock::{Holder, InstanceLock, RootLock};
 use super::place::Place;
 use super::process::process;
 use super::qos::{self, Ipc, Open, events, failed};
-use super::room::enough_files;
+use super::room::check_limits;
+use super::unmet::Unmet;
 use crate::error::{Error, Result};
 use crate::limits;
-use crate::time::{Clock, Seldom};
+use crate::time::Clock;
 use crate::transport::patience::Patience;
 use crate::transport::{Door, ICEORYX2_VERSION, RequestToken, Wake};
 use crate::wire::{
@@ -84,8 +87,8 @@ where
 }
 
 impl<T: Debug + ZeroCopySend + 'static> Out<T> {
-    fn open(node: &Node<Ipc>, place: &Place, topic: &str) -> Result<Self> {
-        Self::of(qos::results(node, place, topic, Open::Create)?)
+    fn open(node: &Node<Ipc>, place: &Place, topic: &str, unmet: &Unmet) -> Result<Self> {
+        Self::of(qos::results(node, place, topic, Open::Create)?, unmet)
     }
 }
 
@@ -94,8 +97,8 @@ where
     T: Debug + ZeroCopySend + 'static,
     H: Debug + ZeroCopySend + Copy + Default + 'static,
 {
-    fn of(service: PubSub<Ipc, [T], H>) -> Result<Self> {
-        let publisher = qos::slice_publisher(&service, qos::SLICE_LEN_START)?;
+    fn of(service: PubSub<Ipc, [T], H>, unmet: &Unmet) -> Result<Self> {
+        let publisher = qos::slice_publisher(&service, qos::SLICE_LEN_START, unmet)?;
         Ok(Self { publisher, service })
     }
 
@@ -151,8 +154,7 @@ pub struct Server {
     patience: Patience,
     demand: Demand,
     next_token: u64,
-    /// Receives that failed.
-    errors: Seldom,
+    troubles: Troubles,
 }
 
 /// Services whose ports are held elsewhere; they stay open as long as the server.
@@ -179,12 +181,13 @@ impl Server {
     /// `Error::Refused` when the instance is taken, the root is another user's, or clients of a daemon with other
     /// sizes still hold its services; `Error::Io` when shared memory fails.
     pub fn open(options: ServerOptions) -> Result<Self> {
-        let place = &options.place;
+        let (place, troubles) = (&options.place, Troubles::default());
         place.check_owner()?;
-        enough_files()?;
+        check_limits()?;
         let lock = InstanceLock::take(place, &holder(&options))?;
         let root = RootLock::hold(place)?;
         let node = qos::node(place, "daemon")?;
+        let unmet = &troubles.unmet;
         let requests = qos::requests(&node, place, Open::Create).map_err(held)?;
         // one server a service: refuses a second daemon even where the lock file was removed by hand
         let answers = requests
@@ -192,6 +195,8 @@ impl Server {
             .initial_max_slice_len(qos::REQUEST_LEN_START)
             .allocation_strategy(AllocationStrategy::PowerOfTwo)
             .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .set_request_degradation_handler(unmet.handler())
+            .set_response_degradation_handler(unmet.handler())
             .create()
             .map_err(|e| refused_twice(place, &e))?;
         let wake = qos::event(&node, place, "wake", Open::Create).map_err(held)?;
@@ -202,9 +207,9 @@ impl Server {
             arrivals: Arrivals::default(),
             asked: BTreeMap::new(),
             answers,
-            transforms: In::open(&node, place, "transforms").map_err(held)?,
-            transforms_vel: In::open(&node, place, "transforms_vel").map_err(held)?,
-            vertices: In::open_vertices(&node, place).map_err(held)?,
+            transforms: In::open(&node, place, "transforms", unmet).map_err(held)?,
+            transforms_vel: In::open(&node, place, "transforms_vel", unmet).map_err(held)?,
+            vertices: In::open_vertices(&node, place, unmet).map_err(held)?,
             wake: wake
                 .listener_builder()
                 .create()
@@ -218,21 +223,21 @@ impl Server {
                 .default_event_id(EventId::new(events::SENT))
                 .create()
                 .map_err(|e| failed("ready", e))?,
-            contacts: Out::open(&node, place, "contacts").map_err(held)?,
-            regions: Out::open(&node, place, "regions").map_err(held)?,
-            pairs: Out::open(&node, place, "pairs").map_err(held)?,
+            contacts: Out::open(&node, place, "contacts", unmet).map_err(held)?,
+            regions: Out::open(&node, place, "regions", unmet).map_err(held)?,
+            pairs: Out::open(&node, place, "pairs", unmet).map_err(held)?,
             changes: qos::changes(&node, place, Open::Create)
-                .and_then(Out::of)
+                .and_then(|service| Out::of(service, unmet))
                 .map(Changes::new)
                 .map_err(held)?,
-            bodies: Out::open(&node, place, "bodies").map_err(held)?,
-            body_verdicts: Out::open(&node, place, "body_verdicts").map_err(held)?,
-            names: Out::open(&node, place, "names").map_err(held)?,
+            bodies: Out::open(&node, place, "bodies", unmet).map_err(held)?,
+            body_verdicts: Out::open(&node, place, "body_verdicts", unmet).map_err(held)?,
+            names: Out::open(&node, place, "names", unmet).map_err(held)?,
             names_owed: false,
-            plan: Out::open(&node, place, "plan").map_err(held)?,
+            plan: Out::open(&node, place, "plan", unmet).map_err(held)?,
             plan_owed: false,
-            tick: single_publisher(&tick)?,
-            hello: single_publisher(&hello)?,
+            tick: single_publisher(&tick, unmet)?,
+            hello: single_publisher(&hello, unmet)?,
             _services: Services {
                 _requests: requests,
                 _tick: tick,
@@ -252,21 +257,11 @@ impl Server {
             patience: Patience::new(options.spin_ns),
             demand: Demand::default(),
             next_token: 1,
-            errors: Seldom::default(),
+            troubles,
             options,
         };
         server.say_hello()?;
         Ok(server)
-    }
-
-    /// Says that messages could not be received, now and then while it goes on: what is behind them is lost.
-    fn tell_receive_errors(&mut self, now_ns: u64) {
-        if let Some(times) = self.errors.note(0, now_ns) {
-            tracing::warn!(
-                "{times} times messages of clients could not be received: a client died in the middle of one, or its files in \
-                 shared memory are damaged; see `sweepd doctor`"
-            );
-        }
     }
 }
 
@@ -320,13 +315,14 @@ impl Door for Server {
     }
 }
 
-fn single_publisher<T>(service: &PubSub<Ipc, T, ()>) -> Result<Publisher<Ipc, T, ()>>
+fn single_publisher<T>(service: &PubSub<Ipc, T, ()>, unmet: &Unmet) -> Result<Publisher<Ipc, T, ()>>
 where
     T: Debug + ZeroCopySend,
 {
     service
         .publisher_builder()
         .backpressure_strategy(BackpressureStrategy::DiscardData)
+        .set_degradation_handler(unmet.handler())
         .create()
         .map_err(|e| failed("publisher", e))
 }

@@ -32,7 +32,7 @@ use super::{RosSourceSpec, open};
 use crate::config::RosKind;
 use crate::error::Error;
 use crate::time::{Clock as _, SystemClock};
-use crate::transport::{BodyChange, BodyNote};
+use crate::transport::{BodyChange, BodyNote, open_files};
 use crate::wire::ros::{Counts, Speaker};
 use crate::wire::{Demand, NameRow, TickRow};
 
@@ -253,6 +253,7 @@ impl Outlet {
         };
         let mut faults = self.shared.faults();
         faults.extend_from_slice(self.strangers.found());
+        faults.extend(open_files::short());
         if self.left_out > 0 {
             let text = "contacts are left out of ~/collisions, which holds the deepest";
             faults.push(format!(

@@ -61,7 +61,7 @@ impl Server {
             let request = match self.answers.receive() {
                 Ok(request) => request?,
                 Err(_) => {
-                    self.errors.add(1);
+                    self.troubles.failed(1);
                     return None;
                 }
             };

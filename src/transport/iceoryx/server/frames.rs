@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 
+use iceoryx2::port::ReceiveError;
 use iceoryx2::port::subscriber::Subscriber;
-use iceoryx2::port::{DegradationAction, ReceiveError};
 use iceoryx2::prelude::{CallbackProgression, Node, PayloadHeader, PortFactory as _, ZeroCopySend};
 use iceoryx2::sample::Sample;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory as PubSub;
@@ -14,7 +14,11 @@ use crate::error::Result;
 use crate::time::Clock;
 use crate::transport::iceoryx::place::Place;
 use crate::transport::iceoryx::qos::{self, Ipc, Open, failed};
+use crate::transport::iceoryx::unmet::Unmet;
 use crate::wire::{Frame, FrameHeader, Inbox, RejectReason, VertexHeader, VertexRow};
+
+/// Messages that one drain passes over at most where they cannot be read: who floods with such must not hold it up.
+const LOST_MAX: u64 = 64;
 
 /// One of the services that sources send on. Drop order: samples, then the port, then the service.
 pub(super) struct In<T, H = FrameHeader>
@@ -78,14 +82,21 @@ impl Stamped {
 }
 
 impl<T: Debug + ZeroCopySend + 'static> In<T> {
-    pub(super) fn open(node: &Node<Ipc>, place: &Place, topic: &str) -> Result<Self> {
-        Self::of(qos::frames::<T>(node, place, topic, Open::Create)?, topic)
+    pub(super) fn open(
+        node: &Node<Ipc>,
+        place: &Place,
+        topic: &str,
+        unmet: &Unmet,
+    ) -> Result<Self> {
+        let service = qos::frames::<T>(node, place, topic, Open::Create)?;
+        Self::of(service, topic, unmet)
     }
 }
 
 impl In<VertexRow, VertexHeader> {
-    pub(super) fn open_vertices(node: &Node<Ipc>, place: &Place) -> Result<Self> {
-        Self::of(qos::vertices(node, place, Open::Create)?, "vertices")
+    pub(super) fn open_vertices(node: &Node<Ipc>, place: &Place, unmet: &Unmet) -> Result<Self> {
+        let service = qos::vertices(node, place, Open::Create)?;
+        Self::of(service, "vertices", unmet)
     }
 }
 
@@ -94,11 +105,10 @@ where
     T: Debug + ZeroCopySend + 'static,
     H: Debug + ZeroCopySend + Copy + 'static,
 {
-    fn of(service: PubSub<Ipc, [T], H>, topic: &str) -> Result<Self> {
+    fn of(service: PubSub<Ipc, [T], H>, topic: &str, unmet: &Unmet) -> Result<Self> {
         let subscriber = service
             .subscriber_builder()
-            // one source with broken files must not silence the others
-            .set_degradation_handler(|_, _| DegradationAction::Ignore)
+            .set_degradation_handler(unmet.handler())
             .create()
             .map_err(|e| failed(topic, e))?;
         Ok(Self {
@@ -121,6 +131,7 @@ where
         let before = self.kept.len();
         let mut errors = 0;
         loop {
+            let is_there = self.subscriber.has_samples().unwrap_or(false);
             match self.subscriber.receive() {
                 Ok(Some(sample)) => {
                     let header = *sample.user_header();
@@ -132,6 +143,8 @@ where
                     sessions.insert(publisher, session);
                     self.kept.push(sample);
                 }
+                // It lies in memory that cannot be mapped, and iceoryx2 drops it without a word; others are behind it.
+                Ok(None) if is_there && errors < LOST_MAX => errors += 1,
                 // every source has given its whole queue: the fair end of a drain
                 Ok(None) | Err(ReceiveError::ExceedsMaxBorrows) => break,
                 Err(_) => {
@@ -172,7 +185,7 @@ impl Server {
             transforms_vel,
             vertices,
             sessions,
-            errors,
+            troubles,
             options,
             ..
         } = self;
@@ -187,7 +200,7 @@ impl Server {
             let of_motions = transforms_vel.drain(rows_max, sessions, |header, rows| {
                 stamp.take(inbox, header, rows, Frame::set_transforms_vel)
             });
-            errors.add(of_poses.errors + of_motions.errors);
+            troubles.failed(of_poses.errors + of_motions.errors);
             poses += of_poses.frames;
             motions += of_motions.frames;
             if of_poses.frames + of_motions.frames == 0 {
@@ -206,10 +219,10 @@ impl Server {
             stamp.take_vertices(inbox, header, rows)
         });
         vertices.release();
-        errors.add(of_vertices.errors);
+        troubles.failed(of_vertices.errors);
         // who came and left between the look and the drain must be looked at again
         self.peers_changed |= self.sessions.len() > known;
-        self.tell_receive_errors(now_ns);
+        self.troubles.tell(now_ns);
         self.end_sessions(inbox);
     }
 

@@ -1,0 +1,40 @@
+//! Why a client has no ports. In: what iceoryx2 said, and how the process stands. Out: an error that names the cause.
+
+use crate::error::{Error, Result};
+use crate::limits::FILES_A_CLIENT;
+use crate::transport::iceoryx::lock;
+use crate::transport::iceoryx::place::Place;
+use crate::transport::open_files::OpenFiles;
+
+/// Why there is no daemon to talk to, with both versions where the holder of the instance says another one.
+pub(super) fn not_found(place: &Place, why: &Error) -> Error {
+    let Some(holder) = lock::holder(place) else {
+        return Error::TimedOut(format!(
+            "no daemon runs as instance `{0}` ({why}); start one with `sweepd run SCENE --instance {0}`; `sweepd list` shows who is there, `sweepd doctor` what is wrong",
+            place.instance()
+        ));
+    };
+    Error::Refused(format!(
+        "instance `{}` is process {}, sweepd {} with iceoryx2 {}, this client is sweepd {} with iceoryx2 {}: {why}",
+        place.instance(),
+        holder.pid,
+        holder.sweepd_version,
+        holder.iceoryx2_version,
+        env!("CARGO_PKG_VERSION"),
+        crate::transport::ICEORYX2_VERSION
+    ))
+}
+
+/// What keeps this process from opening ports; `None`: not its open files.
+pub(super) fn out_of_files() -> Option<Error> {
+    let files = OpenFiles::own().filter(|files| files.left() < 2 * FILES_A_CLIENT)?;
+    Some(Error::Refused(format!(
+        "messages do not pass, for this process has {files}: {}",
+        files.mend()
+    )))
+}
+
+/// A port that was opened, or why not.
+pub(super) fn opened<T>(port: Result<T>) -> Result<T> {
+    port.map_err(|e| out_of_files().unwrap_or(e))
+}
