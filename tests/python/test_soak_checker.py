@@ -19,7 +19,7 @@ from soak import check_answers  # noqa: E402
 from soak import checker as soak_checker  # noqa: E402
 from soak.checker import Checker  # noqa: E402
 from soak.clients import Agreement  # noqa: E402
-from soak.moment import Moment  # noqa: E402
+from soak.moment import NO_LIMIT, Moment  # noqa: E402
 from soak.script import TOPICS, Script  # noqa: E402
 from soak.told import ids_of, source_rows  # noqa: E402
 from sweepd.layout import (  # noqa: E402
@@ -113,11 +113,16 @@ def has_open_way(row):
     return int(row["flags"]) & PairFlags.SWEPT_OPEN
 
 
-def spoil_row(fits, **fields):
+def unlimited(told):
+    """Whether the tick's work had no end."""
+    return told.tick.budget_ns == NO_LIMIT and told.tick.budget_units == NO_LIMIT
+
+
+def spoil_row(fits, when=lambda told: True, **fields):
     """Writes into the first row that fits, in ``pairs`` alone."""
 
     def spoil(world, ticks):
-        at = find(ticks, lambda told: row_of(told.pairs, fits) is not None)
+        at = find(ticks, lambda told: when(told) and row_of(told.pairs, fits) is not None)
         rows = ticks[at].pairs
         for name, value in fields.items():
             rows[name][row_of(rows, fits)] = value
@@ -310,6 +315,11 @@ def less_regions(world, ticks):
     ticks[at].regions = ticks[at].regions[:0]
 
 
+def less_contacts(world, ticks):
+    at = find(ticks, lambda told: unlimited(told) and told.contacts is not None and len(told.contacts) > 0)
+    ticks[at].contacts = ticks[at].contacts[:0]
+
+
 def out_of_order(world, ticks):
     at = find(ticks, lambda told: len(told.pairs) > 1)
     ticks[at].pairs = ticks[at].pairs[::-1]
@@ -332,6 +342,8 @@ SPOILT = {
     "reason": spoil_tick(reasons=lambda was: was ^ 1),
     "state": gone_state,
     "worst": spoil_tick(lambda told: told.tick.colliding > 0, worst_a=0),
+    "undecided": spoil_row(is_of(Verdict.COLLIDING), unlimited, gap_max_m=1.0, verdict=Verdict.POSSIBLE),
+    "oldest": spoil_tick(oldest_undecided_ticks=7),
     "widest": spoil_tick(lambda told: told.tick.widest_m > 0.0, widest_m=-1.0),
     "units": spoil_tick(budget_units=5),
     "budget": spoil_tick(budget_ns=10_000_000_000),
@@ -387,6 +399,7 @@ MORE = {
     "a fixed body that moved": ("status", spoil_body(fixed, position=moved)),
     "a normal of no unit length": ("contact", spoil_contact("normal", 0.1)),
     "more work than was there": ("units", spoil_tick(lambda told: told.tick.budget_units == 0, units=9)),
+    "a collision without contact": ("undecided", less_contacts),
     "a possible pair that is dropped": ("missed", drop_row(is_of(Verdict.POSSIBLE), ("sinker", "floor"))),
     "an open way that is dropped": ("untold", drop_row(has_open_way, ("shot", "wall"))),
 }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Iterator, Optional
 
 import numpy as np
-from sweepd.layout import BodyStatus, Event, Level, PairFlags, Verdict
+from sweepd.layout import BodyStatus, ContactKind, Event, Level, PairFlags, Verdict
 
 from .faults import Fault
 from .moment import Moment
@@ -151,6 +151,28 @@ def _check_unlisted(now: Moment) -> Iterator[Fault]:
         truth = f"the gap is {float(now.gaps[a, b])!r} m, reach {float(now.reach_m[a] + now.reach_m[b])} m,"
         truth += f" to be reported within {float(now.report_m[a, b])} m"
         yield Fault("missed", now.tick, now.who(int(a), int(b)), told, truth)
+
+
+def check_decided(now: Moment) -> Iterator[Fault]:
+    """Where nothing limits the work, every pair of bodies that are placed is decided, and has what is asked for."""
+    rows = now.list
+    if rows is None or not now.is_unlimited:
+        return
+    which, a, b = now.at_rows
+    for at in np.flatnonzero(now.placed[a] & now.placed[b] & (rows["verdict"][which] == Verdict.POSSIBLE)):
+        yield Fault(
+            "undecided", now.tick, now.who(int(a[at]), int(b[at])), said(rows[which[at]]), "no limit of work was set"
+        )
+    contacts = now.told.contacts
+    if contacts is None or now.told.tick.header.truncated:
+        return
+    there = {(ids_of(row), int(row["kind"])) for row in contacts}
+    kinds = {Verdict.COLLIDING: ContactKind.CONTACT, Verdict.NEAR: ContactKind.CLOSEST}
+    for at, verdict in zip(which, rows["verdict"][which]):
+        kind = kinds.get(verdict)
+        if kind is not None and (ids_of(rows[at]), kind) not in there:
+            truth = f"a row of kind {kind.name.lower()}: no limit of work was set"
+            yield Fault("undecided", now.tick, now.who_by_ids(ids_of(rows[at])), "no contact", truth)
 
 
 def check_unbounded(now: Moment, before: Moment) -> Iterator[Fault]:

@@ -142,6 +142,10 @@ def _check_state(now: Moment, there: np.ndarray) -> Iterator[Fault]:
 
 def _check_worst(now: Moment, there: np.ndarray) -> Iterator[Fault]:
     tick = now.told.tick
+    undecided = bool((there["verdict"] == Verdict.POSSIBLE).any())
+    if bool(tick.oldest_undecided_ticks) != undecided:
+        told = f"oldest_undecided_ticks {tick.oldest_undecided_ticks}"
+        yield Fault("oldest", now.tick, "the tick", told, f"{'some' if undecided else 'no'} rows are possible")
     active = there[there["verdict"] > Verdict.APART]
     if len(active):
         worst = int(active["verdict"].max())

@@ -15,6 +15,10 @@ from .ways import Crossings, Way
 
 #: What comes nearer to a touch than this, or to one side of it, is left to rounding, metres.
 _GRAZE_M = 1e-9
+#: What comes as near to a touch as this may stay open, however much work there is, metres.
+_ROUNDED_M = 1e-6
+#: Poses of a tick that a body is followed through.
+_LEGS_MAX = 32
 #: Just before a share: who touches there may be asked for the first time.
 _BEFORE = 1e-12
 _SWEPT = int(PairFlags.SWEPT_HIT | PairFlags.SWEPT_OPEN)
@@ -45,11 +49,20 @@ def check_ways(now: Moment, before: Moment) -> Iterator[Fault]:
         if swept:
             wrong = _wrong_touch(swept, (least[at], before_min[at], by_max[at]))
             if wrong is not None:
-                yield Fault("way", now.tick, now.who(a, b), said(row), wrong)  # type: ignore[arg-type]
+                yield Fault("way", now.tick, now.who(a, b), said(row), wrong)
+            if swept == PairFlags.SWEPT_OPEN and _is_to_decide(now, pair, ways) and abs(asked[at]) > _ROUNDED_M:
+                truth = f"no limit of work was set, and the gap was {float(asked[at])!r} m at the least"
+                yield Fault("undecided", now.tick, now.who(a, b), said(row), truth)
         elif asked[at] < -_GRAZE_M and not cut and not _was_told(now, before, pair, row):
             told = "it is not listed: plainly apart" if row is None else said(row)
             truth = f"on its way the gap was {float(asked[at])!r} m at the least; {_on_way(now, before, pair, ways)}"
             yield Fault("untold", now.tick, now.who(a, b), told, truth)
+
+
+def _is_to_decide(now: Moment, pair: tuple[int, int], ways: dict[int, Optional[Way]]) -> bool:
+    """Whether nothing limits the work on a way."""
+    followed = [way for body in pair if (way := ways.get(body)) is not None]
+    return now.is_unlimited and all(way.legs <= _LEGS_MAX for way in followed)
 
 
 def _on_way(now: Moment, before: Moment, pair: tuple[int, int], ways: dict[int, Optional[Way]]) -> str:

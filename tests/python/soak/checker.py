@@ -114,6 +114,7 @@ class Checker:
         faults += check_bodies.check_verdicts(moment)
         faults += check_pairs.check_rows(moment)
         faults += check_pairs.check_truth(moment)
+        faults += check_pairs.check_decided(moment)
         faults += check_places.check_contacts(moment)
         faults += check_places.check_regions(moment)
         if before is not None:

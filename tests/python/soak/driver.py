@@ -120,8 +120,8 @@ class Soak:
         self.report.deeds.append(f"step {self.step}, tick {told.number if told else 0}: {deed}")
 
     def found(self, faults: list[Fault]) -> None:
-        """Takes faults."""
-        self.report.faults += faults
+        """Takes faults, each once: readers that have the same tick find the same."""
+        self.report.faults += [fault for fault in dict.fromkeys(faults) if fault not in self.report.faults]
 
     def fault(self, check: str, who: str, told: str, truth: str) -> None:
         """A fault that no tick shows."""

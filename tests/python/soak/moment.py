@@ -13,6 +13,8 @@ from .scene import Body, Scene
 from .told import Told, ids_of, source_rows
 from .world import World
 
+#: No end of time or units.
+NO_LIMIT = 0xFFFF_FFFF_FFFF_FFFF
 #: Where a body is placed for certain, as the tick sees it.
 PLACED = (BodyStatus.KNOWN, BodyStatus.HELD)
 #: Takes part in pairs, wherever it may be.
@@ -41,6 +43,11 @@ class Moment:
     def tick(self) -> int:
         """Number of the tick."""
         return self.told.number
+
+    @property
+    def is_unlimited(self) -> bool:
+        """Whether its work had no end."""
+        return self.told.tick.budget_ns == NO_LIMIT and self.told.tick.budget_units == NO_LIMIT
 
     def body(self, at: int) -> Optional[Body]:
         """What the scene says of a body; None where it has none of the name."""

@@ -59,7 +59,7 @@ class Script(Soak):
                 source = self.own[name]
                 poses = {body.name: body.path.at(self.step) for body in source.bodies(self.scene)}
                 if time.monotonic() >= source.quiet_until_s:
-                    source.send(poses, time_left_ns=1_000_000_000)
+                    source.send(poses, time_left_ns=1_000_000_000 * (self.step % 2))
             self.await_used(list(self.own.values()))
 
     def play(self) -> list[Told]:
