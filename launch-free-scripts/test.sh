@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Runs all tests: Rust (unit, law, oracle, transport), and Python (the client, the MuJoCo bridge and real ROS 2 peers
-# against a live daemon). Where the ROS 2 peers cannot be made (no Python 3.11, not x86-64), it says so and goes on;
-# with SWEEPD_ROS2=required that is a failure.
+# Runs all tests: Rust (unit, law, oracle, transport), and Python (the client, the MuJoCo bridge, a soak of the whole
+# system and real ROS 2 peers against a live daemon); with SWEEPD_CI_SLOW=1 that soak is long. Where the ROS 2 peers
+# cannot be made (no Python 3.11, not x86-64), it says so and goes on; with SWEEPD_ROS2=required that is a failure.
 #
 #   ./launch-free-scripts/test.sh [--rust-only]
 set -euo pipefail
