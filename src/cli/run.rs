@@ -54,10 +54,12 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     }
     let mut server = Server::open(options)?;
     let (bodies, sources) = (scene.bodies.len(), scene.sources.len());
-    if let Some(warning) = scarce(bytes_needed(&scene.config.limits, bodies, sources)) {
-        tracing::warn!("{warning}");
-    }
-    if let Some(warning) = cramped(&scene.config.limits, bodies) {
+    let limits = &scene.config.limits;
+    let short = [
+        scarce(bytes_needed(limits, bodies, sources)),
+        cramped(limits, bodies),
+    ];
+    for warning in short.iter().flatten() {
         tracing::warn!("{warning}");
     }
     // Dead clients are cleaned up beside the tick, never in it.

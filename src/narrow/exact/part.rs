@@ -142,9 +142,9 @@ fn across(one: Vec3, other: Vec3) -> Vec3 {
 
 /// What of a direction is across an edge; all of it where the edge has no length.
 fn beside(dir: &Vec3, edge: &Vec3) -> Vec3 {
-    let part = edge.dot(dir) / edge.norm_squared();
-    if part.is_finite() {
-        dir - edge * part
+    let share = edge.dot(dir) / edge.norm_squared();
+    if share.is_finite() {
+        dir - edge * share
     } else {
         *dir
     }
@@ -156,15 +156,14 @@ fn beside(dir: &Vec3, edge: &Vec3) -> Vec3 {
 fn nearest((p, q): (Vec3, Vec3), (r, s): (Vec3, Vec3)) -> (Vec3, Vec3) {
     let (one, other, from) = (q - p, s - r, p - r);
     // A quotient by nothing is not a number: then any point of the edge is as near.
-    let part = |of: f64, by: f64| {
+    let share = |of: f64, by: f64| {
         let t = (of / by).clamp(0.0, 1.0);
         if t.is_nan() { 0.0 } else { t }
     };
-    let square = one.norm_squared();
     let across = beside(&other, &one);
-    let second = part(across.dot(&beside(&from, &one)), across.norm_squared());
-    let first = part(one.dot(&(other * second - from)), square);
-    let second = part(other.dot(&(one * first + from)), other.norm_squared());
+    let second = share(across.dot(&beside(&from, &one)), across.norm_squared());
+    let first = share(one.dot(&(other * second - from)), one.norm_squared());
+    let second = share(other.dot(&(one * first + from)), other.norm_squared());
     (p + one * first, r + other * second)
 }
 

@@ -109,14 +109,11 @@ pub fn leftovers(place: &Place) -> Result<Leftovers> {
 /// As [`leftovers`]; what cannot be removed is no error, it is told.
 pub fn clean_leftovers(place: &Place, instance: Option<&str>) -> Result<Cleaned> {
     let mut done = Cleaned::default();
-    let mut dead = Vec::new();
-    if place.check_owner()? {
-        each_node(place, |node| {
-            if let NodeState::Dead(node) = node {
-                dead.push(node);
-            }
-        })?;
-    }
+    let dead = if place.check_owner()? {
+        dead_nodes(place)?
+    } else {
+        Vec::new()
+    };
     for node in dead {
         let owner = owner(&node);
         if instance.is_none_or(|name| owner.is_of(name)) {
@@ -171,6 +168,16 @@ impl std::fmt::Display for NodeOwner {
     }
 }
 
+fn dead_nodes(place: &Place) -> Result<Vec<DeadNodeView<Ipc>>> {
+    let mut dead = Vec::new();
+    each_node(place, |node| {
+        if let NodeState::Dead(node) = node {
+            dead.push(node);
+        }
+    })?;
+    Ok(dead)
+}
+
 fn each_node(place: &Place, mut take: impl FnMut(NodeState<Ipc>)) -> Result<()> {
     Node::<Ipc>::list(&place.config()?, |node| {
         take(node);
@@ -202,15 +209,10 @@ pub(super) struct Stuck {
 /// # Errors
 /// `Error::Io` when the nodes cannot be listed.
 pub(super) fn stuck(place: &Place) -> Result<Stuck> {
-    let (mut stuck, mut dead) = (Stuck::default(), Vec::new());
-    each_node(place, |node| {
-        if let NodeState::Dead(node) = node {
-            dead.push(node);
-        }
-    })?;
-    for node in dead {
+    let mut stuck = Stuck::default();
+    for node in dead_nodes(place)? {
         let owner = owner(&node);
-        if node.details().is_none() {
+        if owner.is_unknown() {
             stuck.unmade += 1;
         } else if let Err(why) = remove(node) {
             stuck.nodes.push(format!("{owner}: {why}"));
