@@ -649,7 +649,8 @@ SWEEPD_ASSERT(offsetof(sweepd_contact_row, reserved) == 189);
 SWEEPD_ASSERT(sizeof(sweepd_contact_row) == 192);
 
 /* Type name "sweepd.v1.Region", 144 bytes. One place where a pair may touch. The union of a
- * pair's regions holds every point that the two share. */
+ * pair's regions holds every point that the two share; of two convex shapes with COMPLETE the
+ * points of the contacts alone. */
 typedef struct sweepd_region_row {
     /* Smaller body id. */
     uint64_t body_a;
@@ -819,7 +820,8 @@ typedef struct sweepd_tick_row {
     uint64_t budget_units;
     /* What this tick could not cut (admission, broad phase, widening, publishing), nanoseconds. */
     uint64_t floor_ns;
-    /* Work units spent. */
+    /* Work units spent; a step under way is brought to its end, so perhaps one or two beyond the
+     * budget. */
     uint64_t units;
     /* Nanoseconds by Stage; sending: of the tick before. */
     uint64_t stage_ns[SWEEPD_STAGES_LEN];

@@ -2,7 +2,8 @@
 
 use iceoryx2::prelude::ZeroCopySend;
 
-/// One place where a pair may touch. The union of a pair's regions holds every point that the two share.
+/// One place where a pair may touch. The union of a pair's regions holds every point that the two share; of two convex
+/// shapes with `COMPLETE` the points of the contacts alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[repr(C)]
 #[type_name("sweepd.v1.Region")]

@@ -61,7 +61,7 @@ pub struct TickRow {
     pub budget_units: u64,
     /// What this tick could not cut (admission, broad phase, widening, publishing), nanoseconds.
     pub floor_ns: u64,
-    /// Work units spent.
+    /// Work units spent; a step under way is brought to its end, so perhaps one or two beyond the budget.
     pub units: u64,
     /// Nanoseconds by `Stage`; sending: of the tick before.
     pub stage_ns: [u64; STAGES_LEN],

@@ -281,7 +281,11 @@ class ContactRow(_Row):
 
 
 class RegionRow(_Row):
-    """One place where a pair may touch. The union of a pair's regions holds every point that the two share."""
+    """One place where a pair may touch.
+
+    The union of a pair's regions holds every point that the two share; of two convex shapes with `COMPLETE` the points
+    of the contacts alone.
+    """
 
     TYPE_NAME = "sweepd.v1.Region"
     _fields_ = [
@@ -419,7 +423,7 @@ class TickRow(_Row):
         ("budget_units", ctypes.c_uint64),
         # What this tick could not cut (admission, broad phase, widening, publishing), nanoseconds.
         ("floor_ns", ctypes.c_uint64),
-        # Work units spent.
+        # Work units spent; a step under way is brought to its end, so perhaps one or two beyond the budget.
         ("units", ctypes.c_uint64),
         # Nanoseconds by Stage; sending: of the tick before.
         ("stage_ns", ctypes.c_uint64 * STAGES_LEN),

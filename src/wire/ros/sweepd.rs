@@ -293,7 +293,7 @@ pub struct Tick {
     pub budget_units: u64,
     /// What could not be cut, nanoseconds.
     pub floor_ns: u64,
-    /// Work units spent.
+    /// Work units spent; a step under way is brought to its end, so perhaps one or two beyond the budget.
     pub units: u64,
     /// Nanoseconds by stage.
     pub stage_ns: [u64; STAGES_LEN],
