@@ -1,4 +1,4 @@
-"""A client in a process of its own, to be stopped and killed.
+"""A client in a process of its own, to be stopped and killed. SIGINT ends it in good order.
 
     python -m soak.child source INSTANCE SOURCE BASE BODIES.json PAUSE_S
     python -m soak.child reader INSTANCE
@@ -50,4 +50,7 @@ def reader(instance: str) -> None:
 
 
 if __name__ == "__main__":
-    {"source": source, "reader": reader}[sys.argv[1]](*sys.argv[2:])
+    try:
+        {"source": source, "reader": reader}[sys.argv[1]](*sys.argv[2:])
+    except KeyboardInterrupt:
+        pass

@@ -204,7 +204,7 @@ class Reader:
 
 
 class Process:
-    """A child process; ended with SIGKILL, whatever it is doing."""
+    """A child process."""
 
     def __init__(self, *arguments: str) -> None:
         command = [sys.executable, "-m", "soak.child", *arguments]
@@ -214,8 +214,22 @@ class Process:
         self.said = self._process.stdout.readline().strip()
 
     def kill(self) -> None:
-        """Ends it at once."""
+        """Ends it at once, whatever it is doing."""
         self._process.kill()
+        self._clear_up()
+
+    def end(self) -> None:
+        """Lets it close its client, so that nothing of it is left behind."""
+        self._process.send_signal(signal.SIGINT)
+        # it may have been stopped
+        self._process.send_signal(signal.SIGCONT)
+        try:
+            self._process.wait(timeout=PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+        self._clear_up()
+
+    def _clear_up(self) -> None:
         self._process.wait()
         assert self._process.stdout is not None
         self._process.stdout.close()

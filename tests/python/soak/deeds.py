@@ -197,7 +197,7 @@ def kill_child(soak: Soak) -> None:
     """A source's process is killed in the middle; after a while there is another."""
     if soak.child is not None:
         soak.note("the child is killed")
-        soak.end_child()
+        soak.kill_child()
         _steps(soak, soak.random.choice([0.05, 0.8]))
     soak.note("a child starts")
     soak.start_child()

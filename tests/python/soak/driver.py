@@ -262,11 +262,16 @@ class Soak:
         if not self.child.said:
             self.fault("child", "a client", "it ended before it was connected", "the daemon is there")
 
-    def end_child(self) -> None:
+    def kill_child(self) -> None:
         """Kills it."""
         if self.child is not None:
+            self._check_alive(self.child)
             self.child.kill()
         self.child = None
+
+    def _check_alive(self, process: Process) -> None:
+        if process.ended:
+            self.fault("child", "a client", "it has ended", "it goes on until it is killed")
 
     def draw_scene(self) -> tuple[tuple[Source, ...], Scene]:
         """Who takes part."""
@@ -366,9 +371,10 @@ class Soak:
 
     def close(self) -> None:
         """Ends whatever runs."""
-        self.end_child()
-        if self.idle is not None:
-            self.idle.kill()
+        for process in (self.child, self.idle):
+            if process is not None:
+                self._check_alive(process)
+                process.end()
         for reader in self.readers:
             self.report.counts += reader.checker.counts
             reader.close()
