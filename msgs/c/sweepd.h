@@ -131,6 +131,8 @@ enum {
     SWEEPD_BROAD_CAUSE_CALM = 8,
     /* It was asked for, which no daemon does. */
     SWEEPD_BROAD_CAUSE_FORCED = 9,
+    /* More moved, and nearly all of them tremble about their places. */
+    SWEEPD_BROAD_CAUSE_STANDING = 10,
 };
 
 /* Bit numbers of PairRow::events: test `row.events & (1 << SWEEPD_EVENT_BEGIN)`. A row may carry an end and a

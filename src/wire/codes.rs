@@ -147,6 +147,8 @@ code! {
         Calm = 8 => "calm",
         /// It was asked for, which no daemon does.
         Forced = 9 => "forced",
+        /// More moved, and nearly all of them tremble about their places.
+        Standing = 10 => "standing",
     }
 }
 

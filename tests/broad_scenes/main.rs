@@ -29,6 +29,7 @@ mod rig;
 #[path = "../../benches/broad/scenes.rs"]
 mod scenes;
 mod soak;
+mod stand;
 
 use common::Rng;
 use rig::{Rig, at};

@@ -642,6 +642,8 @@ class BroadCause(IntEnum):
     CALM = 8
     # It was asked for, which no daemon does.
     FORCED = 9
+    # More moved, and nearly all of them tremble about their places.
+    STANDING = 10
 
 
 class Event(IntEnum):

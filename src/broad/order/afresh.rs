@@ -101,6 +101,8 @@ impl Order {
         self.worklist.clear();
         // Lanes change without them: what was learned would be another body's.
         self.gaits.clear();
+        self.lags = false;
+        self.held.clear();
         self.afresh.on = true;
         self.afresh.presort.stop();
         self.afresh.held.clear();

@@ -12,6 +12,10 @@
 //! surely a pair: as long as each keeps to its hold, nobody compares their boxes. In a pile at rest, or in a heap, that
 //! is nearly every pair.
 
+mod rest;
+
+pub(super) use rest::hold_of_seen;
+
 use crate::math::Aabb;
 use crate::simd::boxes::{Down, Hold, Lanes, SPARE};
 
@@ -22,11 +26,18 @@ pub(super) const HORIZON: u32 = 16;
 const SWEEP_MAX: f32 = 0.75;
 /// Most that a margin is, in mean sides.
 const MARGIN_MAX: f32 = 0.2;
-/// Least margin, in mean sides: what stands still but for its sender's rounding stays in.
+/// Least margin, in shortest sides: what stands still but for its sender's rounding stays in.
 const MARGIN_MIN: f32 = 1e-3;
+/// A side that is shorter counts as one of so many of the mean one: a wide floor is thin, and who stands on it is to be
+/// sure of it.
+const THIN: f32 = 64.0;
 /// A margin that was enough for as long as was hoped shrinks by this factor, so that a body that has calmed is tight
 /// again.
 const SHRINK: f32 = 0.9;
+/// ... and faster where the box has lasted for so many ticks: its body has calmed, and would keep the margin of its way
+/// for ever.
+const CALMED_TICKS: u32 = 4 * HORIZON;
+const CALMED_SHRINK: f32 = 0.25;
 /// Bodies that go farther than any margin within so many ticks are wild, ...
 const WILD_TICKS: u32 = 1;
 /// ... when they did so often in a row: they get tight boxes, for no box holds them.
@@ -37,9 +48,6 @@ const WILD_RETRY: u8 = 40;
 const REST_AFTER: u8 = 2;
 /// ... until they leave so often in a row at once, or have been about by more than `MARGIN_MAX`.
 const REST_TRIES: u8 = 12;
-/// What the places of a body at rest are widened by, as a share of what they span: enough for most of what is to come
-/// after some ten ticks, and little beside what the body's neighbours have.
-const REST_SHARE: f32 = 0.25;
 /// What a body that is new among others at rest is given on every side, as a share of what those span. Measured in the
 /// pile of the bench: with less more bodies leave in the ticks after, with more fewer pairs are sure for ever.
 const GUESS_SHARE: f32 = 0.6;
@@ -57,6 +65,9 @@ pub(super) struct Gait {
     wild: u8,
     /// Times in a row that it left as a body at rest does; above `REST_AFTER` it is one.
     rest: u8,
+    /// Times that its hold was made narrower in vain, and whether that was the last that happened to it (`rest`).
+    vain: u8,
+    narrowed: bool,
 }
 
 impl Gait {
@@ -67,6 +78,8 @@ impl Gait {
         margin: 0.0,
         wild: 0,
         rest: 0,
+        vain: 0,
+        narrowed: false,
     };
 
     /// Of a body among others that are at rest, and span so much; metres.
@@ -85,7 +98,7 @@ impl Gait {
             widest.max(held.core.faces[k] - held.fat.faces[k])
         });
         let span = widest / side;
-        (self.rest > REST_AFTER && span.is_finite()).then_some(span)
+        (self.is_at_rest() && span.is_finite()).then_some(span)
     }
 
     /// The hold of a body whose box is `now`, and what is learned from how long the last one held.
@@ -100,7 +113,7 @@ impl Gait {
         if age > 0 {
             self.learn(now, held, age, side);
         }
-        let least = side * MARGIN_MIN;
+        let least = thin(now, side) * MARGIN_MIN;
         self.margin = if self.margin > least {
             self.margin
         } else {
@@ -117,9 +130,10 @@ impl Gait {
                 core,
             };
         }
-        // Of a body that is new it is not known where it has been: its margin is a guess at it.
-        if self.rest >= REST_AFTER && !is_new {
-            if let Some(hold) = self.stay(&before, held, side) {
+        // Of a body that is new and was not seen it is not known where it has been: its margin is a guess at it.
+        if self.rest >= REST_AFTER && !(is_new && held.is_lost()) {
+            let narrow = self.narrow(held, age);
+            if let Some(hold) = self.stay(&before, &narrow, side) {
                 return hold;
             }
             (self.rest, self.margin) = (0, side * MARGIN_MAX);
@@ -152,45 +166,29 @@ impl Gait {
         }
     }
 
-    /// The hold of a body at rest: where it has been, and a little more where it came beyond; `None` where that spans
-    /// too much.
-    #[inline(always)]
-    fn stay(&mut self, before: &[f32; 8], held: &Hold, side: f32) -> Option<Hold> {
-        // The first time, and where the hold is lost, the last two places are all that is known.
-        let knows = self.rest > REST_AFTER && !held.fat.faces[0].is_nan();
-        let faces = self.anchor;
-        let (mut fat, mut core) = (Down { faces }, NO_CORE);
-        for k in [0, 1, 2, 4, 5, 6] {
-            let (was, now) = (before[k], self.anchor[k]);
-            let (low, high) = if knows {
-                (held.fat.faces[k], held.core.faces[k])
-            } else {
-                (f32::INFINITY, f32::NEG_INFINITY)
-            };
-            let was = if knows { now } else { was };
-            let (least, most) = if was < now { (was, now) } else { (now, was) };
-            let from = if least < low { least } else { low };
-            let to = if most > high { most } else { high };
-            let span = to - from;
-            if span > side * MARGIN_MAX {
-                return None;
-            }
-            let more = span * REST_SHARE + side * MARGIN_MIN;
-            fat.faces[k] = if least < low { from - more } else { from };
-            core.faces[k] = if most > high { to + more } else { to };
-        }
-        self.rest = self.rest.max(REST_AFTER + 1);
-        Some(Hold {
-            fat: fat.open(),
-            core,
-        })
-    }
-
     /// It moves between two beats: it alone grows older. So a body that moves now and then is swept by its moves, which
     /// say how far it goes, and not by the time that it stood still.
     #[inline(always)]
     pub(super) fn note_move(&mut self) {
         self.born = self.born.wrapping_sub(1);
+    }
+
+    /// Whether it trembles about its place.
+    #[inline(always)]
+    pub(super) fn is_at_rest(&self) -> bool {
+        self.rest > REST_AFTER
+    }
+
+    /// Whether the body has calmed, and its margin is wider than it need be; or it has been at rest for so long that it
+    /// may be about less than it was.
+    #[inline(always)]
+    pub(super) fn has_calmed(&self, now: &Down, beat: u32) -> bool {
+        if self.is_at_rest() {
+            return self.age(beat) >= self.patience();
+        }
+        let side = now.mean_side();
+        let loose = self.margin > 2.0 * thin(now, side) * MARGIN_MIN;
+        loose && side.is_finite() && self.age(beat) >= CALMED_TICKS
     }
 
     /// Times that it may have moved since its fat box was made; 0 without one.
@@ -213,7 +211,7 @@ impl Gait {
         beat: u32,
         ahead: u32,
     ) -> bool {
-        if self.rest > REST_AFTER {
+        if self.is_at_rest() {
             return false;
         }
         #[allow(clippy::cast_precision_loss, reason = "ages of ticks, small")]
@@ -242,7 +240,7 @@ impl Gait {
             astray |= (face > held.core.faces[k]) & (shrunk <= self.margin);
         }
         let small = self.margin * 4.0 <= most;
-        if self.rest > REST_AFTER {
+        if self.is_at_rest() {
             // At once, and it may be on its way; later, it is still at rest.
             let tries = self.rest + 1;
             self.rest = match age {
@@ -258,6 +256,9 @@ impl Gait {
             self.margin = if twice < most { twice } else { most };
         } else {
             self.margin *= SHRINK;
+            if age >= CALMED_TICKS {
+                self.margin *= CALMED_SHRINK;
+            }
         }
         if age > WILD_TICKS {
             self.wild = 0;
@@ -267,10 +268,33 @@ impl Gait {
     }
 }
 
+/// The shortest side, as margins reckon.
+#[inline(always)]
+fn thin(now: &Down, side: f32) -> f32 {
+    let mut shortest = side;
+    for k in 0..3 {
+        let long = -(now.faces[k] + now.faces[k + 4]);
+        shortest = if long < shortest { long } else { shortest };
+    }
+    let least = side / THIN;
+    if shortest > least { shortest } else { least }
+}
+
 /// No core: every box holds it, and it overlaps nothing.
 const NO_CORE: Down = Down {
     faces: [f32::INFINITY; 8],
 };
+
+/// The fat box that stands in a block for one that a box keeps to as [`Lanes::keeps`] tells: wider by what rounding
+/// outward takes, twice.
+#[inline(always)]
+pub(super) fn loose(fat: &Down) -> Down {
+    let mut wide = *fat;
+    for face in &mut wide.faces {
+        *face -= face.abs() * (2.0 * f32::EPSILON) + 2.0 * f32::MIN_POSITIVE;
+    }
+    wide
+}
 
 /// A box of the world as it is stored.
 #[inline(always)]

@@ -84,6 +84,7 @@ impl Order {
             self.fat[block].set(lane, &[f32::NAN; 6]);
             self.afresh.gone[block] |= 1 << lane;
             self.len -= 1;
+            self.forget_seen(*slot);
         }
     }
 

@@ -8,6 +8,11 @@ use crate::simd::boxes::{Down, Hold, Lanes, WIDTH, Work, prefetch};
 /// that must be: the walk down the tree is then shared, and they would be next.
 const ALONG_AGE: u32 = HORIZON / 2;
 
+/// Lanes of bodies that are at rest for long are renewed at one in so many turns of their block.
+const PATIENT_TURNS: u32 = 16;
+/// ... where there is more than one candidate that is not sure for so many bodies.
+const OPEN: usize = 4;
+
 /// Stretches of blocks at least, that the turns go round; a stretch is a quarter at most.
 const STRETCHES: usize = 3 * HORIZON as usize;
 
@@ -26,6 +31,11 @@ impl Order {
     /// Takes boxes; notes who must be renewed in `renewing` and `worklist`.
     pub(super) fn load<P: Proxies>(&mut self, tick: &Tick<'_, P>, many: bool) {
         self.worklist.clear();
+        if self.stands(many) {
+            self.load_standing(tick);
+            return;
+        }
+        self.stir(tick.proxies);
         if many {
             if tick.moved.len() + tick.moved.len() / NEARLY_ALL >= self.len {
                 // As good as all: a box that did not change is taken again, which costs less than to find out which.
@@ -61,15 +71,28 @@ impl Order {
     /// of two asks for both.
     #[inline(always)]
     fn until_turn(&self, block: usize) -> u32 {
-        let stretch = (self.live.len() / STRETCHES).clamp(1, WIDTH);
-        let turn = small(block / stretch) % HORIZON;
+        let turn = small(block / self.stretch()) % HORIZON;
         (turn + HORIZON - self.tick % HORIZON) % HORIZON
+    }
+
+    /// Blocks of a stretch.
+    #[inline(always)]
+    fn stretch(&self) -> usize {
+        (self.live.len() / STRETCHES).clamp(1, WIDTH)
     }
 
     /// Whether it is a quarter's turn. Where a stretch is a quarter it is its blocks' turn too; of fewer blocks each
     /// quarter has a turn of its own, and no tick all of them.
     pub(super) fn is_quarter_due(&self, quarter: usize) -> bool {
         small(quarter) % HORIZON == self.tick % HORIZON
+    }
+
+    /// The blocks whose turn it is.
+    pub(super) fn due_blocks(&self) -> impl Iterator<Item = usize> + use<> {
+        let (blocks, stretch) = (self.live.len(), self.stretch());
+        let first = (self.tick % HORIZON) as usize * stretch;
+        let starts = (first..blocks).step_by(HORIZON as usize * stretch);
+        starts.flat_map(move |start| start..(start + stretch).min(blocks))
     }
 
     /// Whether it is a block's turn.
@@ -85,16 +108,41 @@ impl Order {
         left + 1 + if left < ALONG_AGE { HORIZON } else { 0 }
     }
 
-    /// Of the moved lanes of a block those old enough to be renewed along, that will leave within a round.
+    /// Of the moved lanes of a block those to be renewed along: old enough and about to leave in a round, or calmed.
     #[inline(always)]
-    fn along<L: Lanes>(&self, lanes: L, block: usize, moved: u16) -> u16 {
+    pub(super) fn along<L: Lanes>(&self, lanes: L, block: usize, moved: u16) -> u16 {
         let mut chosen = 0;
+        let patient = self.is_patient(block);
         for lane in ones(moved) {
             let rank = block * WIDTH + lane;
-            let (gait, now, held) = (&self.gaits[rank], &self.exact[rank], &self.held[rank]);
+            let (gait, now) = (&self.gaits[rank], &self.exact[rank]);
+            let held = &self.held[self.slot_of[rank] as usize];
             let leaves = gait.age(self.beat) >= ALONG_AGE
                 && gait.leaves(lanes, now, held, self.beat, HORIZON);
-            chosen |= u16::from(leaves) << lane;
+            let calmed = gait.has_calmed(now, self.beat) && (patient || !gait.is_at_rest());
+            chosen |= u16::from(leaves | calmed) << lane;
+        }
+        chosen
+    }
+
+    /// Whether those of a block that are at rest for long may be renewed at this turn: where that may make candidates
+    /// sure, and not in one turn, for a pile comes to rest at once.
+    #[inline(always)]
+    fn is_patient(&self, block: usize) -> bool {
+        let many_open = self.entries.len() * OPEN > self.len;
+        let turn = (self.tick / HORIZON).wrapping_add(small(block));
+        many_open && turn.is_multiple_of(PATIENT_TURNS)
+    }
+
+    /// The lanes of a block that may be renewed along: those old enough whose bodies are not at rest, and at times all.
+    #[inline(always)]
+    pub(super) fn moving(&self, block: usize) -> u16 {
+        let mut chosen = 0;
+        let patient = self.is_patient(block);
+        for lane in ones(self.live[block]) {
+            let gait = &self.gaits[block * WIDTH + lane];
+            let moves = gait.age(self.beat) >= ALONG_AGE && (patient || !gait.is_at_rest());
+            chosen |= u16::from(moves) << lane;
         }
         chosen
     }
@@ -108,7 +156,7 @@ impl Order {
         slot: BodySlot,
         rank: usize,
     ) -> bool {
-        let (held, exact) = (&self.held[rank], &mut self.exact[rank]);
+        let (held, exact) = (&self.held[slot.index()], &mut self.exact[rank]);
         take(lanes, (proxies, &self.origin), slot, held, exact)
     }
 }
@@ -146,6 +194,16 @@ impl<'a> Taking<'a> {
         }
     }
 
+    /// Asks for the holds of the block ahead.
+    #[inline(always)]
+    fn ask(self, held: &[Hold]) {
+        for ahead in self.ahead {
+            if let Some(hold) = held.get(*ahead as usize) {
+                prefetch(hold);
+            }
+        }
+    }
+
     /// The body of a lane in use; its box is about to be taken.
     #[inline(always)]
     pub(super) fn slot<P: Proxies>(self, lane: usize, proxies: &P) -> BodySlot {
@@ -176,13 +234,14 @@ impl<P: Proxies> Work for LoadBlocks<'_, '_, P> {
                 continue;
             }
             let taking = Taking::of(&order.slot_of, block);
-            let held = &order.held.as_chunks::<WIDTH>().0[block];
+            taking.ask(&order.held);
             let exact = &mut order.exact.as_chunks_mut::<WIDTH>().0[block];
             let mut out = 0;
             for lane in ones(moved) {
                 let slot = taking.slot(lane, tick.proxies);
                 let boxes = (tick.proxies, &origin);
-                let holds = take(lanes, boxes, slot, &held[lane], &mut exact[lane]);
+                let held = &order.held[slot.index()];
+                let holds = take(lanes, boxes, slot, held, &mut exact[lane]);
                 out |= u16::from(!holds) << lane;
             }
             if order.is_due(block) || out != 0 {
@@ -211,7 +270,7 @@ impl<P: Proxies> Work for LoadBodies<'_, '_, P> {
             {
                 let rank = rank as usize;
                 prefetch(tick.proxies.aabb(*ahead));
-                prefetch(&order.held[rank]);
+                prefetch(&order.held[ahead.index()]);
                 prefetch(&order.exact[rank]);
                 prefetch(&order.gaits[rank]);
             }
@@ -244,6 +303,7 @@ mod tests {
                 order.tick = 1000 + tick;
                 let due = |block: &usize| order.is_due(*block);
                 (0..blocks).filter(due).for_each(|block| turns[block] += 1);
+                assert!((0..blocks).filter(due).eq(order.due_blocks()));
                 let mine = (0..quarters).filter(|quarter| order.is_quarter_due(*quarter));
                 let mine: Vec<usize> = mine.collect();
                 assert!(mine.len() <= quarters.div_ceil(HORIZON as usize));

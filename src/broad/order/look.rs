@@ -6,6 +6,7 @@
 //! is let go (`moved`).
 
 use super::entry::{Entry, ages};
+use super::fatten::outward;
 use super::links::Matrix;
 use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, is_thrifty, ones, parts, small};
 use crate::ids::PairKey;
@@ -35,12 +36,19 @@ impl Order {
         done.tests += self.entries.len() as u64;
         let mut found = std::mem::take(&mut self.found);
         found.clear();
-        self.level.run(Look {
-            exact: &self.exact,
-            ages: &self.ages,
-            entries: &mut self.entries,
-            found: &mut found,
-        });
+        let stored = Stored(&self.exact);
+        let world = OfWorld {
+            slot_of: &self.slot_of,
+            proxies: tick.proxies,
+            origin: self.origin,
+        };
+        let (level, ages) = (self.level, &self.ages[..]);
+        let (entries, found_now) = (&mut self.entries, &mut found);
+        if self.lags {
+            level.run(Look(world, ages, entries, found_now));
+        } else {
+            level.run(Look(stored, ages, entries, found_now));
+        }
         for one in &found {
             let ranks = self.entries[one.at as usize].ranks();
             let now = one
@@ -189,7 +197,10 @@ impl Work for ListAll<'_> {
         order.sure.resize(order.live.len(), Boxes16::EMPTY);
         for (block, live) in order.live.iter().enumerate() {
             for lane in ones(*live) {
-                order.sure[block].set(lane, &sure(&order.held[block * WIDTH + lane]));
+                order.sure[block].set(
+                    lane,
+                    &sure(&order.held[order.slot_of[block * WIDTH + lane] as usize]),
+                );
             }
         }
         for record in 0..order.links.len() {
@@ -201,40 +212,88 @@ impl Work for ListAll<'_> {
     }
 }
 
-/// One pass over the list: drops the dead, finds what changed.
-struct Look<'a> {
-    exact: &'a [Down],
-    ages: &'a [u8],
-    entries: &'a mut Vec<Entry>,
-    found: &'a mut Vec<Found>,
+/// Where the boxes of entries are.
+trait Source {
+    /// The box at a rank.
+    fn get<L: Lanes>(&self, lanes: L, rank: u32) -> Down;
+
+    /// Asks for a box to come.
+    fn ask(&self, rank: u32);
 }
 
-impl Work for Look<'_> {
+/// By rank.
+struct Stored<'a>(&'a [Down]);
+
+impl Source for Stored<'_> {
+    #[inline(always)]
+    fn get<L: Lanes>(&self, _: L, rank: u32) -> Down {
+        self.0[rank as usize]
+    }
+
+    #[inline(always)]
+    fn ask(&self, rank: u32) {
+        prefetch(&self.0[rank as usize]);
+    }
+}
+
+/// The world itself: what is stored lags (`stand`).
+struct OfWorld<'a, P> {
+    slot_of: &'a [u32],
+    proxies: &'a P,
+    origin: [f64; 3],
+}
+
+impl<P: Proxies> Source for OfWorld<'_, P> {
+    #[inline(always)]
+    fn get<L: Lanes>(&self, lanes: L, rank: u32) -> Down {
+        match self.slot_of[rank as usize] {
+            // Of a dead entry.
+            NONE => Down::EMPTY,
+            slot => outward(lanes, self.proxies.aabb(BodySlot(slot)), &self.origin),
+        }
+    }
+
+    #[inline(always)]
+    fn ask(&self, rank: u32) {
+        let slot = self.slot_of[rank as usize];
+        if slot != NONE {
+            prefetch(self.proxies.aabb(BodySlot(slot)));
+        }
+    }
+}
+
+/// One pass over the list: drops the dead, finds what changed. By boxes, by the ages of their ranks.
+struct Look<'a, S>(S, &'a [u8], &'a mut Vec<Entry>, &'a mut Vec<Found>);
+
+impl<S: Source> Work for Look<'_, S> {
     type Out = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) {
+        let Self(boxes, aged, entries, found) = self;
         let mut kept = 0;
-        for at in 0..self.entries.len() {
-            if let Some(next) = self.entries.get(at + AHEAD) {
+        for at in 0..entries.len() {
+            if let Some(next) = entries.get(at + AHEAD) {
                 let [one, other] = next.ranks();
-                prefetch(&self.exact[one as usize]);
-                prefetch(&self.exact[other as usize]);
+                boxes.ask(one);
+                boxes.ask(other);
             }
-            let entry = self.entries[at];
-            let [a, b] = entry.ranks().map(|rank| rank as usize);
-            let alive = ages(self.ages[a], self.ages[b]) == entry.ages();
-            self.entries[kept] = entry;
-            let parts = lanes.parts(&self.exact[a], &self.exact[b]);
+            let entry = entries[at];
+            let [a, b] = entry.ranks();
+            let alive = ages(aged[a as usize], aged[b as usize]) == entry.ages();
+            entries[kept] = entry;
+            // No closure: it would be built without the instructions of the level.
+            let (a, b) = (boxes.get(lanes, a), boxes.get(lanes, b));
+            let parts = lanes.parts(&a, &b);
             if alive & !is_as_before(entry.is_hit(), parts) {
                 let now = verdict(parts);
-                self.found.push(Found {
+                found.push(Found {
                     at: small(kept),
                     now,
                 });
             }
             kept += usize::from(alive);
         }
-        self.entries.truncate(kept);
+        entries.truncate(kept);
     }
 }

@@ -11,8 +11,8 @@ use super::home::far_from;
 use super::links::room;
 use super::sort::{Sorter, split};
 use super::tree::NO_BOUND;
-use super::{BodySlot, NONE, Order, ones, small};
-use crate::simd::boxes::{Boxes16, Down, Hold, WIDTH};
+use super::{BodySlot, NONE, Order, Proxies, Tick, ones, small};
+use crate::simd::boxes::{Boxes16, Down, WIDTH};
 
 /// A body farther outside its quarter than so many of its mean sides looks for another block, ...
 const DRIFT_SIDES: f32 = 0.5;
@@ -31,7 +31,6 @@ const FILL_LEAST: usize = 8;
 struct Seat {
     slot: BodySlot,
     exact: Down,
-    held: Hold,
     gait: Gait,
 }
 
@@ -92,12 +91,13 @@ impl Order {
 
     /// Looks after the quarters whose turn it is: who has left one moves, and those that have got mixed up are dealt
     /// anew.
-    pub(super) fn mend(&mut self) {
+    pub(super) fn mend<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
         for quarter in 0..self.quarters.len() {
             let first = quarter * WIDTH;
             if !self.is_quarter_due(quarter) {
                 continue;
             }
+            self.catch_up(first..(first + WIDTH).min(self.live.len()), tick.proxies);
             let mut seen = self.look_over(quarter);
             self.follow(quarter, &seen);
             let mut drifted = false;
@@ -192,11 +192,11 @@ impl Order {
             return false;
         };
         let slot = BodySlot(self.slot_of[from]);
-        let (gait, held) = (self.gaits[from], self.held[from]);
+        let (gait, held) = (self.gaits[from], self.held[slot.index()]);
         self.evict(slot, true);
         self.seat(slot, to, boxed);
         let to = to as usize;
-        (self.gaits[to], self.held[to]) = (gait, held);
+        (self.gaits[to], self.held[slot.index()]) = (gait, held);
         true
     }
 
@@ -242,7 +242,6 @@ impl Order {
                 mender.seats.push(Seat {
                     slot: BodySlot(self.slot_of[rank]),
                     exact: self.exact[rank],
-                    held: self.held[rank],
                     gait: self.gaits[rank],
                 });
             }
@@ -256,7 +255,7 @@ impl Order {
                 let seat = &mender.seats[*index as usize];
                 let rank = block * WIDTH + lane;
                 self.seat(seat.slot, small(rank), seat.exact);
-                (self.gaits[rank], self.held[rank]) = (seat.gait, seat.held);
+                self.gaits[rank] = seat.gait;
                 self.widen_home(block, middle);
             }
         }
@@ -293,7 +292,6 @@ impl Order {
             self.rank_of[self.slot_of[rank] as usize] = NONE;
             self.slot_of[rank] = NONE;
             self.exact[rank] = Down::EMPTY;
-            self.held[rank] = Hold::EMPTY;
             self.ages[rank] = self.ages[rank].wrapping_add(1);
         }
         self.len -= self.live[block].count_ones() as usize;

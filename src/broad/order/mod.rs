@@ -11,6 +11,8 @@
 //! * **The look** (`look`): candidates are compared one after the other, and begin and end are differences of bits.
 //!   Pairs whose cores overlap are sure and not compared. Cost in proportion to what moved: few moved bodies are looked
 //!   at by themselves (`moved`).
+//! * **Standing** (`stand`): where nearly all keep to their holds boxes are held against these in the order of the
+//!   world, and none is stored: a pile at rest is read once, and little is written.
 //! * **Mending** (`mend`): while bodies move, a few blocks in each tick are put in order: all are seldom sorted anew.
 //! * **Exact.** Boxes are f32, rounded outward, relative to an f64 origin amid the scene; where rounding could tell
 //!   otherwise than the f64 boxes, those are asked. So the pairs are those of the f64 boxes at any offset.
@@ -61,6 +63,7 @@ mod probe;
 mod renew;
 mod shares;
 mod sort;
+mod stand;
 mod sweep;
 mod swept;
 mod team;
@@ -112,7 +115,11 @@ pub(super) struct Order {
     live: Vec<u16>,
     /// By rank: the box, rounded outward.
     exact: Vec<Down>,
-    /// By rank: the fat box and the core; and by block, to be asked sixteen at a time, the fat boxes, and while
+    /// Whether boxes of bodies that keep to their holds may be those of an earlier tick (`stand`); and how many bodies
+    /// were renewed in the last tick.
+    lags: bool,
+    renewed: usize,
+    /// By body slot: the fat box and the core; and by block, to be asked sixteen at a time, the fat boxes, and while
     /// candidates are listed what is sure of the cores.
     held: Vec<Hold>,
     fat: Vec<Boxes16>,
@@ -187,6 +194,8 @@ impl Order {
             slot_of: Vec::new(),
             live: Vec::new(),
             exact: Vec::new(),
+            lags: false,
+            renewed: 0,
             held: Vec::new(),
             ages: Vec::new(),
             fat: Vec::new(),
@@ -274,7 +283,7 @@ impl Order {
             self.load(&tick, many);
             self.rehome();
             if many {
-                self.mend();
+                self.mend(&tick);
             } else {
                 self.send_on();
             }
@@ -293,7 +302,12 @@ impl Order {
             self.renew(&mut tick, work);
             self.restore(&mut tick);
             if many {
-                work.way = Some((BroadMode::List, BroadCause::ManyMoved));
+                let cause = if self.lags {
+                    BroadCause::Standing
+                } else {
+                    BroadCause::ManyMoved
+                };
+                work.way = Some((BroadMode::List, cause));
                 self.look_at_all(&mut tick, work);
             } else {
                 work.way = Some((BroadMode::Sparse, BroadCause::FewMoved));

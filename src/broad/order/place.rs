@@ -68,7 +68,7 @@ impl Order {
         }
         let rank = rank as usize;
         self.exact[rank] = Down::EMPTY;
-        self.held[rank] = Hold::EMPTY;
+        self.held[slot.index()] = Hold::EMPTY;
         self.ages[rank] = self.ages[rank].wrapping_add(1);
         self.len -= 1;
         self.lanes_changed += 1;
@@ -95,6 +95,7 @@ impl Order {
 
     /// Gives a body a free lane, where it is to be renewed.
     pub(super) fn seat(&mut self, slot: BodySlot, rank: u32, one: Down) {
+        grow(&mut self.held, slot.index(), Hold::EMPTY);
         self.sit(slot, rank, one);
         let (block, lane) = parts(rank);
         self.mark(block, 1 << lane);
@@ -127,6 +128,7 @@ impl Order {
         );
         self.sorter.frame = Frame::of(&boxes);
         self.lay_out(bodies, &boxes);
+        self.hold_seen();
         self.boxes = boxes;
         self.give_back_sort();
         for rank in 0..self.slot_of.len() {
@@ -134,6 +136,7 @@ impl Order {
                 _ = self.take(Portable, tick.proxies, BodySlot(self.slot_of[rank]), rank);
             }
         }
+        self.lags = false;
         self.tree.reset(self.live.len());
         self.links.reset(self.live.len());
         self.hits = 0;
@@ -207,7 +210,6 @@ impl Order {
         if self.afresh.on && idle::is_thrifty(bodies) {
             return;
         }
-        room(&mut self.held, most * WIDTH);
         if !idle::is_thrifty(bodies) {
             room(&mut self.sure, most);
         }
@@ -291,8 +293,6 @@ impl Order {
         self.fat.resize(blocks, Boxes16::EMPTY);
         self.exact.clear();
         self.exact.resize(blocks * WIDTH, Down::EMPTY);
-        self.held.clear();
-        self.held.resize(blocks * WIDTH, Hold::EMPTY);
         self.ages.clear();
         self.ages.resize(blocks * WIDTH, 0);
     }

@@ -10,6 +10,7 @@ pub(super) use scratch::Scratch;
 
 use scratch::Close;
 
+use super::fatten::loose;
 use super::links::{Bits, EMPTY, Matrix};
 use super::look::sure;
 use super::{BodySlot, NONE, Order, PairKey, Proxies, Tick, Work as Done, ones, parts, small};
@@ -20,6 +21,7 @@ impl Order {
     pub(super) fn renew<P>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
         self.worklist.sort_unstable();
         self.worklist.dedup();
+        self.renewed = 0;
         if self.worklist.is_empty() {
             return;
         }
@@ -132,14 +134,16 @@ impl Renew<'_> {
         for lane in ones(renewing) {
             let rank = block * WIDTH + lane;
             let now = order.exact[rank];
-            let hold = order.gaits[rank].renew(&now, order.beat, horizon, &order.held[rank]);
-            order.held[rank] = hold;
-            order.fat[block].set(lane, &hold.fat.corners());
+            let held = &mut order.held[order.slot_of[rank] as usize];
+            let hold = order.gaits[rank].renew(&now, order.beat, horizon, held);
+            *held = hold;
+            order.fat[block].set(lane, &loose(&hold.fat).corners());
             if order.listed {
                 order.sure[block].set(lane, &sure(&hold));
             }
             order.ages[rank] = order.ages[rank].wrapping_add(1);
         }
+        order.renewed += renewing.count_ones() as usize;
         self.done.renewed += u64::from(renewing.count_ones());
         let bound = lanes.bound(&order.fat[block], u16::MAX);
         order.tree.set(block, bound);

@@ -62,6 +62,12 @@ impl Hold {
         fat: Down::EMPTY,
         core: Down::EMPTY,
     };
+
+    /// Whether it is of no box.
+    #[inline(always)]
+    pub(crate) fn is_lost(&self) -> bool {
+        self.fat.faces[0].is_nan()
+    }
 }
 
 /// The first spare lane of a [`Down`]; the other is four further.
@@ -146,6 +152,10 @@ pub(crate) trait Lanes: Copy {
         hold: &Hold,
         place: &mut Down,
     ) -> bool;
+
+    /// Whether a box keeps to a hold, rounded to nearest: where it does, the box rounded outward lies in a fat box that
+    /// is wider by a step of each face and `LEAST`, and holds the core.
+    fn keeps(self, corners: [&[f64; 3]; 2], origin: &[f64; 3], hold: &Hold) -> bool;
 
     /// Whether two boxes are surely apart, and whether they surely overlap: at every face by the slack of that of `a`
     /// at least. That is enough for both: a face of `b` that is much farther out than that of `a` was rounded by no
@@ -244,6 +254,22 @@ impl Lanes for Portable {
     ) -> bool {
         *place = self.outward(corners[0], corners[1], origin);
         self.holds(&hold.fat, place) & self.holds(place, &hold.core)
+    }
+
+    #[inline(always)]
+    #[allow(
+        clippy::cast_possible_truncation,
+        reason = "rounds to nearest, which the fat box in the block is wider by"
+    )]
+    fn keeps(self, [min, max]: [&[f64; 3]; 2], origin: &[f64; 3], hold: &Hold) -> bool {
+        let mut nearest = Down {
+            faces: [SPARE_FACE; 8],
+        };
+        for k in 0..3 {
+            nearest.faces[k] = (min[k] - origin[k]) as f32;
+            nearest.faces[k + 4] = (origin[k] - max[k]) as f32;
+        }
+        self.holds(&hold.fat, &nearest) & self.holds(&nearest, &hold.core)
     }
 
     #[inline(always)]

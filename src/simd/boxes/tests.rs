@@ -2,6 +2,8 @@
 
 #![allow(clippy::float_cmp, reason = "the same numbers, not near ones")]
 
+mod keeps;
+
 use super::*;
 
 /// Asks one block everything and notes the answers.

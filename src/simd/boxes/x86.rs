@@ -135,14 +135,21 @@ fn corner(p: &[f64; 3]) -> __m256d {
     unsafe { _mm256_maskload_pd(p.as_ptr(), _mm256_setr_epi64x(-1, -1, -1, 0)) }
 }
 
+/// A box rounded to nearest; the spare lanes become -1.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn outward_avx2(min: &[f64; 3], max: &[f64; 3], origin: &[f64; 3]) -> __m256 {
-    // The spare lanes become -1, and a step less.
+fn nearest_avx2(min: &[f64; 3], max: &[f64; 3], origin: &[f64; 3]) -> __m256 {
     let [x, y, z] = *origin;
     let low = _mm256_sub_pd(corner(min), _mm256_setr_pd(x, y, z, 1.0));
     let high = _mm256_sub_pd(_mm256_setr_pd(x, y, z, -1.0), corner(max));
-    let nearest = _mm256_set_m128(_mm256_cvtpd_ps(high), _mm256_cvtpd_ps(low));
+    _mm256_set_m128(_mm256_cvtpd_ps(high), _mm256_cvtpd_ps(low))
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn outward_avx2(min: &[f64; 3], max: &[f64; 3], origin: &[f64; 3]) -> __m256 {
+    // The spare lanes become a step less than -1.
+    let nearest = nearest_avx2(min, max, origin);
     let far = _mm256_andnot_ps(_mm256_set1_ps(-0.0), nearest);
     let off = _mm256_add_ps(
         _mm256_mul_ps(far, _mm256_set1_ps(STEP)),
@@ -164,6 +171,18 @@ fn take_avx2(corners: [&[f64; 3]; 2], origin: &[f64; 3], hold: &Hold, place: &mu
     // Compared from the register: to read back what was just written in halves would wait for both.
     let faces = outward_avx2(corners[0], corners[1], origin);
     store(faces, place);
+    is_within(faces, hold)
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn keeps_avx2(corners: [&[f64; 3]; 2], origin: &[f64; 3], hold: &Hold) -> bool {
+    is_within(nearest_avx2(corners[0], corners[1], origin), hold)
+}
+
+#[inline]
+#[target_feature(enable = "avx2")]
+fn is_within(faces: __m256, hold: &Hold) -> bool {
     let inside = _mm256_cmp_ps::<_CMP_LE_OQ>(one(&hold.fat), faces);
     let around = _mm256_cmp_ps::<_CMP_LE_OQ>(faces, one(&hold.core));
     sign_bits(_mm256_and_ps(inside, around)) == 0xFF
@@ -325,6 +344,12 @@ impl<const WIDE: bool> Lanes for Vectors<WIDE> {
     ) -> bool {
         // SAFETY: a `Vectors` is made only where AVX2 is.
         unsafe { take_avx2(corners, origin, hold, place) }
+    }
+
+    #[inline(always)]
+    fn keeps(self, corners: [&[f64; 3]; 2], origin: &[f64; 3], hold: &Hold) -> bool {
+        // SAFETY: a `Vectors` is made only where AVX2 is.
+        unsafe { keeps_avx2(corners, origin, hold) }
     }
 
     #[inline(always)]

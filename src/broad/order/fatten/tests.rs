@@ -137,3 +137,131 @@ fn infinite_boxes_are_their_own() {
     let held = gait.renew(&all, 3, HORIZON, &held);
     assert_eq!(held.fat.corners(), all.corners());
 }
+
+/// The places of a body that trembles by so much about a unit cube's place.
+fn trembles(by: f32) -> impl Fn(u32) -> Down {
+    move |tick| {
+        let mixed = tick.wrapping_mul(2_654_435_761).wrapping_add(977) >> 8;
+        shifted((mixed as f32 / 8_388_608.0 - 1.0) * by)
+    }
+}
+
+/// The least and the greatest faces of some places.
+fn seen(places: impl Iterator<Item = Down>) -> Hold {
+    let mut seen = Hold {
+        fat: NO_CORE,
+        core: Down {
+            faces: [f32::NEG_INFINITY; 8],
+        },
+    };
+    for place in places {
+        for k in 0..8 {
+            seen.fat.faces[k] = seen.fat.faces[k].min(place.faces[k]);
+            seen.core.faces[k] = seen.core.faces[k].max(place.faces[k]);
+        }
+    }
+    seen
+}
+
+#[test]
+fn a_body_that_was_seen_at_rest_hardly_ever_leaves_its_first_hold_which_is_tight() {
+    let place = trembles(0.004);
+    let all = seen((0..16).map(&place));
+    let mut held = hold_of_seen(&all, [0.0; 3], 0.01);
+    let (mut gait, mut renewals) = (Gait::at_rest(0.01), 0);
+    for tick in 16..2000 {
+        let now = place(tick);
+        if tick == 16 || !(holds(&held.fat, &now) && holds(&now, &held.core)) {
+            held = gait.renew(&now, tick, HORIZON, &held);
+            renewals += 1;
+        }
+    }
+    let span = held.core.faces[0] - held.fat.faces[0];
+    assert!(renewals <= 3 && span < 0.012, "{renewals}, {span}");
+}
+
+#[test]
+fn who_was_seen_far_about_or_not_at_all_is_not_held_to_it() {
+    let far = seen((0..16).map(trembles(0.1)));
+    assert!(hold_of_seen(&far, [0.0; 3], 0.01).is_lost());
+    assert!(hold_of_seen(&seen(std::iter::empty()), [0.0; 3], 0.01).is_lost());
+    // Seen from another origin.
+    let near = hold_of_seen(
+        &seen((0..16).map(trembles(0.004))),
+        [10.0, 20.0, -30.0],
+        0.01,
+    );
+    let mut moved = shifted(0.0);
+    for (k, by) in [10.0, 20.0, -30.0].into_iter().enumerate() {
+        moved.faces[k] += by;
+        moved.faces[k + 4] -= by;
+    }
+    assert!(holds(&near.fat, &moved) && holds(&moved, &near.core));
+}
+
+#[test]
+fn a_wide_floor_has_a_margin_as_its_thickness_and_a_sheet_without_any_still_has_one() {
+    let plate = |long: f32, thick: f32| Down {
+        faces: [0.0, 0.0, 0.0, 0.0, -long, -long, -thick, 0.0],
+    };
+    let margin = |plate: &Down| {
+        let mut gait = Gait::NEW;
+        let held = gait.renew(plate, 0, HORIZON, &Hold::EMPTY);
+        plate.faces[6] - held.fat.faces[6]
+    };
+    // It was three hundredths of a metre: nobody who stood on it was sure of it.
+    assert!((1e-4..2e-3).contains(&margin(&plate(50.0, 1.0))));
+    assert!((1e-4..2e-3).contains(&margin(&plate(50.0, 0.0))));
+}
+
+#[test]
+fn a_body_that_was_pushed_and_rests_again_is_held_tight_again_and_one_that_rests_is_seldom_tried() {
+    let place = trembles(0.004);
+    let (mut gait, mut held) = (Gait::NEW, Hold::EMPTY);
+    let mut run = |ticks: std::ops::Range<u32>, pushed: f32| {
+        let mut renewals = 0;
+        for tick in ticks {
+            let mut now = place(tick);
+            now.faces[0] += pushed;
+            now.faces[4] -= pushed;
+            let keeps = holds(&held.fat, &now) && holds(&now, &held.core);
+            let due = tick % HORIZON == 0 && gait.has_calmed(&now, tick);
+            if tick == 0 || !keeps || due {
+                held = gait.renew(&now, tick, HORIZON, &held);
+                assert!(holds(&held.fat, &now) && holds(&now, &held.core));
+                renewals += 1;
+            }
+        }
+        (renewals, held.core.faces[0] - held.fat.faces[0])
+    };
+    let (_, span) = run(0..200, 0.0);
+    assert!(span < 0.016, "{span}");
+    let (_, pushed) = run(200..240, 0.1);
+    assert!(pushed > 0.1, "{pushed}");
+    let (_, again) = run(240..5000, 0.0);
+    assert!(again < 0.02, "{again}");
+    let (renewals, span) = run(5000..200_000, 0.0);
+    assert!(renewals < 400 && span < 0.02, "{renewals}, {span}");
+}
+
+#[test]
+fn a_body_that_has_calmed_forgets_the_margin_of_its_way() {
+    let (mut gait, mut held) = (Gait::NEW, Hold::EMPTY);
+    let (mut tick, mut width) = (0, f32::INFINITY);
+    // It bounces about; then it stands.
+    for now in (0..60)
+        .map(|t| shifted(if t % 3 == 0 { 0.1 } else { -0.1 }))
+        .chain((0..600).map(|_| shifted(0.0)))
+    {
+        let keeps = holds(&held.fat, &now) && holds(&now, &held.core);
+        if tick == 0 || !keeps || tick % HORIZON == 0 && gait.has_calmed(&now, tick) {
+            held = gait.renew(&now, tick, HORIZON, &held);
+            width = held.core.faces[0] - held.fat.faces[0];
+        }
+        if tick == 60 {
+            assert!(width > 0.1, "{width}");
+        }
+        tick += 1;
+    }
+    assert!(width < 0.03, "{width}");
+}
