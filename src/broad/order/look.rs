@@ -42,12 +42,22 @@ impl Order {
             proxies: tick.proxies,
             origin: self.origin,
         };
-        let (level, ages) = (self.level, &self.ages[..]);
+        let (level, aged) = (self.level, &self.ages[..]);
         let (entries, found_now) = (&mut self.entries, &mut found);
         if self.lags {
-            level.run(Look(world, ages, entries, found_now));
+            level.run(Look {
+                boxes: world,
+                aged,
+                entries,
+                found: found_now,
+            });
         } else {
-            level.run(Look(stored, ages, entries, found_now));
+            level.run(Look {
+                boxes: stored,
+                aged,
+                entries,
+                found: found_now,
+            });
         }
         for one in &found {
             let ranks = self.entries[one.at as usize].ranks();
@@ -262,15 +272,26 @@ impl<P: Proxies> Source for OfWorld<'_, P> {
     }
 }
 
-/// One pass over the list: drops the dead, finds what changed. By boxes, by the ages of their ranks.
-struct Look<'a, S>(S, &'a [u8], &'a mut Vec<Entry>, &'a mut Vec<Found>);
+/// One pass over the list: drops the dead, finds what changed.
+struct Look<'a, S> {
+    boxes: S,
+    /// By rank.
+    aged: &'a [u8],
+    entries: &'a mut Vec<Entry>,
+    found: &'a mut Vec<Found>,
+}
 
 impl<S: Source> Work for Look<'_, S> {
     type Out = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) {
-        let Self(boxes, aged, entries, found) = self;
+        let Self {
+            boxes,
+            aged,
+            entries,
+            found,
+        } = self;
         let mut kept = 0;
         for at in 0..entries.len() {
             if let Some(next) = entries.get(at + AHEAD) {

@@ -61,6 +61,7 @@ mod place;
 mod presort;
 mod probe;
 mod renew;
+mod seen;
 mod shares;
 mod sort;
 mod stand;
@@ -118,7 +119,7 @@ pub(super) struct Order {
     /// Whether boxes of bodies that keep to their holds may be those of an earlier tick (`stand`); and how many bodies
     /// were renewed in the last tick.
     lags: bool,
-    renewed: usize,
+    renewed: u64,
     /// By body slot: the fat box and the core; and by block, to be asked sixteen at a time, the fat boxes, and while
     /// candidates are listed what is sure of the cores.
     held: Vec<Hold>,
@@ -316,6 +317,7 @@ impl Order {
         }
         self.tell_asked(&mut tick);
         self.close();
+        self.renewed = work.renewed;
         let lanes = std::mem::take(&mut self.lanes_changed);
         self.afresh.gear.note(moved, lanes, work);
     }

@@ -21,7 +21,6 @@ impl Order {
     pub(super) fn renew<P>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
         self.worklist.sort_unstable();
         self.worklist.dedup();
-        self.renewed = 0;
         if self.worklist.is_empty() {
             return;
         }
@@ -143,7 +142,6 @@ impl Renew<'_> {
             }
             order.ages[rank] = order.ages[rank].wrapping_add(1);
         }
-        order.renewed += renewing.count_ones() as usize;
         self.done.renewed += u64::from(renewing.count_ones());
         let bound = lanes.bound(&order.fat[block], u16::MAX);
         order.tree.set(block, bound);

@@ -15,9 +15,9 @@ use super::{BodySlot, Order, Proxies, Tick, ones, parts};
 use crate::simd::boxes::{Lanes, WIDTH, Work};
 
 /// Of so many bodies one may have been renewed in the last tick, ...
-const CALM: usize = 64;
+const CALM: u64 = 64;
 /// ... and of so many where they stand already: to take all boxes again costs as much as some ticks.
-const STILL_CALM: usize = 2 * HORIZON as usize;
+const STILL_CALM: u64 = 2 * HORIZON as u64;
 
 impl Order {
     /// Whether boxes are to be taken so.
@@ -27,7 +27,7 @@ impl Order {
         let calm = if self.lags { STILL_CALM } else { CALM };
         // A candidate that is not sure costs as much as a body: two boxes that stand anywhere.
         let few_open = self.entries.len() < self.len;
-        many && self.listed && few_open && self.renewed * calm <= self.len
+        many && self.listed && few_open && self.renewed * calm <= self.len as u64
     }
 
     /// Finds who has left his hold, and notes whom to renew; see [`Order::load`].
@@ -54,6 +54,17 @@ impl Order {
                 blocks,
                 proxies,
             });
+        }
+    }
+
+    /// Takes the boxes of a block.
+    #[inline(always)]
+    fn catch_up_block<L: Lanes, P: Proxies>(&mut self, lanes: L, block: usize, proxies: &P) {
+        let taking = Taking::of(&self.slot_of, block);
+        let exact = &mut self.exact.as_chunks_mut::<WIDTH>().0[block];
+        for lane in ones(self.live[block]) {
+            let slot: BodySlot = taking.slot(lane, proxies);
+            exact[lane] = outward(lanes, proxies.aabb(slot), &self.origin);
         }
     }
 }
@@ -114,24 +125,6 @@ impl<P: Proxies> Work for CatchUp<'_, P> {
     fn run<L: Lanes>(self, lanes: L) {
         for block in self.blocks {
             self.order.catch_up_block(lanes, block, self.proxies);
-        }
-    }
-}
-
-impl Order {
-    /// Takes the boxes of a block.
-    #[inline(always)]
-    pub(super) fn catch_up_block<L: Lanes, P: Proxies>(
-        &mut self,
-        lanes: L,
-        block: usize,
-        proxies: &P,
-    ) {
-        let taking = Taking::of(&self.slot_of, block);
-        let exact = &mut self.exact.as_chunks_mut::<WIDTH>().0[block];
-        for lane in ones(self.live[block]) {
-            let slot: BodySlot = taking.slot(lane, proxies);
-            exact[lane] = outward(lanes, proxies.aabb(slot), &self.origin);
         }
     }
 }

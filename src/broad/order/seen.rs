@@ -1,0 +1,104 @@
+//! Where bodies at rest were seen before candidates are tried again.
+//!
+//! In: their boxes, in each tick of a probe whose bodies are at rest. Out: holds about these places, which bodies begin
+//! with: else each would have to learn its own, most in the very next tick. What is noted stands in `held`, which is
+//! not used while there are no candidates: the least of each face as the fat box, the greatest as the core.
+
+use super::fatten::{hold_of_seen, outward};
+use super::idle::{is_thrifty, shed};
+use super::links::room;
+use super::{BodySlot, Order, Proxies, Tick};
+use crate::simd::boxes::{Down, Hold, Lanes, Work};
+
+/// So often must bodies have been seen for it to tell where they are about.
+const LEAST: u32 = 8;
+
+impl Order {
+    /// Notes where each body is: most of those that are watched are at rest.
+    pub(super) fn see_all<P: Proxies>(&mut self, tick: &Tick<'_, P>) {
+        if self.held.is_empty() {
+            room(&mut self.held, self.rank_of.len());
+            self.held.resize(self.rank_of.len(), UNSEEN);
+        }
+        let level = self.level;
+        level.run(See {
+            held: &mut self.held,
+            origin: self.afresh.probe.origin,
+            bodies: tick.members.bounded(),
+            proxies: tick.proxies,
+        });
+    }
+
+    /// Where a body was seen says nothing of who takes its slot.
+    pub(super) fn forget_seen(&mut self, slot: BodySlot) {
+        if let Some(held) = self.held.get_mut(slot.index()) {
+            *held = UNSEEN;
+        }
+    }
+
+    /// What was seen is out of date.
+    pub(super) fn forget_all_seen(&mut self) {
+        if std::mem::take(&mut self.afresh.probe.seen) > 0 {
+            self.held.clear();
+            if is_thrifty(self.len) {
+                shed(&mut self.held);
+            }
+        }
+    }
+
+    /// Holds to begin with: where bodies were seen for long enough, these places; else none.
+    pub(super) fn hold_seen(&mut self) {
+        let probe = &mut self.afresh.probe;
+        let ticks = std::mem::take(&mut probe.seen);
+        match probe.span().filter(|_| ticks >= LEAST) {
+            Some(span) => {
+                #[allow(clippy::cast_possible_truncation, reason = "a guess")]
+                let by = std::array::from_fn(|k| (probe.origin[k] - self.origin[k]) as f32);
+                for hold in &mut self.held {
+                    *hold = hold_of_seen(hold, by, span);
+                }
+            }
+            None => self.held.clear(),
+        }
+        room(&mut self.held, self.rank_of.len());
+        self.held.resize(self.rank_of.len(), Hold::EMPTY);
+    }
+}
+
+/// Nothing was seen.
+const UNSEEN: Hold = Hold {
+    fat: Down {
+        faces: [f32::INFINITY; 8],
+    },
+    core: Down {
+        faces: [f32::NEG_INFINITY; 8],
+    },
+};
+
+/// Takes the least and the greatest face of each body, as a hold has them.
+struct See<'a, P> {
+    held: &'a mut [Hold],
+    origin: [f64; 3],
+    bodies: &'a [BodySlot],
+    proxies: &'a P,
+}
+
+impl<P: Proxies> Work for See<'_, P> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, lanes: L) {
+        for slot in self.bodies {
+            let Some(Hold { fat, core }) = self.held.get_mut(slot.index()) else {
+                continue;
+            };
+            let now = outward(lanes, self.proxies.aabb(*slot), &self.origin);
+            for k in 0..8 {
+                let face = now.faces[k];
+                let (least, most) = (fat.faces[k], core.faces[k]);
+                fat.faces[k] = if face < least { face } else { least };
+                core.faces[k] = if face > most { face } else { most };
+            }
+        }
+    }
+}
