@@ -193,8 +193,8 @@ class Soak:
         while not self.report.faults:
             self.drain(0.02)
             used = [source for source in self.own.values() if self._is_used(source)]
-            for source in used:
-                source.is_heard = True
+            for source in self.own.values():
+                source.is_heard |= self._is_spoken_for(source)
             if all(source in used for source in waits):
                 return True
             if self.daemon.ended:
@@ -211,6 +211,13 @@ class Soak:
 
     def _is_used(self, source: OwnSource) -> bool:
         return source.last is not None and self.main.has_used(source.name, source.session, source.last)
+
+    def _is_spoken_for(self, source: OwnSource) -> bool:
+        """Whether its newest tick used any frame of a source's session: ticks may come a frame behind what is sent."""
+        if source.last is None:
+            return False
+        epoch, _ = source.last
+        return self.main.has_used(source.name, source.session, (epoch, 0))
 
     # ---------------------------------------------------------------- scene
 
