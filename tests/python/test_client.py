@@ -218,13 +218,13 @@ def test_bug_who_listens_to_the_plan_is_told_it(daemon):
 def test_bug_a_list_whose_place_another_reader_took_is_asked_for_again(started, monkeypatch):
     with sweepd.Client(started(MANY), "sim", quat_order="wxyz", listen=("changes",)) as client:
         client.step(crowd(0), timeout_s=5)
-        subscribe = client._ports.subscribe
+        read = client._ports._read
 
         def taken(topic, *args):
-            monkeypatch.setattr(client._ports, "subscribe", subscribe)
+            monkeypatch.setattr(client._ports, "_read", read)
             raise sweepd.Refused(f"`{topic}`: every place is taken")
 
-        monkeypatch.setattr(client._ports, "subscribe", taken)
+        monkeypatch.setattr(client._ports, "_read", taken)
         with pytest.raises(sweepd.Refused, match="every place"):
             client._renew_list()
         for step in range(1, 12):

@@ -171,3 +171,32 @@ def test_a_source_that_only_sends_knows_the_body_it_has_put(daemon):
             assert len(other.rows(place)) == 1
             with pytest.raises(sweepd.SweepdError, match="no body 'fourth'"):
                 other.rows({"fourth": place["third"]})
+
+
+@pytest.mark.parametrize("is_held", [True, False])
+def test_bug_a_list_asked_for_anew_while_no_daemon_is_there_comes_with_the_next_one(daemon, is_held):
+    with sweepd.Client(daemon.instance, "sim", quat_order="wxyz", listen=("changes",)) as client:
+        client.step(poses(), timeout_s=5)
+        daemon.stop()
+        if not is_held:
+            # as where the place was another one's
+            del client._ports._readers["changes"]
+        for _ in range(3):
+            client._renew_list()
+            assert client._ports.is_open("changes") == is_held
+        daemon.start("left", "right")
+        until_restarted(lambda: client.send(poses()))
+        close = {"left": PLACES["left"], "right": PLACES["left"] + 0.9}
+        until = time.monotonic() + 10
+        result = client.step({name: ((x, 0.0, 0.0), NO_TURN) for name, x in close.items()}, timeout_s=5)
+        while result.listed is None or not len(result.listed):
+            assert time.monotonic() < until, "the list came"
+            result = client.wait(timeout_s=5)
+        assert set(result.listed[0][["body_a", "body_b"]].item()) == {client.names[name] for name in close}
+
+
+def test_a_topic_that_no_daemon_offers_any_more_is_told_as_one_that_is_away(daemon):
+    with sweepd.Client(daemon.instance, "sim", quat_order="wxyz", listen=()) as client:
+        daemon.stop()
+        with pytest.raises(sweepd.TimedOut, match="no daemon runs as instance"):
+            client._ports.subscribe("contacts", layout.ContactRow)

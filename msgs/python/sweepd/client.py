@@ -620,6 +620,9 @@ class Client:
         if not self._ports.is_open("changes"):
             # the place went to another reader when the port was to be renewed
             self._renew_list()
+            if not self._ports.is_open("changes"):
+                # and now the daemon is away
+                return
         while True:
             ahead, self._ahead["changes"] = self._ahead["changes"], None
             if ahead is None:

@@ -296,27 +296,41 @@ class Ports:
 
     def subscribe(self, topic, row, header=layout.MessageHeader, until=0.0):
         """Listens to a message kind from now on; ``until`` when to wait for a place where all are taken."""
-        if topic in self._readers:
-            return
-
-        def port():
-            service = self._topic(topic).publish_subscribe(iox2.Slice[row]).user_header(header).open()
-            return service.subscriber_builder().create()
-
-        try:
-            self._readers[topic] = (_patiently(port, until), np.dtype(row), header, weakref.WeakSet())
-        except _FOREIGN as e:
-            raise Refused(f"`{topic}` of instance `{self._instance}` cannot be read: {_why(e)}") from e
-        self.wake(14)
+        if topic not in self._readers:
+            self._read(topic, row, header, lambda: self._messages(topic, row, header), until)
 
     def renew(self, topic, row, header):
         """Opens the port of a message kind anew: what waits in it is gone, and the daemon sees a new reader.
 
-        Raises Refused where another one took the place meanwhile; the topic is not open then.
+        Where no daemon is there, all stays as it is. Raises Refused where another one took the place meanwhile; the
+        topic is not open then.
         """
-        # first the old one, which takes a reader's place
+        try:
+            messages = self._messages(topic, row, header)
+        except _FOREIGN as e:
+            if str(e) == "DoesNotExist":
+                return
+            raise Refused(self._unread(topic, e)) from e
+        # First the old port, which takes a reader's place. The service is held meanwhile: while a daemon starts anew
+        # nobody else may hold it, and who lets it go last takes it along.
         self._readers.pop(topic, None)
-        self.subscribe(topic, row, header)
+        self._read(topic, row, header, lambda: messages)
+
+    def _messages(self, topic, row, header):
+        return self._topic(topic).publish_subscribe(iox2.Slice[row]).user_header(header).open()
+
+    def _read(self, topic, row, header, messages, until=0.0):
+        try:
+            port = _patiently(lambda: messages().subscriber_builder().create(), until)
+        except _FOREIGN as e:
+            if str(e) == "DoesNotExist":
+                raise TimedOut(self._nobody(e)) from e
+            raise Refused(self._unread(topic, e)) from e
+        self._readers[topic] = (port, np.dtype(row), header, weakref.WeakSet())
+        self.wake(14)
+
+    def _unread(self, topic, e):
+        return f"`{topic}` of instance `{self._instance}` cannot be read: {_why(e)}"
 
     def is_open(self, topic):
         """Whether the topic is listened to."""
@@ -342,9 +356,9 @@ class Ports:
 
     def _sender(self, topic, row, header, count):
         if topic not in self._senders:
-            service = self._topic(topic).publish_subscribe(iox2.Slice[row]).user_header(header).open()
             self._senders[topic] = (
-                service.publisher_builder()
+                self._messages(topic, row, header)
+                .publisher_builder()
                 # a sample sent right after a growth is lost if its sender ends before it is mapped
                 .initial_max_slice_len(max(count, _SLICE_LEN_START))
                 .allocation_strategy(iox2.AllocationStrategy.PowerOfTwo)

@@ -19,7 +19,7 @@ use send::send_frame;
 use why::{not_found, opened, out_of_files};
 
 use super::place::Place;
-use super::qos::{self, Ipc, Open, SLEEP_MIN, events, failed};
+use super::qos::{self, Ipc, Open, PubSub, SLEEP_MIN, events, failed};
 use super::unmet::Unmet;
 use crate::error::{Error, Result};
 use crate::limits;
@@ -181,8 +181,7 @@ impl IoxLink {
         opened(open())
     }
 
-    fn open_changes(&mut self) -> Result<()> {
-        let service = qos::changes(&self.node, &self.place, Open::Existing)?;
+    fn read_changes(&mut self, service: &PubSub<Ipc, [PairRow], ChangesHeader>) -> Result<()> {
         let reader = service
             .subscriber_builder()
             .set_degradation_handler(self.unmet.handler())
@@ -214,7 +213,7 @@ impl Link for IoxLink {
             self.pairs = Some(self.reader("pairs")?);
         }
         if topics.changes && self.changes.is_none() {
-            self.open_changes()?;
+            self.read_changes(&qos::changes(&self.node, &self.place, Open::Existing)?)?;
         }
         if topics.contacts && self.contacts.is_none() {
             self.contacts = Some(self.reader("contacts")?);
@@ -306,10 +305,16 @@ impl Link for IoxLink {
     }
 
     fn renew_changes(&mut self) -> Result<()> {
-        // first the old one, which takes a reader's place
+        let service = match qos::changes(&self.node, &self.place, Open::Existing) {
+            // while no daemon is there all stays as it is
+            Err(e) if qos::is_away(&e) => return Ok(()),
+            service => service?,
+        };
+        // First the old one, which takes a reader's place. The service is held meanwhile: while a daemon starts anew
+        // nobody else may hold it, and who lets it go last takes it along.
         self.changes_owed |= self.changes.take().is_some();
         if self.changes_owed {
-            self.open_changes()?;
+            self.read_changes(&service)?;
             self.changes_owed = false;
             self.wake(events::CREATED);
         }

@@ -11,9 +11,11 @@ use iceoryx2::prelude::{
 };
 use iceoryx2::prelude::{NodeBuilder, NodeName};
 use iceoryx2::service::Service;
-use iceoryx2::service::builder::publish_subscribe::Builder as PubSubBuilder;
+use iceoryx2::service::builder::publish_subscribe::{
+    Builder as PubSubBuilder, PublishSubscribeOpenError,
+};
 use iceoryx2::service::port_factory::event::PortFactory as EventFactory;
-use iceoryx2::service::port_factory::publish_subscribe::PortFactory as PubSub;
+pub(super) use iceoryx2::service::port_factory::publish_subscribe::PortFactory as PubSub;
 use iceoryx2::service::port_factory::request_response::PortFactory as ReqRes;
 
 use super::place::Place;
@@ -101,6 +103,17 @@ where
     E: std::error::Error + Send + Sync + 'static,
 {
     Error::io(format!("{what}: {e}"), e)
+}
+
+/// Whether what could not be opened is not there: no daemon has made it, or it went with the last who held it.
+pub(super) fn is_away(e: &Error) -> bool {
+    let Error::Io { source, .. } = e else {
+        return false;
+    };
+    matches!(
+        source.downcast_ref(),
+        Some(PublishSubscribeOpenError::DoesNotExist)
+    )
 }
 
 pub(super) fn node(place: &Place, role: &str) -> Result<Node<Ipc>> {
