@@ -1,8 +1,9 @@
 //! A whole engine tick against rapier3d-f64's `CollisionPipeline`, same convex bodies, same poses, contacts asked of
 //! both, in one run, tick by tick in turn. Timed on both sides: taking the poses in, broad phase, narrow phase,
-//! contacts; on ours also the filled outbox with all rows.
+//! contacts; on ours also the filled outbox: all contacts, and of the list of pairs all rows, or those that are new.
 //!
-//! `cargo bench --bench engine [-- --quick | --case=N]`; a single case, counted from 0, is printed and not saved.
+//! `cargo bench --bench engine [-- --quick | --case=N [--ticks=N]]`; a single case, counted from 0, is printed and not
+//! saved; for so many ticks in place of its own.
 
 #![allow(
     clippy::unwrap_used,
@@ -27,16 +28,33 @@ use sweepd::shape::ShapeSpec;
 use sweepd::time::{Budget, Clock, SystemClock};
 use sweepd::wire::Demand;
 
-/// What rapier's pipeline yields too: pairs and contacts.
-const ASKED: Demand = Demand {
-    pairs: true,
-    contacts: true,
-    regions: false,
-    bodies: false,
-    body_verdicts: false,
-    changes: false,
-    changes_anew: false,
-};
+/// How the list of pairs is asked for.
+#[derive(Clone, Copy, Debug)]
+enum Rows {
+    /// All of it in each tick.
+    Pairs,
+    /// What is new in it, by which who listens keeps it: as rapier keeps its own.
+    Changes,
+}
+
+impl Rows {
+    /// With what rapier's pipeline yields too: contacts.
+    fn demand(self) -> Demand {
+        Demand {
+            pairs: matches!(self, Self::Pairs),
+            changes: matches!(self, Self::Changes),
+            contacts: true,
+            ..Demand::default()
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Pairs => "pairs",
+            Self::Changes => "changes",
+        }
+    }
+}
 
 /// Rapier's side of the same scene.
 struct Peer {
@@ -137,54 +155,90 @@ impl Peer {
     }
 }
 
-/// What is run: bodies, how many of them move in percent, by how much of their size in percent a tick, ticks.
-const CASES: [(usize, usize, f64, usize); 9] = [
-    (1_000, 100, 0.1, 200),
-    (1_000, 100, 1.0, 200),
-    (1_000, 100, 10.0, 200),
-    (1_000, 1, 1.0, 200),
-    (10_000, 100, 0.1, 200),
-    (10_000, 100, 1.0, 200),
-    (10_000, 100, 10.0, 200),
-    (10_000, 1, 1.0, 200),
-    (100_000, 1, 1.0, 40),
+/// What is run.
+#[derive(Clone, Copy, Debug)]
+struct Case {
+    bodies: usize,
+    /// How many of them move, percent.
+    moving: usize,
+    /// By how much of their size in a tick, percent.
+    speed: f64,
+    ticks: usize,
+    rows: Rows,
+}
+
+const fn case(bodies: usize, moving: usize, speed: f64, ticks: usize, rows: Rows) -> Case {
+    Case {
+        bodies,
+        moving,
+        speed,
+        ticks,
+        rows,
+    }
+}
+
+const CASES: [Case; 12] = [
+    case(1_000, 100, 0.1, 200, Rows::Pairs),
+    case(1_000, 100, 1.0, 200, Rows::Pairs),
+    case(1_000, 100, 10.0, 200, Rows::Pairs),
+    case(1_000, 1, 1.0, 200, Rows::Pairs),
+    case(1_000, 1, 1.0, 200, Rows::Changes),
+    case(10_000, 100, 0.1, 200, Rows::Pairs),
+    case(10_000, 100, 1.0, 200, Rows::Pairs),
+    case(10_000, 100, 10.0, 200, Rows::Pairs),
+    case(10_000, 1, 1.0, 200, Rows::Pairs),
+    case(10_000, 1, 1.0, 200, Rows::Changes),
+    case(100_000, 1, 1.0, 60, Rows::Pairs),
+    case(100_000, 1, 1.0, 60, Rows::Changes),
 ];
 /// Ticks before the count begins.
 const SETTLE: usize = 20;
 const SEED: u64 = 11;
 
 fn main() {
-    let one_case = |one: &str| CASES.get(one.strip_prefix("--case=")?.parse::<usize>().ok()?);
-    let arguments = arguments(|one| one == "--quick" || one_case(one).is_some());
+    let number = |one: &str, name: &str| one.strip_prefix(name)?.parse::<usize>().ok();
+    let case_of = |one: &str| CASES.get(number(one, "--case=")?).copied();
+    let ticks_of = |one: &str| number(one, "--ticks=");
+    let known = |one: &str| one == "--quick" || case_of(one).is_some() || ticks_of(one).is_some();
+    let arguments = arguments(known);
     let quick = arguments.iter().any(|one| one == "--quick");
-    let case = arguments.iter().find_map(|one| one_case(one));
-    if let Some((bodies, moving, percent, ticks)) = case.copied() {
-        println!("{}", run(bodies, moving, percent, ticks));
+    if let Some(mut case) = arguments.iter().find_map(|one| case_of(one)) {
+        let ticks = arguments.iter().find_map(|one| ticks_of(one));
+        case.ticks = ticks.unwrap_or(case.ticks);
+        println!("{}", run(case));
         return;
     }
     let mut csv = String::from(
-        "machine,commit,compiler,seed,bodies,density_per_m3,moving_percent,speed_percent,ticks,ours_median_us,\
+        "machine,commit,compiler,seed,bodies,density_per_m3,moving_percent,speed_percent,rows,ticks,ours_median_us,\
          ours_p99_us,rapier_median_us,rapier_p99_us,ratio_median,ours_colliding,rapier_colliding,ours_contacts,\
          candidates,world_us,broad_us,widen_us,narrow_us,publish_us\n",
     );
     let from = provenance();
-    for (bodies, moving, percent, ticks) in CASES {
-        if quick && bodies > 10_000 {
+    for mut case in CASES {
+        if quick && case.bodies > 10_000 {
             continue;
         }
-        let ticks = if quick { 40 } else { ticks };
-        csv += &format!("{from},{}\n", run(bodies, moving, percent, ticks));
+        case.ticks = if quick { 40 } else { case.ticks };
+        csv += &format!("{from},{}\n", run(case));
     }
     save("engine.csv", &csv);
 }
 
 /// One case; its columns of the CSV.
-fn run(bodies: usize, moving: usize, percent: f64, ticks: usize) -> String {
-    // Who does not move is not sent again, and is to stay known.
-    let scene = pool(bodies, SEED).replace("timeout_ms = 500", "timeout_ms = 600000");
+fn run(case: Case) -> String {
+    let Case {
+        bodies,
+        moving,
+        speed,
+        ticks,
+        rows: asked,
+    } = case;
+    // Who does not move is not sent again, and is to stay known; and no contact is left out.
+    let scene = pool(bodies, SEED).replace("timeout_ms = 500", "timeout_ms = 600000")
+        + "\n[limits]\ncontact_rows = 1048576\n";
     let mut ours = Bench::new(&scene);
     // A body is about 0.75 m across.
-    let mut flight = Flight::new(&ours.scene, 0.75 * percent / 100.0, SEED);
+    let mut flight = Flight::new(&ours.scene, 0.75 * speed / 100.0, SEED);
     let mut peer = Peer::new(&ours.scene);
     let (mut own_ns, mut peer_ns) = (Vec::new(), Vec::new());
     let mut stages = [0_u64; 5];
@@ -195,13 +249,14 @@ fn run(bodies: usize, moving: usize, percent: f64, ticks: usize) -> String {
         // At first everybody has a place.
         let own = if tick == 0 {
             peer.tick(&flight.poses, 0..bodies);
-            ours.tick(&all, true, Budget::UNLIMITED, ASKED).wall_ns
+            ours.tick(&all, true, Budget::UNLIMITED, asked.demand())
+                .wall_ns
         } else {
             flight.advance(who.iter().copied());
             for (to, at) in rows.iter_mut().zip(&who) {
                 *to = row(to.body, &flight.poses[*at]);
             }
-            ours.tick(&rows, moving == 100, Budget::UNLIMITED, ASKED)
+            ours.tick(&rows, moving == 100, Budget::UNLIMITED, asked.demand())
                 .wall_ns
         };
         let theirs = peer.tick(&flight.poses, who.iter().copied());
@@ -221,7 +276,8 @@ fn run(bodies: usize, moving: usize, percent: f64, ticks: usize) -> String {
         .map(|sum| format!("{:.1}", us(sum / ticks as u64)))
         .collect();
     format!(
-        "{SEED},{bodies},0.5,{moving},{percent},{ticks},{:.1},{:.1},{:.1},{:.1},{:.2},{},{},{},{},{}",
+        "{SEED},{bodies},0.5,{moving},{speed},{},{ticks},{:.1},{:.1},{:.1},{:.1},{:.2},{},{},{},{},{}",
+        asked.name(),
         us(own),
         us(quantile(&mut own_ns, 0.99)),
         us(theirs),

@@ -106,17 +106,35 @@ impl Narrow {
         });
     }
 
+    /// At step `at` of visits to some pairs: asks for what those to come are compared by, and for the rest of those
+    /// whose certificates are spent.
+    #[inline]
+    pub(super) fn ask_ahead_of_visits(&self, slots: &[PairSlot], at: usize, world: &World) {
+        if let Some(hot) = (slots.get(at + 2 * AHEAD)).and_then(|slot| self.hot.get(slot.index())) {
+            prefetch(hot);
+        }
+        if let Some(slot) = slots.get(at + AHEAD) {
+            self.ask_ahead_of_look(slot.index(), world);
+        }
+    }
+
     /// At place `at` of the straight walk over all pairs: asks for those to come whose certificates are spent.
     #[inline]
     pub(super) fn ask_ahead_of_walk(&self, at: usize, world: &World) {
-        let ahead = at + AHEAD;
-        let Some(hot) = self.hot.get(ahead).filter(|hot| hot.live) else {
+        self.ask_ahead_of_look(at + AHEAD, world);
+    }
+
+    /// Asks for what a look at the pair in a slot reads, if its certificate is spent.
+    #[inline]
+    fn ask_ahead_of_look(&self, slot: usize, world: &World) {
+        let Some(hot) = self.hot.get(slot).filter(|hot| hot.live) else {
             return;
         };
         if self.spent_m[hot.a.index()] + self.spent_m[hot.b.index()] < hot.expiry_m {
             return;
         }
-        prefetch(&self.memos[ahead]);
+        prefetch(&self.memos[slot]);
+        prefetch(&self.urgencies[slot]);
         world.ask_ahead(hot.a);
         world.ask_ahead(hot.b);
     }

@@ -39,16 +39,17 @@ impl Narrow {
             }
             return;
         }
-        for &body in changes
-            .moved
-            .iter()
-            .chain(&changes.restated)
-            .chain(&changes.requery)
-        {
-            for slot in pairs.pairs_of(body) {
-                self.visit(slot, world);
-            }
+        let mut slots = std::mem::take(&mut self.level);
+        slots.clear();
+        let bodies = changes.moved.iter().chain(&changes.restated);
+        for &body in bodies.chain(&changes.requery) {
+            slots.extend(pairs.pairs_of(body));
         }
+        for (at, &slot) in slots.iter().enumerate() {
+            self.ask_ahead_of_visits(&slots, at, world);
+            self.visit(slot, world);
+        }
+        self.level = slots;
     }
 
     /// Takes over what the rules now say of a pair whose bodies' rules changed: its certificate was made for the old

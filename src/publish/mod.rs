@@ -8,6 +8,7 @@ mod changes;
 mod contacts;
 mod events;
 mod kept;
+mod leaders;
 mod listing;
 mod pairs;
 mod regions;
@@ -26,8 +27,6 @@ use events::Events;
 use kept::Kept;
 use listing::Listing;
 use state::Survey;
-
-pub use state::Worst;
 
 /// How many pairs ahead of the one at hand what is known of a pair is asked for: a pair takes some 50 ns, memory about
 /// twice as long.
@@ -116,14 +115,14 @@ impl Publisher {
         self.events.forget_slots(last, world);
         self.listing.forget_slots();
         self.chain.break_off();
-        self.survey = Survey::default();
+        self.survey.forget();
     }
 
     /// Nothing of the last tick holds: every row is made anew.
     pub(crate) fn forget_rows(&mut self) {
         self.listing.forget();
         self.chain.break_off();
-        self.survey = Survey::default();
+        self.survey.forget();
     }
 
     /// Fills every message that is listened to, then the tick's own counts, state and reasons.

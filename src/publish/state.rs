@@ -1,21 +1,70 @@
 //! The tick in one word, its reasons, its counts, and the worst pair.
 
-use crate::ids::{BodyId, BodySlot};
+use crate::ids::BodySlot;
 use crate::narrow::Passage;
 use crate::wire::{
     BodyStatus, MessageHeader, Outbox, Reason, SOURCES_MAX, SourceRow, State, TickRow, Verdict,
 };
 
+use super::events::Ids;
+use super::leaders::{Leaders, Standing};
 use super::listing::Row;
 use super::{Publisher, View};
 
-/// The pair that a person should look at first.
+/// A pair that a person should look at first. Default: none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Worst {
-    /// Body ids, the smaller first; 0: none.
-    pub ids: (BodyId, BodyId),
+struct Worst {
+    ids: Ids,
     /// `Verdict` code, then depth: the order of worseness.
     rank: (u8, f64),
+}
+
+impl Worst {
+    fn of(row: &Row) -> Self {
+        Self {
+            ids: row.ids,
+            rank: (row.verdict.code(), -row.best_m),
+        }
+    }
+}
+
+impl Standing for Worst {
+    fn is_above(&self, other: &Self) -> bool {
+        let ((verdict, depth_m), (theirs, their_depth_m)) = (self.rank, other.rank);
+        let order = verdict.cmp(&theirs);
+        let order = order.then(depth_m.total_cmp(&their_depth_m));
+        order.then(other.ids.cmp(&self.ids)).is_gt()
+    }
+
+    fn ids(&self) -> Ids {
+        self.ids
+    }
+}
+
+/// How wide the interval of a pair is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Width {
+    ids: Ids,
+    width_m: f64,
+}
+
+impl Width {
+    fn of(row: &Row) -> Self {
+        Self {
+            ids: row.ids,
+            width_m: row.gap.width(),
+        }
+    }
+}
+
+impl Standing for Width {
+    fn is_above(&self, other: &Self) -> bool {
+        self.width_m.total_cmp(&other.width_m).is_gt()
+    }
+
+    fn ids(&self) -> Ids {
+        self.ids
+    }
 }
 
 impl Publisher {
@@ -35,7 +84,8 @@ impl Publisher {
         if truncated > 0 {
             reasons |= Reason::Truncated.bit();
         }
-        let survey = self.survey;
+        let survey = &self.survey;
+        let worst = survey.worst.first();
         if possible > 0 || survey.open > 0 {
             reasons |= Reason::Undecided.bit();
         }
@@ -86,9 +136,9 @@ impl Publisher {
             near: narrow.count(Verdict::Near),
             ignored: view.world.ignored_pairs_count(),
             cancelled_events: self.events.cancelled,
-            worst_a: survey.worst.ids.0.0,
-            worst_b: survey.worst.ids.1.0,
-            widest_m: survey.widest_m,
+            worst_a: worst.ids.0.0,
+            worst_b: worst.ids.1.0,
+            widest_m: survey.widest.first().width_m,
             oldest_undecided_ticks: survey.oldest_ticks,
             reasons,
             sources: sources(view),
@@ -117,11 +167,10 @@ fn repeat(header: MessageHeader, state: State, out: &mut Outbox) {
 }
 
 /// What the rows say for the tick, kept up as they come and go.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Survey {
-    worst: Worst,
-    /// The widest interval, metres.
-    widest_m: f64,
+    worst: Leaders<Worst>,
+    widest: Leaders<Width>,
     /// For how many ticks the oldest undecided pair has been so.
     oldest_ticks: u64,
     /// Pairs that touched on their way, and those that may have.
@@ -129,10 +178,6 @@ pub(super) struct Survey {
     open: u64,
     /// Contacts of all rows.
     contacts: usize,
-    /// The worst pair's row went, and none as bad has come since.
-    worst_gone: bool,
-    /// A row with the widest interval went, and none as wide has come since.
-    widest_gone: bool,
 }
 
 impl Survey {
@@ -141,19 +186,26 @@ impl Survey {
         (self.oldest_ticks, self.touched, self.open) = (0, 0, 0);
     }
 
+    /// Forgets all rows.
+    pub(super) fn forget(&mut self) {
+        self.worst.clear();
+        self.widest.clear();
+        (self.contacts, self.touched, self.open) = (0, 0, 0);
+    }
+
     /// A row of the last tick goes, or is about to be taken anew.
     pub(super) fn leave(&mut self, row: &Row) {
         self.contacts -= row.contacts as usize;
-        self.worst_gone |= row.ids == self.worst.ids;
-        self.widest_gone |= row.gap.width() >= self.widest_m;
+        self.worst.leave(&Worst::of(row));
+        self.widest.leave(&Width::of(row));
     }
 
-    /// Looks for the worst pair and the widest interval anew, if they are gone.
+    /// Looks for the worst pairs and the widest intervals anew, if those that were known are gone.
     pub(super) fn look_again<'a>(&mut self, rows: impl Iterator<Item = &'a Row>) {
-        if self.worst_gone || self.widest_gone {
-            (self.worst, self.widest_m) = (Worst::default(), 0.0);
+        if self.worst.are_gone() || self.widest.are_gone() {
+            self.worst.clear();
+            self.widest.clear();
             rows.for_each(|row| self.rank(row));
-            (self.worst_gone, self.widest_gone) = (false, false);
         }
     }
 
@@ -172,18 +224,8 @@ impl Survey {
     }
 
     fn rank(&mut self, row: &Row) {
-        if row.gap.width() >= self.widest_m {
-            (self.widest_m, self.widest_gone) = (row.gap.width(), false);
-        }
-        let (ids, worst) = (row.ids, self.worst);
-        let rank = (row.verdict.code(), -row.best_m);
-        let order = rank
-            .0
-            .cmp(&worst.rank.0)
-            .then(rank.1.total_cmp(&worst.rank.1));
-        if order.is_gt() || (order.is_eq() && (ids <= worst.ids || worst.ids.0 == BodyId(0))) {
-            (self.worst, self.worst_gone) = (Worst { ids, rank }, false);
-        }
+        self.worst.take(Worst::of(row));
+        self.widest.take(Width::of(row));
     }
 
     /// How many contacts the pairs have.
@@ -196,19 +238,31 @@ impl Survey {
     /// # Errors
     /// What is not.
     pub(super) fn validate<'a>(&self, rows: impl Iterator<Item = &'a Row>) -> Result<(), String> {
-        let (mut contacts, mut widest_m) = (0, 0.0_f64);
+        let (mut contacts, mut worst, mut widest_m) = (0, Worst::default(), 0.0_f64);
         for row in rows {
             contacts += row.contacts as usize;
             widest_m = widest_m.max(row.gap.width());
+            // One that is there for its event alone, or for what was on its way, is no active pair.
+            let one = Worst::of(row);
+            if row.verdict != Verdict::Apart && one.is_above(&worst) {
+                worst = one;
+            }
         }
         if contacts != self.contacts {
             let kept = self.contacts;
             return Err(format!("{contacts} contacts of all rows, {kept} kept up"));
         }
-        if widest_m.total_cmp(&self.widest_m).is_ne() {
-            let kept_m = self.widest_m;
+        let kept_m = self.widest.first().width_m;
+        if widest_m.total_cmp(&kept_m).is_ne() {
             return Err(format!(
                 "the widest interval is {widest_m} m, {kept_m} m kept up"
+            ));
+        }
+        let kept = self.worst.first().ids;
+        if kept != worst.ids {
+            return Err(format!(
+                "the worst pair is {:?}, {kept:?} kept up",
+                worst.ids
             ));
         }
         Ok(())

@@ -8,19 +8,25 @@ use super::body::Body;
 use super::census::{slot_at, source_at};
 use super::source::SourceState;
 use crate::config::OnStale;
-use crate::ids::BodySlot;
+use crate::ids::{BodySlot, small};
 use crate::wire::BodyStatus;
 
 /// No deadline, no stamp.
 const NONE: u64 = u64::MAX;
+/// Bodies of a block: four lines of memory.
+const BLOCK: usize = 16;
 
-/// Deadlines and stamps by slot, side by side so that a tick reads them in one sweep (some 1 ns a body).
+/// Deadlines and stamps by slot, and the ends of each block of them: a tick looks at the blocks in which one was set,
+/// and at the ends of all.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ages {
     list: Vec<Age>,
-    oldest_ns: u64,
-    newest_ns: u64,
-    next_ns: Option<u64>,
+    /// By block.
+    ends: Vec<Ends>,
+    /// Blocks in which one was set since the last sweep, and by block whether it is one of them.
+    dirty: Vec<u32>,
+    is_dirty: Vec<bool>,
+    all: Ends,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -29,17 +35,63 @@ struct Age {
     stamp_ns: u64,
 }
 
+impl Age {
+    const NONE: Self = Self {
+        deadline_ns: NONE,
+        stamp_ns: NONE,
+    };
+}
+
+/// The nearest deadline, the oldest and the newest stamp of some bodies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Ends {
+    next_ns: u64,
+    oldest_ns: u64,
+    /// One more than the newest; 0: no stamp.
+    newest_ns: u64,
+}
+
+impl Default for Ends {
+    /// Of nobody.
+    fn default() -> Self {
+        Self {
+            next_ns: NONE,
+            oldest_ns: NONE,
+            newest_ns: 0,
+        }
+    }
+}
+
+impl Ends {
+    fn of(ages: &[Age]) -> Self {
+        ages.iter().fold(Self::default(), |ends, age| Self {
+            next_ns: ends.next_ns.min(age.deadline_ns),
+            oldest_ns: ends.oldest_ns.min(age.stamp_ns),
+            // No stamp wraps to 0: it is newer than nothing.
+            newest_ns: ends.newest_ns.max(age.stamp_ns.wrapping_add(1)),
+        })
+    }
+
+    fn of_both(self, other: &Self) -> Self {
+        Self {
+            next_ns: self.next_ns.min(other.next_ns),
+            oldest_ns: self.oldest_ns.min(other.oldest_ns),
+            newest_ns: self.newest_ns.max(other.newest_ns),
+        }
+    }
+}
+
 impl Ages {
     pub(super) fn grow(&mut self, len: usize) {
-        let nothing = Age {
-            deadline_ns: NONE,
-            stamp_ns: NONE,
-        };
-        self.list.resize(len.max(self.list.len()), nothing);
+        self.list.resize(len.max(self.list.len()), Age::NONE);
+        let blocks = self.list.len().div_ceil(BLOCK);
+        self.ends.resize(blocks, Ends::default());
+        self.is_dirty.resize(blocks, false);
+        self.dirty.reserve(blocks - self.dirty.len());
     }
 
     pub(super) fn set(&mut self, slot: BodySlot, deadline_ns: Option<u64>, stamp_ns: Option<u64>) {
-        self.list[slot.index()] = Age {
+        *self.at(slot) = Age {
             deadline_ns: deadline_ns.unwrap_or(NONE),
             // A sender that does not stamp says 0, which is older than any time.
             stamp_ns: stamp_ns
@@ -50,7 +102,16 @@ impl Ages {
 
     /// Whatever its deadline was, it is now.
     fn set_due(&mut self, slot: BodySlot) {
-        self.list[slot.index()].deadline_ns = 0;
+        self.at(slot).deadline_ns = 0;
+    }
+
+    /// An age that is to be set.
+    fn at(&mut self, slot: BodySlot) -> &mut Age {
+        let block = slot.index() / BLOCK;
+        if !std::mem::replace(&mut self.is_dirty[block], true) {
+            self.dirty.push(small(block));
+        }
+        &mut self.list[slot.index()]
     }
 
     pub(super) fn deadline_ns(&self, slot: BodySlot) -> Option<u64> {
@@ -58,22 +119,42 @@ impl Ages {
         (deadline_ns != NONE).then_some(deadline_ns)
     }
 
+    /// The oldest and the newest stamp, as of the last sweep.
     pub(super) fn stamps(&self) -> (u64, u64) {
-        (self.oldest_ns, self.newest_ns)
+        let Ends {
+            oldest_ns,
+            newest_ns,
+            ..
+        } = self.all;
+        let oldest_ns = if oldest_ns == NONE { 0 } else { oldest_ns };
+        (oldest_ns, newest_ns.saturating_sub(1))
     }
 
-    /// Nearest deadline, oldest and newest stamp.
+    /// The nearest deadline, as of the last sweep.
+    fn next_ns(&self) -> Option<u64> {
+        (self.all.next_ns != NONE).then_some(self.all.next_ns)
+    }
+
+    /// Brings deadlines and stamps up to what was set.
     fn sweep(&mut self) {
-        let (mut next_ns, mut oldest_ns, mut newest_ns) = (NONE, NONE, 0);
-        for age in &self.list {
-            next_ns = next_ns.min(age.deadline_ns);
-            oldest_ns = oldest_ns.min(age.stamp_ns);
-            // No stamp wraps to 0: it is newer than nothing.
-            newest_ns = newest_ns.max(age.stamp_ns.wrapping_add(1));
+        if self.dirty.is_empty() {
+            return;
         }
-        self.next_ns = (next_ns != NONE).then_some(next_ns);
-        self.oldest_ns = if oldest_ns == NONE { 0 } else { oldest_ns };
-        self.newest_ns = newest_ns.saturating_sub(1);
+        for block in self.dirty.drain(..) {
+            let block = block as usize;
+            let end = self.list.len().min((block + 1) * BLOCK);
+            self.ends[block] = Ends::of(&self.list[block * BLOCK..end]);
+            self.is_dirty[block] = false;
+        }
+        let of_nobody = Ends::default();
+        self.all = self.ends.iter().fold(of_nobody, Ends::of_both);
+    }
+
+    /// Whether the ends are those of what was set.
+    pub(super) fn are_whole(&self) -> bool {
+        let mut blocks = self.list.chunks(BLOCK).zip(&self.ends).enumerate();
+        blocks.all(|(at, (ages, ends))| self.is_dirty[at] || Ends::of(ages) == *ends)
+            && (!self.dirty.is_empty() || self.all == Ends::of(&self.list))
     }
 }
 
@@ -115,7 +196,7 @@ impl World {
         self.settle_attached();
         self.recount();
         self.ages.sweep();
-        if self.ages.next_ns.is_some_and(|next| next <= self.now_ns) {
+        if self.ages.next_ns().is_some_and(|next| next <= self.now_ns) {
             self.settle_expired();
             self.ages.sweep();
         }
@@ -130,7 +211,7 @@ impl World {
             .sources
             .iter()
             .flat_map(|s| [s.deadline_ns(), s.waiting.until_ns]);
-        sources.chain([self.ages.next_ns]).flatten().min()
+        sources.chain([self.ages.next_ns()]).flatten().min()
     }
 
     fn settle_expired(&mut self) {
@@ -202,5 +283,53 @@ impl World {
     pub(super) fn on_stale_of(&self, body: &Body) -> OnStale {
         let of_source = self.source_of(body).map(|s| s.on_stale);
         body.on_stale.or(of_source).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "small numbers by chance"
+    )]
+
+    use super::*;
+    use crate::builtin::Random;
+
+    #[test]
+    fn ends_are_those_of_all_whatever_is_set() {
+        let (mut ages, mut random) = (Ages::default(), Random::new(4));
+        let mut set: Vec<(Option<u64>, Option<u64>)> = Vec::new();
+        for _ in 0..400 {
+            if random.unit() < 0.1 || set.is_empty() {
+                set.resize(
+                    set.len() + (random.unit() * 40.0) as usize + 1,
+                    (None, None),
+                );
+                ages.grow(set.len());
+            }
+            let mut maybe = || (random.unit() < 0.8).then(|| (random.unit() * 1e6) as u64);
+            let age = (maybe(), maybe());
+            let at = (random.unit() * set.len() as f64) as usize;
+            set[at] = age;
+            ages.set(BodySlot(at as u32), age.0, age.1);
+            assert!(ages.are_whole());
+            if random.unit() < 0.7 {
+                ages.sweep();
+                let stamps = || {
+                    set.iter()
+                        .filter_map(|age| age.1)
+                        .filter(|stamp| *stamp != 0)
+                };
+                let ends = (stamps().min().unwrap_or(0), stamps().max().unwrap_or(0));
+                assert_eq!(ages.stamps(), ends);
+                assert_eq!(ages.next_ns(), set.iter().filter_map(|age| age.0).min());
+                assert!(ages.are_whole());
+            }
+        }
+        ages.sweep();
+        ages.ends[0].newest_ns += 1;
+        assert!(!ages.are_whole());
     }
 }

@@ -38,6 +38,9 @@ impl World {
         if by_status != self.by_status {
             return Err("the tallies by status are off".to_owned());
         }
+        if !self.ages.are_whole() {
+            return Err("the nearest deadline, or an end of the stamps, is off".to_owned());
+        }
         Ok(())
     }
 

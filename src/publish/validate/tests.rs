@@ -6,7 +6,7 @@ use std::path::Path;
 use super::super::listing::Row;
 use super::super::{Publisher, View};
 use crate::daemon::build_shapes;
-use crate::ids::PairKey;
+use crate::ids::{BodyId, PairKey};
 use crate::math::Interval;
 use crate::narrow::{Narrow, Order, Wanted};
 use crate::pairs::{PairDelta, PairSet};
@@ -99,7 +99,7 @@ impl Stage {
 /// What is broken, and what is told of it.
 type Fault = (&'static str, fn(&mut Stage));
 
-const FAULTS: [Fault; 11] = [
+const FAULTS: [Fault; 12] = [
     ("known is", |stage| {
         // One that says near of a pair that collides.
         let listing = &mut stage.publisher.listing;
@@ -133,6 +133,17 @@ const FAULTS: [Fault; 11] = [
             ..row
         };
         stage.publisher.survey.take(&wide, None);
+    }),
+    ("the worst pair", |stage| {
+        let row = *stage.publisher.listing.row(0);
+        let deep = Row {
+            ids: (BodyId(1), BodyId(u64::MAX)),
+            contacts: 0,
+            best_m: -1e9,
+            verdict: Verdict::Colliding,
+            ..row
+        };
+        stage.publisher.survey.take(&deep, None);
     }),
     ("wait to be told of", |stage| {
         let ids = stage.publisher.listing.row(0).ids;
