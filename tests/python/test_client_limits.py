@@ -5,6 +5,7 @@ Needs `SWEEPD=path/to/sweepd` and the package of msgs/python with its wheels.
 
 import contextlib
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -210,3 +211,29 @@ def test_bug_a_message_of_a_boot_that_went_unseen_held_back_those_of_the_boot_af
         client._advance("names", header(3, tick))
     assert client._now["names"][1] == "of the boot in force"
     assert client._boots_over == [1, 2]
+
+
+@contextlib.contextmanager
+def files_left(count):
+    """This process may open so many more files."""
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    has = len(os.listdir("/proc/self/fd")) - 1
+    resource.setrlimit(resource.RLIMIT_NOFILE, (has + count, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)
+
+
+def test_bug_too_few_open_files_are_told_as_that(start):
+    name = start()
+    for left in (0, 3, 20, 55):
+        with files_left(left), pytest.raises(sweepd.Refused, match=r"takes up to 56 more: `ulimit -n \d+`"):
+            sweepd.Client(name, "sim", quat_order="wxyz")
+    with files_left(56), sweepd.Client(name, "sim", quat_order="wxyz") as client:
+        assert client.step(poses(), timeout_s=5).state == "clear"
+    with sweepd.Client(name, "sim", quat_order="wxyz") as client:
+        # its port to send by is opened with the first frame
+        with files_left(1), pytest.raises(sweepd.SweepdError, match=r"cannot be sent: .*`ulimit -n \d+`"):
+            client.send(poses())
+        assert client.step(poses(), timeout_s=5).state == "clear"

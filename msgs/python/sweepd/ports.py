@@ -13,7 +13,7 @@ import weakref
 import iceoryx2 as iox2
 import numpy as np
 
-from . import layout
+from . import files, layout
 from .errors import Refused, SweepdError, TimedOut
 from .refusals import text
 
@@ -112,6 +112,9 @@ def _ours(what):
 
 
 def _why(e):
+    short = files.short()
+    if short is not None:
+        return f"{short} ({e})"
     why = str(e)
     if why.startswith("ExceedsMax") and type(e).__name__.endswith(("CreateError", "OpenError")):
         return (
@@ -177,6 +180,7 @@ class Ports:
 
     def __init__(self, instance, timeout_s, root=None, prefix=None):
         check_name(instance)
+        files.check()
         iox2.set_log_level_from_env_or(iox2.LogLevel.Fatal)
         self._instance = instance
         self._config = _config(root, prefix)
@@ -223,6 +227,9 @@ class Ports:
 
     def silence(self):
         """What it means that the daemon says nothing, and what to do."""
+        short = files.short()
+        if short is not None:
+            return f"messages do not pass, for {short}"
         return (
             f"if that lasts, the daemon was killed or is stopped: `sweepd doctor --instance {self._instance}` says which,"
             f" `{self._run()}` starts a new one"

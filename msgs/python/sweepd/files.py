@@ -1,0 +1,51 @@
+"""Open files of this process: who has none left fails in ways that name other causes."""
+
+import errno
+import os
+import resource
+
+from .errors import Refused
+
+#: Files that a client may open beside those that its process has: one that listens to pairs and contacts and sends takes 48.
+_LEAST = 56
+#: With fewer left a port that cannot be opened lacks them.
+_FEW = 16
+
+
+def _left():
+    """How many more this process may open, how many it has and may have; None: there is no limit, or it is not known."""
+    most, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if most == resource.RLIM_INFINITY:
+        return None
+    try:
+        # what lists them is one itself
+        count = len(os.listdir("/proc/self/fd")) - 1
+    except OSError as e:
+        if e.errno != errno.EMFILE:
+            return None
+        count = most
+    # what was inherited may be beyond the limit
+    count = min(count, most)
+    return most - count, count, most
+
+
+def _told(count, most):
+    mend = f"`ulimit -n {max(2 * most, 1024)}` in the shell that starts it, or `resource.setrlimit` in it"
+    return f"this process has {count} of the {most} files open that it may", mend
+
+
+def check():
+    """Refuses what a client cannot do with the files that this process has left."""
+    left = _left()
+    if left is not None and left[0] < _LEAST:
+        has, mend = _told(*left[1:])
+        raise Refused(f"{has}, and a client of a daemon takes up to {_LEAST} more: {mend}")
+
+
+def short():
+    """What keeps this process from opening ports, in words; None: not its open files."""
+    left = _left()
+    if left is None or left[0] >= _FEW:
+        return None
+    has, mend = _told(*left[1:])
+    return f"{has}: {mend}"
