@@ -151,8 +151,10 @@ impl Memo {
         self.tight = whole && goal != Goal::Verdict;
         if told.witness.is_some() {
             self.witness = told.witness;
-        } else if self.gap.min > 0.0 && self.witness.is_some_and(|w| w.best_m <= 0.0) {
-            // Where it touched says nothing of a pair that is apart.
+        } else if self.gap.min > 0.0
+            && (self.tight || self.witness.is_some_and(|w| w.best_m <= 0.0))
+        {
+            // Where it touched says nothing of a pair that is apart, nor where it was nearest of bounds of these poses.
             self.witness = None;
         }
         true

@@ -73,7 +73,17 @@ struct Known {
     high: f64,
     /// 0 inside the interval of every pair of shapes asked means that it touches.
     certain: bool,
+    /// The best of those that the pairs of shapes asked for that goal told.
     witness: Option<Witness>,
+}
+
+impl Known {
+    /// Takes the witness of a pair of shapes. Not by its upper end: a search that is cut off tells of that before it
+    /// has a witness.
+    fn take_witness(&mut self, told: Option<Witness>) {
+        let best = [told, self.witness].into_iter().flatten();
+        self.witness = best.min_by(|x, y| x.best_m.total_cmp(&y.best_m));
+    }
 }
 
 impl Default for Known {
@@ -150,8 +160,13 @@ impl CompoundFront {
     ) -> bool {
         let sides = (&Side::of(a), &Side::of(b));
         if goal > self.known.goal {
-            // Pairs of shapes that touch have been asked for less.
-            (self.known.goal, self.known.low, self.known.certain) = (goal, f64::INFINITY, true);
+            // Pairs of shapes that touch, and the nearest, have been asked for less.
+            let high = self.known.high;
+            self.known = Known {
+                goal,
+                high,
+                ..Known::default()
+            };
             self.found.clear();
             let entries = &mut tools.shelves.store.entries;
             self.cover.anchor_here(entries, &self.at.pos12);
@@ -190,7 +205,7 @@ impl CompoundFront {
         self.known.certain && self.cover.holds_lumped()
     }
 
-    /// Where the pair of shapes with the least upper end asked at this pose is nearest or deepest.
+    /// Where the pair of shapes that is nearest or deepest of those asked at this pose is so.
     pub(super) fn witness(&self) -> Option<Witness> {
         self.known.witness
     }

@@ -296,3 +296,70 @@ fn bug_a_begin_within_a_tight_budget_showed_contacts_of_a_collision_long_over() 
         assert_eq!(again == ids, goes_on, "{away}: {ids:?} {again:?}");
     }
 }
+
+/// A solid box of triangles with a side of 1 m, at a place in its body.
+fn mesh_at([x, y, z]: [f64; 3]) -> String {
+    let corners = (0..8).map(|k| {
+        let side = |bit: u32| if k >> bit & 1 == 1 { 0.5 } else { -0.5 };
+        format!("[{}, {}, {}]", side(0), side(1), side(2))
+    });
+    let corners: Vec<String> = corners.collect();
+    format!(
+        "{{ type = \"trimesh\", vertices = [{}], faces = [[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], \
+         [1, 5, 4], [2, 6, 3], [3, 6, 7], [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5]], position = [{x}, {y}, {z}] }}",
+        corners.join(", ")
+    )
+}
+
+#[test]
+fn bug_closest_points_of_compounds_with_meshes_were_missing_or_of_other_shapes() {
+    let ball = |[x, y, z]: [f64; 3]| {
+        format!("{{ type = \"sphere\", radius = 0.5, position = [{x}, {y}, {z}] }}")
+    };
+    let [left, right] = [[-1.5, 0.0, 0.1], [1.5, 0.0, 0.0]];
+    let plane = "{ type = \"half_space\", normal = [0, 0, 1] }".to_owned();
+    let sides: [Vec<String>; 6] = [
+        vec![mesh_at([0.0; 3])],
+        vec![mesh_at(left), mesh_at(right)],
+        vec![ball(left), mesh_at(right)],
+        vec![mesh_at(left), ball(right), ball([0.0, 1.2, 0.0])],
+        vec![ball(left), ball(right)],
+        vec![plane],
+    ];
+    let mut rng = Rng::new(9);
+    for (one, other) in (0..6).flat_map(|one| (0..5).map(move |other| (one, other))) {
+        let list = |side: &Vec<String>| format!("[{}]", side.join(", "));
+        let bodies = [
+            body(1, [0.0; 3], &list(&sides[one]), "report_within_m = 3.0"),
+            body(2, [0.0; 3], &list(&sides[other]), ""),
+        ];
+        let mut rig = Rig::new(&scene("", &bodies));
+        let mut at = Vec3::new(0.0, 0.0, 1.9);
+        for step in 0..60 {
+            at.x = 4.0 * (f64::from(step) * 0.21).sin();
+            at.z = rng.range(1.2, 2.2);
+            let tilt = Quat::from_scaled_axis(Vec3::y() * rng.range(-0.2, 0.2));
+            rig.place(2, &Pose::from_parts(at.into(), tilt));
+            rig.send(ALL);
+            let case = format!("sides {one} and {other}, step {step}");
+            let Some(pair) = rig
+                .pair(1, 2)
+                .filter(|pair| pair.verdict == Verdict::Near.code())
+            else {
+                continue;
+            };
+            let [told] = &rig.out.contacts[..] else {
+                panic!("{case}: {:?}", rig.out.contacts)
+            };
+            let points = [told.point_a, told.point_b].map(Vec3::from);
+            let length_m = (points[1] - points[0]).norm();
+            let holds = |m: f64| (pair.gap_min_m - 1e-9..=pair.gap_max_m + 1e-9).contains(&m);
+            assert!(holds(length_m), "{case}: {length_m} of {pair:?}");
+            assert!(
+                holds(told.gap_m) && holds(pair.gap_best_m),
+                "{case}: {told:?} of {pair:?}"
+            );
+            assert_eq!(told.flags, 0, "{case}");
+        }
+    }
+}

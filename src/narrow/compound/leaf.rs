@@ -149,10 +149,8 @@ impl CompoundFront {
         let gap = answer.gap;
         self.known.low = self.known.low.min(gap.min.max(known_m));
         self.known.certain &= answer.certain || !gap.contains(0.0);
-        if gap.max < self.known.high {
-            self.known.high = gap.max;
-            self.known.witness = answer.witness;
-        }
+        self.known.high = self.known.high.min(gap.max);
+        self.known.take_witness(answer.witness);
         if gap.min > 0.0 {
             self.cover.keep(entries, leaf, gap.min.max(known_m));
             if gap.min > FAR * one.shape.radius.min(other.shape.radius) {
