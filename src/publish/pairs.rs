@@ -265,7 +265,10 @@ impl Publisher {
         // Who collides now has touched by now.
         let colliding = out.verdict == Verdict::Colliding.code();
         let toi = match swept.passage {
-            Passage::Free if colliding => Passage::Touched(Interval { min: 1.0, max: 1.0 }),
+            // What jumped there was not swept.
+            Passage::Free if colliding && !swept.jumped => {
+                Passage::Touched(Interval { min: 1.0, max: 1.0 })
+            }
             Passage::Open(toi) if colliding => Passage::Touched(toi),
             passage => passage,
         };

@@ -74,7 +74,7 @@ pub struct Path {
     pivot: Point,
     /// Greatest distance of the body's surface from the pivot, metres, rounded up.
     reach: f64,
-    /// Steps of the pivot beyond it are teleports, metres.
+    /// Steps of the body's centre beyond it are teleports, metres.
     teleport_m: f64,
     /// Whether the body itself is swept; else its path is kept for what hangs on it.
     swept: bool,
@@ -271,18 +271,27 @@ impl Path {
     /// Takes the path of the body it hangs on.
     ///
     /// * `local` - its pose seen from there.
+    /// * `centre` - of its own, whose steps may be teleports; body frame, metres.
     /// * `end` - its box at the newest pose.
-    pub(super) fn follow(&mut self, root: &Self, local: &Pose, shapes: &[PlacedShape], end: Aabb) {
+    pub(super) fn follow(
+        &mut self,
+        root: &Self,
+        local: &Pose,
+        (shapes, centre): (&[PlacedShape], &Point),
+        end: Aabb,
+    ) {
         let begin = root
             .legs
             .first()
             .map_or(end, |leg| tight_box(shapes, &(leg.from * local)));
         self.restart(begin);
         for leg in &root.legs {
+            let (from, to) = (leg.from * local, leg.to * local);
+            let step_m = (to * centre - from * centre).norm();
             let leg = Leg {
-                from: leg.from * local,
-                to: leg.to * local,
-                jump: leg.jump || leg.travel.norm() > self.teleport_m,
+                from,
+                to,
+                jump: leg.jump || step_m > self.teleport_m,
                 ..*leg
             };
             let there = tight_box(shapes, &leg.to);

@@ -74,13 +74,17 @@ impl World {
         let moved = self.place(slot, pose);
         let entry = &self.entries[slot.index()];
         let (root, local) = (entry.root, entry.root_pose);
-        let shapes = self.body(slot).map(|body| body.shapes.clone());
+        let body = self
+            .body(slot)
+            .map(|body| (body.shapes.clone(), body.centre));
         // Taken out for the loan, and put back.
         let of_root = self.take_path(root);
         let moved = self.lay(slot, path, moved, |path, end| {
             let before = *path.hull();
-            match (&of_root, &shapes) {
-                (Some((_, root)), Some(shapes)) => path.follow(root, &local, shapes, end),
+            match (&of_root, &body) {
+                (Some((_, root)), Some((shapes, centre))) => {
+                    path.follow(root, &local, (shapes, centre), end);
+                }
                 _ => path.restart(end),
             }
             *path.hull() != before

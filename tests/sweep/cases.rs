@@ -407,6 +407,52 @@ fn an_attached_body_goes_the_way_of_the_body_it_hangs_on() {
 }
 
 #[test]
+fn bug_an_attached_body_was_held_against_the_step_of_the_body_it_hangs_on() {
+    // A ball 5 m along x from the body that it hangs on, and a wall in the plane x = 5.5.
+    let wall = "{ type = \"box\", half_extents = [0.01, 5.0, 5.0] }";
+    let arm = "{ type = \"sphere\", radius = 0.1 }";
+    let mut rig = Rig::new(&scene(
+        "",
+        &[
+            body(1, [5.5, 0.0, 0.0], wall, ""),
+            body(2, [0.0; 3], arm, ""),
+            "name = \"b3\"\nid = 3\nattached_to = \"b2\"\nposition = [5.0, 0.0, 0.0]\ncontinuous = true\n\
+             teleport_m = 2.0\nshape = { type = \"sphere\", radius = 0.01 }"
+                .to_owned(),
+        ],
+    ));
+    rig.send(ALL);
+    // The other steps 3 m up and turns down by as much as makes the ball step one metre along x.
+    let tilt = (3.0_f64 / 5.0).asin();
+    let x = 6.0 - 5.0 * tilt.cos();
+    let down = Quat::from_scaled_axis(Vec3::y() * tilt);
+    rig.place(2, &Pose::from_parts(Vec3::new(x, 0.0, 3.0).into(), down));
+    rig.send(ALL);
+    assert!(hit(rig.pair(1, 3).unwrap()));
+    assert!(rig.because(Reason::Swept) && !rig.because(Reason::Teleported));
+    // Back to x = 2, and again: now it steps by 3 m, and the other by none.
+    rig.place(2, &Pose::identity());
+    rig.send(ALL);
+    let aside = Quat::from_scaled_axis(Vec3::z() * (1.5_f64 / 5.0).asin() * 2.0);
+    rig.place(2, &Pose::from_parts(Vec3::zeros().into(), aside));
+    rig.send(ALL);
+    assert!(rig.because(Reason::Teleported), "a step of 3 m");
+    assert!(!rig.because(Reason::Swept));
+}
+
+#[test]
+fn bug_a_teleport_into_a_wall_was_told_as_a_hit_on_the_way() {
+    let mut rig = plate("continuous = true\nteleport_m = 1.0");
+    rig.place(2, &at(0.0, 0.0, 0.0));
+    rig.send(ALL);
+    let row = *rig.pair(1, 2).unwrap();
+    assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+    assert!(!hit(&row) && row.toi_min.is_nan(), "{row:?}");
+    assert_ne!(row.flags & pair_flags::TELEPORTED, 0);
+    assert!(rig.because(Reason::Teleported) && !rig.because(Reason::Swept));
+}
+
+#[test]
 fn walls_that_are_meshes_or_of_several_shapes_are_met_too() {
     let mesh = trimesh(&cuboid(Vec3::new(5.0, 5.0, 0.0005)), None);
     let surface = trimesh(&cuboid(Vec3::new(5.0, 5.0, 0.0005)), Some(false));
