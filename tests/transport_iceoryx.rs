@@ -11,6 +11,7 @@
 mod transport_support;
 
 use std::io::{BufRead, BufReader};
+use std::os::unix::fs::PermissionsExt;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
@@ -345,6 +346,49 @@ fn bug_changes_renewed_while_no_daemon_is_there_are_read_from_the_next_one() {
     }
     let mut daemon = server(&files, 0);
     until("the reader", || daemon.demand().changes);
+}
+
+#[test]
+fn bug_a_topic_whose_places_are_all_taken_was_told_by_the_name_of_an_enum() {
+    let files = Files::new();
+    let _daemon = server(&files, 0);
+    let pairs = Topics {
+        pairs: true,
+        ..Topics::default()
+    };
+    let mut links = Vec::new();
+    let why = loop {
+        let mut link = IoxLink::open(&files.place, &SystemClock, u64::MAX).unwrap();
+        match Link::subscribe(&mut link, pairs) {
+            Ok(()) => links.push(link),
+            Err(why) => break why,
+        }
+    };
+    assert_eq!(links.len(), 32);
+    assert!(matches!(why, sweepd::error::Error::Refused(_)), "{why:?}");
+    let said = why.with_causes();
+    assert!(said.starts_with("every place is taken"), "{said}");
+    assert_eq!(said.matches("ExceedsMax").count(), 1, "{said}");
+}
+
+#[test]
+fn bug_an_instance_whose_daemon_was_killed_while_it_made_a_service_could_not_be_started_again() {
+    let files = Files::new();
+    let daemon = server(&files, 0);
+    let folder = files.place.root().join("services");
+    let is_it = |text: &str| text.contains("/v1/transforms_vel\"");
+    let entries = std::fs::read_dir(&folder).unwrap();
+    let services = entries.map(|entry| entry.unwrap().path());
+    let (path, text) = services
+        .map(|path| (path.clone(), std::fs::read_to_string(path).unwrap()))
+        .find(|(_, text)| is_it(text))
+        .unwrap();
+    drop(daemon);
+    assert!(!path.exists(), "it went with the daemon");
+    // As a file is until its service is made: it may be written.
+    std::fs::write(&path, text).unwrap();
+    std::fs::set_permissions(&path, PermissionsExt::from_mode(0o600)).unwrap();
+    drop(server(&files, 0));
 }
 
 #[test]

@@ -17,6 +17,7 @@ mod process;
 mod qos;
 mod room;
 mod server;
+mod unfinished;
 mod unmet;
 mod waker;
 

@@ -8,6 +8,9 @@ use crate::transport::open_files::OpenFiles;
 
 /// Why there is no daemon to talk to, with both versions where the holder of the instance says another one.
 pub(super) fn not_found(place: &Place, why: &Error) -> Error {
+    if let Some(crowded) = crowded(why) {
+        return crowded;
+    }
     let Some(holder) = lock::holder(place) else {
         return Error::TimedOut(format!(
             "no daemon runs as instance `{0}` ({why}); start one with `sweepd run SCENE --instance {0}`; `sweepd list` shows who is there, `sweepd doctor` what is wrong",
@@ -36,5 +39,17 @@ pub(super) fn out_of_files() -> Option<Error> {
 
 /// A port that was opened, or why not.
 pub(super) fn opened<T>(port: Result<T>) -> Result<T> {
-    port.map_err(|e| out_of_files().unwrap_or(e))
+    port.map_err(|e| out_of_files().or_else(|| crowded(&e)).unwrap_or(e))
+}
+
+/// What keeps a client from a port that others have all places of; `None`: not that.
+fn crowded(why: &Error) -> Option<Error> {
+    let why = why.to_string();
+    // Of each kind of port it is another type.
+    why.contains("::ExceedsMax").then(|| {
+        Error::Refused(format!(
+            "every place is taken ({why}): end a client that is not needed (`sweepd list` counts them, msgs/README.md has \
+             the limits); one that was killed gives its place back within two seconds"
+        ))
+    })
 }
