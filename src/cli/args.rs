@@ -102,7 +102,7 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "TIME", value_parser = duration, default_value = "10s")]
     pub(super) watchdog: Limit,
     /// End after so many ticks; until a signal otherwise.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(super) ticks: Option<u64>,
     /// Be a ROS 2 node too; on this host only, unless `ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET`.
     ///

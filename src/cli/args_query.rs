@@ -103,10 +103,11 @@ pub(super) struct RayArgs {
         conflicts_with_all = ["a", "b", "batch", "touching", "shape"]
     )]
     pub(super) max: Option<f64>,
-    /// Only bodies of these groups, one bit each; by default all.
+    /// Only bodies of these groups, one bit each, such as `0x6`; by default all.
     #[arg(
         long,
         value_name = "BITS",
+        value_parser = bits,
         requires = "ray",
         conflicts_with_all = ["a", "b", "batch", "touching", "shape"]
     )]
@@ -214,6 +215,16 @@ fn numbers(text: &str) -> Result<Vec<f64>, String> {
     text.split(',').map(number).collect()
 }
 
+/// Bits as scene files have them: `0x6`, `0b110`, `6`.
+fn bits(text: &str) -> Result<u32, String> {
+    let number = match text.split_at_checked(2) {
+        Some(("0x", hex)) => u32::from_str_radix(hex, 16),
+        Some(("0b", binary)) => u32::from_str_radix(binary, 2),
+        _ => text.parse(),
+    };
+    number.map_err(|_| format!("`{text}` is no mask of 32 bits: write a number such as 0x6 or 6"))
+}
+
 /// Metres of `5cm`, `1.5m`, `2mm`, `300um`, `0`.
 pub(super) fn length_m(text: &str) -> Result<f64, String> {
     let wanted =
@@ -256,6 +267,16 @@ mod tests {
         }
         for bad in ["", "cm", "5", "-1m", "2 furlongs", "1e999m", "nan m", "5é"] {
             assert!(length_m(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn bits_are_read_as_scene_files_have_them() {
+        for (text, mask) in [("0x6", 6), ("0b110", 6), ("6", 6), ("0xffffffff", u32::MAX)] {
+            assert_eq!(bits(text), Ok(mask), "{text}");
+        }
+        for bad in ["", "0x", "-1", "0x1ffffffff", "six", "0b2", "é6"] {
+            assert!(bits(bad).is_err(), "{bad}");
         }
     }
 

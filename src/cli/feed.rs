@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::builtin::{Motion, Random, pile, pool};
 use crate::error::{Error, Result};
+use crate::limits;
 use crate::scene::Scene;
 use crate::time::{Clock, SystemClock};
 use crate::transport::client::{Client, FrameInfo, Heard, Rows};
@@ -31,6 +32,12 @@ const HEED_NS: u64 = 1_000_000_000;
 pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
     if let Some(path) = &args.write_scene {
         let count = args.count.unwrap_or(COUNT_DEFAULT);
+        if count > limits::BODIES_MAX {
+            return Err(Error::Usage(format!(
+                "--count {count}: a scene has at most {} bodies",
+                limits::BODIES_MAX
+            )));
+        }
         let text = if args.kind == "pile" {
             pile(count, args.course.seed)
         } else {

@@ -169,6 +169,8 @@ fn start_log(verbose: u8, quiet: bool, asked: Option<LevelFilter>) {
         .with_writer(std::io::stderr)
         .with_ansi(out::coloured_stderr())
         .with_target(false)
+        // A log that cannot be written is told of there, which panics.
+        .log_internal_errors(false)
         .finish();
     // A host that has a log of its own keeps it.
     let _ = tracing::subscriber::set_global_default(log);

@@ -33,6 +33,19 @@ fn places(client: &mut Client) -> BTreeMap<u64, [f64; 3]> {
 }
 
 #[test]
+fn bug_a_scene_of_more_bodies_than_there_may_be_was_begun() {
+    let desk = Desk::new();
+    let path = desk.dir.join("many.toml").to_str().unwrap().to_owned();
+    let ended = output(&["feed", "--write-scene", &path, "--count", "99999999999"]);
+    assert_eq!(code(&ended), Some(2), "{}", err(&ended));
+    assert!(
+        err(&ended).contains("at most 1048576 bodies"),
+        "{}",
+        err(&ended)
+    );
+}
+
+#[test]
 fn without_a_daemon_it_ends_with_code_3_after_its_wait() {
     let desk = Desk::new();
     let scene = desk.scene(TWO_SPHERES);

@@ -227,3 +227,21 @@ fn a_recording_that_becomes_as_long_as_a_file_may_be_is_ended_and_told_and_the_d
     // What was written before the limit is there, but for the chunk that did not fit.
     assert!(ticks > 20 && json["ticks_exact"] == ticks, "{json}");
 }
+
+#[test]
+fn bug_a_log_that_could_not_be_written_ended_the_daemon() {
+    let desk = Desk::new();
+    let scene = desk.scene(TWO_SPHERES);
+    let scene = scene.to_str().unwrap();
+    let run = [
+        "-v",
+        "run",
+        scene,
+        "--instance",
+        &desk.instance,
+        "--ticks",
+        "3",
+    ];
+    let ended = run_out(limited("exec 2>/dev/full"), &run);
+    assert_eq!(code(&ended), Some(0));
+}
