@@ -34,7 +34,7 @@ use super::place::Place;
 use super::process::process;
 use super::qos::{self, Ipc, Open, events, failed};
 use super::room::check_limits;
-use super::unfinished::remove_unfinished;
+use super::unfinished::take_over;
 use super::unmet::Unmet;
 use crate::error::{Error, Result};
 use crate::limits;
@@ -187,10 +187,7 @@ impl Server {
         check_limits()?;
         let lock = InstanceLock::take(place, &holder(&options))?;
         let root = RootLock::hold(place)?;
-        if remove_unfinished(place) > 0 {
-            tracing::info!("took over from a daemon that was killed while it started");
-        }
-        let node = qos::node(place, "daemon")?;
+        let node = take_over(place)?;
         let unmet = &troubles.unmet;
         let requests = qos::requests(&node, place, Open::Create).map_err(held)?;
         // one server a service: refuses a second daemon even where the lock file was removed by hand

@@ -1,15 +1,19 @@
 //! Services whose making was broken off: their maker was killed in the middle of it.
 //!
-//! In: a place whose instance this process holds. Out: the files of such services are gone. iceoryx2 waits for whoever
-//! makes a service, gives up, and takes nobody's word for that he is dead: the instance could never be started again.
-//! Services of an instance are made by its daemon alone, so who holds its lock knows.
+//! In: a place whose instance this process holds. Out: its node; the files of such services are gone. iceoryx2 waits
+//! for whoever makes a service, gives up, and takes nobody's word for that he is dead: the instance could never be
+//! started again. Services of an instance are made by its daemon alone, so who holds its lock knows.
 
 use std::fs::{self, DirEntry};
 use std::os::unix::fs::MetadataExt;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use iceoryx2::prelude::Node;
+
 use super::place::Place;
+use super::qos::{self, Ipc};
+use crate::error::Result;
 
 /// iceoryx2's folder of services under its root, and how their files end.
 const FOLDER: &str = "services";
@@ -19,8 +23,18 @@ const WRITABLE: u32 = 0o200;
 /// What an empty file is a service of cannot be known; to make one takes far less time.
 const OLD: Duration = Duration::from_secs(10);
 
+/// Takes the place over, from a daemon that was killed while it started as from any other: the node of the next one.
+pub(super) fn take_over(place: &Place) -> Result<Node<Ipc>> {
+    if remove_unfinished(place) > 0 {
+        tracing::info!(
+            "the daemon before was killed while it started: what it left half made is removed"
+        );
+    }
+    qos::node(place, "daemon")
+}
+
 /// Removes the files of services of this instance that nobody will finish; returns how many.
-pub(super) fn remove_unfinished(place: &Place) -> usize {
+fn remove_unfinished(place: &Place) -> usize {
     let Ok(entries) = fs::read_dir(place.root().join(FOLDER)) else {
         return 0;
     };
@@ -79,7 +93,7 @@ mod tests {
             put("t_6.service", "", 0o600),
         ];
         let old = put("t_7.service", "", 0o600);
-        let then = std::time::SystemTime::now() - 2 * OLD;
+        let then = fs::metadata(&old).unwrap().modified().unwrap() - 2 * OLD;
         let file = fs::File::options().write(true).open(&old).unwrap();
         file.set_modified(then).unwrap();
         assert_eq!(remove_unfinished(&place), 2);
