@@ -15,7 +15,7 @@ use super::Narrow;
 use super::bent::Bent;
 use super::cursor::SLICE_UNITS;
 use super::memo::{Memo, Witness};
-use super::mesh::{CarriedFront, FrontStore, Goal, LeafContact, Search, numbered};
+use super::mesh::{CarriedFront, FrontStore, Goal, LeafContact, Search, lead_out, numbered};
 use super::query::{leaf_contact, shape_pose, sound, witness_of};
 
 /// What asking two triangles whether they surely cross costs, in tests of a box against a pack, with what it takes to
@@ -94,7 +94,8 @@ impl Narrow {
                 let seen = |(leaf, patch): (LeafContact, u32)| {
                     leaf_contact((one, other), (0, 0), &pos12, (&leaf, patch), gap)
                 };
-                self.found.extend(found_on(front, store).map(seen));
+                self.found
+                    .extend(found_on(front, store, (one_shape, other_shape), &pos12).map(seen));
             }
             self.keep_contacts(slot, a.radius.min(b.radius));
         }
@@ -166,9 +167,21 @@ impl Memo {
 pub(super) fn found_on(
     front: &CarriedFront,
     store: &FrontStore,
+    shapes: (&Shape, &Shape),
+    pos12: &Pose,
 ) -> impl Iterator<Item = (LeafContact, u32)> {
-    let points = numbered(front.contacts(store)).map(|(point, patch)| (*point, patch));
-    points.chain(front.way_out(store).map(|point| (point, 0)))
+    let found = front.contacts(store);
+    let way_out = match found.first() {
+        None => front.way_out(store),
+        // Nothing lies straight across: what stands for the pair is the nearest way out, where that is known.
+        Some(first) if first.patch == LeafContact::SPARE => front.witness(),
+        Some(_) => None,
+    };
+    let led = way_out.and_then(|leaf| lead_out(&leaf, shapes, pos12));
+    let alone = led.or(way_out.filter(|_| found.is_empty()));
+    let found = if led.is_some() { &[][..] } else { found };
+    let points = numbered(found).map(|(point, patch)| (*point, patch));
+    points.chain(alone.map(|point| (point, 0)))
 }
 
 /// Units of a turn of a pair without a verdict since a tick, 0 of one that is decided and asked for more.
@@ -250,6 +263,7 @@ pub(super) fn seen_at(
     pos12: &Pose,
     leaf: &LeafContact,
 ) -> Witness {
+    let leaf = lead_out(leaf, (&one.shape, &other.shape), pos12).unwrap_or(*leaf);
     Witness {
         triangle_a: leaf.triangle_a,
         triangle_b: leaf.triangle_b,

@@ -12,6 +12,7 @@ use crate::world::PlacedShape;
 use super::Counters;
 use super::arena::{Arena, Run};
 use super::bent::Bent;
+use super::carry::seen_at;
 use super::contacts::Contact;
 use super::exact::Warm;
 use super::holdings::Holdings;
@@ -241,11 +242,8 @@ impl Cursor {
     ) {
         let gap = sound(self.meshes.interval(), one, other, &self.rel);
         (self.gap, self.certain) = (gap, self.meshes.is_certain());
-        self.witness = (self.meshes.witness()).map(|leaf| Witness {
-            triangle_a: leaf.triangle_a,
-            triangle_b: leaf.triangle_b,
-            ..witness_of(one, other, pos12, &leaf.closest, self.places)
-        });
+        self.witness =
+            (self.meshes.witness()).map(|leaf| seen_at((one, other), self.places, pos12, &leaf));
         if self.goal == Goal::Contacts && gap.min <= 0.0 {
             for (leaf, patch) in self.meshes.contacts(room.fronts) {
                 let contact = leaf_contact((one, other), self.places, pos12, (&leaf, patch), gap);

@@ -148,9 +148,10 @@ impl Memo {
         }
     }
 
-    /// Finished at just these poses, and 0 cannot be told from the gap.
+    /// Finished at just these poses, and 0 cannot be told from the gap. An overlap that is proved is no touch, however
+    /// near 0 its upper end: that of meshes is a bound, not a depth.
     pub(super) fn touching(&self) -> bool {
-        self.finished && self.widened_m == 0.0 && self.gap.contains(0.0)
+        self.finished && self.widened_m == 0.0 && self.gap.contains(0.0) && self.gap.max > 0.0
     }
 
     /// Whether the contacts are of a collision that has ended since: their ids may go on, their points are no more.

@@ -20,5 +20,6 @@ mod oracle;
 
 mod flat;
 mod fresh;
+mod on_surface;
 mod support;
 mod surfaces;

@@ -244,7 +244,7 @@ impl CompoundFront {
         let certain = far || front.is_certain();
         let witness = front.witness().map(seen);
         if goal == Goal::Contacts && gap.min <= 0.0 {
-            for (leaf, patch) in found_on(front, store) {
+            for (leaf, patch) in found_on(front, store, shapes, &pair.pos12) {
                 let leaf = (&leaf, patch);
                 let contact = leaf_contact((one, other), pair.places, &pair.pos12, leaf, gap);
                 contacts.push(&mut self.found, contact);

@@ -7,6 +7,7 @@
 //! gaps are measured along the normal. The deepest point is always among those that come out.
 
 mod clipped;
+mod lathe;
 mod plane;
 mod shared;
 mod triangles;
@@ -16,6 +17,7 @@ pub(in crate::narrow) use shared::shared_points;
 pub(in crate::narrow) use triangles::shared_by_triangles;
 
 use clipped::Clipped;
+use lathe::Surface;
 
 use super::feature::{CORNERS_MAX, Feature};
 use super::pair::Pair;
@@ -154,8 +156,8 @@ struct Found {
     points: [ManifoldPoint; 2 * CORNERS_MAX],
     count: usize,
     normal: Vec3,
-    margin_a: f64,
-    margin_b: f64,
+    /// Of A and of B.
+    surfaces: [Surface; 2],
     prediction_m: f64,
     witness: ManifoldPoint,
     same: f64,
@@ -164,18 +166,13 @@ struct Found {
 impl Found {
     #[inline]
     fn new(pair: &Pair<'_>, closest: &Closest, prediction_m: f64) -> Self {
-        let margins = (pair.a.margin(), pair.b.margin());
-        let same = SAME * (pair.scale + margins.0 + margins.1);
-        Self::with(closest, margins, prediction_m, same)
+        let same = SAME * (pair.scale + pair.a.margin() + pair.b.margin());
+        let of_b = Surface::new(pair.b, pair.at, pair.rotation.column(2).into_owned());
+        Self::with(closest, [Surface::own(pair.a), of_b], prediction_m, same)
     }
 
     #[inline]
-    fn with(
-        closest: &Closest,
-        (margin_a, margin_b): (f64, f64),
-        prediction_m: f64,
-        same: f64,
-    ) -> Self {
+    fn with(closest: &Closest, surfaces: [Surface; 2], prediction_m: f64, same: f64) -> Self {
         let witness = ManifoldPoint {
             point_a: closest.point_a,
             point_b: closest.point_b,
@@ -186,8 +183,7 @@ impl Found {
             points: [witness; 2 * CORNERS_MAX],
             count: 0,
             normal: closest.normal,
-            margin_a,
-            margin_b,
+            surfaces,
             prediction_m,
             witness,
             same,
@@ -215,20 +211,27 @@ impl Found {
         found
     }
 
-    /// Takes a pair of points on the cores.
+    /// Takes a pair of points of the cores, out to the surfaces; none where there is no surface along the normal.
     fn take(&mut self, a: &Vec3, b: &Vec3, feature: u32) {
-        let gap_m = self.normal.dot(&(b - a)) - self.margin_a - self.margin_b;
+        let [of_a, of_b] = &self.surfaces;
+        let (Some(out_a), Some(out_b)) = (
+            of_a.way_out(a, &self.normal),
+            of_b.way_out(b, &-self.normal),
+        ) else {
+            return;
+        };
+        let gap_m = self.normal.dot(&(b - a)) - out_a - out_b;
         if gap_m > self.prediction_m || self.count == self.points.len() {
             return;
         }
-        let point_a = Point::from(a + self.normal * self.margin_a);
+        let point_a = Point::from(a + self.normal * out_a);
         let doubled = self.points[..self.count]
             .iter()
             .any(|p| (p.point_a - point_a).norm() <= self.same);
         if !doubled {
             self.points[self.count] = ManifoldPoint {
                 point_a,
-                point_b: Point::from(b - self.normal * self.margin_b),
+                point_b: Point::from(b - self.normal * out_b),
                 gap_m,
                 feature,
             };
@@ -346,15 +349,19 @@ fn overlap_lines(of_a: &Feature, of_b: &Feature, normal: &Vec3, found: &mut Foun
         let on_b = (s - place[0]) / span;
         #[allow(clippy::cast_possible_truncation, reason = "0 or 1")]
         let k32 = k as u32;
-        // The far point is put straight across: the lines may lean a little against each other.
+        // The far point is put straight across, and back onto its side: the lines may lean a little against each other.
         if (0.0..=1.0).contains(&on_b) {
             let end = a[0] + along * s;
-            let gap = normal.dot(&(b[0] + other * on_b - end));
-            found.take(&end, &(end + normal * gap), 0x100 | k32);
+            let far = end + normal * normal.dot(&(b[0] + other * on_b - end));
+            if let Some(back) = found.surfaces[1].way_back(&far, &-normal) {
+                found.take(&end, &(far - normal * back), 0x100 | k32);
+            }
         }
         if (0.0..=1.0).contains(&place[k]) {
-            let gap = normal.dot(&(b[k] - a[0] - along * place[k]));
-            found.take(&(b[k] - normal * gap), &b[k], 0x200 | k32);
+            let far = b[k] - normal * normal.dot(&(b[k] - a[0] - along * place[k]));
+            if let Some(back) = found.surfaces[0].way_back(&far, normal) {
+                found.take(&(far + normal * back), &b[k], 0x200 | k32);
+            }
         }
     }
 }

@@ -14,8 +14,10 @@
 //! take the face's normal everywhere (a box on a ridge would tilt to one of its sides).
 
 mod leaf;
+mod nearest;
 
 use leaf::{Leaf, corner_name, mix};
+use nearest::nearest;
 
 use super::Closest;
 use super::contacts::LeafContact;
@@ -162,39 +164,8 @@ pub(super) fn points(
     } else {
         LeafContact::SPARE
     };
-    patches.add(arena, &nearest(&a, &b, normal, patch, found));
+    patches.add(arena, &nearest(&a, &b, patch, found));
     true
-}
-
-/// Where the leaves themselves meet, straight across along a normal.
-fn nearest(
-    a: &Leaf<'_>,
-    b: &Leaf<'_>,
-    normal: Vec3,
-    patch: u32,
-    found: &LeafContact,
-) -> LeafContact {
-    // Two triangles that cross have their depth somewhere else; else these are the nearest points.
-    let middle = crossing(a, b)
-        .unwrap_or_else(|| nalgebra::center(&found.closest.point_a, &found.closest.point_b));
-    let gap_m = if patch == LeafContact::SPARE {
-        normal.dot(&(found.closest.point_b - found.closest.point_a))
-    } else {
-        found.closest.best_m
-    };
-    let triangles = u64::from(found.triangle_a) << 32 | u64::from(found.triangle_b);
-    LeafContact {
-        closest: Closest {
-            normal,
-            best_m: gap_m,
-            point_a: middle - normal * (0.5 * gap_m),
-            point_b: middle + normal * (0.5 * gap_m),
-            ..found.closest
-        },
-        feature: mix(triangles, 3),
-        patch,
-        ..*found
-    }
 }
 
 /// What [`choose`] chose.
@@ -344,30 +315,4 @@ fn corners(
         }
     }
     true
-}
-
-/// The middle of what two triangles share where they cross.
-fn crossing(a: &Leaf<'_>, b: &Leaf<'_>) -> Option<Point> {
-    let (normal_a, normal_b) = (a.normal?, b.normal?);
-    let (of_a, of_b) = (a.corners, b.corners);
-    let (mut sum, mut count) = (Vec3::zeros(), 0.0);
-    for (plane, normal, other) in [(&of_a, &normal_a, &of_b), (&of_b, &normal_b, &of_a)] {
-        for k in 0..3 {
-            let (from, to) = (other[k], other[(k + 1) % 3]);
-            let [x, y] = [from, to].map(|p| normal.dot(&(p - plane[0])));
-            if (x > 0.0) == (y > 0.0) {
-                continue;
-            }
-            let at = from + (to - from) * (x / (x - y));
-            let within = (0..3).all(|i| {
-                let along = plane[(i + 1) % 3] - plane[i];
-                along.cross(&(at - plane[i])).dot(normal) >= 0.0
-            });
-            if within {
-                sum += at.coords;
-                count += 1.0;
-            }
-        }
-    }
-    (count > 0.0).then(|| Point::from(sum / count))
 }

@@ -3,8 +3,8 @@
 //! In: a shape and the exact answer of the pair. Out: the corners of its feature along the plane's normal that lie on
 //! the plane or behind it, all of them: which are kept is decided by who knows which were kept before.
 
-use super::{Closest, Convex, Feature, Found, ManifoldPoint, PREDICTION, SAME};
-use crate::math::Pose;
+use super::{Closest, Convex, Feature, Found, ManifoldPoint, PREDICTION, SAME, Surface};
+use crate::math::{Pose, Vec3};
 
 /// Hands over the contact points of a shape that touches a half-space, up to 9, in A's frame.
 ///
@@ -24,13 +24,17 @@ pub(in crate::narrow) fn points_on_plane(
         None => Feature::towards(shape.core(), &normal),
     };
     let rounding_m = closest.gap.max - closest.gap.min;
-    let (margin_a, margin_b) = match at {
-        Some(_) => (0.0, shape.margin()),
-        None => (shape.margin(), 0.0),
+    let plane = Surface::Even(0.0);
+    let surfaces = match at {
+        Some(pose) => {
+            let axis = pose.rotation * Vec3::z();
+            [plane, Surface::new(shape, pose.translation.vector, axis)]
+        }
+        None => [Surface::own(shape), plane],
     };
     let mut found = Found::with(
         closest,
-        (margin_a, margin_b),
+        surfaces,
         rounding_m.max(PREDICTION * shape.radius()),
         SAME * (shape.reach() + shape.margin()),
     );
