@@ -215,6 +215,17 @@ def test_bug_who_listens_to_the_plan_is_told_it(daemon):
         assert client.plan is None
 
 
+def test_who_sends_says_how_it_writes_quaternions_and_who_reads_need_not(daemon):
+    # a source is what a client is unless it says otherwise
+    for order in ({}, {"quat_order": "zyx"}):
+        with pytest.raises(sweepd.SweepdError, match="quat_order=.*say \"xyzw\" or \"wxyz\".*source=None"):
+            sweepd.Client(daemon[0], **order)
+    with sweepd.Client(daemon[0], source=None) as client:
+        assert client.wait(timeout_s=5).state
+        with pytest.raises(sweepd.SweepdError, match="a reader that makes rows says how it writes quaternions"):
+            client.rows(([1], [[0.0, 0.0, 0.0]], [NO_TURN]))
+
+
 def test_bug_a_list_whose_place_another_reader_took_is_asked_for_again(started, monkeypatch):
     with sweepd.Client(started(MANY), "sim", quat_order="wxyz", listen=("changes",)) as client:
         client.step(crowd(0), timeout_s=5)

@@ -124,7 +124,7 @@ class Client:
     For one thread at a time: what another one asks in the midst of a call is refused, but for ``names`` and ``plan``. It
     waits without Python's lock, so other threads go on. In a forked process it is the parent's: make another one there.
 
-    * ``quat_order``: how you write quaternions, ``"xyzw"`` (ROS) or ``"wxyz"`` (MuJoCo). It must be said.
+    * ``quat_order``: how you write quaternions, ``"xyzw"`` (ROS) or ``"wxyz"`` (MuJoCo). A source must say it.
     * ``listen``: the messages to listen to, or one, of ``pairs``, ``changes``, ``contacts``, ``regions``, ``bodies``,
       ``body_verdicts``, ``plan``; the daemon computes what somebody listens to. ``names`` are always.
     * ``timeout_s``: how long to look for a daemon.
@@ -136,16 +136,19 @@ class Client:
         instance: str = "default",
         source: Optional[str] = "sim",
         *,
-        quat_order: str,
+        quat_order: Optional[str] = None,
         timeout_s: float = 5.0,
         listen: Union[str, Iterable[str]] = ("pairs", "contacts"),
         root: Optional[str] = None,
         prefix: Optional[str] = None,
     ) -> None:
-        if quat_order not in ("xyzw", "wxyz"):
-            raise SweepdError(f'quat_order={quat_order!r}: say "xyzw" or "wxyz"')
+        if quat_order not in ("xyzw", "wxyz") and not (quat_order is None and source is None):
+            raise SweepdError(
+                f'quat_order={quat_order!r}: say "xyzw" or "wxyz", as you write quaternions; a reader, which sends none,'
+                " says source=None instead"
+            )
         self._turns = Turns()
-        self._wxyz = quat_order == "wxyz"
+        self._quat_order = quat_order
         self._source = source
         if source is not None and not 1 <= _bytes_of(source) < layout.SOURCE_NAME_LEN:
             raise SweepdError(
@@ -429,8 +432,11 @@ class Client:
             if poses.ndim != 1:
                 raise SweepdError(f"rows of shape {poses.shape}: give (n,)")
             return poses
+        if self._quat_order is None:
+            raise SweepdError('a reader that makes rows says how it writes quaternions: quat_order="xyzw" or "wxyz"')
+        wxyz = self._quat_order == "wxyz"
         if isinstance(poses, dict):
-            rows = rows_of(self._ids(poses), columns_of(poses), self._wxyz, poses)
+            rows = rows_of(self._ids(poses), columns_of(poses), wxyz, poses)
         else:
             try:
                 ids, *columns = poses
@@ -439,7 +445,7 @@ class Client:
                     f"poses of type {type(poses).__name__}: give {{name: (position, quaternion)}},"
                     " (ids, positions, quaternions) or rows"
                 ) from None
-            rows = rows_of(ids, columns, self._wxyz)
+            rows = rows_of(ids, columns, wxyz)
         rows.boot_id = self._boot
         return rows
 

@@ -101,14 +101,19 @@ def _ours(what):
             try:
                 return method(self, *args, **kwargs)
             except _FOREIGN as e:
-                if str(e) == "DoesNotExist":
-                    # a port that was not needed yet, of a daemon that has ended meanwhile
+                # a port that was not needed yet may be of a daemon that has ended meanwhile
+                if _is_away(e):
                     raise TimedOut(f"{what}: {self._nobody(e)}") from e
                 raise SweepdError(f"{what}: {_why(e)}") from e
 
         return call
 
     return wrap
+
+
+def _is_away(e):
+    """Whether it says that no daemon is there."""
+    return str(e) == "DoesNotExist"
 
 
 def _why(e):
@@ -200,9 +205,7 @@ class Ports:
             raise TimedOut(self._nobody("its files are missing")) from e
         except _FOREIGN as e:
             self.close()
-            if str(e) == "DoesNotExist":
-                raise TimedOut(self._nobody(e)) from e
-            raise Refused(f"instance `{instance}` cannot be opened: {_why(e)}") from e
+            raise self._unopened(e, f"instance `{instance}` cannot be opened") from e
         except SweepdError:
             self.close()
             raise
@@ -228,11 +231,10 @@ class Ports:
     def silence(self):
         """What it means that the daemon says nothing, and what to do."""
         short = files.short()
-        if short is not None:
-            return f"messages do not pass, for {short}"
+        files_told = "" if short is None else f"messages may not pass, for {short}; else, "
         return (
-            f"if that lasts, the daemon was killed or is stopped: `sweepd doctor --instance {self._instance}` says which,"
-            f" `{self._run()}` starts a new one"
+            f"{files_told}if that lasts, the daemon was killed or is stopped: `sweepd doctor --instance {self._instance}`"
+            f" says which, `{self._run()}` starts a new one"
         )
 
     def _open(self):
@@ -315,9 +317,9 @@ class Ports:
         try:
             messages = self._messages(topic, row, header)
         except _FOREIGN as e:
-            if str(e) == "DoesNotExist":
+            if _is_away(e):
                 return
-            raise Refused(self._unread(topic, e)) from e
+            raise self._unread(topic, e) from e
         # First the old port, which takes a reader's place. The service is held meanwhile: while a daemon starts anew
         # nobody else may hold it, and who lets it go last takes it along.
         self._readers.pop(topic, None)
@@ -330,14 +332,16 @@ class Ports:
         try:
             port = _patiently(lambda: messages().subscriber_builder().create(), until)
         except _FOREIGN as e:
-            if str(e) == "DoesNotExist":
-                raise TimedOut(self._nobody(e)) from e
-            raise Refused(self._unread(topic, e)) from e
+            raise self._unread(topic, e) from e
         self._readers[topic] = (port, np.dtype(row), header, weakref.WeakSet())
         self.wake(14)
 
     def _unread(self, topic, e):
-        return f"`{topic}` of instance `{self._instance}` cannot be read: {_why(e)}"
+        return self._unopened(e, f"`{topic}` of instance `{self._instance}` cannot be read")
+
+    def _unopened(self, e, what):
+        """What of this package stands for what iceoryx2 raised when something was to be opened."""
+        return TimedOut(self._nobody(e)) if _is_away(e) else Refused(f"{what}: {_why(e)}")
 
     def is_open(self, topic):
         """Whether the topic is listened to."""
