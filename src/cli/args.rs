@@ -34,6 +34,9 @@ pub(super) enum Command {
     /// Move a scene's bodies by a built-in motion: a source for demos and load.
     Feed(FeedArgs),
     /// Watch a running daemon: state, pairs by name, gaps, budget, sources, rejects.
+    ///
+    /// `q` or Ctrl-C ends it. On a terminal of fewer than some 110 columns (60 at least) names are shortened, `closing`
+    /// goes where there is no room for it, and an event is one word.
     Monitor(MonitorArgs),
     /// Ask a running daemon: gaps, what touches, rays, times of impact; or answer shape-pair questions offline.
     Query(Box<QueryArgs>),

@@ -29,6 +29,14 @@ pub(super) fn number(value: f64, digits: usize) -> String {
     }
 }
 
+/// A number in so many columns, with as many digits as have room behind its point.
+#[cfg(any(feature = "tui", test))]
+pub(super) fn number_within(value: f64, digits: usize, width: usize) -> String {
+    let mut told = (0..=digits).rev().map(|digits| number(value, digits));
+    told.find(|text| text.len() <= width)
+        .unwrap_or_else(|| format!("{value:.0e}"))
+}
+
 /// Metres to the last digit that f64 has: intervals of a proof differ in those.
 pub(super) fn metres(value: f64) -> String {
     let size = value.abs();
@@ -100,6 +108,16 @@ mod tests {
         for value in [0.0, -9_999.999_999, 1e300, f64::NEG_INFINITY, f64::NAN] {
             assert!(number(value, 6).len() <= 12, "{}", number(value, 6));
         }
+    }
+
+    #[test]
+    fn numbers_with_less_room_have_fewer_digits_and_are_never_cut() {
+        assert_eq!(number_within(-9.5, 6, 10), "-9.500000");
+        assert_eq!(number_within(-9_999.125_4, 6, 10), "-9999.1254");
+        assert_eq!(number_within(9_999.96, 3, 5), "10000");
+        assert_eq!(number_within(-1.25e300, 3, 8), "-1e300");
+        assert_eq!(number_within(f64::NAN, 6, 1), "-");
+        assert_eq!(number_within(f64::NEG_INFINITY, 6, 4), "-inf");
     }
 
     #[test]

@@ -74,7 +74,7 @@ fn dispatch(command: Command, ros_words: Option<&[String]>) -> Result<ExitCode> 
         Command::Run(args) => run::run(&args, ros_words, stop()?.as_ref()),
         Command::Check(args) => check::check(&args, &mut out),
         Command::Feed(args) => feed::feed(&args, &mut out, stop()?.as_ref()),
-        Command::Monitor(args) => monitor::monitor(&args, &mut out, stop()?.as_ref()),
+        Command::Monitor(args) => monitor::monitor(&args, &mut out),
         Command::Query(args) => query::query(&args, &mut out),
         Command::List(args) => list::list(&args, &mut out),
         Command::Doctor(args) => doctor::doctor(&args, &mut out),
@@ -100,16 +100,28 @@ fn dispatch(command: Command, ros_words: Option<&[String]>) -> Result<ExitCode> 
 
 /// A flag that SIGINT and SIGTERM raise; a second signal ends the process at once.
 fn stop() -> Result<Arc<AtomicBool>> {
+    flag(true)
+}
+
+/// A flag that SIGINT and SIGTERM raise; a second signal is the caller's.
+#[cfg(feature = "tui")]
+fn stop_at_first() -> Result<Arc<AtomicBool>> {
+    flag(false)
+}
+
+fn flag(second_ends: bool) -> Result<Arc<AtomicBool>> {
+    let failed = |e| Error::io("cannot listen for signals", e);
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        signal_hook::flag::register_conditional_shutdown(signal, 4, Arc::clone(&stop))
-            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&stop)))
-            .map_err(|e| Error::io("cannot listen for signals", e))?;
+        if second_ends {
+            signal_hook::flag::register_conditional_shutdown(signal, 4, Arc::clone(&stop))
+                .map_err(failed)?;
+        }
+        signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(failed)?;
     }
     // Beyond the largest file that is allowed a write fails then, and says so, in place of ending the process.
     let too_large = rustix::process::Signal::XFSZ.as_raw();
-    signal_hook::flag::register(too_large, Arc::default())
-        .map_err(|e| Error::io("cannot listen for signals", e))?;
+    signal_hook::flag::register(too_large, Arc::default()).map_err(failed)?;
     Ok(stop)
 }
 

@@ -1,7 +1,7 @@
 //! `sweepd monitor`: what a running daemon says, as a screen or as JSON lines.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 mod face;
 mod json;
@@ -27,9 +27,10 @@ const WHOLE_WAIT_NS: u64 = 1_000_000_000;
 const SILENCE_NS: u64 = 300_000_000;
 
 /// Follows an instance until stopped.
-pub(super) fn monitor(args: &MonitorArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
+pub(super) fn monitor(args: &MonitorArgs, out: &mut Out) -> Result<bool> {
     let mut face = Face::of(args)?;
-    let Some(mut client) = connect(&args.which.instance, None, args.wait, stop)? else {
+    let stop = face.stop()?;
+    let Some(mut client) = connect(&args.which.instance, None, args.wait, &stop)? else {
         return Ok(true);
     };
     client.subscribe(Topics {
@@ -44,7 +45,9 @@ pub(super) fn monitor(args: &MonitorArgs, out: &mut Out, stop: &AtomicBool) -> R
     let mut heard_ns = clock.monotonic_ns();
     let mut silence_ns = SILENCE_NS;
     let mut whole_by_ns = heard_ns.saturating_add(WHOLE_WAIT_NS);
-    while !stop.load(Ordering::Relaxed) && args.ticks.is_none_or(|most| seen < most) {
+    face.open();
+    let is_ended = |face: &Face| stop.load(Ordering::Relaxed) || face.is_end_typed();
+    while !is_ended(&face) && args.ticks.is_none_or(|most| seen < most) {
         match client.wait_tick(LOOK_NS)? {
             Heard::Tick => {
                 let before_ns = std::mem::replace(&mut heard_ns, clock.monotonic_ns());
@@ -103,6 +106,7 @@ fn is_shown(view: &View, args: &MonitorArgs) -> bool {
 #[derive(Debug, Default)]
 pub(super) struct Names {
     by_id: BTreeMap<u64, String>,
+    longest: usize,
     tick: u64,
     boot_id: u64,
 }
@@ -115,10 +119,18 @@ impl Names {
         }
         (self.tick, self.boot_id) = (names.header.tick, names.header.boot_id);
         self.by_id.clear();
+        self.longest = 0;
         for row in &names.rows {
             let name = name_str(&row.name).unwrap_or("?").to_owned();
+            self.longest = self.longest.max(name.chars().count());
             self.by_id.insert(row.body, name);
         }
+    }
+
+    /// Characters of the longest.
+    #[cfg(feature = "tui")]
+    pub(super) fn longest(&self) -> usize {
+        self.longest
     }
 
     /// The name of a body, or its number.

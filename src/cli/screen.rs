@@ -1,48 +1,55 @@
 //! The screen of `sweepd monitor`: redrawn in place on a terminal, at most ten times a second; plain text elsewhere.
 
+mod keys;
+mod lines;
+mod pairs;
+mod sources;
+
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use crate::error::Result;
 use crate::time::{Clock, SystemClock};
 use crate::transport::client::View;
-use crate::wire::{
-    BodyRow, BodyStatus, EndCause, Event, PairRow, Stage, TickCause, TickRow, Verdict, name_str,
-    pair_flags,
-};
+use crate::wire::{BodyRow, BodyStatus, Stage, TickCause, TickRow};
 
-use super::figures::{cut, number, seconds, time};
+use super::figures::{cut, seconds, time};
 use super::monitor::{Names, reasons, rejects, state_word};
 use super::out::{Out, colours_wanted};
 use super::worst;
+use keys::Keys;
+use lines::{BOLD, GREEN, Ink, RED, YELLOW, flow};
+use pairs::{NAME_WIDTH, PairTable};
 
 /// Time between two drawings, nanoseconds: faster cannot be read, and would cost the daemon's machine a core.
 const REDRAW_NS: u64 = 100_000_000;
 /// Time between two lines that say silence, where nothing can be drawn in place, nanoseconds.
 const RESAY_NS: u64 = 1_000_000_000;
-/// Unknown bodies listed.
+/// Unknown bodies listed, at most; and lines of pairs that they leave on the terminal.
 const UNKNOWN_SHOWN: usize = 5;
-/// Columns of a body's name; longer ones are cut.
-const NAME_WIDTH: usize = 24;
-/// Columns of the bar of the budget.
-const BAR_WIDTH: usize = 20;
-
-const RED: &str = "\x1b[31m";
-const YELLOW: &str = "\x1b[33m";
-const GREEN: &str = "\x1b[32m";
-const BOLD: &str = "\x1b[1m";
-const RESET: &str = "\x1b[0m";
+const PAIRS_KEPT: usize = 3;
+/// Columns of the bar of the budget: where there is room, and where there is not.
+const BAR_WIDTHS: [usize; 2] = [20, 8];
+/// Columns from which on there is room for all that stands above the pairs.
+const ROOMY: usize = 100;
 
 /// Draws ticks.
 pub(super) struct Screen {
     instance: String,
     pairs: usize,
     in_place: bool,
-    colours: bool,
+    ink: Ink,
+    /// Columns of a line; there is no end where nothing is drawn in place.
+    width: usize,
     drawn_ns: Option<u64>,
     /// Tick number and moment of the last drawing, for the rate of ticks.
     drawn_tick: u64,
     restarts: u64,
+    /// From [`Screen::stop`] on; what of them is read, from [`Screen::open`] on.
+    keys: Option<Keys>,
+    are_keys_read: bool,
     /// What stood below the first line, shown on through a silence.
     below: String,
 }
@@ -53,12 +60,34 @@ impl Screen {
             instance,
             pairs,
             in_place: drawn_stdout(),
-            colours: coloured_stdout(),
+            ink: Ink {
+                colours: coloured_stdout(),
+            },
+            width: usize::MAX,
             drawn_ns: None,
             drawn_tick: 0,
             restarts: 0,
+            keys: None,
+            are_keys_read: false,
             below: String::new(),
         }
+    }
+
+    /// The flag that SIGINT and SIGTERM raise; a second one ends the process, the terminal as it was.
+    pub(super) fn stop(&mut self) -> Result<Arc<AtomicBool>> {
+        let (keys, stop) = Keys::watch()?;
+        self.keys = Some(keys);
+        Ok(stop)
+    }
+
+    /// From now on `q` is read, where this is a terminal.
+    pub(super) fn open(&mut self) {
+        self.are_keys_read = self.in_place && self.keys.as_ref().is_some_and(Keys::open);
+    }
+
+    /// Whether `q` was typed.
+    pub(super) fn is_end_typed(&self) -> bool {
+        self.are_keys_read && self.keys.as_ref().is_some_and(Keys::is_end_typed)
     }
 
     /// Notes that the daemon restarted.
@@ -73,13 +102,16 @@ impl Screen {
         if self.is_recent(now_ns, REDRAW_NS) {
             return Ok(());
         }
+        self.measure();
         let tick = view.tick();
         let head = self.head(tick, now_ns);
         let mut below = String::new();
         self.counts(tick, &mut below);
+        self.times(tick, &mut below);
+        self.refused(tick, &mut below);
         self.sources(tick, &mut below);
-        self.bodies(view, names, &mut below);
-        self.rows(view, names, &mut below);
+        self.bodies(view, names, head.lines().count(), &mut below);
+        self.rows(view, names, head.lines().count(), &mut below);
         self.below = below;
         self.drawn_tick = tick.header.tick;
         self.draw(&head, true, now_ns, out)
@@ -92,12 +124,17 @@ impl Screen {
         if self.is_recent(now_ns, pause_ns) {
             return Ok(());
         }
-        let head = format!(
-            "sweepd `{}`  {}  no tick for {:.1} s; below is what came last\n",
-            self.instance,
-            self.paint(RED, "SILENT"),
-            seconds(silent_ns)
-        );
+        self.measure();
+        let parts = [
+            format!("sweepd `{}`", self.instance),
+            self.ink.paint(RED, "SILENT"),
+            format!(
+                "no tick for {:.1} s; below is what came last",
+                seconds(silent_ns)
+            ),
+        ];
+        let mut head = String::new();
+        flow(&mut head, &parts, "  ", self.width);
         self.draw(&head, self.in_place, now_ns, out)
     }
 
@@ -111,13 +148,23 @@ impl Screen {
             .is_some_and(|drawn_ns| now_ns.saturating_sub(drawn_ns) < pause_ns)
     }
 
+    /// Takes the width that the terminal has now. Its last column stays free: what clears a line behind its text would
+    /// clear it.
+    fn measure(&mut self) {
+        self.width = match stdout_size() {
+            Some((_, columns)) if self.in_place => columns.saturating_sub(1),
+            _ => usize::MAX,
+        };
+    }
+
     fn draw(&mut self, head: &str, whole: bool, now_ns: u64, out: &mut Out) -> Result<()> {
         self.drawn_ns = Some(now_ns);
         let below = if whole { self.below.as_str() } else { "" };
         if self.in_place {
             // Home, long lines cut by the terminal, each line cleared behind its text, the rest cleared: no flicker,
             // and nothing scrolls.
-            let most = stdout_lines().map_or(usize::MAX, |lines| lines.saturating_sub(1).max(1));
+            let most =
+                stdout_size().map_or(usize::MAX, |(lines, _)| lines.saturating_sub(1).max(1));
             out.text("\x1b[?7l\x1b[H")?;
             for line in head.lines().chain(below.lines()).take(most) {
                 out.text(&format!("{line}\x1b[K\n"))?;
@@ -131,14 +178,6 @@ impl Screen {
         out.flush()
     }
 
-    fn paint(&self, colour: &str, text: &str) -> String {
-        if self.colours && !colour.is_empty() {
-            format!("{colour}{text}{RESET}")
-        } else {
-            text.to_owned()
-        }
-    }
-
     fn head(&self, tick: &TickRow, now_ns: u64) -> String {
         let word = state_word(tick);
         let colour = match word {
@@ -146,11 +185,8 @@ impl Screen {
             "clear" => GREEN,
             _ => YELLOW,
         };
-        let state = self.paint(BOLD, &self.paint(colour, &word.to_uppercase()));
-        let mut text = format!(
-            "sweepd `{}`  {state}  tick {}",
-            self.instance, tick.header.tick
-        );
+        let state = self.ink.paint(colour, &word.to_uppercase());
+        let mut number = format!("tick {}", tick.header.tick);
         let ticks = tick.header.tick.saturating_sub(self.drawn_tick);
         if let Some(drawn_ns) = self.drawn_ns
             && self.drawn_tick > 0
@@ -160,63 +196,103 @@ impl Screen {
                 reason = "ticks of a tenth of a second; shown with one digit"
             )]
             let rate = ticks as f64 / seconds(now_ns.saturating_sub(drawn_ns)).max(1e-3);
-            let _ = write!(text, " ({rate:.1} a second)");
+            let _ = write!(number, " ({rate:.1} a second)");
         }
         let cause = TickCause::from_code(tick.cause).map_or("?", TickCause::word);
-        let _ = write!(text, "  by {cause}");
-        if self.restarts > 0 {
-            let _ = write!(text, "  restarts {}", self.restarts);
-        }
-        text.push('\n');
+        let restarts = match self.restarts {
+            0 => String::new(),
+            count => format!("restarts {count}"),
+        };
+        let parts = [
+            format!("sweepd `{}`", self.instance),
+            self.ink.paint(BOLD, &state),
+            number,
+            format!("by {cause}"),
+            restarts,
+            if self.are_keys_read {
+                "q ends".to_owned()
+            } else {
+                String::new()
+            },
+        ];
+        let mut text = String::new();
+        flow(&mut text, &parts, "  ", self.width);
         text
     }
 
     fn counts(&self, tick: &TickRow, text: &mut String) {
-        let why = reasons(tick).join(", ");
-        let why = if why.is_empty() { "-" } else { why.as_str() };
-        let _ = writeln!(text, "reasons    {why}");
-        let _ = writeln!(
-            text,
-            "bodies     {:<8} unknown {:<8} ignored pairs {:<8} candidates {}",
-            tick.bodies, tick.unknown, tick.ignored, tick.candidates
-        );
-        let _ = writeln!(
-            text,
-            "colliding  {:<8} possible {:<7} near {:<17} left out {}",
-            tick.colliding, tick.possible, tick.near, tick.header.truncated
-        );
-        let _ = writeln!(
-            text,
-            "time       {}   floor {}   units {}   missed {}",
-            self.budget(tick),
-            time(tick.floor_ns),
-            tick.units,
-            tick.missed
-        );
-        *text += "stages    ";
-        for stage in Stage::ALL {
+        let why = reasons(tick);
+        let why = if why.is_empty() { vec!["-"] } else { why };
+        let mut parts: Vec<String> = why.iter().map(|word| format!("{word},")).collect();
+        if let Some(last) = parts.last_mut() {
+            last.pop();
+        }
+        parts[0].insert_str(0, "reasons    ");
+        flow(text, &parts, " ", self.width);
+        // One below the other where there is room for that.
+        let roomy = self.width >= ROOMY;
+        let pad = |width: usize| if roomy { width } else { 0 };
+        let gap = if roomy { " " } else { "  " };
+        let ignored = if roomy { "ignored pairs" } else { "ignored" };
+        let bodies = [
+            format!("bodies     {:<1$}", tick.bodies, pad(8)),
+            format!("unknown {:<1$}", tick.unknown, pad(8)),
+            format!("{ignored} {:<1$}", tick.ignored, pad(8)),
+            format!("candidates {}", tick.candidates),
+        ];
+        flow(text, &bodies, gap, self.width);
+        let verdicts = [
+            format!("colliding  {:<1$}", tick.colliding, pad(8)),
+            format!("possible {:<1$}", tick.possible, pad(7)),
+            format!("near {:<1$}", tick.near, pad(17)),
+            format!("left out {}", tick.header.truncated),
+        ];
+        flow(text, &verdicts, gap, self.width);
+    }
+
+    fn times(&self, tick: &TickRow, text: &mut String) {
+        let roomy = self.width >= ROOMY;
+        let gap = if roomy { "   " } else { "  " };
+        let parts = [
+            format!(
+                "time       {}",
+                self.budget(tick, BAR_WIDTHS[usize::from(!roomy)])
+            ),
+            format!("floor {}", time(tick.floor_ns)),
+            format!("units {}", tick.units),
+            format!("missed {}", tick.missed),
+        ];
+        flow(text, &parts, gap, self.width);
+        let spent = |stage: &Stage| {
             let spent_ns = tick.stage_ns[usize::from(stage.code())];
-            let _ = write!(text, " {stage} {}  ", time(spent_ns));
+            format!("{stage} {}", time(spent_ns))
+        };
+        let mut stages: Vec<String> = Stage::ALL.iter().map(spent).collect();
+        if let Some(first) = stages.first_mut() {
+            first.insert_str(0, "stages     ");
         }
-        text.push('\n');
+        flow(text, &stages, gap, self.width);
+    }
+
+    fn refused(&self, tick: &TickRow, text: &mut String) {
         let refused = rejects(tick);
-        if !refused.is_empty() {
-            let list: Vec<String> = refused
-                .iter()
-                .map(|(why, n)| format!("{why} {n}"))
-                .collect();
-            let line = format!("refused    {}", list.join("   "));
-            let _ = writeln!(text, "{}", self.paint(YELLOW, &line));
+        if refused.is_empty() {
+            return;
         }
+        let painted =
+            |(why, count): &(&str, u64)| self.ink.paint(YELLOW, &format!("{why} {count}"));
+        let mut parts: Vec<String> = refused.iter().map(painted).collect();
+        parts[0].insert_str(0, &self.ink.paint(YELLOW, "refused    "));
+        flow(text, &parts, "   ", self.width);
     }
 
     /// How much of the budget is used, as a bar where there is one.
-    fn budget(&self, tick: &TickRow) -> String {
+    fn budget(&self, tick: &TickRow, width: usize) -> String {
         let elapsed = time(tick.elapsed_ns);
         if tick.budget_ns == u64::MAX {
             return format!("{elapsed} of no limit");
         }
-        let width = BAR_WIDTH as u64;
+        let width = width as u64;
         let used = (tick.elapsed_ns.saturating_mul(width) / tick.budget_ns.max(1)).min(width);
         let bar: String = (0..width)
             .map(|at| if at < used { '#' } else { '.' })
@@ -225,45 +301,21 @@ impl Screen {
             0 => GREEN,
             _ => RED,
         };
-        let bar = self.paint(colour, &bar);
+        let bar = self.ink.paint(colour, &bar);
         format!("[{bar}] {elapsed} of {}", time(tick.budget_ns))
     }
 
     fn sources(&self, tick: &TickRow, text: &mut String) {
-        let len = usize::from(tick.sources_len);
-        if len == 0 {
-            return;
+        let lines = sources::table(tick, self.width, self.ink);
+        if !lines.is_empty() {
+            text.push('\n');
         }
-        let _ = writeln!(
-            text,
-            "\n{:<24} {:<11} {:>10} {:>12} {:>10} {:>10}",
-            "source", "state", "age", "frame", "skipped", "refused"
-        );
-        for source in tick.sources.iter().take(len) {
-            let (colour, word) = match (source.alive, source.paused, source.age_ns) {
-                (_, _, u64::MAX) => (YELLOW, "nothing yet"),
-                (1, 1, _) => ("", "paused"),
-                (1, _, _) => (GREEN, "alive"),
-                _ => (RED, "silent"),
-            };
-            let age = if source.age_ns == u64::MAX {
-                "-".to_owned()
-            } else {
-                time(source.age_ns)
-            };
-            let _ = writeln!(
-                text,
-                "{:<24} {} {age:>10} {:>12} {:>10} {:>10}",
-                cut(name_str(&source.name).unwrap_or("?"), NAME_WIDTH),
-                self.paint(colour, &format!("{word:<11}")),
-                source.seq,
-                source.skipped,
-                source.refused
-            );
+        for line in lines {
+            let _ = writeln!(text, "{line}");
         }
     }
 
-    fn bodies(&self, view: &View, names: &Names, text: &mut String) {
+    fn bodies(&self, view: &View, names: &Names, head_lines: usize, text: &mut String) {
         let Some(bodies) = view.bodies() else { return };
         let unknown: Vec<_> = bodies
             .rows
@@ -274,84 +326,42 @@ impl Screen {
             return;
         }
         text.push('\n');
-        for (body, word) in unknown.iter().take(UNKNOWN_SHOWN) {
+        // The worst pairs have room below, with their heads and what stands between.
+        let room = self.room(head_lines + text.lines().count() + 3);
+        let shown = room.saturating_sub(PAIRS_KEPT).clamp(1, UNKNOWN_SHOWN);
+        for (body, word) in unknown.iter().take(shown) {
             let line = format!("{} is {word}", cut(&names.of(*body), NAME_WIDTH));
-            let _ = writeln!(text, "{}", self.paint(YELLOW, &line));
+            let _ = writeln!(text, "{}", self.ink.paint(YELLOW, &line));
         }
-        if unknown.len() > UNKNOWN_SHOWN {
-            let _ = writeln!(text, "and {} more", unknown.len() - UNKNOWN_SHOWN);
+        if unknown.len() > shown {
+            let _ = writeln!(text, "and {} more", unknown.len() - shown);
         }
     }
 
-    fn rows(&self, view: &View, names: &Names, text: &mut String) {
+    fn rows(&self, view: &View, names: &Names, head_lines: usize, text: &mut String) {
         let Some(pairs) = view.pairs() else { return };
         if pairs.rows.is_empty() {
             *text += "\nno pair is near, possible or colliding\n";
             return;
         }
-        let _ = writeln!(
-            text,
-            "\n{:<24} {:<24} {:<9} {:>12} {:>12} {:>9}  event",
-            "a", "b", "verdict", "gap from [m]", "to [m]", "closing"
-        );
-        let most = pairs.rows.len().min(self.pairs).min(self.room(text));
-        let rows = worst::pairs(&pairs.rows, most);
+        let table = PairTable::fit(self.width, names.longest());
+        let _ = writeln!(text, "\n{}", table.head());
+        let room = self.room(head_lines + text.lines().count());
+        let rows = worst::pairs(&pairs.rows, self.pairs.min(room));
         for row in &rows {
-            let _ = writeln!(text, "{}", self.row(row, names));
+            let _ = writeln!(text, "{}", table.row(row, names, self.ink));
         }
         if pairs.rows.len() > rows.len() {
             let _ = writeln!(text, "and {} more", pairs.rows.len() - rows.len());
         }
     }
 
-    /// Rows that fit below the text, with the head above and a last line that says how many did not.
-    fn room(&self, text: &str) -> usize {
-        match stdout_lines() {
-            Some(lines) if self.in_place => lines.saturating_sub(text.lines().count() + 3),
+    /// Rows that fit below so many lines, with a line that says how many did not, and the last, which stays free.
+    fn room(&self, above: usize) -> usize {
+        match stdout_size() {
+            Some((lines, _)) if self.in_place => lines.saturating_sub(above + 2),
             _ => usize::MAX,
         }
-    }
-
-    fn row(&self, row: &PairRow, names: &Names) -> String {
-        let verdict = Verdict::from_code(row.verdict);
-        let colour = match verdict {
-            Some(Verdict::Colliding) => RED,
-            _ if row.flags & pair_flags::SWEPT_HIT != 0 => RED,
-            Some(Verdict::Possible) => YELLOW,
-            _ if row.flags & pair_flags::SWEPT_OPEN != 0 => YELLOW,
-            _ => "",
-        };
-        let mut events: Vec<String> = Vec::new();
-        for event in Event::ALL.iter().filter(|e| row.events & e.bit() != 0) {
-            match event {
-                Event::End => {
-                    let cause = EndCause::from_code(row.end_cause).map_or("?", EndCause::word);
-                    events.push(format!("end ({cause})"));
-                }
-                Event::Begin => events.push("begin".to_owned()),
-                Event::Passed => events.push("passed on the way".to_owned()),
-                Event::Persist => {}
-            }
-        }
-        if row.flags & pair_flags::SWEPT_HIT != 0 {
-            events.push(format!("touched at {} of the way", number(row.toi_max, 6)));
-        } else if row.flags & pair_flags::SWEPT_OPEN != 0 {
-            events.push(format!("open from {} of the way", number(row.toi_min, 6)));
-        }
-        if row.flags & pair_flags::TELEPORTED != 0 {
-            events.push("teleported".to_owned());
-        }
-        let word = verdict.map_or("?", Verdict::word);
-        let line = format!(
-            "{:<24} {:<24} {word:<9} {:>12} {:>12} {:>9}  {}",
-            cut(&names.of(row.body_a), NAME_WIDTH),
-            cut(&names.of(row.body_b), NAME_WIDTH),
-            number(row.gap_min_m, 6),
-            number(row.gap_max_m, 6),
-            number(row.closing_mps, 3),
-            events.join(", ")
-        );
-        self.paint(colour, line.trim_end())
     }
 }
 
@@ -365,10 +375,11 @@ fn drawn_stdout() -> bool {
     std::io::stdout().is_terminal() && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
 }
 
-/// Lines of the terminal behind stdout.
-fn stdout_lines() -> Option<usize> {
+/// Lines and columns of the terminal behind stdout.
+fn stdout_size() -> Option<(usize, usize)> {
     let size = rustix::termios::tcgetwinsize(std::io::stdout()).ok()?;
-    (size.ws_row > 0).then(|| usize::from(size.ws_row))
+    let size = [size.ws_row, size.ws_col].map(usize::from);
+    (size[0] > 0 && size[1] > 0).then_some((size[0], size[1]))
 }
 
 /// The word of a body's status, when its place is not known.

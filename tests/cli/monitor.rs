@@ -1,5 +1,6 @@
 //! `sweepd monitor` on a pipe and on a terminal, with and without a daemon.
 
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::process::Stdio;
 use std::time::Instant;
 
@@ -76,11 +77,11 @@ fn what_is_no_terminal_gets_no_escape_codes() {
     assert!(!err(&ended).contains('\x1b'));
 }
 
-/// Runs the monitor behind a terminal of 24 lines of 80 columns.
-fn on_a_terminal(desk: &Desk, environment: &str, ticks: u32) -> Option<String> {
+/// Runs the monitor behind a terminal of 24 lines of so many columns.
+fn on_a_terminal(desk: &Desk, columns: u32, environment: &str, ticks: u32) -> Option<String> {
     let binary = env!("CARGO_BIN_EXE_sweepd");
     let command = format!(
-        "stty rows 24 cols 80; TERM=xterm {environment} {binary} monitor --ticks {ticks} --instance {}",
+        "stty rows 24 cols {columns}; TERM=xterm {environment} {binary} monitor --ticks {ticks} --instance {}",
         desk.instance
     );
     let child = std::process::Command::new("script")
@@ -112,7 +113,7 @@ fn a_terminal_is_drawn_on_in_place_and_never_below_its_last_line() {
     let _daemon = desk.start("run", &[scene, "--budget", "5ms"]);
     let _feed = desk.start("feed", &[scene]);
     let _up = desk.client(None);
-    let Some(text) = on_a_terminal(&desk, "", 40) else {
+    let Some(text) = on_a_terminal(&desk, 80, "", 40) else {
         return;
     };
     assert!(
@@ -123,11 +124,76 @@ fn a_terminal_is_drawn_on_in_place_and_never_below_its_last_line() {
         assert!(drawing.lines().count() <= 24, "{drawing}");
     }
     assert!(text.ends_with("\x1b[?7h"), "lines wrap again at the end");
-    let plain = on_a_terminal(&desk, "NO_COLOR=1", 2).unwrap();
+    let plain = on_a_terminal(&desk, 80, "NO_COLOR=1", 2).unwrap();
     assert!(
         !plain.contains("\x1b[3") && !plain.contains("\x1b[1m"),
         "{plain}"
     );
+    for columns in [60, 80, 100, 130] {
+        let text = on_a_terminal(&desk, columns, "NO_COLOR=1", 40).unwrap();
+        for line in text.split(['\n', '\r']) {
+            let shown = line
+                .split("\x1b[")
+                .skip(1)
+                .map(|part| part.split_once(['H', 'J', 'K', 'h', 'l']));
+            let shown: usize = shown.flatten().map(|(_, shown)| shown.len()).sum();
+            let before = line.split('\x1b').next().unwrap_or_default().len();
+            assert!(
+                shown + before < columns as usize,
+                "bug: {columns}: {line:?}"
+            );
+        }
+        let last = text.rsplit("\x1b[H").next().unwrap();
+        for word in ["  missed ", "  rest ", "from [m]", "  event"] {
+            assert!(last.contains(word), "{columns}: `{word}` in {last}");
+        }
+        assert_eq!(last.contains(" closing "), columns > 60, "{last}");
+    }
+}
+
+#[test]
+fn keys_end_the_screen_and_the_terminal_is_as_it_was() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
+    let binary = env!("CARGO_BIN_EXE_sweepd");
+    let [before, after] = ["before", "after"].map(|name| desk.dir.join(name));
+    let command = format!(
+        "stty rows 24 cols 80; stty -a > {}; TERM=xterm {binary} monitor --instance {}; echo code $?; stty -a > {}",
+        before.display(),
+        desk.instance,
+        after.display()
+    );
+    for (keys, codes) in [("xq", &[0][..]), ("\x03", &[0]), ("\x03\x03", &[0, 4])] {
+        let child = std::process::Command::new("script")
+            .args(["-qec", &command, "/dev/null"])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn();
+        let Ok(mut child) = child else { return };
+        let mut screen = BufReader::new(child.stdout.take().unwrap());
+        let mut text = String::new();
+        while !text.contains("q ends") {
+            assert!(screen.read_line(&mut text).unwrap() > 0, "{text}");
+        }
+        let mut typed = child.stdin.take().unwrap();
+        typed.write_all(keys.as_bytes()).unwrap();
+        screen.read_to_string(&mut text).unwrap();
+        let ended = finish(child);
+        let ends = codes.iter().map(|code| format!("code {code}"));
+        assert!(
+            ends.into_iter().any(|end| text.contains(&end)),
+            "{keys:?}: {text}"
+        );
+        let [before, after] = [&before, &after].map(|file| std::fs::read_to_string(file).unwrap());
+        assert_eq!(before, after, "{keys:?}: {}", err(&ended));
+        assert!(
+            before.contains(" icanon ") && before.contains(" echo "),
+            "{before}"
+        );
+    }
 }
 
 #[test]

@@ -2,6 +2,9 @@
 //!
 //! A build without the feature `tui` has no screen, and says so.
 
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
 use super::Names;
 use super::json;
 use crate::cli::args::MonitorArgs;
@@ -47,6 +50,33 @@ impl Face {
             "this sweepd was built without the screen of `monitor`: add --json for a line a tick, or build it with the feature `tui` (it is on by default)"
                 .to_owned(),
         ))
+    }
+
+    /// The flag that SIGINT and SIGTERM raise.
+    pub(super) fn stop(&mut self) -> Result<Arc<AtomicBool>> {
+        match self {
+            Self::Lines => crate::cli::stop(),
+            #[cfg(feature = "tui")]
+            Self::Screen(screen) => screen.stop(),
+        }
+    }
+
+    /// From now on keys are for the screen.
+    pub(super) fn open(&mut self) {
+        match self {
+            Self::Lines => {}
+            #[cfg(feature = "tui")]
+            Self::Screen(screen) => screen.open(),
+        }
+    }
+
+    /// Whether its end was typed.
+    pub(super) fn is_end_typed(&self) -> bool {
+        match self {
+            Self::Lines => false,
+            #[cfg(feature = "tui")]
+            Self::Screen(screen) => screen.is_end_typed(),
+        }
     }
 
     pub(super) fn tick(

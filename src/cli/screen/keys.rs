@@ -1,0 +1,161 @@
+//! Keys on the terminal that `sweepd monitor` draws on. In: what is typed, and signals. Out: whether `q` was. The
+//! terminal is as before when it ends, by `q`, by a signal or by a panic, and while it is stopped.
+
+use std::io::IsTerminal as _;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use rustix::termios::{LocalModes, OptionalActions, SpecialCodeIndex, Termios};
+use signal_hook::consts::{SIGCONT, SIGINT, SIGQUIT, SIGTERM, SIGTSTP};
+use signal_hook::iterator::{Handle, Signals};
+
+use crate::error::{Error, Result};
+
+/// Exit code of a second signal, as of every command.
+const EXIT_SIGNALS: i32 = 4;
+
+/// Reads keys one by one from [`Keys::open`] on.
+#[derive(Debug)]
+pub(super) struct Keys {
+    terminal: Arc<Terminal>,
+    signals: Handle,
+}
+
+impl Keys {
+    /// Watches signals, so that none leaves the terminal changed; returns also the flag that SIGINT and SIGTERM raise.
+    ///
+    /// # Errors
+    /// `Error::Io` when signals cannot be listened for.
+    pub(super) fn watch() -> Result<(Self, Arc<AtomicBool>)> {
+        let failed = |e| Error::io("cannot listen for signals", e);
+        let stop = crate::cli::stop_at_first()?;
+        let terminal = Arc::<Terminal>::default();
+        let all = [SIGINT, SIGTERM, SIGQUIT, SIGTSTP, SIGCONT];
+        let mut signals = Signals::new(all).map_err(failed)?;
+        let keys = Self {
+            terminal: Arc::clone(&terminal),
+            signals: signals.handle(),
+        };
+        let watch = move || {
+            let mut ends = 0;
+            for signal in signals.forever() {
+                ends += u32::from(matches!(signal, SIGINT | SIGTERM));
+                terminal.take(signal, ends);
+            }
+        };
+        let thread = std::thread::Builder::new().name("sweepd-keys".to_owned());
+        thread.spawn(watch).map_err(failed)?;
+        Ok((keys, stop))
+    }
+
+    /// From now on keys are read one by one and not shown; `false`: there is no terminal to type on.
+    pub(super) fn open(&self) -> bool {
+        self.terminal.open()
+    }
+
+    /// Whether `q` was typed since the last look.
+    pub(super) fn is_end_typed(&self) -> bool {
+        self.terminal.is_typed(b'q')
+    }
+}
+
+impl Drop for Keys {
+    fn drop(&mut self) {
+        self.signals.close();
+        self.terminal.close();
+    }
+}
+
+/// The terminal behind standard input.
+#[derive(Debug, Default)]
+struct Terminal {
+    modes: Mutex<Modes>,
+}
+
+#[derive(Debug, Default)]
+struct Modes {
+    is_open: bool,
+    /// What is to be set again; none while nothing was changed.
+    before: Option<Termios>,
+}
+
+impl Terminal {
+    fn lock(&self) -> MutexGuard<'_, Modes> {
+        self.modes.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn open(&self) -> bool {
+        let mut modes = self.lock();
+        modes.is_open = true;
+        modes.change();
+        modes.before.is_some()
+    }
+
+    fn close(&self) {
+        let mut modes = self.lock();
+        modes.is_open = false;
+        modes.restore();
+    }
+
+    /// * `ends` - signals so far that ask for the end.
+    fn take(&self, signal: i32, ends: u32) {
+        match signal {
+            SIGINT | SIGTERM if ends > 1 => {
+                self.close();
+                std::process::exit(EXIT_SIGNALS);
+            }
+            SIGQUIT | SIGTSTP => {
+                self.lock().restore();
+                let _ends_or_stops = signal_hook::low_level::emulate_default_handler(signal);
+            }
+            SIGCONT => self.lock().change(),
+            _ => {}
+        }
+    }
+
+    fn is_typed(&self, key: u8) -> bool {
+        // Who reads in the background is stopped.
+        if self.lock().before.is_none() || !is_in_front() {
+            return false;
+        }
+        let mut typed = [0; 64];
+        let len = rustix::io::read(std::io::stdin(), &mut typed).unwrap_or_default();
+        typed[..len].contains(&key)
+    }
+}
+
+impl Modes {
+    /// Sets the terminal so that a read returns what is there at once; keys that send signals still do.
+    fn change(&mut self) {
+        if !self.is_open || self.before.is_some() || !is_in_front() {
+            return;
+        }
+        let Ok(before) = rustix::termios::tcgetattr(std::io::stdin()) else {
+            return;
+        };
+        let mut own = before.clone();
+        own.local_modes
+            .remove(LocalModes::ICANON | LocalModes::ECHO);
+        own.special_codes[SpecialCodeIndex::VMIN] = 0;
+        own.special_codes[SpecialCodeIndex::VTIME] = 0;
+        if rustix::termios::tcsetattr(std::io::stdin(), OptionalActions::Now, &own).is_ok() {
+            self.before = Some(before);
+        }
+    }
+
+    fn restore(&mut self) {
+        // In the background the terminal is another's.
+        if let Some(before) = self.before.take()
+            && is_in_front()
+        {
+            let _gone = rustix::termios::tcsetattr(std::io::stdin(), OptionalActions::Now, &before);
+        }
+    }
+}
+
+/// Whether what is typed on the terminal behind standard input is for this process.
+fn is_in_front() -> bool {
+    let stdin = std::io::stdin();
+    stdin.is_terminal()
+        && rustix::termios::tcgetpgrp(&stdin).is_ok_and(|group| group == rustix::process::getpgrp())
+}
