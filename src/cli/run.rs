@@ -22,6 +22,8 @@ use super::ros;
 
 /// Exit code when the watchdog ends the process.
 const EXIT_WATCHDOG: i32 = 5;
+/// How long the watchdog's last line may take, nanoseconds: that of a machine that thrashes takes seconds.
+const LAST_LINE_NS: u64 = 5_000_000_000;
 /// Beyond a heartbeat, after which a long tick shows progress; an idle daemon does so each 100 ms, and a busy machine
 /// may keep it waiting for its turn.
 const WATCHDOG_BEYOND_NS: u64 = 1_000_000_000;
@@ -97,17 +99,21 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     Ok(true)
 }
 
-/// Ends the process for its watchdog. The log may be what the tick thread is stuck in: it gets a second.
+/// Ends the process for its watchdog, with a line past the log, whose lock a thread may hold that gets no turn. Where
+/// nobody takes the line, which may be what the tick thread waits for, the process ends without it.
 fn give_up() {
-    let told = std::thread::spawn(|| {
-        tracing::error!("the tick thread makes no progress: the daemon ends, start it again");
-    });
-    for _ in 0..100 {
-        if told.is_finished() {
-            break;
+    let wait = || {
+        let start_ns = SystemClock.monotonic_ns();
+        while SystemClock.monotonic_ns().saturating_sub(start_ns) < LAST_LINE_NS {
+            std::thread::park_timeout(Duration::from_nanos(LAST_LINE_NS));
         }
-        std::thread::park_timeout(Duration::from_millis(10));
-    }
+        std::process::exit(EXIT_WATCHDOG);
+    };
+    let thread = std::thread::Builder::new().name("sweepd-last".to_owned());
+    let _none_left = thread.spawn(wait);
+    let line: &[u8] =
+        b"sweepd: the tick thread makes no progress: the daemon ends, start it again\n";
+    let _told_if_it_can_be = rustix::io::write(std::io::stderr(), line);
     std::process::exit(EXIT_WATCHDOG);
 }
 

@@ -177,6 +177,39 @@ fn a_daemon_whose_tick_thread_is_stuck_ends_with_code_5_and_the_next_one_starts(
 }
 
 #[test]
+fn bug_the_watchdog_ended_a_daemon_without_a_word_where_the_log_was_held_up() {
+    let desk = Desk::new();
+    let scene = desk.scene(TWO_SPHERES);
+    let (mut log, unread) = full_pipe();
+    let child = sweepd()
+        .args(["run", scene.to_str().unwrap(), "--watchdog", "2s"])
+        .args(["--instance", &desk.instance])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(unread)
+        .spawn()
+        .unwrap();
+    let threads = format!("/proc/{}/task", child.id());
+    let is_ending = || {
+        let threads = std::fs::read_dir(&threads).unwrap();
+        let name = |thread: std::fs::DirEntry| std::fs::read_to_string(thread.path().join("comm"));
+        let mut names = threads.flatten().flat_map(name);
+        names.any(|name| name.trim_end() == "sweepd-last")
+    };
+    until("the watchdog ends it", is_ending);
+    // From now on the log is taken, after a line that the thread that is stuck holds it with.
+    let reader = std::thread::spawn(move || {
+        let mut text = String::new();
+        std::io::Read::read_to_string(&mut log, &mut text).unwrap();
+        text
+    });
+    assert_eq!(finish(child).status.code(), Some(5));
+    let text = reader.join().unwrap();
+    let line = "sweepd: the tick thread makes no progress: the daemon ends, start it again\n";
+    assert!(text.ends_with(line), "{}", text.trim_start_matches('.'));
+}
+
+#[test]
 fn a_watchdog_that_would_take_an_idle_daemon_for_a_stuck_one_is_refused() {
     let desk = Desk::new();
     for (scene, watchdog, least) in [
