@@ -144,7 +144,8 @@ fn connect(
     loop {
         let left_ns = until_ns.saturating_sub(clock.monotonic_ns());
         match Client::connect(instance, source, left_ns.min(CONNECT_LOOK_NS)) {
-            Err(Error::TimedOut(_)) if stop.load(Ordering::Relaxed) => return Ok(None),
+            // A signal cuts off what iceoryx2 waits for, too, with another error.
+            Err(_) if stop.load(Ordering::Relaxed) => return Ok(None),
             Err(Error::TimedOut(_)) if left_ns > CONNECT_LOOK_NS => {
                 let waited_ns = clock.monotonic_ns().saturating_sub(start_ns);
                 if !told && waited_ns >= CONNECT_TELL_NS {

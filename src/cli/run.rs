@@ -1,7 +1,7 @@
 //! `sweepd run`: the daemon on shared memory.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use crate::config::Mode;
@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::time::{Clock, SystemClock};
 use crate::transport::iceoryx::{
-    Place, Server, ServerOptions, bytes_needed, cramped, scarce, spawn_cleaner,
+    Cleaner, Place, Server, ServerOptions, bytes_needed, cramped, scarce, spawn_cleaner,
 };
 use crate::transport::{Both, Door};
 
@@ -54,7 +54,9 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     if args.busy_poll {
         options.spin_ns = u64::MAX;
     }
-    let mut server = Server::open(options)?;
+    let Some((mut server, _cleaner)) = open(options, stop)? else {
+        return Ok(true);
+    };
     let (bodies, sources) = (scene.bodies.len(), scene.sources.len());
     let limits = &scene.config.limits;
     let short = [
@@ -64,8 +66,6 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     for warning in short.iter().flatten() {
         tracing::warn!("{warning}");
     }
-    // Dead clients are cleaned up beside the tick, never in it.
-    let _cleaner = spawn_cleaner(&place)?;
     let mut node = asked.open(&scene, &shapes, &place, boot_id)?;
     let mut both;
     let door: &mut dyn Door = match ros::door(&mut node) {
@@ -97,6 +97,20 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     let _told_already = daemon.end_record(watchdog);
     tracing::info!("ended after {} ticks", daemon.engine().ticks());
     Ok(true)
+}
+
+/// The door, and who cleans up dead clients beside the tick, never in it; `None`: a signal came before they were there.
+fn open(options: ServerOptions, stop: &AtomicBool) -> Result<Option<(Server, Cleaner)>> {
+    let place = options.place.clone();
+    let opened = Server::open(options).and_then(|server| Ok((server, spawn_cleaner(&place)?)));
+    match opened {
+        // What iceoryx2 waits for in a start is cut off by a signal, and told as a failure.
+        Err(cut_off) if stop.load(Ordering::Relaxed) => {
+            tracing::info!("ended by a signal before it ran: {}", cut_off.with_causes());
+            Ok(None)
+        }
+        opened => opened.map(Some),
+    }
 }
 
 /// Ends the process for its watchdog, with a line past the log, whose lock a thread may hold that gets no turn. Where

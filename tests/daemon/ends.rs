@@ -210,6 +210,32 @@ fn bug_the_watchdog_ended_a_daemon_without_a_word_where_the_log_was_held_up() {
 }
 
 #[test]
+fn bug_a_signal_while_a_start_waits_for_shared_memory_was_told_as_a_failure() {
+    let desk = Desk::new();
+    let mut daemon = desk.run(TWO_SPHERES, &[]);
+    drop(desk.client(None));
+    let files = desk.files();
+    let service = files
+        .iter()
+        .find(|path| path.extension().is_some_and(|ending| ending == "service"))
+        .unwrap();
+    assert_eq!(daemon.stop().0.code(), Some(0), "{}", daemon.stderr());
+    // iceoryx2 waits for whoever makes a service to finish it.
+    let half_made = std::fs::File::create(service).unwrap();
+    let owner = std::fs::Permissions::from_mode(0o600);
+    half_made.set_permissions(owner).unwrap();
+    let mut waiting = desk.run(TWO_SPHERES, &["--verbose"]);
+    until("it takes the instance", || {
+        let files = desk.files();
+        files.iter().any(|path| path.starts_with("/dev/shm"))
+    });
+    waiting.signal(Signal::INT);
+    let status = waiting.end().0;
+    std::fs::remove_file(service).unwrap();
+    assert_eq!(status.code(), Some(0), "{}", waiting.stderr());
+}
+
+#[test]
 fn a_watchdog_that_would_take_an_idle_daemon_for_a_stuck_one_is_refused() {
     let desk = Desk::new();
     for (scene, watchdog, least) in [
