@@ -406,6 +406,11 @@ fn what_is_wrong_in_a_line_is_told_with_the_part_it_stands_in() {
     let renamed =
         wrong(&|line| line["pose"] = line.as_object_mut().unwrap().remove("pose_a").unwrap());
     assert_eq!(renamed, "line 1: it has no `pose_a`; is `pose` meant?");
+    let unknown = wrong(&|line| line["pose_a"]["scale"] = json!(2.0));
+    assert!(
+        unknown.starts_with("line 1: pose_a: unknown field `scale`"),
+        "{unknown}"
+    );
     let (_, rows) = ask(b"[1, 2]");
     let listed = rows[0]["error"].as_str().unwrap();
     assert!(listed.starts_with("line 1: it is no object"), "{listed}");

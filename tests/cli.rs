@@ -117,7 +117,7 @@ fn usage_is_refused_with_code_2_on_stderr_and_help_is_given_with_code_0_on_stdou
     }
     assert!(out(&output(&["--version"])).contains(env!("CARGO_PKG_VERSION")));
     let help = out(&output(&["--help"])).replace('\n', " ");
-    let codes = "0 done, 1 a check failed, 2 usage or a bad scene, 3 timed out, 4 refused or could not run, 5 watchdog, 101";
+    let codes = "0 done, 1 a check failed, 2 usage or bad input, 3 timed out, 4 refused or could not run, 5 watchdog, 101";
     assert!(help.contains(codes), "{help}");
 }
 
@@ -312,4 +312,8 @@ fn a_batch_with_a_line_that_cannot_be_read_answers_the_others_and_ends_with_code
     let ended = output(&["query", "--batch", "none.jsonl"]);
     assert_eq!(code(&ended), Some(2));
     assert!(err(&ended).contains("none.jsonl"));
+    let desk = Desk::new();
+    let ended = output(&["query", "--batch", desk.dir.to_str().unwrap()]);
+    assert_eq!(code(&ended), Some(2), "bug: {}", err(&ended));
+    assert!(err(&ended).contains("this is a folder"), "{}", err(&ended));
 }

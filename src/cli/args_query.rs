@@ -36,7 +36,11 @@ pub(super) struct QueryArgs {
     /// No daemon: a file of cases, one JSON object a line (`-`: standard input); one answer a line, in order.
     ///
     /// A case: `{"id", "a": SHAPE, "pose_a": {"t": [x,y,z], "q": [w,x,y,z]}, "b": SHAPE, "pose_b": ...}`, all lengths
-    /// in metres.
+    /// in metres. Keys of a truth that public cases have (`signed_distance`, `bounds`, ..) are passed over, others are
+    /// refused.
+    ///
+    /// An answer: `id`; `gap_m`, `gap_min_m`, `gap_max_m`; `normal`, `point_a`, `point_b`; `point_a_rel` and
+    /// `point_b_rel`, the points less `pose_a.t`, exact far from the origin, too; `colliding`. Or `id` and `error`.
     #[arg(
         long,
         value_name = "IN.jsonl",
@@ -55,6 +59,8 @@ pub(super) struct TouchingArgs {
     #[arg(long, value_name = "NAME", conflicts_with_all = ["a", "b"])]
     pub(super) touching: Option<String>,
     /// The same of a shape that is no body, as in scene files, in JSON: `{"type": "sphere", "radius": 0.5}`.
+    ///
+    /// A mesh `file` is looked for by the daemon, beside its scene file.
     #[arg(long, value_name = "JSON", conflicts_with_all = ["a", "b", "touching"])]
     pub(super) shape: Option<String>,
     /// Where it is put, in metres, and how, as a quaternion; by default where the body is, of a shape the scene's

@@ -62,7 +62,7 @@ const EXAMPLES: [(&str, &[(&str, &str)]); 3] = [
 const EXIT_CODES: [(u8, &str); 7] = [
     (0, "done"),
     (1, "a check failed"),
-    (2, "usage or a bad scene"),
+    (2, "usage or bad input"),
     (3, "timed out"),
     (4, "refused or could not run"),
     (5, "watchdog"),

@@ -6,6 +6,7 @@ mod live;
 mod ray;
 mod touching;
 
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{BufRead, BufReader, IsTerminal as _, Read};
 use std::path::Path;
@@ -47,12 +48,16 @@ fn of_file(path: &Path, out: &mut Out) -> Result<bool> {
     let input: Box<dyn BufRead> = if path.as_os_str() == "-" {
         Box::new(BufReader::new(std::io::stdin()))
     } else {
-        let file = File::open(path).map_err(|e| {
+        let is_none = |why: &dyn Display| {
             Error::Usage(format!(
-                "{}: {e}; give a file of cases, or - for standard input",
+                "{}: {why}; give a file of cases, or - for standard input",
                 path.display()
             ))
-        })?;
+        };
+        let file = File::open(path).map_err(|e| is_none(&e))?;
+        if file.metadata().is_ok_and(|about| about.is_dir()) {
+            return Err(is_none(&"this is a folder"));
+        }
         // Where the answers stand on the terminal themselves, they tell how far it is.
         if std::io::stdout().is_terminal() {
             Box::new(BufReader::new(file))

@@ -182,6 +182,17 @@ fn a_body_is_tried_at_a_pose_and_a_shape_anywhere() {
             "{args:?}: {text}"
         );
     }
+    desk.write("bad.stl", "no mesh");
+    for (file, words) in [("none.stl", "check the path"), ("bad.stl", "bad.stl: ")] {
+        let shape = format!(r#"{{"type": "trimesh", "file": "{file}"}}"#);
+        let ended = ask(&desk, &["--shape", &shape]);
+        assert_eq!(code(&ended), Some(2), "bug: {}", err(&ended));
+        assert!(
+            err(&ended).contains("--shape: ") && err(&ended).contains(words),
+            "{}",
+            err(&ended)
+        );
+    }
     let ended = ask(&desk, &["--shape", r#"{"type": "sphere", "radius": -1}"#]);
     assert_eq!(code(&ended), Some(2), "{}", err(&ended));
     assert!(err(&ended).contains("radius is -1"), "{}", err(&ended));

@@ -249,18 +249,18 @@ fn a_daemon_whose_name_is_taken_touches_no_recording() {
 }
 
 #[test]
-fn what_is_no_recording_is_refused_with_code_4() {
+fn bug_what_is_no_recording_was_not_refused_as_bad_input_is() {
     let desk = Desk::new();
     let (scene, _) = pool(&desk, "10");
-    for file in [path(&scene), "/nowhere/run.mcap"] {
+    for file in [path(&scene), "/nowhere/run.mcap", path(&desk.dir)] {
         let ended = output(&["replay", file]);
-        assert_eq!(code(&ended), Some(4), "{}", err(&ended));
+        assert_eq!(code(&ended), Some(2), "{}", err(&ended));
         assert!(err(&ended).contains(file), "{}", err(&ended));
     }
     let empty = scene.with_extension("mcap");
     std::fs::write(&empty, "").unwrap();
     let ended = output(&["replay", path(&empty)]);
-    assert_eq!(code(&ended), Some(4), "{}", err(&ended));
+    assert_eq!(code(&ended), Some(2), "{}", err(&ended));
     assert!(err(&ended).contains("is empty"), "{}", err(&ended));
 }
 
@@ -342,7 +342,7 @@ fn a_client_records_what_it_hears_and_follows_a_daemon_that_starts_anew() {
     }
     assert_eq!(of("record/input"), 0);
     let ended = output(&["replay", path(&file)]);
-    assert_eq!(code(&ended), Some(4));
+    assert_eq!(code(&ended), Some(2));
     assert!(
         err(&ended).contains("run SCENE --record"),
         "{}",

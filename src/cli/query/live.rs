@@ -117,7 +117,22 @@ pub(super) fn ask<T>(
         .map_err(|e| Error::io(format!("the daemon's answer is no answer: {text}"), e))?;
     match found(&mut answer) {
         Some(found) => Ok((found, answer.warnings)),
-        None => Err(refusal(&mut client, named, answer.error, stop)),
+        None => match answer.error {
+            Some(why) if is_of_file(&question["touching"]["shape"], &why) => {
+                Err(Error::Usage(format!("--shape: {why}")))
+            }
+            why => Err(refusal(&mut client, named, why, stop)),
+        },
+    }
+}
+
+/// Whether a fault is of a mesh file that a shape, or one of a list, names.
+fn is_of_file(shape: &Value, why: &str) -> bool {
+    match shape {
+        Value::Array(shapes) => shapes.iter().any(|shape| is_of_file(shape, why)),
+        shape => shape["file"]
+            .as_str()
+            .is_some_and(|file| why.contains(file)),
     }
 }
 

@@ -31,6 +31,7 @@ struct Case {
 
 /// A pose as it is written; the quaternion's real part comes first.
 #[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Placed {
     t: [f64; 3],
     q: [f64; 4],

@@ -2,6 +2,7 @@
 //! as far as it goes.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
@@ -37,7 +38,7 @@ pub enum Ending {
     Damaged(String),
 }
 
-impl std::fmt::Display for Ending {
+impl Display for Ending {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Whole => f.write_str("whole"),
@@ -103,16 +104,23 @@ impl Reader {
     /// Opens a recording; returns it with its start.
     ///
     /// # Errors
-    /// `Error::Io` when it cannot be read, `Error::Refused` when it is no MCAP file, none of ours, or of another
-    /// version.
+    /// `Error::Usage` when it cannot be opened, is no MCAP file or none of ours, `Error::Refused` when it is of another
+    /// version, `Error::Io` when it cannot be read.
     pub fn open(path: &Path) -> Result<(Self, Start)> {
         let name = path.display().to_string();
         let unreadable = |e| Error::io(format!("cannot read the recording {name}"), e);
-        let mut file = File::open(path).map_err(unreadable)?;
+        let is_none = |why: &dyn Display| {
+            let mend = "give a file that `sweepd run SCENE --record FILE` wrote";
+            Error::Usage(format!("{name}: {why}; {mend}"))
+        };
+        let mut file = File::open(path).map_err(|e| is_none(&e))?;
         let about = file.metadata().map_err(unreadable)?;
         let bytes = about.len();
+        if about.is_dir() {
+            return Err(is_none(&"this is a folder"));
+        }
         if bytes == 0 && about.is_file() {
-            return Err(Error::Refused(format!(
+            return Err(Error::Usage(format!(
                 "{name} is empty: nothing was recorded, or the disk was full; record anew"
             )));
         }
@@ -296,11 +304,11 @@ impl Reader {
         let ours = ours && (self.topics.is_empty() || self.has_start());
         match ending {
             Ending::Damaged(how) if !ours => self.no_mcap(how),
-            Ending::Damaged(how) => Error::Refused(format!(
+            Ending::Damaged(how) => Error::Usage(format!(
                 "the start of {} cannot be read ({how}), so that nothing of it can be replayed: record anew",
                 self.name
             )),
-            Ending::Cut if ours => Error::Refused(format!(
+            Ending::Cut if ours => Error::Usage(format!(
                 "{} is cut off within its start, so that nothing of it can be replayed: record anew",
                 self.name
             )),
@@ -309,14 +317,14 @@ impl Reader {
     }
 
     fn no_mcap(&self, how: &str) -> Error {
-        Error::Refused(format!(
+        Error::Usage(format!(
             "{} is no MCAP file ({how}): give one that `sweepd run SCENE --record FILE` wrote",
             self.name
         ))
     }
 
     fn not_ours(&self) -> Error {
-        Error::Refused(format!(
+        Error::Usage(format!(
             "{} holds nothing that an engine was given (what `sweepd record` writes does not), so that there is nothing \
              to replay: give a file that `sweepd run SCENE --record FILE` wrote",
             self.name
