@@ -2,10 +2,12 @@
 //!
 //! Rooms keep small errors of their own and turn them into this one at their door; it names no room.
 
+mod counted;
 mod nearest;
 
 use std::error::Error as StdError;
 
+pub(crate) use counted::counted;
 pub(crate) use nearest::nearest;
 
 /// The cause beneath an [`Error`], as another library or an inner room reported it.

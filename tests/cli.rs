@@ -233,7 +233,7 @@ fn check_says_what_the_daemon_would_do_as_text_and_as_json() {
     assert_eq!(code(&ended), Some(0), "{}", err(&ended));
     let text = out(&ended);
     assert!(
-        text.contains("2 bodies, 1 sources") && text.contains("a - b:"),
+        text.contains("2 bodies, 1 source,") && text.contains("a - b:"),
         "{text}"
     );
     let ended = output(&["check", scene, "--json"]);
@@ -316,4 +316,109 @@ fn a_batch_with_a_line_that_cannot_be_read_answers_the_others_and_ends_with_code
     let ended = output(&["query", "--batch", desk.dir.to_str().unwrap()]);
     assert_eq!(code(&ended), Some(2), "bug: {}", err(&ended));
     assert!(err(&ended).contains("this is a folder"), "{}", err(&ended));
+}
+
+#[test]
+fn bug_values_below_0_were_told_as_unknown_flags() {
+    for (args, flag, words) in [
+        (
+            &["run", "x.toml", "--budget", "-1ms"][..],
+            "--budget",
+            "`-1ms` is no time",
+        ),
+        (&["run", "x.toml", "--ticks", "-1"], "--ticks", "-1"),
+        (
+            &["query", "a", "b", "--timeout", "-1s"],
+            "--timeout",
+            "`-1s` is no time",
+        ),
+        (
+            &["query", "--touching", "a", "--within", "-5cm"],
+            "--within",
+            "`-5cm` is no length",
+        ),
+        (
+            &["query", "--ray", "0,0,0,1,0,0", "--max", "-5m"],
+            "--max",
+            "`-5m` is no length",
+        ),
+        (
+            &["query", "a", "b", "--impact", "-1s"],
+            "--impact",
+            "`-1s` is no time",
+        ),
+        (
+            &["feed", "x.toml", "--rate", "-5"],
+            "--rate",
+            "frames a second",
+        ),
+        (&["monitor", "--wait", "-1s"], "--wait", "`-1s` is no time"),
+        (
+            &["report", "error", "x.toml", "--budgets", "-1ms"],
+            "--budgets",
+            "`-1ms` is no time",
+        ),
+    ] {
+        let ended = output(args);
+        assert_eq!(code(&ended), Some(2), "{args:?}: {}", err(&ended));
+        let said = err(&ended);
+        assert!(
+            said.contains(flag) && said.contains(words),
+            "{args:?}: {said}"
+        );
+        assert!(!said.contains("tip: to pass"), "{args:?}: {said}");
+    }
+}
+
+#[test]
+fn bug_what_is_wrong_was_told_by_keys_and_variables_that_nobody_wrote() {
+    let desk = Desk::new();
+    let file = desk.write("page", "mine");
+    let scene = desk.scene(TWO_SPHERES);
+    let (file, scene) = (file.to_str().unwrap(), scene.to_str().unwrap());
+    let mut wrong = vec![
+        (
+            vec!["query", "a", "b", "--impact", "0s"],
+            "--impact, in seconds, is 0: write",
+        ),
+        (
+            vec!["query", "a", "b", "--impact", "200000s"],
+            "--impact, in seconds, is 200000: write",
+        ),
+        (
+            vec!["query", "--shape="],
+            "--shape is empty: write a shape as",
+        ),
+        (vec!["man", "--out", file], "this is no directory"),
+    ];
+    if cfg!(feature = "ros2") {
+        let args = vec!["run", scene, "--ros2", "--ros-domain-id", "999"];
+        wrong.push((args, "sweepd: --ros-domain-id 999: "));
+    }
+    for (args, words) in wrong {
+        let ended = output(&args);
+        assert_eq!(code(&ended), Some(2), "{args:?}: {}", err(&ended));
+        assert!(err(&ended).contains(words), "{args:?}: {}", err(&ended));
+    }
+    assert_eq!(std::fs::read(file).unwrap(), b"mine");
+}
+
+#[test]
+fn bug_a_plan_with_a_long_name_of_a_part_was_told_out_of_line() {
+    let desk = Desk::new();
+    let mesh = r#"{ type = "trimesh", vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces = [[0, 1, 2]] }"#;
+    let scene = desk.scene(&format!(
+        "[[source]]\nname = \"sim\"\n[[body]]\nname = \"a\"\nshape = {mesh}\n"
+    ));
+    let ended = output(&["check", scene.to_str().unwrap()]);
+    assert_eq!(code(&ended), Some(0), "{}", err(&ended));
+    let text = out(&ended);
+    assert!(text.contains(": 1 body, 1 source, frame"), "{text}");
+    let part = "  search of mesh pairs ";
+    assert!(text.contains(part), "{text}");
+    let rows = text.lines().filter(|line| line.starts_with("  "));
+    for row in rows {
+        let (name, chosen) = row.split_at(part.len());
+        assert!(name.ends_with(' ') && !chosen.starts_with(' '), "{text}");
+    }
 }

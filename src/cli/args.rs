@@ -85,27 +85,27 @@ pub(super) struct RunArgs {
     #[command(flatten)]
     pub(super) which: Which,
     /// Time a tick may take, such as `2ms`, `500us`, or `none`; the scene's value otherwise.
-    #[arg(long, value_name = "TIME", value_parser = duration)]
+    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub(super) budget: Option<Limit>,
     /// Work units a tick may take, or `none`; the scene's value otherwise. Runs replay bit for bit.
-    #[arg(long, value_name = "UNITS", value_parser = units)]
+    #[arg(long, value_name = "UNITS", value_parser = units, allow_hyphen_values = true)]
     pub(super) budget_units: Option<Limit>,
     /// What makes a tick: `on_all`, `on_frame=SOURCE` or `rate=HZ`; the scene's value otherwise.
     #[arg(long, value_name = "MODE", value_parser = mode)]
     pub(super) mode: Option<crate::config::Mode>,
     /// How long to look for the next frame before going to sleep, such as `100us`, or `0us`: less latency for more CPU
     /// time. The default is 50us where there is more than one core.
-    #[arg(long, value_name = "TIME", value_parser = nanoseconds)]
+    #[arg(long, value_name = "TIME", value_parser = nanoseconds, allow_hyphen_values = true)]
     pub(super) spin: Option<u64>,
     /// Never go to sleep: microseconds less latency for a whole core.
     #[arg(long, conflicts_with = "spin")]
     pub(super) busy_poll: bool,
     /// End with exit code 5 when the tick thread makes no progress for this long, such as `10s`, or `none`; a second
     /// more than the heartbeat at least.
-    #[arg(long, value_name = "TIME", value_parser = duration, default_value = "10s")]
+    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true, default_value = "10s")]
     pub(super) watchdog: Limit,
     /// End after so many ticks; until a signal otherwise.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..))]
     pub(super) ticks: Option<u64>,
     /// Be a ROS 2 node too; on this host only, unless `ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET`.
     ///
@@ -114,7 +114,7 @@ pub(super) struct RunArgs {
     #[arg(long)]
     pub(super) ros2: bool,
     /// DDS domain, 0 to 232; `ROS_DOMAIN_ID` otherwise.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(super) ros_domain_id: Option<u16>,
     /// Record all that the engine is given and says to this file (MCAP), for `sweepd replay` and for people.
     ///
@@ -139,10 +139,10 @@ pub(super) struct ReplayArgs {
     #[arg(long)]
     pub(super) json: bool,
     /// Compare from this tick on; those before it are run.
-    #[arg(long, value_name = "TICK")]
+    #[arg(long, value_name = "TICK", allow_negative_numbers = true)]
     pub(super) from: Option<u64>,
     /// End with this tick.
-    #[arg(long, value_name = "TICK")]
+    #[arg(long, value_name = "TICK", allow_negative_numbers = true)]
     pub(super) until: Option<u64>,
 }
 
@@ -163,10 +163,20 @@ pub(super) struct CheckArgs {
 #[derive(Debug, Args)]
 pub(super) struct CourseArgs {
     /// Frames a second.
-    #[arg(long, default_value_t = 100.0, value_name = "HZ")]
+    #[arg(
+        long,
+        default_value_t = 100.0,
+        value_name = "HZ",
+        allow_negative_numbers = true
+    )]
     pub(super) rate: f64,
     /// Seed of the motion, and of a scene that is made.
-    #[arg(long, default_value_t = 1, value_name = "N")]
+    #[arg(
+        long,
+        default_value_t = 1,
+        value_name = "N",
+        allow_negative_numbers = true
+    )]
     pub(super) seed: u64,
     /// How bodies move: half a metre about their start, 1 mm about it, turning in place, or not at all.
     #[arg(long, value_enum, default_value_t = Pattern::Wander)]
@@ -200,17 +210,17 @@ pub(super) struct FeedArgs {
     #[command(flatten)]
     pub(super) course: CourseArgs,
     /// Bodies to move, the others are sent at rest (default: all); with --write-scene: bodies to make (default: 200).
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(super) count: Option<usize>,
     /// End after so many frames; until a signal otherwise.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(super) frames: Option<u64>,
     /// Work of the source's own before each frame, such as `7ms..15ms`: what is left of the frame is said to be the
     /// daemon's, its result is waited for, and how well the frame time was kept is told at the end.
-    #[arg(long, value_name = "TIME..TIME", value_parser = span)]
+    #[arg(long, value_name = "TIME..TIME", value_parser = span, allow_hyphen_values = true)]
     pub(super) work: Option<(u64, u64)>,
     /// How long to wait for the daemon, such as `10s`.
-    #[arg(long, default_value = "10s", value_name = "TIME", value_parser = nanoseconds)]
+    #[arg(long, default_value = "10s", value_name = "TIME", value_parser = nanoseconds, allow_hyphen_values = true)]
     pub(super) wait: u64,
     /// Write a scene of `--count` mixed bodies to this file, and end.
     #[arg(
@@ -239,20 +249,26 @@ pub(super) struct MonitorArgs {
     pub(super) which: Which,
     /// One JSON object a tick instead of a screen: gaps in metres, times in nanoseconds.
     ///
-    /// An open end of a gap's interval is null. `pairs_shown` is [rows in this line, rows published]. `pairs` is there
-    /// with the rows of the same tick, `contacts` with --contacts, `worst` where a pair is near. Where the daemon has
-    /// started anew there is a line `{"restarted": {"boots": [old, new], "ends": [pairs that ended by that]}}`.
+    /// An open end of a gap's interval is null. `pairs_shown` and `contacts_shown` are [rows in this line, rows
+    /// published]. `pairs` is there with the rows of the same tick, `contacts` with --contacts (up to four for each of
+    /// --pairs), `worst` where a pair is near. Where the daemon has started anew there is a line
+    /// `{"restarted": {"boots": [old, new], "ends": [pairs that ended by that]}}`.
     #[arg(long)]
     pub(super) json: bool,
     /// End after so many ticks; until a signal otherwise. With --json those that are under way, of which there is word
     /// each heartbeat, have no line then.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(super) ticks: Option<u64>,
     /// End with code 3 when no tick comes for so long.
-    #[arg(long, default_value = "10s", value_name = "TIME", value_parser = nanoseconds)]
+    #[arg(long, default_value = "10s", value_name = "TIME", value_parser = nanoseconds, allow_hyphen_values = true)]
     pub(super) wait: u64,
     /// Pairs shown (or written) at most.
-    #[arg(long, default_value_t = 20, value_name = "N")]
+    #[arg(
+        long,
+        default_value_t = 20,
+        value_name = "N",
+        allow_negative_numbers = true
+    )]
     pub(super) pairs: usize,
     /// Also read contacts: the daemon then computes them.
     #[arg(long)]
@@ -287,7 +303,11 @@ pub(super) fn units(text: &str) -> Result<Limit, String> {
 
 /// Nanoseconds of `2ms`, `1.5s`, `500us`, `100ns`, `0`.
 pub(super) fn nanoseconds(text: &str) -> Result<u64, String> {
-    let wanted = || format!("`{text}` is no time: write a number and ns, us, ms or s, such as 2ms");
+    let wanted = || {
+        format!(
+            "`{text}` is no time: write a number that is not below 0 and ns, us, ms or s, such as 2ms"
+        )
+    };
     let split = text
         .find(|c: char| c.is_ascii_alphabetic())
         .unwrap_or(text.len());

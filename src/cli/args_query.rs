@@ -31,7 +31,7 @@ pub(super) struct QueryArgs {
     #[arg(long)]
     pub(super) json: bool,
     /// How long to wait for the daemon and its answer, such as `500ms`.
-    #[arg(long, default_value = "5s", value_name = "TIME", value_parser = nanoseconds)]
+    #[arg(long, default_value = "5s", value_name = "TIME", value_parser = nanoseconds, allow_hyphen_values = true)]
     pub(super) timeout: u64,
     /// No daemon: a file of cases, one JSON object a line (`-`: standard input); one answer a line, in order.
     ///
@@ -78,6 +78,7 @@ pub(super) struct TouchingArgs {
         value_name = "LENGTH",
         default_value = "0",
         value_parser = length_m,
+        allow_hyphen_values = true,
         conflicts_with_all = ["a", "b", "batch", "ray"]
     )]
     pub(super) within: f64,
@@ -105,6 +106,7 @@ pub(super) struct RayArgs {
         long,
         value_name = "LENGTH",
         value_parser = length_m,
+        allow_hyphen_values = true,
         requires = "ray",
         conflicts_with_all = ["a", "b", "batch", "touching", "shape"]
     )]
@@ -114,6 +116,7 @@ pub(super) struct RayArgs {
         long,
         value_name = "BITS",
         value_parser = bits,
+        allow_hyphen_values = true,
         requires = "ray",
         conflicts_with_all = ["a", "b", "batch", "touching", "shape"]
     )]
@@ -130,6 +133,7 @@ pub(super) struct ImpactArgs {
         long,
         value_name = "TIME",
         value_parser = nanoseconds,
+        allow_hyphen_values = true,
         requires = "b",
         conflicts_with_all = ["batch", "touching", "shape", "ray"]
     )]
@@ -233,8 +237,11 @@ fn bits(text: &str) -> Result<u32, String> {
 
 /// Metres of `5cm`, `1.5m`, `2mm`, `300um`, `0`.
 pub(super) fn length_m(text: &str) -> Result<f64, String> {
-    let wanted =
-        || format!("`{text}` is no length: write a number and um, mm, cm, m or km, such as 5cm");
+    let wanted = || {
+        format!(
+            "`{text}` is no length: write a number that is not below 0 and um, mm, cm, m or km, such as 5cm"
+        )
+    };
     let split = text
         .rfind(|c: char| !c.is_ascii_alphabetic())
         .map_or(0, |at| at + 1);

@@ -27,19 +27,19 @@ pub(super) struct ErrorArgs {
     pub(super) scene: PathBuf,
     /// Budgets of time a tick, such as `50us,200us,1ms,none`; by default nine, from the scene's floor to what its
     /// slowest ticks take without a budget.
-    #[arg(long, value_name = "TIME,..", value_delimiter = ',', value_parser = duration)]
+    #[arg(long, value_name = "TIME,..", value_delimiter = ',', value_parser = duration, allow_hyphen_values = true)]
     pub(super) budgets: Vec<Limit>,
     /// Budgets of work units in place of time: no clock takes part, and a report is the same to the last bit whenever
     /// it is made. With numbers, such as `--units=0,1000,none`, those; by default nine.
     #[arg(long, value_name = "UNITS,..", value_delimiter = ',', num_args = 0..=1, require_equals = true, value_parser = units, conflicts_with = "budgets")]
     pub(super) units: Option<Vec<Limit>>,
     /// Ticks at each budget, after a sixth as many to warm up.
-    #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 120, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub(super) ticks: u64,
     #[command(flatten)]
     pub(super) course: CourseArgs,
     /// Bodies of each source that move, the others rest at their start (default: all).
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(super) count: Option<usize>,
     /// One JSON document instead of the table: metres, seconds, shares of 1.
     #[arg(long)]

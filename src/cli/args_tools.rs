@@ -21,13 +21,13 @@ pub(super) struct RecordArgs {
     #[arg(long, value_name = "TOPIC,...", value_delimiter = ',')]
     pub(super) only: Vec<Recorded>,
     /// End after so many ticks; until a signal otherwise.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(super) ticks: Option<u64>,
     /// End after so long, such as `10s`.
-    #[arg(long = "for", value_name = "TIME", value_parser = nanoseconds)]
+    #[arg(long = "for", value_name = "TIME", value_parser = nanoseconds, allow_hyphen_values = true)]
     pub(super) time: Option<u64>,
     /// End with code 3 when no tick comes for so long; what was heard until then is in the file.
-    #[arg(long, default_value = "10s", value_name = "TIME", value_parser = nanoseconds)]
+    #[arg(long, default_value = "10s", value_name = "TIME", value_parser = nanoseconds, allow_hyphen_values = true)]
     pub(super) wait: u64,
     /// What messages call the frame of poses and points: the scene's `frame_id`, which clients are not told.
     #[arg(long, default_value = "world", value_name = "NAME")]

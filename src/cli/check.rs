@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::error::Result;
+use crate::error::{Result, counted};
 use crate::plan::Plan;
 use crate::scene::Scene;
 use crate::shape::Library;
@@ -15,6 +15,10 @@ use super::progress::shapes_of;
 
 /// Ignored pairs listed at most.
 const IGNORED_SHOWN: usize = 10_000;
+
+/// What lines begin with that are no choice.
+const LEFT_OUT: &str = "left out";
+const IGNORED: &str = "ignored pairs";
 
 /// Prints the plan, what was left out, ignored pairs and warnings.
 pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
@@ -50,33 +54,13 @@ pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
         return Ok(true);
     }
     out.line(&format!(
-        "{}: {} bodies, {} sources, frame `{}`",
+        "{}: {}, {}, frame `{}`",
         args.scene.display(),
-        scene.bodies.len(),
-        scene.sources.len(),
+        counted(scene.bodies.len(), "body", "bodies"),
+        counted(scene.sources.len(), "source", "sources"),
         scene.frame_id
     ))?;
-    for choice in &plan.choices {
-        out.line(&format!(
-            "  {:<16} {}  ({})",
-            choice.part, choice.chosen, choice.why
-        ))?;
-    }
-    for part in &plan.left_out {
-        let saved = if part.saved_bytes > 0 {
-            format!(", {} bytes saved", part.saved_bytes)
-        } else {
-            String::new()
-        };
-        out.line(&format!(
-            "  left out         {}  ({}{saved})",
-            part.part, part.why
-        ))?;
-    }
-    out.line(&format!(
-        "  ignored pairs    {}",
-        world.ignored_pairs_count()
-    ))?;
+    tell_plan(&plan, world.ignored_pairs_count(), out)?;
     if args.ignored {
         let (listed, is_cut) = ignored(&world);
         for (a, b, why) in listed {
@@ -97,6 +81,35 @@ pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
     out.line("the scene is fine")?;
     out.flush()?;
     Ok(true)
+}
+
+/// The plan: what was chosen, what was left out, and how many pairs are ignored.
+fn tell_plan(plan: &Plan, ignored: u64, out: &mut Out) -> Result<()> {
+    // All parts in one column, however long their names are.
+    let parts = plan.choices.iter().map(|choice| choice.part);
+    let width = parts
+        .chain([LEFT_OUT, IGNORED])
+        .map(str::len)
+        .max()
+        .unwrap_or_default();
+    for choice in &plan.choices {
+        out.line(&format!(
+            "  {:<width$} {}  ({})",
+            choice.part, choice.chosen, choice.why
+        ))?;
+    }
+    for part in &plan.left_out {
+        let saved = if part.saved_bytes > 0 {
+            format!(", {} bytes saved", part.saved_bytes)
+        } else {
+            String::new()
+        };
+        out.line(&format!(
+            "  {LEFT_OUT:<width$} {}  ({}{saved})",
+            part.part, part.why
+        ))?;
+    }
+    out.line(&format!("  {IGNORED:<width$} {ignored}"))
 }
 
 /// The ignored pairs with their reasons, by id, and whether there are more.

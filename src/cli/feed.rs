@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::builtin::{Motion, Random, pile, pool};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::limits;
 use crate::scene::Scene;
 use crate::time::{Clock, SystemClock};
@@ -44,7 +44,11 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
             pool(count, args.course.seed)
         };
         write_scene(path, &text, args.force)?;
-        out.line(&format!("wrote {}: {count} bodies", path.display()))?;
+        out.line(&format!(
+            "wrote {}: {}",
+            path.display(),
+            counted(count, "body", "bodies")
+        ))?;
         out.flush()?;
         return Ok(true);
     }
@@ -66,8 +70,8 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
         return Ok(true);
     }
     tracing::info!(
-        "feeding {} bodies ({} of them moving) as `{name}` at {} Hz",
-        bodies.rows.len(),
+        "feeding {} ({} of them moving) as `{name}` at {} Hz",
+        counted(bodies.rows.len(), "body", "bodies"),
         bodies.moving,
         args.course.rate
     );

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::error::Result;
+use crate::error::{Result, counted};
 use crate::transport::iceoryx::{InstanceInfo, Place, list_instances};
 
 use super::args_tools::ListArgs;
@@ -48,7 +48,12 @@ fn as_text(i: &InstanceInfo) -> String {
         None => "no daemon".to_owned(),
     };
     format!(
-        "{:<20} {daemon}; {} sources, {} readers ({} of pairs, {} of changes, {} of contacts)",
-        i.instance, i.sources, i.readers, i.pair_readers, i.change_readers, i.contact_readers
+        "{:<20} {daemon}; {}, {} ({} of pairs, {} of changes, {} of contacts)",
+        i.instance,
+        counted(i.sources, "source", "sources"),
+        counted(i.readers, "reader", "readers"),
+        i.pair_readers,
+        i.change_readers,
+        i.contact_readers
     )
 }

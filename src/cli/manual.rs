@@ -123,6 +123,12 @@ pub(super) fn completions(args: &CompletionsArgs, out: &mut Out) -> Result<bool>
 pub(super) fn man(args: &ManArgs, out: &mut Out) -> Result<bool> {
     let cmd = built();
     if let Some(folder) = &args.out {
+        if folder.exists() && !folder.is_dir() {
+            return Err(Error::Usage(format!(
+                "--out {}: this is no directory, and each page is a file of its own: name a directory",
+                folder.display()
+            )));
+        }
         let made = std::fs::create_dir_all(folder).and_then(|()| write_all(&cmd, folder));
         made.map_err(|e| {
             Error::io(

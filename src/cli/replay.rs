@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::args::ReplayArgs;
 use super::out::Out;
 use super::progress::Progress;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::record::file::{Ending, Read, Reader};
 use crate::record::{Difference, Facts, Replay, TIMES, Tally};
 
@@ -91,22 +91,27 @@ fn run(args: &ReplayArgs, stop: &AtomicBool) -> Result<Found> {
 fn tell(found: &Found, out: &mut Out) -> Result<()> {
     let (facts, tally) = (&found.facts, &found.tally);
     out.line(&format!(
-        "{}, recorded by sweepd {}: {} ticks replayed",
-        facts.scene_file, facts.sweepd_version, found.ticks
+        "{}, recorded by sweepd {}: {} replayed",
+        facts.scene_file,
+        facts.sweepd_version,
+        counted(found.ticks, "tick", "ticks")
     ))?;
     if tally.exact > 0 || tally.lawful == 0 {
         out.line(&format!(
-            "{} ticks compared bit by bit; left out as measured times: {}",
-            tally.exact,
+            "{} compared bit by bit; left out as measured times: {}",
+            counted(tally.exact, "tick", "ticks"),
             TIMES.join(", ")
         ))?;
     }
     if tally.lawful > 0 {
         let judged = &tally.judged;
         out.line(&format!(
-            "{} ticks were limited by time, or came after such: replayed without a limit and held against the law; {} \
+            "{} limited by time, or came after such: replayed without a limit and held against the law; {} \
              rows, {} collisions, {} of them told as not decided",
-            tally.lawful, judged.rows, judged.collisions, judged.open
+            counted(tally.lawful, "tick was", "ticks were"),
+            judged.rows,
+            judged.collisions,
+            judged.open
         ))?;
     }
     match &found.ending {

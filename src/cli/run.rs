@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::config::Mode;
 use crate::daemon::{Daemon, Watchdog};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::scene::Scene;
 use crate::time::{Clock, SystemClock};
 use crate::transport::iceoryx::{
@@ -86,16 +86,17 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
         daemon.watched_by(watchdog);
     }
     tracing::info!(
-        "instance `{}` runs {}: {} bodies, {} sources",
+        "instance `{}` runs {}: {}, {}",
         args.which.instance,
         args.scene.display(),
-        scene.bodies.len(),
-        scene.sources.len()
+        counted(bodies, "body", "bodies"),
+        counted(sources, "source", "sources")
     );
     daemon.run(stop, args.ticks)?;
     // That it failed was told when it did; the daemon has done its work.
     let _told_already = daemon.end_record(watchdog);
-    tracing::info!("ended after {} ticks", daemon.engine().ticks());
+    let ticks = counted(daemon.engine().ticks(), "tick", "ticks");
+    tracing::info!("ended after {ticks}");
     Ok(true)
 }
 

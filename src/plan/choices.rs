@@ -2,6 +2,7 @@
 
 use crate::broad::Method;
 use crate::config::{Config, MeshSearch, Viewpoint};
+use crate::error::counted;
 
 use super::facts::Facts;
 use super::{Choice, Seen};
@@ -57,7 +58,7 @@ pub(super) fn of(facts: &Facts, method: Method, config: &Config, seen: Seen) -> 
             chosen:
                 "boxes around the way between two poses, time of impact by conservative advancement"
                     .to_owned(),
-            why: format!("{} continuous bodies", facts.continuous),
+            why: counted(facts.continuous, "continuous body", "continuous bodies"),
         }
     }));
     choices.extend((facts.deforming > 0).then(|| {
@@ -67,8 +68,10 @@ pub(super) fn of(facts: &Facts, method: Method, config: &Config, seen: Seen) -> 
                 "boxes along the axes of the body, widened by what moved, refitted where pairs wait"
                     .to_owned(),
             why: format!(
-                "{} bodies, {} triangles, {} vertices",
-                facts.deforming, facts.bending[0], facts.bending[1]
+                "{}, {}, {}",
+                counted(facts.deforming, "body", "bodies"),
+                counted(facts.bending[0], "triangle", "triangles"),
+                counted(facts.bending[1], "vertex", "vertices")
             ),
         }
     }));
@@ -89,7 +92,11 @@ fn searched_for(facts: &Facts, method: Method, config: &Config) -> Choice {
         Method::SpatialHash => "spatial hash, cells of the largest box",
         Method::HierarchicalGrid => "hierarchical grid, a level of cells by size",
     };
-    let mut why = format!("{} boxes, {} bodies move", facts.boxes, facts.moving);
+    let boxes = counted(facts.boxes, "box", "boxes");
+    let mut why = format!(
+        "{boxes}, {}",
+        counted(facts.moving, "body moves", "bodies move")
+    );
     if let Some([least, largest]) = facts.size_m {
         why += &format!(", {least} to {largest} m across");
     }
@@ -139,8 +146,8 @@ fn filtered(facts: &Facts) -> Option<Choice> {
 fn narrowed(facts: &Facts) -> Choice {
     let chosen = if facts.shapes[1] > 0 {
         format!(
-            "exact convex queries, walks over {} triangles",
-            facts.triangles
+            "exact convex queries, walks over {}",
+            counted(facts.triangles, "triangle", "triangles")
         )
     } else {
         "exact convex queries".to_owned()
@@ -149,8 +156,9 @@ fn narrowed(facts: &Facts) -> Choice {
         part: "narrow phase",
         chosen,
         why: format!(
-            "{} convex shapes, {} meshes",
-            facts.shapes[0], facts.shapes[1]
+            "{}, {}",
+            counted(facts.shapes[0], "convex shape", "convex shapes"),
+            counted(facts.shapes[1], "mesh", "meshes")
         ),
     }
 }

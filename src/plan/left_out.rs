@@ -1,6 +1,7 @@
 //! What a scene does not need, and what that saves.
 
 use crate::broad::Method;
+use crate::error::counted;
 use crate::limits::LEGS_MAX;
 use crate::world::{Leg, Path};
 
@@ -20,7 +21,7 @@ pub(super) fn of(facts: &Facts, method: Method, seen: Seen) -> Vec<LeftOut> {
         // Boxes in two forms, what is known of motion, candidates: about 200 bytes a body in the scenes of the bench.
         out(
             "blocks of boxes and lists of candidates",
-            format!("{} boxes", facts.boxes),
+            counted(facts.boxes, "box", "boxes"),
             facts.boxes as u64 * 200,
         );
     }

@@ -285,7 +285,7 @@ fn a_time_of_impact_is_told_for_velocities_that_are_said() {
         ),
         (&["a", "b", "--linear-a", "1,2,3"], "--impact"),
         (&["--touching", "a", "--impact", "1s"], "cannot be used"),
-        (&["a", "b", "--impact", "0s"], "--impact: within_s is 0"),
+        (&["a", "b", "--impact", "0s"], "--impact, in seconds, is 0"),
         (&["a", "zeppelin", "--impact", "1s"], "zeppelin"),
     ] {
         let ended = ask(&desk, args);

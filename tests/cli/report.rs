@@ -279,6 +279,10 @@ fn one_family_has_a_table_a_page_and_its_own_line() {
         text.contains("bullet") && text.contains("nested") && !text.contains("vibration"),
         "{text}"
     );
+    // Why some of them are farther off than the tolerance, and nothing is wrong.
+    let mut nested = text.lines().filter(|line| line.starts_with("nested"));
+    let why = " beyond the tolerance have a proved interval and no estimate";
+    assert!(nested.next_back().unwrap().contains(why), "{text}");
     let html = std::fs::read_to_string(&page).unwrap();
     assert_eq!(html.matches("<svg").count(), 2);
     let list = out(&output(&["report", "stability", "--list"]));

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use rustix::fs::{Access, AtFlags, CWD, accessat};
 
+use crate::error::counted;
 use crate::transport::iceoryx::{
     Cleaned, Leftovers, NodeOwner, Place, clean_leftovers, leftovers, unreaped_by,
 };
@@ -197,7 +198,11 @@ fn judge(left: &Leftovers, instance: Option<&str>, mend: &str) -> Vec<Finding> {
     if left.unclear > 0 {
         found.push(Finding::warning(
             check,
-            format!("{} nodes that are damaged, or another user's", left.unclear),
+            counted(
+                left.unclear,
+                "node that is damaged, or another user's",
+                "nodes that are damaged, or another user's",
+            ),
             "end all iceoryx2 programs, then remove their root directory",
         ));
     }

@@ -11,7 +11,7 @@ use crate::cli::args_query::QueryArgs;
 use crate::cli::connect;
 use crate::cli::figures::{metres, time};
 use crate::cli::out::Out;
-use crate::error::{Error, Result, nearest};
+use crate::error::{Error, Result, counted, nearest};
 use crate::scene::Request;
 use crate::shape::{ShapeSpec, build};
 use crate::time::{Clock, SystemClock};
@@ -40,6 +40,9 @@ const FLAGS: [(&str, &str); 11] = [
     ("angular_b", "--angular-b"),
 ];
 
+/// What numbers of a key that ends so are in: a flag has units of its own.
+const UNITS: [(&str, &str); 2] = [("_m", "metres"), ("_s", "seconds")];
+
 /// Reads a question as the daemon will: what is wrong with it is the user's, and needs no daemon to be told.
 fn check(question: &Value) -> Result<()> {
     let of_shape = |why: &str| Error::Usage(format!("--shape: {}", bare(why)));
@@ -52,9 +55,13 @@ fn check(question: &Value) -> Result<()> {
         let said = bare(&why);
         let word = said.split([' ', ':', '.']).next().unwrap_or_default();
         let word = word.trim_matches('`');
-        match FLAGS.iter().find(|(key, _)| *key == word) {
-            Some((_, flag)) => Error::Usage(format!("{flag}: {said}")),
-            None => Error::Usage(said.to_owned()),
+        let unit = UNITS.iter().find(|(ending, _)| word.ends_with(ending));
+        match (FLAGS.iter().find(|(key, _)| *key == word), unit) {
+            (Some((key, flag)), Some((_, unit))) if said.starts_with(key) => {
+                Error::Usage(format!("{flag}, in {unit},{}", &said[key.len()..]))
+            }
+            (Some((_, flag)), _) => Error::Usage(format!("{flag}: {said}")),
+            (None, _) => Error::Usage(said.to_owned()),
         }
     };
     let text = question.to_string();
@@ -176,8 +183,8 @@ fn unknown(name: &str, known: &[&str]) -> String {
         None => match known {
             [] => "it has none at all".to_owned(),
             [first, ..] => format!(
-                "its {} bodies have names such as \"{first}\"; `sweepd check SCENE` reads the scene file",
-                known.len()
+                "its {} such as \"{first}\"; `sweepd check SCENE` reads the scene file",
+                counted(known.len(), "body has a name", "bodies have names")
             ),
         },
     };
@@ -225,20 +232,20 @@ pub(super) fn worded(what: &impl Serialize, verdict: u8) -> Value {
 }
 
 /// Adds lines of bodies whose place is not known, and of how many were left out for what.
+///
+/// * `counts` - how many, with the words for one and for many.
 pub(super) fn strangers(
     told: &mut Vec<(&str, String)>,
     (unknown, more): (&[UnknownBody], u64),
-    counts: &[(u64, &str)],
+    counts: &[(u64, [&str; 2])],
 ) {
     let unknown = unknown.iter();
     told.extend(unknown.map(|it| ("unknown", format!("{} ({})", clean(&it.body), it.status))));
     let counts = counts.iter().copied();
-    for (count, what) in [(more, "more whose place is not known")]
-        .into_iter()
-        .chain(counts)
-    {
+    let more = (more, ["more whose place is not known"; 2]);
+    for (count, [one, many]) in [more].into_iter().chain(counts) {
         if count > 0 {
-            told.push(("and", format!("{count} {what}")));
+            told.push(("and", counted(count, one, many)));
         }
     }
 }
@@ -292,7 +299,7 @@ mod tests {
         for (question, words) in [
             (
                 json!({ "impact": { "a": "a", "b": "b", "within_s": 0.0 } }),
-                "--impact: within_s is 0",
+                "--impact, in seconds, is 0",
             ),
             (
                 json!({ "ray": { "from": [0, 0, 0], "direction": [0, 0, 0] } }),

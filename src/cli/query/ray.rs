@@ -82,11 +82,17 @@ fn as_text(found: &RayFound, warnings: &[String]) -> String {
         &[
             (
                 found.left_out,
-                "bodies in the way left out: nothing is known of them",
+                [
+                    "body in the way left out: nothing is known of it",
+                    "bodies in the way left out: nothing is known of them",
+                ],
             ),
             (
                 found.ignored,
-                "bodies in the way not looked at: their groups, or disabled",
+                [
+                    "body in the way not looked at: its groups, or disabled",
+                    "bodies in the way not looked at: their groups, or disabled",
+                ],
             ),
         ],
     );

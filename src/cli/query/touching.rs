@@ -8,8 +8,11 @@ use serde_json::{Value, json};
 use super::live::{ask, clean, end, lines, strangers, tell, told_json, word, worded};
 use crate::cli::args_query::QueryArgs;
 use crate::cli::out::Out;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::wire::{TouchingFound, TouchingRow};
+
+/// What to do where a shape is none.
+const SHAPE_MEND: &str = r#"write a shape as '{"type": "sphere", "radius": 0.5}'"#;
 
 /// Asks, waits and tells.
 pub(super) fn touching(args: &QueryArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
@@ -31,11 +34,11 @@ fn question(args: &QueryArgs) -> Result<Value> {
         asked["body"] = json!(name);
     }
     if let Some(text) = &flags.shape {
-        asked["shape"] = serde_json::from_str(text).map_err(|e| {
-            Error::Usage(format!(
-                "--shape is no JSON: {e}; write a shape as '{{\"type\": \"sphere\", \"radius\": 0.5}}'"
-            ))
-        })?;
+        if text.trim().is_empty() {
+            return Err(Error::Usage(format!("--shape is empty: {SHAPE_MEND}")));
+        }
+        asked["shape"] = serde_json::from_str(text)
+            .map_err(|e| Error::Usage(format!("--shape is no JSON: {e}; {SHAPE_MEND}")))?;
     }
     if let Some(at) = flags.at {
         asked["position"] = json!(at.position);
@@ -58,7 +61,10 @@ fn as_text(found: &TouchingFound, warnings: &[String]) -> String {
     let what = match found.asked.as_slice() {
         [] => "the shape".to_owned(),
         [body] => clean(body),
-        [body, with @ ..] => format!("{} with {} that hang on it", clean(body), with.len()),
+        [body, with @ ..] => {
+            let hanging = counted(with.len(), "that hangs", "that hang");
+            format!("{} with {hanging} on it", clean(body))
+        }
     };
     let mut told = vec![("asked for", what)];
     told.extend(
@@ -76,11 +82,17 @@ fn as_text(found: &TouchingFound, warnings: &[String]) -> String {
         &[
             (
                 found.left_out,
-                "pairs with near boxes left out: nothing is known of them",
+                [
+                    "pair with near boxes left out: nothing is known of it",
+                    "pairs with near boxes left out: nothing is known of them",
+                ],
             ),
             (
                 found.ignored,
-                "pairs with near boxes not looked at: filters, or disabled",
+                [
+                    "pair with near boxes not looked at: a filter, or disabled",
+                    "pairs with near boxes not looked at: filters, or disabled",
+                ],
             ),
         ],
     );

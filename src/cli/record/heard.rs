@@ -11,7 +11,7 @@ use crate::cli::args_tools::{RecordArgs, Recorded};
 use crate::cli::connect;
 use crate::cli::files::open_new;
 use crate::cli::out::Out;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::record::FLUSH_NS;
 use crate::record::file::{McapLog, Shown, buffered};
 use crate::time::{Clock, SystemClock};
@@ -66,12 +66,16 @@ pub(in crate::cli) fn record(args: &RecordArgs, out: &mut Out, stop: &AtomicBool
     let why = done.as_ref().err().map_or(String::new(), Error::to_string);
     let closed = log.end(&why, tally.missed);
     let (ticks, missed) = (tally.ticks, tally.missed);
-    out.line(&format!("{ticks} ticks in {name}"))?;
+    out.line(&format!("{} in {name}", counted(ticks, "tick", "ticks")))?;
     out.flush()?;
     if missed > 0 {
         tracing::warn!(
-            "{missed} ticks were overtaken before they were heard and are not in {name}: record less with --only, or to a \
-             faster disk"
+            "{} not in {name}: record less with --only, or to a faster disk",
+            counted(
+                missed,
+                "tick was overtaken before it was heard and is",
+                "ticks were overtaken before they were heard and are"
+            )
         );
     }
     done.and(closed).map(|()| true)

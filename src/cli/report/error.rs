@@ -7,7 +7,7 @@ use crate::cli::args_report::ErrorArgs;
 use crate::cli::files::{check_inputs, inputs};
 use crate::cli::out::Out;
 use crate::daemon::build_shapes;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::report::error::columns::{Column, columns};
 use crate::report::error::page::{html, summary};
 use crate::report::error::{Report, Setup, Sweep, run};
@@ -86,12 +86,12 @@ fn sweep(args: &ErrorArgs) -> Result<Sweep> {
 
 fn table(report: &Report, scene: &str, out: &mut Out) -> Result<()> {
     out.line(&format!(
-        "{scene}: {} bodies (median diameter {:.3} m), {} moving; {:.0} pairs; {} ticks at {} Hz, seed {}",
-        report.bodies,
+        "{scene}: {} (median diameter {:.3} m), {} moving; pairs: {:.0}; {} at {} Hz, seed {}",
+        counted(report.bodies, "body", "bodies"),
         report.size_m,
         report.moving,
         report.pairs,
-        report.ticks,
+        counted(report.ticks, "tick", "ticks"),
         report.rate_hz,
         report.seed
     ))?;
@@ -108,7 +108,8 @@ fn table(report: &Report, scene: &str, out: &mut Out) -> Result<()> {
     }
     out.line(&summary(report))?;
     out.line(&format!(
-        "against a twin without a budget: {} verdicts are wrong, {} intervals exclude the truth",
-        report.wrong, report.excluded
+        "against a twin without a budget: {} wrong, {} the truth",
+        counted(report.wrong, "verdict is", "verdicts are"),
+        counted(report.excluded, "interval excludes", "intervals exclude")
     ))
 }

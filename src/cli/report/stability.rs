@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::cli::args_report::StabilityArgs;
 use crate::cli::figures::time;
 use crate::cli::out::Out;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, counted};
 use crate::report::stability::families::{FAMILIES, Family, named};
 use crate::report::stability::{Found, Report, page, run};
 
@@ -91,8 +91,11 @@ fn table(report: &Report, out: &mut Out) -> Result<()> {
          size. Truth: twice the precision, no code of the engine.",
     )?;
     out.line(&format!(
-        "{cases} cases, {answers} answers: {} intervals exclude the truth, {} verdicts are wrong",
-        report.excluded, report.wrong
+        "{}, {}: {} the truth, {} wrong",
+        counted(cases, "case", "cases"),
+        counted(answers, "answer", "answers"),
+        counted(report.excluded, "interval excludes", "intervals exclude"),
+        counted(report.wrong, "verdict is", "verdicts are")
     ))
 }
 
@@ -130,6 +133,13 @@ fn worst(found: &Found) -> Option<String> {
     }
     if sum.open > 0 {
         text += &format!("; {} left open within rounding", sum.open);
+    }
+    if sum.beyond_bounded > 0 {
+        text += &format!(
+            "; {} beyond the tolerance have a proved interval and no estimate, as what lies within a mesh has: its farther end \
+             counts, and no answer is wrong",
+            sum.beyond_bounded
+        );
     }
     if sum.changes_true > 0 {
         text += &format!(

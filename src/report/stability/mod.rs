@@ -65,6 +65,9 @@ pub struct Summary {
     pub worst_value: Option<f64>,
     /// Points with a greater error than the tolerance, or left open.
     pub beyond: u64,
+    /// Those of them whose depth is bounded and not estimated: the error is of the interval's farther end, and no limit
+    /// of what is proved.
+    pub beyond_bounded: u64,
     /// Pairs left open although nothing limited the work.
     pub open: u64,
     /// Intervals that do not hold the truth.
@@ -147,6 +150,7 @@ impl Summary {
             sum.cases += 1;
             sum.answers += point.answers;
             sum.beyond += u64::from(point.is_beyond());
+            sum.beyond_bounded += u64::from(point.is_beyond() && point.is_bounded());
             sum.open += point.open;
             sum.excluded += point.excluded;
             sum.wrong += point.wrong;

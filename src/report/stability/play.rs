@@ -93,6 +93,12 @@ impl Point {
         self.open > 0 || self.error.is_some_and(|error| error > self.tolerance)
     }
 
+    /// Whether the worst answer is an interval without an estimate.
+    #[must_use]
+    pub fn is_bounded(&self) -> bool {
+        self.open == 0 && self.best.is_none()
+    }
+
     fn of(case: &Case) -> Self {
         let round = case.actors.iter().any(is_round);
         Self {

@@ -34,6 +34,10 @@ impl Network {
         variable: impl Fn(&str) -> Option<String>,
     ) -> Result<Self, String> {
         let given = |name: &str| variable(name).filter(|text| !text.is_empty());
+        let said_by = match domain {
+            Some(_) => "--ros-domain-id ",
+            None => "ROS_DOMAIN_ID=",
+        };
         let domain = match domain {
             Some(domain) => domain,
             None => given("ROS_DOMAIN_ID").map_or(Ok(0), |text| {
@@ -44,7 +48,7 @@ impl Network {
         };
         if domain > DOMAIN_MAX {
             return Err(format!(
-                "ROS_DOMAIN_ID={domain}: DDS has ports for 0 to {DOMAIN_MAX}, of which 0 to 101 are safe on Linux"
+                "{said_by}{domain}: DDS has ports for 0 to {DOMAIN_MAX}, of which 0 to 101 are safe on Linux"
             ));
         }
         rmw(given("RMW_IMPLEMENTATION").as_deref())?;
@@ -156,6 +160,11 @@ mod tests {
 
     #[test]
     fn what_cannot_be_honoured_is_refused_by_name() {
+        let by_flag = read(Some(999), &[("ROS_DOMAIN_ID", "7")]).unwrap_err();
+        assert!(
+            by_flag.starts_with("--ros-domain-id 999: "),
+            "bug: {by_flag}"
+        );
         for (name, text) in [
             ("ROS_DOMAIN_ID", "many"),
             ("ROS_DOMAIN_ID", "233"),
