@@ -294,9 +294,8 @@ impl Publisher {
 fn closing_speed(a: &Body, b: &Body, witness: &Witness) -> f64 {
     let velocity_at = |body: &Body, point: Point| {
         // Who cannot move has none.
-        let [lx, ly, lz, ax, ay, az] = body.velocity.unwrap_or_default();
-        let arm = body.pose.rotation * point.coords;
-        Vec3::new(lx, ly, lz) + Vec3::new(ax, ay, az).cross(&arm)
+        let [x, y, z, ..] = body.twist_at(&point).unwrap_or_default();
+        Vec3::new(x, y, z)
     };
     let relative = velocity_at(b, witness.point_b) - velocity_at(a, witness.point_a);
     -relative.dot(&(a.pose.rotation * witness.normal))

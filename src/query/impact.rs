@@ -1,15 +1,16 @@
 //! When two bodies touch first if they go on as they do, or as a question says. In: the question, and the world between
 //! two ticks. Out: a question that holds all it needs; then a proved interval of the time, or a proof that they do not.
 //!
-//! The way is that of continuous bodies: the centre of a body's geometry straight, its turn about one axis at a
-//! constant rate; and so is the method, conservative advancement.
+//! The way is that of continuous bodies: the centre of a body's geometry straight, or that of the body on which it
+//! hangs, its turn about one axis at a constant rate; and so is the method, conservative advancement.
 
 use super::gap::both;
+use super::going::{Goer, Going, goings};
 use super::measure::{WORK_NS, age_ns};
 use crate::limits::LEG_TURNS_MAX;
 use crate::math::Vec3;
 use crate::narrow::{Passage, touch_on_way};
-use crate::scene::{Impact, Velocity};
+use crate::scene::Impact;
 use crate::shape::{Core, Geometry};
 use crate::time::{Clock, Meter};
 use crate::wire::{ImpactFound, MessageHeader, Verdict};
@@ -35,21 +36,30 @@ impl ImpactQuestion {
     /// # Errors
     /// As of a gap; and a half-space that is to move, a turn that is too far to be followed.
     pub fn new(world: &World, tick_header: MessageHeader, asked: &Impact) -> Result<Self, String> {
-        let ((_, a), (_, b), mut warnings) = both(world, &asked.a, &asked.b)?;
-        let (of_a, of_b) = (
-            velocity(a, &asked.velocity_a, &mut warnings),
-            velocity(b, &asked.velocity_b, &mut warnings),
-        );
+        let ((slot_a, a), (slot_b, b), mut warnings) = both(world, &asked.a, &asked.b)?;
+        let goer = |slot, body, asked| Goer { slot, body, asked };
+        let goers = [
+            goer(slot_a, a, &asked.velocity_a),
+            goer(slot_b, b, &asked.velocity_b),
+        ];
+        let ([of_a, of_b], together) = goings(world, goers, &mut warnings);
+        let go = |body: &Body, going: &Going| {
+            if together {
+                Ok(body.still())
+            } else {
+                on_way(body, going, asked.within_s)
+            }
+        };
         Ok(Self {
-            a: on_way(a, of_a, asked.within_s)?,
-            b: on_way(b, of_b, asked.within_s)?,
+            a: go(a, &of_a)?,
+            b: go(b, &of_b)?,
             within_s: asked.within_s,
             found: ImpactFound {
                 tick_header,
-                linear_a: of_a.0.into(),
-                angular_a: of_a.1.into(),
-                linear_b: of_b.0.into(),
-                angular_b: of_b.1.into(),
+                linear_a: of_a.linear.into(),
+                angular_a: of_a.angular.into(),
+                linear_b: of_b.linear.into(),
+                angular_b: of_b.angular.into(),
                 ..ImpactFound::default()
             },
             warnings,
@@ -88,26 +98,14 @@ impl ImpactQuestion {
     }
 }
 
-/// Linear and angular velocity: as asked, else as sent, else none.
-fn velocity(body: &Body, asked: &Velocity, warnings: &mut Vec<String>) -> (Vec3, Vec3) {
-    let told = asked.linear.is_some() || asked.angular.is_some();
-    if !told && body.velocity.is_none() && body.moves {
-        warnings.push(format!(
-            "body \"{}\" is taken to be at rest: its source sends no velocity, and the question says none",
-            body.name
-        ));
-    }
-    // What the question says of a body is all that holds of it.
-    let [x, y, z, rx, ry, rz] = body.velocity.filter(|_| !told).unwrap_or_default();
-    (
-        asked.linear.map_or(Vec3::new(x, y, z), Vec3::from),
-        asked.angular.map_or(Vec3::new(rx, ry, rz), Vec3::from),
-    )
-}
-
-fn on_way(body: &Body, (linear, angular): (Vec3, Vec3), within_s: f64) -> Result<Body, String> {
+fn on_way(body: &Body, going: &Going, within_s: f64) -> Result<Body, String> {
     let name = &body.name;
-    let (linear, angular) = if is_ball(body) {
+    let Going {
+        linear,
+        angular,
+        pivot,
+    } = *going;
+    let (linear, angular) = if pivot == body.centre && is_ball(body) {
         // What turns about its middle stays where it is, and no bound need allow for the turn.
         let arm = body.pose.rotation * body.centre.coords;
         (linear + angular.cross(&arm), Vec3::zeros())
@@ -127,7 +125,7 @@ fn on_way(body: &Body, (linear, angular): (Vec3, Vec3), within_s: f64) -> Result
             "body \"{name}\" turns more than {LEG_TURNS_MAX} times in {within_s} s: ask for a shorter time"
         ));
     }
-    Ok(body.on_way(linear, angular, within_s))
+    Ok(body.on_way_about(&pivot, linear, angular, within_s))
 }
 
 /// One sphere, about whose middle the body turns.

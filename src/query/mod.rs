@@ -1,6 +1,7 @@
 //! Queries: offline, of shape pairs; and of a running daemon, of its bodies as a tick left them.
 pub mod batch;
 mod gap;
+mod going;
 mod impact;
 mod measure;
 mod nearest;

@@ -254,6 +254,7 @@ impl World {
                 continue;
             };
             let pose = root.pose * root_pose;
+            let velocity = root.twist_at(&root_pose.translation.vector.into());
             let (stamp_ns, since_ns, received_ns) =
                 (root.stamp_ns, root.since_ns, root.received_ns);
             let reject = root.reject;
@@ -263,11 +264,24 @@ impl World {
                 body.since_ns = since_ns;
                 body.received_ns = received_ns;
                 body.reject = reject;
-                // Not that of the root: a lever makes it larger.
-                body.velocity = None;
             }
+            let was_in = self.body(slot).is_some_and(|body| body.in_broad);
+            let other_speed = self.take_velocity(slot, velocity);
             self.settle(slot, moved);
+            if other_speed && !moved && was_in {
+                self.lists.restated(slot);
+            }
         }
+    }
+
+    /// Gives a body another velocity; whether it is another one.
+    fn take_velocity(&mut self, slot: BodySlot, velocity: Option<[f64; 6]>) -> bool {
+        let bits = |v: Option<[f64; 6]>| v.map(|v| v.map(f64::to_bits));
+        let Some(body) = self.bodies[slot.index()].as_mut() else {
+            return false;
+        };
+        let was = std::mem::replace(&mut body.velocity, velocity);
+        bits(was) != bits(velocity)
     }
 
     fn source_of(&self, body: &Body) -> Option<&SourceState> {

@@ -2,7 +2,7 @@
 
 use crate::config::OnStale;
 use crate::ids::{BodyId, BodySlot, SourceSlot};
-use crate::math::{Aabb, Point, Pose, displacement};
+use crate::math::{Aabb, Point, Pose, Vec3, displacement};
 use crate::wire::{BodyStatus, EndCause, RejectReason};
 
 use super::bend::Vertices;
@@ -26,7 +26,8 @@ pub struct Body {
     pub unbounded: bool,
     /// Last admitted pose, scene frame.
     pub pose: Pose,
-    /// Linear and angular velocity of that pose, scene frame, where the sender gave them.
+    /// Linear and angular velocity of that pose, scene frame, where the sender gave them; of a body that hangs on
+    /// another as those of the other move it.
     pub velocity: Option<[f64; 6]>,
     /// Centre of its geometry in the body frame: the reference point of its motion.
     pub centre: Point,
@@ -66,6 +67,19 @@ pub struct Body {
     pub on_stale: Option<OnStale>,
     /// Whether it has a proxy in the broad phase.
     pub in_broad: bool,
+}
+
+impl Body {
+    /// Linear and angular velocity of a frame that moves with the body, where the body's own are known: scene frame.
+    ///
+    /// * `point` - the frame's origin, body frame, metres.
+    #[must_use]
+    pub fn twist_at(&self, point: &Point) -> Option<[f64; 6]> {
+        let [x, y, z, rx, ry, rz] = self.velocity?;
+        let (linear, angular) = (Vec3::new(x, y, z), Vec3::new(rx, ry, rz));
+        let there = linear + angular.cross(&(self.pose.rotation * point.coords));
+        Some([there.x, there.y, there.z, rx, ry, rz])
+    }
 }
 
 /// How far a body has moved: a path over anchors, and the displacement from the newest anchor.

@@ -8,7 +8,7 @@ use super::parts::Parts;
 use super::path::{Leg, Path};
 use super::place::{new_body, tight_box};
 use crate::ids::{BodyId, BodySlot};
-use crate::math::{Pose, Quat, Vec3};
+use crate::math::{Point, Pose, Quat, Vec3};
 use crate::scene::BodySpec;
 use crate::wire::BodyStatus;
 
@@ -48,11 +48,19 @@ impl Body {
     /// * `angular` - scene frame, radians a second.
     #[must_use]
     pub fn on_way(&self, linear: Vec3, angular: Vec3, seconds: f64) -> Self {
-        let arm = self.pose.rotation * self.centre.coords;
+        self.on_way_about(&self.centre, linear, angular, seconds)
+    }
+
+    /// As [`Body::on_way`], where another point goes straight than the centre of its geometry.
+    ///
+    /// * `pivot` - body frame, metres.
+    #[must_use]
+    pub fn on_way_about(&self, pivot: &Point, linear: Vec3, angular: Vec3, seconds: f64) -> Self {
+        let arm = self.pose.rotation * pivot.coords;
         let (travel, spin) = ((linear + angular.cross(&arm)) * seconds, angular * seconds);
-        let at = self.pose * self.centre;
+        let at = self.pose * pivot;
         let turned = Quat::from_scaled_axis(spin) * self.pose.rotation;
-        let end = at + travel - turned * self.centre.coords;
+        let end = at + travel - turned * pivot.coords;
         let leg = Leg {
             from: self.pose,
             to: Pose::from_parts(end.coords.into(), turned),
@@ -62,8 +70,13 @@ impl Body {
             extra: Vec3::zeros(),
             jump: false,
         };
+        let reach = if *pivot == self.centre {
+            self.radius
+        } else {
+            (self.radius + (pivot - self.centre).norm()) * (1.0 + 8.0 * f64::EPSILON)
+        };
         Self {
-            path: Some(Box::new(Path::of_leg(leg, self.centre, self.radius))),
+            path: Some(Box::new(Path::of_leg(leg, *pivot, reach))),
             ..self.still()
         }
     }
@@ -80,6 +93,15 @@ impl Body {
 }
 
 impl World {
+    /// The body that one hangs on in the end, itself where it hangs on none, and its pose seen from there.
+    #[must_use]
+    pub fn root_of(&self, slot: BodySlot) -> (BodySlot, Pose) {
+        let entry = self.entries.get(slot.index());
+        entry.map_or((slot, Pose::identity()), |entry| {
+            (entry.root, entry.root_pose)
+        })
+    }
+
     /// The bodies that hang on one, also over others, each with its pose seen from that one; by slot.
     ///
     /// Cost: O(attached bodies).

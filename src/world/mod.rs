@@ -293,6 +293,12 @@ impl World {
         Some(source_at(place))
     }
 
+    /// The moment that it stands at, nanoseconds of `CLOCK_BOOTTIME`: that of the newest tick.
+    #[must_use]
+    pub fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
     /// Revision of the scene: 1 at the start, raised by each request that changed something.
     #[must_use]
     pub fn scene_rev(&self) -> u64 {

@@ -1,5 +1,6 @@
 //! When two bodies touch first on a way that a question says: closed forms, samples of the way, cut off at any unit.
 
+mod attached;
 mod bugs;
 
 use sweepd::math::Vec3;
@@ -33,6 +34,10 @@ fn question(world: &World, json: &str) -> Result<ImpactQuestion, String> {
 
 fn ask(world: &World, json: &str) -> ImpactFound {
     question(world, json).unwrap().answer(&SystemClock)
+}
+
+fn warnings(world: &World, json: &str) -> Vec<String> {
+    question(world, json).unwrap().warnings
 }
 
 fn rig(bodies: &[String]) -> Rig {

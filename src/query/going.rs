@@ -1,0 +1,145 @@
+//! How two bodies of a question go on. In: the world between two ticks, what the question says of their velocities.
+//! Out: a velocity and a pivot for each, and what is odd about them, but legal.
+//!
+//! What the question says of a body holds of that body and of the other, if that hangs on it and nothing is said of it.
+//! Else a body goes on as it was sent, and what hangs on another as the body at the root of all moves it: on an arc
+//! about that one's centre. Two that hang on one body are at rest as the one sees the other.
+
+use super::measure::age_ns;
+use crate::ids::BodySlot;
+use crate::math::{Point, Vec3};
+use crate::scene::Velocity;
+use crate::wire::BodyStatus;
+use crate::world::{Body, World};
+
+/// How a body goes on.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Going {
+    /// Of its frame's origin, scene frame, metres a second.
+    pub(super) linear: Vec3,
+    /// Scene frame, radians a second.
+    pub(super) angular: Vec3,
+    /// The point that goes straight, body frame.
+    pub(super) pivot: Point,
+}
+
+/// One of the two.
+#[derive(Clone, Copy)]
+pub(super) struct Goer<'q> {
+    pub(super) slot: BodySlot,
+    pub(super) body: &'q Body,
+    pub(super) asked: &'q Velocity,
+}
+
+impl Goer<'_> {
+    /// Whether the question says how it moves: then that is all that holds of it.
+    fn is_told(&self) -> bool {
+        self.asked.linear.is_some() || self.asked.angular.is_some()
+    }
+
+    fn as_told(&self) -> Going {
+        let vector = |told: Option<[f64; 3]>| told.map(Vec3::from).unwrap_or_default();
+        Going {
+            linear: vector(self.asked.linear),
+            angular: vector(self.asked.angular),
+            pivot: self.body.centre,
+        }
+    }
+
+    /// As it was sent, or as what it hangs on was.
+    fn as_sent(&self, world: &World) -> Going {
+        let (root, local) = world.root_of(self.slot);
+        let centre = world
+            .body(root)
+            .map_or(self.body.centre, |root| root.centre);
+        let pivot = if root == self.slot {
+            self.body.centre
+        } else {
+            local.inverse_transform_point(&centre)
+        };
+        let [x, y, z, rx, ry, rz] = self.body.velocity.unwrap_or_default();
+        Going {
+            linear: Vec3::new(x, y, z),
+            angular: Vec3::new(rx, ry, rz),
+            pivot,
+        }
+    }
+
+    /// As another body moves it, on which it hangs.
+    fn carried(&self, by: &Self) -> Going {
+        let Going {
+            linear, angular, ..
+        } = by.as_told();
+        let arm = self.body.pose.translation.vector - by.body.pose.translation.vector;
+        Going {
+            linear: linear + angular.cross(&arm),
+            angular,
+            pivot: self
+                .body
+                .pose
+                .inverse_transform_point(&(by.body.pose * by.body.centre)),
+        }
+    }
+
+    /// What is odd about the velocity that it was sent with.
+    fn doubts(&self, world: &World) -> Option<String> {
+        let body = self.body;
+        if !body.moves {
+            return None;
+        }
+        let name = &body.name;
+        if body.velocity.is_none() {
+            let (root, _) = world.root_of(self.slot);
+            let who = match world.body(root).filter(|_| root != self.slot) {
+                Some(root) => format!("the source of \"{}\", on which it hangs,", root.name),
+                None => "its source".to_owned(),
+            };
+            return Some(format!(
+                "body \"{name}\" is taken to be at rest: {who} sends no velocity, and the question says none"
+            ));
+        }
+        let age_ns = age_ns(body, world.now_ns()).filter(|_| body.status == BodyStatus::Held)?;
+        #[allow(
+            clippy::cast_precision_loss,
+            reason = "told to a thousandth of a second"
+        )]
+        let age_s = age_ns as f64 * 1e-9;
+        Some(format!(
+            "body \"{name}\" is taken to go on as it was sent: that velocity was {age_s:.3} s old at this tick, and the question says none"
+        ))
+    }
+}
+
+/// How both go on; whether the one is at rest as the other sees it; adds what is odd to the warnings.
+pub(super) fn goings(
+    world: &World,
+    [a, b]: [Goer<'_>; 2],
+    warnings: &mut Vec<String>,
+) -> ([Going; 2], bool) {
+    for goer in [a, b].iter().filter(|goer| goer.body.vertices.is_some()) {
+        warnings.push(format!(
+            "body \"{}\" deforms: its vertices are taken as they are, whatever way they go",
+            goer.body.name
+        ));
+    }
+    let hangs = |one: &Goer<'_>, on: &Goer<'_>| {
+        let hanging = world.hanging_on(on.slot);
+        hanging.iter().any(|(slot, _)| *slot == one.slot)
+    };
+    match (a.is_told(), b.is_told()) {
+        (true, false) if hangs(&b, &a) => return ([a.as_told(), b.carried(&a)], true),
+        (false, true) if hangs(&a, &b) => return ([a.carried(&b), b.as_told()], true),
+        (false, false) if world.root_of(a.slot).0 == world.root_of(b.slot).0 => {
+            return ([a.as_sent(world), b.as_sent(world)], true);
+        }
+        _ => {}
+    }
+    let mut of = |goer: Goer<'_>| {
+        if goer.is_told() {
+            return goer.as_told();
+        }
+        warnings.extend(goer.doubts(world));
+        goer.as_sent(world)
+    };
+    ([of(a), of(b)], false)
+}
