@@ -9,11 +9,16 @@
 )]
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use serde_json::{Value, json};
 use sweepd::math::{Point, Pose, Quat, Vec3};
 use sweepd::narrow::exact::{Closest, Warm, convex_gap, gap_to_half_space, half_space_gap};
-use sweepd::shape::Convex;
+use sweepd::narrow::gap_between;
+use sweepd::shape::{Convex, ShapeSpec, build};
+use sweepd::time::{Meter, SystemClock};
+use sweepd::wire::Verdict;
+use sweepd::world::{Body, Parts, PlacedShape};
 
 fn ask(text: &[u8]) -> (bool, Vec<Value>) {
     let mut out = Vec::new();
@@ -435,5 +440,121 @@ fn bug_a_sliver_that_is_just_apart_was_told_nearer_than_it_is() {
     assert!(
         end("gap_min_m") <= truth && truth <= end("gap_max_m"),
         "{rows:?}"
+    );
+}
+
+/// A cube of half side `h`, closed, outward.
+fn cube(h: f64, solid: Option<bool>) -> Value {
+    let corners: Vec<[f64; 3]> = (0..8)
+        .map(|k| [4, 2, 1].map(|bit| if k & bit == 0 { -h } else { h }))
+        .collect();
+    let faces = [
+        [0, 1, 3],
+        [0, 3, 2],
+        [4, 6, 7],
+        [4, 7, 5],
+        [0, 4, 5],
+        [0, 5, 1],
+        [2, 3, 7],
+        [2, 7, 6],
+        [0, 2, 6],
+        [0, 6, 4],
+        [1, 5, 7],
+        [1, 7, 3],
+    ];
+    let mut mesh = json!({"type": "trimesh", "vertices": corners, "faces": faces});
+    if let Some(solid) = solid {
+        mesh["solid"] = json!(solid);
+    }
+    mesh
+}
+
+/// What a daemon tells of the same two shapes, of meshes as their `solid` says.
+fn as_in_a_daemon(a: &Value, b: &Value, t: [f64; 3]) -> (f64, f64, bool) {
+    let body = |shape: &Value, at: [f64; 3]| {
+        let spec: ShapeSpec = serde_json::from_value(shape.clone()).unwrap();
+        let parts = Parts::from([PlacedShape {
+            shape: build(&spec, Path::new(".")).unwrap().shape,
+            pose: Pose::identity(),
+        }]);
+        Body::of_shapes(
+            parts,
+            &Pose::from_parts(Vec3::from(at).into(), Quat::identity()),
+        )
+    };
+    let mut meter = Meter::unlimited(&SystemClock);
+    let asked = gap_between(&body(a, [0.0; 3]), &body(b, t), 0.0, &mut meter);
+    (
+        asked.gap.min,
+        asked.gap.max,
+        asked.verdict == Verdict::Colliding,
+    )
+}
+
+/// It was proved apart by the distance to the surface.
+#[test]
+fn bug_what_is_inside_a_solid_mesh_collides_with_it() {
+    let others = [
+        (0.2, json!({"type": "sphere", "radius": 0.2})),
+        (0.2, json!({"type": "box", "half_extents": [0.2, 0.2, 0.2]})),
+        (0.3, cube(0.3, Some(true))),
+        (0.3, cube(0.3, None)),
+        (0.3, cube(0.3, Some(false))),
+    ];
+    for (half, other) in &others {
+        for z in [0.0, 0.3, 0.6, 0.95, 2.0] {
+            let at = [0.05, 0.02, z];
+            let back = at.map(|x: f64| -x);
+            let gap = z - 1.0 - half;
+            let solid = cube(1.0, Some(true));
+            for (a, b, t) in [(&solid, other, at), (other, &solid, back)] {
+                let (_, told) = ask(line("x", a, b, t).as_bytes());
+                let told = &told[0];
+                let what = format!("{half} {z}: {told}");
+                let number = |key: &str| told[key].as_f64().unwrap();
+                let (low, high) = (number("gap_min_m"), number("gap_max_m"));
+                assert_eq!(told["colliding"], gap < 0.0, "{what}");
+                if gap < 0.0 {
+                    assert!(high <= 0.0, "{what}");
+                } else {
+                    assert!(low <= gap && gap <= high && high - low < 1e-9, "{what}");
+                }
+                // What says nothing is a surface here; a daemon would settle it by its topology.
+                if other["solid"].is_null() && other["type"] == "trimesh" {
+                    continue;
+                }
+                assert_eq!(as_in_a_daemon(a, b, t), (low, high, gap < 0.0), "{what}");
+            }
+            // A surface has no inside.
+            for surface in [cube(1.0, None), cube(1.0, Some(false))] {
+                if other["solid"] == true {
+                    continue;
+                }
+                let (_, told) = ask(line("x", &surface, other, at).as_bytes());
+                let inside = z + half < 1.0;
+                assert_eq!(
+                    told[0]["colliding"],
+                    gap < 0.0 && !inside,
+                    "{z}: {}",
+                    told[0]
+                );
+            }
+        }
+    }
+    // Half-spaces too; and what is not closed is no solid.
+    let floor = json!({"type": "half_space", "normal": [0, 0, 1], "offset": -3.0});
+    let (_, told) = ask(line("x", &floor, &cube(1.0, Some(true)), [0.0, 0.0, 0.5]).as_bytes());
+    assert!(
+        (told[0]["gap_m"].as_f64().unwrap() - 2.5).abs() < 1e-12,
+        "{}",
+        told[0]
+    );
+    let mut open = cube(1.0, Some(true));
+    open["faces"].as_array_mut().unwrap().pop();
+    let (whole, told) = ask(line("x", &open, &others[0].1, [0.0; 3]).as_bytes());
+    assert!(
+        !whole && told[0]["error"].as_str().unwrap().contains("a: "),
+        "{}",
+        told[0]
     );
 }

@@ -1,9 +1,11 @@
 //! `sweepd query --batch`: shape-pair cases in, gaps out, one line of JSON each; no engine, no admission.
 //!
 //! In: JSON Lines with `id`, `a`, `b` (shapes), `pose_a`, `pose_b` (`t` in metres, `q` = w, x, y, z, any finite
-//! length but 0); other keys are passed over. Out: one answer a line in the order of the input, or `{id, error}`.
+//! length but 0); other keys are passed over. A `trimesh` is a surface (law 3.3), one with `solid: true` a solid.
+//! Out: one answer a line in the order of the input, or `{id, error}`.
 
 mod pieces;
+mod solids;
 
 use std::io::{BufRead, ErrorKind, Read, Write};
 
@@ -12,11 +14,12 @@ use serde_json::{Map, Value};
 
 use crate::error::{Error, Result, nearest};
 use crate::limits::REQUEST_BYTES_MAX;
-use crate::math::{Pose, Vec3, pose_from, relative};
+use crate::math::{Point, Pose, Vec3, pose_from, relative};
 use crate::narrow::exact::Closest;
 use crate::shape::ShapeSpec;
 
 use pieces::{Kind, Pieces, gap};
+use solids::Known;
 
 /// What a case is made of.
 const PARTS: [&str; 5] = ["id", "a", "b", "pose_a", "pose_b"];
@@ -41,7 +44,7 @@ struct Placed {
 #[derive(Serialize)]
 struct Answer {
     id: Value,
-    /// `null` where a mesh surface is crossed.
+    /// `null` where a mesh surface is crossed; of a solid mesh that overlaps an estimate, or `null`.
     gap_m: Option<f64>,
     gap_min_m: f64,
     gap_max_m: f64,
@@ -151,31 +154,56 @@ fn answer(case: &Case) -> std::result::Result<Answer, String> {
     let pose_b = case.pose_b.read("pose_b")?;
     let a = Pieces::build(&case.a).map_err(|e| format!("a: {e}"))?;
     let b = Pieces::build(&case.b).map_err(|e| format!("b: {e}"))?;
-    let closest = gap(&a, &b, &relative(&pose_a, &pose_b))?;
+    let pos12 = relative(&pose_a, &pose_b);
+    let closest = gap(&a, &b, &pos12)?;
+    if let Some(known) = solids::gap((&case.a, &case.b), &pos12, &closest)? {
+        return Ok(of_solids(&known, &pose_a));
+    }
     let surface = a.kind == Kind::Surface || b.kind == Kind::Surface;
     Ok(shown(&closest, &pose_a, surface))
 }
 
-/// From A's frame to the world's.
+/// As a daemon would tell it of two bodies.
+fn of_solids(known: &Known, pose_a: &Pose) -> Answer {
+    let places = (known.normal, known.point_a, known.point_b);
+    Answer {
+        gap_m: known.best_m,
+        gap_min_m: known.gap.min,
+        gap_max_m: known.gap.max,
+        colliding: known.collides,
+        ..placed(places, pose_a)
+    }
+}
+
+/// Of pieces.
 fn shown(closest: &Closest, pose_a: &Pose, surface: bool) -> Answer {
     let crossed = surface && closest.gap.max < 0.0;
-    let turned = |v: &Vec3| pose_a.rotation * v;
-    let (a, b) = (
-        turned(&closest.point_a.coords),
-        turned(&closest.point_b.coords),
-    );
-    let at = &pose_a.translation.vector;
+    let places = (closest.normal, closest.point_a, closest.point_b);
     Answer {
-        id: Value::Null,
         gap_m: (!crossed).then_some(closest.best_m),
         gap_min_m: closest.gap.min,
         gap_max_m: if crossed { 0.0 } else { closest.gap.max },
-        normal: turned(&closest.normal).into(),
+        colliding: closest.collides(),
+        ..placed(places, pose_a)
+    }
+}
+
+/// Normal and points, from A's frame to the world's.
+fn placed((normal, point_a, point_b): (Vec3, Point, Point), pose_a: &Pose) -> Answer {
+    let turned = |v: &Vec3| pose_a.rotation * v;
+    let (a, b) = (turned(&point_a.coords), turned(&point_b.coords));
+    let at = &pose_a.translation.vector;
+    Answer {
+        id: Value::Null,
+        gap_m: None,
+        gap_min_m: f64::NEG_INFINITY,
+        gap_max_m: f64::INFINITY,
+        normal: turned(&normal).into(),
         point_a: (a + at).into(),
         point_b: (b + at).into(),
         point_a_rel: a.into(),
         point_b_rel: b.into(),
-        colliding: closest.collides(),
+        colliding: false,
     }
 }
 

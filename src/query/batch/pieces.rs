@@ -1,6 +1,7 @@
 //! Shapes of a batch as convex pieces, and the least gap over all pairs of them.
 //!
-//! In: shape specs, a relative pose. Out: one [`Closest`]. A mesh is a surface here: its triangles are its pieces. By
+//! In: shape specs, a relative pose. Out: one [`Closest`]. A mesh is a surface here: its triangles are its pieces
+//! (of one that is a solid see `solids`). By
 //! brute force, pruned by bounding balls alone, so that it shares no tree with the engine.
 
 use crate::math::{Interval, Point, Pose, Vec3};

@@ -1,0 +1,88 @@
+//! Lines of a batch in which a mesh is a solid: answered as a running daemon answers the question for a gap.
+//!
+//! In: the shapes of a line, the pose of B seen from A. Out: an interval and what is known with it, or `None` where no
+//! mesh of the line is a solid. By the engine's own query, so that the two agree.
+
+use std::path::Path;
+
+use crate::math::{Interval, Point, Pose, Vec3};
+use crate::narrow::exact::Closest;
+use crate::narrow::gap_between;
+use crate::shape::{ShapeSpec, build};
+use crate::time::{Meter, SystemClock};
+use crate::wire::Verdict;
+use crate::world::{Body, Parts, PlacedShape};
+
+/// What is known of two shapes of which one at least is a solid mesh; A's frame, metres.
+pub(super) struct Known {
+    pub(super) gap: Interval,
+    pub(super) best_m: Option<f64>,
+    pub(super) normal: Vec3,
+    pub(super) point_a: Point,
+    pub(super) point_b: Point,
+    pub(super) collides: bool,
+}
+
+/// Whether the line says that the inside of a mesh belongs to it.
+fn is_solid(spec: &ShapeSpec) -> bool {
+    let ShapeSpec::Trimesh { solid, .. } = spec else {
+        return false;
+    };
+    *solid == Some(true)
+}
+
+/// The gap, where one of the two is a solid mesh.
+///
+/// * `surfaces` - what is known of them as surfaces: a place to tell where the query has none.
+///
+/// # Errors
+/// Why it is no solid.
+pub(super) fn gap(
+    (a, b): (&ShapeSpec, &ShapeSpec),
+    pos12: &Pose,
+    surfaces: &Closest,
+) -> Result<Option<Known>, String> {
+    if !is_solid(a) && !is_solid(b) {
+        return Ok(None);
+    }
+    let a = body("a", a, &Pose::identity())?;
+    let b = body("b", b, pos12)?;
+    let asked = gap_between(&a, &b, 0.0, &mut Meter::unlimited(&SystemClock));
+    let Interval { min, max } = asked.gap;
+    Ok(Some(match asked.witness {
+        Some(witness) => Known {
+            gap: asked.gap,
+            // An estimate is never outside what is proved.
+            best_m: Some(witness.best_m.max(min).min(max)),
+            normal: witness.normal,
+            point_a: witness.point_a,
+            point_b: pos12 * witness.point_b,
+            collides: asked.verdict == Verdict::Colliding,
+        },
+        None => Known {
+            gap: asked.gap,
+            best_m: None,
+            normal: surfaces.normal,
+            point_a: surfaces.point_a,
+            point_b: surfaces.point_b,
+            collides: asked.verdict == Verdict::Colliding,
+        },
+    }))
+}
+
+/// A shape that stands alone; of a mesh of which nothing is said, as a batch takes it: a surface.
+fn body(what: &str, spec: &ShapeSpec, pose: &Pose) -> Result<Body, String> {
+    let surface = |spec: &ShapeSpec| {
+        let mut spec = spec.clone();
+        if let ShapeSpec::Trimesh { solid, .. } = &mut spec {
+            *solid = Some(*solid == Some(true));
+        }
+        spec
+    };
+    let built = build(&surface(spec), Path::new(".")).map_err(|e| format!("{what}: {e}"))?;
+    let parts = Parts::from([PlacedShape {
+        shape: built.shape,
+        pose: Pose::identity(),
+    }]);
+    Ok(Body::of_shapes(parts, pose))
+}
