@@ -532,8 +532,8 @@ typedef struct sweepd_pair_row {
     double gap_max_m;
     /* Best estimate of the gap, metres, signed; NaN: none. */
     double gap_best_m;
-    /* How fast the gap shrinks along the normal, metres a second; negative: it grows; NaN:
-     * velocities unknown. */
+    /* How fast the gap shrinks along the normal, metres a second; negative: it grows; NaN: not
+     * known (no velocity was sent, or a body is silent, refused or deforms). */
     double closing_mps;
     /* Of a swept pair that touched, or may have, on the way from the last tick's poses (0) to this
      * one's (1): the share before which it did not; NaN: not swept, or free of touch. */

@@ -6,7 +6,7 @@ use crate::narrow::{Finding, Passage, Witness};
 use crate::wire::{
     BodyStatus, EndCause, Event, Level, MessageHeader, Outbox, PairRow, Verdict, pair_flags,
 };
-use crate::world::Body;
+use crate::world::{Body, Tag};
 
 use super::events::Ids;
 use super::kept::{Kept, Span};
@@ -231,8 +231,8 @@ impl Publisher {
         if let Some(witness) = finding.witness {
             // An estimate is never outside what is proved.
             out.gap_best_m = witness.best_m.max(finding.gap.min).min(finding.gap.max);
-            if a.has_velocity
-                && b.has_velocity
+            if goes_as_told(a)
+                && goes_as_told(b)
                 && let (Some(a), Some(b)) = (world.body(finding.a), world.body(finding.b))
             {
                 out.closing_mps = closing_speed(a, b, witness);
@@ -288,6 +288,11 @@ impl Publisher {
         };
         (out.toi_min, out.toi_max) = (toi.min, toi.max);
     }
+}
+
+/// Whether a body goes as its sender says: of one that is silent or refused that is long ago.
+fn goes_as_told(tag: &Tag) -> bool {
+    tag.has_velocity && matches!(tag.status, BodyStatus::Known | BodyStatus::Truncated)
 }
 
 /// How fast the gap shrinks at the witness of two bodies whose velocities are known, metres a second.

@@ -115,7 +115,8 @@ pub struct PairRow {
     pub gap_max_m: f64,
     /// Best estimate of the gap, metres, signed; NaN: none.
     pub gap_best_m: f64,
-    /// How fast the gap shrinks along the normal, metres a second; negative: it grows; NaN: velocities unknown.
+    /// How fast the gap shrinks along the normal, metres a second; negative: it grows; NaN: not known (no velocity was
+    /// sent, or a body is silent, refused or deforms).
     pub closing_mps: f64,
     /// Of a swept pair that touched, or may have, on the way from the last tick's poses (0) to this one's (1): the
     /// share before which it did not; NaN: not swept, or free of touch.

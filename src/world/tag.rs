@@ -14,7 +14,8 @@ pub struct Tag {
     pub id: BodyId,
     /// What is known of its place.
     pub status: BodyStatus,
-    /// Whether its velocity is known: told by its sender, or none because it cannot move.
+    /// Whether the velocity of its surface is known: told by its sender, or none because it cannot move. Of what
+    /// deforms nobody tells how its vertices go.
     pub has_velocity: bool,
 }
 
@@ -25,7 +26,7 @@ impl Tag {
         Self {
             id: body.id,
             status: body.status,
-            has_velocity: body.velocity.is_some() || !body.moves,
+            has_velocity: (body.velocity.is_some() || !body.moves) && body.vertices.is_none(),
         }
     }
 }

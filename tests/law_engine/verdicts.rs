@@ -2,7 +2,9 @@
 
 use sweepd::math::{Point, Vec3, pose_from};
 use sweepd::scene::PairAction;
-use sweepd::wire::{ContactKind, State, Verdict};
+use sweepd::wire::{
+    ContactKind, State, Verdict, VertexFrame, VertexHeader, WIRE_VERSION, name_bytes, vertex_flags,
+};
 use sweepd::world::Edit;
 
 use crate::rig::{ALL, Rig, ball, body, row, rule, scene};
@@ -181,5 +183,79 @@ fn law_6_how_fast_a_gap_shrinks_is_told_where_velocities_are() {
             (closing(&rig, 3) - toward_wall).abs() < 1e-12,
             "{velocities:?}"
         );
+    }
+}
+
+/// Old and silent senders, and vertices that go their own way, had the speed of the pose they were last sent with.
+#[test]
+fn bug_how_fast_a_gap_shrinks_is_not_told_of_what_is_silent_or_deforms() {
+    let near = "report_within_m = 30.0";
+    let sheet = "{ type = \"trimesh\", solid = false, \
+        vertices = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]], \
+        faces = [[0, 1, 2], [0, 2, 3]] }";
+    let floor = "name = \"floor\"\nid = 9\nmoves = false\nreport_within_m = 30.0\n\
+        shape = { type = \"half_space\", normal = [0, 0, 1], offset = -3.0 }";
+    for (on_stale, speed) in [
+        ("hold", ""),
+        ("unknown", ""),
+        ("unknown", "max_speed_mps = 1.0"),
+    ] {
+        let more = format!("{near}\non_stale = \"{on_stale}\"\n{speed}");
+        let mut rig = Rig::new(&scene(
+            "",
+            &[
+                ball(1, 0.0, &more),
+                body(
+                    2,
+                    [9.0, 0.0, 0.0],
+                    sheet,
+                    &format!("{near}\ndeforms = true"),
+                ),
+                floor.to_owned(),
+            ],
+        ));
+        rig.velocities = vec![[0.0, 0.0, -2.0, 0.0, 0.0, 0.0]; 2];
+        let square = [
+            [-1.0, -1.0, 0.0],
+            [1.0, -1.0, 0.0],
+            [1.0, 1.0, 0.0],
+            [-1.0, 1.0, 0.0],
+        ];
+        let mut vertices = VertexFrame {
+            header: VertexHeader {
+                session: 11,
+                epoch: 1,
+                body: 2,
+                version: 1,
+                source: name_bytes("feed"),
+                count: 4,
+                total: 4,
+                flags: vertex_flags::FULL,
+                schema: WIRE_VERSION,
+                ..VertexHeader::default()
+            },
+            rows: square.to_vec(),
+            ..VertexFrame::default()
+        };
+        rig.vertices = vec![vertices.clone()];
+        rig.send(ALL);
+        let closing = |rig: &Rig, a| rig.pair(a, 9).unwrap().closing_mps;
+        assert!((closing(&rig, 1) - 2.0).abs() < 1e-12, "{on_stale}");
+        assert!(closing(&rig, 2).is_nan(), "nobody tells how vertices go");
+        vertices.header.version = 2;
+        vertices.rows.iter_mut().for_each(|row| row[2] = -0.1);
+        rig.vertices = vec![vertices];
+        rig.send(ALL);
+        assert!(closing(&rig, 2).is_nan());
+        rig.idle(499_000_000, ALL);
+        assert!((closing(&rig, 1) - 2.0).abs() < 1e-12, "{on_stale}");
+        rig.idle(2_000_000, ALL);
+        assert!(
+            closing(&rig, 1).is_nan(),
+            "{on_stale}: {:?}",
+            rig.pair(1, 9)
+        );
+        rig.send(ALL);
+        assert!((closing(&rig, 1) - 2.0).abs() < 1e-12, "{on_stale}");
     }
 }

@@ -200,7 +200,8 @@ class PairRow(_Row):
         ("gap_max_m", ctypes.c_double),
         # Best estimate of the gap, metres, signed; NaN: none.
         ("gap_best_m", ctypes.c_double),
-        # How fast the gap shrinks along the normal, metres a second; negative: it grows; NaN: velocities unknown.
+        # How fast the gap shrinks along the normal, metres a second; negative: it grows; NaN: not known (no velocity
+        # was sent, or a body is silent, refused or deforms).
         ("closing_mps", ctypes.c_double),
         # Of a swept pair that touched, or may have, on the way from the last tick's poses (0) to this one's (1): the share
         # before which it did not; NaN: not swept, or free of touch.
