@@ -53,6 +53,7 @@ pub use order::Order;
 pub use sweep::{Passage, Swept, touch_on_way};
 
 use crate::ids::{BodySlot, PairSlot};
+use crate::limits::SWEEP_LOOKS_MAX;
 use crate::pairs::{PairDelta, PairSet};
 use crate::simd;
 use crate::time::Meter;
@@ -68,7 +69,7 @@ use order::{RankCost, Urgency};
 use pool::{NONE, Pool};
 use refit::Refits;
 use shelves::Shelves;
-use sweep::Sweeps;
+use sweep::{FIRST_LOOKS, Sweeps};
 
 /// What the narrow phase did in this tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -232,11 +233,13 @@ impl Narrow {
     fn spend_on_pairs(&mut self, world: &World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
         let kept = Self::keep_back_for_regions(wanted, meter);
         let half = self.has_sweeps().then(|| meter.half());
-        let swept = self.spend_on_sweeps(world, wanted, meter, half);
+        let swept = self.spend_on_sweeps(world, wanted, meter, half, FIRST_LOOKS);
         let decided = self.spend_on_verdicts(world, wanted, meter);
-        let swept = swept || self.spend_on_sweeps(world, wanted, meter, None);
-        self.close_sweeps(world);
+        let swept = swept || self.spend_on_sweeps(world, wanted, meter, None, FIRST_LOOKS);
+        self.bring_up_swept(world);
         let done = decided && swept && self.spend_on_reports(world, wanted, meter);
+        let done = self.spend_on_sweeps(world, wanted, meter, None, SWEEP_LOOKS_MAX) && done;
+        self.close_sweeps();
         meter.release(kept);
         self.spend_on_regions(world, wanted, meter);
         // With what splitting did not take.

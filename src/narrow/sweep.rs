@@ -11,7 +11,8 @@
 //! slope of the gap. What comes as near as rounding and no nearer is open.
 //!
 //! Sweeps come before the verdicts, because another tick has other poses: what is undecided at the end of this one is
-//! told as open. They take half of what the budget leaves, so that verdicts do not starve, and what verdicts leave.
+//! told as open. They take half of what the budget leaves, so that verdicts do not starve, and what verdicts leave;
+//! long ones, of what turns close beside another, what contacts leave.
 //!
 //! Refused: sampling (a wall is as thin as it likes); looking for the touch by bisection of the verdict (a bullet that
 //! ends behind the wall is apart at both ends); keeping an undecided sweep for later (nobody asks for it any more).
@@ -20,10 +21,13 @@ mod advance;
 mod asked;
 mod close;
 mod motion;
+#[cfg(test)]
+mod tests;
 
 pub use asked::touch_on_way;
 
 use crate::ids::{BodySlot, PairSlot};
+use crate::limits::SWEEP_LOOKS_MAX;
 use crate::math::Interval;
 use crate::pairs::PairSet;
 use crate::time::{Meter, Share};
@@ -39,8 +43,8 @@ use motion::{Moment, length, way};
 
 /// Looks at a pair before the next one has its turn.
 const SLICE_LOOKS: u32 = 8;
-/// Looks at a pair in all: what grazes, or turns about itself near a mesh, must end. A touch takes 5 to 40.
-const LOOKS_MAX: u32 = 160;
+/// Looks at a pair before contacts have their turn; what takes more has what they leave. A touch takes 5 to 40.
+pub(super) const FIRST_LOOKS: u32 = 160;
 /// Products of shares and times are off by some units of roundoff.
 const SHORT: f64 = 1.0 - 1e-12;
 
@@ -158,15 +162,18 @@ impl Narrow {
         }
     }
 
-    /// Works on sweeps while the meter is open, for at most this share of it; whether all are decided.
+    /// Works on sweeps while the meter is open, for at most this share of it and so many looks at each; whether no more
+    /// is to be done.
     pub(super) fn spend_on_sweeps(
         &mut self,
         world: &World,
         wanted: Wanted,
         meter: &mut Meter<'_>,
         share: Option<Share>,
+        looks_max: u32,
     ) -> bool {
-        if self.sweeps.told || self.sweeps.list.iter().all(|sweep| sweep.done) {
+        let waits = |sweep: &Sweep| !sweep.done && sweep.looks < looks_max;
+        if self.sweeps.told || !self.sweeps.list.iter().any(waits) {
             return true;
         }
         if wanted.order == Order::Counted {
@@ -187,7 +194,7 @@ impl Narrow {
         let mut open = true;
         while open {
             open = false;
-            for sweep in list.iter_mut().filter(|sweep| !sweep.done) {
+            for sweep in list.iter_mut().filter(|sweep| waits(sweep)) {
                 let within = share.is_none_or(|share| work.meter.within(share));
                 if !within || !work.meter.open() {
                     open = false;
@@ -195,24 +202,28 @@ impl Narrow {
                 }
                 if let (Some(a), Some(b)) = (world.body(sweep.a), world.body(sweep.b)) {
                     sweep.turn((a, b), &mut work);
-                    open |= !sweep.done;
+                    open |= waits(sweep);
                     // Where they are next asked for their gap.
                     memos[sweep.slot.index()].warm = sweep.warm;
                 }
             }
         }
         work.release();
-        self.sweeps.list.iter().all(|sweep| sweep.done)
+        !self.sweeps.list.iter().any(waits)
     }
 
-    /// Sweeps are told: a row shows the gap of this tick's poses beside the touch on the way.
-    pub(super) fn close_sweeps(&mut self, world: &World) {
+    /// A row shows the gap of this tick's poses beside the touch on the way.
+    pub(super) fn bring_up_swept(&mut self, world: &World) {
         for at in 0..self.sweeps.list.len() {
             let sweep = self.sweeps.list[at].outcome();
             if sweep.passage != Passage::Free {
                 self.widen_pair(sweep.slot, world);
             }
         }
+    }
+
+    /// Sweeps are told.
+    pub(super) fn close_sweeps(&mut self) {
         self.sweeps.told = true;
     }
 
@@ -322,7 +333,7 @@ impl Sweep {
     fn turn(&mut self, bodies: (&Body, &Body), work: &mut Work<'_, '_>) {
         let stop = self.looks + SLICE_LOOKS;
         while !self.done && self.looks < stop && work.meter.open() {
-            if self.free >= 1.0 || self.looks >= LOOKS_MAX {
+            if self.free >= 1.0 || self.looks >= SWEEP_LOOKS_MAX {
                 self.done = true;
                 return;
             }
@@ -367,34 +378,5 @@ impl Sweep {
         self.last = (here, gap_m);
         self.free = (here + time * SHORT).min(moment.until).max(here);
         self.free - here
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_broken_in_the_sweeps_is_found() {
-        let sweeps = || {
-            let mut all = Sweeps::default();
-            let fresh =
-                |slot| Sweep::fresh((PairSlot(slot), BodySlot(0), BodySlot(1)), Warm::default());
-            all.list.extend([4, 2].map(fresh));
-            all.places = vec![NONE, NONE, 1, NONE, 0];
-            all
-        };
-        sweeps().validate().unwrap();
-        let mut swapped = sweeps();
-        swapped.list.swap(0, 1);
-        assert!(
-            swapped
-                .validate()
-                .unwrap_err()
-                .contains("not where its pair says")
-        );
-        let mut more = sweeps();
-        more.places[1] = 0;
-        assert!(more.validate().unwrap_err().contains("3 pairs with one"));
     }
 }

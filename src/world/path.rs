@@ -336,7 +336,13 @@ fn pivot_far(pivots: &Aabb) -> f64 {
 /// The turn between two orientations: the shortest, or the one nearest to what the sender says; whole turns about the
 /// sender's own axis where the turn has none that could be told; and whether it can be followed.
 fn turn_of(from: &Quat, to: &Quat, declared: Option<Vec3>) -> (Vec3, Vec3, bool) {
-    let shortest = (to * from.inverse()).scaled_axis();
+    // Rounding turns nothing that was sent as it was.
+    let is_same = from.coords == to.coords;
+    let shortest = if is_same {
+        Vec3::zeros()
+    } else {
+        (to * from.inverse()).scaled_axis()
+    };
     let Some(declared) = declared.filter(|turn| *turn != Vec3::zeros()) else {
         return (shortest, Vec3::zeros(), true);
     };
@@ -354,7 +360,8 @@ fn turn_of(from: &Quat, to: &Quat, declared: Option<Vec3>) -> (Vec3, Vec3, bool)
         return (shortest, Vec3::repeat(LEG_TURNS_MAX * full), false);
     }
     let more = axis * (turns * full);
-    if has_axis {
+    // What stands as it did has turned about the sender's axis alone.
+    if has_axis || is_same {
         (shortest + more, Vec3::zeros(), true)
     } else {
         (shortest, more, true)

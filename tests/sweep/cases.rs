@@ -335,6 +335,51 @@ fn a_declared_spin_adds_the_turns_that_the_poses_do_not_show() {
     assert_eq!(rig.state(), State::Clear);
 }
 
+/// It was given up after 160 looks, whatever time there was; and a turn that ends as it began had no axis.
+#[test]
+fn bug_what_spins_close_beside_another_is_decided_where_there_is_time() {
+    let ball = "{ type = \"sphere\", radius = 0.04 }";
+    let blade = "{ type = \"box\", half_extents = [1.0, 0.02, 0.02] }";
+    for turns in [1.0, 2.0, 5.0, 20.0, 100.0] {
+        for (clear_m, slant) in [
+            (1e-3, 0.0),
+            (5e-3, 1e-4),
+            (0.02, 0.0),
+            (0.2, 0.0),
+            (-1e-3, 0.0),
+        ] {
+            let mut rig = Rig::new(&scene(
+                "",
+                &[
+                    body(1, [0.8, 0.3, 0.0], ball, ""),
+                    body(2, [0.0, 0.0, -0.06 - clear_m], blade, SWEPT),
+                ],
+            ));
+            let still = [0.0; 6];
+            let spin = turns * TAU / (FRAME_NS as f64 * 1e-9);
+            rig.velocities = vec![still, [0.0, 0.0, 0.0, 0.0, 0.0, spin]];
+            rig.send(ALL);
+            let turned = Pose::rotation(Vec3::z() * slant);
+            rig.place(2, &(at(0.0, 0.0, -0.06 - clear_m) * turned));
+            rig.send(ALL);
+            let what = format!("{turns} turns {clear_m} m: {:?}", rig.pair(1, 2));
+            if clear_m > 0.0 {
+                assert_eq!(rig.state(), State::Clear, "{what}");
+            } else {
+                assert!(hit(rig.pair(1, 2).unwrap()), "{what}");
+            }
+            // With little it is as open as ever.
+            rig.place(2, &at(0.0, 0.0, -0.06 - clear_m));
+            rig.send(Budget::units(40));
+            let told = rig.pair(1, 2).map_or(0, |row| row.flags);
+            let (hit, open) = (pair_flags::SWEPT_HIT, pair_flags::SWEPT_OPEN);
+            let wrong = if clear_m > 0.0 { hit } else { 0 };
+            assert_eq!(told & wrong, 0, "{what}");
+            assert!(clear_m > 0.0 || told & (hit | open) != 0, "{what}");
+        }
+    }
+}
+
 #[test]
 fn the_shortest_turn_is_taken_where_nothing_is_declared() {
     let mut rig = rod(SWEPT);
