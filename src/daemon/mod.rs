@@ -295,6 +295,7 @@ impl<'a> Daemon<'a> {
         }
         if let Some(words) = self.refusals.words(self.engine.world(), start_ns) {
             tracing::warn!("{words}");
+            self.door.tell(&words);
         }
         self.engine.note_sent(send_ns);
         self.pacer.learn(self.engine.world());

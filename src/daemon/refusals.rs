@@ -29,7 +29,11 @@ impl Refusals {
             let of = world
                 .refused_of(*reason)
                 .map(|name| format!(", the last of source \"{name}\""));
-            let (of, mend) = (of.unwrap_or_default(), reason.mend());
+            let mut of = of.unwrap_or_default();
+            if let Some(body) = world.refused_body(*reason) {
+                of.push_str(&format!(", body \"{body}\""));
+            }
+            let mend = reason.mend();
             (count > 0).then(|| format!("{count} {reason}{of}: {mend}"))
         });
         let text = format!(
@@ -100,5 +104,39 @@ mod tests {
             "{text}"
         );
         assert_eq!(refusals.words(&world, 90 * S), None);
+    }
+
+    #[test]
+    fn bug_a_pose_that_is_refused_is_told_with_the_name_of_its_body() {
+        let text = "[[source]]\nname = \"sim\"\n[[body]]\nname = \"b\"\nid = 3\nsource = \"sim\"\n\
+                    shape = { type = \"sphere\", radius = 1 }\n";
+        let scene = Scene::parse(text, "scene.toml", std::path::Path::new("")).unwrap();
+        let shapes = build_shapes(&scene).unwrap();
+        let mut world = World::new(&scene, shapes.bodies, S).unwrap();
+        let header = FrameHeader {
+            source: name_bytes("sim"),
+            session: 7,
+            seq: 1,
+            flags: frame_flags::FULL,
+            schema: WIRE_VERSION,
+            ..FrameHeader::default()
+        };
+        let row = TransformRow {
+            body: 3,
+            position: [1e300, 0.0, 0.0],
+            orientation: [0.0, 0.0, 0.0, 1.0],
+            ..TransformRow::default()
+        };
+        let frame = Frame {
+            header,
+            transforms: vec![row],
+            ..Frame::default()
+        };
+        world.admit(&frame, S);
+        let text = Refusals::default().words(&world, S).unwrap();
+        assert!(
+            text.contains("1 over_limit, the last of source \"sim\", body \"b\": "),
+            "{text}"
+        );
     }
 }

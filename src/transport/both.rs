@@ -85,6 +85,11 @@ impl Door for Both<'_> {
         self.beside.bodies(changes);
     }
 
+    fn tell(&mut self, words: &str) {
+        self.first.tell(words);
+        self.beside.tell(words);
+    }
+
     fn housekeeping(&mut self) {
         self.first.housekeeping();
         self.beside.housekeeping();

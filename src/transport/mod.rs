@@ -150,6 +150,9 @@ pub trait Door {
     /// it.
     fn bodies(&mut self, _changes: &[BodyChange]) {}
 
+    /// Says what the log says; for those who do not see it.
+    fn tell(&mut self, _words: &str) {}
+
     /// Lets late joiners have the newest state, forgets requests of clients that left. Cheap; each idle round.
     fn housekeeping(&mut self);
 }

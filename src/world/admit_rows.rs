@@ -169,6 +169,7 @@ impl World {
 
     /// The newest pose of a body was refused: it is unknown until a good one comes; its last good one is kept.
     fn refuse_pose(&mut self, slot: BodySlot, reason: RejectReason) {
+        self.note_refused_body(reason, slot);
         self.entries[slot.index()].refused = true;
         if let Some(body) = self.bodies[slot.index()].as_mut() {
             body.reject = Some(reason);

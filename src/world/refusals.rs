@@ -1,7 +1,7 @@
 //! What was refused: counted by reason, with the source that the last of each reason was of.
 
 use super::World;
-use crate::ids::SourceSlot;
+use crate::ids::{BodyId, BodySlot, SourceSlot};
 use crate::wire::{REJECTS_LEN, RejectReason, SOURCE_NAME_LEN, name_str};
 
 /// Refusals in this boot.
@@ -9,6 +9,8 @@ use crate::wire::{REJECTS_LEN, RejectReason, SOURCE_NAME_LEN, name_str};
 pub(super) struct Refusals {
     counts: [u64; REJECTS_LEN],
     last: [Option<SourceSlot>; REJECTS_LEN],
+    /// The body whose pose was refused last, by reason; `None`: a frame was.
+    bodies: [Option<BodyId>; REJECTS_LEN],
     /// The name that the last frame of no source of the scene had.
     stranger: [u8; SOURCE_NAME_LEN],
 }
@@ -39,6 +41,20 @@ impl World {
         let place = usize::from(reason.code());
         self.refusals.counts[place] += 1;
         self.refusals.last[place] = source;
+        self.refusals.bodies[place] = None;
+    }
+
+    /// Notes whose pose the refusal was of that was counted last for a reason.
+    pub(super) fn note_refused_body(&mut self, reason: RejectReason, slot: BodySlot) {
+        self.refusals.bodies[usize::from(reason.code())] = self.body(slot).map(|body| body.id);
+    }
+
+    /// The body whose pose was refused last for a reason, if it is there still and no frame was since.
+    #[must_use]
+    pub fn refused_body(&self, reason: RejectReason) -> Option<&str> {
+        let id = self.refusals.bodies[usize::from(reason.code())]?;
+        let body = self.body(self.slot_of(id)?)?;
+        Some(body.name.as_str())
     }
 
     /// Counts a message that is refused as a whole.

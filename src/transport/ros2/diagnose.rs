@@ -18,6 +18,8 @@ pub(super) struct Diagnoser {
     tick: u64,
     overrun_s: u32,
     rejects: Vec<u64>,
+    /// Frames refused, by source.
+    refused: Vec<u64>,
     counts: Counts,
 }
 
@@ -29,6 +31,7 @@ impl Diagnoser {
             tick: row.header.tick,
             overrun_s: 0,
             rejects: row.rejects.to_vec(),
+            refused: row.sources.iter().map(|s| s.refused).collect(),
             counts,
         }
     }
@@ -103,13 +106,23 @@ impl Diagnoser {
         });
         let new: Vec<String> = new.collect();
         self.rejects = row.rejects.to_vec();
+        let of = sources().enumerate().filter_map(|(at, source)| {
+            let before = self.refused.get(at).copied().unwrap_or_default();
+            (source.refused > before).then(|| name(source))
+        });
+        let of: Vec<&str> = of.collect();
+        self.refused = row.sources.iter().map(|s| s.refused).collect();
         let mut said = Vec::new();
         if !silent.is_empty() {
             said.push(format!("silent: {}", silent.join(", ")));
         }
         // Also of a silent source: it may be silent because all that it sends is refused.
         if !new.is_empty() {
-            said.push(format!("refused in the last second: {}", new.join(", ")));
+            let mut text = format!("refused in the last second: {}", new.join(", "));
+            if !of.is_empty() {
+                text.push_str(&format!(" (frames of {})", of.join(", ")));
+            }
+            said.push(text);
         }
         let (level, message) = match said.as_slice() {
             [] => (OK, "all sources send".to_owned()),
@@ -328,11 +341,12 @@ mod tests {
         assert_eq!(all[3], (WARN, "body a: lost".to_owned()));
         row.sources[0].alive = 1;
         row.rejects[1] = 5;
+        row.sources[0].refused = 2;
         assert_eq!(
             levels(&mut diagnoser, &row, &[])[2],
             (
                 WARN,
-                "refused in the last second: 2 bad_quaternion".to_owned()
+                "refused in the last second: 2 bad_quaternion (frames of arm)".to_owned()
             )
         );
     }

@@ -251,6 +251,12 @@ impl Door for LastingNode {
         }
     }
 
+    fn tell(&mut self, words: &str) {
+        if let Some(node) = &mut self.live {
+            node.tell(words);
+        }
+    }
+
     fn housekeeping(&mut self) {
         if let Some(node) = &mut self.live {
             node.housekeeping();

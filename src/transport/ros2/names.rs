@@ -36,6 +36,12 @@ impl Names {
         &self.node
     }
 
+    /// The name of the node's logger, as rclcpp makes it.
+    #[must_use]
+    pub fn logger(&self) -> String {
+        self.full_node().trim_start_matches('/').replace('/', ".")
+    }
+
     /// The node's namespace.
     #[must_use]
     pub fn namespace(&self) -> &str {
@@ -157,11 +163,13 @@ mod tests {
         let plain = names("");
         assert_eq!(plain.resolve("~/contacts").unwrap(), "/sweepd/contacts");
         assert_eq!(plain.full_node(), "/sweepd");
+        assert_eq!(plain.logger(), "sweepd");
         let cell = names("-r __ns:=/cell -r ~/contacts:=touch -r /tf:=/other/tf -r x:pairs:=no");
         assert_eq!(cell.resolve("~/contacts").unwrap(), "/cell/touch");
         assert_eq!(cell.resolve("~/pairs").unwrap(), "/cell/sweepd/pairs");
         assert_eq!(cell.resolve("/tf").unwrap(), "/other/tf");
         assert_eq!(cell.full_node(), "/cell/sweepd");
+        assert_eq!(cell.logger(), "cell.sweepd");
     }
 
     #[test]

@@ -97,10 +97,8 @@ impl RosNode {
         let (table, mut odd) = Table::started(scene, &said(&options.args)?, &names.full_node())
             .map_err(Error::Usage)?;
         let table = Arc::new(table);
-        let least = Say::least(options.args.log_level.as_deref());
         let book = Book::of(&first_names(scene));
-        let timeouts_ns: Vec<u64> = scene.sources.iter().map(|s| s.timeout_ns).collect();
-        let shared = Arc::new(Shared::new(names.node(), book.clone(), &timeouts_ns, least));
+        let shared = shared(options, scene, &names, book.clone());
 
         let (context, noise) = join(options.network)?;
         let mut node = make(options, &context, &names)?;
@@ -244,6 +242,13 @@ impl Drop for RosNode {
     }
 }
 
+/// What the threads share, with the names before the first tick.
+fn shared(options: &RosOptions, scene: &RosScene, names: &Names, book: Book) -> Arc<Shared> {
+    let least = Say::least(options.args.log_level.as_deref());
+    let timeouts_ns: Vec<u64> = scene.sources.iter().map(|s| s.timeout_ns).collect();
+    Arc::new(Shared::new(&names.logger(), book, &timeouts_ns, least))
+}
+
 /// A shelf with the bodies of common topics.
 fn shelf(sources: &[Source], session: u64) -> Shelf {
     let shelf = Shelf::default();
@@ -351,6 +356,10 @@ impl Door for RosNode {
 
     fn bodies(&mut self, changes: &[BodyChange]) {
         open(&self.shared.changes).extend_from_slice(changes);
+    }
+
+    fn tell(&mut self, words: &str) {
+        open(&self.shared.words).push(words.to_owned());
     }
 
     fn housekeeping(&mut self) {}

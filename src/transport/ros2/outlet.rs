@@ -97,6 +97,9 @@ impl Outlet {
         loop {
             self.follow_edits();
             self.look_who_listens();
+            for words in std::mem::take(&mut *open(&self.shared.words)) {
+                self.shared.write(Say::Warn, &words);
+            }
             self.diagnose();
             let strange = self.strangers.watch(SystemClock.boottime_ns());
             for text in self.namesakes.look().into_iter().chain(strange) {

@@ -11,6 +11,7 @@ use super::lines::Arrival;
 use super::open;
 use super::params::{Effect, Own};
 use super::parcel::Caps;
+pub(super) use super::say::Say;
 use super::services::Desk;
 use super::told::Told;
 use crate::time::SystemClock;
@@ -20,31 +21,6 @@ use crate::wire::ros::{Book, Counts, Time};
 
 /// Stands for no value.
 const NONE: u64 = u64::MAX;
-
-/// A level of `/rosout` and of the log.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Say {
-    /// For the record.
-    Info,
-    /// To be looked at.
-    Warn,
-    /// Something does not work.
-    Error,
-    /// Nothing works.
-    Fatal,
-}
-
-impl Say {
-    /// The least level that is said for the word of `--log-level`.
-    pub(super) fn least(word: Option<&str>) -> Self {
-        match word {
-            Some("warn") => Self::Warn,
-            Some("error") => Self::Error,
-            Some("fatal") => Self::Fatal,
-            _ => Self::Info,
-        }
-    }
-}
 
 /// Shared by the threads of the node.
 pub(super) struct Shared {
@@ -77,7 +53,10 @@ pub(super) struct Shared {
     names_rev: AtomicU64,
     faults: Mutex<Vec<String>>,
     told: Mutex<Told>,
+    /// What the daemon has said, for `/rosout`; the sending thread takes it there.
+    pub(super) words: Mutex<Vec<String>>,
     rosout: Mutex<Option<Arc<Option<Publisher<Log>>>>>,
+    /// The name of the logger.
     node: String,
     /// Least level that goes to `/rosout`.
     least: Say,
@@ -93,7 +72,7 @@ impl std::fmt::Debug for Shared {
 }
 
 impl Shared {
-    /// For the node of this name.
+    /// For the node whose logger has this name.
     ///
     /// * `timeouts_ns` - of each source of the scene.
     pub(super) fn new(node: &str, book: Book, timeouts_ns: &[u64], least: Say) -> Self {
@@ -122,6 +101,7 @@ impl Shared {
             names_rev: AtomicU64::new(0),
             faults: Mutex::new(Vec::new()),
             told: Mutex::default(),
+            words: Mutex::default(),
             rosout: Mutex::new(None),
             node: node.to_owned(),
             least,
@@ -363,6 +343,11 @@ impl Shared {
             Say::Warn => tracing::warn!("{text}"),
             Say::Error | Say::Fatal => tracing::error!("{text}"),
         }
+        self.write(level, text);
+    }
+
+    /// Says it on `/rosout`.
+    pub(super) fn write(&self, level: Say, text: &str) {
         if level < self.least {
             return;
         }
