@@ -110,6 +110,12 @@ pub const FILES_A_CLIENT: u64 = 8;
 /// Files that a process must be allowed to open beside those that it has, to be a client: `monitor` opens 42, `record`
 /// 49, one that listens to everything and sends some 80.
 pub const CLIENT_FILES_LEAST: u64 = 56;
+/// Bytes of an answer of a ROS 2 service, its CDR head among them: `RustDDS` takes larger ones apart, and those arrive
+/// nowhere (`transport/ros2/reply`). It does so above the least MTU of the networks that lead to its readers less 128;
+/// that of IPv6, which VPNs have too, is 1280.
+pub const ROS_REPLY_BYTES_MAX: usize = 1280 - 128;
+/// Bytes of a text in an answer of a ROS 2 service that is too large: room for the others.
+pub const ROS_REPLY_TEXT_BYTES_MAX: usize = 512;
 /// Bytes of one scene edit request.
 pub const REQUEST_BYTES_MAX: usize = 1 << 29;
 /// Remembered sessions that are over, per daemon; beyond it the oldest is forgotten, and its client could come back.
@@ -131,5 +137,6 @@ const _: () = {
     assert!(PAIRS_DEFAULT < u32::MAX as usize);
     assert!(CONTACTS_PER_PAIR_MAX >= MANIFOLD_POINTS_MAX);
     assert!(SOURCES_MAX <= 255);
+    assert!(ROS_REPLY_TEXT_BYTES_MAX < ROS_REPLY_BYTES_MAX / 2);
     assert!(RAY_MAX_M > 3.5 * (COORDINATE_MAX_M + EXTENT_MAX_M));
 };

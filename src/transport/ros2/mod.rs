@@ -28,6 +28,7 @@ pub mod params_file;
 mod parcel;
 mod poses;
 mod readers;
+mod reply;
 mod say;
 mod services;
 mod shared;

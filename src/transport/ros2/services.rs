@@ -24,6 +24,7 @@ use scribe::{Scribe, Words};
 
 use super::names::Names;
 use super::open;
+use super::reply;
 use super::shared::{Say, Shared};
 use super::topics::{TypeName, failed};
 use crate::error::{Error, Result};
@@ -189,8 +190,7 @@ impl Services {
                     message: crowded(),
                     ..Ticked::default()
                 };
-                let sent = self.tick.send_response(id, refusal);
-                shared.note_unsent(u64::from(sent.is_err()));
+                reply::send((&self.tick, "~/tick_now"), id, refusal, shared);
                 continue;
             }
             let token = self.token();
@@ -255,8 +255,7 @@ impl Services {
                     .map_or("unknown", wire::State::word)
                     .to_owned(),
             };
-            let sent = self.tick.send_response(id, response);
-            shared.note_unsent(u64::from(sent.is_err()));
+            reply::send((&self.tick, "~/tick_now"), id, response, shared);
         }
     }
 
@@ -264,16 +263,21 @@ impl Services {
         if let (Some(why), true) = (&answer.error, verb != Verb::Gap) {
             shared.say(Say::Warn, &format!("an edit over ROS 2 was refused: {why}"));
         }
-        let sent = match verb {
-            Verb::Gap => self.gap.send_response(id, told(answer)),
-            Verb::Put => self.put.send_response(id, edited(answer)),
-            Verb::Remove => self.remove.send_response(id, edited(answer)),
-            Verb::Enable => self.enable.send_response(id, edited(answer)),
-            Verb::Attach => self.attach.send_response(id, edited(answer)),
-            Verb::Filter => self.filter.send_response(id, edited(answer)),
-            Verb::Reset => self.reset.send_response(id, edited(answer)),
-        };
-        shared.note_unsent(u64::from(sent.is_err()));
+        match verb {
+            Verb::Gap => reply::send((&self.gap, "~/gap"), id, told(answer), shared),
+            Verb::Put => reply::send((&self.put, "~/put_body"), id, edited(answer), shared),
+            Verb::Remove => {
+                reply::send((&self.remove, "~/remove_body"), id, edited(answer), shared)
+            }
+            Verb::Enable => {
+                reply::send((&self.enable, "~/enable_body"), id, edited(answer), shared)
+            }
+            Verb::Attach => {
+                reply::send((&self.attach, "~/attach_body"), id, edited(answer), shared)
+            }
+            Verb::Filter => reply::send((&self.filter, "~/set_filter"), id, edited(answer), shared),
+            Verb::Reset => reply::send((&self.reset, "~/reset"), id, edited(answer), shared),
+        }
     }
 }
 

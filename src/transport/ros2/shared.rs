@@ -195,7 +195,7 @@ impl Shared {
         let back = self.sim_time() && now_ns < before_ns;
         if back {
             let text = "/clock went back: every pair ends, and bodies are not received until their next poses";
-            self.say_seldom(text, boot_ns);
+            self.say_seldom(Say::Warn, text, boot_ns);
         }
         back
     }
@@ -325,14 +325,14 @@ impl Shared {
     /// * `now_ns` - nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) fn say_back(&self, source: &str, now_ns: u64) {
         let text = format!("the stamps of source {source} went back: its bodies begin anew");
-        self.say_seldom(&text, now_ns);
+        self.say_seldom(Say::Warn, &text, now_ns);
     }
 
-    /// Warns of what may happen with each message, once a second.
-    fn say_seldom(&self, text: &str, now_ns: u64) {
+    /// Says what may happen with each message, once a second.
+    pub(super) fn say_seldom(&self, level: Say, text: &str, now_ns: u64) {
         let due = open(&self.told).is_due(text, now_ns);
         if due {
-            self.say(Say::Warn, text);
+            self.say(level, text);
         }
     }
 

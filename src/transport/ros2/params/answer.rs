@@ -19,6 +19,7 @@ use ros2_client::{Context, Node, Publisher, Server, builtin_interfaces};
 use rustdds::mio1::{Registry, Token};
 
 use super::super::names::Names;
+use super::super::reply;
 use super::super::services::{receive, register, server};
 use super::super::shared::{Say, Shared};
 use super::super::topics::{Out, publisher};
@@ -117,10 +118,8 @@ impl Answers {
         for (id, request) in asked {
             let sets = request.parameter.chunks(1);
             let results = sets.map(|one| self.take(one, shared)).collect();
-            let sent = self
-                .set
-                .send_response(id, SetParametersResponse { results });
-            shared.note_unsent(u64::from(sent.is_err()));
+            let response = SetParametersResponse { results };
+            reply::send((&self.set, "~/set_parameters"), id, response, shared);
         }
         let mut asked = Vec::new();
         receive(&self.set_at_once, shared, |id, r| asked.push((id, r)));
@@ -128,34 +127,33 @@ impl Answers {
         for (id, request) in asked {
             let result = self.take(&request.parameter, shared);
             let response = SetParametersAtomicallyResponse { result };
-            let sent = self.set_at_once.send_response(id, response);
-            shared.note_unsent(u64::from(sent.is_err()));
+            let server = (&self.set_at_once, "~/set_parameters_atomically");
+            reply::send(server, id, response, shared);
         }
         came
     }
 
     /// Answers who only wants to know.
     fn tell(&self, shared: &Shared) {
-        let unsent = |failed: bool| shared.note_unsent(u64::from(failed));
         receive(&self.list, shared, |id, r| {
             let names = self.values.keys().map(String::as_str);
             let result = list(names, &r.prefixes, r.depth);
             let response = ListParametersResponse { result };
-            unsent(self.list.send_response(id, response).is_err());
+            reply::send((&self.list, "~/list_parameters"), id, response, shared);
         });
         receive(&self.get, shared, |id, r| {
             let values = r.names.iter().map(|name| spoken(self.values.get(name)));
             let response = GetParametersResponse {
                 values: values.collect(),
             };
-            unsent(self.get.send_response(id, response).is_err());
+            reply::send((&self.get, "~/get_parameters"), id, response, shared);
         });
         receive(&self.types, shared, |id, r| {
             let values = r.names.iter().map(|name| self.values.get(name));
             let response = GetParameterTypesResponse {
                 values: values.map(|value| value.map_or(0, kind)).collect(),
             };
-            unsent(self.types.send_response(id, response).is_err());
+            reply::send((&self.types, "~/get_parameter_types"), id, response, shared);
         });
         receive(&self.describe, shared, |id, r| {
             let describe = |name: &String| {
@@ -165,7 +163,12 @@ impl Answers {
             let response = DescribeParametersResponse {
                 values: r.names.iter().map(describe).collect(),
             };
-            unsent(self.describe.send_response(id, response).is_err());
+            reply::send(
+                (&self.describe, "~/describe_parameters"),
+                id,
+                response,
+                shared,
+            );
         });
     }
 
