@@ -105,14 +105,14 @@ fn buffers(usual: Option<u64>, most: Option<u64>) -> Finding {
         return Finding::ok(
             CHECK,
             format!(
-                "{what}: a subscriber must ask for larger ones where more than 200 KB come in a burst, as \
+                "{what}: a subscriber must ask for larger ones where more than 100 KB come in a burst, as \
                  launch-free-scripts/ros2/fastdds_profile.xml does"
             ),
         );
     }
     Finding::warning(
         CHECK,
-        format!("{what}: a subscriber loses messages where more than 200 KB come in a burst"),
+        format!("{what}: a subscriber loses messages where more than 100 KB come in a burst"),
         format!("`sysctl net.core.rmem_default={BUFFER} net.core.rmem_max={BUFFER}`"),
     )
 }

@@ -137,9 +137,6 @@ impl Diagnoser {
     }
 
     fn node(&mut self, counts: Counts, faults: &[String]) -> Finding {
-        let unsent = counts
-            .sends_dropped
-            .saturating_sub(self.counts.sends_dropped);
         let undecodable = counts.undecodable.saturating_sub(self.counts.undecodable);
         let dropped = counts
             .datagrams_dropped
@@ -162,11 +159,6 @@ impl Diagnoser {
         if unread > 0 {
             said.push(format!(
                 "{unread} datagrams began as RTPS and could not be read: who else sends to the ports of this domain?"
-            ));
-        }
-        if unsent > 0 {
-            said.push(format!(
-                "{unsent} messages could not be sent in the last second: a reader is too slow"
             ));
         }
         let level = if said.is_empty() { OK } else { WARN };

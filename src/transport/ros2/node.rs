@@ -21,7 +21,7 @@ use super::lines::subscribe;
 use super::markers::Boxes;
 use super::names::Names;
 use super::namesakes::Namesakes;
-use super::outlet::{Outlet, Publishers, Read, Topics};
+use super::outlet::{Outlet, Publishers, Read, Topics, Unsent};
 use super::params::{Answers, Table};
 use super::parcel::Parcels;
 use super::poses::Source;
@@ -150,6 +150,7 @@ impl RosNode {
             shown_ns: 0,
             boxes: boxes(scene),
             left_out: 0,
+            unsent: Unsent::default(),
             noise,
             strangers: Strangers::of(&context, &names, scene),
             readers,
@@ -307,6 +308,7 @@ impl Door for RosNode {
 
     fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
         let gone = self.parcels.put(outbox, self.demand, self.shared.caps());
+        // Told by the sending thread, with the topics; none of it is of shared memory.
         self.shared.note_unsent(gone);
         if !self.ticks_asked.is_empty() {
             let header = outbox.tick.header;
@@ -314,7 +316,7 @@ impl Door for RosNode {
             open(&self.shared.desk.ticked).extend(ticked);
             let _gone_already = self.waker.wake();
         }
-        Ok(gone)
+        Ok(0)
     }
 
     fn publish_tick(&mut self, tick: &TickRow) -> Result<()> {

@@ -6,6 +6,7 @@
 mod heard;
 mod owed;
 mod publishers;
+mod unsent;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -15,6 +16,7 @@ pub(super) use publishers::Publishers;
 use ros2_client::{Context, Node, Publisher};
 use rustdds::mio1::Waker;
 use serde::Serialize;
+pub(super) use unsent::Unsent;
 
 use super::diagnose::Diagnoser;
 use super::lines::{Arrival, Line, of_body};
@@ -63,6 +65,7 @@ pub(super) struct Outlet {
     pub(super) boxes: Boxes,
     /// Contacts that the newest `~/collisions` does not hold.
     pub(super) left_out: u64,
+    pub(super) unsent: Unsent,
     pub(super) noise: Noise,
     pub(super) strangers: Strangers,
     pub(super) readers: Readers,
@@ -97,6 +100,8 @@ impl Outlet {
         loop {
             self.follow_edits();
             self.look_who_listens();
+            let now_ns = SystemClock.boottime_ns();
+            self.unsent.look(&mut self.publishers, &self.shared, now_ns);
             for words in std::mem::take(&mut *open(&self.shared.words)) {
                 self.shared.write(Say::Warn, &words);
             }
@@ -257,6 +262,7 @@ impl Outlet {
         let mut faults = self.shared.faults();
         faults.extend_from_slice(self.strangers.found());
         faults.extend(open_files::short());
+        faults.extend(self.unsent.words.clone());
         if self.left_out > 0 {
             let text = "contacts are left out of ~/collisions, which holds the deepest";
             faults.push(format!(

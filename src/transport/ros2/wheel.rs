@@ -51,6 +51,8 @@ pub(super) struct Wheel<M: Serialize> {
     kind: TypeName,
     out: Out,
     turned_ns: u64,
+    /// Since it was asked last.
+    lost: u64,
 }
 
 /// What it takes to publish.
@@ -96,6 +98,7 @@ impl<M: Serialize> Wheel<M> {
             kind,
             out,
             turned_ns: 0,
+            lost: 0,
         })
     }
 
@@ -134,6 +137,11 @@ impl<M: Serialize> Wheel<M> {
         }
     }
 
+    /// Its topic, and what was lost since the last call.
+    pub(super) fn take_lost(&mut self) -> (String, u64) {
+        (self.full_name.clone(), std::mem::take(&mut self.lost))
+    }
+
     /// Publishes behind what is held.
     pub(super) fn publish(&mut self, message: M, with: &mut Means<'_>) -> Sent {
         if self.stuck && self.next.is_none() && self.sent >= self.out.window() / 2 {
@@ -142,6 +150,7 @@ impl<M: Serialize> Wheel<M> {
         self.held.push_back(message);
         let over = self.held.len() > self.out.window().max(HELD_MIN);
         let lost = over.then(|| self.held.pop_front());
+        self.lost += u64::from(lost.is_some());
         let sent = self.flush(with);
         Sent {
             lost: sent.lost + u64::from(lost.is_some()),
@@ -168,6 +177,7 @@ impl<M: Serialize> Wheel<M> {
                 Err(_) => sent.lost += 1,
             }
         }
+        self.lost += sent.lost + sent.given_up;
         sent
     }
 

@@ -169,9 +169,9 @@ def test_paused_frames_keep_the_poses_young_and_silence_makes_them_unknown(room)
     assert "stale" in state.reason_words
 
 
-def crowd(room, count):
+def crowd(room, count, *ros_args):
     """Spheres all in one place: every pair collides, each with one contact. Returns how to send them."""
-    room.daemon(cloud(count))
+    room.daemon(cloud(count), ros_args=ros_args)
     room.node()
     sender = Sender(room.nodes[0])
     together = {f"b{n:04}": (0.001 * n, 0, 0) for n in range(count)}
@@ -179,7 +179,7 @@ def crowd(room, count):
 
 
 def test_a_large_tick_comes_in_chunks_below_128_kb_and_is_whole(room):
-    send, wanted = crowd(room, 44)
+    send, wanted = crowd(room, 44, "-p", "ros_max_pairs:=1000")
     raw = room.hear(Pairs, "/sweepd/pairs", raw=True)
     heard = room.hear(Pairs, "/sweepd/pairs")
     room.until(lambda: any(len(all) == wanted for all in rows.whole(heard).values()), f"all {wanted} pairs", then=send)

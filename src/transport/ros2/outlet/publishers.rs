@@ -140,6 +140,19 @@ impl Publishers {
         rows || shown || self.state.holds() || self.tick.holds() || self.names.holds()
     }
 
+    /// What writers have lost since the last call, by topic.
+    pub(super) fn take_lost(&mut self) -> Vec<(String, u64)> {
+        let lost = [
+            self.pairs.take_lost(),
+            self.contacts.take_lost(),
+            self.collisions.take_lost(),
+            self.markers.take_lost(),
+            self.state.take_lost(),
+            self.tick.take_lost(),
+        ];
+        lost.into_iter().filter(|(_, lost)| *lost > 0).collect()
+    }
+
     /// Sets whether pairs and contacts that were lost are sent again.
     pub(super) fn set_reliable(&mut self, with: &mut Means<'_>, reliable: bool) {
         self.pairs.set_reliable(with, reliable);

@@ -8,6 +8,9 @@ use crate::limits;
 
 /// What -1 stands for.
 const NO_LIMIT: &str = "no limit";
+/// Rows of a tick on a large topic: 500 of `~/pairs` take 88 KB. Readers have receive buffers of 208 KB by default,
+/// half of which datagrams fill: with 750 rows, 132 KB, reliable messages came seconds late, and ticks were lost.
+const ROWS_DEFAULT: i64 = 500;
 /// Longest time a parameter can name, milliseconds: a day.
 const TIME_MS_MAX: f64 = 86_400_000.0;
 /// Most rows a tick may have on a topic: 20 MB of contacts.
@@ -136,8 +139,8 @@ fn of_node() -> Vec<Spec> {
     );
     let sim_time = ("use_sim_time", "whether the node's time is that of /clock");
     vec![
-        Spec::new(pairs, Value::Whole(1000), rows(), always),
-        Spec::new(contacts, Value::Whole(500), rows(), always),
+        Spec::new(pairs, Value::Whole(ROWS_DEFAULT), rows(), always),
+        Spec::new(contacts, Value::Whole(ROWS_DEFAULT), rows(), always),
         Spec::new(rate_hz, Value::Real(10.0), rate, always),
         Spec::new(again, reliable, Rule::Word(words), always),
         flag(markers, true, always),
