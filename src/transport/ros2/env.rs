@@ -10,6 +10,8 @@ pub struct Network {
     pub range: Range,
     /// Whether `ROS_LOCALHOST_ONLY` keeps it on this host, whatever the range says.
     pub pinned: bool,
+    /// Whether `ROS_SECURITY_ENABLE` asks for what is not kept here.
+    pub unsecured: bool,
 }
 
 /// How far the node reaches.
@@ -52,6 +54,13 @@ impl Network {
             ));
         }
         rmw(given("RMW_IMPLEMENTATION").as_deref())?;
+        let unsecured = given("ROS_SECURITY_ENABLE").is_some_and(|text| text == "true");
+        if unsecured && given("ROS_SECURITY_STRATEGY").is_some_and(|text| text == "Enforce") {
+            return Err(
+                "ROS_SECURITY_STRATEGY=Enforce with ROS_SECURITY_ENABLE=true: this build has no DDS security, so nothing would be enforced: unset ROS_SECURITY_ENABLE to go on without it"
+                    .to_owned(),
+            );
+        }
         if let Some(peers) = given("ROS_STATIC_PEERS") {
             let local = |peer: &str| ["127.0.0.1", "localhost", "::1"].contains(&peer.trim());
             if !peers.split(';').filter(|p| !p.is_empty()).all(local) {
@@ -70,6 +79,7 @@ impl Network {
                 range
             },
             pinned: localhost_only,
+            unsecured,
         })
     }
 }
@@ -126,6 +136,7 @@ mod tests {
                 domain: 0,
                 range: Range::Localhost,
                 pinned: false,
+                unsecured: false,
             }
         );
         let network = read(
@@ -141,8 +152,27 @@ mod tests {
                 domain: 42,
                 range: Range::Subnet,
                 pinned: false,
+                unsecured: false,
             })
         );
+    }
+
+    #[test]
+    fn bug_security_that_must_be_enforced_is_refused_and_other_is_told_as_missing() {
+        let enable = ("ROS_SECURITY_ENABLE", "true");
+        let strategy = |text| read(None, &[enable, ("ROS_SECURITY_STRATEGY", text)]);
+        let refusal = strategy("Enforce").unwrap_err();
+        assert!(
+            refusal.contains("ROS_SECURITY_STRATEGY=Enforce"),
+            "{refusal}"
+        );
+        assert!(strategy("Permissive").unwrap().unsecured);
+        assert!(read(None, &[enable]).unwrap().unsecured);
+        let off = [
+            ("ROS_SECURITY_ENABLE", "false"),
+            ("ROS_SECURITY_STRATEGY", "Enforce"),
+        ];
+        assert!(!read(None, &off).unwrap().unsecured);
     }
 
     #[test]

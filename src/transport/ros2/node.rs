@@ -211,6 +211,12 @@ impl RosNode {
                 "ROS_DISTRO is humble, whose graph this build does not speak (Iron and later): topics work, node names may not",
             );
         }
+        if network.unsecured {
+            self.shared.say(
+                Say::Warn,
+                "ROS_SECURITY_ENABLE is true, and this build has no DDS security: what the node sends and hears is not secured",
+            );
+        }
         for text in odd {
             self.shared.say(Say::Warn, text);
         }

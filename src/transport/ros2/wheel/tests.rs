@@ -39,6 +39,7 @@ pub(in super::super) fn peer(domain: u16, name: &str) -> (Context, Node) {
         domain,
         range: Range::Localhost,
         pinned: false,
+        unsecured: false,
     };
     let (context, _) = join(network).unwrap();
     let name = NodeName::new("/", name).unwrap();
