@@ -104,6 +104,10 @@ pub const TIMEOUT_MS_DEFAULT: u64 = 500;
 pub const OPEN_FILES_LEAST: u64 = 96;
 /// Bytes that a file of a daemon must be allowed to have: the memory for answers is some 24 MiB from its start on.
 pub const FILE_BYTES_LEAST: u64 = 32 << 20;
+/// Files that a ROS 2 node takes beside its daemon's: sockets of DDS, and some for each writer and reader.
+pub const ROS_FILES: u64 = 200;
+/// Files that it takes for each topic of a body.
+pub const ROS_FILES_A_TOPIC: u64 = 4;
 /// Files that a client takes of a daemon: 7 or 8 where it listens to some messages or sends poses, twice as many where
 /// it does all that there is.
 pub const FILES_A_CLIENT: u64 = 8;

@@ -30,7 +30,7 @@ const NEEDS: [Need; 3] = [
         unit: 1,
         least: OPEN_FILES_LEAST,
         wished: 1024,
-        why: "a daemon has some 80 open, and some 8 more with each client",
+        why: "a daemon has some 80 open, some 8 more with each client, some 200 with --ros2 and 4 with each body's topic",
         show: |count| count.to_string(),
     },
     Need {

@@ -1,6 +1,7 @@
 //! The node as the daemon sees it: opened on the daemon's thread, a [`Door`] beside the one of shared memory, closed
 //! in the order that takes its name out of the graph at once.
 
+mod files;
 mod make;
 
 use std::sync::Arc;
@@ -8,6 +9,7 @@ use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use files::check_files;
 pub(super) use make::join;
 use make::{make, said};
 use ros2_client::{Context, RosoutRaw as _};
@@ -100,6 +102,7 @@ impl RosNode {
         let book = Book::of(&first_names(scene));
         let shared = shared(options, scene, &names, book.clone());
 
+        check_files(scene)?;
         let (context, noise) = join(options.network)?;
         let mut node = make(options, &context, &names)?;
         shared.take(table.effects());
