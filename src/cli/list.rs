@@ -48,7 +48,7 @@ fn as_text(i: &InstanceInfo) -> String {
         None => "no daemon".to_owned(),
     };
     format!(
-        "{:<20} {daemon}; {}, {} ({} of pairs, {} of changes, {} of contacts)",
+        "{:<20} {daemon}; over shared memory {}, {} ({} of pairs, {} of changes, {} of contacts)",
         i.instance,
         counted(i.sources, "source", "sources"),
         counted(i.readers, "reader", "readers"),
