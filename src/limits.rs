@@ -85,9 +85,9 @@ pub const LEGS_MAX: usize = 32;
 /// Whole turns between two poses that a declared angular velocity may add; beyond it a pair is told as open. A drill at
 /// 100,000 turns a minute makes 1667 in a second.
 pub const LEG_TURNS_MAX: f64 = 4096.0;
-/// Looks at a pair in a sweep; beyond it the pair is told as open, whatever time is left. A touch takes 5 to 40, each
-/// turn close beside something some tens; a look takes microseconds, at a mesh up to milliseconds. What has a budget is
-/// cut off by that before: this is the end of what has none.
+/// Looks at a pair in a sweep; a pair that would not come to its end with so many is told as open, whatever time is
+/// left. A touch takes 5 to 40, each turn close beside something some tens; a look takes microseconds, at a mesh up to
+/// milliseconds. What has a budget is cut off by that before: this is the end of what has none.
 pub const SWEEP_LOOKS_MAX: u32 = 16_384;
 /// Fewest ticks a second of mode `rate`, hertz: one in a quarter of an hour.
 pub const RATE_HZ_MIN: f64 = 1e-3;

@@ -87,6 +87,8 @@ struct Sweep {
     /// The share asked last at which no touch was found, behind `free` and before `hit`.
     missed: f64,
     looks: u32,
+    /// What was free when it was last judged whether it comes to its end, and at how many looks that was.
+    judged: (f64, u32),
     probes: u32,
     /// Share and gap at the last look.
     last: (f64, f64),
@@ -303,6 +305,7 @@ impl Sweep {
             stuck: false,
             missed: 0.0,
             looks: 0,
+            judged: (0.0, 0),
             probes: 0,
             last: (f64::NAN, f64::NAN),
             slope: 0.0,
@@ -333,7 +336,7 @@ impl Sweep {
     fn turn(&mut self, bodies: (&Body, &Body), work: &mut Work<'_, '_>) {
         let stop = self.looks + SLICE_LOOKS;
         while !self.done && self.looks < stop && work.meter.open() {
-            if self.free >= 1.0 || self.looks >= SWEEP_LOOKS_MAX {
+            if self.free >= 1.0 || self.is_in_vain() {
                 self.done = true;
                 return;
             }
@@ -365,6 +368,17 @@ impl Sweep {
             }
             self.close_in(bodies, step, work);
         }
+    }
+
+    /// Whether it comes to its end with no looks that it may have: what grazes slows down for good.
+    fn is_in_vain(&mut self) -> bool {
+        let (free, looks) = self.judged;
+        if self.looks < looks + FIRST_LOOKS {
+            return false;
+        }
+        self.judged = (self.free, self.looks);
+        let left = SWEEP_LOOKS_MAX.saturating_sub(self.looks);
+        (self.free - free) * f64::from(left) < (1.0 - self.free) * f64::from(FIRST_LOOKS)
     }
 
     /// Advances; returns by how much.
