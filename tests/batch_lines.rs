@@ -227,24 +227,7 @@ fn a_line_that_cannot_be_read_gets_an_error_and_the_others_an_answer() {
 
 #[test]
 fn a_crossing_mesh_surface_has_no_gap_and_a_surface_around_a_ball_is_apart() {
-    let corners: Vec<[f64; 3]> = (0..8)
-        .map(|k| [0, 1, 2].map(|b| if k >> b & 1 == 1 { 2.0 } else { -2.0 }))
-        .collect();
-    let faces = [
-        [0, 1, 3],
-        [0, 3, 2],
-        [4, 6, 7],
-        [4, 7, 5],
-        [0, 4, 5],
-        [0, 5, 1],
-        [2, 3, 7],
-        [2, 7, 6],
-        [0, 2, 6],
-        [0, 6, 4],
-        [1, 5, 7],
-        [1, 7, 3],
-    ];
-    let mesh = json!({"type": "trimesh", "vertices": corners, "faces": faces});
+    let mesh = cube(2.0, None);
     let ball = json!({"type": "sphere", "radius": 1.0});
     let floor = json!({"type": "half_space", "normal": [0.0, 0.0, 2.0], "offset": -2.5});
     let text = [

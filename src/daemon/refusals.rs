@@ -53,6 +53,29 @@ mod tests {
     use crate::wire::{Frame, FrameHeader, TransformRow, WIRE_VERSION, frame_flags, name_bytes};
     const S: u64 = 1_000_000_000;
 
+    /// Of one body, at `x` metres.
+    fn frame(source: &str, seq: u64, body: u64, x: f64) -> Frame {
+        let header = FrameHeader {
+            source: name_bytes(source),
+            session: 7,
+            seq,
+            flags: frame_flags::FULL,
+            schema: WIRE_VERSION,
+            ..FrameHeader::default()
+        };
+        let row = TransformRow {
+            body,
+            position: [x, 0.0, 0.0],
+            orientation: [0.0, 0.0, 0.0, 1.0],
+            ..TransformRow::default()
+        };
+        Frame {
+            header,
+            transforms: vec![row],
+            ..Frame::default()
+        }
+    }
+
     #[test]
     fn bug_what_is_refused_of_a_client_that_only_sends_is_in_the_log() {
         let text = "[[source]]\nname = \"sim\"\n[[body]]\nname = \"b\"\nid = 3\n\
@@ -63,25 +86,7 @@ mod tests {
         let mut seq = 0;
         let mut admit = |world: &mut World, source: &str, body: u64| {
             seq += 1;
-            let header = FrameHeader {
-                source: name_bytes(source),
-                session: 7,
-                seq,
-                flags: frame_flags::FULL,
-                schema: WIRE_VERSION,
-                ..FrameHeader::default()
-            };
-            let row = TransformRow {
-                body,
-                orientation: [0.0, 0.0, 0.0, 1.0],
-                ..TransformRow::default()
-            };
-            let frame = Frame {
-                header,
-                transforms: vec![row],
-                ..Frame::default()
-            };
-            world.admit(&frame, S);
+            world.admit(&frame(source, seq, body, 0.0), S);
         };
         let mut refusals = Refusals::default();
         admit(&mut world, "sim", 3);
@@ -113,26 +118,7 @@ mod tests {
         let scene = Scene::parse(text, "scene.toml", std::path::Path::new("")).unwrap();
         let shapes = build_shapes(&scene).unwrap();
         let mut world = World::new(&scene, shapes.bodies, S).unwrap();
-        let header = FrameHeader {
-            source: name_bytes("sim"),
-            session: 7,
-            seq: 1,
-            flags: frame_flags::FULL,
-            schema: WIRE_VERSION,
-            ..FrameHeader::default()
-        };
-        let row = TransformRow {
-            body: 3,
-            position: [1e300, 0.0, 0.0],
-            orientation: [0.0, 0.0, 0.0, 1.0],
-            ..TransformRow::default()
-        };
-        let frame = Frame {
-            header,
-            transforms: vec![row],
-            ..Frame::default()
-        };
-        world.admit(&frame, S);
+        world.admit(&frame("sim", 1, 3, 1e300), S);
         let text = Refusals::default().words(&world, S).unwrap();
         assert!(
             text.contains("1 over_limit, the last of source \"sim\", body \"b\": "),

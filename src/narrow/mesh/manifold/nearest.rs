@@ -34,7 +34,8 @@ pub(super) fn nearest(a: &Leaf<'_>, b: &Leaf<'_>, patch: u32, found: &LeafContac
 fn edges_across(a: &[Point; 3], b: &[Point; 3], normal: &Vec3) -> Option<[Point; 2]> {
     let deepest = |corners: &[Point; 3], outward: Vec3| {
         let mut by_depth = *corners;
-        by_depth.sort_by(|p, q| outward.dot(&(q - p)).total_cmp(&0.0));
+        let height = |p: &Point| outward.dot(&p.coords);
+        by_depth.sort_by(|p, q| height(q).total_cmp(&height(p)));
         (by_depth[0], by_depth[1] - by_depth[0])
     };
     let ((from_a, along_a), (from_b, along_b)) = (deepest(a, *normal), deepest(b, -normal));
