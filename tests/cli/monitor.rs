@@ -159,8 +159,9 @@ fn keys_end_the_screen_and_the_terminal_is_as_it_was() {
     step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
     let binary = env!("CARGO_BIN_EXE_sweepd");
     let [before, after] = ["before", "after"].map(|name| desk.dir.join(name));
+    // Ctrl-C reaches the shell as well, and not every one outlives it.
     let command = format!(
-        "stty rows 24 cols 80; stty -a > {}; TERM=xterm {binary} monitor --instance {}; echo code $?; stty -a > {}",
+        "trap : INT; stty rows 24 cols 80; stty -a > {}; TERM=xterm {binary} monitor --instance {}; echo code $?; stty -a > {}",
         before.display(),
         desk.instance,
         after.display()
