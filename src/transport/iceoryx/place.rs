@@ -86,6 +86,11 @@ impl Place {
         format!("{}/v{}/{topic}", self.instance, crate::wire::WIRE_VERSION)
     }
 
+    /// Name of the service that says which wire version the others are of.
+    pub(super) fn hello(&self) -> String {
+        format!("{}/hello", self.instance)
+    }
+
     /// The root directory of iceoryx2's files.
     #[must_use]
     pub fn root(&self) -> PathBuf {

@@ -284,7 +284,7 @@ pub(super) fn hellos(
     place: &Place,
     open: Open,
 ) -> Result<PubSub<Ipc, Hello, ()>> {
-    let name = format!("{}/hello", place.instance());
+    let name = place.hello();
     let builder = node
         .service_builder(&service_name(&name)?)
         .publish_subscribe::<Hello>();

@@ -4,12 +4,13 @@
 //! for whoever makes a service, gives up, and takes nobody's word for that he is dead: the instance could never be
 //! started again. Services of an instance are made by its daemon alone, so who holds its lock knows.
 
-use std::fs::{self, DirEntry};
+use std::fs;
 use std::os::unix::fs::MetadataExt;
-use std::path::PathBuf;
-use std::time::Duration;
+use std::path::Path;
 
-use iceoryx2::prelude::Node;
+use iceoryx2::prelude::{MessagingPattern, Node};
+use iceoryx2::service::Service;
+use iceoryx2::service::service_hash::ServiceHash;
 
 use super::place::Place;
 use super::qos::{self, Ipc};
@@ -20,8 +21,24 @@ const FOLDER: &str = "services";
 const ENDING: &str = ".service";
 /// While a service is made its file may be written; then nobody may.
 const WRITABLE: u32 = 0o200;
-/// What an empty file is a service of cannot be known; to make one takes far less time.
-const OLD: Duration = Duration::from_secs(10);
+/// What the services of this wire version are named after.
+const TOPICS: [&str; 15] = [
+    "transforms",
+    "transforms_vel",
+    "vertices",
+    "contacts",
+    "regions",
+    "pairs",
+    "changes",
+    "bodies",
+    "body_verdicts",
+    "names",
+    "plan",
+    "tick",
+    "wake",
+    "ready",
+    "requests",
+];
 
 /// Takes the place over, from a daemon that was killed while it started as from any other: the node of the next one.
 pub(super) fn take_over(place: &Place) -> Result<Node<Ipc>> {
@@ -35,40 +52,45 @@ pub(super) fn take_over(place: &Place) -> Result<Node<Ipc>> {
 
 /// Removes the files of services of this instance that nobody will finish; returns how many.
 fn remove_unfinished(place: &Place) -> usize {
-    let Ok(entries) = fs::read_dir(place.root().join(FOLDER)) else {
-        return 0;
-    };
-    let unfinished = entries.flatten().filter_map(|entry| path_of(&entry, place));
-    let gone = unfinished.filter(|path| fs::remove_file(path).is_ok());
+    let folder = place.root().join(FOLDER);
+    let services = TOPICS.map(|topic| place.service(topic));
+    let services = services.into_iter().chain([place.hello()]);
+    let gone = services
+        .flat_map(|service| files_of(place, &service))
+        .map(|name| folder.join(name))
+        .filter(|path| is_unfinished(path) && fs::remove_file(path).is_ok());
     gone.count()
 }
 
-/// The file, if it is that of a service to be removed.
-fn path_of(entry: &DirEntry, place: &Place) -> Option<PathBuf> {
-    let name = entry.file_name();
-    let name = name.to_str()?;
-    let meta = entry.metadata().ok()?;
-    if !(name.starts_with(&place.prefix()) && name.ends_with(ENDING) && meta.is_file())
-        || meta.mode() & WRITABLE == 0
-    {
-        return None;
-    }
-    let text = fs::read_to_string(entry.path()).ok()?;
-    let service = text
-        .lines()
-        .find_map(|line| line.strip_prefix("service_name = \""));
-    let is_ours = match service {
-        Some(service) => service.starts_with(&format!("{}/", place.instance())),
-        None => meta.modified().ok()?.elapsed().ok()? > OLD,
+/// Names of the files that a service of this name may have, one for each pattern: the file of one half made may be
+/// empty, and says by its name alone whose it is.
+fn files_of(place: &Place, service: &str) -> Vec<String> {
+    let Ok(service) = qos::service_name(service) else {
+        return Vec::new();
     };
-    is_ours.then(|| entry.path())
+    let patterns = [
+        MessagingPattern::PublishSubscribe,
+        MessagingPattern::Event,
+        MessagingPattern::RequestResponse,
+    ];
+    let file = |pattern| {
+        let hash = ServiceHash::new::<<Ipc as Service>::ServiceNameHasher>(&service, pattern);
+        format!("{}{hash}{ENDING}", place.prefix())
+    };
+    patterns.map(file).into()
+}
+
+fn is_unfinished(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok_and(|meta| meta.is_file() && meta.mode() & WRITABLE != 0)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
     use std::os::unix::fs::PermissionsExt;
 
     use super::*;
+    use crate::transport::iceoryx::{Server, ServerOptions};
 
     #[test]
     fn what_is_unfinished_of_an_instance_goes_and_all_else_stays() {
@@ -76,29 +98,29 @@ mod tests {
         let place = Place::new("mine").unwrap().under(&root, "t_");
         assert_eq!(remove_unfinished(&place), 0, "no folder");
         let folder = root.join(FOLDER);
-        fs::create_dir_all(&folder).unwrap();
-        let put = |name: &str, text: &str, mode| {
-            let path = folder.join(name);
-            fs::write(&path, text).unwrap();
-            fs::set_permissions(&path, fs::Permissions::from_mode(mode)).unwrap();
-            path
+        let files = || -> BTreeSet<_> {
+            let entries = fs::read_dir(&folder).unwrap();
+            entries.map(|entry| entry.unwrap().path()).collect()
         };
-        let ours = "service_hash = \"1\"\nservice_name = \"mine/v1/tick\"\n";
-        let gone = put("t_1.service", ours, 0o600);
-        let stay = [
-            put("t_2.service", ours, 0o400),
-            put("t_3.service", &ours.replace("mine", "mine_too"), 0o600),
-            put("u_4.service", ours, 0o600),
-            put("t_5.other", ours, 0o600),
-            put("t_6.service", "", 0o600),
-        ];
-        let old = put("t_7.service", "", 0o600);
-        let then = fs::metadata(&old).unwrap().modified().unwrap() - 2 * OLD;
-        let file = fs::File::options().write(true).open(&old).unwrap();
-        file.set_modified(then).unwrap();
-        assert_eq!(remove_unfinished(&place), 2);
-        assert!(!gone.exists() && !old.exists());
-        assert!(stay.iter().all(|path| path.exists()));
+        let server = Server::open(ServerOptions::new(place.clone(), 1)).unwrap();
+        let ours = files();
+        let neighbour = place.with_instance("mine_too").unwrap();
+        let other = Server::open(ServerOptions::new(neighbour, 2)).unwrap();
+        let all = files();
+        assert!(all.len() == 2 * ours.len() && ours.len() > 15, "{all:?}");
+        assert_eq!(remove_unfinished(&place), 0, "all are made");
+        let aside = root.join("aside");
+        fs::rename(&folder, &aside).unwrap();
+        fs::create_dir(&folder).unwrap();
+        for path in &all {
+            fs::write(path, "").unwrap();
+            fs::set_permissions(path, fs::Permissions::from_mode(0o600)).unwrap();
+        }
+        assert_eq!(remove_unfinished(&place), ours.len());
+        assert_eq!(files(), all.difference(&ours).cloned().collect());
+        fs::remove_dir_all(&folder).unwrap();
+        fs::rename(&aside, &folder).unwrap();
+        drop((server, other));
         fs::remove_dir_all(&root).unwrap();
     }
 }
