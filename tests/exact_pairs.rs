@@ -593,6 +593,78 @@ fn a_large_sweep() {
     assert!(rows.values().all(|row| row.unsound == 0));
 }
 
+/// A shape whose reach along the axes of the world is a short decimal, at a turn by a multiple of 90 degrees, and that
+/// reach.
+fn upright(r: &mut Random) -> (Solid, Quat, Vec3) {
+    let lengths = [0.05, 0.1, 0.2, 0.25, 0.3, 0.5, 1.0, 2.0];
+    let mut length = || lengths[r.below(8) as usize];
+    let half = Vec3::new(length(), length(), length());
+    let solid = match r.below(5) {
+        0 => Solid::Cuboid(half),
+        1 => {
+            let corner =
+                |k: u32| [0, 1, 2].map(|i| if k >> i & 1 == 0 { -half[i] } else { half[i] });
+            Solid::Points((0..8).map(|k| corner(k).into()).collect())
+        }
+        2 => Solid::Cylinder(half.x, half.z),
+        3 => Solid::Cone(half.x, half.z),
+        _ => Solid::Capsule(half.x, half.z),
+    };
+    let half = match &solid {
+        Solid::Capsule(r, h) => Vec3::new(*r, *r, r + h),
+        Solid::Cylinder(r, h) | Solid::Cone(r, h) => Vec3::new(*r, *r, *h),
+        _ => half,
+    };
+    // Quarter turns about axes, and thirds about diagonals: entries of the matrix are 0 and 1 but for rounding.
+    let turns = [
+        [1., 0., 0., 0.],
+        [1., 0., 0., 1.],
+        [1., 0., 1., 0.],
+        [1., 1., 0., 0.],
+        [1., 1., 1., 1.],
+        [1., 1., 1., -1.],
+        [1., -1., 1., 1.],
+        [0., 1., 1., 0.],
+    ];
+    let [w, i, j, k] = turns[r.below(8) as usize];
+    let turn = UnitQuaternion::new_normalize(Quaternion::new(w, i, j, k));
+    let reach = turn
+        .to_rotation_matrix()
+        .matrix()
+        .map(|x: f64| x.abs().round())
+        * half;
+    (solid, turn, reach)
+}
+
+/// What stands on a table, to the last bit of a decimal, is the commonest touch of all.
+#[test]
+fn bug_what_touched_to_the_last_bit_was_left_undecided() {
+    let mut r = Random(17);
+    let mut faces = 0;
+    for number in 0..8_000 {
+        let ((a, turn_a, reach_a), (b, turn_b, reach_b)) = (upright(&mut r), upright(&mut r));
+        let side = r.below(3) as usize;
+        let mut at = Vec3::from_fn(|_, _| [0.0, 0.0, 0.05, 0.1][r.below(4) as usize]);
+        at[side] = (reach_a[side] + reach_b[side]) * if r.below(2) == 0 { 1.0 } else { -1.0 };
+        let pose_a = Pose::from_parts(Vec3::zeros().into(), turn_a);
+        let pose = pose_a.inverse() * Pose::from_parts(at.into(), turn_b);
+        let c = convex_gap(&a.build(), &b.build(), &pose, &mut Warm::default());
+        let what = format!("{number}: {a:?} {b:?} {pose:?} {c:?}");
+        assert!(c.finished, "{what}");
+        let (_, wrong) = check(&a, &b, &pose, &c, 12);
+        assert_eq!(wrong, None, "{what}");
+        // The axis proves that they are not deeper; where cones or round sides meet they may be apart.
+        let size = a.size() + b.size();
+        assert!(c.gap.max >= -1e-12 * size, "{what}");
+        let flat = |of: &Solid| matches!(of, Solid::Cuboid(_) | Solid::Points(_));
+        if flat(&a) && flat(&b) && (0..3).all(|k| at[k].abs() < reach_a[k] + reach_b[k] + 1e-9) {
+            assert!(c.collides() && c.gap.max < 1e-12 * size, "{what}");
+            faces += 1;
+        }
+    }
+    assert!(faces > 800, "{faces} touch by faces");
+}
+
 #[test]
 fn bug_closest_points_on_parallel_features_lay_outside_their_shapes() {
     let pose = |q: [f64; 4], t: [f64; 3]| {

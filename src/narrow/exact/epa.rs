@@ -69,6 +69,9 @@ pub(super) fn depth(pair: &Pair<'_>, simplex: &Simplex, warm: Option<Refined>) -
             let again = polytope.run(pair, &Simplex::default(), axes, None);
             gap = gjk::better(&gap, &polytope.straight(pair, again));
         }
+        // Last, for what is tight by it alone may still gain by another attempt at the other end.
+        gap.upper = gap.upper.min((gap.point_b - gap.point_a).norm());
+        gap.upper = gap.upper.max(gap.lower);
         gap
     };
     SCRATCH.with(|scratch| match scratch.try_borrow_mut() {

@@ -21,8 +21,8 @@ const STEPS_MAX: usize = 64;
 pub(super) enum Outcome {
     /// The cores are apart.
     Apart(CoreGap),
-    /// They overlap, or touch to the last bit.
-    Overlap(Simplex),
+    /// They overlap, or touch to the last bit; with what the simplex proves, which is no depth.
+    Overlap(Simplex, CoreGap),
 }
 
 /// State between steps, so that a run can be resumed with a tighter tolerance.
@@ -72,7 +72,7 @@ pub(super) fn distance(
     gjk.recall(held);
     if pair.polytopes {
         return match gjk.run(tiny / 2.0, None) {
-            Run::Overlap => Outcome::Overlap(gjk.simplex),
+            Run::Overlap => Outcome::Overlap(gjk.simplex, gjk.touch()),
             Run::Ended => gjk.decide(gjk.gap()),
         };
     }
@@ -82,7 +82,7 @@ pub(super) fn distance(
     let size = pair.a.reach().min(pair.b.reach());
     for tolerance in [1e-2, 1e-4, 1e-7, 0.0] {
         if matches!(gjk.run((tolerance * size).max(tiny), hint), Run::Overlap) {
-            return Outcome::Overlap(gjk.simplex);
+            return Outcome::Overlap(gjk.simplex, gjk.touch());
         }
         let found = gjk.gap();
         let found = match newton::refine(pair, &gjk.simplex, &gjk.normal) {
@@ -116,7 +116,7 @@ impl Gjk<'_> {
     /// Where no direction separates, the polytope has to tell: the simplex may have stalled around the origin.
     fn decide(&self, gap: CoreGap) -> Outcome {
         if gap.lower < -self.pair.tiny() {
-            Outcome::Overlap(self.simplex)
+            Outcome::Overlap(self.simplex, gap)
         } else {
             Outcome::Apart(gap)
         }
@@ -185,6 +185,7 @@ impl Gjk<'_> {
         let tiny = self.pair.tiny() / 4.0;
         self.simplex.push(new);
         let Some(nearest) = self.simplex.nearest() else {
+            self.simplex.keep_all();
             return Some(Run::Overlap);
         };
         let dir = self.simplex.direction(&nearest);
@@ -201,6 +202,20 @@ impl Gjk<'_> {
         self.simplex.keep(&nearest);
         (self.point, self.upper, self.dir) = (nearest.point, upper, dir);
         None
+    }
+
+    /// Of cores that overlap: their points at the origin are as good as one, and the best direction proves how far they
+    /// overlap at most.
+    fn touch(&self) -> CoreGap {
+        let (point_a, point_b) = self.simplex.witnesses();
+        CoreGap {
+            lower: self.lower,
+            upper: (point_b - point_a).norm().max(self.lower),
+            normal: self.normal,
+            point_a,
+            point_b,
+            held: Held::of(self.simplex.used(), &self.simplex.weights),
+        }
     }
 
     fn gap(&self) -> CoreGap {

@@ -215,11 +215,22 @@ fn iterate(pair: &Pair<'_>, warm: &Warm, mut shell: Option<&mut Shell>) -> CoreG
     }
     match gjk::distance(pair, &start, &warm.held, refined.as_ref()) {
         gjk::Outcome::Apart(gap) => gap,
-        gjk::Outcome::Overlap(simplex) => match known.or_else(|| around(pair, None)) {
-            Some(gap) if gap.is_tight(pair) => gap,
-            Some(gap) => gjk::better(&gap, &epa::depth(pair, &simplex, refined)),
-            None => epa::depth(pair, &simplex, refined),
-        },
+        gjk::Outcome::Overlap(simplex, touch) => {
+            let gap = match known.or_else(|| around(pair, None)) {
+                Some(gap) if gap.is_tight(pair) => return gap,
+                Some(gap) => gjk::better(&gap, &epa::depth(pair, &simplex, refined)),
+                None => epa::depth(pair, &simplex, refined),
+            };
+            // A polytope that only touches the origin may break before it tells anything: they touch all the same.
+            if touch.upper < gap.upper {
+                CoreGap {
+                    held: gap.held,
+                    ..gjk::better(&gap, &touch)
+                }
+            } else {
+                gap
+            }
+        }
     }
 }
 

@@ -56,7 +56,7 @@ impl Simplex {
     /// Sub-simplices with the newest vertex are tried, and no others.
     pub(super) fn nearest(&self) -> Option<Nearest> {
         let new = self.count.checked_sub(1)?;
-        if self.count == 4 && self.holds_origin() {
+        if self.weights_inside().is_some() {
             return None;
         }
         let w = |k: usize| self.vertices[k].w;
@@ -90,6 +90,13 @@ impl Simplex {
             }
         }
         Some(best)
+    }
+
+    /// Keeps all four vertices, around the origin as they are.
+    pub(super) fn keep_all(&mut self) {
+        if let Some(weights) = self.weights_inside() {
+            self.weights = weights;
+        }
     }
 
     /// Cuts the simplex down to what [`Simplex::nearest`] found. The rest moves up: who stands in its place stays.
@@ -136,8 +143,11 @@ impl Simplex {
         }
     }
 
-    /// Whether the origin lies in the tetrahedron.
-    fn holds_origin(&self) -> bool {
+    /// Weights of the origin, where it lies in a tetrahedron; none of them is below 0.
+    fn weights_inside(&self) -> Option<[f64; 4]> {
+        if self.count < 4 {
+            return None;
+        }
         let [a, b, c, d] = self.vertices.map(|v| v.w);
         let det = |p: &Vec3, q: &Vec3, r: &Vec3| p.dot(&q.cross(r));
         let volume = det(&(b - a), &(c - a), &(d - a));
@@ -149,7 +159,9 @@ impl Simplex {
         let vc = det(&ad, &bd, &from);
         let whole = det(&ad, &bd, &cd);
         let vd = whole - va - vb - vc;
-        volume != 0.0 && whole != 0.0 && [va, vb, vc, vd].iter().all(|v| *v / whole >= 0.0)
+        let weights = [va, vb, vc, vd].map(|v| v / whole);
+        let holds = volume != 0.0 && whole != 0.0 && weights.iter().all(|weight| *weight >= 0.0);
+        holds.then_some(weights)
     }
 }
 
