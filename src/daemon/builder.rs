@@ -9,7 +9,7 @@ use std::thread::JoinHandle;
 
 use crate::error::{Error, Result};
 use crate::query::Query;
-use crate::record::{Asked, Origin};
+use crate::record::Asked;
 use crate::scene::{Question, Request, Scene};
 use crate::shape::Library;
 use crate::tick::EditBatch;
@@ -31,7 +31,7 @@ enum Job {
     /// Something to do, and who waits for it.
     Do(RequestToken, Work),
     /// What is needed no more.
-    Forget(Origin),
+    Forget(Box<dyn Send>),
 }
 
 enum Work {
@@ -95,8 +95,8 @@ impl Builder {
                 }
                 let (token, work) = match job {
                     Job::Do(token, work) => (token, work),
-                    Job::Forget(origin) => {
-                        drop(origin);
+                    Job::Forget(what) => {
+                        drop(what);
                         continue;
                     }
                 };
@@ -127,9 +127,9 @@ impl Builder {
     }
 
     /// Hands over what is needed no more: to give the memory of a large request back takes as long as a tick.
-    pub(super) fn forget(&self, origin: Origin) {
+    pub(super) fn forget(&self, what: impl Send + 'static) {
         if let Some(asked) = &self.asked {
-            let _gone_anyway = asked.send(Job::Forget(origin));
+            let _gone_anyway = asked.send(Job::Forget(Box::new(what)));
         }
     }
 

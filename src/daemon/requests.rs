@@ -50,8 +50,12 @@ impl Daemon<'_> {
 
     /// Answers the requests whose edits the last tick applied or refused.
     pub(super) fn settle_edits(&mut self) {
-        self.tell_bodies();
-        self.ready.clear();
+        if self.door.follows_bodies() {
+            self.tell_bodies();
+        }
+        if !self.ready.is_empty() {
+            self.builder.forget(std::mem::take(&mut self.ready));
+        }
         for at in 0..self.engine.outcomes().len() {
             let outcome = &self.engine.outcomes()[at];
             let (token, warnings) = (RequestToken(outcome.token), outcome.warnings.clone());

@@ -2,29 +2,22 @@
 //!
 //! In: a tick's input. Out: the world of this tick, and the end of its time as its frames ask for it.
 
-use super::{EditOutcome, Engine, TickInput};
+use std::sync::Arc;
+
+use super::floor::Laps;
+use super::{EditOutcome, Engine, TickInput, beat};
 use crate::plan::Seen;
+use crate::time::Meter;
 use crate::wire::{Frame, Inbox, SOURCE_NAME_LEN, TickCause};
 
 impl Engine {
-    pub(super) fn admit(&mut self, input: &TickInput<'_>) {
+    pub(super) fn admit(&mut self, input: &mut TickInput<'_>, laps: &Laps) {
         let now_ns = self.clock.boottime_ns();
         self.now_ns = now_ns;
         let asked = input.edits.iter().any(|batch| batch.validate);
         let fault = asked.then(|| self.repair()).flatten();
         self.world.begin_tick(self.tick);
-        for batch in input.edits {
-            let (token, mut warnings) = (batch.token, batch.warnings.clone());
-            if batch.validate {
-                warnings.extend(fault.clone());
-            }
-            let result = self.world.apply(&batch.edits);
-            self.outcomes.push(EditOutcome {
-                token,
-                result,
-                warnings,
-            });
-        }
+        self.edit(input, laps, fault.as_deref());
         self.admit_frames(input.inbox, now_ns);
         let limited = self.config.budget.is_limited();
         // Who has no time because only ages are judged says nothing of what the others will have.
@@ -37,6 +30,34 @@ impl Engine {
         let is_edited = !input.edits.is_empty();
         if is_edited || is_news || limited != self.config.budget.is_limited() {
             self.replan(is_edited);
+        }
+    }
+
+    /// Applies the edits. A hundred thousand take longer than a heartbeat, and cannot be done in parts.
+    ///
+    /// * `fault` - what was found in the structures, for those who asked.
+    fn edit(&mut self, input: &mut TickInput<'_>, laps: &Laps, fault: Option<&str>) {
+        if input.edits.is_empty() {
+            return;
+        }
+        let row = self.bare_tick(input);
+        let clock = Arc::clone(&self.clock);
+        let mut beat = beat(&mut input.pulse, row, clock.as_ref());
+        let heartbeat_ns = self.config.heartbeat_ns;
+        let mut meter =
+            Meter::unlimited(clock.as_ref()).with_beat(laps.woke_ns(), heartbeat_ns, &mut beat);
+        for batch in input.edits {
+            let (token, mut warnings) = (batch.token, batch.warnings.clone());
+            if batch.validate {
+                warnings.extend(fault.map(str::to_owned));
+            }
+            let step = &mut || meter.charge(1);
+            let result = self.world.apply_stepwise(&batch.edits, step);
+            self.outcomes.push(EditOutcome {
+                token,
+                result,
+                warnings,
+            });
         }
     }
 

@@ -154,7 +154,7 @@ impl Engine {
     /// Runs one tick.
     pub fn tick(&mut self, mut input: TickInput<'_>) -> &Outbox {
         let mut laps = self.begin(&input);
-        self.admit(&input);
+        self.admit(&mut input, &laps);
         laps.lap(Stage::World);
         self.find_candidates();
         laps.lap(Stage::Broad);
@@ -268,14 +268,9 @@ impl Engine {
             (began, above_ns, deadline_ns)
         });
         let deadline_ns = timed.map(|(_, _, deadline_ns)| deadline_ns);
-        let mut row = self.bare_tick(input);
+        let row = self.bare_tick(input);
         let clock = Arc::clone(&self.clock);
-        let mut beat = || {
-            if let Some(pulse) = input.pulse.as_mut() {
-                row.sent_ns = clock.boottime_ns();
-                pulse(&row);
-            }
-        };
+        let mut beat = beat(&mut input.pulse, row, clock.as_ref());
         let mut meter = Meter::new(clock.as_ref(), deadline_ns, budget.units).with_beat(
             laps.woke_ns(),
             self.config.heartbeat_ns,
@@ -363,6 +358,20 @@ impl Engine {
         row.broad_renewed = u32::try_from(broad.renewed).unwrap_or(u32::MAX);
         let (mode, cause) = broad.way.unwrap_or((BroadMode::Whole, BroadCause::None));
         (row.broad_mode, row.broad_cause) = (mode.code(), cause.code());
+    }
+}
+
+/// Sends a bare tick, now.
+fn beat<'a>(
+    pulse: &'a mut Option<&mut dyn FnMut(&TickRow)>,
+    mut row: TickRow,
+    clock: &'a dyn Clock,
+) -> impl FnMut() + 'a {
+    move || {
+        if let Some(pulse) = pulse {
+            row.sent_ns = clock.boottime_ns();
+            pulse(&row);
+        }
     }
 }
 

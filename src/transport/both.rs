@@ -80,6 +80,10 @@ impl Door for Both<'_> {
         self.beside.settings(take);
     }
 
+    fn follows_bodies(&self) -> bool {
+        self.first.follows_bodies() || self.beside.follows_bodies()
+    }
+
     fn bodies(&mut self, changes: &[BodyChange]) {
         self.first.bodies(changes);
         self.beside.bodies(changes);
@@ -149,6 +153,9 @@ mod tests {
         }
         fn settings(&mut self, take: &mut dyn FnMut(Setting)) {
             self.settings.drain(..).for_each(take);
+        }
+        fn follows_bodies(&self) -> bool {
+            true
         }
         fn bodies(&mut self, changes: &[BodyChange]) {
             self.told.extend_from_slice(changes);

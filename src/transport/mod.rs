@@ -146,8 +146,12 @@ pub trait Door {
     /// Hands over what was set since the last call; a door without an operator has nothing.
     fn settings(&mut self, _take: &mut dyn FnMut(Setting)) {}
 
-    /// Says what edits did to bodies, after the tick that applied them; a door whose frames name bodies has no use for
-    /// it.
+    /// Whether it is to be told what edits do to bodies; a door whose frames name bodies has no use for it.
+    fn follows_bodies(&self) -> bool {
+        false
+    }
+
+    /// Says what edits did to bodies, after the tick that applied them.
     fn bodies(&mut self, _changes: &[BodyChange]) {}
 
     /// Says what the log says; for those who do not see it.

@@ -118,16 +118,31 @@ impl World {
     /// # Errors
     /// A text for the user: which edit names what, and what to change. Then nothing of the request was applied.
     pub fn apply(&mut self, edits: &[Edit]) -> Result<Applied, String> {
-        self.check(edits, true)?;
-        Ok(self.apply_checked(edits))
+        self.apply_stepwise(edits, &mut || {})
+    }
+
+    /// As [`World::apply`].
+    ///
+    /// * `step` - called after each edit that was looked at, and each that was applied.
+    ///
+    /// # Errors
+    /// As [`World::apply`].
+    pub fn apply_stepwise(
+        &mut self,
+        edits: &[Edit],
+        step: &mut dyn FnMut(),
+    ) -> Result<Applied, String> {
+        self.check(edits, true, step)?;
+        Ok(self.apply_checked(edits, step))
     }
 
     /// Applies edits that [`World::check`] let pass.
-    pub(super) fn apply_checked(&mut self, edits: &[Edit]) -> Applied {
+    pub(super) fn apply_checked(&mut self, edits: &[Edit], step: &mut dyn FnMut()) -> Applied {
         let mut after = After::default();
         self.reserve_ids(edits);
         for edit in edits {
             self.apply_one(edit, &mut after);
+            step();
         }
         self.relist(std::mem::take(&mut after.slots));
         let ruled = self.edit_rules(edits);

@@ -62,7 +62,13 @@ impl World {
     /// Whether a request can be applied as a whole.
     ///
     /// * `numbered` - whether errors say which edit it is.
-    pub(super) fn check(&self, edits: &[Edit], numbered: bool) -> Result<(), String> {
+    /// * `step` - called after each edit.
+    pub(super) fn check(
+        &self,
+        edits: &[Edit],
+        numbered: bool,
+        step: &mut dyn FnMut(),
+    ) -> Result<(), String> {
         let mut draft = Draft {
             world: self,
             bodies: BTreeMap::new(),
@@ -86,6 +92,7 @@ impl World {
                     text
                 }
             })?;
+            step();
         }
         draft.references_hold(edits)
     }
@@ -286,7 +293,7 @@ impl<'a> Draft<'a> {
         let owner = owner.or_else(|| self.ids.get(&spec.id).copied());
         if let Some(owner) = owner.filter(|owner| *owner != name) {
             return Err(format!(
-                "body `{name}`: the id {id} belongs to `{owner}`: give another, or none"
+                "body `{name}`: the id {id} belongs to `{owner}` for this run of the daemon: give another, or none"
             ));
         }
         self.ids.insert(spec.id, name);

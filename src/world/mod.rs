@@ -170,8 +170,10 @@ impl World {
             .filters
             .rules
             .set(scene.rules.clone(), &mut world.names);
-        world.check(&edits, false).map_err(Error::Scene)?;
-        world.apply_checked(&edits);
+        world
+            .check(&edits, false, &mut || {})
+            .map_err(Error::Scene)?;
+        world.apply_checked(&edits, &mut || {});
         world.recount();
         world.scene_rev = 1;
         world.names_changed = true;

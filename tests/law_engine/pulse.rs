@@ -3,8 +3,9 @@
 
 use sweepd::time::{Budget, Clock};
 use sweepd::wire::{MessageHeader, Reason, RejectReason, State, WIRE_VERSION};
+use sweepd::world::Edit;
 
-use crate::rig::{ALL, Rig, ball_pairs, put_pairs};
+use crate::rig::{ALL, NONE, Rig, ball_pairs, put_pairs};
 
 const LOOK_NS: u64 = 1_000_000;
 const HEARTBEAT_NS: u64 = 100_000_000;
@@ -60,6 +61,30 @@ fn law_4_4_a_tick_longer_than_a_heartbeat_sends_tick_alone_between_its_slices() 
     }
     assert_eq!(rig.rejects(RejectReason::UnknownBody), 1);
     assert!(row.sent_ns > last_ns, "the tick itself is the newest");
+}
+
+/// A request is done as a whole, however many edits it has.
+#[test]
+fn bug_while_a_large_request_was_applied_nobody_heard_of_it() {
+    let mut rig = pairs();
+    rig.send(ALL);
+    rig.clock.step_each_read(LOOK_NS);
+    let woke_ns = rig.clock.monotonic_ns();
+    let bodies = 2 * PAIRS;
+    let enable = |at: u64| Edit::Enable {
+        name: format!("b{}", at % bodies + 1),
+        enabled: at / bodies % 2 == 1,
+    };
+    rig.edit((0..4 * bodies).map(enable).collect(), NONE);
+    rig.clock.step_each_read(0);
+    let mut last_ns = woke_ns;
+    for pulse in &rig.pulses {
+        assert!(pulse.sent_ns - last_ns <= HEARTBEAT_NS + 30 * LOOK_NS);
+        assert_eq!(pulse.header.tick, rig.out.tick.header.tick);
+        last_ns = pulse.sent_ns;
+    }
+    // A look for each eight edits, checked and applied.
+    assert!((8..=11).contains(&rig.pulses.len()), "{}", rig.pulses.len());
 }
 
 #[test]

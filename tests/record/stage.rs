@@ -90,6 +90,9 @@ impl Door for Desk {
     fn settings(&mut self, take: &mut dyn FnMut(Setting)) {
         self.panel.lock().unwrap().drain(..).for_each(take);
     }
+    fn follows_bodies(&self) -> bool {
+        true
+    }
     fn bodies(&mut self, changes: &[BodyChange]) {
         self.inner.bodies(changes);
     }

@@ -153,5 +153,10 @@ fn failed(name: &str, error: McapError) -> Error {
         }
         _ => "is the disk full?",
     };
-    Error::io(format!("cannot write the recording {name}; {why}"), error)
+    let what = format!("cannot write the recording {name}; {why}");
+    match error {
+        // In its own words: those around it speak of compression.
+        McapError::Io(error) => Error::io(what, error),
+        error => Error::io(what, error),
+    }
 }

@@ -241,6 +241,10 @@ impl Door for LastingNode {
         }
     }
 
+    fn follows_bodies(&self) -> bool {
+        true
+    }
+
     fn bodies(&mut self, changes: &[BodyChange]) {
         let mut scene = open(&self.scene);
         changes.iter().for_each(|change| scene.follow(change));

@@ -365,6 +365,10 @@ impl Door for RosNode {
         }
     }
 
+    fn follows_bodies(&self) -> bool {
+        true
+    }
+
     fn bodies(&mut self, changes: &[BodyChange]) {
         open(&self.shared.changes).extend_from_slice(changes);
     }
