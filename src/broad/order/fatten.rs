@@ -55,8 +55,8 @@ const GUESS_SHARE: f32 = 0.6;
 /// What a body has learned about its motion.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gait {
-    /// Its box when the fat one was made: the faces of a [`Down`], whose alignment would cost a third as much again.
-    anchor: [f32; 8],
+    /// Its box when the fat one was made: the faces of a [`Down`] without the spare ones.
+    anchor: [f32; 6],
     /// The order's beat then, less the times that the body has moved between beats; see [`Gait::note_move`].
     born: u32,
     /// What is added on every side, metres.
@@ -73,7 +73,7 @@ pub(super) struct Gait {
 impl Gait {
     /// Of a body that nothing is known of.
     pub(super) const NEW: Self = Self {
-        anchor: [0.0; 8],
+        anchor: [0.0; 6],
         born: u32::MAX,
         margin: 0.0,
         wild: 0,
@@ -91,9 +91,14 @@ impl Gait {
         }
     }
 
+    #[inline(always)]
+    fn anchor(&self) -> Down {
+        Down::of_six(self.anchor)
+    }
+
     /// What a body at rest spans, in its mean sides; `None`: it is not at rest, or has no hold that tells.
     pub(super) fn span(&self, held: &Hold) -> Option<f32> {
-        let side = Down { faces: self.anchor }.mean_side();
+        let side = self.anchor().mean_side();
         let widest = (0..3).fold(0.0, |widest: f32, k| {
             widest.max(held.core.faces[k] - held.fat.faces[k])
         });
@@ -119,8 +124,8 @@ impl Gait {
         } else {
             least
         };
-        let before = self.anchor;
-        self.anchor = now.faces;
+        let before = self.anchor();
+        self.anchor = now.six();
         self.born = beat;
         let (mut fat, mut core) = (*now, NO_CORE);
         // An infinite box has no finite side: it is its own fat box.
@@ -148,7 +153,7 @@ impl Gait {
             0.0
         };
         let most = side * SWEEP_MAX;
-        for (k, before) in before.into_iter().enumerate() {
+        for (k, before) in before.faces.into_iter().enumerate() {
             // Outward is down on every lane.
             let out = (before - now.faces[k]) * ahead;
             let clamped = |far: f32| {
@@ -217,8 +222,8 @@ impl Gait {
         #[allow(clippy::cast_precision_loss, reason = "ages of ticks, small")]
         let share = ahead as f32 / self.age(beat).max(1) as f32;
         let mut then = *now;
-        for (k, face) in then.faces.iter_mut().enumerate() {
-            let out = (self.anchor[k] - *face) * share;
+        for (face, before) in then.faces.iter_mut().zip(self.anchor().faces) {
+            let out = (before - *face) * share;
             // What moves inward counts for nothing.
             *face -= if out > 0.0 { out } else { 0.0 };
         }
@@ -230,9 +235,9 @@ impl Gait {
     #[inline(always)]
     fn learn(&mut self, now: &Down, held: &Hold, age: u32, side: f32) {
         let most = side * MARGIN_MAX;
-        let (mut far, mut astray) = (false, false);
+        let (mut far, mut astray, anchor) = (false, false, self.anchor());
         for k in [0, 1, 2, 4, 5, 6] {
-            let (before, face) = (self.anchor[k], now.faces[k]);
+            let (before, face) = (anchor.faces[k], now.faces[k]);
             let swept = before - held.fat.faces[k] - self.margin;
             let shrunk = held.core.faces[k] - before - self.margin;
             far |= before - face > most;

@@ -2,7 +2,7 @@
 
 use super::fatten::HORIZON;
 use super::{BodySlot, NONE, Order, Proxies, Tick, ones, parts, small};
-use crate::simd::boxes::{Down, Hold, Lanes, WIDTH, Work, prefetch};
+use crate::simd::boxes::{Down, Held, Lanes, WIDTH, Work, prefetch};
 
 /// Lanes that moved and have lived for half a round are renewed at their block's turn, or with a lane of their block
 /// that must be: the walk down the tree is then shared, and they would be next.
@@ -116,7 +116,7 @@ impl Order {
         for lane in ones(moved) {
             let rank = block * WIDTH + lane;
             let (gait, now) = (&self.gaits[rank], &self.exact[rank]);
-            let held = &self.held[self.slot_of[rank] as usize];
+            let held = &self.held[self.slot_of[rank] as usize].hold();
             let leaves = gait.age(self.beat) >= ALONG_AGE
                 && gait.leaves(lanes, now, held, self.beat, HORIZON);
             let calmed = gait.has_calmed(now, self.beat) && (patient || !gait.is_at_rest());
@@ -167,7 +167,7 @@ fn take<L: Lanes, P: Proxies>(
     lanes: L,
     (proxies, origin): (&P, &[f64; 3]),
     slot: BodySlot,
-    held: &Hold,
+    held: &Held,
     exact: &mut Down,
 ) -> bool {
     let aabb = proxies.aabb(slot);
@@ -196,7 +196,7 @@ impl<'a> Taking<'a> {
 
     /// Asks for the holds of the block ahead.
     #[inline(always)]
-    fn ask(self, held: &[Hold]) {
+    fn ask(self, held: &[Held]) {
         for ahead in self.ahead {
             if let Some(hold) = held.get(*ahead as usize) {
                 prefetch(hold);

@@ -209,7 +209,7 @@ impl Work for ListAll<'_> {
             for lane in ones(*live) {
                 order.sure[block].set(
                     lane,
-                    &sure(&order.held[order.slot_of[block * WIDTH + lane] as usize]),
+                    &sure(&order.held[order.slot_of[block * WIDTH + lane] as usize].hold()),
                 );
             }
         }

@@ -32,7 +32,7 @@
 use super::members::{ASKED, CAME, Members};
 use super::{Proxies, Work};
 use crate::ids::{BodySlot, PairKey, small};
-use crate::simd::boxes::{Boxes16, Down, Hold, Lanes, Level, Portable, WIDTH};
+use crate::simd::boxes::{Boxes16, Down, Held, Lanes, Level, Portable, WIDTH};
 use crate::wire::{BroadCause, BroadMode};
 
 mod afresh;
@@ -122,7 +122,7 @@ pub(super) struct Order {
     renewed: u64,
     /// By body slot: the fat box and the core; and by block, to be asked sixteen at a time, the fat boxes, and while
     /// candidates are listed what is sure of the cores.
-    held: Vec<Hold>,
+    held: Vec<Held>,
     fat: Vec<Boxes16>,
     sure: Vec<Boxes16>,
     /// By rank: how often the lane was given a fat box or lost its body, around the clock.

@@ -9,7 +9,7 @@ use super::sort::{FILL, Sorter};
 use super::tree::NO_BOUND;
 use super::{BodySlot, NONE, Order, Proxies, Tick, Work as Done, ones, parts};
 use crate::ids::small;
-use crate::simd::boxes::{Boxes16, Down, Hold, Portable, WIDTH};
+use crate::simd::boxes::{Boxes16, Down, Held, Portable, WIDTH};
 
 /// Blocks met by queries beyond what is usual that cost as much as sorting one body anew, carrying its overlaps and
 /// finding its candidates. Sorting when the excess has cost as much as a sort is at most twice as dear as the best
@@ -68,7 +68,7 @@ impl Order {
         }
         let rank = rank as usize;
         self.exact[rank] = Down::EMPTY;
-        self.held[slot.index()] = Hold::EMPTY;
+        self.held[slot.index()] = Held::EMPTY;
         self.ages[rank] = self.ages[rank].wrapping_add(1);
         self.len -= 1;
         self.lanes_changed += 1;
@@ -95,7 +95,7 @@ impl Order {
 
     /// Gives a body a free lane, where it is to be renewed.
     pub(super) fn seat(&mut self, slot: BodySlot, rank: u32, one: Down) {
-        grow(&mut self.held, slot.index(), Hold::EMPTY);
+        grow(&mut self.held, slot.index(), Held::EMPTY);
         self.sit(slot, rank, one);
         let (block, lane) = parts(rank);
         self.mark(block, 1 << lane);

@@ -10,7 +10,7 @@ use super::fatten::{Gait, HORIZON};
 use super::gear::Footing;
 use super::links::room;
 use super::{BodySlot, Order, Proxies, Tick};
-use crate::simd::boxes::{Down, Hold, Lanes, Portable};
+use crate::simd::boxes::{Down, Held, Lanes, Portable};
 
 /// Ticks of a probe, and those of them until bodies have learned their margins, which do not count.
 pub(super) const PROBE_TICKS: u32 = 64;
@@ -25,7 +25,7 @@ const CROWD: u64 = 4;
 struct Watched {
     slot: BodySlot,
     gait: Gait,
-    hold: Hold,
+    held: Held,
 }
 
 /// What a probe has seen.
@@ -54,7 +54,7 @@ impl Probe {
         self.bodies.extend(some.map(|slot| Watched {
             slot: *slot,
             gait: Gait::NEW,
-            hold: Hold::EMPTY,
+            held: Held::EMPTY,
         }));
         *self = Self {
             origin,
@@ -69,16 +69,16 @@ impl Probe {
         let counts = u64::from(self.ticks > LEARN_TICKS);
         self.hits += counts * hits as u64;
         self.all += counts * tick.members.bounded().len() as u64;
-        for Watched { slot, gait, hold } in &mut self.bodies {
+        for Watched { slot, gait, held } in &mut self.bodies {
             if !tick.members.is_bounded(*slot) {
                 continue;
             }
             let aabb = tick.proxies.aabb(*slot);
             let corners = [aabb.min.coords.as_ref(), aabb.max.coords.as_ref()];
             let mut now = Down::EMPTY;
-            let stays = Portable.take(corners, &self.origin, hold, &mut now);
+            let stays = Portable.take(corners, &self.origin, held, &mut now);
             if !stays {
-                *hold = gait.renew(&now, self.ticks, HORIZON, hold);
+                *held = Held::of(&gait.renew(&now, self.ticks, HORIZON, &held.hold()));
             }
             self.escapes += counts * u64::from(!stays);
             self.watched += counts;
@@ -92,7 +92,7 @@ impl Probe {
         let known = self
             .bodies
             .iter()
-            .filter_map(|one| one.gait.span(&one.hold));
+            .filter_map(|one| one.gait.span(&one.held.hold()));
         for (place, span) in spans.iter_mut().zip(known) {
             *place = span;
             count += 1;

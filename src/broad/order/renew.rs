@@ -14,7 +14,7 @@ use super::fatten::loose;
 use super::links::{Bits, EMPTY, Matrix};
 use super::look::sure;
 use super::{BodySlot, NONE, Order, PairKey, Proxies, Tick, Work as Done, ones, parts, small};
-use crate::simd::boxes::{Lanes, WIDTH, Work, prefetch};
+use crate::simd::boxes::{Held, Lanes, WIDTH, Work, prefetch};
 
 impl Order {
     /// Renews the lanes noted in `renewing`.
@@ -134,8 +134,8 @@ impl Renew<'_> {
             let rank = block * WIDTH + lane;
             let now = order.exact[rank];
             let held = &mut order.held[order.slot_of[rank] as usize];
-            let hold = order.gaits[rank].renew(&now, order.beat, horizon, held);
-            *held = hold;
+            let hold = order.gaits[rank].renew(&now, order.beat, horizon, &held.hold());
+            *held = Held::of(&hold);
             order.fat[block].set(lane, &loose(&hold.fat).corners());
             if order.listed {
                 order.sure[block].set(lane, &sure(&hold));

@@ -8,7 +8,7 @@ use super::fatten::{hold_of_seen, outward};
 use super::idle::{is_thrifty, shed};
 use super::links::room;
 use super::{BodySlot, Order, Proxies, Tick};
-use crate::simd::boxes::{Down, Hold, Lanes, Work};
+use crate::simd::boxes::{Down, Held, Hold, Lanes, Work};
 
 /// So often must bodies have been seen for it to tell where they are about.
 const LEAST: u32 = 8;
@@ -54,30 +54,30 @@ impl Order {
             Some(span) => {
                 #[allow(clippy::cast_possible_truncation, reason = "a guess")]
                 let by = std::array::from_fn(|k| (probe.origin[k] - self.origin[k]) as f32);
-                for hold in &mut self.held {
-                    *hold = hold_of_seen(hold, by, span);
+                for held in &mut self.held {
+                    *held = Held::of(&hold_of_seen(&held.hold(), by, span));
                 }
             }
             None => self.held.clear(),
         }
         room(&mut self.held, self.rank_of.len());
-        self.held.resize(self.rank_of.len(), Hold::EMPTY);
+        self.held.resize(self.rank_of.len(), Held::EMPTY);
     }
 }
 
 /// Nothing was seen.
-const UNSEEN: Hold = Hold {
+const UNSEEN: Held = Held::of(&Hold {
     fat: Down {
         faces: [f32::INFINITY; 8],
     },
     core: Down {
         faces: [f32::NEG_INFINITY; 8],
     },
-};
+});
 
 /// Takes the least and the greatest face of each body, as a hold has them.
 struct See<'a, P> {
-    held: &'a mut [Hold],
+    held: &'a mut [Held],
     origin: [f64; 3],
     bodies: &'a [BodySlot],
     proxies: &'a P,
@@ -89,9 +89,10 @@ impl<P: Proxies> Work for See<'_, P> {
     #[inline(always)]
     fn run<L: Lanes>(self, lanes: L) {
         for slot in self.bodies {
-            let Some(Hold { fat, core }) = self.held.get_mut(slot.index()) else {
+            let Some(held) = self.held.get_mut(slot.index()) else {
                 continue;
             };
+            let Hold { mut fat, mut core } = held.hold();
             let now = outward(lanes, self.proxies.aabb(*slot), &self.origin);
             for k in 0..8 {
                 let face = now.faces[k];
@@ -99,6 +100,7 @@ impl<P: Proxies> Work for See<'_, P> {
                 fat.faces[k] = if face < least { face } else { least };
                 core.faces[k] = if face > most { face } else { most };
             }
+            *held = Held::of(&Hold { fat, core });
         }
     }
 }

@@ -84,12 +84,12 @@ impl<P: Proxies> Work for LoadStanding<'_, '_, P> {
         let origin = order.origin;
         for slot in tick.moved {
             // Who has no lane has no hold.
-            let Some(hold) = order.held.get(slot.index()) else {
+            let Some(held) = order.held.get(slot.index()) else {
                 continue;
             };
             let aabb = tick.proxies.aabb(*slot);
             let corners = [aabb.min.coords.as_ref(), aabb.max.coords.as_ref()];
-            if lanes.keeps(corners, &origin, hold) {
+            if lanes.keeps(corners, &origin, held) {
                 continue;
             }
             if let Some(rank) = order.rank(*slot) {

@@ -45,13 +45,14 @@ impl Order {
             if (0..3).any(|k| fat[k] > exact[k] || fat[k + 3] < exact[k + 3]) {
                 return Err(format!("{slot:?} has left its fat box"));
             }
-            let hold = &self.held[slot.index()];
+            let held = &self.held[slot.index()];
+            let hold = held.hold();
             if loose(&hold.fat).corners().map(f32::to_bits) != fat.map(f32::to_bits) {
                 return Err(format!("the two fat boxes of {slot:?} do not fit"));
             }
             let aabb = proxies.aabb(*slot);
             let corners = [aabb.min.coords.as_ref(), aabb.max.coords.as_ref()];
-            let keeps = Portable.keeps(corners, &self.origin, hold);
+            let keeps = Portable.keeps(corners, &self.origin, held);
             let within = Portable.holds(&hold.fat, &boxed) && Portable.holds(&boxed, &hold.core);
             if !(keeps || within) {
                 return Err(format!("{slot:?} does not keep to its hold"));

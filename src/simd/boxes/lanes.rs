@@ -1,5 +1,7 @@
 //! Sixteen boxes as a structure of arrays, what can be asked of them, and the safe twin of every kernel.
 
+use super::hold::Held;
+
 /// Boxes in a block.
 pub(crate) const WIDTH: usize = 16;
 /// The same, to reckon with ranks.
@@ -46,30 +48,6 @@ pub(crate) struct Down {
     pub(crate) faces: [f32; 8],
 }
 
-/// What a box may do without any work: it stays inside `fat` and goes on holding `core`. A cache line.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
-pub(crate) struct Hold {
-    /// Holds the box; its spare lanes are minus infinity.
-    pub(crate) fat: Down,
-    /// Is held by the box; infinite, also in its spare lanes: no box fails it.
-    pub(crate) core: Down,
-}
-
-impl Hold {
-    /// Of no box: nothing keeps to it.
-    pub(crate) const EMPTY: Self = Self {
-        fat: Down::EMPTY,
-        core: Down::EMPTY,
-    };
-
-    /// Whether it is of no box.
-    #[inline(always)]
-    pub(crate) fn is_lost(&self) -> bool {
-        self.fat.faces[0].is_nan()
-    }
-}
-
 /// The first spare lane of a [`Down`]; the other is four further.
 pub(crate) const SPARE: usize = 3;
 /// What stands in the spare lanes of a box: two of them overlap there for sure, so that no kernel needs to leave the
@@ -94,6 +72,21 @@ impl Down {
     pub(crate) fn of([x, y, z, u, v, w]: [f32; 6]) -> Self {
         Self {
             faces: [x, y, z, SPARE_FACE, -u, -v, -w, SPARE_FACE],
+        }
+    }
+
+    /// Its faces without the spare lanes.
+    #[inline(always)]
+    pub(crate) const fn six(&self) -> [f32; 6] {
+        let [x, y, z, _, u, v, w, _] = self.faces;
+        [x, y, z, u, v, w]
+    }
+
+    /// Of its faces without the spare lanes.
+    #[inline(always)]
+    pub(crate) fn of_six([x, y, z, u, v, w]: [f32; 6]) -> Self {
+        Self {
+            faces: [x, y, z, SPARE_FACE, u, v, w, SPARE_FACE],
         }
     }
 
@@ -149,13 +142,13 @@ pub(crate) trait Lanes: Copy {
         self,
         corners: [&[f64; 3]; 2],
         origin: &[f64; 3],
-        hold: &Hold,
+        held: &Held,
         place: &mut Down,
     ) -> bool;
 
     /// Whether a box keeps to a hold, rounded to nearest: where it does, the box rounded outward lies in a fat box that
     /// is wider by a step of each face and `LEAST`, and holds the core.
-    fn keeps(self, corners: [&[f64; 3]; 2], origin: &[f64; 3], hold: &Hold) -> bool;
+    fn keeps(self, corners: [&[f64; 3]; 2], origin: &[f64; 3], held: &Held) -> bool;
 
     /// Whether two boxes are surely apart, and whether they surely overlap: at every face by the slack of that of `a`
     /// at least. That is enough for both: a face of `b` that is much farther out than that of `a` was rounded by no
@@ -249,10 +242,11 @@ impl Lanes for Portable {
         self,
         corners: [&[f64; 3]; 2],
         origin: &[f64; 3],
-        hold: &Hold,
+        held: &Held,
         place: &mut Down,
     ) -> bool {
         *place = self.outward(corners[0], corners[1], origin);
+        let hold = held.hold();
         self.holds(&hold.fat, place) & self.holds(place, &hold.core)
     }
 
@@ -261,7 +255,7 @@ impl Lanes for Portable {
         clippy::cast_possible_truncation,
         reason = "rounds to nearest, which the fat box in the block is wider by"
     )]
-    fn keeps(self, [min, max]: [&[f64; 3]; 2], origin: &[f64; 3], hold: &Hold) -> bool {
+    fn keeps(self, [min, max]: [&[f64; 3]; 2], origin: &[f64; 3], held: &Held) -> bool {
         let mut nearest = Down {
             faces: [SPARE_FACE; 8],
         };
@@ -269,6 +263,7 @@ impl Lanes for Portable {
             nearest.faces[k] = (min[k] - origin[k]) as f32;
             nearest.faces[k + 4] = (origin[k] - max[k]) as f32;
         }
+        let hold = held.hold();
         self.holds(&hold.fat, &nearest) & self.holds(&nearest, &hold.core)
     }
 

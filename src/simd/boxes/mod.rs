@@ -17,11 +17,13 @@
     reason = "instructions that only some processors have; each block names what it relies on"
 )]
 
+mod hold;
 mod lanes;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-pub(crate) use lanes::{Boxes16, Down, Hold, LANES, Lanes, Portable, SPARE, WIDTH, slack};
+pub(crate) use hold::{Held, Hold};
+pub(crate) use lanes::{Boxes16, Down, LANES, Lanes, Portable, SPARE, WIDTH, slack};
 
 /// A loop that is built once for each set of lanes.
 pub(crate) trait Work {

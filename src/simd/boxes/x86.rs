@@ -1,6 +1,7 @@
 //! The kernels in AVX2 and AVX-512. Only sums, products, compares and maxima, in the order of the twin, so that every
 //! bit is the twin's.
 
+mod hold;
 mod number;
 
 use std::arch::asm;
@@ -20,7 +21,9 @@ use std::arch::x86_64::{
 };
 
 use super::Work;
-use super::lanes::{Boxes16, Down, Hold, LEAST, Lanes, SLACK_LEAST, SLACK_SHARE, STEP, WIDTH};
+use super::hold::Held;
+use super::lanes::{Boxes16, Down, LEAST, Lanes, SLACK_LEAST, SLACK_SHARE, STEP, WIDTH};
+use hold::{keeps_avx2, take_avx2};
 use number::{number_avx2, number_avx512};
 
 /// Two halves of eight lanes or, where `WIDE`, sixteen at once for what gains by it. Only [`run_avx2`] and
@@ -163,29 +166,6 @@ fn outward_avx2(min: &[f64; 3], max: &[f64; 3], origin: &[f64; 3]) -> __m256 {
 fn store(faces: __m256, place: &mut Down) {
     // SAFETY: a `Down` is eight floats, aligned to their size.
     unsafe { _mm256_store_ps(place.faces.as_mut_ptr(), faces) };
-}
-
-#[inline]
-#[target_feature(enable = "avx2")]
-fn take_avx2(corners: [&[f64; 3]; 2], origin: &[f64; 3], hold: &Hold, place: &mut Down) -> bool {
-    // Compared from the register: to read back what was just written in halves would wait for both.
-    let faces = outward_avx2(corners[0], corners[1], origin);
-    store(faces, place);
-    is_within(faces, hold)
-}
-
-#[inline]
-#[target_feature(enable = "avx2")]
-fn keeps_avx2(corners: [&[f64; 3]; 2], origin: &[f64; 3], hold: &Hold) -> bool {
-    is_within(nearest_avx2(corners[0], corners[1], origin), hold)
-}
-
-#[inline]
-#[target_feature(enable = "avx2")]
-fn is_within(faces: __m256, hold: &Hold) -> bool {
-    let inside = _mm256_cmp_ps::<_CMP_LE_OQ>(one(&hold.fat), faces);
-    let around = _mm256_cmp_ps::<_CMP_LE_OQ>(faces, one(&hold.core));
-    sign_bits(_mm256_and_ps(inside, around)) == 0xFF
 }
 
 #[inline]
@@ -339,17 +319,17 @@ impl<const WIDE: bool> Lanes for Vectors<WIDE> {
         self,
         corners: [&[f64; 3]; 2],
         origin: &[f64; 3],
-        hold: &Hold,
+        held: &Held,
         place: &mut Down,
     ) -> bool {
         // SAFETY: a `Vectors` is made only where AVX2 is.
-        unsafe { take_avx2(corners, origin, hold, place) }
+        unsafe { take_avx2(corners, origin, held, place) }
     }
 
     #[inline(always)]
-    fn keeps(self, corners: [&[f64; 3]; 2], origin: &[f64; 3], hold: &Hold) -> bool {
+    fn keeps(self, corners: [&[f64; 3]; 2], origin: &[f64; 3], held: &Held) -> bool {
         // SAFETY: a `Vectors` is made only where AVX2 is.
-        unsafe { keeps_avx2(corners, origin, hold) }
+        unsafe { keeps_avx2(corners, origin, held) }
     }
 
     #[inline(always)]

@@ -43,11 +43,12 @@ impl Gait {
             (self.vain + 1).min(VAIN_MAX)
         };
         self.narrowed = true;
+        let anchor = self.anchor();
         for k in [0, 1, 2, 4, 5, 6] {
             let (low, high) = (held.fat.faces[k], held.core.faces[k]);
             let side = (high - low) * NARROW;
-            narrow.fat.faces[k] = low.max(self.anchor[k] - side);
-            narrow.core.faces[k] = high.min(self.anchor[k] + side);
+            narrow.fat.faces[k] = low.max(anchor.faces[k] - side);
+            narrow.core.faces[k] = high.min(anchor.faces[k] + side);
         }
         narrow
     }
@@ -55,14 +56,14 @@ impl Gait {
     /// The hold of a body at rest: where it has been, and a little more where it came beyond; `None` where that spans
     /// too much.
     #[inline(always)]
-    pub(super) fn stay(&mut self, before: &[f32; 8], held: &Hold, side: f32) -> Option<Hold> {
+    pub(super) fn stay(&mut self, before: &Down, held: &Hold, side: f32) -> Option<Hold> {
         // The first time, and where the hold is lost, the last two places are all that is known.
         let knows = self.is_at_rest() && !held.is_lost();
-        let faces = self.anchor;
-        let (mut fat, mut core) = (Down { faces }, NO_CORE);
+        let place = self.anchor();
+        let (mut fat, mut core) = (place, NO_CORE);
         let thin = thin(&fat, side);
         for k in [0, 1, 2, 4, 5, 6] {
-            let (was, now) = (before[k], self.anchor[k]);
+            let (was, now) = (before.faces[k], place.faces[k]);
             let (low, high) = if knows {
                 (held.fat.faces[k], held.core.faces[k])
             } else {

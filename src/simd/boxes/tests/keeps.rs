@@ -1,11 +1,11 @@
 //! Whether a box keeps to a hold, rounded to nearest: alike at every level, and what follows for it rounded outward.
 
 use super::super::lanes::{LEAST, STEP};
-use super::next;
-use crate::simd::boxes::{Hold, Lanes, Level, Portable, SPARE, Work};
+use super::{FACES, next};
+use crate::simd::boxes::{Held, Hold, Lanes, Level, Portable, SPARE, Work};
 
 /// Tells whether a box keeps to a hold, rounded to nearest.
-struct Kept<'a>([&'a [f64; 3]; 2], &'a [f64; 3], &'a Hold);
+struct Kept<'a>([&'a [f64; 3]; 2], &'a [f64; 3], &'a Held);
 
 impl Work for Kept<'_> {
     type Out = bool;
@@ -34,7 +34,7 @@ fn a_box_that_keeps_to_a_hold_rounded_to_nearest_lies_in_the_looser_one_rounded_
         };
         (hold.core.faces[SPARE], hold.core.faces[SPARE + 4]) = (f32::INFINITY, f32::INFINITY);
         // Within some steps of what the box is rounded to, on either side.
-        for k in [0, 1, 2, 4, 5, 6] {
+        for k in FACES {
             for (face, up) in [(&mut hold.fat, -1), (&mut hold.core, 1)] {
                 let face = &mut face.faces[k];
                 for _ in 0..next(state) % 6 {
@@ -53,10 +53,11 @@ fn a_box_that_keeps_to_a_hold_rounded_to_nearest_lies_in_the_looser_one_rounded_
                 }
             }
         }
-        let wanted = Kept([&low, &high], &origin, &hold).run(Portable);
+        let held = Held::of(&hold);
+        let wanted = Kept([&low, &high], &origin, &held).run(Portable);
         kept += u32::from(wanted);
         for level in Level::available() {
-            let got = level.run(Kept([&low, &high], &origin, &hold));
+            let got = level.run(Kept([&low, &high], &origin, &held));
             assert_eq!(got, wanted, "seed {seed}, {level:?}");
         }
         let mut loose = hold.fat;
