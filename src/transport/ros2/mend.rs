@@ -1,10 +1,11 @@
-//! The node, opened anew where DDS's own threads have ended.
+//! The node, opened anew where DDS's own threads have ended, or where a participant that it took as gone is back.
 //!
 //! In: how to open a node. Out: a door that goes on with another node. Each thread of rustdds 0.15 ends for good when
 //! its wait is interrupted, which a stop and a continue of the process does (SIGSTOP and SIGCONT, a debugger); the node
 //! would then be deaf and mute while the daemon ticks on. Seen by `tests/python/ros2`. A thread of this file looks once
 //! a second, and opening and closing are its work, so that the tick never waits for them; peers find the new
-//! participant as they find a restarted daemon, with the boot id as it was.
+//! participant as they find a restarted daemon, with the boot id as it was, and miss a second or two. A participant
+//! that was away for longer than its lease is not heard by the old node any more (`absent`).
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -14,12 +15,15 @@ use std::time::Duration;
 
 use super::{RosNode, RosScene, open};
 use crate::error::{Error, Result};
-use crate::time::Clock;
+use crate::time::{Clock, SystemClock};
 use crate::transport::{BodyChange, Door, RequestToken, Setting, Wake};
 use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow};
 
 /// How often it is looked whether DDS lives: silence is told by the lease after 3 s.
 const LOOK: Duration = Duration::from_secs(1);
+/// Between two new nodes for participants that are back, nanoseconds: each costs all others a second or two, and on a
+/// network that comes and goes somebody is always back.
+const BACK_NS: u64 = 30_000_000_000;
 /// Names of DDS's threads, as far as the system keeps them.
 const DDS_THREADS: [&str; 2] = ["RustDDS Partici", "RustDDS discove"];
 /// Requests of one node are told from those of the next by their upper bits; the uppermost is the daemon's.
@@ -27,6 +31,17 @@ const NODE_SHIFT: u32 = 40;
 
 /// Opens the node for a scene.
 pub type Opener = Box<dyn Fn(&RosScene) -> Result<RosNode> + Send>;
+
+/// What the door and the thread that looks tell each other.
+#[derive(Clone, Debug, Default)]
+struct Flags {
+    /// The node is to be given away.
+    dead: Arc<AtomicBool>,
+    /// A participant is back that the node does not hear.
+    back: Arc<AtomicBool>,
+    /// The thread is to end.
+    ended: Arc<AtomicBool>,
+}
 
 /// A node that is opened anew when DDS has died beneath it.
 pub struct LastingNode {
@@ -40,8 +55,7 @@ pub struct LastingNode {
     scene: Arc<Mutex<RosScene>>,
     /// What edits did while there was no node; the next one may have been opened before them.
     missed: Vec<BodyChange>,
-    dead: Arc<AtomicBool>,
-    ended: Arc<AtomicBool>,
+    flags: Flags,
     broken: Option<Sender<RosNode>>,
     mended: Receiver<RosNode>,
     watcher: Option<JoinHandle<()>>,
@@ -66,12 +80,11 @@ impl LastingNode {
         let watched = Arc::clone(&scene);
         let (broken, to_mend) = channel();
         let (give, mended) = channel();
-        let dead = Arc::new(AtomicBool::new(false));
-        let ended = Arc::new(AtomicBool::new(false));
-        let flags = (Arc::clone(&dead), Arc::clone(&ended));
+        let flags = Flags::default();
+        let seen = flags.clone();
         let watcher = std::thread::Builder::new()
             .name("ros-watch".to_owned())
-            .spawn(move || watch((&opener, &watched), &flags, &to_mend, &give))
+            .spawn(move || watch((&opener, &watched), &seen, &to_mend, &give))
             .map_err(|e| Error::io("cannot start the thread ros-watch", e))?;
         Ok(Self {
             live: Some(live),
@@ -79,8 +92,7 @@ impl LastingNode {
             tell_names: false,
             scene,
             missed: Vec::new(),
-            dead,
-            ended,
+            flags,
             broken: Some(broken),
             mended,
             watcher: Some(watcher),
@@ -89,7 +101,9 @@ impl LastingNode {
 
     /// Gives a dead node away, takes the new one.
     fn exchange(&mut self) {
-        if self.live.is_some() && self.dead.load(Ordering::Acquire) {
+        let is_back = self.live.as_ref().is_some_and(RosNode::is_to_open_anew);
+        self.flags.back.store(is_back, Ordering::Relaxed);
+        if self.live.is_some() && self.flags.dead.load(Ordering::Acquire) {
             if let (Some(node), Some(broken)) = (self.live.take(), &self.broken) {
                 // A watcher that is gone drops it: there is nobody to mend it.
                 let _gone = broken.send(node);
@@ -107,7 +121,7 @@ impl LastingNode {
 
 impl Drop for LastingNode {
     fn drop(&mut self) {
-        self.ended.store(true, Ordering::Release);
+        self.flags.ended.store(true, Ordering::Release);
         self.broken = None;
         if let Some(watcher) = self.watcher.take() {
             watcher.thread().unpark();
@@ -119,22 +133,32 @@ impl Drop for LastingNode {
 /// Looks, and opens the node anew where it must.
 fn watch(
     (opener, scene): (&Opener, &Mutex<RosScene>),
-    (dead, ended): &(Arc<AtomicBool>, Arc<AtomicBool>),
+    flags: &Flags,
     to_mend: &Receiver<RosNode>,
     give: &Sender<RosNode>,
 ) {
     let pause = || {
         std::thread::park_timeout(LOOK);
-        ended.load(Ordering::Acquire)
+        flags.ended.load(Ordering::Acquire)
     };
+    let mut back_ns = 0;
     while !pause() {
-        if dds_lives() {
+        let now_ns = SystemClock.boottime_ns();
+        if !dds_lives() {
+            tracing::error!(
+                "ROS 2: a thread of DDS has ended (SIGSTOP and SIGCONT, or a debugger, do that): the node is opened anew"
+            );
+        } else if flags.back.load(Ordering::Relaxed)
+            && (back_ns == 0 || now_ns.saturating_sub(back_ns) >= BACK_NS)
+        {
+            back_ns = now_ns;
+            tracing::warn!(
+                "ROS 2: a DDS participant that counted as gone is heard again (a computer that slept, a network that was down, a process that was stopped), and DDS does not take it back: the node is opened anew, and others do not hear it for a second or two"
+            );
+        } else {
             continue;
         }
-        tracing::error!(
-            "ROS 2: a thread of DDS has ended (SIGSTOP and SIGCONT, or a debugger, do that): the node is opened anew"
-        );
-        dead.store(true, Ordering::Release);
+        flags.dead.store(true, Ordering::Release);
         let Ok(broken) = to_mend.recv() else { return };
         drop(broken);
         let mut told = false;
@@ -155,7 +179,7 @@ fn watch(
                 return;
             }
         };
-        dead.store(false, Ordering::Release);
+        flags.dead.store(false, Ordering::Release);
         if give.send(node).is_err() {
             return;
         }

@@ -11,6 +11,7 @@
 //! Order at the end is a promise: the sending and receiving threads first, with them the node, which takes its name out
 //! of the graph, then the context; in any other order the name stays in the graph for 50 s.
 
+mod absent;
 pub mod args;
 mod diagnose;
 pub mod env;

@@ -179,6 +179,11 @@ impl RosNode {
         Ok(open)
     }
 
+    /// Whether this node cannot hear all that lives, and a new one could.
+    pub(super) fn is_to_open_anew(&self) -> bool {
+        self.shared.again.load(Ordering::Relaxed)
+    }
+
     fn start(&mut self, inlet: Inlet, outlet: Outlet) -> Result<()> {
         self.sending = Some(thread("ros-tx", move || outlet.run())?);
         self.receiving = Some(thread("ros-rx", move || inlet.run())?);

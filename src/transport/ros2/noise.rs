@@ -1,13 +1,15 @@
 //! What comes to the ports of DDS and is no message of it, counted.
 //!
 //! In: what the kernel's filter drops (`sockets`), which is all that does not begin as RTPS does; and what the parser
-//! of rustdds says of the rest to its log, because it tells nobody else. Out: two counts.
+//! of rustdds says of the rest to its log, because it tells nobody else. Out: two counts; and participants that are
+//! heard while DDS does not know them, which it tells its log alone, too (see `absent`).
 
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, OnceLock};
 
 use log::{Level, LevelFilter, Log, Metadata, Record, set_logger, set_max_level};
 
+use super::open;
 use super::sockets::Drops;
 
 /// Where rustdds parses datagrams.
@@ -19,14 +21,38 @@ const GIVEN_UP: [&str; 3] = [
     "Received message with unknown start of header",
 ];
 
-static EAR: Ear = Ear(AtomicU64::new(0));
+/// Where rustdds keeps participants.
+const KEEPER: &str = "rustdds::discovery::discovery_db";
+/// What it says there of one that announces itself and is not kept; its GUID prefix follows.
+const UNKNOWN: &str = "Participant alive update for unknown ";
+/// Participants that are remembered between two looks: a look comes ten times a second, an announcement once a second
+/// at most.
+const UNKNOWN_MAX: usize = 256;
+
+static EAR: Ear = Ear::new();
 
 /// The log of the process, of which all but these records are passed over.
-struct Ear(AtomicU64);
+struct Ear {
+    given_up: AtomicU64,
+    unknown: Mutex<Vec<String>>,
+}
+
+impl Ear {
+    const fn new() -> Self {
+        Self {
+            given_up: AtomicU64::new(0),
+            unknown: Mutex::new(Vec::new()),
+        }
+    }
+}
 
 impl Log for Ear {
     fn enabled(&self, of: &Metadata<'_>) -> bool {
-        of.level() <= Level::Warn && of.target() == PARSER
+        match of.level() {
+            Level::Error | Level::Warn => of.target() == PARSER,
+            Level::Info => of.target() == KEEPER,
+            Level::Debug | Level::Trace => false,
+        }
     }
 
     fn log(&self, record: &Record<'_>) {
@@ -34,8 +60,14 @@ impl Log for Ear {
             return;
         }
         let said = record.args().to_string();
-        if GIVEN_UP.iter().any(|begin| said.starts_with(begin)) {
-            self.0.fetch_add(1, Ordering::Relaxed);
+        if let Some(of) = said.strip_prefix(UNKNOWN) {
+            let prefix = of.split(|c: char| !c.is_ascii_hexdigit()).next();
+            let mut unknown = open(&self.unknown);
+            if unknown.len() < UNKNOWN_MAX {
+                unknown.push(prefix.unwrap_or_default().to_owned());
+            }
+        } else if GIVEN_UP.iter().any(|begin| said.starts_with(begin)) {
+            self.given_up.fetch_add(1, Ordering::Relaxed);
             tracing::debug!("DDS: {said}");
         }
     }
@@ -63,7 +95,7 @@ impl Noise {
         }
         Self {
             drops,
-            unread_before: EAR.0.load(Ordering::Relaxed),
+            unread_before: EAR.given_up.load(Ordering::Relaxed),
         }
     }
 
@@ -74,9 +106,15 @@ impl Noise {
 
     /// Datagrams that DDS could not read.
     pub(super) fn unread(&self) -> u64 {
-        let now = EAR.0.load(Ordering::Relaxed);
+        let now = EAR.given_up.load(Ordering::Relaxed);
         now.saturating_sub(self.unread_before)
     }
+}
+
+/// Participants that were heard since the last call and that DDS does not know, by their GUID prefixes in hexadecimal
+/// digits.
+pub(super) fn unknown_participants() -> Vec<String> {
+    std::mem::take(&mut *open(&EAR.unknown))
 }
 
 /// Hears what DDS says.
@@ -85,7 +123,7 @@ fn listen_to_dds() -> Result<(), String> {
     static HEARD: OnceLock<Result<(), String>> = OnceLock::new();
     let hear = || {
         set_logger(&EAR).map_err(|e| e.to_string())?;
-        set_max_level(LevelFilter::Warn);
+        set_max_level(LevelFilter::Info);
         Ok(())
     };
     HEARD.get_or_init(hear).clone()
@@ -97,7 +135,7 @@ mod tests {
 
     #[test]
     fn what_the_parser_gives_up_is_counted_and_nothing_else_is() {
-        let ear = Ear(AtomicU64::new(0));
+        let ear = Ear::new();
         let say = |level, target, text: &str| {
             let args = format_args!("{text}");
             let record = Record::builder()
@@ -115,7 +153,14 @@ mod tests {
             "rustdds::rtps::writer",
             "RTPS deserialize error",
         );
-        assert_eq!(ear.0.load(Ordering::Relaxed), 1);
+        say(
+            Level::Info,
+            KEEPER,
+            "Participant alive update for unknown 010f9c2a. This is normal, if the message does not repeat.",
+        );
+        say(Level::Info, KEEPER, "removing participant 010f9c2b");
+        assert_eq!(ear.given_up.load(Ordering::Relaxed), 1);
+        assert_eq!(*open(&ear.unknown), ["010f9c2a"]);
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod publishers;
 mod unsent;
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 pub(super) use heard::Topics;
@@ -23,7 +24,7 @@ use super::lines::{Arrival, Line, of_body};
 use super::markers::{Boxes, CONTACTS_MAX, collisions, markers};
 use super::names::Names;
 use super::namesakes::Namesakes;
-use super::noise::Noise;
+use super::noise::{Noise, unknown_participants};
 use super::parcel::{Next, Parcel, Parcels};
 use super::readers::Readers;
 use super::shared::{Say, Shared};
@@ -100,6 +101,7 @@ impl Outlet {
         loop {
             self.follow_edits();
             self.look_who_listens();
+            self.look_who_is_back();
             let now_ns = SystemClock.boottime_ns();
             self.unsent.look(&mut self.publishers, &self.shared, now_ns);
             for words in std::mem::take(&mut *open(&self.shared.words)) {
@@ -175,6 +177,18 @@ impl Outlet {
             self.shared.say(Say::Error, &text);
         })
         .ok()
+    }
+
+    /// Tells who was lost, and asks for a new node when one of them is back.
+    fn look_who_is_back(&mut self) {
+        let absent = &mut self.readers.absent;
+        for text in absent.take_lost() {
+            self.shared.say(Say::Info, &text);
+        }
+        absent.hear(&unknown_participants());
+        if absent.is_back() {
+            self.shared.again.store(true, Ordering::Relaxed);
+        }
     }
 
     fn look_who_listens(&mut self) {

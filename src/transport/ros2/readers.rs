@@ -1,4 +1,5 @@
-//! Who reads what this node writes. In: what DDS says of endpoints that match and that go. Out: counts.
+//! Who reads what this node writes. In: what DDS says of endpoints that match and that go. Out: counts; and who was
+//! lost and is back, which DDS says to the same listener.
 //!
 //! DDS says it once, to one listener, in a queue of 2048: this is the only one, and it is asked at each turn of the
 //! sending thread, ten times a second at least.
@@ -7,14 +8,18 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use ros2_client::{Context, Publisher};
 use rustdds::{
-    DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, StatusEvented as _,
+    DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, LostReason,
+    StatusEvented as _,
 };
 use serde::Serialize;
+
+use super::absent::Absent;
 
 /// Readers of each writer.
 pub(super) struct Readers {
     listener: DomainParticipantStatusListener,
     of: BTreeMap<GUID, Matched>,
+    pub(super) absent: Absent,
 }
 
 /// Readers of one writer.
@@ -31,6 +36,7 @@ impl Readers {
         Self {
             listener: context.domain_participant().status_listener(),
             of: BTreeMap::new(),
+            absent: Absent::default(),
         }
     }
 
@@ -52,8 +58,18 @@ impl Readers {
                     self.lose(|reader| *reader == guid);
                 }
                 // Who was killed or fell silent takes all its readers with it, and nothing is said of each.
-                DomainParticipantStatusEvent::ParticipantLost { id, .. } => {
+                DomainParticipantStatusEvent::ParticipantLost { id, reason } => {
                     self.lose(|reader| reader.prefix == id);
+                    let prefix = format!("{id:?}");
+                    match reason {
+                        LostReason::Timeout { lease, .. } => {
+                            self.absent.lose(&prefix, lease.to_std());
+                        }
+                        LostReason::Disposed => self.absent.part(&prefix),
+                    }
+                }
+                DomainParticipantStatusEvent::ParticipantDiscovered { dpd } => {
+                    self.absent.meet(&format!("{:?}", dpd.guid.prefix));
                 }
                 _ => {}
             }

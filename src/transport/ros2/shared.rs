@@ -25,6 +25,8 @@ const NONE: u64 = u64::MAX;
 /// Shared by the threads of the node.
 pub(super) struct Shared {
     pub(super) stop: AtomicBool,
+    /// Whether the node is to be opened anew, because one that DDS took as gone is back.
+    pub(super) again: AtomicBool,
     undecodable: AtomicU64,
     refused: AtomicU64,
     unsent: AtomicU64,
@@ -78,6 +80,7 @@ impl Shared {
     pub(super) fn new(node: &str, book: Book, timeouts_ns: &[u64], least: Say) -> Self {
         Self {
             stop: AtomicBool::new(false),
+            again: AtomicBool::new(false),
             undecodable: AtomicU64::new(0),
             refused: AtomicU64::new(0),
             unsent: AtomicU64::new(0),

@@ -164,6 +164,28 @@ def test_a_daemon_that_was_stopped_and_continued_is_heard_again_and_the_gap_is_t
     room.until(lambda: names and len(names[-1].names) == 3, "the names, too")
 
 
+@pytest.mark.slow
+def test_a_peer_that_was_away_for_longer_than_its_lease_hears_and_is_heard_again(room):
+    """Fast DDS's lease is 20 s. DDS does not take such a peer back: the node is opened anew when it is heard."""
+    daemon = room.daemon(HANDS)
+    room.node()
+    ticks = room.hear(Tick, "/sweepd/tick")
+    peer = room.python("peer_answer.py")
+    room.until(lambda: ticks and ticks[-1].sources[0].frames > 20, "frames")
+    peer.send_signal(signal.SIGSTOP)
+    room.until(lambda: "counts as gone" in daemon.log, "that it was lost", seconds=30)
+    assert "opened anew" not in daemon.log, "not for one that may be dead"
+    room.spin(3.0)
+    before = len(ticks)
+    peer.send_signal(signal.SIGCONT)
+    start, frames = time.monotonic(), ticks[-1].sources[0].frames
+    room.until(lambda: "opened anew" in daemon.log and ticks[-1].sources[0].frames > frames + 50, "frames again", seconds=20)
+    gaps = [b.sent_ns - a.sent_ns for a, b in zip(ticks[before:], ticks[before + 1 :])]
+    print(f"served again after {time.monotonic() - start:.1f} s; another reader missed {max(gaps) / 1e9:.1f} s of ticks")
+    assert max(gaps) < 5_000_000_000
+    assert len({tick.tick_header.boot_id for tick in ticks}) == 1
+
+
 def test_parameters_set_while_running_hold_in_the_node_that_is_opened_anew(room):
     daemon = room.daemon(HANDS, ros_args=["-p", "ros.allow_edits:=true", "-p", "budget_ms:=7.0"])
     node = room.node()
