@@ -1,9 +1,10 @@
 //! Participants that DDS took as gone, while they may live: a computer that slept, a network that was down, a process
 //! that was stopped. In: who was not heard for its lease, and who is heard. Out: whether one of them is back. Pure.
 //!
-//! rustdds 0.15 never takes one back that announces itself as before: it holds each announcement by its sequence number,
-//! and Fast DDS and Cyclone DDS repeat theirs with the same, so that it is passed over as a duplicate; what the
-//! participant said of its writers and readers is passed over likewise. A new node knows none of it and hears all.
+//! rustdds 0.15 never takes one back that announces itself as before: it holds each announcement by its sequence
+//! number, and Fast DDS and Cyclone DDS repeat theirs with the same, so that it is passed over as a duplicate; what
+//! the participant said of its writers and readers is passed over likewise. A new node knows none of it and hears
+//! all.
 
 use std::collections::VecDeque;
 use std::time::Duration;

@@ -23,6 +23,7 @@ pub mod names;
 mod namesakes;
 mod node;
 mod noise;
+mod order;
 mod outlet;
 mod params;
 pub mod params_file;

@@ -13,6 +13,7 @@ use stamps::{both, crowded, forgotten, older, rivalry};
 use ros2_client::Gid;
 
 use super::RosScene;
+use super::order::{Order, Step};
 use super::shelf::Update;
 use super::tf::{Missing, Taken, Tree, no_pose, plain, sound};
 use super::told::brief;
@@ -46,8 +47,8 @@ struct Member {
     frame: usize,
     /// Its topic (other kinds).
     topic: String,
-    /// Stamp of its newest pose, nanoseconds.
-    stamp_ns: u64,
+    /// The stamps of its poses.
+    order: Order,
     /// What was last handed on of it, to say only what is new: receipt of its newest link, or why it has no pose.
     last: Option<Result<(u64, u64), Missing>>,
     /// When it was last handed on, nanoseconds of `CLOCK_BOOTTIME`.
@@ -140,7 +141,7 @@ impl Source {
     pub(super) fn forget(&mut self) {
         self.tree.forget();
         for member in &mut self.members {
-            member.stamp_ns = 0;
+            member.order = Order::default();
             member.last = None;
         }
     }
@@ -317,15 +318,16 @@ impl Source {
             return false;
         };
         let mut back = false;
-        if stamp_ns < member.stamp_ns {
-            let by_ns = member.stamp_ns - stamp_ns;
-            if by_ns <= self.timeout_ns {
+        let step = (member.order).take(stamp_ns, receipt.now_ns, self.timeout_ns);
+        match step {
+            Step::On => {}
+            Step::Late(by_ns) => {
                 let odd = older(("body", &member.name), by_ns);
                 self.refused += 1;
                 self.tell(Some(odd), receipt);
                 return false;
             }
-            back = true;
+            Step::Anew => back = true,
         }
         let odd = off(("body", &member.name), stamp_ns, receipt, self.timeout_ns);
         let mut result = sound(row.position, row.orientation).map(|_| row);
@@ -342,11 +344,11 @@ impl Source {
         }
         if back {
             self.forget();
+            if let Some(member) = self.members.get_mut(place) {
+                member.order = Order::from(stamp_ns);
+            }
         }
         self.tell(odd, receipt);
-        if let Some(member) = self.members.get_mut(place) {
-            member.stamp_ns = stamp_ns;
-        }
         updates.push(Update {
             member: place,
             result,

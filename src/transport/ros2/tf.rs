@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use ros2_client::Gid;
 
 use super::lines::Heard;
+use super::order::{Order, Step};
 use crate::limits::QUATERNION_NORM_TOLERANCE;
 use crate::math::{Pose, pose_from};
 use crate::wire::RejectReason;
@@ -29,6 +30,8 @@ struct Link {
     pose: Option<Pose>,
     /// Sender's stamp, nanoseconds.
     stamp_ns: u64,
+    /// Its stamps so far.
+    order: Order,
     /// Receipt, nanoseconds of `CLOCK_BOOTTIME`.
     received_ns: u64,
     /// It came as one that never changes, and has no age.
@@ -42,7 +45,7 @@ pub(super) enum Taken {
     Newer,
     /// One with a stamp later by so much is there already, nanoseconds; it is passed over.
     Older(u64),
-    /// It is so much older than the one that is there that time has gone back.
+    /// Its sender's time began anew.
     WentBack,
     /// A frame without a name, with one that is too long, or hung on itself.
     Refused,
@@ -173,13 +176,13 @@ impl Tree {
 
     /// Takes a link.
     ///
-    /// * `back_ns` - an older stamp by more than this means that the sender's time went back.
+    /// * `timeout_ns` - of its source, which tells late ones from those of a clock that began anew (`order`).
     pub(super) fn take(
         &mut self,
         link: &TransformStamped,
         fixed: bool,
         received_ns: u64,
-        back_ns: u64,
+        timeout_ns: u64,
     ) -> Taken {
         let (child, parent) = (plain(&link.child_frame_id), plain(&link.header.frame_id));
         let is_named = |frame: &str| (1..=FRAME_NAME_BYTES_MAX).contains(&frame.len());
@@ -192,16 +195,22 @@ impl Tree {
         let (child, parent) = (self.id(child), self.id(parent));
         let stamp_ns = link.header.stamp.to_ns();
         let mut taken = Taken::Newer;
-        if let Some(old) = self.link(child)
+        let mut order = Order::from(stamp_ns);
+        let old = self.frames.get_mut(child);
+        if let Some(old) = old.and_then(|frame| frame.link.as_mut())
             && !fixed
             && !old.fixed
-            && stamp_ns < old.stamp_ns
         {
-            if old.stamp_ns - stamp_ns <= back_ns {
-                return Taken::Older(old.stamp_ns - stamp_ns);
+            let step = old.order.take(stamp_ns, received_ns, timeout_ns);
+            order = old.order;
+            match step {
+                Step::On => {}
+                Step::Late(by_ns) => return Taken::Older(by_ns),
+                Step::Anew => {
+                    taken = Taken::WentBack;
+                    self.forget();
+                }
             }
-            taken = Taken::WentBack;
-            self.forget();
         }
         let position = link.transform.translation.into();
         let orientation = link.transform.rotation.into();
@@ -211,6 +220,7 @@ impl Tree {
             orientation,
             pose: sound(position, orientation).ok(),
             stamp_ns,
+            order,
             received_ns,
             fixed,
         };

@@ -1,5 +1,6 @@
 //! Which bodies a source of common topics has: those of the scene, and what edits make of them while the node runs.
 
+use super::super::order::Order;
 use super::super::tf::Tree;
 use super::{Member, NOBODY, Source};
 use crate::transport::BodyNote;
@@ -11,7 +12,7 @@ impl Member {
             name: body.name.clone(),
             frame: tree.pin(&body.frame),
             topic: body.topic.clone(),
-            stamp_ns: 0,
+            order: Order::default(),
             last: None,
             told_ns: 0,
             fault: None,

@@ -58,7 +58,7 @@ pub(super) fn rivalry((kind, name): (&str, &str)) -> String {
 /// A stamp lies before the newest one of the same body or link: the message is passed over.
 pub(super) fn older((kind, name): (&str, &str), by_ns: u64) -> String {
     format!(
-        "{kind} {}: a stamp lies {:.3} s before the one that was there: it is passed over; do two senders write it?",
+        "{kind} {}: a stamp lies {:.3} s before the one that was there: it is passed over; does the network bring it late, or do two senders write it?",
         brief(name),
         seconds(by_ns)
     )

@@ -163,15 +163,44 @@ fn time_that_goes_back_is_told_once_and_small_disorder_is_passed_over() {
     let mut pose = PoseStamped::default();
     pose.header.frame_id = "/world".to_owned();
     pose.pose.orientation.w = 1.0;
-    let mut send = |stamp_ns, updates: &mut Vec<Update>| {
+    let mut send = |stamp_ns, now_ns, updates: &mut Vec<Update>| {
         pose.header.stamp = Time::from_ns(stamp_ns);
-        one.take_pose(0, &pose, at(MS), updates)
+        let back = one.take_pose(0, &pose, at(now_ns), updates);
+        (back, one.refused)
     };
-    assert!(!send(2000 * MS, &mut updates));
-    assert!(!send(1900 * MS, &mut updates));
+    assert_eq!(send(2000 * MS, MS, &mut updates), (false, 0));
+    assert_eq!(send(1900 * MS, MS, &mut updates), (false, 1));
+    // A clock that began anew; its first messages may as well be late ones of the old.
+    assert_eq!(send(10 * MS, MS, &mut updates), (false, 2));
+    assert_eq!(send(20 * MS, 150 * MS, &mut updates), (false, 3));
     assert_eq!(updates.len(), 1);
-    assert!(send(10 * MS, &mut updates));
+    assert_eq!(send(30 * MS, 300 * MS, &mut updates), (true, 3));
     assert_eq!(updates.len(), 2);
+    assert_eq!(send(40 * MS, 310 * MS, &mut updates), (false, 3));
+    assert_eq!(updates.len(), 3);
+}
+
+#[test]
+fn bug_a_late_pose_never_becomes_the_newest() {
+    let mut one = source(RosKind::Pose, 0, "");
+    let mut updates = Vec::new();
+    let mut pose = PoseStamped::default();
+    pose.header.frame_id = "world".to_owned();
+    pose.pose.orientation.w = 1.0;
+    for n in 0..100 {
+        for late_ns in [0, 800 * MS, 5000 * MS] {
+            let now_ns = 10_000 * MS + n * 20 * MS;
+            pose.header.stamp = Time::from_ns(now_ns - late_ns);
+            assert!(!one.take_pose(0, &pose, at(now_ns), &mut updates));
+        }
+    }
+    assert_eq!((updates.len(), one.refused), (100, 200));
+    assert!(updates.is_sorted_by_key(|update| update.stamp_ns));
+    let told = one.faults(9, 12_000 * MS);
+    assert!(
+        told[0].contains("does the network bring it late"),
+        "{told:?}"
+    );
 }
 
 #[test]

@@ -80,7 +80,7 @@ fn loops_gaps_and_bad_numbers_are_told_apart() {
 }
 
 #[test]
-fn an_older_link_is_passed_over_and_a_much_older_one_turns_time_back() {
+fn an_older_link_is_passed_over_and_a_clock_that_began_anew_ends_all_links() {
     let mut tree = Tree::default();
     tree.take(&link("world", "a", 1.0, 2000), false, 1, BACK_NS);
     tree.take(&link("world", "b", 1.0, 2000), false, 1, BACK_NS);
@@ -89,10 +89,10 @@ fn an_older_link_is_passed_over_and_a_much_older_one_turns_time_back() {
         Taken::Older(100)
     );
     assert_eq!(find(&mut tree, "a").unwrap().position[0], 1.0);
-    assert_eq!(
-        tree.take(&link("world", "a", 3.0, 100), false, 3, BACK_NS),
-        Taken::WentBack
-    );
+    let mut late = |n: u64| tree.take(&link("world", "a", 3.0, 100 + n), false, 3 + n, BACK_NS);
+    assert_eq!(late(0), Taken::Older(1900), "bug: a late one is no pose");
+    assert_eq!(late(150), Taken::Older(1750));
+    assert_eq!(late(300), Taken::WentBack);
     assert_eq!(find(&mut tree, "a").unwrap().position[0], 3.0);
     assert_eq!(find(&mut tree, "b"), Err(Missing::Frame("b".to_owned())));
 }
