@@ -48,7 +48,7 @@ sweepd=${CARGO_TARGET_DIR:-$root/target}/release/sweepd
 
 "$sweepd" check "$here/ros2/robots.toml"
 "$sweepd" --quiet run "$here/ros2/robots.toml" --instance "ros2_demo_$$" --ros2 & pids+=($!)
-"$python" "$here/ros2/move_robots.py" --seconds "$((seconds + 5))" & pids+=($!)
+"$python" "$here/ros2/move_robots.py" --same-host --seconds "$((seconds + 5))" & pids+=($!)
 code=0
 "$python" "$here/ros2/print_pairs.py" --seconds "$seconds" || code=$?
 finish

@@ -8,10 +8,11 @@ from rclpy.signals import SignalHandlerOptions
 
 
 def arguments():
-    """`seconds` to run, and the name of sweepd's `node`."""
+    """`seconds` to run, the name of sweepd's `node`, and whether it runs on this host."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--seconds", type=float, default=60)
     parser.add_argument("--node", default="sweepd", help="name of sweepd's node")
+    parser.add_argument("--same-host", action="store_true", help="sweepd runs on this host: say when frames were sent, so that ages count from that")
     return parser.parse_args()
 
 

@@ -1,6 +1,6 @@
 """An rclpy node that moves the two robots of robots.toml through each other: `a` by ~/transforms, `b` by /tf.
 
-    python move_robots.py [--seconds N] [--node NAME]
+    python move_robots.py [--seconds N] [--node NAME] [--same-host]
 """
 
 import math
@@ -63,7 +63,8 @@ def main():
         # Robot a: all its bodies in one message, in the fixed frame.
         frame.header.stamp = now
         frame.seq += 1
-        frame.sent_ns = time.clock_gettime_ns(time.CLOCK_BOOTTIME)
+        # The clock of the machine that sweepd runs on: elsewhere nobody has it, and ages count from receipt.
+        frame.sent_ns = time.clock_gettime_ns(time.CLOCK_BOOTTIME) if args.same_host else 0
         frame.transforms = []
         for name, at, turn in chained("a", links(-1, elapsed)):
             body = BodyTransform(name=name)

@@ -25,7 +25,9 @@ impl RejectReason {
             Self::NotSteerable => {
                 "send no body that is attached or does not move, and vertices only where the scene says deforms"
             }
-            Self::TooOld => "write sent_ns",
+            Self::TooOld => {
+                "they waited while the daemon stood still: send the next ones; frames that say their sent_ns count by it, and poses of ROS topics have none"
+            }
             Self::OverLimit => "send fewer rows a frame, and metres",
             Self::BadChain => {
                 "send poses in the scene's frame, by links without a loop that are young and of one time"

@@ -242,10 +242,10 @@ fn source(instance: &str, row: &SourceRow) -> Finding {
         (_, age_ns) => Finding::warning(
             check,
             format!(
-                "`{instance}` has heard nothing of source \"{name}\" for {}",
+                "`{instance}` has nothing of source \"{name}\" that is younger than {}",
                 time(age_ns)
             ),
-            "see whether it still runs",
+            "see whether it still runs; if it does, its `sent_ns` may be of another machine's clock: it writes 0 there",
         ),
     }
 }

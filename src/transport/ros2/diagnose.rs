@@ -20,6 +20,8 @@ pub(super) struct Diagnoser {
     rejects: Vec<u64>,
     /// Frames refused, by source.
     refused: Vec<u64>,
+    /// Frames taken, by source.
+    frames: Vec<u64>,
     counts: Counts,
 }
 
@@ -32,6 +34,7 @@ impl Diagnoser {
             overrun_s: 0,
             rejects: row.rejects.to_vec(),
             refused: row.sources.iter().map(|s| s.refused).collect(),
+            frames: row.sources.iter().map(|s| s.frames).collect(),
             counts,
         }
     }
@@ -97,7 +100,18 @@ impl Diagnoser {
 
     fn sources(&mut self, row: &TickRow) -> Finding {
         let sources = || row.sources.iter().take(usize::from(row.sources_len));
-        let silent: Vec<&str> = sources().filter(|s| s.alive == 0).map(name).collect();
+        // One whose frames come is not silent, however old they are.
+        let (mut silent, mut old) = (Vec::new(), Vec::new());
+        for (at, source) in sources().enumerate().filter(|(_, s)| s.alive == 0) {
+            let before = self.frames.get(at).copied().unwrap_or_default();
+            let list = if source.frames > before && source.age_ns != u64::MAX {
+                &mut old
+            } else {
+                &mut silent
+            };
+            list.push(name(source));
+        }
+        self.frames = row.sources.iter().map(|s| s.frames).collect();
         let new = RejectReason::ALL.iter().filter_map(|reason| {
             let place = usize::from(reason.code());
             let all = row.rejects.get(place).copied().unwrap_or_default();
@@ -116,6 +130,9 @@ impl Diagnoser {
         if !silent.is_empty() {
             said.push(format!("silent: {}", silent.join(", ")));
         }
+        if !old.is_empty() {
+            said.push(format!("frames come and are too old: {}", old.join(", ")));
+        }
         // Also of a silent source: it may be silent because all that it sends is refused.
         if !new.is_empty() {
             let mut text = format!("refused in the last second: {}", new.join(", "));
@@ -126,7 +143,7 @@ impl Diagnoser {
         }
         let (level, message) = match said.as_slice() {
             [] => (OK, "all sources send".to_owned()),
-            _ if silent.is_empty() => (WARN, said.join("; ")),
+            _ if silent.is_empty() && old.is_empty() => (WARN, said.join("; ")),
             _ => (ERROR, said.join("; ")),
         };
         let age = |source: &SourceRow| match source.age_ns {
@@ -341,5 +358,22 @@ mod tests {
                 "refused in the last second: 2 bad_quaternion (frames of arm)".to_owned()
             )
         );
+    }
+
+    #[test]
+    fn bug_a_source_whose_frames_come_and_are_old_is_not_told_as_silent() {
+        let mut row = TickRow {
+            sources_len: 1,
+            ..TickRow::default()
+        };
+        row.sources[0].name = name_bytes("arm");
+        row.sources[0].frames = 50;
+        row.sources[0].age_ns = 3_600_000_000_000;
+        let mut diagnoser = Diagnoser::since(&row, Counts::default());
+        row.sources[0].frames = 100;
+        let old = (ERROR, "frames come and are too old: arm".to_owned());
+        assert_eq!(levels(&mut diagnoser, &row, &[])[2], old);
+        let silent = (ERROR, "silent: arm".to_owned());
+        assert_eq!(levels(&mut diagnoser, &row, &[])[2], silent);
     }
 }

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use super::super::RosScene;
-use super::super::poses::{Receipt, off};
+use super::super::poses::{Receipt, off, seconds};
 use super::super::tf::{no_pose, plain, sound};
 use super::super::told::brief;
 use super::frames::{id, velocity};
@@ -14,6 +14,8 @@ use crate::limits::FRAME_ROWS_MAX;
 use crate::wire::ros::{BodyTransform, BodyTransforms, Book, Twist};
 use crate::wire::{RejectReason, frame_flags};
 
+/// A frame is heard within this time of its sending, nanoseconds, or `sent_ns` is of another clock.
+const SENT_OFF_NS: u64 = 1_000_000_000;
 /// Sources named at most where one is missing.
 const SOURCES_TOLD_MAX: usize = 8;
 /// Names of bodies that a missing one is compared with at most: half a millisecond or so each thousand.
@@ -145,8 +147,12 @@ impl Local {
         let mut bodies = message.transforms.iter();
         let odd =
             bodies.find_map(|body| self.odd_body((place, &source), body, speeds.next(), book));
-        if odd.is_some() || message.clock_id != 0 {
-            return odd;
+        let sent = sent(&source, message.sent_ns, receipt.now_ns).map(Wrong::Said);
+        if let Some(odd) = odd.or(sent) {
+            return Some(odd);
+        }
+        if message.clock_id != 0 {
+            return None;
         }
         let text = off(
             ("source", &source),
@@ -207,6 +213,27 @@ impl Local {
             ),
         };
         Some(Wrong::Said(text))
+    }
+}
+
+/// What is wrong with when a frame is said to have been sent, on `CLOCK_BOOTTIME` of this machine; 0 says nothing.
+fn sent(source: &str, sent_ns: u64, now_ns: u64) -> Option<String> {
+    let (ahead, behind) = (
+        sent_ns.saturating_sub(now_ns),
+        now_ns.saturating_sub(sent_ns),
+    );
+    let mend = "sent_ns is CLOCK_BOOTTIME of the machine that sweepd runs on: a sender on another machine writes 0";
+    match sent_ns {
+        0 => None,
+        _ if behind > SENT_OFF_NS => Some(format!(
+            "frames of source {source} come, but their sent_ns is {:.3} s old, and so are its bodies: {mend}",
+            seconds(behind)
+        )),
+        _ if ahead > SENT_OFF_NS => Some(format!(
+            "frames of source {source}: their sent_ns lies {:.3} s in the future: {mend}",
+            seconds(ahead)
+        )),
+        _ => None,
     }
 }
 

@@ -48,7 +48,7 @@ fn words(lost: u64, topics: &[(String, u64)]) -> String {
         of.push(format!("{rest} ticks or answers before they were sent"));
     }
     format!(
-        "ROS 2: {lost} messages were not sent over DDS, as a reader or this machine is too slow ({}): give readers larger \
+        "ROS 2: {lost} messages were not sent over DDS, as a reader or this machine is too slow or a network is down ({}): give readers larger \
          buffers (net.core.rmem_default), lower ros_max_pairs or ros_max_contacts, or set out_reliability to best_effort",
         of.join(", ")
     )

@@ -227,3 +227,26 @@ fn what_is_wrong_with_one_source_hides_nothing_of_another_and_is_over_in_time() 
     assert_eq!(wrongs.words(&book, S, S).len(), 1);
     assert_eq!(wrongs.words(&book, 5 + S, S).len(), 0);
 }
+
+#[test]
+fn bug_a_sender_with_the_clock_of_another_machine_is_told() {
+    let (local, book) = local();
+    let now_ns = 5000 * S;
+    let told = |sent_ns| {
+        let mut wrongs = Wrongs::default();
+        let message = BodyTransforms { sent_ns, ..good() };
+        wrongs.note(&local, (&message, None), receipt(now_ns, 0), &book);
+        wrongs.words(&book, now_ns, S).concat()
+    };
+    let old = told(1400 * S);
+    assert!(
+        old.contains("source arm come, but their sent_ns is 3600.000 s old")
+            && old.contains("writes 0"),
+        "{old}"
+    );
+    let ahead = told(5003 * S);
+    assert!(ahead.contains("3.000 s in the future"), "{ahead}");
+    for fine_ns in [0, now_ns, now_ns - S, now_ns + S] {
+        assert_eq!(told(fine_ns), "");
+    }
+}
