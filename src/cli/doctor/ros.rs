@@ -1,6 +1,6 @@
 //! What `sweepd run --ros2` needs of the machine: variables, loopback, receive buffers, ports.
 
-use crate::transport::ros2::env::{Network, Range};
+use crate::transport::ros2::env::{Network, Range, unread};
 
 use super::Finding;
 
@@ -19,6 +19,17 @@ pub(super) fn look() -> Vec<Finding> {
     let network = Network::read(None, |name| std::env::var(name).ok());
     let number = |path: &str| read(path).and_then(|text| text.trim().parse().ok());
     let mut found = vec![variables(&network)];
+    found.extend(
+        unread(|name| std::env::var(name).ok())
+            .into_iter()
+            .map(|text| {
+                Finding::warning(
+                    CHECK,
+                    text,
+                    "unset it where `sweepd run --ros2` starts, or leave it: nothing of it is done",
+                )
+            }),
+    );
     if let Ok(network) = network {
         found.extend(ports(
             network.domain,

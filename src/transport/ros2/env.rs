@@ -12,6 +12,8 @@ pub struct Network {
     pub pinned: bool,
     /// Whether `ROS_SECURITY_ENABLE` asks for what is not kept here.
     pub unsecured: bool,
+    /// Whether services answer nodes on Cyclone DDS, and not those on Fast DDS: each writes requests in its own way.
+    pub cyclone: bool,
 }
 
 /// How far the node reaches.
@@ -22,6 +24,15 @@ pub enum Range {
     /// Every network this host is in.
     Subnet,
 }
+
+/// What configures another DDS and is not read here, with what it is of.
+const UNREAD: [(&str, &str); 5] = [
+    ("CYCLONEDDS_URI", "Cyclone DDS"),
+    ("FASTDDS_DEFAULT_PROFILES_FILE", "Fast DDS"),
+    ("FASTRTPS_DEFAULT_PROFILES_FILE", "Fast DDS"),
+    ("ROS_SUPER_CLIENT", "Fast DDS's discovery server"),
+    ("RMW_FASTRTPS_USE_QOS_FROM_XML", "Fast DDS"),
+];
 
 /// Greatest domain: beyond it the ports of DDS (7400 + 250 a domain) end.
 const DOMAIN_MAX: u16 = 232;
@@ -53,7 +64,13 @@ impl Network {
                 "{said_by}{domain}: DDS has ports for 0 to {DOMAIN_MAX}, of which 0 to 101 are safe on Linux"
             ));
         }
-        rmw(given("RMW_IMPLEMENTATION").as_deref())?;
+        let implementation = given("RMW_IMPLEMENTATION");
+        rmw(implementation.as_deref())?;
+        if let Some(server) = given("ROS_DISCOVERY_SERVER") {
+            return Err(format!(
+                "ROS_DISCOVERY_SERVER={server}: this node finds peers by multicast only, and would not meet those of a discovery server: unset it here and for them"
+            ));
+        }
         let unsecured = given("ROS_SECURITY_ENABLE").is_some_and(|text| text == "true");
         if unsecured && given("ROS_SECURITY_STRATEGY").is_some_and(|text| text == "Enforce") {
             return Err(
@@ -80,8 +97,20 @@ impl Network {
             },
             pinned: localhost_only,
             unsecured,
+            cyclone: implementation.as_deref() == Some("rmw_cyclonedds_cpp"),
         })
     }
+}
+
+/// Words for variables that are set and that nothing here reads.
+pub fn unread(variable: impl Fn(&str) -> Option<String>) -> Vec<String> {
+    let set = UNREAD.iter().filter_map(|(name, of)| {
+        let text = variable(name).filter(|text| !text.is_empty())?;
+        Some(format!(
+            "{name}={text} is not read: it is of {of}, and this node has another DDS; interfaces, peers and buffers that it sets hold for other nodes only"
+        ))
+    });
+    set.collect()
 }
 
 fn range(text: Option<&str>) -> Result<Range, String> {
@@ -137,6 +166,7 @@ mod tests {
                 range: Range::Localhost,
                 pinned: false,
                 unsecured: false,
+                cyclone: false,
             }
         );
         let network = read(
@@ -153,6 +183,7 @@ mod tests {
                 range: Range::Subnet,
                 pinned: false,
                 unsecured: false,
+                cyclone: false,
             })
         );
     }
@@ -185,7 +216,26 @@ mod tests {
         let pinned = read(None, &both).unwrap();
         assert_eq!((pinned.range, pinned.pinned), (Range::Localhost, true));
         assert!(read(None, &[("ROS_STATIC_PEERS", "127.0.0.1;")]).is_ok());
-        assert!(read(None, &[("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")]).is_ok());
+        let rmw = |text| read(None, &[("RMW_IMPLEMENTATION", text)]).unwrap();
+        assert!(rmw("rmw_cyclonedds_cpp").cyclone);
+        assert!(!rmw("rmw_fastrtps_cpp").cyclone);
+    }
+
+    #[test]
+    fn bug_variables_of_another_dds_are_told_as_not_read() {
+        let set = [
+            ("CYCLONEDDS_URI", "file:///a.xml"),
+            ("FASTDDS_DEFAULT_PROFILES_FILE", ""),
+            ("ROS_SUPER_CLIENT", "TRUE"),
+            ("ROS_DOMAIN_ID", "3"),
+        ];
+        let told = unread(|name| {
+            let found = set.iter().find(|(own, _)| *own == name);
+            found.map(|(_, text)| (*text).to_owned())
+        });
+        assert_eq!(told.len(), 2, "{told:?}");
+        assert!(told[0].starts_with("CYCLONEDDS_URI=file:///a.xml is not read"));
+        assert!(told[1].starts_with("ROS_SUPER_CLIENT=TRUE is not read"));
     }
 
     #[test]
@@ -201,6 +251,7 @@ mod tests {
             ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF"),
             ("ROS_AUTOMATIC_DISCOVERY_RANGE", "subnet"),
             ("ROS_STATIC_PEERS", "192.168.0.7"),
+            ("ROS_DISCOVERY_SERVER", "192.168.0.7:11811"),
             ("RMW_IMPLEMENTATION", "rmw_zenoh_cpp"),
             ("RMW_IMPLEMENTATION", "rmw_email_cpp"),
         ] {

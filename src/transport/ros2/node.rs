@@ -11,13 +11,13 @@ use std::time::Duration;
 
 use files::check_files;
 pub(super) use make::join;
-use make::{make, said};
+use make::{make, mapping, said};
 use ros2_client::{Context, RosoutRaw as _};
 use rustdds::mio1::Waker;
 
 use super::args::RosArgs;
 use super::diagnose::Diagnoser;
-use super::env::{Network, Range};
+use super::env::{Network, Range, unread};
 use super::inlet::{Inlet, Local};
 use super::lines::subscribe;
 use super::markers::Boxes;
@@ -116,8 +116,9 @@ impl RosNode {
             (heartbeat_ns, scene.sources.len()),
             shared.reliable(),
         )?;
-        let services = Services::create(&mut node, &mut names, table.flag("ros.allow_edits"))?;
-        let answers = Answers::create(&mut node, &context, &mut names, &table)?;
+        let (mapping, edits) = (mapping(options.network), table.flag("ros.allow_edits"));
+        let services = Services::create((&mut node, mapping), &mut names, edits)?;
+        let answers = Answers::create((&mut node, mapping), &context, &mut names, &table)?;
         // Behind all that is the node's own: no body has a name of these.
         let (lines, unheard) = subscribe(&mut node, &context, &mut names, &sources, scene.again)?;
         odd.extend(unheard);
@@ -225,7 +226,8 @@ impl RosNode {
                 "ROS_SECURITY_ENABLE is true, and this build has no DDS security: what the node sends and hears is not secured",
             );
         }
-        for text in odd {
+        let unread = unread(|name| std::env::var(name).ok());
+        for text in unread.iter().chain(odd) {
             self.shared.say(Say::Warn, text);
         }
     }

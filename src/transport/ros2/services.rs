@@ -98,21 +98,26 @@ pub(super) struct Services {
 impl Services {
     /// Creates them.
     ///
+    /// * `mapping` - how requests and answers are told apart: each DDS of ROS 2 has its own way.
     /// * `allowed` - whether edits are done.
     ///
     /// # Errors
     /// `Error::Usage` when remaps collide; `Error::Io` when DDS refuses.
-    pub(super) fn create(node: &mut Node, names: &mut Names, allowed: bool) -> Result<Self> {
+    pub(super) fn create(
+        (node, mapping): (&mut Node, ServiceMapping),
+        names: &mut Names,
+        allowed: bool,
+    ) -> Result<Self> {
         let kind = |kind| ("sweepd_msgs", kind);
         Ok(Self {
-            put: server(node, names, "~/put_body", kind("PutBody"))?,
-            remove: server(node, names, "~/remove_body", kind("RemoveBody"))?,
-            enable: server(node, names, "~/enable_body", kind("EnableBody"))?,
-            attach: server(node, names, "~/attach_body", kind("AttachBody"))?,
-            filter: server(node, names, "~/set_filter", kind("SetFilter"))?,
-            reset: server(node, names, "~/reset", kind("Reset"))?,
-            gap: server(node, names, "~/gap", kind("Gap"))?,
-            tick: server(node, names, "~/tick_now", kind("TickNow"))?,
+            put: server(node, mapping, names, "~/put_body", kind("PutBody"))?,
+            remove: server(node, mapping, names, "~/remove_body", kind("RemoveBody"))?,
+            enable: server(node, mapping, names, "~/enable_body", kind("EnableBody"))?,
+            attach: server(node, mapping, names, "~/attach_body", kind("AttachBody"))?,
+            filter: server(node, mapping, names, "~/set_filter", kind("SetFilter"))?,
+            reset: server(node, mapping, names, "~/reset", kind("Reset"))?,
+            gap: server(node, mapping, names, "~/gap", kind("Gap"))?,
+            tick: server(node, mapping, names, "~/tick_now", kind("TickNow"))?,
             pending: BTreeMap::new(),
             ticks: BTreeMap::new(),
             late: Vec::new(),
@@ -301,6 +306,7 @@ fn edited(answer: Answer) -> Edited {
 /// `Error::Usage` when remaps collide; `Error::Io` when DDS refuses.
 pub(super) fn server<Q: Message + Clone + 'static, R: Message + 'static>(
     node: &mut Node,
+    mapping: ServiceMapping,
     names: &mut Names,
     name: &str,
     (package, kind): TypeName,
@@ -311,7 +317,7 @@ pub(super) fn server<Q: Message + Clone + 'static, R: Message + 'static>(
         .history(History::KeepLast { depth: 10 })
         .reliability_reliable(WhenFull::Fail);
     let kind = ServiceTypeName::new(package, kind);
-    node.create_server(ServiceMapping::Enhanced, &parsed, &kind, qos.clone(), qos)
+    node.create_server(mapping, &parsed, &kind, qos.clone(), qos)
         .map_err(|e| failed(&full, e))
 }
 

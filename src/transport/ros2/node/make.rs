@@ -2,7 +2,7 @@
 
 use std::net::Ipv4Addr;
 
-use ros2_client::{Context, Node, NodeName, NodeOptions};
+use ros2_client::{Context, Node, NodeName, NodeOptions, ServiceMapping};
 use rustdds::DomainParticipantBuilder;
 
 use super::super::args::{Params, RosArgs};
@@ -43,6 +43,15 @@ pub(super) fn make(options: &RosOptions, context: &Context, names: &Names) -> Re
         let text = format!("ROS 2: node {} cannot be made", names.full_node());
         Error::io(text, e)
     })
+}
+
+/// How requests of services and their answers are told apart: each DDS of ROS 2 has its own way.
+pub(super) fn mapping(network: Network) -> ServiceMapping {
+    if network.cyclone {
+        ServiceMapping::Cyclone
+    } else {
+        ServiceMapping::Enhanced
+    }
 }
 
 /// Joins the DDS domain, on this host or on all its networks.

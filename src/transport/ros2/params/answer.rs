@@ -15,7 +15,7 @@ use ros2_client::rcl_interfaces::{
     ListParametersResponse, SetParametersAtomicallyResponse, SetParametersRequest,
     SetParametersResponse,
 };
-use ros2_client::{Context, Node, Publisher, Server, builtin_interfaces};
+use ros2_client::{Context, Node, Publisher, Server, ServiceMapping, builtin_interfaces};
 use rustdds::mio1::{Registry, Token};
 
 use super::super::names::Names;
@@ -51,7 +51,7 @@ impl Answers {
     /// # Errors
     /// `Error::Usage` when remaps collide; `Error::Io` when DDS refuses.
     pub(in super::super) fn create(
-        node: &mut Node,
+        (node, mapping): (&mut Node, ServiceMapping),
         context: &Context,
         names: &mut Names,
         table: &Arc<Table>,
@@ -65,23 +65,44 @@ impl Answers {
         let specs = table.specs.iter();
         let kinds = |kind| ("rcl_interfaces", kind);
         Ok(Self {
-            list: server(node, names, "~/list_parameters", kinds("ListParameters"))?,
-            get: server(node, names, "~/get_parameters", kinds("GetParameters"))?,
+            list: server(
+                node,
+                mapping,
+                names,
+                "~/list_parameters",
+                kinds("ListParameters"),
+            )?,
+            get: server(
+                node,
+                mapping,
+                names,
+                "~/get_parameters",
+                kinds("GetParameters"),
+            )?,
             types: server(
                 node,
+                mapping,
                 names,
                 "~/get_parameter_types",
                 kinds("GetParameterTypes"),
             )?,
             describe: server(
                 node,
+                mapping,
                 names,
                 "~/describe_parameters",
                 kinds("DescribeParameters"),
             )?,
-            set: server(node, names, "~/set_parameters", kinds("SetParameters"))?,
+            set: server(
+                node,
+                mapping,
+                names,
+                "~/set_parameters",
+                kinds("SetParameters"),
+            )?,
             set_at_once: server(
                 node,
+                mapping,
                 names,
                 "~/set_parameters_atomically",
                 kinds("SetParametersAtomically"),

@@ -40,6 +40,7 @@ pub(in super::super) fn peer(domain: u16, name: &str) -> (Context, Node) {
         range: Range::Localhost,
         pinned: false,
         unsecured: false,
+        cyclone: false,
     };
     let (context, _) = join(network).unwrap();
     let name = NodeName::new("/", name).unwrap();
