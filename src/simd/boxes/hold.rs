@@ -25,7 +25,8 @@ impl Hold {
     }
 }
 
-/// A hold as it is kept: without the spare lanes, which say nothing and would be a quarter of what is read of each body.
+/// A hold as it is kept: without the spare lanes, which say nothing and would be a quarter of what is read of each
+/// body.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub(crate) struct Held {
