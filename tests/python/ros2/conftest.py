@@ -101,6 +101,11 @@ class Daemon:
         tasks = Path(f"/proc/{self.pid}/task").iterdir()
         return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks) / 1e9
 
+    def wakes(self):
+        """How often its threads have slept and were woken so far."""
+        states = ((task / "status").read_text() for task in Path(f"/proc/{self.pid}/task").iterdir())
+        return sum(int(state.rpartition("\nvoluntary_ctxt_switches:")[2].split()[0]) for state in states)
+
 
 class Room:
     """What one test has for itself."""
