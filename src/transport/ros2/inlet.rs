@@ -197,10 +197,10 @@ impl Inlet {
             return (false, false);
         };
         match line {
-            Line::Clock(from) => {
+            Line::Clock(from, order) => {
                 let mut back = false;
                 let taken = drain(from, shared, |message, _| {
-                    back |= shared.tick_clock(message.clock, receipt.now_ns)
+                    back |= shared.tick_clock(message.clock, order, receipt.now_ns)
                 });
                 if back {
                     for (place, source) in sources.iter_mut().enumerate() {

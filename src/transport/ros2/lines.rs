@@ -4,6 +4,7 @@ use ros2_client::{Context, Gid, MessageInfo, Node, Subscription};
 use rustdds::mio1::{Interest, Registry, Token};
 
 use super::names::Names;
+use super::order::Order;
 use super::poses::Source;
 use super::topics::{In, TypeName, subscription};
 use crate::config::RosKind;
@@ -50,8 +51,8 @@ pub(super) enum Line {
     Pose(Subscription<PoseStamped>, Feeder),
     /// Odometry of one body.
     Odometry(Subscription<Odometry>, Feeder),
-    /// Simulated time.
-    Clock(Subscription<Clock>),
+    /// Simulated time, and its order.
+    Clock(Subscription<Clock>, Order),
 }
 
 impl Line {
@@ -63,7 +64,7 @@ impl Line {
             Self::Links { from, .. } => registry.register(from, token, wanted),
             Self::Pose(from, _) => registry.register(from, token, wanted),
             Self::Odometry(from, _) => registry.register(from, token, wanted),
-            Self::Clock(from) => registry.register(from, token, wanted),
+            Self::Clock(from, _) => registry.register(from, token, wanted),
         }
     }
 
@@ -201,7 +202,7 @@ pub(super) fn subscribe(
     let clock = names.claim("/clock").map_err(Error::Usage)?;
     let kind = ("rosgraph_msgs", "Clock");
     let clock = subscription(node, context, (&clock, kind), NEWEST)?;
-    let mut lines = vec![Line::Transforms(own), Line::Clock(clock)];
+    let mut lines = vec![Line::Transforms(own), Line::Clock(clock, Order::default())];
     let mut odd = Vec::new();
     let mut trees: Vec<(String, bool, Vec<usize>)> = Vec::new();
     // Bodies last: one that an edit has brought must not take a topic away that the scene says.

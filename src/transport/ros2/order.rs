@@ -1,5 +1,5 @@
-//! Whether a stamp is new, late, or of a clock that began anew. In: stamps of one frame or body as they come. Out:
-//! which of the three. Pure.
+//! Whether a stamp is new, late, or of a clock that began anew. In: stamps of one frame, body or clock as they come.
+//! Out: which of the three. Pure.
 //!
 //! A stamp before the newest one is late first of all: networks delay and reorder datagrams, by seconds where a link
 //! was down, and an old pose must not become the newest. A clock that began anew (a simulator that was started again)
@@ -19,7 +19,7 @@ pub(super) enum Step {
     Anew,
 }
 
-/// The stamps of one frame or body.
+/// The stamps of one frame or body, or the times of one clock.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Order {
     newest_ns: u64,

@@ -9,6 +9,7 @@ use ros2_client::{Publisher, builtin_interfaces};
 
 use super::lines::Arrival;
 use super::open;
+use super::order::{Order, Step};
 use super::params::{Effect, Own};
 use super::parcel::Caps;
 pub(super) use super::say::Say;
@@ -21,6 +22,8 @@ use crate::wire::ros::{Book, Counts, Time};
 
 /// Stands for no value.
 const NONE: u64 = u64::MAX;
+/// A time of `/clock` that is late by less is no sign of another clock, nanoseconds.
+const CLOCK_LATE_NS: u64 = 500_000_000;
 
 /// Shared by the threads of the node.
 pub(super) struct Shared {
@@ -189,13 +192,19 @@ impl Shared {
         self.sim_time.load(Ordering::Relaxed)
     }
 
-    /// The clock says a time; whether it went back, where time is that of `/clock`.
+    /// The clock says a time; whether it began anew, where time is that of `/clock`.
     ///
+    /// * `order` - of what it has said.
     /// * `boot_ns` - now, nanoseconds of `CLOCK_BOOTTIME`.
-    pub(super) fn tick_clock(&self, clock: Time, boot_ns: u64) -> bool {
+    pub(super) fn tick_clock(&self, clock: Time, order: &mut Order, boot_ns: u64) -> bool {
         let now_ns = clock.to_ns();
-        let before_ns = self.sim_now_ns.swap(now_ns, Ordering::Relaxed);
-        let back = self.sim_time() && now_ns < before_ns;
+        let step = order.take(now_ns, boot_ns, CLOCK_LATE_NS);
+        if matches!(step, Step::Late(_)) {
+            self.note_refused(1);
+            return false;
+        }
+        self.sim_now_ns.store(now_ns, Ordering::Relaxed);
+        let back = step == Step::Anew && self.sim_time();
         if back {
             let text = "/clock went back: every pair ends, and bodies are not received until their next poses";
             self.say_seldom(Say::Warn, text, boot_ns);

@@ -80,8 +80,7 @@ def test_a_jump_back_ends_every_pair_with_cause_reset_flushes_and_goes_on(room):
     room.spin(0.2)
     start, state = len(world.pairs), len(world.states)
     world.now_ns = 10 * 10**9
-    world.tick_clock()
-    room.until(lambda: len(world.ends(start)) >= 2, "both pairs ended")
+    room.until(lambda: len(world.ends(start)) >= 2, "both pairs ended", then=world.tick_clock)
     assert sorted(world.ends(start)) == [("a", "b", 5), ("p", "post", 5)]
     unknown = room.until(lambda: [s for s in world.states[state:] if "not_received" in s.reason_words], "bodies not received")
     assert unknown[0].word == "unknown"
@@ -106,6 +105,20 @@ def test_a_clock_that_stands_or_jumps_ahead_ends_nothing(room, step_s):
         world.step()
         room.spin(0.02)
     assert world.ends(start) == [] and world.ticks[-1].colliding == 2
+
+
+def test_a_time_that_comes_late_ends_nothing(room):
+    world = World(room, True)
+    start = len(world.pairs)
+    for late_s in (0.1, 2.0, 500.0) * 4:
+        world.step()
+        now_ns, world.now_ns = world.now_ns, world.now_ns - int(late_s * 1e9)
+        world.tick_clock()
+        world.now_ns = now_ns
+        room.spin(0.02)
+    room.until(lambda: world.ticks[-1].receipts_refused >= 12, "late times are counted", then=world.step)
+    assert world.ends(start) == [] and world.ticks[-1].colliding == 2
+    assert not any("went back" in log.msg for log in world.logs)
 
 
 def test_without_use_sim_time_the_clock_says_nothing(room):
