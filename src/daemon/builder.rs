@@ -1,5 +1,8 @@
-//! The worker that turns requests into edits with built shapes, and answers questions, off the tick's thread: a mesh of
-//! a million triangles takes a second to build, and no tick waits for it.
+//! The workers that turn requests into edits with built shapes, and answer questions, off the tick's thread: a mesh of
+//! a million triangles takes seconds to build, and neither a tick nor a question waits for it.
+//!
+//! In: requests in their order, questions with their bodies, worn trees. Out: edits in the order of their requests,
+//! answers as they are found.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -10,7 +13,7 @@ use std::thread::JoinHandle;
 use crate::error::{Error, Result};
 use crate::query::Query;
 use crate::record::Asked;
-use crate::scene::{Question, Request, Scene};
+use crate::scene::{EditRequest, Question, Request, Scene};
 use crate::shape::Library;
 use crate::tick::EditBatch;
 use crate::tick::build::EditBuilder;
@@ -26,24 +29,25 @@ const INTERNAL: &str =
 /// Stands for the asker of a tree: the daemon itself.
 pub(super) const TREE: RequestToken = RequestToken(u64::MAX);
 
-/// What is on its way to the worker.
-enum Job {
-    /// Something to do, and who waits for it.
-    Do(RequestToken, Work),
+/// For the thread that reads requests and answers questions.
+enum Reading {
+    /// A request: its payload, of which so many bytes are JSON.
+    Request(RequestToken, usize, Vec<u8>),
+    /// A question, with the bodies it is about.
+    Measure(RequestToken, Box<Query>),
+}
+
+/// For the thread that builds shapes and trees.
+enum Building {
+    /// Edits that were read, the payload they were read from, and how much of it is JSON.
+    Edits(RequestToken, EditRequest, usize, Vec<u8>),
+    /// A tree that has become loose; nobody waits for an answer.
+    Tree(Box<WornTree>),
     /// What is needed no more.
     Forget(Box<dyn Send>),
 }
 
-enum Work {
-    /// A request to be read: its payload, of which so many bytes are JSON.
-    Read(usize, Vec<u8>),
-    /// A question, with the bodies it is about.
-    Measure(Box<Query>),
-    /// A tree that has become loose; nobody waits for an answer.
-    Tree(Box<WornTree>),
-}
-
-/// What the worker made of a request.
+/// What became of a request.
 pub(super) enum Done {
     /// Edits for the next tick, and what they were made of.
     Batch(EditBatch, Asked),
@@ -65,88 +69,81 @@ pub(super) struct Asking {
 }
 
 /// That, or what to change.
-type Built = (RequestToken, std::result::Result<Done, String>);
+type Made = std::result::Result<Done, String>;
 
-/// The worker's handle.
+/// The workers' handle.
 pub(super) struct Builder {
-    asked: Option<Sender<Job>>,
-    built: Receiver<Built>,
+    /// `None` once it is dropped, which ends the threads.
+    hands: Option<(Sender<Reading>, Sender<Building>)>,
+    built: Receiver<(RequestToken, Made)>,
     open: usize,
     ended: Arc<AtomicBool>,
-    worker: Option<JoinHandle<()>>,
+    threads: Vec<JoinHandle<()>>,
 }
 
 impl Builder {
-    /// Starts the worker with the shapes that are built already.
+    /// Starts the workers with the shapes that are built already.
     pub(super) fn start(library: Library, scene: &Scene, clock: Arc<dyn Clock>) -> Result<Self> {
-        let (asked, requests) = channel::<Job>();
-        let (answers, built) = channel::<Built>();
-        let mut against = Against {
-            edits: EditBuilder::new(scene, library),
-            clock,
-        };
+        let (to_read, requests) = channel();
+        let (to_build, jobs) = channel();
+        let (answers, built) = channel();
         let ended = Arc::new(AtomicBool::new(false));
-        let told = Arc::clone(&ended);
-        let work = move || {
-            for job in requests {
-                // What still waits at the end is not built any more.
-                if told.load(Ordering::Relaxed) {
-                    return;
-                }
-                let (token, work) = match job {
-                    Job::Do(token, work) => (token, work),
-                    Job::Forget(what) => {
-                        drop(what);
-                        continue;
-                    }
-                };
-                // Whatever goes wrong, its asker gets an answer and the next request is built.
-                let answer = catch_unwind(AssertUnwindSafe(|| against.work(token, work)))
-                    .unwrap_or_else(|_| Err(INTERNAL.to_owned()));
-                if answers.send((token, answer)).is_err() {
-                    return;
-                }
-            }
+        let edits = EditBuilder::new(scene, library);
+        let mut reader = Reader {
+            shapes: edits.beside(),
+            clock,
+            to_build: to_build.clone(),
         };
-        let worker = std::thread::Builder::new()
-            .name("sweepd-shapes".to_owned())
-            .spawn(work)
-            .map_err(|e| Error::io("cannot start the thread that builds shapes", e))?;
+        let mut maker = Maker { edits };
+        let desk = Desk {
+            answers,
+            ended: Arc::clone(&ended),
+        };
+        let threads = vec![
+            start("sweepd-asks", requests, desk.clone(), move |job| {
+                reader.work(job)
+            })?,
+            start("sweepd-shapes", jobs, desk, move |job| maker.work(job))?,
+        ];
         Ok(Self {
-            asked: Some(asked),
+            hands: Some((to_read, to_build)),
             built,
             open: 0,
             ended,
-            worker: Some(worker),
+            threads,
         })
     }
 
     /// Hands over a request.
     pub(super) fn ask(&mut self, token: RequestToken, json_len: usize, payload: Vec<u8>) {
-        self.hand(token, Work::Read(json_len, payload));
-    }
-
-    /// Hands over what is needed no more: to give the memory of a large request back takes as long as a tick.
-    pub(super) fn forget(&self, what: impl Send + 'static) {
-        if let Some(asked) = &self.asked {
-            let _gone_anyway = asked.send(Job::Forget(Box::new(what)));
-        }
+        self.read(Reading::Request(token, json_len, payload));
     }
 
     /// Hands over a question.
     pub(super) fn measure(&mut self, token: RequestToken, query: Query) {
-        self.hand(token, Work::Measure(Box::new(query)));
+        self.read(Reading::Measure(token, Box::new(query)));
+    }
+
+    fn read(&mut self, job: Reading) {
+        let hand = self.hands.as_ref();
+        let sent = hand.is_some_and(|(to_read, _)| to_read.send(job).is_ok());
+        self.open += usize::from(sent);
     }
 
     /// Hands over a tree to be built.
     pub(super) fn build_tree(&mut self, worn: WornTree) {
-        self.hand(TREE, Work::Tree(Box::new(worn)));
+        let sent = self.build(Building::Tree(Box::new(worn)));
+        self.open += usize::from(sent);
     }
 
-    fn hand(&mut self, token: RequestToken, work: Work) {
-        let asked = self.asked.as_ref();
-        let sent = asked.is_some_and(|asked| asked.send(Job::Do(token, work)).is_ok());
-        self.open += usize::from(sent);
+    /// Hands over what is needed no more: to give the memory of a large request back takes as long as a tick.
+    pub(super) fn forget(&self, what: impl Send + 'static) {
+        let _gone_anyway = self.build(Building::Forget(Box::new(what)));
+    }
+
+    fn build(&self, job: Building) -> bool {
+        let hand = self.hands.as_ref();
+        hand.is_some_and(|(_, to_build)| to_build.send(job).is_ok())
     }
 
     /// Whether a request is being worked on.
@@ -154,8 +151,8 @@ impl Builder {
         self.open > 0
     }
 
-    /// What the worker has finished since.
-    pub(super) fn finished(&mut self) -> Option<Built> {
+    /// What the workers have finished since.
+    pub(super) fn finished(&mut self) -> Option<(RequestToken, Made)> {
         let built = self.built.try_recv().ok()?;
         self.open = self.open.saturating_sub(1);
         Some(built)
@@ -165,52 +162,121 @@ impl Builder {
 impl Drop for Builder {
     fn drop(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
-        self.asked = None;
-        // A shape can take seconds to build, and nobody waits for it any more: a busy worker ends by itself.
-        if let Some(worker) = self.worker.take()
-            && self.open == 0
-        {
-            let _ended_anyway = worker.join();
+        self.hands = None;
+        // A shape can take seconds to build, and nobody waits for it any more: busy workers end by themselves.
+        if self.open == 0 {
+            for thread in self.threads.drain(..) {
+                let _ended_anyway = thread.join();
+            }
         }
     }
 }
 
-/// What a request is read against.
-struct Against {
-    edits: EditBuilder,
-    clock: Arc<dyn Clock>,
+/// Where a worker puts what it has made.
+#[derive(Clone)]
+struct Desk {
+    answers: Sender<(RequestToken, Made)>,
+    /// What still waits then is not made any more.
+    ended: Arc<AtomicBool>,
 }
 
-impl Against {
-    fn work(&mut self, token: RequestToken, work: Work) -> std::result::Result<Done, String> {
-        let (json_len, payload) = match work {
-            Work::Read(json_len, payload) => (json_len, payload),
-            Work::Measure(query) => {
-                return Ok(Done::Found(Box::new(query.answer(self.clock.as_ref()))));
+/// A thread that does its jobs one after another; whatever goes wrong, its asker gets an answer and the next is done.
+///
+/// * `work` - `None`: there is nothing to say of it, or another worker will.
+fn start<J: Job>(
+    name: &str,
+    jobs: Receiver<J>,
+    desk: Desk,
+    mut work: impl FnMut(J) -> Option<Made> + Send + 'static,
+) -> Result<JoinHandle<()>> {
+    let run = move || {
+        for job in jobs {
+            if desk.ended.load(Ordering::Relaxed) {
+                return;
             }
-            Work::Tree(worn) => return Ok(Done::Tree(Box::new(worn.build()))),
-        };
+            let token = job.token();
+            let made = catch_unwind(AssertUnwindSafe(|| work(job)))
+                .unwrap_or_else(|_| Some(Err(INTERNAL.to_owned())));
+            if let Some(made) = made
+                && desk.answers.send((token, made)).is_err()
+            {
+                return;
+            }
+        }
+    };
+    std::thread::Builder::new()
+        .name(name.to_owned())
+        .spawn(run)
+        .map_err(|e| Error::io("cannot start a thread that works on requests", e))
+}
+
+/// What a worker does at a time.
+trait Job: Send + 'static {
+    /// Who waits for it.
+    fn token(&self) -> RequestToken;
+}
+
+impl Job for Reading {
+    fn token(&self) -> RequestToken {
+        let (Self::Request(token, ..) | Self::Measure(token, _)) = self;
+        *token
+    }
+}
+
+impl Job for Building {
+    fn token(&self) -> RequestToken {
+        match self {
+            Self::Edits(token, ..) => *token,
+            Self::Tree(_) | Self::Forget(_) => TREE,
+        }
+    }
+}
+
+/// Reads requests; answers questions, and hands edits on in their order.
+struct Reader {
+    /// For what questions bring along.
+    shapes: EditBuilder,
+    clock: Arc<dyn Clock>,
+    to_build: Sender<Building>,
+}
+
+impl Reader {
+    fn work(&mut self, job: Reading) -> Option<Made> {
+        match job {
+            Reading::Request(token, json_len, payload) => {
+                self.read(token, json_len, payload).transpose()
+            }
+            Reading::Measure(_, query) => {
+                let answer = query.answer(self.clock.as_ref());
+                Some(Ok(Done::Found(Box::new(answer))))
+            }
+        }
+    }
+
+    fn read(
+        &mut self,
+        token: RequestToken,
+        json_len: usize,
+        payload: Vec<u8>,
+    ) -> std::result::Result<Option<Done>, String> {
         let cut = payload.split_at_checked(json_len);
         let (json, blobs) = cut.ok_or("the request is shorter than its header says")?;
         match Request::parse(json, blobs)? {
-            Request::Ask(question) => self.ask(question),
+            Request::Ask(question) => self.ask(question).map(Some),
             Request::Edits(asked) => {
-                let batch = self.edits.build(token.0, asked)?;
-                let asked = Asked {
-                    json_len,
-                    files: self.edits.take_kept(),
-                    payload,
-                };
-                Ok(Done::Batch(batch, asked))
+                let job = Building::Edits(token, asked, json_len, payload);
+                // The other one ends with this one alone.
+                self.to_build.send(job).map_err(|_| INTERNAL)?;
+                Ok(None)
             }
         }
     }
 
     /// Builds what a question brings along.
-    fn ask(&mut self, question: Question) -> std::result::Result<Done, String> {
+    fn ask(&mut self, question: Question) -> Made {
         let built = match question.shapes() {
             [] => None,
-            specs => Some(self.edits.shapes(specs)?),
+            specs => Some(self.shapes.shapes(specs)?),
         };
         let (shapes, warnings) = built.unzip();
         Ok(Done::Ask(Box::new(Asking {
@@ -218,5 +284,41 @@ impl Against {
             shapes,
             warnings: warnings.unwrap_or_default(),
         })))
+    }
+}
+
+/// Makes edits and trees.
+struct Maker {
+    edits: EditBuilder,
+}
+
+impl Maker {
+    fn work(&mut self, job: Building) -> Option<Made> {
+        match job {
+            Building::Edits(token, asked, json_len, payload) => {
+                Some(self.edits(token, asked, json_len, payload))
+            }
+            Building::Tree(worn) => Some(Ok(Done::Tree(Box::new(worn.build())))),
+            Building::Forget(what) => {
+                drop(what);
+                None
+            }
+        }
+    }
+
+    fn edits(
+        &mut self,
+        token: RequestToken,
+        asked: EditRequest,
+        json_len: usize,
+        payload: Vec<u8>,
+    ) -> Made {
+        let batch = self.edits.build(token.0, asked)?;
+        let asked = Asked {
+            json_len,
+            files: self.edits.take_kept(),
+            payload,
+        };
+        Ok(Done::Batch(batch, asked))
     }
 }

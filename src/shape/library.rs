@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::shape::build::build_by;
 use crate::shape::files::{Contents, FileMark, Files};
@@ -13,10 +13,13 @@ use crate::shape::{Built, ShapeError, ShapeSpec};
 /// A mesh file is read again when its size or time has changed.
 #[derive(Debug, Default)]
 pub struct Library {
-    /// By digest; several entries of one digest are told apart by their specs.
-    shelves: BTreeMap<u64, Vec<Entry>>,
+    /// Never held while a shape is built.
+    shelves: Arc<Mutex<Shelves>>,
     files: Files,
 }
+
+/// By digest; several entries of one digest are told apart by their specs.
+type Shelves = BTreeMap<u64, Vec<Entry>>;
 
 #[derive(Debug)]
 struct Entry {
@@ -53,6 +56,19 @@ impl Library {
         }
     }
 
+    /// Another one of the same shapes, for another thread; what it reads is not kept.
+    #[must_use]
+    pub fn beside(&self) -> Self {
+        Self {
+            shelves: Arc::clone(&self.shelves),
+            files: Files::default(),
+        }
+    }
+
+    fn shelves(&self) -> MutexGuard<'_, Shelves> {
+        self.shelves.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Files that were read since the last call, where they are kept.
     pub fn take_kept(&mut self) -> Contents {
         match &mut self.files {
@@ -67,7 +83,9 @@ impl Library {
             return;
         };
         let stays = |entry: &Entry| entry.spec.file().is_none_or(|f| !contents.contains_key(f));
-        (self.shelves.values_mut()).for_each(|shelf| shelf.retain(stays));
+        let mut shelves = (self.shelves.lock()).unwrap_or_else(PoisonError::into_inner);
+        (shelves.values_mut()).for_each(|shelf| shelf.retain(stays));
+        drop(shelves);
         all.extend(contents);
     }
 
@@ -79,33 +97,37 @@ impl Library {
         let name = spec.file();
         let file = name.map(|name| self.files.mark(base, name)).transpose()?;
         let known = (name.zip(file.as_ref())).is_none_or(|(name, m)| self.files.knows(name, m));
-        let shelf = self.shelves.entry(digest(spec)).or_default();
+        let digest = digest(spec);
         let same = |entry: &&Entry| known && entry.spec == *spec && entry.file == file;
-        if let Some(entry) = shelf.iter().find(same) {
+        let shelves = self.shelves();
+        let found = shelves.get(&digest).and_then(|s| s.iter().find(same));
+        if let Some(entry) = found {
             return Ok(entry.built.clone());
         }
+        drop(shelves);
         let files = &mut self.files;
         let built = build_by(spec, &mut |name| files.read(base, name))?;
-        shelf.push(Entry {
+        let entry = Entry {
             spec: spec.clone(),
             file,
             built: built.clone(),
-        });
+        };
+        self.shelves().entry(digest).or_default().push(entry);
         Ok(built)
     }
 
     /// Forgets shapes that nobody else holds; to be called after bodies were removed.
     pub fn prune(&mut self) {
-        for shelf in self.shelves.values_mut() {
+        self.shelves().retain(|_, shelf| {
             shelf.retain(|entry| Arc::strong_count(&entry.built.shape) > 1);
-        }
-        self.shelves.retain(|_, shelf| !shelf.is_empty());
+            !shelf.is_empty()
+        });
     }
 
     /// How many different shapes it holds.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.shelves.values().map(Vec::len).sum()
+        self.shelves().values().map(Vec::len).sum()
     }
 
     /// Whether it holds none.

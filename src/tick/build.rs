@@ -98,6 +98,16 @@ impl EditBuilder {
         }
     }
 
+    /// Another one for the questions of the same scene, which keeps no files.
+    #[must_use]
+    pub fn beside(&self) -> Self {
+        Self {
+            sources: self.sources.clone(),
+            base: self.base.clone(),
+            library: self.library.beside(),
+        }
+    }
+
     /// Builds the shapes of a request.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! Scene edits of a running daemon, over the request service.
 
 use std::fmt::Write as _;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use sweepd::transport::client::{Client, FrameInfo, Heard, Rows};
 use sweepd::wire::{
@@ -331,6 +331,41 @@ fn a_shape_that_takes_long_to_build_does_not_stop_the_ticks() {
     let (status, time) = daemon.stop();
     assert_eq!(status.code(), Some(0), "{}", daemon.stderr());
     assert!(time.as_secs_f64() < 2.0, "{time:?}");
+}
+
+#[test]
+fn bug_questions_do_not_wait_for_the_mesh_of_another_client() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let instance = desk.instance.clone();
+    let mut client = desk.source("sim");
+    step(&mut client, &[at(1, 0.0), at(2, 5.0)]);
+    let (json, vertices, faces) = put_ball(400, 20.0);
+    let putter = std::thread::spawn(move || {
+        let mut putter = Client::connect(&instance, None, 30 * SECOND_NS).unwrap();
+        let start = Instant::now();
+        let blobs: [&[u8]; 2] = [&vertices, &faces];
+        let answer = putter.request(&json, &blobs, 60 * SECOND_NS).unwrap();
+        assert!(answer.ok, "{answer:?}");
+        start.elapsed()
+    });
+    let brings =
+        r#"{"touching": {"shape": {"type": "sphere", "radius": 4.6}, "position": [0, 0, 0]}}"#;
+    let (mut longest, mut asked) = (Duration::ZERO, 0);
+    while !putter.is_finished() {
+        step(&mut client, &[at(1, 0.0), at(2, 5.0)]);
+        for question in [r#"{"gap": {"a": "a", "b": "b"}}"#, brings] {
+            let start = Instant::now();
+            let answer = client.request(question, &[], 60 * SECOND_NS).unwrap();
+            assert!(answer.ok, "{answer:?}");
+            longest = longest.max(start.elapsed());
+            asked += 1;
+        }
+    }
+    // The one that waits for the mesh waits for nearly all of it; milliseconds of seconds are told here.
+    let mesh = putter.join().unwrap();
+    println!("{asked} questions, the longest {longest:?}, in {mesh:?}");
+    assert!(longest < mesh / 2, "{longest:?} of {mesh:?}");
 }
 
 #[test]
