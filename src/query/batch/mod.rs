@@ -155,10 +155,12 @@ fn answer(case: &Case) -> std::result::Result<Answer, String> {
     let a = Pieces::build(&case.a).map_err(|e| format!("a: {e}"))?;
     let b = Pieces::build(&case.b).map_err(|e| format!("b: {e}"))?;
     let pos12 = relative(&pose_a, &pose_b);
-    let closest = gap(&a, &b, &pos12)?;
-    if let Some(known) = solids::gap((&case.a, &case.b), &pos12, &closest)? {
+    // By brute force: seconds, for two meshes of many triangles.
+    let surfaces = || gap(&a, &b, &pos12);
+    if let Some(known) = solids::gap((&case.a, &case.b), &pos12, surfaces)? {
         return Ok(of_solids(&known, &pose_a));
     }
+    let closest = surfaces()?;
     let surface = a.kind == Kind::Surface || b.kind == Kind::Surface;
     Ok(shown(&closest, &pose_a, surface))
 }

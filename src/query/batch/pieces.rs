@@ -172,9 +172,7 @@ pub(super) fn gap(a: &Pieces, b: &Pieces, pos12: &Pose) -> Result<Closest, Strin
         }
         _ => bounded(&a.convexes, &b.convexes, pos12, &mut least),
     }
-    least
-        .found
-        .filter(|_| !least.is_lost)
+    (least.found())
         .map(|found| allow_for_squares(&found))
         .ok_or_else(|| {
             "the shapes are too far from each other to compute with: write positions that are nearer".to_owned()
@@ -199,6 +197,8 @@ fn allow_for_squares(found: &Closest) -> Closest {
 #[derive(Default)]
 struct Least {
     found: Option<Closest>,
+    /// Least lower end of those whose search is not finished.
+    open_m: Option<f64>,
     /// Of a pair of pieces nothing is known: squares of its lengths are beyond what a number holds.
     is_lost: bool,
 }
@@ -209,19 +209,31 @@ impl Least {
             self.is_lost = true;
             return;
         }
+        if !closest.finished {
+            let open_m = self.open_m.unwrap_or(f64::INFINITY);
+            self.open_m = Some(open_m.min(closest.gap.min));
+        }
         match &mut self.found {
             None => self.found = Some(*closest),
             Some(found) => {
                 let gap = found.gap.least(closest.gap);
-                let finished = found.finished && closest.finished;
                 if closest.best_m < found.best_m {
                     *found = *closest;
                 }
                 found.gap = gap;
-                found.finished = finished;
                 found.best_m = found.best_m.clamp(gap.min, gap.max);
             }
         }
+    }
+
+    /// What is known of them all, unless one is lost. Finished where no search that is not can narrow it.
+    fn found(&self) -> Option<Closest> {
+        let found = self.found.filter(|_| !self.is_lost)?;
+        let is_open = self.open_m.is_some_and(|low_m| low_m <= found.gap.max);
+        Some(Closest {
+            finished: !is_open,
+            ..found
+        })
     }
 
     fn upper(&self) -> f64 {

@@ -36,11 +36,11 @@ fn is_solid(spec: &ShapeSpec) -> bool {
 /// * `surfaces` - what is known of them as surfaces: a place to tell where the query has none.
 ///
 /// # Errors
-/// Why it is no solid.
+/// Why it is no solid, or nothing is known of the surfaces.
 pub(super) fn gap(
     (a, b): (&ShapeSpec, &ShapeSpec),
     pos12: &Pose,
-    surfaces: &Closest,
+    surfaces: impl FnOnce() -> Result<Closest, String>,
 ) -> Result<Option<Known>, String> {
     if !is_solid(a) && !is_solid(b) {
         return Ok(None);
@@ -49,24 +49,27 @@ pub(super) fn gap(
     let b = body("b", b, pos12)?;
     let asked = gap_between(&a, &b, 0.0, &mut Meter::unlimited(&SystemClock));
     let Interval { min, max } = asked.gap;
-    Ok(Some(match asked.witness {
-        Some(witness) => Known {
+    let collides = asked.verdict == Verdict::Colliding;
+    Ok(Some(if let Some(witness) = asked.witness {
+        Known {
             gap: asked.gap,
             // An estimate is never outside what is proved.
             best_m: Some(witness.best_m.max(min).min(max)),
             normal: witness.normal,
             point_a: witness.point_a,
             point_b: pos12 * witness.point_b,
-            collides: asked.verdict == Verdict::Colliding,
-        },
-        None => Known {
+            collides,
+        }
+    } else {
+        let surfaces = surfaces()?;
+        Known {
             gap: asked.gap,
             best_m: None,
             normal: surfaces.normal,
             point_a: surfaces.point_a,
             point_b: surfaces.point_b,
-            collides: asked.verdict == Verdict::Colliding,
-        },
+            collides,
+        }
     }))
 }
 
