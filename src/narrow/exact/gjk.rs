@@ -207,15 +207,7 @@ impl Gjk<'_> {
     /// Of cores that overlap: their points at the origin are as good as one, and the best direction proves how far they
     /// overlap at most.
     fn touch(&self) -> CoreGap {
-        let (point_a, point_b) = self.simplex.witnesses();
-        CoreGap {
-            lower: self.lower,
-            upper: (point_b - point_a).norm().max(self.lower),
-            normal: self.normal,
-            point_a,
-            point_b,
-            held: Held::of(self.simplex.used(), &self.simplex.weights),
-        }
+        self.between(self.lower, self.normal)
     }
 
     fn gap(&self) -> CoreGap {
@@ -230,10 +222,15 @@ impl Gjk<'_> {
                 }
             }
         }
+        self.between(lower, normal)
+    }
+
+    /// From what a direction proves to the points of the simplex.
+    fn between(&self, lower: f64, normal: Vec3) -> CoreGap {
         let (point_a, point_b) = self.simplex.witnesses();
         CoreGap {
             lower,
-            upper: (point_b - point_a).norm(),
+            upper: (point_b - point_a).norm().max(lower),
             normal,
             point_a,
             point_b,

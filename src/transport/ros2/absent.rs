@@ -24,6 +24,8 @@ pub(super) struct Absent {
 impl Absent {
     /// One was not heard for its lease.
     pub(super) fn lose(&mut self, prefix: &str, lease: Duration) {
+        // One that DDS took back, and lost again before it was seen here, is there once.
+        self.part(prefix);
         if self.prefixes.len() == ABSENT_MAX {
             self.prefixes.pop_front();
         }
@@ -101,6 +103,10 @@ mod tests {
         absent.lose(TWO, LEASE);
         for _ in 0..ABSENT_MAX {
             absent.lose(THREE, LEASE);
+        }
+        assert_eq!(absent.prefixes, [TWO, THREE]);
+        for n in 1..ABSENT_MAX {
+            absent.lose(&format!("{n:024x}"), LEASE);
         }
         absent.hear(&[TWO.to_owned()]);
         assert!(!absent.is_back());
