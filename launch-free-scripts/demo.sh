@@ -10,6 +10,8 @@
 #   --deadline    a source that works 7 to 15 ms of each frame, and leaves what is left of its 20 ms to the daemon (2,000
 #                 bodies unless --count says otherwise): a table of when the results were there
 #   --mujoco      a real simulator as the source: installs MuJoCo into a virtual environment of its own (.venv-demo)
+#
+# Builds sweepd without ROS 2 and recording; SWEEPD=FILE names one that is built already.
 set -euo pipefail
 
 usage() { sed -n '2,/^set /p' "$0" | sed '$d; s/^# \{0,1\}//'; }
@@ -81,10 +83,12 @@ trap finish EXIT
 trap 'interrupted=yes; exit 130' INT
 trap 'exit 143' TERM
 
-# The lean build: shared memory only.
-echo "building (the first time takes a few minutes)"
-cargo build --quiet --release --no-default-features --features tui --manifest-path "$root/Cargo.toml" --bin sweepd
-sweepd=${CARGO_TARGET_DIR:-$root/target}/release/sweepd
+sweepd=${SWEEPD:-}
+if [ -z "$sweepd" ]; then
+  echo "building (the first time takes a few minutes)"
+  cargo build --quiet --release --no-default-features --features tui --manifest-path "$root/Cargo.toml" --bin sweepd
+  sweepd=${CARGO_TARGET_DIR:-$root/target}/release/sweepd
+fi
 
 if [ -n "$mujoco" ]; then
   venv=$root/.venv-demo
