@@ -22,6 +22,7 @@ mod extremes;
 mod fronts;
 mod half_space;
 mod holes;
+mod in_line;
 mod laws;
 mod odd;
 mod profile;

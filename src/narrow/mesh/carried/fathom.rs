@@ -1,37 +1,59 @@
 //! How deep two overlap whose leaves only just touch.
 //!
 //! Solids pushed into one another along faces that are in line cross nowhere: their leaves prove a touch within
-//! rounding, and no overlap. So a touch that is no more is followed by a look at the balls within the two and at the
-//! middle of what their boxes share, and then by a search that goes on for a bounded number of steps, to leaves that
-//! cross, or the middle of one of which lies deep in the other solid. What then is no overlap still touches.
+//! rounding, and no overlap. So a touch that is no more is followed by a look at the balls within the two and at points
+//! of what their boxes share, and then by a search that goes on for a bounded number of steps, to leaves that cross, or
+//! the middle of one of which lies deep in the other solid, or that are in line and face one way, so that both solids
+//! are behind them. What then is no overlap still touches: of 4,800 pairs of solids made of cubes in line, at random,
+//! one that overlaps.
 
 use super::{CarriedFront, Search, Side};
-use crate::math::{Point, ROUND};
+use crate::math::{Point, ROUND, Vec3};
 use crate::narrow::mesh::deep::overlap;
 use crate::narrow::mesh::lack::Lack;
 use crate::narrow::mesh::triangle::edges;
-use crate::shape::Shape;
+use crate::shape::{Mesh, Shape};
 use crate::time::Meter;
 
+/// Points of what the two boxes share: its middle, and those of its eight parts.
+const POINTS: u32 = 9;
 /// Steps of the search that goes on, at most.
-const STEPS_MAX: u32 = 32;
-/// Pairs of leaves the middles of which are looked at, at most, ...
-const PROBES_MAX: u32 = 8;
+const STEPS_MAX: u32 = 64;
+/// Leaves the middles of which are looked at, at most, ...
+const PROBES_MAX: u32 = 16;
 /// ... in how many boxes twice, at most, ...
 const BOXES_MAX: usize = 256;
 /// ... and what that costs, in tests of a box against a pack: when the clock is to be read.
 const PROBE_COST: u64 = 16;
-/// Leaves are in line below this sine: the middle of neither lies deep in the other.
+/// Leaves are in line below this sine: the middle of neither lies deep in the other. Where they face one way, both
+/// solids are behind them ...
 const IN_LINE: f64 = 1e-6;
+/// ... and what is behind by this share of the smaller one's size is looked at.
+const BELOW: f64 = 0.1;
 /// After a search in vain the next is made where the two have moved by this share of the smaller one's radius.
 const VAIN: f64 = 1e-4;
 
 /// What was done about it at a pose.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Fathomed {
-    balls: bool,
+    points: u32,
     steps: u32,
     probes: u32,
+    /// By side, and by the triangle's number modulo 64: those the middles of which were looked at.
+    asked: [u64; 2],
+}
+
+impl Fathomed {
+    /// Whether the middles of two leaves were not looked at yet; from now on they were.
+    fn is_new(&mut self, places: [u32; 2]) -> [bool; 2] {
+        let bits = places.map(|place| 1 << (place % 64));
+        let is_new = [0, 1].map(|k| self.asked[k] & bits[k] == 0);
+        for k in 0..2 {
+            self.asked[k] |= bits[k];
+            self.probes += u32::from(is_new[k]);
+        }
+        is_new
+    }
 }
 
 impl CarriedFront {
@@ -44,42 +66,56 @@ impl CarriedFront {
     pub(super) fn is_fathoming(&self) -> bool {
         let done = &self.known.fathomed;
         let more = || !self.cover.open.is_empty() || self.cover.has_expired();
-        self.only_touches() && (!done.balls || (done.steps < STEPS_MAX && more()))
+        self.only_touches() && (done.points < POINTS || (done.steps < STEPS_MAX && more()))
     }
 
-    /// Asks the balls within the two, and then one point between them, once a pose; false: it is not their turn.
+    /// Asks the balls within the two and one point between them, and then each time another point; false: it is not
+    /// their turn.
     pub(super) fn fathom(&mut self, (a, b): (&Shape, &Shape), meter: &mut Meter<'_>) -> bool {
-        if !self.only_touches() || std::mem::replace(&mut self.known.fathomed.balls, true) {
+        let place = self.known.fathomed.points;
+        if !self.only_touches() || place == POINTS {
             return false;
         }
+        self.known.fathomed.points += 1;
         let pos12 = self.at.pos12;
-        let depth_m = if self.search == Search::Carried {
-            self.deep.depth(a, b, &pos12, meter)
-        } else {
-            overlap((a, b), &pos12, meter)
+        let of_balls = match (place, self.search) {
+            (0, Search::Carried) => self.deep.depth(a, b, &pos12, meter),
+            (0, _) => overlap((a, b), &pos12, meter),
+            _ => None,
         };
-        let depth_m = depth_m.or_else(|| {
+        let depth_m = of_balls.or_else(|| {
             meter.charge_weighted(1, PROBE_COST);
-            self.depth_between((a, b))
+            self.depth_between((a, b), place)
         });
         match depth_m {
             Some(depth_m) => self.known.high = self.known.high.min(-depth_m),
-            None if self.vain.holds(a, b, &pos12) => self.known.fathomed.steps = STEPS_MAX,
+            None if self.vain.holds(a, b, &pos12) => {
+                (self.known.fathomed.points, self.known.fathomed.steps) = (POINTS, STEPS_MAX);
+            }
             None => {}
         }
         true
     }
 
-    /// The same of the middle of what the boxes around the two share, where it lies in both.
-    fn depth_between(&self, (a, b): (&Shape, &Shape)) -> Option<f64> {
+    /// The same of a point of what the boxes around the two share, where it lies in both.
+    fn depth_between(&self, (a, b): (&Shape, &Shape), place: u32) -> Option<f64> {
         let (one, other) = (a.mesh()?, b.mesh()?);
         let middle_b = self.at.to_a(&b.aabb.centre());
         let half_b = self.at.rotation.abs() * b.aabb.half_extents();
         let low = (middle_b - half_b).sup(&a.aabb.min);
         let high = (middle_b + half_b).inf(&a.aabb.max);
-        let middle = nalgebra::center(&low, &high);
-        let in_a = one.depth_of(&middle, BOXES_MAX)?;
-        let in_b = other.depth_of(&self.at.to_b(&middle), BOXES_MAX)?;
+        let part = |k: usize| match place.checked_sub(1) {
+            None => 0.5,
+            Some(part) => 0.25 + 0.5 * f64::from(part >> k & 1),
+        };
+        let point = low + (high - low).component_mul(&Vec3::new(part(0), part(1), part(2)));
+        self.depth_at([one, other], &point)
+    }
+
+    /// The same of a point, A's frame.
+    fn depth_at(&self, [a, b]: [&Mesh; 2], point: &Point) -> Option<f64> {
+        let in_a = a.depth_of(point, BOXES_MAX)?;
+        let in_b = b.depth_of(&self.at.to_b(point), BOXES_MAX)?;
         self.certain_depth(in_a.max(in_b))
     }
 
@@ -114,23 +150,41 @@ impl CarriedFront {
         if done.steps >= STEPS_MAX || done.probes >= PROBES_MAX {
             return;
         }
-        let corners = [one.triangle(places[0]), other.triangle(places[1])];
+        if !self.only_touches() {
+            return;
+        }
+        let at = &self.at;
+        let corners = [
+            one.triangle(places[0]),
+            other.triangle(places[1]).map(|p| at.to_a(&p)),
+        ];
         let normals = corners.map(|corners| {
             let edges = edges(&corners);
             edges[0].cross(&edges[1])
         });
-        let turned = self.at.rotation * normals[1];
-        let sine = normals[0].cross(&turned).norm();
-        if !self.only_touches() || sine <= IN_LINE * normals[0].norm() * turned.norm() {
+        let middles = corners.map(|[p, q, r]| Point::from((p.coords + q.coords + r.coords) / 3.0));
+        let sine = normals[0].cross(&normals[1]).norm();
+        let meshes = [one, other];
+        let depth_m = if sine > IN_LINE * normals[0].norm() * normals[1].norm() {
+            let [of_a, of_b] = self.known.fathomed.is_new(places);
+            if !of_a && !of_b {
+                return;
+            }
+            let of_a = of_a.then(|| other.depth_of(&at.to_b(&middles[0]), BOXES_MAX));
+            let of_b = of_b.then(|| one.depth_of(&middles[1], BOXES_MAX));
+            let deepest_m = [of_a, of_b].into_iter().flatten().flatten();
+            self.certain_depth(deepest_m.fold(0.0, f64::max))
+        } else if normals[0].dot(&normals[1]) > 0.0 {
+            self.known.fathomed.probes += 1;
+            let below_m = BELOW * normals[0].norm().min(normals[1].norm()).sqrt();
+            let below = normals[0].normalize() * below_m;
+            let of = |middle: &Point| self.depth_at(meshes, &(middle - below));
+            of(&middles[0]).or_else(|| of(&middles[1]))
+        } else {
             return;
-        }
-        self.known.fathomed.probes += 1;
-        let middle = corners.map(|[p, q, r]| Point::from((p.coords + q.coords + r.coords) / 3.0));
-        let of_a = other.depth_of(&self.at.to_b(&middle[0]), BOXES_MAX);
-        let of_b = one.depth_of(&self.at.to_a(&middle[1]), BOXES_MAX);
+        };
         meter.charge_weighted(1, PROBE_COST);
-        let deepest_m = of_a.unwrap_or(0.0).max(of_b.unwrap_or(0.0));
-        if let Some(depth_m) = self.certain_depth(deepest_m) {
+        if let Some(depth_m) = depth_m {
             self.known.high = self.known.high.min(-depth_m);
         }
     }
