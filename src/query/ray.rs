@@ -270,7 +270,12 @@ impl RayQuestion {
         // A little more work, whatever the rest took.
         let mut meter = Meter::new(clock, None, Some(100_000));
         let seen = Measured::of(&probe, &near.body, 0.0, &mut meter);
-        found.normal = seen.normal.map(|[x, y, z]| [-x, -y, -z]);
+        // Of a surface that the ray begins on, the query may tell either side.
+        found.normal = seen.normal.map(|normal| {
+            let towards = Vec3::from(normal);
+            let is_ahead = towards.dot(&self.direction) >= 0.0 || before_m > 0.0;
+            (if is_ahead { -towards } else { towards }).into()
+        });
         found.shape = seen.place_b.map(|(shape, _)| shape);
         let triangle = seen.place_b.map(|(_, triangle)| triangle);
         found.triangle = triangle.filter(|place| *place != NO_INDEX);
@@ -329,7 +334,7 @@ impl RayQuestion {
             }
             cast.until_m = middle_m;
             // What is but within rounding of a touch may still be in front of it.
-            if seen.gap.max <= 0.0 {
+            if seen.gap.max <= 0.0 || self.is_hit(near, cast.free_m, middle_m, meter) {
                 cast.hit_m = middle_m;
             } else if seen.touching || seen.gap.max <= 2.0 * slop_m {
                 cast.touch_m = middle_m;
@@ -341,6 +346,15 @@ impl RayQuestion {
         }
         cast.free_m = cast.free_m.min(cast.hit_m);
         cast
+    }
+
+    /// Whether a ray that is free up to `free_m` certainly hits by `to_m`: where it is within the body then, or a piece
+    /// that begins well in front crosses the surface. One that begins at the surface only touches it, to all that
+    /// rounding tells.
+    fn is_hit(&self, near: &Near, free_m: f64, to_m: f64, meter: &mut Meter<'_>) -> bool {
+        let before_m = (2.0 * free_m - to_m).max(0.0);
+        let mut proves = |from_m| self.look(near, from_m, to_m, meter).gap.max <= 0.0;
+        proves(to_m) || before_m < free_m && proves(before_m)
     }
 
     fn look(&self, near: &Near, from_m: f64, to_m: f64, meter: &mut Meter<'_>) -> Measured {

@@ -348,3 +348,66 @@ fn bug_a_ray_near_the_z_axis_is_asked_along_its_own_direction() {
         }
     }
 }
+
+/// A cube of 2 m as a mesh that is a solid.
+const CUBE: &str = "{ type = \"trimesh\", solid = true, vertices = [[-1, -1, -1], [1, -1, -1], [-1, 1, -1], [1, 1, -1], [-1, -1, 1], [1, -1, 1], [-1, 1, 1], [1, 1, 1]], faces = [[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4], [2, 6, 3], [3, 6, 7], [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5]] }";
+
+/// The ray is free until it is in the box of the cube, which is its surface: all pieces of it begin there.
+#[test]
+fn bug_a_solid_mesh_along_the_axes_is_hit_where_it_is() {
+    let mut rig = Rig::new(&scene("", &[body(1, [0.0; 3], CUBE, "")]));
+    rig.send(ALL);
+    let hit = |from: [f64; 3], direction: [f64; 3]| {
+        ask(
+            rig.engine.world(),
+            &json(&Vec3::from(from), &Vec3::from(direction), ""),
+        )
+    };
+    let third = 1.0 / 3.0;
+    for (at, far) in [
+        // Onto a face, its diagonal, an edge, a corner, askew; and along a face, whose plane it is in.
+        ([0.3, 0.2, 1.0], [0.0, 0.0, 1.0]),
+        ([0.25, 0.25, -1.0], [0.0, 0.0, -2.0]),
+        ([0.3, 1.0, third], [0.5, 2.0, 0.1]),
+        ([1.0, 1.0, 0.25], [1.0, 1.0, 0.0]),
+        ([1.0, 1.0, 1.0], [1.0, 2.0, 3.0]),
+        ([-1.0, 0.5, 1.0], [-1.0, 0.25, 1.0]),
+        ([1.0, 0.5, 1.0], [2.0, 0.0, 0.0]),
+    ] {
+        let (at, far) = (Vec3::from(at), Vec3::from(far));
+        let found = hit((at + far).into(), (-far).into());
+        let (least, most) = (found.t_min_m, found.t_max_m.unwrap());
+        assert!(least <= far.norm() + 1e-12, "{at} {found:?}");
+        let in_plane = far.y == 0.0 && at.z == 1.0 && far.z == 0.0;
+        assert!(most >= far.norm() - 1e-12, "{at} {found:?}");
+        // What it only skims it never surely hits: by the end of its way along it, at most.
+        let wide = if in_plane { 2.0 } else { 1e-9 };
+        assert!(most - least <= wide + 1e-12, "{at} {found:?}");
+        let off = (found.t_best_m.unwrap() - far.norm()).abs();
+        assert!(off <= 1e-9, "{at} {found:?}");
+    }
+}
+
+#[test]
+fn bug_the_normal_of_a_surface_that_a_ray_begins_on_is_against_the_ray() {
+    let triangle = "{ type = \"triangle\", vertices = [[-1, -1, 0], [1, -1, 0], [0, 1, 0]] }";
+    let field =
+        "{ type = \"height_field\", heights = [[0, 0], [0, 0]], size = [2, 2], base_m = 1 }";
+    let cube = "{ type = \"box\", half_extents = [1, 1, 1] }";
+    for (shape, heights) in [
+        (CUBE, [1.0, -1.0]),
+        (cube, [1.0, -1.0]),
+        (field, [0.0, -1.0]),
+        (triangle, [0.0, 0.0]),
+    ] {
+        let mut rig = Rig::new(&scene("", &[body(1, [0.0; 3], shape, "")]));
+        rig.send(ALL);
+        for (height, down) in heights.into_iter().zip([-1.0, 1.0]) {
+            let from = Vec3::new(0.3, 0.2, height);
+            let found = ask(rig.engine.world(), &json(&from, &(Vec3::z() * down), ""));
+            assert_eq!(found.t_max_m, Some(0.0), "{shape} {found:?}");
+            let normal = Vec3::from(found.normal.unwrap());
+            assert!((normal.z + down).abs() < 1e-9, "{shape} {found:?}");
+        }
+    }
+}
