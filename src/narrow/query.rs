@@ -187,16 +187,8 @@ pub(super) fn sound(gap: Interval, a: &PlacedShape, b: &PlacedShape, bodies12: &
     }
     let reach = |pose: &Pose| pose.translation.vector.amax();
     let magnitude = reach(&a.pose) + reach(&b.pose) + reach(bodies12);
-    let wide = ordered.widened(32.0 * ROUND * magnitude);
-    // A proved overlap stays one: within rounding it touches at least, and touching collides.
-    Interval {
-        min: wide.min,
-        max: if ordered.max <= 0.0 {
-            wide.max.min(0.0)
-        } else {
-            wide.max
-        },
-    }
+    // An overlap that is less than that is a touch.
+    ordered.widened(32.0 * ROUND * magnitude)
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! 3.2, 3.3, 4.6: what once was said of meshes, half-spaces and height fields, through the engine.
 
-use sweepd::math::{Pose, Quat, Vec3};
+use sweepd::math::{Pose, Quat, Vec3, pose_from};
 use sweepd::time::Budget;
-use sweepd::wire::{State, Verdict};
+use sweepd::wire::{State, Verdict, pair_flags};
 
 use crate::oracle::meshes::{self, trimesh};
 use crate::rig::{ALL, NONE, Rig, ball, body, scene};
@@ -257,5 +257,53 @@ fn bug_what_touched_last_was_known_better_than_the_place_of_a_part_far_from_its_
             row.gap_max_m >= row.gap_best_m + off,
             "after {units}: {row:?}"
         );
+    }
+}
+
+/// Turned by quarters and at decimal places, a kilometre from the origins of their bodies: what composing their poses
+/// loses is more than they are apart by.
+#[test]
+fn bug_shapes_far_from_their_bodies_are_not_proved_to_overlap_where_rounding_alone_says_so() {
+    const HALF: f64 = std::f64::consts::FRAC_1_SQRT_2;
+    let gem = "type = \"convex\", vertices = [[0.3, 0, 0], [-0.3, 0, 0], [0, 0.3, 0], [0, -0.3, 0], [0, 0, 0.3], [0, 0, -0.3]]";
+    let turn = [0.0, HALF, 0.0, HALF];
+    // Gaps by 400 bits.
+    let cases = [
+        (
+            "position = [-626.9554710763733, -1320.663211605125, -107.75250794802987], \
+             orientation = [0, 0.7071067811865476, 0, 0.7071067811865476]",
+            (
+                [107.75250794802976, 1320.663211605125, -626.9554710763734],
+                turn,
+            ),
+            "type = \"box\", half_extents = [0.3, 0.3, 0.5], orientation = [-0.5, 0.5, 0.5, 0.5]",
+            ([0.60000000000004, 0.0, 0.0], turn),
+            1.5365e-13,
+        ),
+        (
+            "position = [1.0000000002220446, -1000000.5000000002, 0.1], \
+             orientation = [-0.7071067811865476, 0, 0, 0.7071067811865476]",
+            ([1000000.1, 0.1, 0.3], [HALF, HALF, 0.0, 0.0]),
+            "type = \"box\", half_extents = [1.0, 0.3, 0.5], orientation = [-0.5, 0.5, 0.5, 0.5], \
+             position = [2.220446049250313e-10, -1.0, -1000000.5000000002]",
+            ([1000000.1, 0.4, 0.8], [HALF, 0.0, HALF, 0.0]),
+            2.2204e-10,
+        ),
+    ];
+    for (gem_at, (at_a, turn_a), other, (at_b, turn_b), gap_m) in cases {
+        let bodies = [
+            body(1, [0.0; 3], &format!("{{ {gem}, {gem_at} }}"), ""),
+            body(2, [0.0; 3], &format!("{{ {other} }}"), ""),
+        ];
+        let mut rig = Rig::new(&scene("", &bodies));
+        rig.place(1, &pose_from(at_a, turn_a).unwrap());
+        rig.place(2, &pose_from(at_b, turn_b).unwrap());
+        rig.send(ALL);
+        let row = rig.pair(1, 2).unwrap();
+        let held = row.gap_min_m <= gap_m && gap_m <= row.gap_max_m;
+        assert!(held, "{gap_m} {row:?}");
+        // Rounding tells no overlap from a touch: it collides, and says so.
+        assert_eq!(rig.verdict(1, 2), Verdict::Colliding, "{row:?}");
+        assert_ne!(row.flags & pair_flags::TOUCHING, 0, "{row:?}");
     }
 }
