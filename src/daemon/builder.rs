@@ -26,6 +26,9 @@ use crate::world::{BuiltTree, Parts, WornTree};
 const INTERNAL: &str =
     "an internal error of the daemon while it read the request: nothing was changed; see its log";
 
+/// A question that brings along more vertices, faces and samples waits among the edits: others do not wait for it.
+const LARGE: usize = 4096;
+
 /// Stands for the asker of a tree: the daemon itself.
 pub(super) const TREE: RequestToken = RequestToken(u64::MAX);
 
@@ -41,6 +44,8 @@ enum Reading {
 enum Building {
     /// Edits that were read, the payload they were read from, and how much of it is JSON.
     Edits(RequestToken, EditRequest, usize, Vec<u8>),
+    /// A question that brings along large shapes.
+    Question(RequestToken, Question),
     /// A tree that has become loose; nobody waits for an answer.
     Tree(Box<WornTree>),
     /// What is needed no more.
@@ -226,7 +231,7 @@ impl Job for Reading {
 impl Job for Building {
     fn token(&self) -> RequestToken {
         match self {
-            Self::Edits(token, ..) => *token,
+            Self::Edits(token, ..) | Self::Question(token, _) => *token,
             Self::Tree(_) | Self::Forget(_) => TREE,
         }
     }
@@ -261,33 +266,37 @@ impl Reader {
     ) -> std::result::Result<Option<Done>, String> {
         let cut = payload.split_at_checked(json_len);
         let (json, blobs) = cut.ok_or("the request is shorter than its header says")?;
-        match Request::parse(json, blobs)? {
-            Request::Ask(question) => self.ask(question).map(Some),
-            Request::Edits(asked) => {
-                let job = Building::Edits(token, asked, json_len, payload);
-                // The other one ends with this one alone.
-                self.to_build.send(job).map_err(|_| INTERNAL)?;
-                Ok(None)
-            }
-        }
-    }
-
-    /// Builds what a question brings along.
-    fn ask(&mut self, question: Question) -> Made {
-        let built = match question.shapes() {
-            [] => None,
-            specs => Some(self.shapes.shapes(specs)?),
+        let job = match Request::parse(json, blobs)? {
+            Request::Ask(question) if is_large(&question) => Building::Question(token, question),
+            Request::Ask(question) => return asking(&mut self.shapes, question).map(Some),
+            Request::Edits(asked) => Building::Edits(token, asked, json_len, payload),
         };
-        let (shapes, warnings) = built.unzip();
-        Ok(Done::Ask(Box::new(Asking {
-            question,
-            shapes,
-            warnings: warnings.unwrap_or_default(),
-        })))
+        // The other one ends with this one alone.
+        self.to_build.send(job).map_err(|_| INTERNAL)?;
+        Ok(None)
     }
 }
 
-/// Makes edits and trees.
+fn is_large(question: &Question) -> bool {
+    let sizes = question.shapes().iter().map(|placed| placed.shape.size());
+    sizes.fold(0, usize::saturating_add) > LARGE
+}
+
+/// Builds what a question brings along.
+fn asking(builder: &mut EditBuilder, question: Question) -> Made {
+    let built = match question.shapes() {
+        [] => None,
+        specs => Some(builder.shapes(specs)?),
+    };
+    let (shapes, warnings) = built.unzip();
+    Ok(Done::Ask(Box::new(Asking {
+        question,
+        shapes,
+        warnings: warnings.unwrap_or_default(),
+    })))
+}
+
+/// Makes edits, trees, and what is large in questions.
 struct Maker {
     edits: EditBuilder,
 }
@@ -298,6 +307,7 @@ impl Maker {
             Building::Edits(token, asked, json_len, payload) => {
                 Some(self.edits(token, asked, json_len, payload))
             }
+            Building::Question(_, question) => Some(asking(&mut self.edits, question)),
             Building::Tree(worn) => Some(Ok(Done::Tree(Box::new(worn.build())))),
             Building::Forget(what) => {
                 drop(what);

@@ -100,4 +100,18 @@ impl ShapeSpec {
             _ => None,
         }
     }
+
+    /// How many vertices, faces and samples it brings along; a file may hold any number.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        match self {
+            Self::Convex { file: Some(_), .. } | Self::Trimesh { file: Some(_), .. } => usize::MAX,
+            Self::Convex { vertices, .. } => vertices.len(),
+            Self::Trimesh {
+                vertices, faces, ..
+            } => vertices.len() + faces.len(),
+            Self::HeightField { heights, .. } => heights.iter().map(Vec::len).sum(),
+            _ => 0,
+        }
+    }
 }
