@@ -541,3 +541,30 @@ fn bug_what_is_inside_a_solid_mesh_collides_with_it() {
         told[0]
     );
 }
+
+/// The engine of a daemon, which answers them, never sees such places, and is not made for them.
+#[test]
+fn solids_that_are_too_far_to_compute_with_are_told_as_such() {
+    let others = [
+        json!({"type": "sphere", "radius": 0.2}),
+        cube(1.0, Some(true)),
+        cube(1.0, None),
+        json!({"type": "half_space", "normal": [0, 0, 1], "offset": 0.0}),
+        json!({"type": "half_space", "normal": [0, 0, 1], "offset": 1e200}),
+    ];
+    for far in [1e100, 1e160, 1e200, 1e308] {
+        for other in &others {
+            for t in [[far, 0.0, far], [0.0, -far, 1.0]] {
+                let (whole, told) = ask(line("x", &cube(1.0, Some(true)), other, t).as_bytes());
+                let told = &told[0];
+                if far > 1e150 || other["offset"] == 1e200 {
+                    let why = told["error"].as_str().unwrap();
+                    assert!(!whole && why.contains("too far"), "{far} {told}");
+                } else {
+                    let ends = ["gap_min_m", "gap_max_m"].map(|key| told[key].as_f64().unwrap());
+                    assert!(ends[0] <= ends[1] && ends[1].is_finite(), "{far} {told}");
+                }
+            }
+        }
+    }
+}

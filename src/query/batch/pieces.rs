@@ -12,6 +12,10 @@ use crate::shape::{Convex, ShapeError, ShapeSpec, spread};
 /// digits): without it points 1e-170 m apart would be told as in one place. No longer gap is changed by so little.
 const SQUARES_LOST_M: f64 = 1.5e-154;
 
+/// Of squares that no number holds.
+pub(super) const TOO_FAR: &str =
+    "the shapes are too far from each other to compute with: write positions that are nearer";
+
 /// What pieces mean together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
@@ -174,9 +178,7 @@ pub(super) fn gap(a: &Pieces, b: &Pieces, pos12: &Pose) -> Result<Closest, Strin
     }
     (least.found())
         .map(|found| allow_for_squares(&found))
-        .ok_or_else(|| {
-            "the shapes are too far from each other to compute with: write positions that are nearer".to_owned()
-        })
+        .ok_or_else(|| TOO_FAR.to_owned())
 }
 
 /// Widens an interval by what squares may have lost; one that is no wider than that is as narrow as can be.

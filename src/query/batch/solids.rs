@@ -5,6 +5,7 @@
 
 use std::path::Path;
 
+use super::pieces::TOO_FAR;
 use crate::math::{Interval, Point, Pose, Vec3};
 use crate::narrow::exact::Closest;
 use crate::narrow::gap_between;
@@ -12,6 +13,9 @@ use crate::shape::{ShapeSpec, build};
 use crate::time::{Meter, SystemClock};
 use crate::wire::Verdict;
 use crate::world::{Body, Parts, PlacedShape};
+
+/// Farther the squares of distances are no numbers, metres.
+const FAR_M: f64 = 1e150;
 
 /// What is known of two shapes of which one at least is a solid mesh; A's frame, metres.
 pub(super) struct Known {
@@ -44,6 +48,18 @@ pub(super) fn gap(
 ) -> Result<Option<Known>, String> {
     if !is_solid(a) && !is_solid(b) {
         return Ok(None);
+    }
+    // The engine is made for scenes, whose numbers are far smaller.
+    let offset_m = |spec: &ShapeSpec| match spec {
+        ShapeSpec::HalfSpace { offset, .. } => offset.abs(),
+        _ => 0.0,
+    };
+    if offset_m(a)
+        .max(offset_m(b))
+        .max(pos12.translation.vector.amax())
+        > FAR_M
+    {
+        return Err(TOO_FAR.to_owned());
     }
     let a = body("a", a, &Pose::identity())?;
     let b = body("b", b, pos12)?;
