@@ -4,10 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::oracle::meshes::Soup;
 use crate::oracle::rng::Rng;
-use crate::support::shape;
-use sweepd::math::{Interval, Point, Pose, Vec3};
+use crate::support::{convex, shape};
+use sweepd::math::{Interval, Point, Pose, Quat, Vec3};
 use sweepd::narrow::mesh::{FrontStore, Goal, MeshQuery};
-use sweepd::shape::Shape;
+use sweepd::shape::{Convex, Shape};
 use sweepd::time::{ManualClock, Meter};
 
 type Cell = [i32; 3];
@@ -74,20 +74,38 @@ fn shared(one: &BTreeSet<Cell>, other: &BTreeSet<Cell>, off: Cell) -> i32 {
     all.map(|(a, b)| pair(a, b)).max().unwrap()
 }
 
-fn gap(a: &Shape, b: &Shape, pos12: &Pose) -> Interval {
+/// Their gap, and the units that it took.
+fn asked(a: &Shape, b: &Shape, pos12: &Pose) -> (Interval, u64) {
     let (mut store, mut query) = (FrontStore::default(), MeshQuery::default());
     let clock = ManualClock::new(0);
+    let mut meter = Meter::unlimited(&clock);
     query.start(&mut store, a, b, pos12);
-    while !query.advance(
-        &mut store,
-        (a, b),
-        Goal::Gap,
-        100,
-        &mut Meter::unlimited(&clock),
-    ) {}
+    while !query.advance(&mut store, (a, b), Goal::Gap, 100, &mut meter) {}
     let gap = query.interval();
     query.release(&mut store);
-    gap
+    (gap, meter.spent())
+}
+
+fn gap(a: &Shape, b: &Shape, pos12: &Pose) -> Interval {
+    asked(a, b, pos12).0
+}
+
+/// A point's depth is known in solid meshes alone: where one of the two is none, no second point is asked for it.
+/// A point's depth is known in solid meshes alone.
+#[test]
+fn bug_a_box_that_stands_on_a_solid_pays_for_no_points_that_tell_nothing() {
+    let floor = solid(&BTreeSet::from([[0, 0, 0]]));
+    let units = (1..20).map(|k| {
+        let half = 0.03 * f64::from(k);
+        let turn = Quat::from_scaled_axis(Vec3::z() * half);
+        let stands = Pose::from_parts(Vec3::new(0.5, 0.5, 1.0 + half).into(), turn);
+        let (found, units) = asked(&floor, &convex(Convex::cuboid(Vec3::repeat(half))), &stands);
+        assert!(found.contains(0.0), "{half} {found:?}");
+        units
+    });
+    let units: Vec<u64> = units.collect();
+    // 8 more each where all nine points are asked for.
+    assert!(units.iter().all(|units| *units <= 12), "{units:?}");
 }
 
 #[test]

@@ -76,7 +76,16 @@ impl CarriedFront {
         if !self.only_touches() || place == POINTS {
             return false;
         }
-        self.known.fathomed.points += 1;
+        // Of no other shape it is known how deep a point is: one unit is enough to see that.
+        let tells = |shape: &Shape| {
+            (shape.mesh()).is_some_and(|mesh| mesh.is_solid() && !mesh.is_deforming())
+        };
+        let points = if tells(a) && tells(b) {
+            place + 1
+        } else {
+            POINTS
+        };
+        self.known.fathomed.points = points;
         let pos12 = self.at.pos12;
         let of_balls = match (place, self.search) {
             (0, Search::Carried) => self.deep.depth(a, b, &pos12, meter),
@@ -146,11 +155,9 @@ impl CarriedFront {
         let (Side::Mesh(one), Side::Mesh(other)) = (a, b) else {
             return;
         };
-        let done = &mut self.known.fathomed;
-        if done.steps >= STEPS_MAX || done.probes >= PROBES_MAX {
-            return;
-        }
-        if !self.only_touches() {
+        let done = &self.known.fathomed;
+        let is_done = done.steps >= STEPS_MAX || done.probes >= PROBES_MAX;
+        if is_done || !self.only_touches() {
             return;
         }
         let at = &self.at;
