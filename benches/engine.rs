@@ -1,6 +1,6 @@
 //! A whole engine tick against rapier3d-f64's `CollisionPipeline`, same convex bodies, same poses, contacts asked of
 //! both, in one run, tick by tick in turn. Timed on both sides: taking the poses in, broad phase, narrow phase,
-//! contacts; on ours also the filled outbox: all contacts, and of the list of pairs all rows, or those that are new.
+//! contacts; on ours also the filled outbox: of the list of pairs and of contacts all rows, or those that are new.
 //!
 //! `cargo bench --bench engine [-- --quick | --case=N [--ticks=N]]`; a single case, counted from 0, is printed and not
 //! saved; for so many ticks in place of its own.
@@ -28,13 +28,15 @@ use sweepd::shape::ShapeSpec;
 use sweepd::time::{Budget, Clock, SystemClock};
 use sweepd::wire::Demand;
 
-/// How the list of pairs is asked for.
+/// How pairs and contacts are asked for.
 #[derive(Clone, Copy, Debug)]
 enum Rows {
     /// All of it in each tick.
     Pairs,
-    /// What is new in it, by which who listens keeps it: as rapier keeps its own.
+    /// All contacts, and of the list of pairs what is new.
     Changes,
+    /// What is new in both, by which who listens keeps them: as rapier keeps its own.
+    News,
 }
 
 impl Rows {
@@ -42,8 +44,9 @@ impl Rows {
     fn demand(self) -> Demand {
         Demand {
             pairs: matches!(self, Self::Pairs),
-            changes: matches!(self, Self::Changes),
-            contacts: true,
+            changes: matches!(self, Self::Changes | Self::News),
+            contacts: matches!(self, Self::Pairs | Self::Changes),
+            contact_changes: matches!(self, Self::News),
             ..Demand::default()
         }
     }
@@ -52,6 +55,7 @@ impl Rows {
         match self {
             Self::Pairs => "pairs",
             Self::Changes => "changes",
+            Self::News => "news",
         }
     }
 }
@@ -177,19 +181,22 @@ const fn case(bodies: usize, moving: usize, speed: f64, ticks: usize, rows: Rows
     }
 }
 
-const CASES: [Case; 12] = [
+const CASES: [Case; 15] = [
     case(1_000, 100, 0.1, 200, Rows::Pairs),
     case(1_000, 100, 1.0, 200, Rows::Pairs),
     case(1_000, 100, 10.0, 200, Rows::Pairs),
     case(1_000, 1, 1.0, 200, Rows::Pairs),
     case(1_000, 1, 1.0, 200, Rows::Changes),
+    case(1_000, 1, 1.0, 200, Rows::News),
     case(10_000, 100, 0.1, 200, Rows::Pairs),
     case(10_000, 100, 1.0, 200, Rows::Pairs),
     case(10_000, 100, 10.0, 200, Rows::Pairs),
     case(10_000, 1, 1.0, 200, Rows::Pairs),
     case(10_000, 1, 1.0, 200, Rows::Changes),
+    case(10_000, 1, 1.0, 200, Rows::News),
     case(100_000, 1, 1.0, 60, Rows::Pairs),
     case(100_000, 1, 1.0, 60, Rows::Changes),
+    case(100_000, 1, 1.0, 60, Rows::News),
 ];
 /// Ticks before the count begins.
 const SETTLE: usize = 20;
@@ -269,6 +276,11 @@ fn run(case: Case) -> String {
         }
     }
     let out = ours.out();
+    let listed = if matches!(asked, Rows::News) {
+        usize::try_from(out.contact_changes_header.listed).unwrap()
+    } else {
+        0
+    };
     let us = |ns: u64| ns as f64 / 1e3;
     let (own, theirs) = (quantile(&mut own_ns, 0.5), quantile(&mut peer_ns, 0.5));
     let means: Vec<String> = stages
@@ -285,7 +297,7 @@ fn run(case: Case) -> String {
         theirs as f64 / own as f64,
         out.tick.colliding,
         peer.colliding(),
-        out.contacts.len(),
+        out.contacts.len().max(listed),
         out.tick.candidates,
         means.join(",")
     )

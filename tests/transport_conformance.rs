@@ -364,15 +364,21 @@ fn nothing_is_sent_for_nobody<B: Backend>() {
     assert_eq!(client.view().pairs().unwrap().rows.len(), 3);
     assert!(client.view().contacts().is_none());
     assert!(client.view().regions().is_none());
-    assert!(client.view().list().is_none());
+    assert!(client.view().list().is_none() && client.view().contact_list().is_none());
 }
 
-/// The list kept from `changes` is the pairs of the same tick.
-fn has_list(client: &Client) -> bool {
+/// The lists kept from `changes` and `contact_changes` are the pairs and contacts of the same tick.
+fn has_lists(client: &Client) -> bool {
     let view = client.view();
-    let Some(list) = view.list() else {
+    let (Some(list), Some(contact_list)) = (view.list(), view.contact_list()) else {
         return false;
     };
+    if let Some(contacts) = view.contacts() {
+        assert_eq!(
+            contact_list.iter().copied().collect::<Vec<_>>(),
+            contacts.rows
+        );
+    }
     // Overtaken in the queue, they are not there to be compared with.
     if let Some(pairs) = view.pairs() {
         assert_eq!(list.iter().collect::<Vec<_>>(), pairs.rows);
@@ -380,7 +386,7 @@ fn has_list(client: &Client) -> bool {
     true
 }
 
-fn a_list_kept_from_changes_is_whole_or_not_shown<B: Backend>() {
+fn lists_kept_from_changes_are_whole_or_not_shown<B: Backend>() {
     let backend = B::new();
     let _daemon = backend.daemon(Manners::default());
     let mut client = backend.client(Some("sim"));
@@ -389,12 +395,12 @@ fn a_list_kept_from_changes_is_whole_or_not_shown<B: Backend>() {
     slow.subscribe(Topics::ALL).unwrap();
     for x in 1..=100_u32 {
         step(&mut client, 1 + u64::from(x % 4), f64::from(x)).unwrap();
-        assert!(has_list(&client), "step {x}");
+        assert!(has_lists(&client), "step {x}");
     }
     // Most of it was overtaken in its queue.
     assert_eq!(slow.latest().unwrap(), Heard::Tick);
     until("the whole list again", || {
-        let shown = has_list(&slow);
+        let shown = has_lists(&slow);
         slow.wait_tick(SECOND_NS).unwrap();
         shown
     });
@@ -404,10 +410,10 @@ fn a_list_kept_from_changes_is_whole_or_not_shown<B: Backend>() {
         slow = backend.client(None);
         slow.subscribe(Topics::ALL).unwrap();
         step(&mut client, 1 + u64::from(x % 4), f64::from(x)).unwrap();
-        assert!(has_list(&client), "step {x}");
+        assert!(has_lists(&client), "step {x}");
         until("the whole list for the new one", || {
             slow.wait_tick(SECOND_NS).unwrap();
-            has_list(&slow)
+            has_lists(&slow)
         });
     }
 }
@@ -721,7 +727,7 @@ both! {
     a_frame_that_was_passed_over_is_said_to_be_skipped
     a_late_joiner_gets_the_newest_state_from_an_idle_daemon
     a_slow_reader_holds_nobody_up_and_keeps_the_newest
-    a_list_kept_from_changes_is_whole_or_not_shown
+    lists_kept_from_changes_are_whole_or_not_shown
     sixteen_sources_are_all_heard
     a_flooder_does_not_starve_another_source
     frames_of_another_layout_or_beyond_limits_are_counted_and_good_ones_still_heard

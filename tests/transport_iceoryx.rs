@@ -256,7 +256,7 @@ fn an_instance_is_listed_with_its_daemon_sources_and_readers() {
     assert_eq!(info.boot_id, 7);
     assert_eq!((info.sources, info.readers), (1, 1));
     assert_eq!((info.pair_readers, info.contact_readers), (1, 1));
-    assert_eq!(info.change_readers, 1);
+    assert_eq!((info.change_readers, info.contact_change_readers), (1, 1));
     drop(client);
     daemon.stop();
     assert_eq!(list_instances(&files.place).unwrap(), []);

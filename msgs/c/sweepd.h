@@ -248,6 +248,8 @@ enum {
     SWEEPD_CONTACT_KIND_CONTACT = 0,
     /* The closest points of a near pair. */
     SWEEPD_CONTACT_KIND_CLOSEST = 1,
+    /* In `contact_changes` alone: the pair has no contacts any more. */
+    SWEEPD_CONTACT_KIND_GONE = 2,
 };
 
 /* The stages of a tick; index into TickRow::stage_ns. */
@@ -504,8 +506,8 @@ SWEEPD_ASSERT(offsetof(sweepd_message_header, reserved) == 49);
 SWEEPD_ASSERT(offsetof(sweepd_message_header, schema) == 52);
 SWEEPD_ASSERT(sizeof(sweepd_message_header) == 56);
 
-/* Type name "sweepd.v1.ChangesHeader", 72 bytes. User header of changes: what its rows are to be
- * applied to, and what that makes. */
+/* Type name "sweepd.v1.ChangesHeader", 72 bytes. User header of changes and contact_changes: what
+ * the rows are to be applied to, and what that makes. */
 typedef struct sweepd_changes_header {
     /* As in every message. */
     sweepd_message_header message;

@@ -38,6 +38,7 @@ fn as_json(i: &InstanceInfo) -> String {
         "pair_readers": i.pair_readers,
         "change_readers": i.change_readers,
         "contact_readers": i.contact_readers,
+        "contact_change_readers": i.contact_change_readers,
     })
     .to_string()
 }
@@ -48,12 +49,13 @@ fn as_text(i: &InstanceInfo) -> String {
         None => "no daemon".to_owned(),
     };
     format!(
-        "{:<20} {daemon}; over shared memory {}, {} ({} of pairs, {} of changes, {} of contacts)",
+        "{:<20} {daemon}; over shared memory {}, {} ({} of pairs, {} of changes, {} of contacts, {} of their changes)",
         i.instance,
         counted(i.sources, "source", "sources"),
         counted(i.readers, "reader", "readers"),
         i.pair_readers,
         i.change_readers,
-        i.contact_readers
+        i.contact_readers,
+        i.contact_change_readers
     )
 }

@@ -7,7 +7,7 @@
 //! message is the whole list, and so is the next. A message that changes the list is therefore never cut off.
 
 use crate::ids::small;
-use crate::wire::{ChangesHeader, Demand, MessageHeader, Outbox, PairRow};
+use crate::wire::{ChangesHeader, MessageHeader, Outbox, PairRow};
 
 use super::events::Ids;
 use super::listing::NO_EVENT;
@@ -18,10 +18,10 @@ use super::{AHEAD, Publisher, View};
 pub(super) struct Chain {
     /// The tick whose list its readers hold; 0: they hold none, or not all of it.
     base_tick: u64,
-    /// Pairs whose rows were dropped in this tick, by ids.
-    dropped: Vec<Ids>,
-    /// Places of the rows that are sent, by ids.
-    places: Vec<u32>,
+    /// Pairs whose rows, or whose contacts, were dropped in this tick, by ids.
+    pub(super) dropped: Vec<Ids>,
+    /// Places of the rows of the pairs that are told, by ids.
+    pub(super) places: Vec<u32>,
 }
 
 impl Chain {
@@ -30,11 +30,35 @@ impl Chain {
         self.dropped.clear();
     }
 
-    /// The row of a pair is dropped; it may get another yet.
-    pub(super) fn note_dropped(&mut self, demand: Demand, ids: Ids) {
-        if demand.changes {
+    /// What was told of a pair is dropped; it may get another row yet.
+    ///
+    /// * `told` - whether anybody is told.
+    pub(super) fn note_dropped(&mut self, told: bool, ids: Ids) {
+        if told {
             self.dropped.push(ids);
         }
+    }
+
+    /// The tick whose list a message of this one may build on; 0: none.
+    pub(super) fn base(&self, tick: u64) -> u64 {
+        if self.base_tick + 1 == tick {
+            self.base_tick
+        } else {
+            0
+        }
+    }
+
+    /// Ends a tick.
+    ///
+    /// * `base_tick` - what the next may build on; 0: nothing.
+    /// * `all` - how many rows the list has: how many are new differs from tick to tick, and room for all is made when
+    ///   they are more than ever.
+    pub(super) fn end(&mut self, base_tick: u64, all: usize) {
+        self.base_tick = base_tick;
+        self.dropped.clear();
+        self.dropped.reserve(all);
+        self.places.clear();
+        self.places.reserve(all);
     }
 
     /// Structure check, between two ticks.
@@ -87,13 +111,9 @@ impl Publisher {
             base_tick,
             listed: self.listing.len() as u64 - left_out,
         };
-        self.chain.base_tick = if left_out == 0 { view.tick } else { 0 };
-        // How many are new differs from tick to tick: room for all is made when they are more than ever.
         let all = self.listing.len();
-        self.chain.dropped.clear();
-        self.chain.dropped.reserve(all);
-        self.chain.places.clear();
-        self.chain.places.reserve(all);
+        self.chain
+            .end(if left_out == 0 { view.tick } else { 0 }, all);
         let more = all.saturating_sub(out.changes.len());
         out.changes.reserve(more);
     }
@@ -104,9 +124,9 @@ impl Publisher {
     fn choose_changes(&mut self, holds: bool, tick: u64) -> u64 {
         let (chain, listing, chosen) = (&mut self.chain, &self.listing, &self.chosen);
         let all = small(listing.len());
-        let base_tick = chain.base_tick;
+        let base_tick = chain.base(tick);
         chain.places.clear();
-        if holds && base_tick != 0 && base_tick + 1 == tick {
+        if holds && base_tick != 0 {
             chain.dropped.retain(|ids| listing.find(*ids).is_err());
             chain.places.extend(listing.news());
             if chain.places.len() + chain.dropped.len() <= listing.len() {

@@ -11,18 +11,13 @@ use super::listing::Mark;
 use super::{AHEAD, Publisher, View};
 
 impl Publisher {
-    /// Fills `contacts`; returns how many rows did not fit. Whole pairs are kept, deepest first.
+    /// Fills `contacts` and `contact_changes`; returns how many rows did not fit. Whole pairs are kept, deepest first.
     pub(super) fn fill_contacts(
         &mut self,
         view: &mut View<'_>,
         header: MessageHeader,
         out: &mut Outbox,
     ) -> u64 {
-        if !view.demand.contacts {
-            out.contacts.clear();
-            self.whole.contacts = false;
-            return 0;
-        }
         let all = self.survey.contacts();
         debug_assert_eq!(
             all,
@@ -30,9 +25,24 @@ impl Publisher {
             "every row was surveyed once"
         );
         let cut = all > self.limits.contact_rows;
-        if cut {
-            self.choose_pairs();
+        let told = if cut { self.choose_pairs() } else { all };
+        let left_out = (all - told) as u64;
+        let header = MessageHeader {
+            truncated: left_out,
+            ..header
+        };
+        self.fill_all_contacts(view, header, out);
+        self.fill_contact_changes(view, header, told, out);
+        left_out
+    }
+
+    fn fill_all_contacts(&mut self, view: &mut View<'_>, header: MessageHeader, out: &mut Outbox) {
+        if !view.demand.contacts {
+            out.contacts.clear();
+            self.whole.contacts = false;
+            return;
         }
+        let cut = header.truncated > 0;
         let whole = std::mem::replace(&mut self.whole.contacts, !cut) && !cut;
         let mut kept = std::mem::take(&mut self.kept_contacts);
         kept.begin();
@@ -65,12 +75,7 @@ impl Publisher {
         }
         kept.finish(&mut out.contacts);
         self.kept_contacts = kept;
-        let left_out = all.saturating_sub(out.contacts.len()) as u64;
-        out.contacts_header = MessageHeader {
-            truncated: left_out,
-            ..header
-        };
-        left_out
+        out.contacts_header = header;
     }
 
     /// Keeps the contacts of rows that are not fresh and stood side by side, from a place on; returns the place behind
@@ -98,8 +103,8 @@ impl Publisher {
     }
 
     /// Chooses the pairs whose contacts fit: the deepest, of equally deep ones those with the smaller ids. The first is
-    /// told, whatever the limit is.
-    fn choose_pairs(&mut self) {
+    /// told, whatever the limit is. Returns how many contacts they have.
+    fn choose_pairs(&mut self) -> usize {
         let (by_depth, rows) = (&mut self.contact_pairs, &self.listing);
         by_depth.clear();
         let pairs = rows.iter().enumerate().filter(|(_, row)| row.contacts > 0);
@@ -123,14 +128,17 @@ impl Publisher {
         from = from.max(usize::from(!by_depth.is_empty()));
         self.chosen.clear();
         self.chosen.resize(rows.len(), false);
-        by_depth[..from]
-            .iter()
-            .for_each(|&(_, at, _)| self.chosen[at as usize] = true);
+        let mut told = 0;
+        for &(_, at, count) in &by_depth[..from] {
+            self.chosen[at as usize] = true;
+            told += count as usize;
+        }
+        told
     }
 }
 
 /// Appends the contacts of a pair.
-fn push_rows(view: &View<'_>, slot: PairSlot, out: &mut Vec<ContactRow>) {
+pub(super) fn push_rows(view: &View<'_>, slot: PairSlot, out: &mut Vec<ContactRow>) {
     let Some(finding) = view.narrow.finding(slot) else {
         return;
     };

@@ -5,6 +5,7 @@
 
 mod bodies;
 mod changes;
+mod contact_changes;
 mod contacts;
 mod events;
 mod kept;
@@ -37,6 +38,7 @@ const AHEAD: usize = 8;
 struct OfMessages {
     pairs: bool,
     contacts: bool,
+    contact_changes: bool,
 }
 
 /// What a tick hands to the publisher.
@@ -73,6 +75,8 @@ pub struct Publisher {
     /// What `changes` build on.
     chain: Chain,
     kept_contacts: Kept<ContactRow>,
+    /// What `contact_changes` build on.
+    contact_chain: Chain,
     /// Used only when not all contacts fit: of the pairs that have some the depth in metres, the place among the rows
     /// and how many they are.
     contact_pairs: Vec<(f64, u32, u32)>,
@@ -99,6 +103,7 @@ impl Publisher {
             kept_pairs: Kept::default(),
             chain: Chain::default(),
             kept_contacts: Kept::default(),
+            contact_chain: Chain::default(),
             contact_pairs: Vec::new(),
             chosen: Vec::new(),
             whole: OfMessages::default(),
@@ -114,15 +119,20 @@ impl Publisher {
     pub fn forget_slots(&mut self, last: u64, world: &World) {
         self.events.forget_slots(last, world);
         self.listing.forget_slots();
-        self.chain.break_off();
+        self.break_chains();
         self.survey.forget();
     }
 
     /// Nothing of the last tick holds: every row is made anew.
     pub(crate) fn forget_rows(&mut self) {
         self.listing.forget();
-        self.chain.break_off();
+        self.break_chains();
         self.survey.forget();
+    }
+
+    fn break_chains(&mut self) {
+        self.chain.break_off();
+        self.contact_chain.break_off();
     }
 
     /// Fills every message that is listened to, then the tick's own counts, state and reasons.

@@ -24,6 +24,7 @@ impl Publisher {
         let heard = OfMessages {
             pairs: view.demand.pairs,
             contacts: view.demand.contacts,
+            contact_changes: view.demand.contact_changes,
         };
         if std::mem::replace(&mut self.heard, heard) != heard {
             // What nobody listened to was not made.
@@ -41,6 +42,7 @@ impl Publisher {
     fn renew_rows(&mut self, view: &mut View<'_>) {
         self.listing.begin(|slot| view.narrow.is_stirred(slot));
         self.chain.begin();
+        self.contact_chain.begin();
         let mut n = 0;
         while let Some(at) = self.listing.dirty(n) {
             let ahead = self.listing.dirty(n + AHEAD);
@@ -53,16 +55,22 @@ impl Publisher {
             // An event is told once: without it the row is another.
             let stirred = was.slot.is_none_or(|slot| view.narrow.is_stirred(slot));
             let news = stirred || was.event != NO_EVENT;
-            match was.slot.and_then(|slot| self.look(view, slot)) {
+            let now = was.slot.and_then(|slot| self.look(view, slot));
+            let has_some = |now: &Row| now.ids == was.ids && now.contacts > 0;
+            if was.contacts > 0 && !now.as_ref().is_some_and(has_some) {
+                let told = view.demand.contact_changes;
+                self.contact_chain.note_dropped(told, was.ids);
+            }
+            match now {
                 Some(now) if now.ids == was.ids => self.listing.renew(at, now, news),
                 // The slot holds another pair now.
                 Some(now) => {
-                    self.chain.note_dropped(view.demand, was.ids);
+                    self.chain.note_dropped(view.demand.changes, was.ids);
                     self.listing.drop(at);
                     self.listing.add(now);
                 }
                 None => {
-                    self.chain.note_dropped(view.demand, was.ids);
+                    self.chain.note_dropped(view.demand.changes, was.ids);
                     self.listing.drop(at);
                     if was.slot.is_some_and(|slot| view.narrow.is_active(slot)) {
                         self.listing.lacks();
@@ -148,7 +156,7 @@ fn row_of(
     finding: &Finding<'_>,
     passage: Option<Passage>,
 ) -> Row {
-    let contacts = if view.demand.contacts {
+    let contacts = if view.demand.tells_contacts() {
         contacts_of(view, slot, finding)
     } else {
         0

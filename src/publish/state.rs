@@ -155,6 +155,7 @@ fn repeat(header: MessageHeader, state: State, out: &mut Outbox) {
         &mut out.pairs_header,
         &mut out.changes_header.message,
         &mut out.contacts_header,
+        &mut out.contact_changes_header.message,
         &mut out.regions_header,
         &mut out.bodies_header,
     ] {

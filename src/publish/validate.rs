@@ -26,6 +26,7 @@ impl Publisher {
         self.validate_rows(narrow)?;
         self.survey.validate(self.listing.iter())?;
         self.chain.validate(tick)?;
+        self.contact_chain.validate(tick)?;
         // Of rows that were forgotten the messages tell still.
         if !self.listing.is_complete() {
             return Ok(());

@@ -182,6 +182,7 @@ fn demand_bits(demand: Demand) -> u8 {
         | u8::from(demand.body_verdicts) << 4
         | u8::from(demand.changes) << 5
         | u8::from(demand.changes_anew) << 6
+        | u8::from(demand.contact_changes) << 7
 }
 
 fn demand_of(bits: u8) -> Demand {
@@ -193,6 +194,7 @@ fn demand_of(bits: u8) -> Demand {
         body_verdicts: bits & 16 != 0,
         changes: bits & 32 != 0,
         changes_anew: bits & 64 != 0,
+        contact_changes: bits & 128 != 0,
     }
 }
 

@@ -26,6 +26,7 @@ const DEMAND: Demand = Demand {
     bodies: false,
     body_verdicts: false,
     changes: false,
+    contact_changes: false,
     changes_anew: false,
 };
 

@@ -28,10 +28,10 @@ impl Default for Audience {
 impl Audience {
     /// Notes who listens to this tick; what somebody has read lately.
     pub(super) fn note(&mut self, now: Demand) -> Readers {
-        let whole = now.contacts || now.regions;
+        let whole = now.tells_contacts() || now.regions;
         Readers {
             bounds: lately(&mut self.bounds, now.pairs || now.changes || whole),
-            contacts: lately(&mut self.contacts, now.contacts),
+            contacts: lately(&mut self.contacts, now.tells_contacts()),
             regions: lately(&mut self.regions, now.regions),
         }
     }

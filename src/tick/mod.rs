@@ -255,8 +255,8 @@ impl Engine {
         let budget = input.budget;
         let demand = input.demand;
         let wanted = Wanted {
-            contacts: demand.contacts || demand.regions,
-            bounds: demand.pairs || demand.changes || demand.contacts || demand.regions,
+            contacts: demand.tells_contacts() || demand.regions,
+            bounds: demand.pairs || demand.changes || demand.tells_contacts() || demand.regions,
             regions: demand.regions,
             order: self.end.order(budget),
         };

@@ -196,7 +196,7 @@ fn a_tick_says_the_same_whether_its_rows_are_kept_or_made_anew() {
         let (inbox, edits) = (world.frames(clock.boottime_ns()), world.edits());
         let (mut demand, budget) = world.asked();
         // They tell what was forgotten: see `changes`.
-        demand.changes = false;
+        (demand.changes, demand.contact_changes) = (false, false);
         let broken = tick % 211 == 0;
         let run = |engine: &mut Engine| {
             if broken {

@@ -46,6 +46,7 @@ impl Door for Both<'_> {
             bodies: first.bodies || beside.bodies,
             body_verdicts: first.body_verdicts || beside.body_verdicts,
             changes: first.changes || beside.changes,
+            contact_changes: first.contact_changes || beside.contact_changes,
             changes_anew: first.changes_anew || beside.changes_anew,
         }
     }

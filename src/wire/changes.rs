@@ -1,11 +1,12 @@
-//! `changes`: its header, and what its rows mean for a list of pairs that is kept from them.
+//! `changes` and `contact_changes`: their header, and what rows mean for a list that is kept from them.
 
 use iceoryx2::prelude::ZeroCopySend;
 
-use super::codes::{Verdict, pair_flags};
-use super::rows::{MessageHeader, PairRow};
+use super::codes::{ContactKind, Verdict, pair_flags};
+use super::rows::{ContactRow, MessageHeader, PairRow};
+use crate::ids::BodyId;
 
-/// User header of `changes`: what its rows are to be applied to, and what that makes.
+/// User header of `changes` and `contact_changes`: what the rows are to be applied to, and what that makes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ZeroCopySend)]
 #[repr(C)]
 #[type_name("sweepd.v1.ChangesHeader")]
@@ -40,5 +41,25 @@ impl PairRow {
         if self.verdict == Verdict::Near.code() || self.verdict == Verdict::Colliding.code() {
             self.certified_tick = self.certified_tick.saturating_add(ticks);
         }
+    }
+}
+
+impl ContactRow {
+    /// The row of `contact_changes` that says of a pair that it has no contacts any more.
+    #[must_use]
+    pub fn gone((body_a, body_b): (BodyId, BodyId)) -> Self {
+        Self {
+            body_a: body_a.0,
+            body_b: body_b.0,
+            kind: ContactKind::Gone.code(),
+            ..Self::default()
+        }
+    }
+
+    /// Whether this row of `contact_changes` says that its pair has no contacts any more; any others take the place of
+    /// all that the pair had.
+    #[must_use]
+    pub fn is_gone(&self) -> bool {
+        self.kind == ContactKind::Gone.code()
     }
 }

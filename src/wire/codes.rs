@@ -272,6 +272,8 @@ code! {
         Contact = 0 => "contact",
         /// The closest points of a `near` pair.
         Closest = 1 => "closest",
+        /// In `contact_changes` alone: the pair has no contacts any more.
+        Gone = 2 => "gone",
     }
 }
 

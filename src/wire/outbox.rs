@@ -24,7 +24,9 @@ pub struct Demand {
     pub body_verdicts: bool,
     /// Somebody reads `changes`.
     pub changes: bool,
-    /// ... and came since the last message of it, or missed that: the next holds the whole list.
+    /// Somebody reads `contact_changes`: manifolds are computed.
+    pub contact_changes: bool,
+    /// Somebody came to one of these two since its last message, or missed that: the next of both are whole.
     pub changes_anew: bool,
 }
 
@@ -37,8 +39,15 @@ impl Demand {
         bodies: true,
         body_verdicts: true,
         changes: true,
+        contact_changes: true,
         changes_anew: false,
     };
+
+    /// Whether contacts are told, all of them or what is new.
+    #[must_use]
+    pub fn tells_contacts(self) -> bool {
+        self.contacts || self.contact_changes
+    }
 }
 
 /// What one tick publishes. Kept and refilled from tick to tick.
@@ -58,6 +67,10 @@ pub struct Outbox {
     pub contacts_header: MessageHeader,
     /// Contacts, by `(body_a, body_b)`, then by shapes, triangles and id.
     pub contacts: Vec<ContactRow>,
+    /// Header of `contact_changes`.
+    pub contact_changes_header: ChangesHeader,
+    /// What is new of `contacts` since the tick before, in the same order; or all of it, by the header.
+    pub contact_changes: Vec<ContactRow>,
     /// Header of `regions`.
     pub regions_header: MessageHeader,
     /// Regions, by `(body_a, body_b)`, then by index.

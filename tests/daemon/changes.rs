@@ -1,7 +1,8 @@
-//! `changes`: a list kept from them is what another process reads in `pairs`, through edits, lost messages, restarts.
+//! `changes` and `contact_changes`: lists kept from them are what another process reads in `pairs` and `contacts`, through
+//! edits, lost messages, restarts.
 
 use sweepd::transport::client::{Client, FrameInfo, Heard, Rows, StepError, Topics};
-use sweepd::wire::{EndCause, PairRow, TransformRow};
+use sweepd::wire::{EndCause, TransformRow};
 
 use crate::live::{Desk, SECOND_NS, at, step, until};
 
@@ -47,7 +48,7 @@ fn rows(number: u64, squeezed: u64) -> Vec<TransformRow> {
 }
 
 /// As text: NaN is equal to NaN here.
-fn text(rows: impl Iterator<Item = PairRow>) -> Vec<String> {
+fn text<T: std::fmt::Debug>(rows: impl Iterator<Item = T>) -> Vec<String> {
     rows.map(|row| format!("{row:?}")).collect()
 }
 
@@ -62,17 +63,23 @@ fn pairs_of(reader: &mut Client, tick: u64) -> Vec<String> {
 }
 
 #[test]
-fn a_list_kept_from_changes_is_what_another_process_reads_in_pairs() {
+fn lists_kept_from_changes_are_what_another_process_reads_in_pairs_and_contacts() {
     let desk = Desk::new();
     let _daemon = desk.run(&scene(), &[]);
     let mut client = changes_only(&desk, Some("sim"));
+    let topics = Topics {
+        contact_changes: true,
+        ..Topics::default()
+    };
+    client.subscribe(topics).unwrap();
     let mut reader = desk.client(None);
     let topics = Topics {
         pairs: true,
+        contacts: true,
         ..Topics::default()
     };
     reader.subscribe(topics).unwrap();
-    let (mut deltas, mut cut) = (0, 0);
+    let (mut deltas, mut cut, mut contact_deltas) = (0, 0, 0);
     for number in 1..=120 {
         // Squeezed, they are more pairs than fit.
         let squeezed = if number % 40 > 30 { 30 } else { 3 };
@@ -96,8 +103,22 @@ fn a_list_kept_from_changes_is_what_another_process_reads_in_pairs() {
             pairs_of(&mut reader, tick),
             "step {number}"
         );
+        let contacts = client.view().contact_list().unwrap();
+        contact_deltas += u64::from(contacts.changes().header.base_tick != 0);
+        let told = reader.view().contacts().unwrap();
+        assert_eq!(
+            text(contacts.iter()),
+            text(told.rows.iter()),
+            "step {number}"
+        );
+        for row in &told.rows {
+            let of_pair = contacts.get(row.body_a, row.body_b);
+            assert!(of_pair.contains(row), "step {number}");
+        }
+        assert_eq!(contacts.len(), told.rows.len());
     }
     assert!(deltas > 60 && cut > 10, "{deltas} deltas, {cut} cut off");
+    assert!(contact_deltas > 60, "{contact_deltas} deltas");
 }
 
 fn request(client: &mut Client, json: &str) {

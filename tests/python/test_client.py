@@ -115,19 +115,42 @@ def crowd(step):
     return {**poses(1.2 + 0.5 * math.sin(0.3 * step)), **places}
 
 
-def test_a_list_kept_from_changes_is_what_pairs_says(started):
-    with sweepd.Client(started(MANY), "sim", quat_order="wxyz", listen=("pairs", "changes")) as client:
-        deltas = rows = 0
+def test_lists_kept_from_changes_are_what_pairs_and_contacts_say(started):
+    listen = ("pairs", "changes", "contacts", "contact_changes")
+    with sweepd.Client(started(MANY), "sim", quat_order="wxyz", listen=listen) as client:
+        deltas = rows = contacts = gone = 0
         for step in range(150):
             result = client.step(crowd(step), timeout_s=5)
             assert result.listed.tobytes() == result.pairs.tobytes(), step
             deltas += result.changes_header.base_tick != 0
             rows += len(result.changes)
+            assert result.listed_contacts.tobytes() == result.contacts.tobytes(), step
+            assert len(result.contacts) == result.contact_changes_header.listed > 0
+            contacts += len(result.contact_changes)
+            gone += int((result.contact_changes["kind"] == sweepd.layout.ContactKind.GONE).sum())
         assert deltas > 100 and rows < 150 * len(result.pairs)
+        assert contacts < 150 * len(result.contacts) and gone > 50
         before = result
         client.step(crowd(step), timeout_s=5)
         with pytest.raises(sweepd.SweepdError, match="gone on to another tick"):
             before.listed
+        with pytest.raises(sweepd.SweepdError, match="gone on to another tick"):
+            before.listed_contacts
+
+
+def test_contacts_are_kept_from_their_changes_alone(started):
+    instance = started(MANY)
+    with (
+        sweepd.Client(instance, "sim", quat_order="wxyz", listen="contact_changes") as client,
+        sweepd.Client(instance, None, listen="contacts") as reader,
+    ):
+        for step in range(40):
+            result = client.step(crowd(step), timeout_s=5)
+            told = reader.wait(timeout_s=5)
+            while told.tick.header.tick < result.tick.header.tick:
+                told = reader.wait(timeout_s=5)
+            assert result.pairs is None and result.contacts is None
+            assert result.listed_contacts.tobytes() == told.contacts.tobytes()
 
 
 def test_a_list_that_missed_a_message_is_not_shown_until_the_whole_of_it_came(started, monkeypatch):
@@ -160,7 +183,7 @@ def test_a_list_that_missed_a_message_is_not_shown_until_the_whole_of_it_came(st
         assert after.changes_header.base_tick != 0 and len(after.listed) == after.changes_header.listed
 
 
-@pytest.mark.parametrize("topics", [("pairs", "contacts", "regions", "bodies"), ("changes", "bodies")])
+@pytest.mark.parametrize("topics", [("pairs", "contacts", "regions", "bodies"), ("changes", "contact_changes", "bodies")])
 def test_bug_results_may_be_kept_and_stay_as_they_are(started, topics):
     with sweepd.Client(started(MANY), "sim", quat_order="wxyz", listen=topics) as client:
         kept = []
@@ -237,7 +260,7 @@ def test_bug_a_list_whose_place_another_reader_took_is_asked_for_again(started, 
 
         monkeypatch.setattr(client._ports, "_read", taken)
         with pytest.raises(sweepd.Refused, match="every place"):
-            client._renew_list()
+            client._renew_list("changes")
         for step in range(1, 12):
             result = client.step(crowd(step), timeout_s=5)
             if result.listed is not None and result.changes_header.base_tick == 0:

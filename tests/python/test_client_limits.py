@@ -187,7 +187,7 @@ def test_bug_what_a_boot_that_came_and_went_unseen_left_was_followed_for_ever():
     client._held = client._tick = None
     client._boots_over, client._topics, client._now, client._ahead = [], {}, {}, {"names": None}
     client._waited = {"names": 0}
-    client._list = SimpleNamespace(boot_id=0)
+    client._lists = {}
     client._ports = SimpleNamespace(tick=tick, message=lambda topic: None, close=lambda: None)
     assert client._take()
     with pytest.raises(sweepd.Restarted):

@@ -235,7 +235,7 @@ def bare(world, ticks):
     tick.tick.header.tick += 1
     tick.tick.sources_len = 0
     tick.tick.header.state = State.CLEAR
-    tick.changes_header = None
+    tick.changes_header = tick.contact_changes_header = None
     ticks.insert(21, tick)
 
 
@@ -295,6 +295,23 @@ def kept_row(world, ticks):
         ticks, lambda told: told.changes is not None and len(told.changes) > 0 and told.changes_header.base_tick, 20
     )
     ticks[at].changes["begin_first_tick"] += 1
+
+
+def kept_contact(world, ticks):
+    """``contact_changes`` have a contact of which ``contacts`` say something else."""
+    at = find(ticks, lambda told: told.contact_changes is not None and told.contact_changes_header.base_tick, 20)
+    at = find(ticks, lambda told: bool((told.contact_changes["kind"] == ContactKind.CONTACT).any()), at)
+    ticks[at].contact_changes["gap_m"] -= 1e-12
+
+
+def forgotten_contact(world, ticks):
+    """A pair whose contacts are gone is not told."""
+
+    def gone(told):
+        return told.contact_changes["kind"] == ContactKind.GONE
+
+    at = find(ticks, lambda told: told.contact_changes is not None and bool(gone(told).any()), 20)
+    ticks[at].contact_changes = ticks[at].contact_changes[~gone(ticks[at])]
 
 
 def spoil_contact(field, by):
@@ -377,6 +394,7 @@ SPOILT = {
     "base": spoil_changes("base_tick", -1),
     "listed": spoil_changes("listed", 1),
     "changes": kept_row,
+    "contact_changes": kept_contact,
     "contact": spoil_contact("point_a", FAR),
     "region": less_regions,
 }
@@ -399,6 +417,7 @@ MORE = {
     "a fixed body that moved": ("status", spoil_body(fixed, position=moved)),
     "a normal of no unit length": ("contact", spoil_contact("normal", 0.1)),
     "more work than was there": ("units", spoil_tick(lambda told: told.tick.budget_units == 0, units=9)),
+    "contacts that are gone and not told": ("listed", forgotten_contact),
     "a collision without contact": ("undecided", less_contacts),
     "a possible pair that is dropped": ("missed", drop_row(is_of(Verdict.POSSIBLE), ("sinker", "floor"))),
     "an open way that is dropped": ("untold", drop_row(has_open_way, ("shot", "wall"))),

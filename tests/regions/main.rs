@@ -37,6 +37,7 @@ const ASKED: Demand = Demand {
     bodies: false,
     body_verdicts: false,
     changes: false,
+    contact_changes: false,
     changes_anew: false,
 };
 

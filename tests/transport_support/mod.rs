@@ -18,6 +18,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use sweepd::error::Result;
+use sweepd::ids::BodyId;
 use sweepd::time::{Clock, SystemClock};
 use sweepd::transport::iceoryx::{Place, Server, ServerOptions};
 use sweepd::transport::{Door, RequestToken};
@@ -328,13 +329,17 @@ fn tick(door: &mut dyn Door, outbox: &mut Outbox, demand: sweepd::wire::Demand, 
         outbox.pairs.clone_from(&pairs);
     }
     change(outbox, demand, &pairs);
+    let contact = |row: &TransformRow| ContactRow {
+        body_a: row.body,
+        gap_m: row.position[0],
+        ..ContactRow::default()
+    };
+    let contacts: Vec<ContactRow> = frame.transforms.iter().map(contact).collect();
+    if demand.contacts {
+        outbox.contacts.clone_from(&contacts);
+    }
+    change_contacts(outbox, demand, &contacts);
     for row in &frame.transforms {
-        if demand.contacts {
-            outbox.contacts.push(ContactRow {
-                body_a: row.body,
-                ..ContactRow::default()
-            });
-        }
         if demand.regions {
             outbox.regions.push(RegionRow {
                 body_a: row.body,
@@ -366,6 +371,26 @@ fn change(outbox: &mut Outbox, demand: sweepd::wire::Demand, pairs: &[PairRow]) 
         gone.verdict = Verdict::Apart.code();
     }
     outbox.changes.extend_from_slice(pairs);
+}
+
+/// As [`change`], of contacts.
+fn change_contacts(outbox: &mut Outbox, demand: sweepd::wire::Demand, contacts: &[ContactRow]) {
+    let header = outbox.tick.header;
+    let before = outbox.contact_changes_header.message.tick;
+    let whole = demand.changes_anew || before + 1 != header.tick;
+    outbox.contact_changes_header = ChangesHeader {
+        message: header,
+        base_tick: if whole { 0 } else { before },
+        listed: contacts.len() as u64,
+    };
+    let there = |gone: &ContactRow| contacts.iter().any(|row| row.body_a == gone.body_a);
+    outbox
+        .contact_changes
+        .retain(|row| !whole && !row.is_gone() && !there(row));
+    for row in &mut outbox.contact_changes {
+        *row = ContactRow::gone((BodyId(row.body_a), BodyId(row.body_b)));
+    }
+    outbox.contact_changes.extend_from_slice(contacts);
 }
 
 /// `n` bodies whose x says which frame they are from.

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from . import layout
 from .errors import Refused, Restarted, Skipped, SweepdError, TimedOut
 from .frames import MOVING, POSE, array, blank, columns_of, rows_of, seconds, seconds_to_send, time_left, whole
-from .pairlist import PairList
+from .lists import ContactList, PairList
 from .ports import Ports
 from .refusals import source_row, why_no_result
 from .turns import Turns, in_turn
@@ -32,13 +32,15 @@ _TOPICS = {
     "pairs": layout.PairRow,
     "changes": layout.PairRow,
     "contacts": layout.ContactRow,
+    "contact_changes": layout.ContactRow,
     "regions": layout.RegionRow,
     "bodies": layout.BodyRow,
     "body_verdicts": ctypes.c_uint8,
     "names": layout.NameRow,
     "plan": ctypes.c_uint8,
 }
-_HEADERS = {"changes": layout.ChangesHeader}
+_HEADERS = {"changes": layout.ChangesHeader, "contact_changes": layout.ChangesHeader}
+_LISTS = {"changes": PairList, "contact_changes": ContactList}
 _VERTEX = np.dtype(layout.VertexRow)
 #: Poses of bodies as ``Client.send`` describes them: by name, columns, or rows.
 Poses = Union[Mapping[str, Sequence[ArrayLike]], Sequence[ArrayLike], np.ndarray]
@@ -74,15 +76,18 @@ class Result:
     structured arrays over shared memory, None where the client did not listen or a newer one overtook it. Keep as many
     results as you like: where three arrays of a kind are still there, the next one is a copy. ``changes`` are the rows that
     changed since the tick before, under ``changes_header`` whose ``base_tick`` is 0 the whole list; None also where the
-    list is not whole (yet, or again). Copies (``copy.deepcopy``) and pickles are whole.
+    list is not whole (yet, or again). ``contact_changes`` and ``contact_changes_header`` are the same of contacts. Copies (``copy.deepcopy``) and pickles are whole.
     """
 
-    def __init__(self, tick: layout.TickRow, messages: dict[str, Any], listing: PairList, turns: Turns) -> None:
+    def __init__(self, tick: layout.TickRow, messages: dict[str, Any], lists: dict[str, Any], turns: Turns) -> None:
         self.tick = tick
-        self._list, self._turns = listing, turns
+        self._lists, self._turns = lists, turns
         self.changes_header: Optional[layout.ChangesHeader]
         self.changes: Optional[np.ndarray]
         self.changes_header, self.changes = messages.pop("changes", (None, None))
+        self.contact_changes_header: Optional[layout.ChangesHeader]
+        self.contact_changes: Optional[np.ndarray]
+        self.contact_changes_header, self.contact_changes = messages.pop("contact_changes", (None, None))
         self.pairs: Optional[np.ndarray] = messages.get("pairs")
         self.contacts: Optional[np.ndarray] = messages.get("contacts")
         self.regions: Optional[np.ndarray] = messages.get("regions")
@@ -101,11 +106,18 @@ class Result:
 
         Made when it is asked for, which is to be before the client goes on to the next tick.
         """
-        if self.changes is None:
-            return None
-        if not self._list.is_of(self.tick.header):
-            raise SweepdError("the client has gone on to another tick: ask a result for `listed` before the next step")
-        return self._list.rows()
+        return None if self.changes is None else self._rows("changes", "listed")
+
+    @property
+    @in_turn
+    def listed_contacts(self) -> Optional[np.ndarray]:
+        """What ``contacts`` would hold, kept from ``contact_changes``; as ``listed``."""
+        return None if self.contact_changes is None else self._rows("contact_changes", "listed_contacts")
+
+    def _rows(self, topic, name):
+        if not self._lists[topic].is_of(self.tick.header):
+            raise SweepdError(f"the client has gone on to another tick: ask a result for `{name}` before the next step")
+        return self._lists[topic].rows()
 
     @property
     def colliding(self) -> np.ndarray:
@@ -125,8 +137,8 @@ class Client:
     waits without Python's lock, so other threads go on. In a forked process it is the parent's: make another one there.
 
     * ``quat_order``: how you write quaternions, ``"xyzw"`` (ROS) or ``"wxyz"`` (MuJoCo). A source must say it.
-    * ``listen``: the messages to listen to, or one, of ``pairs``, ``changes``, ``contacts``, ``regions``, ``bodies``,
-      ``body_verdicts``, ``plan``; the daemon computes what somebody listens to. ``names`` are always.
+    * ``listen``: the messages to listen to, or one, of ``pairs``, ``changes``, ``contacts``, ``contact_changes``,
+      ``regions``, ``bodies``, ``body_verdicts``, ``plan``; the daemon computes what somebody listens to. ``names`` are always.
     * ``timeout_s``: how long to look for a daemon.
     * ``root``, ``prefix``: other files than iceoryx2's default ones; the daemon's must be the same.
     """
@@ -169,7 +181,7 @@ class Client:
         self._ahead = {topic: None for topic in self._topics}
         self._waited = {topic: 0 for topic in self._topics}
         self._now = {topic: None for topic in self._topics}
-        self._list = PairList()
+        self._lists = {topic: _LISTS[topic]() for topic in self._topics if topic in _LISTS}
         #: This client's session, drawn at its start.
         self.session: int = secrets.randbits(64) or 1
         self._epoch = 0
@@ -560,8 +572,8 @@ class Client:
                 continue
             self._tick, self._boot = tick, new.boot_id
             for topic in self._topics:
-                if topic == "changes":
-                    self._advance_list(new)
+                if topic in self._lists:
+                    self._advance_list(topic, new)
                 else:
                     self._advance(topic, new)
             return True
@@ -572,8 +584,8 @@ class Client:
         pairs, rows = self._now.get("pairs"), None
         if pairs is not None and pairs[0].boot_id == old.boot_id:
             rows = pairs[1]
-        elif self._list.boot_id == old.boot_id:
-            rows = self._list.rows()
+        elif "changes" in self._lists and self._lists["changes"].boot_id == old.boot_id:
+            rows = self._lists["changes"].rows()
         if rows is not None:
             there = rows["flags"] & int(layout.PairFlags.GONE) == 0
             rows = rows[there & (rows["certified_verdict"] == layout.Verdict.COLLIDING)]
@@ -621,51 +633,54 @@ class Client:
                 return
             ahead = None
 
-    def _advance_list(self, tick):
+    def _advance_list(self, topic, tick):
         """As ``_advance``, but every message is applied; one that is not for the list has the whole list asked for."""
-        if not self._ports.is_open("changes"):
+        listing = self._lists[topic]
+        if not self._ports.is_open(topic):
             # the place went to another reader when the port was to be renewed
-            self._renew_list()
-            if not self._ports.is_open("changes"):
+            self._renew_list(topic)
+            if not self._ports.is_open(topic):
                 # and now the daemon is away
                 return
         while True:
-            ahead, self._ahead["changes"] = self._ahead["changes"], None
+            ahead, self._ahead[topic] = self._ahead[topic], None
             if ahead is None:
-                ahead, self._waited["changes"] = self._ports.message("changes"), 0
+                ahead, self._waited[topic] = self._ports.message(topic), 0
             if ahead is None:
                 return
             header = ahead[0].message
             if header.boot_id in self._boots_over:
                 continue
             if header.boot_id != tick.boot_id or header.tick > tick.tick:
-                self._ahead["changes"] = ahead
-                if header.boot_id == tick.boot_id or not self._is_in_vain("changes", header.boot_id):
+                self._ahead[topic] = ahead
+                if header.boot_id == tick.boot_id or not self._is_in_vain(topic, header.boot_id):
                     return
                 continue
-            self._now["changes"] = None
-            if self._list.take(*ahead):
+            self._now[topic] = None
+            if listing.take(*ahead):
                 ahead = None
-                self._renew_list()
-            elif self._list.is_whole:
-                self._now["changes"] = ahead
+                self._renew_list(topic)
+            elif listing.is_whole:
+                self._now[topic] = ahead
             if header.tick == tick.tick:
                 return
             ahead = None
 
-    def _renew_list(self):
-        self._ports.renew("changes", layout.PairRow, layout.ChangesHeader)
+    def _renew_list(self, topic):
+        self._ports.renew(topic, _TOPICS[topic], layout.ChangesHeader)
 
     def _result(self):
         tick = self._tick.header
-        messages = {
-            topic: now[1]
-            for topic, now in self._now.items()
-            if topic != "changes" and now is not None and (now[0].boot_id, now[0].tick) == (tick.boot_id, tick.tick)
-        }
-        if self._now.get("changes") is not None and self._list.is_of(tick):
-            messages["changes"] = self._now["changes"]
-        return Result(self._tick, messages, self._list, self._turns)
+        messages = {}
+        for topic, now in self._now.items():
+            if now is None:
+                continue
+            if topic in self._lists:
+                if self._lists[topic].is_of(tick):
+                    messages[topic] = now
+            elif (now[0].boot_id, now[0].tick) == (tick.boot_id, tick.tick):
+                messages[topic] = now[1]
+        return Result(self._tick, messages, self._lists, self._turns)
 
     def _why_no_result(self, seq, before, timeout_s, scene_rev=0):
         told = f"no result of frame {seq} of `{self._source}` within {timeout_s} s"

@@ -172,7 +172,7 @@ class MessageHeader(_Row):
 
 
 class ChangesHeader(_Row):
-    """User header of changes: what its rows are to be applied to, and what that makes."""
+    """User header of changes and contact_changes: what the rows are to be applied to, and what that makes."""
 
     TYPE_NAME = "sweepd.v1.ChangesHeader"
     _fields_ = [
@@ -764,6 +764,8 @@ class ContactKind(IntEnum):
     CONTACT = 0
     # The closest points of a near pair.
     CLOSEST = 1
+    # In contact_changes alone: the pair has no contacts any more.
+    GONE = 2
 
 
 class Stage(IntEnum):

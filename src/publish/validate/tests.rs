@@ -147,7 +147,7 @@ const FAULTS: [Fault; 12] = [
     }),
     ("wait to be told of", |stage| {
         let ids = stage.publisher.listing.row(0).ids;
-        stage.publisher.chain.note_dropped(Demand::ALL, ids);
+        stage.publisher.chain.note_dropped(true, ids);
     }),
     ("rows of pairs are not by ids", |stage| {
         stage.out.pairs.swap(0, 1)

@@ -1,10 +1,11 @@
-//! A list of pairs that is kept from `changes` holds what `pairs` says, field by field, whatever happens to the scene;
-//! and `changes` say the same where nobody reads `pairs`.
+//! A list of pairs that is kept from `changes` holds what `pairs` says, field by field, whatever happens to the scene,
+//! and one of contacts that is kept from `contact_changes` what `contacts` says; and both say the same where nobody
+//! reads `pairs` or `contacts`.
 
 use std::collections::BTreeMap;
 
 use super::*;
-use crate::wire::PairRow;
+use crate::wire::{ContactRow, PairRow};
 
 /// What a reader of `changes` keeps: by ids, the tick that sent the row, and the row.
 #[derive(Default)]
@@ -48,9 +49,50 @@ impl List {
     }
 }
 
+/// What a reader of `contact_changes` keeps, by ids.
+#[derive(Default)]
+struct Contacts {
+    rows: BTreeMap<(u64, u64), Vec<ContactRow>>,
+    tick: u64,
+}
+
+impl Contacts {
+    fn apply(&mut self, out: &Outbox) {
+        let header = &out.contact_changes_header;
+        if header.base_tick == 0 {
+            self.rows.clear();
+        } else {
+            assert_eq!(header.base_tick, self.tick);
+        }
+        let ids = |row: &ContactRow| (row.body_a, row.body_b);
+        assert!(out.contact_changes.is_sorted_by_key(ids));
+        for rows in out.contact_changes.chunk_by(|x, y| ids(x) == ids(y)) {
+            if rows[0].is_gone() {
+                assert_eq!((rows.len(), header.base_tick == 0), (1, false));
+                let had = self.rows.remove(&ids(&rows[0]));
+                assert!(had.is_some(), "{:?} had no contacts", ids(&rows[0]));
+            } else {
+                self.rows.insert(ids(&rows[0]), rows.to_vec());
+            }
+        }
+        self.tick = header.message.tick;
+        assert_eq!(self.rows().count() as u64, header.listed);
+    }
+
+    fn rows(&self) -> impl Iterator<Item = &ContactRow> {
+        self.rows.values().flatten()
+    }
+}
+
 /// What came in how many ticks.
 #[derive(Debug, Default)]
 struct Seen {
+    contact_deltas: u64,
+    contact_wholes: u64,
+    contacts_cut: u64,
+    contacts_gone: usize,
+    contacts_told: usize,
+    contacts_kept: usize,
     deltas: u64,
     wholes: u64,
     cut: u64,
@@ -72,6 +114,20 @@ impl Seen {
         self.left += left;
         self.changed += rows.len() - left;
         self.aged += out.pairs.len() - (rows.len() - left);
+    }
+
+    fn note_contacts(&mut self, out: &Outbox) {
+        let (header, rows) = (&out.contact_changes_header, &out.contact_changes);
+        self.contacts_cut += u64::from(header.message.truncated > 0);
+        if header.base_tick == 0 {
+            self.contact_wholes += 1;
+            return;
+        }
+        self.contact_deltas += 1;
+        let gone = rows.iter().filter(|row| row.is_gone()).count();
+        self.contacts_gone += gone;
+        self.contacts_told += rows.len() - gone;
+        self.contacts_kept += out.contacts.len() - (rows.len() - gone);
     }
 }
 
@@ -114,7 +170,7 @@ impl Trouble {
     }
 }
 
-fn same(one: &[PairRow], other: &[PairRow], what: &str) {
+fn same<T: std::fmt::Debug>(one: &[T], other: &[T], what: &str) {
     // As text: NaN is equal to NaN here, and 0 not to -0.
     let [one, other] = [one, other].map(|rows| {
         let rows = rows.iter().map(|row| format!("{row:?}"));
@@ -131,7 +187,7 @@ fn same(one: &[PairRow], other: &[PairRow], what: &str) {
 }
 
 #[test]
-fn a_list_kept_from_changes_holds_what_pairs_says_whatever_happens() {
+fn lists_kept_from_changes_hold_what_pairs_and_contacts_say_whatever_happens() {
     let mut seen = Seen::default();
     for seed in 1..=4 {
         play(seed, &mut seen);
@@ -142,6 +198,14 @@ fn a_list_kept_from_changes_holds_what_pairs_says_whatever_happens() {
     );
     assert!(
         seen.left > 1500 && seen.changed > 30_000 && seen.aged > 30_000,
+        "{seen:?}"
+    );
+    assert!(
+        seen.contact_deltas > 3000 && seen.contact_wholes > 500 && seen.contacts_cut > 100,
+        "{seen:?}"
+    );
+    assert!(
+        seen.contacts_gone > 1000 && seen.contacts_told > 10_000 && seen.contacts_kept > 10_000,
         "{seen:?}"
     );
 }
@@ -156,6 +220,7 @@ fn play(seed: u64, seen: &mut Seen) {
         epoch: 0,
     };
     let mut list = List::default();
+    let (mut contacts, mut lone_contacts) = (Contacts::default(), Contacts::default());
     for tick in 1..=1500_u64 {
         clock.advance(10_000_000);
         let (mut inbox, mut edits) = (world.frames(clock.boottime_ns()), world.edits());
@@ -164,8 +229,14 @@ fn play(seed: u64, seen: &mut Seen) {
         trouble.frames(&mut inbox);
         trouble.edits(&mut edits, broken);
         demand.changes = tick % 300 > 3;
+        demand.contact_changes = demand.contacts;
         demand.changes_anew = trouble.random.unit() < 0.02;
-        let run = |engine: &mut Engine, pairs: bool| {
+        let run = |engine: &mut Engine, whole: bool| {
+            let demand = Demand {
+                pairs: whole,
+                contacts: whole && demand.contacts,
+                ..demand
+            };
             if broken {
                 engine.broad = BroadPhase::new(engine.method);
             }
@@ -175,7 +246,7 @@ fn play(seed: u64, seen: &mut Seen) {
             engine.tick(TickInput {
                 inbox: &inbox,
                 edits: &edits,
-                demand: Demand { pairs, ..demand },
+                demand,
                 budget,
                 cause: TickCause::Frame,
                 cause_source: Some(0),
@@ -185,12 +256,25 @@ fn play(seed: u64, seen: &mut Seen) {
         };
         run(&mut both, true);
         run(&mut lone, false);
-        assert!(lone.out.pairs.is_empty());
+        assert!(lone.out.pairs.is_empty() && lone.out.contacts.is_empty());
+        let what = format!("seed {seed}, tick {tick}");
+        if demand.contact_changes {
+            for (engine, list) in [(&both, &mut contacts), (&lone, &mut lone_contacts)] {
+                let header = engine.out.contact_changes_header;
+                assert!(!demand.changes_anew || header.base_tick == 0, "{what}");
+                assert_eq!(header.message, both.out.contacts_header, "{what}");
+                list.apply(&engine.out);
+                let kept: Vec<_> = list.rows().copied().collect();
+                same(&kept, &both.out.contacts, &what);
+            }
+            seen.note_contacts(&both.out);
+        } else {
+            assert!(both.out.contact_changes.is_empty(), "{what}");
+        }
         if !demand.changes {
             assert!(both.out.changes.is_empty());
             continue;
         }
-        let what = format!("seed {seed}, tick {tick}");
         let header = both.out.changes_header;
         assert_eq!(header, lone.out.changes_header, "{what}");
         same(&both.out.changes, &lone.out.changes, &what);

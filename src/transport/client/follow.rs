@@ -1,7 +1,7 @@
 //! Following the ticks: each message is put with the tick it belongs to; what is older than the newest is dropped.
 
 use super::link::Link;
-use super::list::PairList;
+use super::list::{ContactList, PairList};
 use super::{BOOTS_OVER_MAX, Heard, Restarted, ends_of};
 use crate::error::Result;
 use crate::wire::{
@@ -34,6 +34,7 @@ pub struct View {
     pairs: Stream<PairRow>,
     list: PairList,
     contacts: Stream<ContactRow>,
+    contact_list: ContactList,
     regions: Stream<RegionRow>,
     bodies: Stream<BodyRow>,
     body_verdicts: Stream<u8>,
@@ -74,6 +75,12 @@ impl View {
     #[must_use]
     pub fn contacts(&self) -> Option<&Message<ContactRow>> {
         self.contacts.of(&self.tick.header)
+    }
+
+    /// The contacts at this very tick, kept from `contact_changes`; `None` as for [`View::list`].
+    #[must_use]
+    pub fn contact_list(&self) -> Option<&ContactList> {
+        self.contact_list.of(&self.tick.header)
     }
 
     /// The regions of this very tick; `None` as for [`View::pairs`].
@@ -256,6 +263,7 @@ impl Follow {
     fn gather(&mut self, link: &mut dyn Link, tick: &MessageHeader) -> Result<()> {
         let (view, over) = (&mut self.view, &mut self.boots_over);
         view.contacts.advance(tick, over, |m| link.contacts(m))?;
+        view.contact_list.advance(tick, over, link)?;
         view.regions.advance(tick, over, |m| link.regions(m))?;
         view.pairs.advance(tick, over, |m| link.pairs(m))?;
         view.list.advance(tick, over, link)?;

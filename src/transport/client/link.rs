@@ -20,6 +20,8 @@ pub struct Topics {
     pub pairs: bool,
     /// `changes`.
     pub changes: bool,
+    /// `contact_changes`.
+    pub contact_changes: bool,
     /// `contacts`.
     pub contacts: bool,
     /// `regions`.
@@ -39,6 +41,7 @@ impl Topics {
     pub const ALL: Self = Self {
         pairs: true,
         changes: true,
+        contact_changes: true,
         contacts: true,
         regions: true,
         bodies: true,
@@ -101,6 +104,16 @@ pub trait Link: Debug {
     /// # Errors
     /// `Error::Io`.
     fn renew_changes(&mut self) -> Result<()>;
+    /// The next `contact_changes`.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn contact_changes(&mut self, into: &mut Message<ContactRow, ChangesHeader>) -> Result<bool>;
+    /// As [`Link::renew_changes`], of `contact_changes`.
+    ///
+    /// # Errors
+    /// `Error::Io`.
+    fn renew_contact_changes(&mut self) -> Result<()>;
     /// The next `contacts`.
     ///
     /// # Errors

@@ -1,14 +1,17 @@
-//! The list of pairs, kept from `changes`: each message is applied in its order, none to a list that it is not for.
+//! The lists of pairs and of contacts, kept from `changes` and `contact_changes`: each message is applied in its order,
+//! none to a list that it is not for.
 //!
 //! A reader that has missed a message holds a list that is not whole. It does not show it, opens its port anew, and has
 //! the whole list with the daemon's next tick.
 
-use std::collections::BTreeMap;
+mod rows;
 
 use super::follow::{Message, Wait};
 use super::link::Link;
 use crate::error::Result;
-use crate::wire::{ChangesHeader, MessageHeader, PairRow};
+use crate::wire::{ChangesHeader, ContactRow, MessageHeader, PairRow};
+
+use rows::{Contacts, Pairs, Rows};
 
 /// Messages that are passed over while the whole list is awaited, before the port is opened anew: the daemon sends it
 /// with the first or second tick.
@@ -16,69 +19,49 @@ const PATIENCE: u32 = 8;
 
 /// The rows of `pairs`, as `changes` make them: by ids, with the ages of the tick.
 #[derive(Clone, Debug, Default)]
-pub struct PairList {
-    /// The newest that was taken.
-    news: Message<PairRow, ChangesHeader>,
-    /// One that came early.
-    ahead: Message<PairRow, ChangesHeader>,
-    has_ahead: bool,
-    wait: Wait,
-    /// By ids: the tick that sent the row, and the row.
-    rows: BTreeMap<(u64, u64), (u64, PairRow)>,
-    is_whole: bool,
-    /// Messages passed over since the whole list was last asked for.
-    passed: u32,
-}
+pub struct PairList(List<Pairs>);
 
 impl PairList {
     /// What the tick said: the rows that changed, or under `base_tick` 0 the whole list.
     #[must_use]
     pub fn changes(&self) -> &Message<PairRow, ChangesHeader> {
-        &self.news
+        &self.0.news
     }
 
     /// How many rows it has.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.rows.len()
+        self.0.rows.len()
     }
 
     /// Whether it has none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.rows.is_empty()
+        self.len() == 0
     }
 
     /// The row of a pair, the smaller id first; `None`: it is not listed.
     #[must_use]
     pub fn get(&self, body_a: u64, body_b: u64) -> Option<PairRow> {
-        let row = self.rows.get(&(body_a, body_b));
-        row.map(|row| self.at_tick(row))
+        self.0.rows.get((body_a, body_b), self.tick())
     }
 
     /// The rows, by ids.
     pub fn iter(&self) -> impl Iterator<Item = PairRow> {
-        self.rows.values().map(|row| self.at_tick(row))
+        self.0.rows.iter(self.tick())
     }
 
     pub(super) fn boot_id(&self) -> u64 {
-        self.news.header.message.boot_id
+        self.0.boot_id()
     }
 
     pub(super) fn tick(&self) -> u64 {
-        self.news.header.message.tick
+        self.0.tick()
     }
 
     /// The list, where it is whole and of this tick.
     pub(super) fn of(&self, tick: &MessageHeader) -> Option<&Self> {
-        let is_of = self.boot_id() == tick.boot_id && self.tick() == tick.tick;
-        (self.is_whole && is_of).then_some(self)
-    }
-
-    fn at_tick(&self, (sent, row): &(u64, PairRow)) -> PairRow {
-        let mut row = *row;
-        row.age(self.tick().saturating_sub(*sent));
-        row
+        self.0.is_of(tick).then_some(self)
     }
 
     /// Takes messages up to the tick; one of a later tick or boot is kept for then.
@@ -88,9 +71,100 @@ impl PairList {
         boots_over: &mut Vec<u64>,
         link: &mut dyn Link,
     ) -> Result<()> {
+        self.0.advance(tick, boots_over, link)
+    }
+}
+
+/// The rows of `contacts`, as `contact_changes` make them.
+#[derive(Clone, Debug, Default)]
+pub struct ContactList(List<Contacts>);
+
+impl ContactList {
+    /// What the tick said: the contacts of the pairs of which there was something new, and of those that have none any
+    /// more that they are gone; or under `base_tick` 0 all contacts.
+    #[must_use]
+    pub fn changes(&self) -> &Message<ContactRow, ChangesHeader> {
+        &self.0.news
+    }
+
+    /// How many contacts it has.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.0.rows.len()
+    }
+
+    /// Whether it has none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The contacts of a pair, the smaller id first; of one that has none an empty slice.
+    #[must_use]
+    pub fn get(&self, body_a: u64, body_b: u64) -> &[ContactRow] {
+        self.0.rows.get((body_a, body_b))
+    }
+
+    /// The contacts, in the order of `contacts`.
+    pub fn iter(&self) -> impl Iterator<Item = &ContactRow> {
+        self.0.rows.iter()
+    }
+
+    /// As [`PairList::of`].
+    pub(super) fn of(&self, tick: &MessageHeader) -> Option<&Self> {
+        self.0.is_of(tick).then_some(self)
+    }
+
+    /// As [`PairList::advance`].
+    pub(super) fn advance(
+        &mut self,
+        tick: &MessageHeader,
+        boots_over: &mut Vec<u64>,
+        link: &mut dyn Link,
+    ) -> Result<()> {
+        self.0.advance(tick, boots_over, link)
+    }
+}
+
+/// A list that is kept from messages of what is new.
+#[derive(Clone, Debug, Default)]
+struct List<R: Rows> {
+    /// The newest that was taken.
+    news: Message<R::Row, ChangesHeader>,
+    /// One that came early.
+    ahead: Message<R::Row, ChangesHeader>,
+    has_ahead: bool,
+    wait: Wait,
+    rows: R,
+    is_whole: bool,
+    /// Messages passed over since the whole list was last asked for.
+    passed: u32,
+}
+
+impl<R: Rows> List<R> {
+    fn boot_id(&self) -> u64 {
+        self.news.header.message.boot_id
+    }
+
+    fn tick(&self) -> u64 {
+        self.news.header.message.tick
+    }
+
+    /// Whether it is whole and of this tick.
+    fn is_of(&self, tick: &MessageHeader) -> bool {
+        self.is_whole && self.boot_id() == tick.boot_id && self.tick() == tick.tick
+    }
+
+    /// Takes messages up to the tick; one of a later tick or boot is kept for then.
+    fn advance(
+        &mut self,
+        tick: &MessageHeader,
+        boots_over: &mut Vec<u64>,
+        link: &mut dyn Link,
+    ) -> Result<()> {
         loop {
             if !self.has_ahead {
-                if !link.changes(&mut self.ahead)? {
+                if !R::read(link, &mut self.ahead)? {
                     return Ok(());
                 }
                 self.has_ahead = true;
@@ -107,7 +181,7 @@ impl PairList {
             }
             self.has_ahead = false;
             if !is_over && self.take() {
-                link.renew_changes()?;
+                R::renew(link)?;
             }
         }
     }
@@ -116,26 +190,16 @@ impl PairList {
     fn take(&mut self) -> bool {
         let (header, had) = (self.ahead.header, self.is_whole);
         let (boot_id, tick) = (header.message.boot_id, header.message.tick);
+        let follows = had && self.boot_id() == boot_id && self.tick() == header.base_tick;
+        self.is_whole = header.base_tick == 0 || follows;
         if header.base_tick == 0 {
             self.rows.clear();
-            let rows = self.ahead.rows.iter();
-            self.rows
-                .extend(rows.map(|row| ((row.body_a, row.body_b), (tick, *row))));
-            self.is_whole = true;
-        } else if had && self.boot_id() == boot_id && self.tick() == header.base_tick {
-            for row in &self.ahead.rows {
-                let ids = (row.body_a, row.body_b);
-                if row.has_left() {
-                    self.rows.remove(&ids);
-                } else {
-                    self.rows.insert(ids, (tick, *row));
-                }
-            }
-        } else {
-            self.is_whole = false;
+        }
+        if self.is_whole {
+            self.rows.take(tick, &self.ahead.rows);
         }
         // What the sender says of its list is checked, so that a fault of either side is found and mended.
-        self.is_whole &= self.rows.len() as u64 == header.listed;
+        self.is_whole = self.is_whole && self.rows.len() as u64 == header.listed;
         if self.is_whole {
             std::mem::swap(&mut self.news, &mut self.ahead);
             self.passed = 0;
@@ -172,13 +236,13 @@ mod tests {
             tick,
             ..MessageHeader::default()
         };
-        list.ahead.header = ChangesHeader {
+        list.0.ahead.header = ChangesHeader {
             message,
             base_tick,
             listed,
         };
-        list.ahead.rows = rows.to_vec();
-        list.take()
+        list.0.ahead.rows = rows.to_vec();
+        list.0.take()
     }
 
     fn ids(list: &PairList, tick: u64) -> Option<Vec<u64>> {
@@ -243,16 +307,16 @@ mod tests {
     fn a_list_of_another_boot_is_not_built_on() {
         let mut list = PairList::default();
         assert!(!hear(&mut list, 5, 0, &[row(2, Verdict::Near)], 1));
-        list.ahead.header = ChangesHeader {
+        list.0.ahead.header = ChangesHeader {
             base_tick: 5,
             listed: 1,
-            ..list.news.header
+            ..list.0.news.header
         };
         (
-            list.ahead.header.message.boot_id,
-            list.ahead.header.message.tick,
+            list.0.ahead.header.message.boot_id,
+            list.0.ahead.header.message.tick,
         ) = (8, 6);
-        assert!(list.take());
+        assert!(list.0.take());
         assert_eq!(ids(&list, 6), None);
     }
 }

@@ -14,7 +14,7 @@ pub use connect::ClientOptions;
 pub(crate) use connect::random_u64;
 pub use follow::{Message, View};
 pub use link::{Link, Rows, Topics};
-pub use list::PairList;
+pub use list::{ContactList, PairList};
 pub use step::StepError;
 pub use vertices::Part;
 

@@ -1,5 +1,6 @@
 //! A client's ports over shared memory. It only opens what a daemon has made.
 
+mod news;
 mod read;
 mod send;
 mod why;
@@ -12,14 +13,15 @@ use iceoryx2::port::listener::{Listener, ListenerWaitError};
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
-use iceoryx2::prelude::{AllocationStrategy, EventId, Node, ZeroCopySend};
+use iceoryx2::prelude::{AllocationStrategy, EventId, ZeroCopySend};
 
+use news::{News, Spot};
 use read::{Reader, read};
 use send::send_frame;
 use why::{not_found, opened, out_of_files};
 
 use super::place::Place;
-use super::qos::{self, Ipc, Open, PubSub, SLEEP_MIN, events, failed};
+use super::qos::{self, Ipc, Open, SLEEP_MIN, events, failed};
 use super::unmet::Unmet;
 use crate::error::{Error, Result};
 use crate::limits;
@@ -55,24 +57,21 @@ pub struct IoxLink {
     tick: Subscriber<Ipc, TickRow, ()>,
     hello: Subscriber<Ipc, Hello, ()>,
     pairs: Reader<PairRow>,
-    changes: Reader<PairRow, ChangesHeader>,
-    /// Its place went to another reader when it was to be renewed.
-    changes_owed: bool,
+    changes: News<PairRow>,
+    contact_changes: News<ContactRow>,
     contacts: Reader<ContactRow>,
     regions: Reader<RegionRow>,
     bodies: Reader<BodyRow>,
     body_verdicts: Reader<u8>,
     names: Reader<NameRow>,
     plan: Reader<u8>,
-    unmet: Unmet,
-    node: Node<Ipc>,
-    place: Place,
+    spot: Spot,
 }
 
 impl std::fmt::Debug for IoxLink {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("IoxLink")
-            .field("place", &self.place)
+            .field("place", &self.spot.place)
             .finish_non_exhaustive()
     }
 }
@@ -140,23 +139,25 @@ impl IoxLink {
             tick,
             hello,
             pairs: None,
-            changes: None,
-            changes_owed: false,
+            changes: News::new("changes"),
+            contact_changes: News::new("contact_changes"),
             contacts: None,
             regions: None,
             bodies: None,
             body_verdicts: None,
             names: None,
             plan: None,
-            unmet,
-            node,
-            place: place.clone(),
+            spot: Spot {
+                unmet,
+                node,
+                place: place.clone(),
+            },
         })
     }
 
     /// Says that what is sent to or by this client does not pass for want of open files: nothing else would.
     fn check_met(&self) -> Result<()> {
-        match self.unmet.take() {
+        match self.spot.unmet.take() {
             0 => Ok(()),
             _ => out_of_files().map_or(Ok(()), Err),
         }
@@ -172,22 +173,13 @@ impl IoxLink {
         topic: &str,
     ) -> Result<Subscriber<Ipc, [T], MessageHeader>> {
         let open = || {
-            qos::results::<T>(&self.node, &self.place, topic, Open::Existing)?
+            qos::results::<T>(&self.spot.node, &self.spot.place, topic, Open::Existing)?
                 .subscriber_builder()
-                .set_degradation_handler(self.unmet.handler())
+                .set_degradation_handler(self.spot.unmet.handler())
                 .create()
                 .map_err(|e| failed(topic, e))
         };
         opened(open())
-    }
-
-    fn read_changes(&mut self, service: &PubSub<Ipc, [PairRow], ChangesHeader>) -> Result<()> {
-        let reader = service
-            .subscriber_builder()
-            .set_degradation_handler(self.unmet.handler())
-            .create();
-        self.changes = Some(reader.map_err(|e| failed("changes", e))?);
-        Ok(())
     }
 
     fn sender<T: std::fmt::Debug + ZeroCopySend>(
@@ -196,14 +188,14 @@ impl IoxLink {
         rows: usize,
     ) -> Result<Publisher<Ipc, [T], FrameHeader>> {
         let service = opened(qos::frames::<T>(
-            &self.node,
-            &self.place,
+            &self.spot.node,
+            &self.spot.place,
             topic,
             Open::Existing,
         ))?;
         // room for the first frame: a sample sent right after a growth is lost if its sender ends before it is mapped
         let rows = rows.max(qos::SLICE_LEN_START);
-        opened(qos::slice_publisher(&service, rows, &self.unmet))
+        opened(qos::slice_publisher(&service, rows, &self.spot.unmet))
     }
 }
 
@@ -212,8 +204,11 @@ impl Link for IoxLink {
         if topics.pairs && self.pairs.is_none() {
             self.pairs = Some(self.reader("pairs")?);
         }
-        if topics.changes && self.changes.is_none() {
-            self.read_changes(&qos::changes(&self.node, &self.place, Open::Existing)?)?;
+        if topics.changes {
+            self.changes.open(&self.spot)?;
+        }
+        if topics.contact_changes {
+            self.contact_changes.open(&self.spot)?;
         }
         if topics.contacts && self.contacts.is_none() {
             self.contacts = Some(self.reader("contacts")?);
@@ -263,9 +258,9 @@ impl Link for IoxLink {
 
     fn send_vertices(&mut self, header: &VertexHeader, rows: &[VertexRow]) -> Result<()> {
         if self.vertices.is_none() {
-            let service = qos::vertices(&self.node, &self.place, Open::Existing)?;
+            let service = qos::vertices(&self.spot.node, &self.spot.place, Open::Existing)?;
             let rows = rows.len().max(qos::SLICE_LEN_START);
-            self.vertices = Some(qos::slice_publisher(&service, rows, &self.unmet)?);
+            self.vertices = Some(qos::slice_publisher(&service, rows, &self.spot.unmet)?);
         }
         if let Some(port) = &self.vertices {
             send_frame(port, header, rows)?;
@@ -298,24 +293,28 @@ impl Link for IoxLink {
     }
 
     fn changes(&mut self, into: &mut Message<PairRow, ChangesHeader>) -> Result<bool> {
-        if self.changes_owed {
+        if self.changes.owed {
             self.renew_changes()?;
         }
-        read(&self.changes, limits::ROWS_MAX, into)
+        self.changes.read(into)
     }
 
     fn renew_changes(&mut self) -> Result<()> {
-        let service = match qos::changes(&self.node, &self.place, Open::Existing) {
-            // while no daemon is there all stays as it is
-            Err(e) if qos::is_away(&e) => return Ok(()),
-            service => service?,
-        };
-        // First the old one, which takes a reader's place. The service is held meanwhile: while a daemon starts anew
-        // nobody else may hold it, and who lets it go last takes it along.
-        self.changes_owed |= self.changes.take().is_some();
-        if self.changes_owed {
-            self.read_changes(&service)?;
-            self.changes_owed = false;
+        if self.changes.renew(&self.spot)? {
+            self.wake(events::CREATED);
+        }
+        Ok(())
+    }
+
+    fn contact_changes(&mut self, into: &mut Message<ContactRow, ChangesHeader>) -> Result<bool> {
+        if self.contact_changes.owed {
+            self.renew_contact_changes()?;
+        }
+        self.contact_changes.read(into)
+    }
+
+    fn renew_contact_changes(&mut self) -> Result<()> {
+        if self.contact_changes.renew(&self.spot)? {
             self.wake(events::CREATED);
         }
         Ok(())
@@ -356,7 +355,7 @@ impl Link for IoxLink {
     fn request(&mut self, header: &RequestHeader, json: &[u8], blobs: &[&[u8]]) -> Result<()> {
         let len = json.len() + blobs.iter().map(|b| b.len()).sum::<usize>();
         if self.requests.is_none() {
-            let port = qos::requests(&self.node, &self.place, Open::Existing)?
+            let port = qos::requests(&self.spot.node, &self.spot.place, Open::Existing)?
                 .client_builder()
                 .initial_max_slice_len(len.max(qos::REQUEST_LEN_START))
                 .allocation_strategy(AllocationStrategy::PowerOfTwo)

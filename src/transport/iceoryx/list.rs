@@ -32,6 +32,8 @@ pub struct InstanceInfo {
     pub change_readers: usize,
     /// Readers of contacts.
     pub contact_readers: usize,
+    /// Readers of contact changes.
+    pub contact_change_readers: usize,
 }
 
 /// The instances of this wire version under a place's root; the place's own name does not matter.
@@ -80,9 +82,9 @@ fn info(node: &Node<Ipc>, place: &Place) -> InstanceInfo {
         readers: qos::ticks(node, place, Open::Existing)
             .map_or(0, |s| s.dynamic_config().number_of_subscribers()),
         pair_readers: readers::<PairRow>(node, place, "pairs"),
-        change_readers: qos::changes(node, place, Open::Existing)
-            .map_or(0, |s| s.dynamic_config().number_of_subscribers()),
+        change_readers: change_readers::<PairRow>(node, place, "changes"),
         contact_readers: readers::<ContactRow>(node, place, "contacts"),
+        contact_change_readers: change_readers::<ContactRow>(node, place, "contact_changes"),
     }
 }
 
@@ -93,5 +95,10 @@ fn sources<T: Debug + ZeroCopySend>(node: &Node<Ipc>, place: &Place, topic: &str
 
 fn readers<T: Debug + ZeroCopySend>(node: &Node<Ipc>, place: &Place, topic: &str) -> usize {
     qos::results::<T>(node, place, topic, Open::Existing)
+        .map_or(0, |s| s.dynamic_config().number_of_subscribers())
+}
+
+fn change_readers<T: Debug + ZeroCopySend>(node: &Node<Ipc>, place: &Place, topic: &str) -> usize {
+    qos::changes::<T>(node, place, topic, Open::Existing)
         .map_or(0, |s| s.dynamic_config().number_of_subscribers())
 }

@@ -23,8 +23,8 @@ use super::unmet::Unmet;
 use crate::error::{Error, Result};
 use crate::limits::SOURCES_MAX;
 use crate::wire::{
-    AnswerHeader, ChangesHeader, Hello, MessageHeader, PairRow, RequestHeader, TickRow,
-    VertexHeader, VertexRow,
+    AnswerHeader, ChangesHeader, Hello, MessageHeader, RequestHeader, TickRow, VertexHeader,
+    VertexRow,
 };
 
 /// The services of one thread.
@@ -214,13 +214,15 @@ pub(super) fn results<T: Debug + ZeroCopySend>(
     results_under(node, place, (topic, 1), open)
 }
 
-/// `changes`: rows under a [`ChangesHeader`]. No history: the newest message says nothing without those before it.
-pub(super) fn changes(
+/// `changes` or `contact_changes`: rows under a [`ChangesHeader`]. No history: the newest message says nothing without
+/// those before it.
+pub(super) fn changes<T: Debug + ZeroCopySend>(
     node: &Node<Ipc>,
     place: &Place,
+    topic: &str,
     open: Open,
-) -> Result<PubSub<Ipc, [PairRow], ChangesHeader>> {
-    results_under(node, place, ("changes", 0), open)
+) -> Result<PubSub<Ipc, [T], ChangesHeader>> {
+    results_under(node, place, (topic, 0), open)
 }
 
 /// Rows under a header; with the topic how many of the newest messages late joiners get.

@@ -32,7 +32,8 @@ pub fn bytes_needed(limits: &Limits, bodies: usize, sources: usize) -> u64 {
     } = most_rows(limits, bodies);
     [
         message::<PairRow>(pairs),
-        // `changes`, which begin with the whole list.
+        message::<ContactRow>(contacts),
+        // `changes` and `contact_changes`, which begin with the whole list.
         message::<PairRow>(pairs),
         message::<ContactRow>(contacts),
         message::<RegionRow>(regions),

@@ -128,7 +128,8 @@ pub struct Server {
     contacts: Out<ContactRow>,
     regions: Out<RegionRow>,
     pairs: Out<PairRow>,
-    changes: Changes,
+    changes: Changes<PairRow>,
+    contact_changes: Changes<ContactRow>,
     bodies: Out<BodyRow>,
     body_verdicts: Out<u8>,
     names: Out<NameRow>,
@@ -227,10 +228,8 @@ impl Server {
             contacts: Out::open(&node, place, "contacts", unmet).map_err(held)?,
             regions: Out::open(&node, place, "regions", unmet).map_err(held)?,
             pairs: Out::open(&node, place, "pairs", unmet).map_err(held)?,
-            changes: qos::changes(&node, place, Open::Create)
-                .and_then(|service| Out::of(service, unmet))
-                .map(Changes::new)
-                .map_err(held)?,
+            changes: Changes::open(&node, place, "changes", unmet).map_err(held)?,
+            contact_changes: Changes::open(&node, place, "contact_changes", unmet).map_err(held)?,
             bodies: Out::open(&node, place, "bodies", unmet).map_err(held)?,
             body_verdicts: Out::open(&node, place, "body_verdicts", unmet).map_err(held)?,
             names: Out::open(&node, place, "names", unmet).map_err(held)?,
@@ -281,10 +280,12 @@ impl Door for Server {
     }
 
     fn demand(&mut self) -> Demand {
-        let (changes, changes_anew) = self.changes.look();
+        let (changes, pairs_owed) = self.changes.look();
+        let (contact_changes, contacts_owed) = self.contact_changes.look();
         self.demand = Demand {
             changes,
-            changes_anew,
+            contact_changes,
+            changes_anew: pairs_owed || contacts_owed,
             pairs: self.pairs.read(),
             contacts: self.contacts.read(),
             regions: self.regions.read(),

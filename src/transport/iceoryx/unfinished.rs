@@ -22,7 +22,7 @@ const ENDING: &str = ".service";
 /// While a service is made its file may be written; then nobody may.
 const WRITABLE: u32 = 0o200;
 /// What the services of this wire version are named after.
-const TOPICS: [&str; 15] = [
+const TOPICS: [&str; 16] = [
     "transforms",
     "transforms_vel",
     "vertices",
@@ -30,6 +30,7 @@ const TOPICS: [&str; 15] = [
     "regions",
     "pairs",
     "changes",
+    "contact_changes",
     "bodies",
     "body_verdicts",
     "names",

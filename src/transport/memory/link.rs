@@ -76,9 +76,10 @@ impl Link for MemoryLink {
         }
         join!(pairs contacts regions bodies body_verdicts names plan);
         // the newest message says nothing without those before it
-        if topics.changes && !peer.topics.changes {
-            (peer.topics.changes, peer.changes_anew) = (true, true);
-        }
+        peer.changes_anew |= topics.changes && !peer.topics.changes;
+        peer.changes_anew |= topics.contact_changes && !peer.topics.contact_changes;
+        peer.topics.changes |= topics.changes;
+        peer.topics.contact_changes |= topics.contact_changes;
         state.wake.peers_changed = true;
         self.shared.to_server.notify_all();
         Ok(())
@@ -151,7 +152,19 @@ impl Link for MemoryLink {
     fn renew_changes(&mut self) -> Result<()> {
         self.with((), |peer| {
             peer.changes.clear();
-            peer.changes_anew = peer.topics.changes;
+            peer.changes_anew |= peer.topics.changes;
+        });
+        Ok(())
+    }
+
+    fn contact_changes(&mut self, into: &mut Message<ContactRow, ChangesHeader>) -> Result<bool> {
+        Ok(self.with(false, |peer| pop(&mut peer.contact_changes, into)))
+    }
+
+    fn renew_contact_changes(&mut self) -> Result<()> {
+        self.with((), |peer| {
+            peer.contact_changes.clear();
+            peer.changes_anew |= peer.topics.contact_changes;
         });
         Ok(())
     }

@@ -67,7 +67,8 @@ struct Peer {
     tick: VecDeque<TickRow>,
     pairs: VecDeque<Message<PairRow>>,
     changes: VecDeque<Message<PairRow, ChangesHeader>>,
-    /// It came to `changes`, and has not been seen there yet.
+    contact_changes: VecDeque<Message<ContactRow, ChangesHeader>>,
+    /// It came to one of these two, and has not been seen there yet.
     changes_anew: bool,
     contacts: VecDeque<Message<ContactRow>>,
     regions: VecDeque<Message<RegionRow>>,

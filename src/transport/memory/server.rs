@@ -12,8 +12,8 @@ use crate::transport::hello::hello;
 use crate::transport::request::{refusal, unreadable};
 use crate::transport::{Door, RequestToken, Wake};
 use crate::wire::{
-    AnswerHeader, Demand, Inbox, MessageHeader, Outbox, RejectReason, RequestHeader, TickRow,
-    WIRE_VERSION,
+    AnswerHeader, ChangesHeader, Demand, Inbox, MessageHeader, Outbox, RejectReason, RequestHeader,
+    TickRow, WIRE_VERSION,
 };
 
 /// The daemon's side of a [`Hub`]; the hub is free again when it is dropped.
@@ -25,7 +25,7 @@ pub struct MemoryServer {
     frame_rows_max: usize,
     drained_ns: Option<u64>,
     demand: Demand,
-    /// Somebody came to `changes` since the whole list was last sent.
+    /// Somebody came to `changes` or `contact_changes` since they were last whole.
     changes_owed: bool,
     next_token: u64,
 }
@@ -87,6 +87,18 @@ impl MemoryServer {
                 newest.$topic = Some(message);
             };
         }
+        // No newest one is kept: it says nothing without those before it.
+        macro_rules! send_new {
+            ($topic:ident, $header:expr, $rows:expr) => {
+                let message = Message {
+                    header: $header,
+                    rows: $rows.clone(),
+                };
+                for peer in peers.values_mut().filter(|p| p.topics.$topic) {
+                    queue(&mut peer.$topic, message.clone());
+                }
+            };
+        }
         let whole = MessageHeader {
             truncated: 0,
             ..outbox.tick.header
@@ -101,15 +113,16 @@ impl MemoryServer {
             send!(pairs, outbox.pairs_header, outbox.pairs);
         }
         if self.demand.changes {
-            let message = Message {
-                header: outbox.changes_header,
-                rows: outbox.changes.clone(),
-            };
-            for peer in peers.values_mut().filter(|peer| peer.topics.changes) {
-                queue(&mut peer.changes, message.clone());
-            }
-            self.changes_owed &= outbox.changes_header.base_tick != 0;
+            send_new!(changes, outbox.changes_header, outbox.changes);
         }
+        let new_contacts = outbox.contact_changes_header;
+        if self.demand.contact_changes {
+            send_new!(contact_changes, new_contacts, outbox.contact_changes);
+        }
+        let is_whole = |read: bool, header: &ChangesHeader| !read || header.base_tick == 0;
+        let all_whole = is_whole(self.demand.changes, &outbox.changes_header)
+            && is_whole(self.demand.contact_changes, &new_contacts);
+        self.changes_owed &= !all_whole;
         if self.demand.bodies {
             send!(bodies, outbox.bodies_header, outbox.bodies);
         }
@@ -196,13 +209,14 @@ impl Door for MemoryServer {
         for peer in state.peers.values_mut().filter(|peer| !peer.left) {
             demand.pairs |= peer.topics.pairs;
             demand.changes |= peer.topics.changes;
+            demand.contact_changes |= peer.topics.contact_changes;
             self.changes_owed |= std::mem::take(&mut peer.changes_anew);
             demand.contacts |= peer.topics.contacts;
             demand.regions |= peer.topics.regions;
             demand.bodies |= peer.topics.bodies;
             demand.body_verdicts |= peer.topics.body_verdicts;
         }
-        demand.changes_anew = demand.changes && self.changes_owed;
+        demand.changes_anew = (demand.changes || demand.contact_changes) && self.changes_owed;
         self.demand = demand;
         demand
     }

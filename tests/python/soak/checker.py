@@ -9,7 +9,7 @@ import numpy as np
 from sweepd import layout
 
 from . import check_bodies, check_pairs, check_places, check_tick, check_ways
-from .check_changes import Listing, compare
+from .check_changes import Contacts, Listing, compare, compare_contacts
 from .check_events import Balance, Ids
 from .faults import Fault
 from .moment import Moment
@@ -19,6 +19,7 @@ from .world import World
 #: Moments that an answer may be about: it is told some ticks later.
 _RECENT = 32
 _PAIR = np.dtype(layout.PairRow)
+_CONTACT = np.dtype(layout.ContactRow)
 
 
 class Checker:
@@ -30,7 +31,8 @@ class Checker:
         self._moment: Optional[Moment] = None
         #: The newest moments, the last at the end.
         self.recent: deque[Moment] = deque(maxlen=_RECENT)
-        self._listing, self._balance, self._is_balanced = Listing(), Balance(), False
+        self._listing, self._contacts = Listing(), Contacts()
+        self._balance, self._is_balanced = Balance(), False
         self._losses = check_tick.Losses()
         #: What was looked at, and what could not be.
         self.counts: Counter[str] = Counter()
@@ -63,7 +65,7 @@ class Checker:
         if followed and before is not None:
             faults += self._losses.check(told, before, self._world)
         faults += check_bodies.check_names(told, self._world)
-        faults += self._take_list(told, followed)
+        faults += self._take_lists(told, followed)
         # where even the bodies are not those of the scene nothing can be said of their pairs
         if told.bodies is not None and not {"names", "sources"} & {fault.check for fault in faults}:
             faults += self._take_bodies(told, followed)
@@ -88,11 +90,12 @@ class Checker:
 
     def _begin_anew(self) -> None:
         self._before = self._moment = None
-        self._listing, self._balance, self._is_balanced = Listing(), Balance(), False
+        self._listing, self._contacts = Listing(), Contacts()
+        self._balance, self._is_balanced = Balance(), False
         self._losses = check_tick.Losses()
 
-    def _take_list(self, told: Told, followed: bool) -> list[Fault]:
-        """What is kept from ``changes``; where that is all there is, it stands for ``pairs`` from here on."""
+    def _take_lists(self, told: Told, followed: bool) -> list[Fault]:
+        """What is kept from messages of what is new; where that is all there is, it stands for the whole from here on."""
         faults = list(self._listing.take(told, followed))
         if self._listing.of == (told.boot, told.number):
             rows = self._listing.rows(told.number, _PAIR)
@@ -101,6 +104,14 @@ class Checker:
                 told.pairs = rows
             else:
                 faults += compare(told, rows)
+        faults += self._contacts.take(told, followed)
+        if self._contacts.of == (told.boot, told.number):
+            rows = self._contacts.rows(_CONTACT)
+            self.counts["contacts from changes"] += 1
+            if told.contacts is None:
+                told.contacts = rows
+            else:
+                faults += compare_contacts(told, rows)
         return faults
 
     def _take_bodies(self, told: Told, followed: bool) -> list[Fault]:

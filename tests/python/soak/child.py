@@ -39,7 +39,7 @@ def source(instance: str, name: str, base: str, bodies: str, pause_s: str) -> No
 
 def reader(instance: str) -> None:
     """Listens until it is killed."""
-    topics = ("pairs", "changes", "contacts", "bodies")
+    topics = ("pairs", "changes", "contacts", "contact_changes", "bodies")
     with sweepd.Client(instance, None, quat_order="xyzw", listen=topics, timeout_s=60) as client:
         print("listens", flush=True)
         while True:

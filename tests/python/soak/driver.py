@@ -25,9 +25,9 @@ from .world import NOTHING, Change, Setup, World
 MODES = ("on_frame", "on_all", "rate")
 #: What the first reader listens to: all, or what makes the daemon leave something out.
 TOPICS = (
-    ("pairs", "changes", "contacts", "regions", "bodies", "body_verdicts"),
+    ("pairs", "changes", "contacts", "contact_changes", "regions", "bodies", "body_verdicts"),
     ("pairs", "changes", "bodies", "body_verdicts"),
-    ("changes", "contacts", "bodies"),
+    ("changes", "contact_changes", "bodies"),
     ("pairs", "regions", "bodies"),
 )
 #: How long a frame may stay without a tick before that is told, seconds: on a machine that is busy with other tests.

@@ -13,7 +13,7 @@ from .shapes import Part, Plane
 from .told import Told
 from .world import Change, Setup
 
-TOPICS = ("pairs", "changes", "contacts", "regions", "bodies", "body_verdicts")
+TOPICS = ("pairs", "changes", "contacts", "contact_changes", "regions", "bodies", "body_verdicts")
 _BALL = Part(radius_m=0.25)
 
 

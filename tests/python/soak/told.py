@@ -20,6 +20,8 @@ class Told:
     changes_header: Optional[layout.ChangesHeader] = None
     changes: Optional[np.ndarray] = None
     contacts: Optional[np.ndarray] = None
+    contact_changes_header: Optional[layout.ChangesHeader] = None
+    contact_changes: Optional[np.ndarray] = None
     regions: Optional[np.ndarray] = None
     bodies: Optional[np.ndarray] = None
     verdicts: Optional[np.ndarray] = None
@@ -55,6 +57,8 @@ def told_of(result: Any, names: dict[str, int]) -> Told:
         result.changes_header if result.changes is not None else None,
         result.changes,
         result.contacts,
+        result.contact_changes_header if result.contact_changes is not None else None,
+        result.contact_changes,
         result.regions,
         result.bodies,
         result.body_verdicts,

@@ -68,6 +68,12 @@ impl Link for Queues {
     fn renew_changes(&mut self) -> Result<()> {
         Ok(())
     }
+    fn contact_changes(&mut self, _: &mut Message<ContactRow, ChangesHeader>) -> Result<bool> {
+        Ok(false)
+    }
+    fn renew_contact_changes(&mut self) -> Result<()> {
+        Ok(())
+    }
     fn contacts(&mut self, _: &mut Message<ContactRow>) -> Result<bool> {
         Ok(false)
     }

@@ -1,13 +1,19 @@
-//! Who reads `changes`: to one who has just come it says nothing until it has the whole list.
+//! Who reads `changes` or `contact_changes`: to one who has just come they say nothing until it has the whole list.
 
-use iceoryx2::prelude::{CallbackProgression, PortFactory as _};
+use std::fmt::Debug;
 
-use super::{Out, Server};
-use crate::wire::{ChangesHeader, Outbox, PairRow};
+use iceoryx2::prelude::{CallbackProgression, Node, PortFactory as _, ZeroCopySend};
 
-/// `changes` and who reads it.
-pub(super) struct Changes {
-    pub(super) out: Out<PairRow, ChangesHeader>,
+use super::{Ipc, Out};
+use crate::error::Result;
+use crate::transport::iceoryx::place::Place;
+use crate::transport::iceoryx::qos::{self, Open};
+use crate::transport::iceoryx::unmet::Unmet;
+use crate::wire::ChangesHeader;
+
+/// A message of what is new, and who reads it.
+pub(super) struct Changes<T: Debug + ZeroCopySend + 'static> {
+    out: Out<T, ChangesHeader>,
     /// Ports of the readers at this look, and at the one before.
     now: Vec<u128>,
     before: Vec<u128>,
@@ -15,14 +21,20 @@ pub(super) struct Changes {
     owed: bool,
 }
 
-impl Changes {
-    pub(super) fn new(out: Out<PairRow, ChangesHeader>) -> Self {
-        Self {
-            out,
+impl<T: Debug + ZeroCopySend + Copy + 'static> Changes<T> {
+    pub(super) fn open(
+        node: &Node<Ipc>,
+        place: &Place,
+        topic: &str,
+        unmet: &Unmet,
+    ) -> Result<Self> {
+        let service = qos::changes(node, place, topic, Open::Create)?;
+        Ok(Self {
+            out: Out::of(service, unmet)?,
             now: Vec::new(),
             before: Vec::new(),
             owed: false,
-        }
+        })
     }
 
     /// Whether somebody reads it, and whether the whole list is owed. By ports, not by their number: one may have come
@@ -40,17 +52,14 @@ impl Changes {
         self.owed |= self.now.iter().any(|port| !self.before.contains(port));
         (!self.now.is_empty(), self.owed)
     }
-}
 
-impl Server {
     /// Sends it.
     ///
     /// * returns - 1 when it could not be handed over.
-    pub(super) fn send_changes(&mut self, outbox: &Outbox) -> u64 {
-        let (port, header) = (&self.changes.out.publisher, &outbox.changes_header);
-        let lost = super::sent::send(port, header, &outbox.changes);
+    pub(super) fn send(&mut self, header: &ChangesHeader, rows: &[T]) -> u64 {
+        let lost = super::sent::send(&self.out.publisher, header, rows);
         if lost > 0 || header.base_tick == 0 {
-            self.changes.owed = lost > 0;
+            self.owed = lost > 0;
         }
         lost
     }

@@ -27,6 +27,10 @@ impl Server {
                 &outbox.contacts,
             );
         }
+        if demand.contact_changes {
+            let header = &outbox.contact_changes_header;
+            failures += (self.contact_changes).send(header, &outbox.contact_changes);
+        }
         if demand.regions {
             failures += send(
                 &self.regions.publisher,
@@ -38,7 +42,7 @@ impl Server {
             failures += send(&self.pairs.publisher, &outbox.pairs_header, &outbox.pairs);
         }
         if demand.changes {
-            failures += self.send_changes(outbox);
+            failures += (self.changes).send(&outbox.changes_header, &outbox.changes);
         }
         if demand.bodies {
             failures += send(

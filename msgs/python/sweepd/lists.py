@@ -1,4 +1,7 @@
-"""The list of pairs, kept from ``changes``: each message is applied in its order, none to a list that it is not for."""
+"""The lists of pairs and of contacts, kept from ``changes`` and ``contact_changes``.
+
+Each message is applied in its order, none to a list that it is not for.
+"""
 
 import numpy as np
 
@@ -6,7 +9,8 @@ from . import layout
 
 #: Messages that are passed over while the whole list is awaited, before the port is opened anew.
 _PATIENCE = 8
-_ROW = np.dtype(layout.PairRow)
+_PAIR = np.dtype(layout.PairRow)
+_CONTACT = np.dtype(layout.ContactRow)
 _TOLD = int(layout.PairFlags.SWEPT_HIT | layout.PairFlags.SWEPT_OPEN)
 
 
@@ -20,19 +24,16 @@ def _keys(rows):
     return zip(rows["body_a"].tolist(), rows["body_b"].tolist())
 
 
-class PairList:
-    """The rows of ``pairs`` as ``changes`` make them. To apply a message costs as much as it has rows."""
+class _List:
+    """A list that is kept from messages of what is new."""
 
-    def __init__(self):
+    def __init__(self, row):
         #: Of the newest message that was applied; 0: none was.
         self.boot_id = self.tick = 0
         #: Whether nothing is missing.
         self.is_whole = False
         self._passed = 0
-        self._replace(np.empty(0, _ROW))
-
-    def __len__(self):
-        return len(self._places)
+        self._replace(np.empty(0, row))
 
     def is_of(self, header):
         """Whether it is whole, and that of a tick."""
@@ -61,6 +62,19 @@ class PairList:
             self._passed = 0
         return ask
 
+    def _set_tick(self, message):
+        self.boot_id, self.tick = message.boot_id, message.tick
+
+
+class PairList(_List):
+    """The rows of ``pairs`` as ``changes`` make them. To apply a message costs as much as it has rows."""
+
+    def __init__(self):
+        super().__init__(_PAIR)
+
+    def __len__(self):
+        return len(self._places)
+
     def rows(self):
         """The rows by ids, with the ages of the tick: an array of their own."""
         places = np.fromiter(self._places.values(), np.intp, len(self._places))
@@ -71,9 +85,6 @@ class PairList:
         certified = (rows["verdict"] == layout.Verdict.NEAR) | (rows["verdict"] == layout.Verdict.COLLIDING)
         rows["certified_tick"][certified] += ticks[certified]
         return rows[np.lexsort((rows["body_b"], rows["body_a"]))]
-
-    def _set_tick(self, message):
-        self.boot_id, self.tick = message.boot_id, message.tick
 
     def _replace(self, rows):
         self._rows = rows.copy()
@@ -102,6 +113,42 @@ class PairList:
     def _grow(self):
         had = len(self._rows)
         more = max(had, 64)
-        self._rows = np.concatenate([self._rows, np.empty(more, _ROW)])
+        self._rows = np.concatenate([self._rows, np.empty(more, _PAIR)])
         self._sent = np.concatenate([self._sent, np.zeros(more, np.uint64)])
         self._free.extend(range(had + more - 1, had - 1, -1))
+
+
+class ContactList(_List):
+    """The rows of ``contacts`` as ``contact_changes`` make them. To apply a message costs as much as it has rows."""
+
+    def __init__(self):
+        super().__init__(_CONTACT)
+
+    def __len__(self):
+        return self._len
+
+    def rows(self):
+        """The rows in the order of ``contacts``: an array of their own."""
+        pairs = [self._pairs[key] for key in sorted(self._pairs)]
+        return np.concatenate(pairs) if pairs else np.empty(0, _CONTACT)
+
+    def _replace(self, rows):
+        self._pairs = {}
+        self._len = 0
+        self._change(rows)
+
+    def _change(self, rows):
+        # What a client keeps is its own: rows lie in shared memory.
+        rows = rows.copy()
+        begins = (rows["body_a"][1:] != rows["body_a"][:-1]) | (rows["body_b"][1:] != rows["body_b"][:-1])
+        starts = np.flatnonzero(np.concatenate([[len(rows) > 0], begins]))
+        firsts = rows[starts]
+        gone = firsts["kind"] == layout.ContactKind.GONE
+        for key, start, end, is_gone in zip(
+            _keys(firsts), starts.tolist(), [*starts[1:].tolist(), len(rows)], gone.tolist()
+        ):
+            before = self._pairs.pop(key, None)
+            self._len -= 0 if before is None else len(before)
+            if not is_gone:
+                self._pairs[key] = rows[start:end]
+                self._len += end - start
