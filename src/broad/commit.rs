@@ -113,7 +113,7 @@ impl<'a, X: Proxies, P: PairPolicy> Judge<'a, X, P> {
             "{key:?} was told to overlap"
         );
         inside
-            && (self.is_unconditional(key) || (!self.policy.keeps(low) && !self.policy.keeps(high)))
+            && (self.is_unconditional(key) || (!self.policy.bars(low) && !self.policy.bars(high)))
             && self.policy.allows(low, high)
     }
 

@@ -34,4 +34,8 @@ impl PairPolicy for Filters {
     fn keeps(&self, slot: BodySlot) -> bool {
         Self::keeps(self, slot)
     }
+
+    fn bars(&self, slot: BodySlot) -> bool {
+        Self::bars(self, slot)
+    }
 }

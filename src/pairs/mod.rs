@@ -21,11 +21,17 @@ pub trait PairPolicy {
     /// by `ChangeSet::requery` with at least one of the two bodies.
     fn allows(&self, a: BodySlot, b: BodySlot) -> bool;
 
-    /// Whether the body's box says nothing, because its place is not known: its pairs stay even when the boxes part,
-    /// and no new ones are made from its box. When this ends, the body stands in `ChangeSet::requery`.
+    /// Whether the body's box says nothing of where it is, because that is not known: its pairs stay even when the boxes
+    /// part. When this ends, the body stands in `ChangeSet::requery`.
     fn keeps(&self, slot: BodySlot) -> bool {
         let _ = slot;
         false
+    }
+
+    /// Whether no new pairs are made from the box of a body that [`PairPolicy::keeps`] its own: the box does not tell
+    /// of a way either.
+    fn bars(&self, slot: BodySlot) -> bool {
+        self.keeps(slot)
     }
 }
 

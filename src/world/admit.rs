@@ -6,7 +6,7 @@
 
 use super::World;
 use super::ahead::AHEAD;
-use super::filters::KEEPS;
+use super::filters::{BARS, KEEPS};
 use super::source::{Standing, owns, stand};
 use crate::ids::{BodyId, BodySlot, SourceSlot};
 use crate::limits::FRAME_ROWS_MAX;
@@ -282,7 +282,7 @@ impl World {
             body.velocity = None;
         }
         if let Some(hot) = self.hot(slot) {
-            hot.flags &= !KEEPS;
+            hot.flags &= !(KEEPS | BARS);
         }
         self.settle(slot, false);
     }

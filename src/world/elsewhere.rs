@@ -69,6 +69,7 @@ impl Body {
             spin,
             extra: Vec3::zeros(),
             jump: false,
+            lapse: false,
         };
         let reach = if *pivot == self.centre {
             self.radius

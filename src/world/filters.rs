@@ -14,6 +14,8 @@ pub(super) const ENABLED: u16 = 2;
 pub(super) const MOVES: u16 = 4;
 pub(super) const UNBOUNDED: u16 = 8;
 pub(super) const KEEPS: u16 = 16;
+/// What it keeps its pairs for is not told by its box, which makes no new ones.
+pub(super) const BARS: u16 = 128;
 /// A rule of two plain names speaks of it.
 pub(super) const EXACT: u16 = 32;
 /// A rule with a pattern speaks of it.
@@ -110,6 +112,14 @@ impl Hot {
     pub(super) fn has(&self, flag: u16) -> bool {
         self.flags & flag != 0
     }
+
+    pub(super) fn set(&mut self, flag: u16, on: bool) {
+        self.flags = if on {
+            self.flags | flag
+        } else {
+            self.flags & !flag
+        };
+    }
 }
 
 /// The compiled filters.
@@ -136,6 +146,14 @@ impl Filters {
         self.bodies
             .get(slot.index())
             .is_some_and(|hot| hot.has(KEEPS))
+    }
+
+    /// Whether it does so, and its box holds no way of this tick either.
+    #[must_use]
+    pub fn bars(&self, slot: BodySlot) -> bool {
+        self.bodies
+            .get(slot.index())
+            .is_some_and(|hot| hot.has(BARS))
     }
 
     /// Whether a pair is checked, and why.

@@ -31,8 +31,10 @@ pub struct Leg {
     pub spin: Vec3,
     /// Whole turns on top, about an axis of their own: only where the turn itself has none that could be told.
     pub extra: Vec3,
-    /// A step beyond the body's `teleport_m`: what lies between is not asked.
+    /// A step beyond the body's `teleport_m`, or over a reset: what lies between is not asked.
     pub jump: bool,
+    /// A step over a reset.
+    pub lapse: bool,
 }
 
 impl Leg {
@@ -166,7 +168,7 @@ impl Path {
     /// Whether a step of it was beyond its `teleport_m`.
     #[must_use]
     pub fn has_jumped(&self) -> bool {
-        self.counts() && self.legs.iter().any(|leg| leg.jump)
+        self.counts() && self.legs.iter().any(|leg| leg.jump && !leg.lapse)
     }
 
     /// Whether it is the way of a body that is continuous and takes part.
@@ -242,8 +244,30 @@ impl Path {
             spin,
             extra,
             jump: travel.norm() > self.teleport_m,
+            lapse: false,
         };
         self.add(leg, end, !followed)
+    }
+
+    /// Adds the first pose after a reset to the way before it, which was gone and is asked for; whether the hull grew.
+    pub(super) fn lapse(&mut self, from: Pose, to: Pose, end: Aabb) -> bool {
+        let (at, goal) = (from * self.pivot, to * self.pivot);
+        let leg = Leg {
+            from,
+            to,
+            pivot: at,
+            travel: goal - at,
+            spin: Vec3::zeros(),
+            extra: Vec3::zeros(),
+            jump: true,
+            lapse: true,
+        };
+        self.add(leg, end, false)
+    }
+
+    /// Whether it has a way of this tick that takes part.
+    pub(super) fn goes_on(&self) -> bool {
+        !self.aside && !self.is_empty()
     }
 
     /// Adds a leg; whether the hull grew.

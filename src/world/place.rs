@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::World;
 use super::bend::Vertices;
 use super::body::{Body, Motion};
-use super::filters::{Hot, KEEPS};
+use super::filters::{BARS, Hot, KEEPS};
 use super::names::NameId;
 use super::parts::{Parts, PlacedShape};
 use super::path::Path;
@@ -228,14 +228,13 @@ impl World {
             entry.growing = true;
             self.growing.push(slot);
         }
+        let keeps = judged.in_broad && judged.reach_m.is_infinite();
+        // What it went in this tick, before its place was lost, is asked for all the same.
+        let bars = keeps && !body.path.as_ref().is_some_and(|path| path.is_swept());
         let hot = &mut self.filters.bodies[slot.index()];
         let kept = hot.has(KEEPS);
-        let keeps = judged.in_broad && judged.reach_m.is_infinite();
-        hot.flags = if keeps {
-            hot.flags | KEEPS
-        } else {
-            hot.flags & !KEEPS
-        };
+        hot.set(KEEPS, keeps);
+        hot.set(BARS, bars);
         if kept && !keeps && judged.in_broad {
             self.lists.requery(slot);
         }

@@ -7,6 +7,7 @@
 
 use super::World;
 use super::census::slot_at;
+use super::filters::{BARS, KEEPS};
 use super::path::Path;
 use super::place::tight_box;
 use crate::ids::BodySlot;
@@ -41,6 +42,12 @@ impl World {
             let Some(path) = body.path.as_mut() else {
                 continue;
             };
+            let was_swept = path.is_swept();
+            if let Some(hot) = self.filters.bodies.get_mut(slot.index())
+                && was_swept
+            {
+                hot.set(BARS, hot.has(KEEPS));
+            }
             if path.rest() {
                 entry.tight = *path.hull();
                 body.proxy = entry.tight.widened(entry.widened_m);
@@ -61,8 +68,13 @@ impl World {
             return self.place(slot, pose);
         };
         let moved = self.place(slot, pose);
+        let lapsed = !self.is_placed(slot);
         self.lay(slot, path, moved, |path, end| {
-            path.push(from, *pose, declared, end)
+            if lapsed {
+                path.lapse(from, *pose, end)
+            } else {
+                path.push(from, *pose, declared, end)
+            }
         })
     }
 
@@ -95,6 +107,12 @@ impl World {
         moved
     }
 
+    /// Whether a body has a pose that another one is a motion from.
+    fn is_placed(&self, slot: BodySlot) -> bool {
+        let entry = &self.entries[slot.index()];
+        self.body(slot).is_some_and(|body| body.in_broad) || entry.root == slot && entry.has_pose
+    }
+
     fn take_path(&mut self, slot: BodySlot) -> Option<(Pose, Box<Path>)> {
         let body = self.bodies[slot.index()].as_mut()?;
         Some((body.pose, body.path.take()?))
@@ -108,15 +126,19 @@ impl World {
         moved: bool,
         go: impl FnOnce(&mut Path, Aabb) -> bool,
     ) -> bool {
+        let placed = self.is_placed(slot);
+        // After a reset the way of this tick goes on behind a lapse: what was touched on it before is told.
+        let lapses = !placed && path.goes_on();
         let entry = &mut self.entries[slot.index()];
         let Some(body) = self.bodies[slot.index()].as_mut() else {
             return moved;
         };
         // Where it was placed, its box is new and tight.
         let end = if moved { entry.tight } else { *path.end() };
-        path.set_aside(!body.in_broad);
-        let was_placed = body.in_broad || entry.root == slot && entry.has_pose;
-        let grown = if was_placed {
+        if !lapses {
+            path.set_aside(!body.in_broad);
+        }
+        let grown = if placed || lapses {
             let was_empty = path.is_empty();
             let grown = go(&mut path, end);
             if was_empty && !path.is_empty() {

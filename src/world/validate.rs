@@ -2,7 +2,7 @@
 
 use super::World;
 use super::body::Body;
-use super::filters::{ENABLED, KEEPS, LIVE, MOVES, UNBOUNDED};
+use super::filters::{BARS, ENABLED, KEEPS, LIVE, MOVES, UNBOUNDED};
 use super::tag::Tag;
 use crate::ids::BodySlot;
 use crate::wire::BodyStatus;
@@ -81,6 +81,11 @@ impl World {
         )?;
         let keeps = body.in_broad && body.reach_m.is_infinite();
         check(hot.has(KEEPS) == keeps, "the filters disagree on keeps")?;
+        let swept = body.path.as_ref().is_some_and(|path| path.is_swept());
+        check(
+            hot.has(BARS) == (keeps && !swept),
+            "the filters disagree on bars",
+        )?;
         let judged = self.judge(slot, body);
         check(
             judged.status == body.status,

@@ -38,7 +38,7 @@ pub fn is_near(row: &PairRow, toi: f64, close: f64) {
 }
 
 /// A plate in the plane z = 0, and a ball of 10 mm above it.
-fn plate(more: &str) -> Rig {
+pub fn plate(more: &str) -> Rig {
     let mut rig = Rig::new(&scene(
         "",
         &[
