@@ -349,6 +349,43 @@ fn bug_changes_renewed_while_no_daemon_is_there_are_read_from_the_next_one() {
 }
 
 #[test]
+fn bug_who_waited_for_an_answer_as_the_daemon_ended_waited_out_its_time() {
+    let files = Files::new();
+    let mut daemon = server(&files, 0);
+    let mut link = IoxLink::open(&files.place, &SystemClock, u64::MAX).unwrap();
+    let mut ask = |request| {
+        let header = RequestHeader {
+            json_len: 2,
+            request,
+            schema: WIRE_VERSION,
+            reserved: 0,
+        };
+        link.request(&header, b"{}", &[]).unwrap();
+    };
+    ask(5);
+    let mut tokens = Vec::new();
+    until("the request", || {
+        daemon.requests(&mut |token, _, _| tokens.push(token));
+        !tokens.is_empty()
+    });
+    // This one nobody has looked at.
+    ask(6);
+    drop(daemon);
+    let (mut text, mut refused) = (Vec::new(), Vec::new());
+    until("both answers", || {
+        while let Some(answer) = link.answer(&mut text).unwrap() {
+            let words = String::from_utf8_lossy(&text);
+            assert!(words.contains("has ended"), "{words}");
+            refused.push((answer.request, answer.ok));
+        }
+        refused.len() == 2
+    });
+    refused.sort_unstable();
+    assert_eq!(refused, [(5, 0), (6, 0)]);
+    assert!(tokens.len() == 1 && link.answer(&mut text).unwrap().is_none());
+}
+
+#[test]
 fn bug_a_topic_whose_places_are_all_taken_was_told_by_the_name_of_an_enum() {
     let files = Files::new();
     let _daemon = server(&files, 0);

@@ -21,8 +21,8 @@ pub trait PairPolicy {
     /// by `ChangeSet::requery` with at least one of the two bodies.
     fn allows(&self, a: BodySlot, b: BodySlot) -> bool;
 
-    /// Whether the body's box says nothing of where it is, because that is not known: its pairs stay even when the boxes
-    /// part. When this ends, the body stands in `ChangeSet::requery`.
+    /// Whether the body's box says nothing of where it is, because that is not known: its pairs stay even when the
+    /// boxes part. When this ends, the body stands in `ChangeSet::requery`.
     fn keeps(&self, slot: BodySlot) -> bool {
         let _ = slot;
         false

@@ -22,6 +22,10 @@ pub(super) fn unreadable(header: &RequestHeader, len: usize) -> Option<String> {
         .then(|| format!("the request says {json_len} bytes of JSON and has {len} in all"))
 }
 
+/// What a request comes to that no daemon has any more.
+pub(super) const UNANSWERED: &str = "no daemon has this request any more: the one that it went to has ended, or none was \
+    there. Whether it was done is not known (`sweepd list` says which daemons run)";
+
 /// The JSON of a refusal.
 pub(super) fn refusal(error: String) -> String {
     let answer = Answer {

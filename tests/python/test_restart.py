@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from daemons import NO_TURN
@@ -200,3 +201,27 @@ def test_a_topic_that_no_daemon_offers_any_more_is_told_as_one_that_is_away(daem
         daemon.stop()
         with pytest.raises(sweepd.TimedOut, match="no daemon runs as instance"):
             client._ports.subscribe("contacts", layout.ContactRow)
+
+
+def test_bug_a_request_to_a_daemon_that_ended_was_waited_for_as_long_as_there_was_time(daemon):
+    with sweepd.Client(daemon.instance, "sim", quat_order="wxyz", listen=()) as client:
+        client.step(poses(), timeout_s=5)
+        # It ends with the request in its queue.
+        daemon.process.send_signal(signal.SIGSTOP)
+        with ThreadPoolExecutor(1) as pool:
+            asked = time.monotonic()
+            answer = pool.submit(client.request, {"gap": {"a": "left", "b": "right"}}, timeout_s=60)
+            time.sleep(0.3)
+            daemon.process.send_signal(signal.SIGTERM)
+            daemon.process.send_signal(signal.SIGCONT)
+            try:
+                # it may have come to it yet
+                assert answer.result()["gap"]
+            except sweepd.Refused as e:
+                assert "has ended" in str(e)
+            assert time.monotonic() - asked < 30
+        assert daemon.process.wait(timeout=10) == 0
+        asked = time.monotonic()
+        with pytest.raises(sweepd.Refused, match="or none was there"):
+            client.request({"gap": {"a": "left", "b": "right"}}, timeout_s=60)
+        assert time.monotonic() - asked < 30

@@ -6,6 +6,7 @@ messages of a kind: where three are held, the next one is copied.
 
 import ctypes
 import functools
+import json
 import os
 import time
 import weakref
@@ -25,6 +26,10 @@ _HELD_MAX = 3
 _SLICE_LEN_START = 256
 _REQUEST_LEN_START = 1 << 14
 _ROWS_MAX = 1 << 26
+_UNANSWERED = (
+    "no daemon has this request any more: the one that it went to has ended, or none was there. Whether it was done is not"
+    " known (`sweepd list` says which daemons run)"
+)
 _FOREIGN = tuple(kind for kind in vars(iox2).values() if isinstance(kind, type) and issubclass(kind, Exception))
 
 # What has ports or samples of iceoryx2.
@@ -405,22 +410,29 @@ class Ports:
                 .allocation_strategy(iox2.AllocationStrategy.PowerOfTwo)
                 .create()
             )
-        self._pending = [pending for pending in self._pending if pending.is_connected]
+        self._pending = [one for one in self._pending if one[0].is_connected]
         request = self._client.loan_slice_uninit(len(payload))
         ctypes.memmove(request.user_header_ptr, ctypes.byref(header), ctypes.sizeof(header))
         ctypes.memmove(request.payload_ptr, payload, len(payload))
-        self._pending.append(request.assume_init().send())
+        self._pending.append((request.assume_init().send(), header.request))
         self.wake(ASKED)
 
     @_ours("an answer cannot be received")
     def answer(self):
-        """The next answer as ``(header, bytes)``, or None."""
-        for pending in self._pending:
+        """The next answer as ``(header, bytes)``, or None. What no daemon will answer is refused here."""
+        for one in self._pending:
+            pending, request = one
+            # before it is looked for: no answer is sent after a request was let go of
+            is_open = pending.is_connected
             response = pending.receive()
-            if response is not None:
-                self._pending.remove(pending)
-                header = layout.AnswerHeader.from_buffer_copy(response.user_header().contents)
-                return header, ctypes.string_at(response.payload_ptr, response.header.number_of_elements)
+            if response is None and is_open:
+                continue
+            self._pending.remove(one)
+            if response is None:
+                header = layout.AnswerHeader(request=request, schema=layout.WIRE_VERSION)
+                return header, json.dumps({"error": _UNANSWERED}).encode()
+            header = layout.AnswerHeader.from_buffer_copy(response.user_header().contents)
+            return header, ctypes.string_at(response.payload_ptr, response.header.number_of_elements)
         return None
 
     def close(self):

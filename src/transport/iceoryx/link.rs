@@ -1,5 +1,6 @@
 //! A client's ports over shared memory. It only opens what a daemon has made.
 
+mod answers;
 mod news;
 mod read;
 mod send;
@@ -7,7 +8,6 @@ mod why;
 
 use std::time::Duration;
 
-use iceoryx2::pending_response::PendingResponse;
 use iceoryx2::port::client::Client as RequestClient;
 use iceoryx2::port::listener::{Listener, ListenerWaitError};
 use iceoryx2::port::notifier::Notifier;
@@ -15,6 +15,7 @@ use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{AllocationStrategy, EventId, ZeroCopySend};
 
+use answers::{Pending, next_answer};
 use news::{News, Spot};
 use read::{Reader, read};
 use send::send_frame;
@@ -41,7 +42,6 @@ const PLAN_BYTES_MAX: usize = 1 << 24;
 
 type Sender<T> = Option<Publisher<Ipc, [T], FrameHeader>>;
 type Asker = RequestClient<Ipc, [u8], RequestHeader, [u8], AnswerHeader>;
-type Pending = PendingResponse<Ipc, [u8], RequestHeader, [u8], AnswerHeader>;
 
 /// A client's ports over shared memory. Not `Send`.
 ///
@@ -381,19 +381,6 @@ impl Link for IoxLink {
     }
 
     fn answer(&mut self, into: &mut Vec<u8>) -> Result<Option<AnswerHeader>> {
-        for at in 0..self.pending.len() {
-            let Some(pending) = self.pending.get(at) else {
-                break;
-            };
-            let received = pending.receive().map_err(|e| failed("answer", e))?;
-            let Some(response) = received else { continue };
-            let header = *response.user_header();
-            into.clear();
-            into.extend_from_slice(response.payload());
-            drop(response);
-            drop(self.pending.swap_remove(at));
-            return Ok(Some(header));
-        }
-        Ok(None)
+        next_answer(&mut self.pending, into)
     }
 }

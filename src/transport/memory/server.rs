@@ -9,7 +9,7 @@ use crate::limits;
 use crate::time::Clock;
 use crate::transport::client::Message;
 use crate::transport::hello::hello;
-use crate::transport::request::{refusal, unreadable};
+use crate::transport::request::{UNANSWERED, refusal, unreadable};
 use crate::transport::{Door, RequestToken, Wake};
 use crate::wire::{
     AnswerHeader, ChangesHeader, Demand, Inbox, MessageHeader, Outbox, RejectReason, RequestHeader,
@@ -262,12 +262,7 @@ impl Door for MemoryServer {
         if let Some((peer, request)) = state.asked.remove(&token)
             && let Some(peer) = state.peers.get_mut(&peer)
         {
-            let header = AnswerHeader {
-                boot_id: self.boot_id,
-                request,
-                schema: WIRE_VERSION,
-                ok: u32::from(ok),
-            };
+            let header = answer_header(self.boot_id, request, ok);
             if peer.answers.len() < RESULT_BUFFER {
                 peer.answers.push_back((header, json.as_bytes().to_vec()));
             }
@@ -288,8 +283,36 @@ impl Door for MemoryServer {
 impl Drop for MemoryServer {
     fn drop(&mut self) {
         let mut state = self.shared.lock();
+        let State {
+            asked,
+            requests,
+            peers,
+            ..
+        } = &mut *state;
+        let unread = requests
+            .drain(..)
+            .map(|(peer, header, _)| (peer, header.request));
+        let rest: Vec<_> = std::mem::take(asked).into_values().chain(unread).collect();
+        for (peer, request) in rest {
+            if let Some(peer) = peers.get_mut(&peer) {
+                let header = answer_header(self.boot_id, request, false);
+                let json = refusal(UNANSWERED.into()).into_bytes();
+                peer.answers.push_back((header, json));
+                peer.ready = true;
+            }
+        }
         state.served = false;
         state.newest = Newest::default();
-        state.asked.clear();
+        drop(state);
+        self.shared.to_clients.notify_all();
+    }
+}
+
+fn answer_header(boot_id: u64, request: u64, ok: bool) -> AnswerHeader {
+    AnswerHeader {
+        boot_id,
+        request,
+        schema: WIRE_VERSION,
+        ok: u32::from(ok),
     }
 }
