@@ -36,6 +36,9 @@ use crate::wire::{self, Answer, MessageHeader};
 
 /// Requests that wait for their answer; more are refused at once.
 const OPEN_MAX: usize = 64;
+/// Requests and answers of a service that are kept until all have them. Its clients share them: of ten, one that was
+/// lost on its way was overwritten by those of other clients before it could be sent again.
+const DEPTH: usize = 256;
 
 impl Message for AttachBody {}
 impl Message for Edited {}
@@ -314,7 +317,7 @@ pub(super) fn server<Q: Message + Clone + 'static, R: Message + 'static>(
     let full = names.claim(name).map_err(Error::Usage)?;
     let parsed = Name::parse(&full).map_err(|e| Error::Usage(format!("{full}: {e}")))?;
     let qos = QosProfile::publisher_default()
-        .history(History::KeepLast { depth: 10 })
+        .history(History::KeepLast { depth: DEPTH })
         .reliability_reliable(WhenFull::Fail);
     let kind = ServiceTypeName::new(package, kind);
     node.create_server(mapping, &parsed, &kind, qos.clone(), qos)

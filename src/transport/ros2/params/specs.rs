@@ -53,10 +53,10 @@ impl Spec {
 
 /// What touches the daemon's promises.
 fn of_daemon(config: &Config) -> Vec<Spec> {
-    let time_ms = || Rule::Real {
+    let time_ms = |none| Rule::Real {
         min: 0.0,
         max: TIME_MS_MAX,
-        none: Some(NO_LIMIT),
+        none: Some(none),
     };
     let units = Rule::Whole {
         max: i64::MAX,
@@ -79,7 +79,7 @@ fn of_daemon(config: &Config) -> Vec<Spec> {
             "budget_ms",
             "time of a whole tick, from wake-up to the last message, milliseconds",
             budget_ms,
-            time_ms(),
+            time_ms(NO_LIMIT),
         ),
         spec(
             "budget_units",
@@ -92,7 +92,7 @@ fn of_daemon(config: &Config) -> Vec<Spec> {
             "max_skew_ms",
             "widest skew of stamps along a chain of /tf, milliseconds; beyond it the body is unknown",
             as_said(),
-            time_ms(),
+            time_ms("what the scene says of each source"),
         ),
         spec(
             "report_within_m",
