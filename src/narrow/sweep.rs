@@ -68,6 +68,8 @@ pub struct Swept {
     pub passage: Passage,
     /// A body of it jumped: that part of the way was not asked.
     pub jumped: bool,
+    /// ... by a teleport, and not by a reset.
+    pub teleported: bool,
 }
 
 /// A sweep under way.
@@ -78,6 +80,7 @@ struct Sweep {
     b: BodySlot,
     done: bool,
     jumped: bool,
+    teleported: bool,
     /// Free of touch up to here.
     free: f64,
     /// A share at which they are known to touch; infinite: none is known.
@@ -274,6 +277,7 @@ impl Sweep {
         let jumped = paths().any(crate::world::Path::has_jumped);
         let mut sweep = Self {
             jumped,
+            teleported: paths().any(crate::world::Path::has_teleported),
             ..Self::fresh((slot, at_a, at_b), memo.warm)
         };
         let start = Moment::of((a, b), 0.0);
@@ -300,6 +304,7 @@ impl Sweep {
             b,
             done: false,
             jumped: false,
+            teleported: false,
             free: 0.0,
             hit: f64::INFINITY,
             stuck: false,
@@ -329,6 +334,7 @@ impl Sweep {
             slot: self.slot,
             passage,
             jumped: self.jumped,
+            teleported: self.teleported,
         }
     }
 

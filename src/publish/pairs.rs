@@ -259,7 +259,7 @@ impl Publisher {
         let Some(swept) = view.narrow.passage(slot) else {
             return;
         };
-        if swept.jumped {
+        if swept.teleported {
             out.flags |= pair_flags::TELEPORTED;
         }
         // Who collides now has touched by now.

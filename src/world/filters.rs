@@ -14,7 +14,8 @@ pub(super) const ENABLED: u16 = 2;
 pub(super) const MOVES: u16 = 4;
 pub(super) const UNBOUNDED: u16 = 8;
 pub(super) const KEEPS: u16 = 16;
-/// What it keeps its pairs for is not told by its box, which makes no new ones.
+/// It keeps its pairs, and its box, which says nothing, makes no new ones. Off only in the tick in which its place was
+/// lost on a way that the box holds.
 pub(super) const BARS: u16 = 128;
 /// A rule of two plain names speaks of it.
 pub(super) const EXACT: u16 = 32;

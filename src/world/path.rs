@@ -156,7 +156,7 @@ impl Path {
     /// Whether the body is to be asked for on the way: it is continuous and did not stand still.
     #[must_use]
     pub fn is_swept(&self) -> bool {
-        self.counts() && (self.blurred || self.legs.iter().any(|leg| !leg.is_still()))
+        self.counts() && self.has_moved()
     }
 
     /// Whether the body is continuous; else its path is kept for what hangs on it.
@@ -165,9 +165,15 @@ impl Path {
         self.swept
     }
 
-    /// Whether a step of it was beyond its `teleport_m`.
+    /// Whether there is a step of which nothing is asked.
     #[must_use]
     pub fn has_jumped(&self) -> bool {
+        self.counts() && self.legs.iter().any(|leg| leg.jump)
+    }
+
+    /// Whether a step of it was beyond its `teleport_m`.
+    #[must_use]
+    pub fn has_teleported(&self) -> bool {
         self.counts() && self.legs.iter().any(|leg| leg.jump && !leg.lapse)
     }
 
@@ -265,9 +271,9 @@ impl Path {
         self.add(leg, end, false)
     }
 
-    /// Whether it has a way of this tick that takes part.
-    pub(super) fn goes_on(&self) -> bool {
-        !self.aside && !self.is_empty()
+    /// Whether it has gone anywhere in this tick.
+    pub(super) fn has_moved(&self) -> bool {
+        self.blurred || self.legs.iter().any(|leg| !leg.is_still())
     }
 
     /// Adds a leg; whether the hull grew.

@@ -229,12 +229,14 @@ impl World {
             self.growing.push(slot);
         }
         let keeps = judged.in_broad && judged.reach_m.is_infinite();
-        // What it went in this tick, before its place was lost, is asked for all the same.
-        let bars = keeps && !body.path.as_ref().is_some_and(|path| path.is_swept());
+        let swept = body.path.as_ref().is_some_and(|path| path.is_swept());
         let hot = &mut self.filters.bodies[slot.index()];
         let kept = hot.has(KEEPS);
+        // What it went in this tick, before its place was lost, is asked for all the same. Not what it goes while it is
+        // lost: pairs that its box was barred from would be found by those methods alone that look at all of it.
+        let barred = hot.has(BARS);
         hot.set(KEEPS, keeps);
-        hot.set(BARS, bars);
+        hot.set(BARS, keeps && (barred || !swept));
         if kept && !keeps && judged.in_broad {
             self.lists.requery(slot);
         }

@@ -3,7 +3,8 @@
 //!
 //! In: admitted poses, and what the sender says of the spin. Out: paths of bodies and of what hangs on them. A body
 //! that was not in the broad phase in the last pose has no path of its own: a first pose, one after a reset, an edit
-//! are no motion. What hangs on it may take part all the same, and goes its way.
+//! are no motion, and what lay before a reset in the same tick is one. What hangs on it may take part all the same, and
+//! goes its way.
 
 use super::World;
 use super::census::slot_at;
@@ -28,7 +29,7 @@ impl World {
         self.travelled
             .iter()
             .filter_map(path)
-            .any(|path| path.has_jumped())
+            .any(|path| path.has_teleported())
     }
 
     /// A tick begins: what lay before it has been told, boxes are tight again.
@@ -128,7 +129,7 @@ impl World {
     ) -> bool {
         let placed = self.is_placed(slot);
         // After a reset the way of this tick goes on behind a lapse: what was touched on it before is told.
-        let lapses = !placed && path.goes_on();
+        let lapses = !placed && path.has_moved();
         let entry = &mut self.entries[slot.index()];
         let Some(body) = self.bodies[slot.index()].as_mut() else {
             return moved;

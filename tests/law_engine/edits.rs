@@ -152,6 +152,7 @@ fn law_4_7_contacts_are_computed_only_for_listeners_and_owed_to_those_who_come_l
     ];
     let mut rig = Rig::new(&scene("", &bodies));
     (rig.demand.contacts, rig.demand.regions) = (false, false);
+    rig.demand.contact_changes = false;
     rig.send(ALL);
     assert_eq!(rig.engine.counters().manifolds, 0);
     rig.send(ALL);

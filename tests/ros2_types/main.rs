@@ -105,7 +105,9 @@ fn codes_of_messages() -> Codes {
         ),
         (
             "msg/Contact.msg",
+            // Of `contact_changes`, which is not told over ROS 2.
             named("", codes!(ContactKind))
+                .filter(|(name, _)| name != "GONE")
                 .chain(named(
                     "",
                     bits(&[

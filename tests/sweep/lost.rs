@@ -47,6 +47,37 @@ fn a_reset_between_two_poses_of_one_tick_is_no_motion() {
 }
 
 #[test]
+fn what_stands_in_contact_and_is_reset_in_the_same_tick_is_no_news() {
+    let mut rig = plate(SWEPT);
+    rig.place(2, &at(0.005));
+    rig.send(ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+    let height = [0.005, 5.0];
+    let frame = |k: usize, rig: &mut Rig| {
+        rig.epoch += k as u64;
+        rig.place(2, &at(height[k]));
+    };
+    rig.send_several(2, frame, ALL);
+    assert_eq!(rig.state(), State::Clear);
+    let row = rig.pair(1, 2).unwrap();
+    assert!(has(row, Event::End) && !has(row, Event::Begin) && !hit(row));
+}
+
+#[test]
+fn what_a_reset_puts_into_a_wall_was_not_hit_on_its_way() {
+    let mut rig = plate(SWEPT);
+    let height = [6.0, 0.0];
+    let frame = |k: usize, rig: &mut Rig| {
+        rig.epoch += k as u64;
+        rig.place(2, &at(height[k]));
+    };
+    rig.send_several(2, frame, ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+    let row = rig.pair(1, 2).unwrap();
+    assert!(has(row, Event::Begin) && !hit(row), "{row:?}");
+}
+
+#[test]
 fn bug_a_touch_before_a_refused_pose_in_the_same_tick_was_never_told() {
     // Through it, and through it and back.
     for heights in [&[-5.0, f64::NAN][..], &[-5.0, 5.0, f64::NAN]] {

@@ -76,7 +76,8 @@ class Result:
     structured arrays over shared memory, None where the client did not listen or a newer one overtook it. Keep as many
     results as you like: where three arrays of a kind are still there, the next one is a copy. ``changes`` are the rows that
     changed since the tick before, under ``changes_header`` whose ``base_tick`` is 0 the whole list; None also where the
-    list is not whole (yet, or again). ``contact_changes`` and ``contact_changes_header`` are the same of contacts. Copies (``copy.deepcopy``) and pickles are whole.
+    list is not whole (yet, or again). ``contact_changes`` and ``contact_changes_header`` are the same of contacts. Copies
+    (``copy.deepcopy``) and pickles are whole.
     """
 
     def __init__(self, tick: layout.TickRow, messages: dict[str, Any], lists: dict[str, Any], turns: Turns) -> None:

@@ -138,8 +138,6 @@ class ContactList(_List):
         self._change(rows)
 
     def _change(self, rows):
-        # What a client keeps is its own: rows lie in shared memory.
-        rows = rows.copy()
         begins = (rows["body_a"][1:] != rows["body_a"][:-1]) | (rows["body_b"][1:] != rows["body_b"][:-1])
         starts = np.flatnonzero(np.concatenate([[len(rows) > 0], begins]))
         firsts = rows[starts]
@@ -150,5 +148,6 @@ class ContactList(_List):
             before = self._pairs.pop(key, None)
             self._len -= 0 if before is None else len(before)
             if not is_gone:
-                self._pairs[key] = rows[start:end]
+                # of its own: the message lies in shared memory, and a pair may stay for longer than the others of it
+                self._pairs[key] = rows[start:end].copy()
                 self._len += end - start

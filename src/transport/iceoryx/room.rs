@@ -219,7 +219,8 @@ mod tests {
         };
         let more = bytes_needed(&one, 100, 1) - bytes_needed(&none, 100, 1);
         let rows = 15 * size_of::<ContactRow>() as u64;
-        assert_eq!(more, MESSAGES * rows);
+        // In `contacts` and in `contact_changes`.
+        assert_eq!(more, 2 * MESSAGES * rows);
         let regions = Limits {
             region_rows: 1,
             ..limits

@@ -49,8 +49,11 @@ impl<T: Debug + ZeroCopySend + Copy + 'static> Changes<T> {
                 CallbackProgression::Continue
             });
         }
+        let is_read = !self.now.is_empty();
+        // Nothing is owed to those who have gone.
+        self.owed &= is_read;
         self.owed |= self.now.iter().any(|port| !self.before.contains(port));
-        (!self.now.is_empty(), self.owed)
+        (is_read, self.owed)
     }
 
     /// Sends it.
