@@ -251,10 +251,8 @@ impl Sweeps {
     pub(super) fn validate(&self) -> Result<(), String> {
         for (at, sweep) in (0..).zip(&self.list) {
             if self.places.get(sweep.slot.index()) != Some(&at) {
-                return Err(format!(
-                    "the sweep of {:?} is not where its pair says",
-                    sweep.slot
-                ));
+                let slot = sweep.slot;
+                return Err(format!("the sweep of {slot:?} is not where its pair says"));
             }
         }
         let placed = self.places.iter().filter(|at| **at != NONE).count();
