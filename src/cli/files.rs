@@ -1,7 +1,7 @@
 //! Files that commands write. In: a path of a user. Out: an open file, or why there is none. What a command reads it
 //! does not write over.
 
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
@@ -45,32 +45,50 @@ fn place(path: &Path) -> Option<(u64, u64)> {
     meta.is_file().then(|| (meta.dev(), meta.ino()))
 }
 
-/// Opens a new file; one that is there is somebody's work.
+/// Opens a new file; one that is there is somebody's work. It is locked until it is closed, so that no other of these
+/// commands writes into it.
 ///
 /// * `over` - whether one that is there is written over.
 /// * `what` - it is for, in words.
 ///
 /// # Errors
-/// `Error::Refused` when it is there, `Error::Io` when it cannot be opened.
+/// `Error::Refused` when it is there, or is being written, `Error::Io` when it cannot be opened.
 pub(super) fn open_new(path: &Path, over: bool, what: &str) -> Result<File> {
+    let failed = |e| {
+        let mend = "give a file in a folder that exists and that you may write to";
+        Error::io(
+            format!("cannot open {} for {what}; {mend}", path.display()),
+            e,
+        )
+    };
     let mut how = File::options();
+    // Emptied once it is known that nobody else is writing it.
     how.write(true)
         .create(over)
         .create_new(!over)
-        .truncate(true);
-    how.open(path).map_err(|e| match e.kind() {
+        .truncate(false);
+    let file = how.open(path).map_err(|e| match e.kind() {
         ErrorKind::AlreadyExists => Error::Refused(format!(
             "{} is there already: name another file, or write over it with --force",
             path.display()
         )),
-        _ => Error::io(
-            format!(
-                "cannot open {} for {what}; give a file in a folder that exists and that you may write to",
-                path.display()
-            ),
-            e,
-        ),
-    })
+        _ => failed(e),
+    })?;
+    // What keeps nothing (a device, a pipe) is anybody's.
+    if !file.metadata().map_err(failed)?.is_file() {
+        return Ok(file);
+    }
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(Error::Refused(format!(
+            "{} is being written by another process: name another file, or end that one first",
+            path.display()
+        ))),
+        // There are file systems without locks.
+        Ok(()) | Err(TryLockError::Error(_)) => {
+            file.set_len(0).map_err(failed)?;
+            Ok(file)
+        }
+    }
 }
 
 #[cfg(test)]
@@ -122,6 +140,14 @@ mod tests {
         assert_eq!(error.exit_code(), 4);
         assert!(error.to_string().contains("--force"), "{error}");
         assert_eq!(std::fs::read(&path).unwrap(), b"mine");
+        let held = open_new(&path, true, "a test").unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"");
+        std::fs::write(&path, b"theirs").unwrap();
+        let error = open_new(&path, true, "a test").unwrap_err();
+        assert_eq!(error.exit_code(), 4);
+        assert!(error.to_string().contains("another process"), "{error}");
+        assert_eq!(std::fs::read(&path).unwrap(), b"theirs");
+        drop(held);
         open_new(&path, true, "a test").unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"");
         std::fs::remove_file(&path).unwrap();

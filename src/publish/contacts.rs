@@ -39,11 +39,11 @@ impl Publisher {
     fn fill_all_contacts(&mut self, view: &mut View<'_>, header: MessageHeader, out: &mut Outbox) {
         if !view.demand.contacts {
             out.contacts.clear();
-            self.whole.contacts = false;
+            self.had_all_contacts = false;
             return;
         }
         let cut = header.truncated > 0;
-        let whole = std::mem::replace(&mut self.whole.contacts, !cut) && !cut;
+        let whole = std::mem::replace(&mut self.had_all_contacts, !cut) && !cut;
         let mut kept = std::mem::take(&mut self.kept_contacts);
         kept.begin();
         let mut at = 0;

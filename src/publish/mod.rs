@@ -33,9 +33,9 @@ use state::Survey;
 /// twice as long.
 const AHEAD: usize = 8;
 
-/// A word on each of the messages whose rows are kept.
+/// Which of the messages that are made of kept rows are listened to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct OfMessages {
+struct Heard {
     pairs: bool,
     contacts: bool,
     contact_changes: bool,
@@ -70,7 +70,7 @@ pub struct Publisher {
     listing: Listing,
     survey: Survey,
     /// Which were listened to in the last tick.
-    heard: OfMessages,
+    heard: Heard,
     kept_pairs: Kept<PairRow>,
     /// What `changes` build on.
     chain: Chain,
@@ -82,8 +82,10 @@ pub struct Publisher {
     contact_pairs: Vec<(f64, u32, u32)>,
     /// Used only when not all rows fit: by place whether it is sent.
     chosen: Vec<bool>,
-    /// Which had all their rows in the last tick.
-    whole: OfMessages,
+    /// Whether `pairs` had all its rows in the last tick.
+    had_all_pairs: bool,
+    /// The same of `contacts`.
+    had_all_contacts: bool,
     /// Places among the rows of the pairs whose regions are sent, or of all by rank.
     ranked: Vec<usize>,
     verdicts: Vec<u8>,
@@ -99,14 +101,15 @@ impl Publisher {
             events: Events::default(),
             listing: Listing::default(),
             survey: Survey::default(),
-            heard: OfMessages::default(),
+            heard: Heard::default(),
             kept_pairs: Kept::default(),
             chain: Chain::default(),
             kept_contacts: Kept::default(),
             contact_chain: Chain::default(),
             contact_pairs: Vec::new(),
             chosen: Vec::new(),
-            whole: OfMessages::default(),
+            had_all_pairs: false,
+            had_all_contacts: false,
             ranked: Vec::new(),
             verdicts: Vec::new(),
             next_contact: 1,

@@ -59,11 +59,11 @@ impl Publisher {
     ) {
         if !view.demand.pairs {
             out.pairs.clear();
-            self.whole.pairs = false;
+            self.had_all_pairs = false;
             return;
         }
         let cut = left_out > 0;
-        let whole = std::mem::replace(&mut self.whole.pairs, !cut) && !cut;
+        let whole = std::mem::replace(&mut self.had_all_pairs, !cut) && !cut;
         let mut kept = std::mem::take(&mut self.kept_pairs);
         kept.begin();
         let mut at = 0;

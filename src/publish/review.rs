@@ -11,7 +11,7 @@ use super::contacts::contacts_of;
 use super::events::Ids;
 use super::listing::{NO_EVENT, Row};
 use super::pairs::worst_of;
-use super::{AHEAD, OfMessages, Publisher, View};
+use super::{AHEAD, Heard, Publisher, View};
 
 impl Publisher {
     /// Brings the rows up to this tick.
@@ -21,7 +21,7 @@ impl Publisher {
             .find_slots(view.tick, view.world, view.pairs, view.narrow);
         self.events
             .begin(view.tick, view.world, view.narrow, view.delta);
-        let heard = OfMessages {
+        let heard = Heard {
             pairs: view.demand.pairs,
             contacts: view.demand.contacts,
             contact_changes: view.demand.contact_changes,

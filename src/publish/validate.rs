@@ -73,7 +73,7 @@ impl Publisher {
             return Err("rows of pairs are not by ids".into());
         }
         let listed = self.listing.iter().map(|row| (row.ids.0.0, row.ids.1.0));
-        if self.whole.pairs && !sent().eq(listed) {
+        if self.had_all_pairs && !sent().eq(listed) {
             return Err("rows of pairs are not those of the list".into());
         }
         if self.kept_pairs.rows() != out.pairs.len() {
@@ -103,7 +103,7 @@ impl Publisher {
                     row.ids
                 ));
             }
-            if self.whole.contacts && len != row.contacts as usize {
+            if self.had_all_contacts && len != row.contacts as usize {
                 return Err(format!(
                     "{len} contacts of {:?} are sent, {} there are",
                     row.ids, row.contacts

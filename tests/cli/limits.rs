@@ -221,7 +221,9 @@ fn a_recording_that_becomes_as_long_as_a_file_may_be_is_ended_and_told_and_the_d
     let ended = output(&["replay", tape, "--json"]);
     assert_eq!(code(&ended), Some(0), "{} {}", out(&ended), err(&ended));
     let json: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
-    assert_eq!(json["ending"], "cut", "{json}");
+    assert_eq!(json["ending"], "early", "{json}");
+    let why = json["why"].as_str().unwrap();
+    assert!(why.contains("`ulimit -f unlimited`"), "{json}");
     assert_eq!(json["difference"], serde_json::Value::Null);
     let ticks = json["ticks"].as_u64().unwrap();
     // What was written before the limit is there, but for the chunk that did not fit.

@@ -328,7 +328,17 @@ fn tick(door: &mut dyn Door, outbox: &mut Outbox, demand: sweepd::wire::Demand, 
     if demand.pairs {
         outbox.pairs.clone_from(&pairs);
     }
-    change(outbox, demand, &pairs);
+    retell(
+        outbox.tick.header,
+        demand.changes_anew,
+        (&mut outbox.changes_header, &mut outbox.changes),
+        &pairs,
+        |row| row.body_a,
+        |row| PairRow {
+            verdict: Verdict::Apart.code(),
+            ..*row
+        },
+    );
     let contact = |row: &TransformRow| ContactRow {
         body_a: row.body,
         gap_m: row.position[0],
@@ -338,7 +348,17 @@ fn tick(door: &mut dyn Door, outbox: &mut Outbox, demand: sweepd::wire::Demand, 
     if demand.contacts {
         outbox.contacts.clone_from(&contacts);
     }
-    change_contacts(outbox, demand, &contacts);
+    retell(
+        outbox.tick.header,
+        demand.changes_anew,
+        (
+            &mut outbox.contact_changes_header,
+            &mut outbox.contact_changes,
+        ),
+        &contacts,
+        |row| row.body_a,
+        |row| ContactRow::gone((BodyId(row.body_a), BodyId(row.body_b))),
+    );
     for row in &frame.transforms {
         if demand.regions {
             outbox.regions.push(RegionRow {
@@ -353,44 +373,30 @@ fn tick(door: &mut dyn Door, outbox: &mut Outbox, demand: sweepd::wire::Demand, 
     outbox.plan_changed = false;
 }
 
-/// What is new of the pairs: all that are there, and those of the tick before that are not.
-fn change(outbox: &mut Outbox, demand: sweepd::wire::Demand, pairs: &[PairRow]) {
-    let header = outbox.tick.header;
-    let before = outbox.changes_header.message.tick;
-    let whole = demand.changes_anew || before + 1 != header.tick;
-    outbox.changes_header = ChangesHeader {
-        message: header,
+/// What is new of a list: all rows that are there, and those of the tick before that are not.
+///
+/// * `left` - the row that says that a pair has left the list.
+fn retell<R: Copy + PartialEq>(
+    tick: MessageHeader,
+    anew: bool,
+    (header, rows): (&mut ChangesHeader, &mut Vec<R>),
+    now: &[R],
+    body: fn(&R) -> u64,
+    left: fn(&R) -> R,
+) {
+    let before = header.message.tick;
+    let whole = anew || before + 1 != tick.tick;
+    *header = ChangesHeader {
+        message: tick,
         base_tick: if whole { 0 } else { before },
-        listed: pairs.len() as u64,
+        listed: now.len() as u64,
     };
-    let there = |gone: &PairRow| pairs.iter().any(|row| row.body_a == gone.body_a);
-    outbox
-        .changes
-        .retain(|row| !whole && !row.has_left() && !there(row));
-    for gone in &mut outbox.changes {
-        gone.verdict = Verdict::Apart.code();
+    let is_there = |row: &R| now.iter().any(|now| body(now) == body(row));
+    rows.retain(|row| !whole && *row != left(row) && !is_there(row));
+    for row in &mut *rows {
+        *row = left(row);
     }
-    outbox.changes.extend_from_slice(pairs);
-}
-
-/// As [`change`], of contacts.
-fn change_contacts(outbox: &mut Outbox, demand: sweepd::wire::Demand, contacts: &[ContactRow]) {
-    let header = outbox.tick.header;
-    let before = outbox.contact_changes_header.message.tick;
-    let whole = demand.changes_anew || before + 1 != header.tick;
-    outbox.contact_changes_header = ChangesHeader {
-        message: header,
-        base_tick: if whole { 0 } else { before },
-        listed: contacts.len() as u64,
-    };
-    let there = |gone: &ContactRow| contacts.iter().any(|row| row.body_a == gone.body_a);
-    outbox
-        .contact_changes
-        .retain(|row| !whole && !row.is_gone() && !there(row));
-    for row in &mut outbox.contact_changes {
-        *row = ContactRow::gone((BodyId(row.body_a), BodyId(row.body_b)));
-    }
-    outbox.contact_changes.extend_from_slice(contacts);
+    rows.extend_from_slice(now);
 }
 
 /// `n` bodies whose x says which frame they are from.

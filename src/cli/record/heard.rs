@@ -30,8 +30,7 @@ type Log = McapLog<BufWriter<File>>;
 /// What was heard so far.
 #[derive(Default)]
 struct Tally {
-    /// Ticks written, and ticks that were overtaken before they were heard.
-    ticks: u64,
+    /// Ticks that were overtaken before they were heard.
     missed: u64,
     /// The newest tick of this boot; tick 0: none yet.
     last: TickRow,
@@ -65,8 +64,11 @@ pub(in crate::cli) fn record(args: &RecordArgs, out: &mut Out, stop: &AtomicBool
     // Whatever ended it, the file is closed and says so.
     let why = done.as_ref().err().map_or(String::new(), Error::to_string);
     let closed = log.end(&why, tally.missed);
-    let (ticks, missed) = (tally.ticks, tally.missed);
-    out.line(&format!("{} in {name}", counted(ticks, "tick", "ticks")))?;
+    let missed = tally.missed;
+    out.line(&format!(
+        "{} in {name}",
+        counted(log.ticks(), "tick", "ticks")
+    ))?;
     out.flush()?;
     if missed > 0 {
         tracing::warn!(
@@ -93,7 +95,7 @@ fn follow(
     let until_ns = args.time.map(|time| start_ns.saturating_add(time));
     let (mut heard_ns, mut flushed_ns) = (start_ns, start_ns);
     let mut named_by_ns = start_ns.saturating_add(NAMES_WAIT_NS);
-    while !stop.load(Ordering::Relaxed) && args.ticks.is_none_or(|most| tally.ticks < most) {
+    while !stop.load(Ordering::Relaxed) && args.ticks.is_none_or(|most| log.ticks() < most) {
         let now_ns = clock.monotonic_ns();
         let left_ns = until_ns.map_or(LOOK_NS, |until| until.saturating_sub(now_ns));
         if left_ns == 0 {
@@ -136,8 +138,8 @@ impl Tally {
             self.ended = now.saturating_sub(1);
         }
         // A long tick is told of more than once, each time under its number; its end is the whole of it.
-        if !view.is_under_way() {
-            self.ticks += 1;
+        let has_ended = !view.is_under_way();
+        if has_ended {
             self.missed += now.saturating_sub(self.ended + 1);
             self.ended = now;
         }
@@ -146,13 +148,14 @@ impl Tally {
             let these = (names.header.boot_id, names.header.tick);
             std::mem::replace(&mut self.names, these) != these
         });
-        log.tick(&Shown {
+        let shown = Shown {
             tick,
             names: names.map(|names| names.rows.as_slice()),
             bodies: view.bodies().map(|bodies| bodies.rows.as_slice()),
             contacts: view.contacts().map(parts),
             pairs: view.pairs().map(parts),
-        })
+        };
+        log.tick(&shown, has_ended)
     }
 
     fn restart(&mut self, log: &mut Log, news: &Restarted) -> Result<()> {
@@ -187,7 +190,7 @@ mod tests {
         for ticks in 0..=1 {
             assert_eq!(client.wait_tick(SECOND_NS).unwrap(), Heard::Tick);
             tally.tick(&mut log, client.view()).unwrap();
-            assert_eq!((tally.ticks, tally.missed), (ticks, 0));
+            assert_eq!((log.ticks(), tally.missed), (ticks, 0));
             server.publish(&out).unwrap();
         }
         // One whose end is overtaken is missed.

@@ -156,7 +156,7 @@ const FAULTS: [Fault; 12] = [
         stage.out.pairs.pop();
     }),
     ("rows of pairs settled", |stage| {
-        stage.publisher.whole.pairs = false;
+        stage.publisher.had_all_pairs = false;
         stage.out.pairs.pop();
     }),
     ("not where its mark says", |stage| {

@@ -1,8 +1,8 @@
 //! What a client heard of a daemon is written: for people alone, and nothing that could be replayed.
 
 use std::collections::BTreeMap;
-use std::io::{Seek, Write};
 
+use super::medium::Medium;
 use super::shown::{self, Show, Shown};
 use super::tape::Tape;
 use super::{MISSED, WHY};
@@ -11,13 +11,13 @@ use crate::wire::{PairRow, TickRow};
 
 /// Writes what was heard as MCAP.
 #[derive(Debug)]
-pub struct McapLog<W: Write + Seek> {
+pub struct McapLog<W: Medium> {
     tape: Tape<W>,
     show: Show,
     since_1970_ns: u64,
 }
 
-impl<W: Write + Seek> McapLog<W> {
+impl<W: Medium> McapLog<W> {
     /// A file without ticks.
     ///
     /// * `name` - what messages call the file.
@@ -38,11 +38,23 @@ impl<W: Write + Seek> McapLog<W> {
 
     /// Writes a tick.
     ///
+    /// * `has_ended` - whether this is the whole of it: a long tick is told of more than once.
+    ///
     /// # Errors
     /// As [`McapLog::new`].
-    pub fn tick(&mut self, shown: &Shown<'_>) -> Result<()> {
+    pub fn tick(&mut self, shown: &Shown<'_>, has_ended: bool) -> Result<()> {
         let time_ns = shown.tick.sent_ns.saturating_add(self.since_1970_ns);
-        self.show.tick(&mut self.tape, time_ns, shown)
+        self.show.rows(&mut self.tape, time_ns, shown)?;
+        if has_ended {
+            self.tape.count();
+        }
+        self.show.tick(&mut self.tape, time_ns, shown.tick)
+    }
+
+    /// How many ticks that have ended the file has.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        self.tape.ticks()
     }
 
     /// The daemon has started anew: writes the ends that it means for pairs of the boot that is over.
@@ -69,7 +81,7 @@ impl<W: Write + Seek> McapLog<W> {
         self.tape.flush()
     }
 
-    /// Closes the file.
+    /// Closes the file; one that could not be written was closed then.
     ///
     /// * `missed` - ticks that were overtaken and are not in it.
     /// * `why` - nothing follows; empty: it was meant to end.

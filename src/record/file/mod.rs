@@ -5,6 +5,7 @@
 //! the first of this program, and can be had afterwards for keeping (`mcap compress`).
 
 mod heard;
+mod medium;
 mod read;
 mod schemas;
 mod shown;
@@ -12,9 +13,9 @@ mod tape;
 mod write;
 
 pub use heard::McapLog;
+pub use medium::{Medium, buffered};
 pub use read::{Ending, Read, Reader};
 pub use shown::Shown;
-pub use tape::buffered;
 pub use write::McapSink;
 
 /// Topics of our own: the start, then what went in and what came out, bit by bit.

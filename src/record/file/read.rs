@@ -130,6 +130,8 @@ impl Reader {
             mcap: LinearReader::new_with_options(
                 LinearReaderOptions::default()
                     .with_prevalidate_chunk_crcs(true)
+                    .with_validate_data_section_crc(true)
+                    .with_validate_summary_section_crc(true)
                     .with_record_length_limit(RECORD_BYTES_MAX),
             ),
             read_bytes: 0,

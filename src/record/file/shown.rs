@@ -1,7 +1,6 @@
 //! A tick as people look at it: ROS 2 messages, names beside ids.
 
-use std::io::{Seek, Write};
-
+use super::medium::Medium;
 use super::tape::Tape;
 use crate::error::Result;
 use crate::wire::ros::{Book, Counts, Speaker, Time};
@@ -62,8 +61,8 @@ impl Show {
         self.speaker.book = Book::default();
     }
 
-    /// A tick.
-    pub(super) fn tick<W: Write + Seek>(
+    /// All that there is of a tick but the tick itself.
+    pub(super) fn rows<W: Medium>(
         &mut self,
         tape: &mut Tape<W>,
         time_ns: u64,
@@ -88,14 +87,24 @@ impl Show {
         if let Some((header, rows)) = shown.pairs {
             self.pairs(tape, time_ns, header, rows)?;
         }
-        let state = self.speaker.state(shown.tick);
+        Ok(())
+    }
+
+    /// A tick, after all that belongs to it.
+    pub(super) fn tick<W: Medium>(
+        &mut self,
+        tape: &mut Tape<W>,
+        time_ns: u64,
+        tick: &TickRow,
+    ) -> Result<()> {
+        let state = self.speaker.state(tick);
         tape.write_message(STATE, time_ns, &state)?;
-        let tick = self.speaker.tick(shown.tick, Counts::default());
+        let tick = self.speaker.tick(tick, Counts::default());
         tape.write_message(TICK, time_ns, &tick)
     }
 
     /// Pairs alone.
-    pub(super) fn pairs<W: Write + Seek>(
+    pub(super) fn pairs<W: Medium>(
         &self,
         tape: &mut Tape<W>,
         time_ns: u64,

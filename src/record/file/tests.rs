@@ -10,6 +10,8 @@ use crate::error::Error;
 use crate::record::{Facts, LAYOUT, Sink as _, Start, TickRecord};
 use crate::wire::{Demand, PairRow, WIRE_VERSION};
 
+mod full;
+
 static NUMBERS: AtomicU64 = AtomicU64::new(0);
 
 /// A file that goes when it is dropped.
@@ -194,6 +196,24 @@ fn bug_a_record_that_is_not_known_any_more_or_claims_to_be_longer_is_damage() {
     let (ticks, ending) = changed(note.1, 0xf0).unwrap();
     assert!(matches!(ending, Ending::Damaged(_)), "{ending:?}");
     assert_eq!(ticks, 50);
+}
+
+#[test]
+fn bug_a_changed_bit_outside_of_the_chunks_was_not_noticed() {
+    let whole = std::fs::read(&written(20, Some("")).0).unwrap();
+    let mut unnoticed = Vec::new();
+    for at in (0..whole.len())
+        .step_by(whole.len() / 400)
+        .chain(whole.len() - 700..whole.len())
+    {
+        let mut bytes = whole.clone();
+        bytes[at] ^= 4;
+        let scrap = Scrap::of(&bytes);
+        if Reader::open(&scrap.0).is_ok() && read(&scrap).1 == Ending::Whole {
+            unnoticed.push(at);
+        }
+    }
+    assert_eq!(unnoticed, Vec::<usize>::new(), "of {}", whole.len());
 }
 
 #[test]

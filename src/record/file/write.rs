@@ -1,8 +1,8 @@
 //! A recording is written: bit by bit for a replay, and as ROS 2 messages for people.
 
 use std::collections::BTreeMap;
-use std::io::{Seek, Write};
 
+use super::medium::Medium;
 use super::shown::{self, Show, Shown};
 use super::tape::Tape;
 use super::{INPUT, NOT_SHOWN, OUTPUT, START, TICKS, WHY};
@@ -19,16 +19,15 @@ const TOPICS: [(&str, &str); 3] = [
 
 /// Writes a recording as MCAP.
 #[derive(Debug)]
-pub struct McapSink<W: Write + Seek> {
+pub struct McapSink<W: Medium> {
     tape: Tape<W>,
     show: Show,
     since_1970_ns: u64,
-    ticks: u64,
     /// Ticks of which nothing is there for people: the disk did not follow.
     not_shown: u64,
 }
 
-impl<W: Write + Seek> McapSink<W> {
+impl<W: Medium> McapSink<W> {
     /// A recording that begins with `start`.
     ///
     /// * `name` - what messages call the file.
@@ -43,7 +42,6 @@ impl<W: Write + Seek> McapSink<W> {
             tape: Tape::new(to, name, topics)?,
             show: Show::new(frame_id),
             since_1970_ns: facts.since_1970_ns,
-            ticks: 0,
             not_shown: 0,
         };
         let time_ns = facts.started_ns.saturating_add(facts.since_1970_ns);
@@ -53,17 +51,23 @@ impl<W: Write + Seek> McapSink<W> {
         sink.tape.flush()?;
         Ok(sink)
     }
+
+    /// How many ticks the file has.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        self.tape.ticks()
+    }
 }
 
-impl<W: Write + Seek + Send> Sink for McapSink<W> {
+impl<W: Medium + Send> Sink for McapSink<W> {
     fn tick(&mut self, record: &TickRecord, hurried: bool) -> Result<()> {
         let (out, demand) = (&record.out, record.ask.demand);
         let time_ns = out.tick.sent_ns.saturating_add(self.since_1970_ns);
         self.tape
             .write_bytes(INPUT, time_ns, |to| put_input(record, to))?;
+        self.tape.count();
         self.tape
             .write_bytes(OUTPUT, time_ns, |to| put_output(out, demand, to))?;
-        self.ticks += 1;
         // Names belong to what follows.
         if hurried && !out.names_changed {
             self.not_shown += 1;
@@ -80,7 +84,8 @@ impl<W: Write + Seek + Send> Sink for McapSink<W> {
                 .pairs
                 .then_some((&out.pairs_header, out.pairs.as_slice())),
         };
-        self.show.tick(&mut self.tape, time_ns, &shown)
+        self.show.rows(&mut self.tape, time_ns, &shown)?;
+        self.show.tick(&mut self.tape, time_ns, &out.tick)
     }
 
     fn flush(&mut self) -> Result<()> {
@@ -90,7 +95,7 @@ impl<W: Write + Seek + Send> Sink for McapSink<W> {
     fn end(&mut self, why: &str) -> Result<()> {
         self.tape.end(BTreeMap::from([
             (WHY.to_owned(), why.to_owned()),
-            (TICKS.to_owned(), self.ticks.to_string()),
+            (TICKS.to_owned(), self.tape.ticks().to_string()),
             (NOT_SHOWN.to_owned(), self.not_shown.to_string()),
         ]))
     }

@@ -18,117 +18,14 @@ use rows::{Contacts, Pairs, Rows};
 const PATIENCE: u32 = 8;
 
 /// The rows of `pairs`, as `changes` make them: by ids, with the ages of the tick.
-#[derive(Clone, Debug, Default)]
-pub struct PairList(List<Pairs>);
-
-impl PairList {
-    /// What the tick said: the rows that changed, or under `base_tick` 0 the whole list.
-    #[must_use]
-    pub fn changes(&self) -> &Message<PairRow, ChangesHeader> {
-        &self.0.news
-    }
-
-    /// How many rows it has.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.0.rows.len()
-    }
-
-    /// Whether it has none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The row of a pair, the smaller id first; `None`: it is not listed.
-    #[must_use]
-    pub fn get(&self, body_a: u64, body_b: u64) -> Option<PairRow> {
-        self.0.rows.get((body_a, body_b), self.tick())
-    }
-
-    /// The rows, by ids.
-    pub fn iter(&self) -> impl Iterator<Item = PairRow> {
-        self.0.rows.iter(self.tick())
-    }
-
-    pub(super) fn boot_id(&self) -> u64 {
-        self.0.boot_id()
-    }
-
-    pub(super) fn tick(&self) -> u64 {
-        self.0.tick()
-    }
-
-    /// The list, where it is whole and of this tick.
-    pub(super) fn of(&self, tick: &MessageHeader) -> Option<&Self> {
-        self.0.is_of(tick).then_some(self)
-    }
-
-    /// Takes messages up to the tick; one of a later tick or boot is kept for then.
-    pub(super) fn advance(
-        &mut self,
-        tick: &MessageHeader,
-        boots_over: &mut Vec<u64>,
-        link: &mut dyn Link,
-    ) -> Result<()> {
-        self.0.advance(tick, boots_over, link)
-    }
-}
+pub type PairList = List<Pairs>;
 
 /// The rows of `contacts`, as `contact_changes` make them.
-#[derive(Clone, Debug, Default)]
-pub struct ContactList(List<Contacts>);
-
-impl ContactList {
-    /// What the tick said: the contacts of the pairs of which there was something new, and of those that have none any
-    /// more that they are gone; or under `base_tick` 0 all contacts.
-    #[must_use]
-    pub fn changes(&self) -> &Message<ContactRow, ChangesHeader> {
-        &self.0.news
-    }
-
-    /// How many contacts it has.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.0.rows.len()
-    }
-
-    /// Whether it has none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The contacts of a pair, the smaller id first; of one that has none an empty slice.
-    #[must_use]
-    pub fn get(&self, body_a: u64, body_b: u64) -> &[ContactRow] {
-        self.0.rows.get((body_a, body_b))
-    }
-
-    /// The contacts, in the order of `contacts`.
-    pub fn iter(&self) -> impl Iterator<Item = &ContactRow> {
-        self.0.rows.iter()
-    }
-
-    /// As [`PairList::of`].
-    pub(super) fn of(&self, tick: &MessageHeader) -> Option<&Self> {
-        self.0.is_of(tick).then_some(self)
-    }
-
-    /// As [`PairList::advance`].
-    pub(super) fn advance(
-        &mut self,
-        tick: &MessageHeader,
-        boots_over: &mut Vec<u64>,
-        link: &mut dyn Link,
-    ) -> Result<()> {
-        self.0.advance(tick, boots_over, link)
-    }
-}
+pub type ContactList = List<Contacts>;
 
 /// A list that is kept from messages of what is new.
 #[derive(Clone, Debug, Default)]
-struct List<R: Rows> {
+pub struct List<R: Rows> {
     /// The newest that was taken.
     news: Message<R::Row, ChangesHeader>,
     /// One that came early.
@@ -141,22 +38,68 @@ struct List<R: Rows> {
     passed: u32,
 }
 
+impl PairList {
+    /// The row of a pair, the smaller id first; `None`: it is not listed.
+    #[must_use]
+    pub fn get(&self, body_a: u64, body_b: u64) -> Option<PairRow> {
+        self.rows.get((body_a, body_b), self.tick())
+    }
+
+    /// The rows, by ids.
+    pub fn iter(&self) -> impl Iterator<Item = PairRow> {
+        self.rows.iter(self.tick())
+    }
+}
+
+impl ContactList {
+    /// The contacts of a pair, the smaller id first; of one that has none an empty slice.
+    #[must_use]
+    pub fn get(&self, body_a: u64, body_b: u64) -> &[ContactRow] {
+        self.rows.get((body_a, body_b))
+    }
+
+    /// The contacts, in the order of `contacts`.
+    pub fn iter(&self) -> impl Iterator<Item = &ContactRow> {
+        self.rows.iter()
+    }
+}
+
 impl<R: Rows> List<R> {
-    fn boot_id(&self) -> u64 {
+    /// What the tick said: of pairs the rows that changed, of contacts those of the pairs of which there was something
+    /// new; under `base_tick` 0 the whole list.
+    #[must_use]
+    pub fn changes(&self) -> &Message<R::Row, ChangesHeader> {
+        &self.news
+    }
+
+    /// How many rows it has.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether it has none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    pub(super) fn boot_id(&self) -> u64 {
         self.news.header.message.boot_id
     }
 
-    fn tick(&self) -> u64 {
+    pub(super) fn tick(&self) -> u64 {
         self.news.header.message.tick
     }
 
-    /// Whether it is whole and of this tick.
-    fn is_of(&self, tick: &MessageHeader) -> bool {
-        self.is_whole && self.boot_id() == tick.boot_id && self.tick() == tick.tick
+    /// The list, where it is whole and of this tick.
+    pub(super) fn of(&self, tick: &MessageHeader) -> Option<&Self> {
+        let is_of = self.boot_id() == tick.boot_id && self.tick() == tick.tick;
+        (self.is_whole && is_of).then_some(self)
     }
 
     /// Takes messages up to the tick; one of a later tick or boot is kept for then.
-    fn advance(
+    pub(super) fn advance(
         &mut self,
         tick: &MessageHeader,
         boots_over: &mut Vec<u64>,
@@ -236,13 +179,13 @@ mod tests {
             tick,
             ..MessageHeader::default()
         };
-        list.0.ahead.header = ChangesHeader {
+        list.ahead.header = ChangesHeader {
             message,
             base_tick,
             listed,
         };
-        list.0.ahead.rows = rows.to_vec();
-        list.0.take()
+        list.ahead.rows = rows.to_vec();
+        list.take()
     }
 
     fn ids(list: &PairList, tick: u64) -> Option<Vec<u64>> {
@@ -307,16 +250,16 @@ mod tests {
     fn a_list_of_another_boot_is_not_built_on() {
         let mut list = PairList::default();
         assert!(!hear(&mut list, 5, 0, &[row(2, Verdict::Near)], 1));
-        list.0.ahead.header = ChangesHeader {
+        list.ahead.header = ChangesHeader {
             base_tick: 5,
             listed: 1,
-            ..list.0.news.header
+            ..list.news.header
         };
         (
-            list.0.ahead.header.message.boot_id,
-            list.0.ahead.header.message.tick,
+            list.ahead.header.message.boot_id,
+            list.ahead.header.message.tick,
         ) = (8, 6);
-        assert!(list.0.take());
+        assert!(list.take());
         assert_eq!(ids(&list, 6), None);
     }
 }

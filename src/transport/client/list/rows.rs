@@ -9,7 +9,7 @@ use crate::transport::client::link::Link;
 use crate::wire::{ChangesHeader, ContactRow, PairRow};
 
 /// Rows by their pairs.
-pub(super) trait Rows: Debug + Default {
+pub trait Rows: Debug + Default {
     /// A row of its message.
     type Row: Debug + Default + Clone + Copy + PartialEq;
 
@@ -27,7 +27,7 @@ pub(super) trait Rows: Debug + Default {
 
 /// Of each pair that is listed the tick that sent its row, and the row.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Pairs(BTreeMap<(u64, u64), (u64, PairRow)>);
+pub struct Pairs(BTreeMap<(u64, u64), (u64, PairRow)>);
 
 impl Pairs {
     pub(super) fn get(&self, ids: (u64, u64), tick: u64) -> Option<PairRow> {
@@ -78,7 +78,7 @@ impl Rows for Pairs {
 
 /// Of each pair that has some its contacts, and how many all have.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Contacts {
+pub struct Contacts {
     pairs: BTreeMap<(u64, u64), Vec<ContactRow>>,
     len: usize,
 }
