@@ -394,6 +394,8 @@ fn bug_what_is_wrong_was_told_by_keys_and_variables_that_nobody_wrote() {
     if cfg!(feature = "ros2") {
         let args = vec!["run", scene, "--ros2", "--ros-domain-id", "999"];
         wrong.push((args, "sweepd: --ros-domain-id 999: "));
+        let args = vec!["run", scene, "--ros2", "--ros-domain-id", "-1"];
+        wrong.push((args, "sweepd: --ros-domain-id -1: "));
     }
     for (args, words) in wrong {
         let ended = output(&args);

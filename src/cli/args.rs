@@ -115,7 +115,7 @@ pub(super) struct RunArgs {
     pub(super) ros2: bool,
     /// DDS domain, 0 to 232; `ROS_DOMAIN_ID` otherwise.
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
-    pub(super) ros_domain_id: Option<u16>,
+    pub(super) ros_domain_id: Option<i64>,
     /// Record all that the engine is given and says to this file (MCAP), for `sweepd replay` and for people.
     ///
     /// The recording listens to pairs and contacts, and ten times a second to bodies: these are then computed.

@@ -43,7 +43,7 @@ impl Network {
     /// # Errors
     /// One text that names the variable, what is wrong with it and what to do.
     pub fn read(
-        domain: Option<u16>,
+        domain: Option<i64>,
         variable: impl Fn(&str) -> Option<String>,
     ) -> Result<Self, String> {
         let given = |name: &str| variable(name).filter(|text| !text.is_empty());
@@ -59,11 +59,12 @@ impl Network {
                 })
             })?,
         };
-        if domain > DOMAIN_MAX {
-            return Err(format!(
+        let fits = u16::try_from(domain).ok();
+        let domain = fits.filter(|fits| *fits <= DOMAIN_MAX).ok_or_else(|| {
+            format!(
                 "{said_by}{domain}: DDS has ports for 0 to {DOMAIN_MAX}, of which 0 to 101 are safe on Linux"
-            ));
-        }
+            )
+        })?;
         let implementation = given("RMW_IMPLEMENTATION");
         rmw(implementation.as_deref())?;
         if let Some(server) = given("ROS_DISCOVERY_SERVER") {
@@ -149,7 +150,7 @@ fn rmw(text: Option<&str>) -> Result<(), String> {
 mod tests {
     use super::*;
 
-    fn read(domain: Option<u16>, variables: &[(&str, &str)]) -> Result<Network, String> {
+    fn read(domain: Option<i64>, variables: &[(&str, &str)]) -> Result<Network, String> {
         Network::read(domain, |name| {
             let found = variables.iter().find(|(own, _)| *own == name);
             found.map(|(_, text)| (*text).to_owned())

@@ -8,7 +8,7 @@ mod stamps;
 
 use judge::judge;
 pub(super) use stamps::off;
-use stamps::{both, crowded, forgotten, older, rivalry};
+use stamps::{both, crowded, forgotten, older, rivalry, unfit};
 
 use ros2_client::Gid;
 
@@ -165,10 +165,11 @@ impl Source {
                 Taken::Newer if !fixed => off(what, stamp_ns, receipt, self.timeout_ns),
                 Taken::Older(by_ns) => Some(older(what, by_ns)),
                 Taken::Full => Some(crowded(what)),
-                Taken::Newer | Taken::Refused | Taken::WentBack => None,
+                Taken::Refused(why) => Some(unfit(what, why)),
+                Taken::Newer | Taken::WentBack => None,
             };
             // Those that never change are said again by whoever starts anew.
-            let is_in = !matches!(taken, Taken::Refused | Taken::Full);
+            let is_in = !matches!(taken, Taken::Refused(_) | Taken::Full);
             let rivals = !fixed && is_in && self.tree.hear(what.1, receipt.from, receipt.now_ns);
             let odd = mixed.filter(|_| is_in).or(odd);
             let odd = if rivals { Some(rivalry(what)) } else { odd };

@@ -47,8 +47,8 @@ pub(super) enum Taken {
     Older(u64),
     /// Its sender's time began anew.
     WentBack,
-    /// A frame without a name, with one that is too long, or hung on itself.
-    Refused,
+    /// It links no two frames, and why.
+    Refused(&'static str),
     /// A frame too many.
     Full,
 }
@@ -185,9 +185,8 @@ impl Tree {
         timeout_ns: u64,
     ) -> Taken {
         let (child, parent) = (plain(&link.child_frame_id), plain(&link.header.frame_id));
-        let is_named = |frame: &str| (1..=FRAME_NAME_BYTES_MAX).contains(&frame.len());
-        if !is_named(child) || !is_named(parent) || child == parent {
-            return Taken::Refused;
+        if let Some(why) = unfit(child, parent) {
+            return Taken::Refused(why);
         }
         if !self.has_room(child, parent) {
             return Taken::Full;
@@ -282,6 +281,22 @@ impl Tree {
             skew_ns: newest.saturating_sub(oldest),
             received_ns: aged.then_some((latest, earliest)),
         })
+    }
+}
+
+/// Why these are no two frames that can be linked, if they are none.
+fn unfit(child: &str, parent: &str) -> Option<&'static str> {
+    const { assert!(FRAME_NAME_BYTES_MAX == 255, "it is in the words below") };
+    if child.is_empty() {
+        Some("it has no name: give it one (`child_frame_id`)")
+    } else if parent.is_empty() {
+        Some("its parent has no name: give it one (`header.frame_id`)")
+    } else if child.len().max(parent.len()) > FRAME_NAME_BYTES_MAX {
+        Some("it or its parent has a name of more than 255 bytes: give it a shorter one")
+    } else if child == parent {
+        Some("it is linked to itself: link it to another frame, or leave the link out")
+    } else {
+        None
     }
 }
 

@@ -34,6 +34,12 @@ pub(super) fn both((kind, name): (&str, &str)) -> String {
     )
 }
 
+/// A link is of no two frames.
+pub(super) fn unfit((kind, name): (&str, &str), why: &str) -> String {
+    let name = brief(name);
+    format!("{kind} `{name}`: its link is refused, because {why}")
+}
+
 /// There is no room for a frame.
 pub(super) fn crowded((kind, name): (&str, &str)) -> String {
     format!(

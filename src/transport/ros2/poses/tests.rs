@@ -104,6 +104,33 @@ fn a_link_that_is_fixed_on_one_topic_and_moves_on_another_is_told() {
 }
 
 #[test]
+fn bug_a_link_without_a_name_or_to_itself_was_passed_over_in_silence() {
+    let mut one = tf("tool");
+    one.take_links(&link("world", "tool", MS), false, at(MS));
+    assert_eq!(one.faults(9, MS), [""; 0]);
+    for (parent, child, words) in [
+        (
+            "world",
+            "",
+            "frame ``: its link is refused, because it has no name",
+        ),
+        (
+            "",
+            "tool",
+            "frame `tool`: its link is refused, because its parent has no name",
+        ),
+        ("/tool", "tool", "linked to itself"),
+        (&"x".repeat(256), "tool", "more than 255 bytes"),
+    ] {
+        let refused = one.refused;
+        one.take_links(&link(parent, child, 2 * MS), false, at(2 * MS));
+        let told = one.faults(9, 2 * MS);
+        assert!(told[0].contains(words), "{told:?}");
+        assert_eq!(one.refused, refused + 1);
+    }
+}
+
+#[test]
 fn stamps_too_far_apart_make_the_body_unknown_and_say_so() {
     let mut one = source(RosKind::Tf, 50 * MS, "tool");
     one.take_links(&link("world", "base", 10 * MS), false, at(MS));
