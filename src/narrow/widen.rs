@@ -158,7 +158,9 @@ impl Narrow {
         let known = |status| matches!(status, BodyStatus::Known | BodyStatus::Held);
         let still = reach_m == 0.0 && known(a.status) && known(b.status) && by_path.is_finite();
         // The comparison that spares the next visits: gap_min - (spent - credit) > report.
-        hot.expiry_m = if still && memo.cursor == NONE {
+        // Only from a pair that is apart by it: nobody would come to say that another is so again.
+        let is_apart = memo.now.min > memo.report_m.max(0.0);
+        hot.expiry_m = if still && is_apart && memo.cursor == NONE {
             let sum = memo.gap.min + memo.credit_m - memo.report_m.max(0.0);
             sum - 4.0 * ROUND * (memo.gap.min.abs() + memo.credit_m.abs() + memo.report_m.abs())
         } else {

@@ -129,23 +129,30 @@ impl World {
             Standing::Afresh => self.forget_poses(source),
             Standing::Next => {}
         }
-        // An older frame that still waits has nothing to say any more.
         let state = &mut self.sources[source.index()];
-        let older_until_ns = state.pass_over_waiting();
+        // An older frame that still waits has nothing to say any more, unless it may have bodies that this one lacks or
+        // is a part of a body's way.
+        let stands_for_older = header.flags == frame_flags::FULL && !state.followed;
+        let older_until_ns = if standing == Standing::Afresh || stands_for_older {
+            state.pass_over_waiting()
+        } else {
+            None
+        };
+        let is_paused = header.flags == frame_flags::PAUSED;
         if frame.waited && header.sent_ns == 0 {
+            state.gap |= !is_paused;
             return Err(RejectReason::TooOld);
         }
-        if header.scene_rev > self.scene_rev {
+        let is_behind = state.waits() && !is_paused;
+        if header.scene_rev > self.scene_rev || is_behind {
             let own_until_ns = times.received_ns.saturating_add(state.timeout_ns);
             // The stream waits, not each of its frames: one that takes another's place would put off the end for ever.
             let until_ns = match older_until_ns {
                 Some(older_ns) if standing == Standing::Next => older_ns.min(own_until_ns),
                 _ => own_until_ns,
             };
-            let waiting = &mut state.waiting;
-            waiting.until_ns = Some(until_ns);
-            waiting.frame.clone_from(frame);
-            waiting.frame.received_ns = times.received_ns;
+            let crowded_out = state.waiting.push(frame, times.received_ns, until_ns);
+            state.skipped += u64::from(crowded_out);
             return Ok(Admission::Waiting { source });
         }
         Ok(self.take(source, frame, times))
@@ -171,18 +178,27 @@ impl World {
     fn take(&mut self, source: SourceSlot, frame: &Frame, times: Times) -> Admission {
         let state = &mut self.sources[source.index()];
         state.frames += 1;
-        state.newest = Some(frame.header);
-        state.admitted = Some((frame.header, times.received_ns));
-        state.since_ns = times.since_ns;
-        state.alive = self.now_ns.saturating_sub(times.since_ns) < state.timeout_ns;
+        let number = (frame.header.epoch, frame.header.seq);
+        // One that waited may be taken after a pause that it was sent before.
+        let is_newer = |newest: FrameHeader| number > (newest.epoch, newest.seq);
+        if state.newest.is_none_or(is_newer) {
+            state.newest = Some(frame.header);
+            state.admitted = Some((frame.header, times.received_ns));
+            state.since_ns = times.since_ns;
+            state.alive = self.now_ns.saturating_sub(times.since_ns) < state.timeout_ns;
+        }
         if frame.header.flags == frame_flags::PAUSED {
-            self.renew_last_poses(source, times);
+            // The poses that hold are those of its sender's last pose frame, which may not be those that are known.
+            if !state.gap && !state.waits() {
+                self.renew_last_poses(source, times);
+            }
             return Admission::Admitted {
                 source,
                 poses: 0,
                 refused_rows: 0,
             };
         }
+        state.gap &= state.order != Some(number);
         // Its list of rows is worked on outside of the world, and put back.
         let mut rows = std::mem::take(&mut self.sources[source.index()].rows);
         let refused_rows = self.find_rows(source, &frame.transforms, &mut rows);
@@ -297,22 +313,33 @@ impl World {
         }
     }
 
-    /// Admits the frame of a source that waited, where the scene has come to its revision or its wait is over.
+    /// Admits the frames of a source that waited, where the scene has come to their revision; refuses them where the
+    /// wait is over.
     pub(super) fn flush_waiting(&mut self, source: SourceSlot) {
-        let state = &mut self.sources[source.index()];
-        let Some(until_ns) = state.waiting.until_ns else {
-            return;
-        };
-        if state.waiting.frame.header.scene_rev <= self.scene_rev {
-            state.waiting.until_ns = None;
-            let frame = std::mem::take(&mut state.waiting.frame);
-            let times = self.times_of(&frame);
-            self.take(source, &frame, times);
-            self.sources[source.index()].waiting.frame = frame;
-        } else if until_ns <= self.now_ns {
-            state.waiting.until_ns = None;
-            state.refused += 1;
-            self.note_reject(RejectReason::SceneRevision, Some(source));
+        loop {
+            let state = &mut self.sources[source.index()];
+            let waiting = &mut state.waiting;
+            let (Some(first), Some(until_ns)) = (waiting.first(), waiting.until_ns()) else {
+                return;
+            };
+            let is_due = first.header.scene_rev <= self.scene_rev;
+            if !is_due && until_ns > self.now_ns {
+                return;
+            }
+            let Some(frame) = waiting.take() else {
+                return;
+            };
+            if is_due {
+                waiting.begin_next(state.timeout_ns);
+                let times = self.times_of(&frame);
+                self.take(source, &frame, times);
+            } else {
+                // The stream has waited, not each of its frames.
+                state.gap = true;
+                state.refused += 1;
+                self.note_reject(RejectReason::SceneRevision, Some(source));
+            }
+            self.sources[source.index()].waiting.give_back(frame);
         }
     }
 }

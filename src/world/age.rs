@@ -6,10 +6,10 @@
 use super::World;
 use super::body::Body;
 use super::census::{slot_at, source_at};
+use super::place::grows;
 use super::source::SourceState;
 use crate::config::OnStale;
 use crate::ids::{BodySlot, small};
-use crate::wire::BodyStatus;
 
 /// No deadline, no stamp.
 const NONE: u64 = u64::MAX;
@@ -210,7 +210,7 @@ impl World {
         let sources = self
             .sources
             .iter()
-            .flat_map(|s| [s.deadline_ns(), s.waiting.until_ns]);
+            .flat_map(|s| [s.deadline_ns(), s.waiting.until_ns()]);
         sources.chain([self.ages.next_ns()]).flatten().min()
     }
 
@@ -232,9 +232,8 @@ impl World {
         let mut growing = std::mem::take(&mut self.growing);
         growing.retain(|&slot| {
             self.settle(slot, false);
-            let still = self
-                .body(slot)
-                .is_some_and(|body| body.status == BodyStatus::Stale && body.reach_m.is_finite());
+            let body = self.body(slot);
+            let still = body.is_some_and(|body| grows(body.status, body.reach_m));
             self.entries[slot.index()].growing = still;
             still
         });

@@ -115,6 +115,8 @@ impl World {
         entry.has_pose = has_pose || !moves;
         entry.refused = refused && moves;
         entry.raw = [f64::NAN; 7];
+        // Where it is was said by another: no pause of its own source speaks of it.
+        entry.seen = 0;
         if let (Some(body), Some(age)) = (self.bodies[slot.index()].as_mut(), age) {
             (body.stamp_ns, body.since_ns, body.received_ns, body.reject) = age;
             if !root_moves {

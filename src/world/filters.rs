@@ -14,8 +14,7 @@ pub(super) const ENABLED: u16 = 2;
 pub(super) const MOVES: u16 = 4;
 pub(super) const UNBOUNDED: u16 = 8;
 pub(super) const KEEPS: u16 = 16;
-/// It keeps its pairs, and its box, which says nothing, makes no new ones. Off only in the tick in which its place was
-/// lost on a way that the box holds.
+/// It keeps its pairs, and its box, which says nothing, makes no new ones.
 pub(super) const BARS: u16 = 128;
 /// A rule of two plain names speaks of it.
 pub(super) const EXACT: u16 = 32;
@@ -149,7 +148,7 @@ impl Filters {
             .is_some_and(|hot| hot.has(KEEPS))
     }
 
-    /// Whether it does so, and its box holds no way of this tick either.
+    /// Whether it does so, and its box makes no pairs in this tick either.
     #[must_use]
     pub fn bars(&self, slot: BodySlot) -> bool {
         self.bodies

@@ -23,6 +23,7 @@ mod elsewhere;
 mod filters;
 mod gaze;
 mod lists;
+mod lost;
 mod names;
 mod parts;
 mod path;
@@ -104,6 +105,8 @@ pub struct World {
     attached: Vec<BodySlot>,
     /// Stale bodies whose reach still grows.
     growing: Vec<BodySlot>,
+    /// Bodies whose place is lost and whose boxes make pairs in this tick.
+    met: Vec<BodySlot>,
     /// Bodies whose path has legs.
     travelled: Vec<BodySlot>,
     /// Bodies that deform.
@@ -180,6 +183,7 @@ impl World {
         world.edited = true;
         world.first = true;
         world.growing.reserve(len);
+        world.met.reserve(len);
         Ok(world)
     }
 
@@ -200,6 +204,7 @@ impl World {
             resting: Vec::new(),
             attached: Vec::new(),
             growing: Vec::new(),
+            met: Vec::new(),
             travelled: Vec::new(),
             deforming: Vec::new(),
             lists: Lists::default(),

@@ -83,7 +83,7 @@ pub struct Path {
     /// Its end is where a velocity leads, and no pose that was sent.
     ahead: bool,
     /// The body is not in the broad phase now: its way counts for what hangs on it alone.
-    aside: bool,
+    pub(super) aside: bool,
     /// Not every pose found room: only the box knows of the rest.
     blurred: bool,
     /// Holds the body at the newest pose.
@@ -332,8 +332,10 @@ impl Path {
         self.blurred = root.blurred;
         if root.blurred && self.swept {
             // Legs that found no room: it was no farther than this from where the pivot was.
-            let reach = self.reach + 64.0 * ROUND * (self.reach + pivot_far(&root.pivots));
-            self.hull = self.hull.merged(&root.pivots.widened(reach));
+            let pivots = &root.pivots;
+            let far = pivots.min.coords.amax().max(pivots.max.coords.amax());
+            let reach = self.reach + 64.0 * ROUND * (self.reach + far);
+            self.hull = self.hull.merged(&pivots.widened(reach));
         }
     }
 }
@@ -356,11 +358,6 @@ fn swept_box(leg: &Leg, pivot: &Point, reach: f64, (begin, end): (&Aabb, &Aabb))
         min: straight.min.sup(&ball.min),
         max: straight.max.inf(&ball.max),
     }
-}
-
-/// Greatest coordinate of a box, metres.
-fn pivot_far(pivots: &Aabb) -> f64 {
-    pivots.min.coords.amax().max(pivots.max.coords.amax())
 }
 
 /// The turn between two orientations: the shortest, or the one nearest to what the sender says; whole turns about the

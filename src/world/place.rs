@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::World;
 use super::bend::Vertices;
 use super::body::{Body, Motion};
-use super::filters::{BARS, Hot, KEEPS};
+use super::filters::Hot;
 use super::names::NameId;
 use super::parts::{Parts, PlacedShape};
 use super::path::Path;
@@ -98,8 +98,10 @@ impl World {
             (BodyStatus::Disabled, 0.0)
         } else if !body.moves {
             (BodyStatus::Known, 0.0)
-        } else if root.refused || vertices().any(|v| v.refused.is_some()) {
+        } else if vertices().any(|v| v.refused.is_some()) {
             (BodyStatus::Rejected, f64::INFINITY)
+        } else if root.refused {
+            (BodyStatus::Rejected, self.reach_of(body, entry.root))
         } else if !(root.has_pose && has_vertices) {
             (BodyStatus::NotReceived, f64::INFINITY)
         } else {
@@ -130,18 +132,23 @@ impl World {
         match self.on_stale_of(root_body) {
             OnStale::Hold => (BodyStatus::Held, 0.0),
             OnStale::Remove => (BodyStatus::RemovedByAge, f64::INFINITY),
-            OnStale::Unknown => {
-                let reach_m = body.max_speed_mps.map_or(f64::INFINITY, |speed_mps| {
-                    // Three roundings, each by half an ulp: four are added.
-                    let age_s = age_ns as f64 * 1e-9;
-                    (speed_mps * age_s * (1.0 + 8.0 * ROUND)).next_up()
-                });
-                let bounded = reach_m <= self.stale_reach_m;
-                (
-                    BodyStatus::Stale,
-                    if bounded { reach_m } else { f64::INFINITY },
-                )
-            }
+            OnStale::Unknown => (BodyStatus::Stale, self.reach_of(body, root)),
+        }
+    }
+
+    /// How far a body may be by now from its last good pose, metres; infinite without a bound.
+    fn reach_of(&self, body: &Body, root: BodySlot) -> f64 {
+        let since_ns = self.body(root).unwrap_or(body).since_ns;
+        let (Some(speed_mps), Some(since_ns)) = (body.max_speed_mps, since_ns) else {
+            return f64::INFINITY;
+        };
+        // Three roundings, each by half an ulp: four are added.
+        let age_s = self.now_ns.saturating_sub(since_ns) as f64 * 1e-9;
+        let reach_m = (speed_mps * age_s * (1.0 + 8.0 * ROUND)).next_up();
+        if reach_m <= self.stale_reach_m {
+            reach_m
+        } else {
+            f64::INFINITY
         }
     }
 
@@ -201,6 +208,7 @@ impl World {
         }
         let restated = status_changed || was_reach_m.to_bits() != judged.reach_m.to_bits();
         self.watch(slot, judged);
+        self.flag_lost(slot, judged, was_in);
         self.list(
             slot,
             was_in,
@@ -210,7 +218,7 @@ impl World {
         );
     }
 
-    /// Flags, deadline and growth that follow from a judgement.
+    /// Deadline and growth that follow from a judgement.
     fn watch(&mut self, slot: BodySlot, judged: Judgement) {
         let Some(body) = self.bodies[slot.index()].as_ref() else {
             return;
@@ -223,22 +231,9 @@ impl World {
         let stamp_ns = (judged.in_broad && body.moves).then_some(body.stamp_ns);
         self.ages.set(slot, deadline_ns, stamp_ns);
         let entry = &mut self.entries[slot.index()];
-        let grows = judged.status == BodyStatus::Stale && judged.reach_m.is_finite();
-        if grows && !entry.growing {
+        if grows(judged.status, judged.reach_m) && !entry.growing {
             entry.growing = true;
             self.growing.push(slot);
-        }
-        let keeps = judged.in_broad && judged.reach_m.is_infinite();
-        let swept = body.path.as_ref().is_some_and(|path| path.is_swept());
-        let hot = &mut self.filters.bodies[slot.index()];
-        let kept = hot.has(KEEPS);
-        // What it went in this tick, before its place was lost, is asked for all the same. Not what it goes while it is
-        // lost: pairs that its box was barred from would be found by those methods alone that look at all of it.
-        let barred = hot.has(BARS);
-        hot.set(KEEPS, keeps);
-        hot.set(BARS, keeps && (barred || !swept));
-        if kept && !keeps && judged.in_broad {
-            self.lists.requery(slot);
         }
     }
 
@@ -282,6 +277,11 @@ impl World {
     pub(super) fn hot(&mut self, slot: BodySlot) -> Option<&mut Hot> {
         self.filters.bodies.get_mut(slot.index())
     }
+}
+
+/// Whether the reach of a body grows from tick to tick.
+pub(super) fn grows(status: BodyStatus, reach_m: f64) -> bool {
+    matches!(status, BodyStatus::Stale | BodyStatus::Rejected) && reach_m.is_finite()
 }
 
 /// Why the pairs of a body end when it leaves the broad phase.

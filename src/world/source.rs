@@ -6,7 +6,7 @@
 use super::body::Body;
 use crate::config::OnStale;
 use crate::ids::{BodySlot, SourceSlot};
-use crate::limits::SESSIONS_OVER_MAX;
+use crate::limits::{FRAMES_WAITING_MAX, SESSIONS_OVER_MAX};
 use crate::scene::SourceSpec;
 use crate::wire::{
     Frame, FrameHeader, RejectReason, SOURCE_NAME_LEN, SourceRow, VertexHeader, frame_flags,
@@ -47,18 +47,77 @@ pub struct SourceState {
     pub(super) pose_frame: u64,
     /// The slots of its last pose frame, row by row: where its next frame will most likely have them too.
     pub(super) rows: Vec<BodySlot>,
-    /// A frame that needs a later scene revision.
+    /// Frames that wait for a later scene revision.
     pub(super) waiting: Waiting,
+    /// A pose frame newer than the one that `rows` are of has not been taken: it was lost, refused or passed over.
+    pub(super) gap: bool,
     /// Whether a continuous body goes where its frames say.
     pub(super) followed: bool,
 }
 
-/// A frame that waits for a scene revision; its memory is kept.
+/// Frames that wait for a scene revision, or behind one that does; their memory is kept.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Waiting {
-    pub(super) frame: Frame,
-    /// When its wait ends, nanoseconds of `CLOCK_BOOTTIME`; `None`: no frame waits.
-    pub(super) until_ns: Option<u64>,
+    /// The oldest first, then spare ones.
+    frames: Vec<Frame>,
+    len: usize,
+    /// When the wait of the first ends, nanoseconds of `CLOCK_BOOTTIME`.
+    until_ns: u64,
+}
+
+impl Waiting {
+    /// The first one.
+    pub(super) fn first(&self) -> Option<&Frame> {
+        self.frames.get(..self.len)?.first()
+    }
+
+    /// When the wait of the first ends, nanoseconds of `CLOCK_BOOTTIME`; `None`: no frame waits.
+    pub(super) fn until_ns(&self) -> Option<u64> {
+        (self.len > 0).then_some(self.until_ns)
+    }
+
+    /// Puts a copy of a frame behind the others; whether the first had to go for it.
+    ///
+    /// * `until_ns` - when its wait ends, should it be the first.
+    pub(super) fn push(&mut self, frame: &Frame, received_ns: u64, until_ns: u64) -> bool {
+        let crowded_out = if self.len == FRAMES_WAITING_MAX {
+            self.take()
+        } else {
+            None
+        };
+        let is_full = crowded_out.is_some();
+        self.frames.extend(crowded_out);
+        if self.len == self.frames.len() {
+            self.frames.push(Frame::default());
+        }
+        if let Some(place) = self.frames.get_mut(self.len) {
+            place.clone_from(frame);
+            place.received_ns = received_ns;
+        }
+        if self.len == 0 {
+            self.until_ns = until_ns;
+        }
+        self.len += 1;
+        is_full
+    }
+
+    /// The wait of the one that is the first now is its own.
+    pub(super) fn begin_next(&mut self, timeout_ns: u64) {
+        if let Some(received_ns) = self.first().map(|frame| frame.received_ns) {
+            self.until_ns = received_ns.saturating_add(timeout_ns);
+        }
+    }
+
+    /// Takes the first out; its memory is to be given back.
+    pub(super) fn take(&mut self) -> Option<Frame> {
+        self.len = self.len.checked_sub(1)?;
+        Some(self.frames.remove(0))
+    }
+
+    /// Gives back the memory of a frame.
+    pub(super) fn give_back(&mut self, frame: Frame) {
+        self.frames.push(frame);
+    }
 }
 
 impl SourceState {
@@ -82,6 +141,7 @@ impl SourceState {
             pose_frame: 0,
             rows: Vec::with_capacity(bodies),
             waiting: Waiting::default(),
+            gap: false,
             followed: false,
         }
     }
@@ -154,15 +214,16 @@ impl SourceState {
     /// Whether a frame of it waits for a later revision of the scene.
     #[must_use]
     pub fn waits(&self) -> bool {
-        self.waiting.until_ns.is_some()
+        self.waiting.len > 0
     }
 
     /// What waits has nothing to say any more: it is passed over.
     ///
-    /// * returns - when its wait would have ended.
+    /// * returns - when the wait of the first would have ended.
     pub(super) fn pass_over_waiting(&mut self) -> Option<u64> {
-        let until_ns = self.waiting.until_ns.take();
-        self.skipped += u64::from(until_ns.is_some());
+        let until_ns = self.waiting.until_ns();
+        self.skipped += self.waiting.len as u64;
+        self.waiting.len = 0;
         until_ns
     }
 }
@@ -247,17 +308,20 @@ pub(super) fn stand(
         source.order = Some(order);
         // Nothing of this session has been taken yet.
         (source.newest, source.alive, source.bent) = (None, false, 0);
+        source.gap = false;
         return Standing::Afresh;
     }
     source.heard_ns = source.heard_ns.max(received_ns);
     match source.order {
         Some(newest) if order <= newest => Standing::Refused(RejectReason::OldFrame),
-        Some((epoch, _)) if header.epoch == epoch => {
+        Some((epoch, seq)) if header.epoch == epoch => {
+            source.gap |= header.seq > seq.saturating_add(1);
             source.order = Some(order);
             Standing::Next
         }
         _ => {
             source.order = Some(order);
+            source.gap = false;
             Standing::Afresh
         }
     }

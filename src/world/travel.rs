@@ -8,7 +8,6 @@
 
 use super::World;
 use super::census::slot_at;
-use super::filters::{BARS, KEEPS};
 use super::path::Path;
 use super::place::tight_box;
 use crate::ids::BodySlot;
@@ -43,12 +42,6 @@ impl World {
             let Some(path) = body.path.as_mut() else {
                 continue;
             };
-            let was_swept = path.is_swept();
-            if let Some(hot) = self.filters.bodies.get_mut(slot.index())
-                && was_swept
-            {
-                hot.set(BARS, hot.has(KEEPS));
-            }
             if path.rest() {
                 entry.tight = *path.hull();
                 body.proxy = entry.tight.widened(entry.widened_m);
@@ -58,6 +51,7 @@ impl World {
             }
         }
         self.travelled.clear();
+        self.bar_lost();
     }
 
     /// As [`World::place`], for a pose that a frame has: a continuous body goes there.
@@ -70,7 +64,7 @@ impl World {
         };
         let moved = self.place(slot, pose);
         let lapsed = !self.is_placed(slot);
-        self.lay(slot, path, moved, |path, end| {
+        self.lay(slot, path, (moved, false), |path, end| {
             if lapsed {
                 path.lapse(from, *pose, end)
             } else {
@@ -92,7 +86,12 @@ impl World {
             .map(|body| (body.shapes.clone(), body.centre));
         // Taken out for the loan, and put back.
         let of_root = self.take_path(root);
-        let moved = self.lay(slot, path, moved, |path, end| {
+        // Where the other has gone since its first pose of this tick this one has gone, too, though it is settled later.
+        let root_is_disabled = !self.entries[root.index()].enabled;
+        let has_gone = |path: &Path| !path.is_empty() && (!path.aside || root_is_disabled);
+        let goes = self.entries[slot.index()].enabled
+            && of_root.as_ref().is_some_and(|(_, root)| has_gone(root));
+        let moved = self.lay(slot, path, (moved, goes), |path, end| {
             let before = *path.hull();
             match (&of_root, &body) {
                 (Some((_, root)), Some((shapes, centre))) => {
@@ -120,14 +119,16 @@ impl World {
     }
 
     /// Gives a placed body its path back, with what `go` adds to it; whether pose or box changed.
+    ///
+    /// * `goes` - whether it has gone where `go` says, though it is not in the broad phase yet.
     fn lay(
         &mut self,
         slot: BodySlot,
         mut path: Box<Path>,
-        moved: bool,
+        (moved, goes): (bool, bool),
         go: impl FnOnce(&mut Path, Aabb) -> bool,
     ) -> bool {
-        let placed = self.is_placed(slot);
+        let placed = self.is_placed(slot) || goes;
         // After a reset the way of this tick goes on behind a lapse: what was touched on it before is told.
         let lapses = !placed && path.has_moved();
         let entry = &mut self.entries[slot.index()];
@@ -137,7 +138,7 @@ impl World {
         // Where it was placed, its box is new and tight.
         let end = if moved { entry.tight } else { *path.end() };
         if !lapses {
-            path.set_aside(!body.in_broad);
+            path.set_aside(!(body.in_broad || goes));
         }
         let grown = if placed || lapses {
             let was_empty = path.is_empty();

@@ -81,12 +81,8 @@ impl World {
         )?;
         let keeps = body.in_broad && body.reach_m.is_infinite();
         check(hot.has(KEEPS) == keeps, "the filters disagree on keeps")?;
-        let swept = body.path.as_ref().is_some_and(|path| path.is_swept());
-        let bars = hot.has(BARS);
-        check(
-            if bars { keeps } else { !keeps || swept },
-            "the filters disagree on bars",
-        )?;
+        let bars = keeps && !self.met.contains(&slot);
+        check(hot.has(BARS) == bars, "the filters disagree on bars")?;
         let judged = self.judge(slot, body);
         check(
             judged.status == body.status,

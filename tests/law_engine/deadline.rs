@@ -227,7 +227,11 @@ fn law_4_7_where_only_frames_deadlines_end_the_work_each_pair_has_its_turn_too()
     let mut decided: Vec<bool> = (0..PAIRS).map(|_| false).collect();
     let mut least = PAIRS;
     for tick in 0..120 {
-        put(&mut rig, if tick % 2 == 0 { TOUCHING } else { APART });
+        // Elsewhere each time: what was proved where they were before says nothing.
+        let [x, y] = if tick % 2 == 0 { TOUCHING } else { APART };
+        let side = |turn: i32| if tick / turn % 2 == 0 { 1.0 } else { -1.0 };
+        let aside = 0.25 * side(2);
+        put(&mut rig, [side(4) * (x + aside), side(8) * (y - aside)]);
         rig.deadline_ns = after(&rig, 100_000);
         rig.clock.step_each_read(LOOK_NS);
         rig.send(ALL);

@@ -3,7 +3,8 @@
 use sweepd::math::{Point, Vec3, pose_from};
 use sweepd::scene::PairAction;
 use sweepd::wire::{
-    ContactKind, State, Verdict, VertexFrame, VertexHeader, WIRE_VERSION, name_bytes, vertex_flags,
+    ContactKind, Demand, State, Verdict, VertexFrame, VertexHeader, WIRE_VERSION, name_bytes,
+    vertex_flags,
 };
 use sweepd::world::Edit;
 
@@ -25,6 +26,26 @@ fn law_3_4_near_is_apart_below_the_larger_of_the_two_report_distances() {
     };
     assert_eq!(contact.kind, ContactKind::Closest.code());
     assert!((contact.gap_m - 0.3).abs() < 1e-9);
+}
+
+#[test]
+fn bug_a_pair_that_was_near_and_is_no_more_stayed_near_while_nobody_asked_for_bounds() {
+    let near = "report_within_m = 0.5";
+    let mut rig = Rig::new(&scene("", &[ball(1, 0.0, near), ball(2, 3.0, "")]));
+    rig.demand = Demand {
+        pairs: true,
+        ..Demand::default()
+    };
+    for (x, verdict) in [
+        (3.0, Verdict::Apart),
+        (2.4, Verdict::Near),
+        (2.7, Verdict::Apart),
+    ] {
+        rig.move_x(2, x);
+        rig.send(ALL);
+        assert_eq!(rig.verdict(1, 2), verdict, "{x}");
+    }
+    assert_eq!(rig.state(), State::Clear);
 }
 
 #[test]

@@ -11,6 +11,7 @@ mod churn;
 mod common;
 mod edits;
 mod filters;
+mod frames;
 mod requests;
 mod rules;
 mod sources;

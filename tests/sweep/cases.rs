@@ -10,7 +10,7 @@ use sweepd::wire::{Event, PairRow, Reason, State, Verdict, pair_flags};
 use crate::oracle::meshes::{cuboid, trimesh};
 use crate::rig::{ALL, FRAME_NS, NONE, Rig, body, has, scene};
 
-const PLATE: &str = "{ type = \"box\", half_extents = [5.0, 5.0, 0.0005] }";
+pub const PLATE: &str = "{ type = \"box\", half_extents = [5.0, 5.0, 0.0005] }";
 pub const SHOT: &str = "{ type = \"sphere\", radius = 0.01 }";
 pub const SWEPT: &str = "continuous = true";
 

@@ -2,10 +2,10 @@
 //! any other way.
 
 use sweepd::math::Pose;
-use sweepd::wire::{Event, PairRow, State, Verdict, pair_flags};
+use sweepd::wire::{Event, PairRow, Reason, State, Verdict, pair_flags};
 
-use crate::cases::{SWEPT, is_near, plate};
-use crate::rig::{ALL, Rig, has};
+use crate::cases::{PLATE, SHOT, SWEPT, is_near, plate};
+use crate::rig::{ALL, Rig, body, has, scene};
 
 fn at(z: f64) -> Pose {
     Pose::translation(0.0, 0.0, z)
@@ -97,4 +97,117 @@ fn bug_a_touch_before_a_refused_pose_in_the_same_tick_was_never_told() {
         assert_eq!(rig.state(), State::Clear);
         assert_eq!(rig.verdict(1, 2), Verdict::Apart);
     }
+}
+
+/// A plate, a body that may pass it by, and a continuous ball that hangs on it and may not.
+fn carrier(more: &str) -> Rig {
+    let ball = "name = \"b3\"\nid = 3\nattached_to = \"b2\"\nposition = [0.0, 0.2, 0.0]\ncontinuous = true\n\
+                shape = { type = \"sphere\", radius = 0.05 }";
+    Rig::new(&scene(
+        "",
+        &[
+            body(1, [0.0; 3], PLATE, ""),
+            body(2, [0.0; 3], SHOT, &format!("mask = 0\n{more}")),
+            ball.to_owned(),
+        ],
+    ))
+}
+
+#[test]
+fn bug_what_hangs_on_a_body_was_not_followed_from_its_first_pose_of_a_tick() {
+    for more in [
+        "",
+        SWEPT,
+        "enabled = false",
+        "enabled = false\ncontinuous = true",
+    ] {
+        for first in [None, Some(5.0), Some(-5.0)] {
+            for heights in [&[5.0, -5.0][..], &[7.0, 5.0, -5.0], &[5.0, 4.0, -5.0, -6.0]] {
+                let mut rig = carrier(more);
+                if let Some(first) = first {
+                    rig.place(2, &at(first));
+                    rig.send(ALL);
+                    rig.epoch += 1;
+                }
+                let frame = |k: usize, rig: &mut Rig| rig.place(2, &at(heights[k]));
+                rig.send_several(heights.len(), frame, ALL);
+                let what = format!("`{more}`, {first:?}, {heights:?}");
+                let row = rig.pair(1, 3).unwrap_or_else(|| panic!("{what}: no row"));
+                assert!(hit(row) && has(row, Event::Passed), "{what}: {row:?}");
+                assert_eq!(rig.state(), State::Colliding);
+                rig.send(ALL);
+                assert_eq!(rig.state(), State::Clear, "{what}");
+            }
+        }
+    }
+    // Where the one it hangs on comes from far, that is no motion of either.
+    let mut rig = carrier(SWEPT);
+    rig.place(2, &at(5.0));
+    rig.send(ALL);
+    rig.epoch += 1;
+    rig.place(2, &at(-5.0));
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+}
+
+#[test]
+fn bug_what_hangs_on_a_body_that_is_found_and_lost_in_one_tick_was_never_asked() {
+    for more in ["", SWEPT] {
+        let mut rig = carrier(more);
+        rig.place(2, &at(5.0));
+        rig.send(ALL);
+        rig.place(2, &at(f64::NAN));
+        rig.send(ALL);
+        assert!(rig.pair(1, 3).is_none());
+        let heights = [-5.0, f64::NAN];
+        let frame = |k: usize, rig: &mut Rig| rig.place(2, &at(heights[k]));
+        rig.send_several(2, frame, ALL);
+        assert!(hit(rig.pair(1, 3).unwrap()), "{more}");
+        assert_eq!(rig.state(), State::Colliding);
+    }
+}
+
+#[test]
+fn bug_what_went_on_its_way_in_a_frame_that_is_too_old_by_now_was_never_asked() {
+    let late_ns = 600_000_000;
+    for lost in [f64::NAN, 5.0] {
+        let wall = body(1, [0.0; 3], PLATE, "").replace("moves = true", "moves = false");
+        let mut rig = Rig::new(&scene("", &[wall, body(2, [0.0; 3], SHOT, SWEPT)]));
+        rig.place(2, &at(5.0));
+        rig.send(ALL);
+        rig.place(2, &at(lost));
+        rig.send(ALL);
+        rig.idle(late_ns, ALL);
+        assert!(rig.pair(1, 2).is_none());
+        rig.waited_ns = late_ns;
+        rig.place(2, &at(-5.0));
+        rig.send(ALL);
+        let row = rig.pair(1, 2).unwrap();
+        assert!(hit(row), "{row:?}");
+        assert!(rig.because(Reason::Swept));
+        assert_eq!(rig.state(), State::Colliding);
+        // Its box makes no more pairs than it has.
+        rig.waited_ns = 0;
+        rig.send(ALL);
+        assert_eq!(rig.state(), State::Clear);
+    }
+}
+
+#[test]
+fn a_wall_that_is_lost_in_the_tick_in_which_something_passes_it_was_there_before() {
+    let mut rig = plate(SWEPT);
+    assert_eq!(rig.state(), State::Clear);
+    rig.place(1, &at(f64::NAN));
+    rig.place(2, &at(-5.0));
+    rig.send(ALL);
+    let row = rig.pair(1, 2).unwrap();
+    assert_eq!(row.flags & pair_flags::SWEPT_OPEN, pair_flags::SWEPT_OPEN);
+    assert_eq!(rig.verdict(1, 2), Verdict::Possible);
+    // Where it was says nothing afterwards.
+    let mut rig = plate(SWEPT);
+    rig.place(1, &at(f64::NAN));
+    rig.send(ALL);
+    rig.place(2, &at(-5.0));
+    rig.send(ALL);
+    assert!(rig.pair(1, 2).is_none());
 }
