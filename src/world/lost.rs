@@ -1,8 +1,8 @@
 //! Bodies whose place is not known and whose reach has no bound: they keep their pairs, and which make new ones.
 //!
-//! In: judgements. Out: flags of the filters. The box of such a body says nothing, and makes no pairs; but for a tick it
-//! does where it says something: it was there as the tick began in which its place was lost, or a frame said where it
-//! went, though that is too old by now, or a pose behind it was refused.
+//! In: judgements. Out: flags of the filters. The box of such a body says nothing, and makes no pairs; but it does
+//! for a tick in which it says something: the body was there as the tick began in which its place was lost, or a frame
+//! said where it went, though that is too old by now or a pose behind it was refused.
 
 use super::World;
 use super::filters::{BARS, KEEPS};

@@ -86,7 +86,7 @@ impl World {
             .map(|body| (body.shapes.clone(), body.centre));
         // Taken out for the loan, and put back.
         let of_root = self.take_path(root);
-        // Where the other has gone since its first pose of this tick this one has gone, too, though it is settled later.
+        // Where the other has gone since its first pose of this tick this one has gone, too: it is settled later.
         let root_is_disabled = !self.entries[root.index()].enabled;
         let has_gone = |path: &Path| !path.is_empty() && (!path.aside || root_is_disabled);
         let goes = self.entries[slot.index()].enabled

@@ -276,7 +276,12 @@ impl Inlet {
         all.extend(feeders.filter_map(|feeder| feeder.fault(now_ns)));
         all.extend(self.shared_topics());
         for source in &self.sources {
-            all.extend(source.faults(FAULTS_MAX, now_ns));
+            // Sources of one topic say the same of what is not theirs.
+            for fault in source.faults(FAULTS_MAX, now_ns) {
+                if !all.contains(&fault) {
+                    all.push(fault);
+                }
+            }
         }
         all.truncate(FAULTS_MAX);
         self.shared.set_faults(all, now_ns);

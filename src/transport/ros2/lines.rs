@@ -119,9 +119,14 @@ impl Feeder {
     }
 }
 
-/// The two publishers last heard of one thing, and when, nanoseconds of `CLOCK_BOOTTIME`.
+/// The publishers last heard of one thing, and when, nanoseconds of `CLOCK_BOOTTIME`.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Heard([Option<(Gid, u64)>; 2]);
+pub(super) struct Heard {
+    /// The newest first.
+    last: [Option<(Gid, u64)>; 3],
+    /// When one was heard again after another.
+    together_ns: Option<u64>,
+}
 
 /// Two publishers within this time make a body jump between them, nanoseconds.
 const TOGETHER_NS: u64 = 1_000_000_000;
@@ -129,22 +134,24 @@ const TOGETHER_NS: u64 = 1_000_000_000;
 impl Heard {
     /// One sent something.
     pub(super) fn hear(&mut self, from: Gid, now_ns: u64) {
-        let [first, second] = &mut self.0;
-        match first {
-            Some((own, at)) if *own == from => *at = now_ns,
-            _ => {
-                *second = first.take();
-                *first = Some((from, now_ns));
-            }
+        let is_fresh = |at: u64| now_ns.saturating_sub(at) < TOGETHER_NS;
+        let mut last = self.last.iter();
+        let place = last.position(|heard| heard.is_some_and(|(own, _)| own == from));
+        let [newest, ..] = self.last;
+        // One that starts anew is another and the first is never heard again.
+        if place.is_some_and(|place| place > 0) && newest.is_some_and(|(_, at)| is_fresh(at)) {
+            self.together_ns = Some(now_ns);
         }
+        let end = place.unwrap_or(self.last.len() - 1);
+        if let Some(newer) = self.last.get_mut(..=end) {
+            newer.rotate_right(1);
+        }
+        self.last[0] = Some((from, now_ns));
     }
 
-    /// Whether both send now.
+    /// Whether two send now.
     pub(super) fn are_two(&self, now_ns: u64) -> bool {
-        let fresh = |heard: &Option<(Gid, u64)>| {
-            heard.is_some_and(|(_, at)| now_ns.saturating_sub(at) < TOGETHER_NS)
-        };
-        self.0.iter().all(fresh)
+        (self.together_ns).is_some_and(|at| now_ns.saturating_sub(at) < TOGETHER_NS)
     }
 }
 

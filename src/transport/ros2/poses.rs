@@ -8,7 +8,7 @@ mod stamps;
 
 use judge::judge;
 pub(super) use stamps::off;
-use stamps::{both, crowded, forgotten, older, rivalry, unfit};
+use stamps::{Passing, both, crowded, forgotten, older, rivalry, unfit};
 
 use ros2_client::Gid;
 
@@ -53,6 +53,8 @@ struct Member {
     last: Option<Result<(u64, u64), Missing>>,
     /// When it was last handed on, nanoseconds of `CLOCK_BOOTTIME`.
     told_ns: u64,
+    /// From when on its pose grows old, nanoseconds of `CLOCK_BOOTTIME`; `None`: it has none that does.
+    since_ns: Option<u64>,
     /// What is wrong with it now, for people.
     fault: Option<String>,
 }
@@ -78,8 +80,8 @@ pub(super) struct Source {
     pub(super) skew_ns: Option<u64>,
     /// Messages or links that were refused.
     pub(super) refused: u64,
-    /// What was last wrong with a stamp, and when, nanoseconds of `CLOCK_BOOTTIME`.
-    passing: Option<(String, u64)>,
+    /// What was wrong a moment ago.
+    passing: Passing,
 }
 
 impl Source {
@@ -106,7 +108,7 @@ impl Source {
                 tree,
                 skew_ns: None,
                 refused: 0,
-                passing: None,
+                passing: Passing::default(),
             });
         }
         all
@@ -124,11 +126,14 @@ impl Source {
 
     /// What is wrong with its bodies now, at most `most` of them.
     pub(super) fn faults(&self, most: usize, now_ns: u64) -> Vec<String> {
-        let faulty = self.members.iter().filter_map(|member| {
-            let fault = member.fault.as_ref()?;
+        let members = self.members.iter();
+        let members = members.filter(|member| member.body != NOBODY);
+        let faulty = members.filter_map(|member| {
+            let fault = member.fault.clone();
+            let fault = fault.or_else(|| self.silence(member, now_ns))?;
             Some(format!("body {}: {fault}", member.name))
         });
-        faulty.chain(self.passing(now_ns)).take(most).collect()
+        faulty.chain(self.passing.now(now_ns)).take(most).collect()
     }
 
     /// Sets its time-out, and the widest skew of a chain (`None`: as the scene says).
@@ -142,7 +147,7 @@ impl Source {
         self.tree.forget();
         for member in &mut self.members {
             member.order = Order::default();
-            member.last = None;
+            (member.last, member.since_ns) = (None, None);
         }
     }
 
@@ -230,6 +235,7 @@ impl Source {
             // A chain is as old as its oldest link (law 3.8); that there is no pose is news of now.
             let earliest = found.as_ref().ok().and_then(|found| found.received_ns);
             let since_ns = earliest.filter(|_| result.is_ok()).map(|(_, ns)| ns);
+            member.since_ns = since_ns;
             updates.push(Update {
                 member: place,
                 result,
@@ -345,9 +351,12 @@ impl Source {
         }
         if back {
             self.forget();
-            if let Some(member) = self.members.get_mut(place) {
+        }
+        if let Some(member) = self.members.get_mut(place) {
+            if back {
                 member.order = Order::from(stamp_ns);
             }
+            member.since_ns = result.is_ok().then_some(receipt.now_ns);
         }
         self.tell(odd, receipt);
         updates.push(Update {

@@ -41,7 +41,7 @@ impl Told {
 }
 
 /// Words without numbers such as `3.002`, which differ from one look to the next.
-fn gist(words: &str) -> String {
+pub(super) fn gist(words: &str) -> String {
     let mut gist = String::with_capacity(words.len());
     for word in words.split(' ') {
         if !word.contains('.') || word.parse::<f64>().is_err() {

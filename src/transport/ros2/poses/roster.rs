@@ -15,6 +15,7 @@ impl Member {
             order: Order::default(),
             last: None,
             told_ns: 0,
+            since_ns: None,
             fault: None,
         }
     }

@@ -2,27 +2,58 @@
 //!
 //! Stamps are carried and never trusted for ages (law 4.8), so none of this changes a pose; whoever sends them is told.
 
-use super::super::told::brief;
-use super::{Receipt, Source, seconds};
+use std::collections::VecDeque;
+
+use super::super::told::{brief, gist};
+use super::{Member, Receipt, Source, seconds};
 
 /// How long something that passes is told of, nanoseconds: as long as it takes a person to look.
 const TOLD_NS: u64 = 3_000_000_000;
 /// Clocks and paths of one robot differ by less, nanoseconds.
 const OFF_NS: u64 = 1_000_000_000;
 
+/// Most that is told of at once; beyond it the oldest goes.
+const PASSING_MAX: usize = 8;
+
+/// What was wrong a moment ago, and when, nanoseconds of `CLOCK_BOOTTIME`; each once, whatever its numbers.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Passing(VecDeque<(String, u64)>);
+
+impl Passing {
+    /// Takes what is wrong now.
+    pub(super) fn put(&mut self, text: String, now_ns: u64) {
+        let words = gist(&text);
+        self.0.retain(|(other, _)| gist(other) != words);
+        if self.0.len() == PASSING_MAX {
+            self.0.pop_front();
+        }
+        self.0.push_back((text, now_ns));
+    }
+
+    /// What is told of now.
+    pub(super) fn now(&self, now_ns: u64) -> impl Iterator<Item = String> {
+        let is_fresh = move |(_, at): &&(String, u64)| now_ns.saturating_sub(*at) < TOLD_NS;
+        self.0.iter().filter(is_fresh).map(|(text, _)| text.clone())
+    }
+}
+
 impl Source {
-    /// Takes what is wrong with a stamp, if anything is.
+    /// Takes what is wrong with a stamp or a link, if anything is.
     pub(super) fn tell(&mut self, text: Option<String>, receipt: Receipt) {
         if let Some(text) = text {
-            self.passing = Some((text, receipt.now_ns));
+            self.passing.put(text, receipt.now_ns);
         }
     }
 
-    /// What was wrong with stamps a moment ago.
-    pub(super) fn passing(&self, now_ns: u64) -> Option<String> {
-        let fresh = |(_, at): &&(String, u64)| now_ns.saturating_sub(*at) < TOLD_NS;
-        let passing = self.passing.as_ref().filter(fresh);
-        passing.map(|(text, _)| text.clone())
+    /// What is wrong with a body of which nothing comes any more.
+    pub(super) fn silence(&self, member: &Member, now_ns: u64) -> Option<String> {
+        let silent_ns = now_ns.saturating_sub(member.since_ns?);
+        (silent_ns > self.timeout_ns).then(|| {
+            format!(
+                "nothing has come of it for {:.1} s, longer than the time-out of its source: see who sends it",
+                seconds(silent_ns)
+            )
+        })
     }
 }
 
