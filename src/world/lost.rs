@@ -14,8 +14,8 @@ impl World {
     ///
     /// * `was_in` - whether the body was in the broad phase before it.
     pub(super) fn flag_lost(&mut self, slot: BodySlot, judged: Judgement, was_in: bool) {
-        let goes = self.goes_as_told(slot);
         let keeps = judged.in_broad && judged.reach_m.is_infinite();
+        let goes = keeps && self.goes_as_told(slot);
         let hot = &mut self.filters.bodies[slot.index()];
         let (kept, barred) = (hot.has(KEEPS), hot.has(BARS));
         let bars = keeps && !goes && (barred || !(kept || was_in));
