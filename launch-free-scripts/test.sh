@@ -32,14 +32,14 @@ cargo test --release --no-fail-fast --test alloc --test engine --test soundness 
 
 if [ "${1:-}" != --rust-only ]; then
   cargo build --quiet --release --bin sweepd
-  # Two at a time: they mostly wait for one another's messages.
+  # Some at a time: they mostly wait for messages, those over DDS nearly always.
   SWEEPD=${CARGO_TARGET_DIR:-$root/target}/release/sweepd "$SWEEPD_PYTHON" -m pytest -q -n 2 tests/python --ignore tests/python/ros2
   ros2=$("$here/ros2_env.sh") && code=0 || code=$?
   if [ "$code" = 0 ]; then
     # Those that say how much of a core is taken, or how much comes through, are alone.
     load=tests/python/ros2/test_load.py
     export SWEEPD=${CARGO_TARGET_DIR:-$root/target}/release/sweepd
-    "$ros2" -m pytest -q -n 2 -p no:cacheprovider tests/python/ros2 --ignore "$load"
+    "$ros2" -m pytest -q -n 4 -p no:cacheprovider tests/python/ros2 --ignore "$load"
     "$ros2" -m pytest -q -p no:cacheprovider "$load"
   elif [ "$code" = 3 ] && [ "${SWEEPD_ROS2:-}" != required ]; then
     echo "the tests with ROS 2 peers are skipped: see above"
