@@ -59,7 +59,8 @@ pub const VERTEX_FRAMES_WAITING_MAX: usize = 1024;
 /// Vertices of one source that wait for their tick, in all of its messages: as many as its queue in shared memory
 /// holds.
 pub const VERTEX_ROWS_WAITING_MAX: usize = 64 * DEFORMING_VERTICES_MAX;
-/// Frames of one source that wait for a scene revision; beyond it the oldest goes.
+/// Frames of one source that wait for a scene revision; beyond it, and beyond `FRAME_ROWS_MAX` of all of them, the
+/// oldest go.
 pub const FRAMES_WAITING_MAX: usize = 1024;
 /// Frames taken from one source in one drain; the rest waits in its queue, newest kept.
 pub const FRAMES_PER_DRAIN_MAX: usize = 64;

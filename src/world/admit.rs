@@ -1,8 +1,8 @@
 //! Admission: one frame comes in, checked as a whole and row by row.
 //!
 //! In: a decoded frame from a client that may be wrong in every field. Out: poses taken, ages renewed, refusals
-//! counted, bodies marked unknown. No allocation once a source has sent its largest frame; a row costs no lookup when
-//! it stands where its body stood in the frame before.
+//! counted, bodies marked unknown. No allocation once a source has sent its largest frame, but for frames that wait; a
+//! row costs no lookup when it stands where its body stood in the frame before.
 
 use super::World;
 use super::ahead::AHEAD;
@@ -130,29 +130,32 @@ impl World {
             Standing::Next => {}
         }
         let state = &mut self.sources[source.index()];
+        let is_first = standing == Standing::Afresh;
+        if frame.waited && header.sent_ns == 0 {
+            if is_first {
+                state.pass_over_waiting();
+            }
+            state.note_gap(header);
+            return Err(RejectReason::TooOld);
+        }
         // An older frame that still waits has nothing to say any more, unless it may have bodies that this one lacks or
         // is a part of a body's way.
         let stands_for_older = header.flags == frame_flags::FULL && !state.followed;
-        let older_until_ns = if standing == Standing::Afresh || stands_for_older {
+        let older_until_ns = if is_first || stands_for_older {
             state.pass_over_waiting()
         } else {
             None
         };
-        let is_paused = header.flags == frame_flags::PAUSED;
-        if frame.waited && header.sent_ns == 0 {
-            state.gap |= !is_paused;
-            return Err(RejectReason::TooOld);
-        }
-        let is_behind = state.waits() && !is_paused;
-        if header.scene_rev > self.scene_rev || is_behind {
+        // A pause has no rows that could be of another scene.
+        let has_rows = header.flags != frame_flags::PAUSED;
+        if has_rows && (header.scene_rev > self.scene_rev || state.waits()) {
             let own_until_ns = times.received_ns.saturating_add(state.timeout_ns);
             // The stream waits, not each of its frames: one that takes another's place would put off the end for ever.
             let until_ns = match older_until_ns {
-                Some(older_ns) if standing == Standing::Next => older_ns.min(own_until_ns),
+                Some(older_ns) if !is_first => older_ns.min(own_until_ns),
                 _ => own_until_ns,
             };
-            let crowded_out = state.waiting.push(frame, times.received_ns, until_ns);
-            state.skipped += u64::from(crowded_out);
+            state.skipped += state.waiting.push(frame, times.received_ns, until_ns);
             return Ok(Admission::Waiting { source });
         }
         Ok(self.take(source, frame, times))
@@ -189,7 +192,7 @@ impl World {
         }
         if frame.header.flags == frame_flags::PAUSED {
             // The poses that hold are those of its sender's last pose frame, which may not be those that are known.
-            if !state.gap && !state.waits() {
+            if state.gap == 0 && !state.waits() {
                 self.renew_last_poses(source, times);
             }
             return Admission::Admitted {
@@ -198,7 +201,9 @@ impl World {
                 refused_rows: 0,
             };
         }
-        state.gap &= state.order != Some(number);
+        if frame.header.seq >= state.gap {
+            state.gap = 0;
+        }
         // Its list of rows is worked on outside of the world, and put back.
         let mut rows = std::mem::take(&mut self.sources[source.index()].rows);
         let refused_rows = self.find_rows(source, &frame.transforms, &mut rows);
@@ -335,11 +340,10 @@ impl World {
                 self.take(source, &frame, times);
             } else {
                 // The stream has waited, not each of its frames.
-                state.gap = true;
+                state.note_gap(&frame.header);
                 state.refused += 1;
                 self.note_reject(RejectReason::SceneRevision, Some(source));
             }
-            self.sources[source.index()].waiting.give_back(frame);
         }
     }
 }

@@ -90,14 +90,9 @@ impl World {
     pub(super) fn reset(&mut self, source: Option<&str>) {
         if let Some(name) = source {
             if let Some(source) = self.source_named(name) {
-                // What waits was sent before.
-                self.sources[source.index()].pass_over_waiting();
                 self.forget_poses(source);
             }
             return;
-        }
-        for source in &mut self.sources {
-            source.pass_over_waiting();
         }
         for index in 0..self.bodies.len() {
             let slot = slot_at(index);

@@ -3,10 +3,12 @@
 //! In: frame headers. Out: whether a frame is of the session in force and newer than its newest; sessions that are
 //! over stay over for this boot.
 
+use std::collections::VecDeque;
+
 use super::body::Body;
 use crate::config::OnStale;
 use crate::ids::{BodySlot, SourceSlot};
-use crate::limits::{FRAMES_WAITING_MAX, SESSIONS_OVER_MAX};
+use crate::limits::{FRAME_ROWS_MAX, FRAMES_WAITING_MAX, SESSIONS_OVER_MAX};
 use crate::scene::SourceSpec;
 use crate::wire::{
     Frame, FrameHeader, RejectReason, SOURCE_NAME_LEN, SourceRow, VertexHeader, frame_flags,
@@ -49,18 +51,19 @@ pub struct SourceState {
     pub(super) rows: Vec<BodySlot>,
     /// Frames that wait for a later scene revision.
     pub(super) waiting: Waiting,
-    /// A pose frame newer than the one that `rows` are of has not been taken: it was lost, refused or passed over.
-    pub(super) gap: bool,
+    /// A frame with poses, whose number in the epoch is below this, was lost or refused, and none of a later number has
+    /// been taken since; 0: none.
+    pub(super) gap: u64,
     /// Whether a continuous body goes where its frames say.
     pub(super) followed: bool,
 }
 
-/// Frames that wait for a scene revision, or behind one that does; their memory is kept.
+/// Frames that wait for a scene revision, or behind one that does, the oldest first.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Waiting {
-    /// The oldest first, then spare ones.
-    frames: Vec<Frame>,
-    len: usize,
+    frames: VecDeque<Frame>,
+    /// How many rows they have.
+    rows: usize,
     /// When the wait of the first ends, nanoseconds of `CLOCK_BOOTTIME`.
     until_ns: u64,
 }
@@ -68,55 +71,49 @@ pub(super) struct Waiting {
 impl Waiting {
     /// The first one.
     pub(super) fn first(&self) -> Option<&Frame> {
-        self.frames.get(..self.len)?.first()
+        self.frames.front()
     }
 
     /// When the wait of the first ends, nanoseconds of `CLOCK_BOOTTIME`; `None`: no frame waits.
     pub(super) fn until_ns(&self) -> Option<u64> {
-        (self.len > 0).then_some(self.until_ns)
+        (!self.frames.is_empty()).then_some(self.until_ns)
     }
 
-    /// Puts a copy of a frame behind the others; whether the first had to go for it.
+    /// Puts a copy of a frame behind the others; returns how many of the oldest had to go for it.
     ///
     /// * `until_ns` - when its wait ends, should it be the first.
-    pub(super) fn push(&mut self, frame: &Frame, received_ns: u64, until_ns: u64) -> bool {
-        let crowded_out = if self.len == FRAMES_WAITING_MAX {
-            self.take()
-        } else {
-            None
-        };
-        let is_full = crowded_out.is_some();
-        self.frames.extend(crowded_out);
-        if self.len == self.frames.len() {
-            self.frames.push(Frame::default());
+    pub(super) fn push(&mut self, frame: &Frame, received_ns: u64, until_ns: u64) -> u64 {
+        let mut gone = 0;
+        let rows = frame.transforms.len();
+        while self.frames.len() >= FRAMES_WAITING_MAX || self.rows + rows > FRAME_ROWS_MAX {
+            if self.take().is_none() {
+                break;
+            }
+            gone += 1;
         }
-        if let Some(place) = self.frames.get_mut(self.len) {
-            place.clone_from(frame);
-            place.received_ns = received_ns;
-        }
-        if self.len == 0 {
+        if self.frames.is_empty() {
             self.until_ns = until_ns;
         }
-        self.len += 1;
-        is_full
+        self.rows += rows;
+        self.frames.push_back(Frame {
+            received_ns,
+            ..frame.clone()
+        });
+        gone
+    }
+
+    /// Takes the first out.
+    pub(super) fn take(&mut self) -> Option<Frame> {
+        let frame = self.frames.pop_front()?;
+        self.rows -= frame.transforms.len();
+        Some(frame)
     }
 
     /// The wait of the one that is the first now is its own.
     pub(super) fn begin_next(&mut self, timeout_ns: u64) {
-        if let Some(received_ns) = self.first().map(|frame| frame.received_ns) {
-            self.until_ns = received_ns.saturating_add(timeout_ns);
+        if let Some(first) = self.first() {
+            self.until_ns = first.received_ns.saturating_add(timeout_ns);
         }
-    }
-
-    /// Takes the first out; its memory is to be given back.
-    pub(super) fn take(&mut self) -> Option<Frame> {
-        self.len = self.len.checked_sub(1)?;
-        Some(self.frames.remove(0))
-    }
-
-    /// Gives back the memory of a frame.
-    pub(super) fn give_back(&mut self, frame: Frame) {
-        self.frames.push(frame);
     }
 }
 
@@ -141,7 +138,7 @@ impl SourceState {
             pose_frame: 0,
             rows: Vec::with_capacity(bodies),
             waiting: Waiting::default(),
-            gap: false,
+            gap: 0,
             followed: false,
         }
     }
@@ -214,7 +211,14 @@ impl SourceState {
     /// Whether a frame of it waits for a later revision of the scene.
     #[must_use]
     pub fn waits(&self) -> bool {
-        self.waiting.len > 0
+        !self.waiting.frames.is_empty()
+    }
+
+    /// The frame of this number has poses that are never taken: what is known is not what its sender has said last.
+    pub(super) fn note_gap(&mut self, header: &FrameHeader) {
+        if header.flags != frame_flags::PAUSED {
+            self.gap = self.gap.max(header.seq.saturating_add(1));
+        }
     }
 
     /// What waits has nothing to say any more: it is passed over.
@@ -222,8 +226,8 @@ impl SourceState {
     /// * returns - when the wait of the first would have ended.
     pub(super) fn pass_over_waiting(&mut self) -> Option<u64> {
         let until_ns = self.waiting.until_ns();
-        self.skipped += self.waiting.len as u64;
-        self.waiting.len = 0;
+        self.skipped += self.waiting.frames.len() as u64;
+        self.waiting = Waiting::default();
         until_ns
     }
 }
@@ -308,20 +312,22 @@ pub(super) fn stand(
         source.order = Some(order);
         // Nothing of this session has been taken yet.
         (source.newest, source.alive, source.bent) = (None, false, 0);
-        source.gap = false;
+        source.gap = 0;
         return Standing::Afresh;
     }
     source.heard_ns = source.heard_ns.max(received_ns);
     match source.order {
         Some(newest) if order <= newest => Standing::Refused(RejectReason::OldFrame),
         Some((epoch, seq)) if header.epoch == epoch => {
-            source.gap |= header.seq > seq.saturating_add(1);
+            if header.seq > seq.saturating_add(1) {
+                source.gap = header.seq;
+            }
             source.order = Some(order);
             Standing::Next
         }
         _ => {
             source.order = Some(order);
-            source.gap = false;
+            source.gap = 0;
             Standing::Afresh
         }
     }

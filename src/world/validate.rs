@@ -81,8 +81,12 @@ impl World {
         )?;
         let keeps = body.in_broad && body.reach_m.is_infinite();
         check(hot.has(KEEPS) == keeps, "the filters disagree on keeps")?;
-        let bars = keeps && !self.met.contains(&slot);
-        check(hot.has(BARS) == bars, "the filters disagree on bars")?;
+        // Until the tick ends; one that came back in it is barred at once.
+        let may_meet = !keeps || self.met.contains(&slot);
+        check(
+            if hot.has(BARS) { keeps } else { may_meet },
+            "the filters disagree on bars",
+        )?;
         let judged = self.judge(slot, body);
         check(
             judged.status == body.status,

@@ -116,6 +116,49 @@ fn bug_a_pause_renewed_poses_that_newer_ones_had_followed_which_were_never_taken
     }
 }
 
+/// What is missing is older than the poses that are taken at last, or newer.
+#[test]
+fn a_pause_speaks_of_poses_that_waited_unless_newer_ones_were_lost() {
+    for (lost_before, lost_after) in [(false, false), (true, false), (false, true), (true, true)] {
+        let mut bench = Bench::of(vec![moving("a", 1)]);
+        bench.send(MS, "sim", 1, &[row(1, 0.0)]);
+        let seq = 2 + u64::from(lost_before);
+        let later = |f: &mut Frame| f.header.scene_rev = 2;
+        assert_eq!(send(&mut bench, MS, (seq, &[row(1, 3.0)]), later), WAITING);
+        let first = seq + 1 + u64::from(lost_after);
+        pause(&mut bench, MS, first);
+        revise(&mut bench, "wall");
+        assert_eq!(x(&bench, "a"), 3.0);
+        for seq in first + 1..first + 6 {
+            // It needs nothing of the scene, whatever it says.
+            send(&mut bench, 200 * MS, (seq, &[]), |f| {
+                f.header.flags = frame_flags::PAUSED;
+                f.header.scene_rev = 77;
+            });
+        }
+        let known = bench.status("a") == BodyStatus::Known;
+        assert_eq!(known, !lost_after, "{lost_before}");
+    }
+}
+
+#[test]
+fn bug_a_frame_that_is_too_old_threw_away_what_waited() {
+    let mut bench = Bench::of(vec![moving("a", 1)]);
+    let later = |f: &mut Frame| f.header.scene_rev = 2;
+    assert_eq!(send(&mut bench, MS, (1, &[row(1, 3.0)]), later), WAITING);
+    let of_the_past = |f: &mut Frame| (f.waited, f.header.sent_ns) = (true, 0);
+    send(&mut bench, MS, (2, &[row(1, 4.0)]), of_the_past);
+    revise(&mut bench, "wall");
+    assert_eq!(x(&bench, "a"), 3.0);
+    // Its sender has said others since.
+    let since_ns = bench.now_ns;
+    for seq in 3..6 {
+        pause(&mut bench, 100 * MS, seq);
+    }
+    bench.wait(since_ns + TIMEOUT_NS - bench.now_ns);
+    assert_eq!(bench.status("a"), BodyStatus::Stale);
+}
+
 #[test]
 fn bug_a_partial_frame_that_waited_was_passed_over_for_the_next() {
     let mut bench = Bench::of(vec![moving("a", 1), moving("b", 2)]);
@@ -146,7 +189,7 @@ fn bug_a_partial_frame_that_waited_was_passed_over_for_the_next() {
 }
 
 #[test]
-fn a_full_frame_stands_for_all_that_wait_and_a_reset_is_after_them() {
+fn a_full_frame_stands_for_all_that_wait_and_one_that_needs_what_a_reset_makes_is_after_it() {
     let mut bench = Bench::of(vec![moving("a", 1), moving("b", 2)]);
     for seq in 1..4 {
         send(&mut bench, MS, (seq, &[row(1, 1.0)]), partial(2));
@@ -165,9 +208,27 @@ fn a_full_frame_stands_for_all_that_wait_and_a_reset_is_after_them() {
         );
         bench.edit(Edit::Reset { source });
         assert_eq!(bench.world.scene_rev(), later);
-        assert_eq!(bench.status("a"), BodyStatus::NotReceived);
+        assert_eq!(
+            (x(&bench, "a"), bench.status("a")),
+            (1.0, BodyStatus::Known)
+        );
+        assert_eq!(bench.status("b"), BodyStatus::NotReceived);
         bench.send(MS, "sim", seq + 2, &[row(1, 5.0), row(2, 9.0)]);
     }
+}
+
+#[test]
+fn a_body_that_is_lost_and_comes_back_lost_in_one_tick_is_whole() {
+    let mut bench = Bench::of(vec![moving("a", 1)]);
+    bench.send(MS, "sim", 1, &[row(1, 0.0)]);
+    let now_ns = bench.now_ns + 900 * MS;
+    let refused = frame("sim", 2, now_ns, &[row(1, f64::NAN)]);
+    let mut old = frame("sim", 1, now_ns, &[row(1, 0.0)]);
+    old.header.epoch = 1;
+    old.header.sent_ns = now_ns - 600 * MS;
+    bench.tick_at(now_ns, &[], &[refused, old]);
+    assert_eq!(bench.status("a"), BodyStatus::Stale);
+    bench.wait(MS);
 }
 
 #[test]

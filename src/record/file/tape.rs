@@ -225,6 +225,10 @@ impl<W: Medium> Tape<W> {
         };
         let closed = ending_of(&note).and_then(|ending| {
             let mut medium = medium.cut(self.kept.bytes)?;
+            // Without its front it is no file of this kind, and ends empty.
+            if self.kept.bytes == 0 {
+                return Ok(());
+            }
             medium.write_all(&ending)?;
             Ok(medium.flush()?)
         });

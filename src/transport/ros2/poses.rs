@@ -8,7 +8,7 @@ mod stamps;
 
 use judge::judge;
 pub(super) use stamps::off;
-use stamps::{Passing, both, crowded, forgotten, older, rivalry, unfit};
+use stamps::{Passing, both, crowded, forgotten, older, refused, rivalry};
 
 use ros2_client::Gid;
 
@@ -170,7 +170,7 @@ impl Source {
                 Taken::Newer if !fixed => off(what, stamp_ns, receipt, self.timeout_ns),
                 Taken::Older(by_ns) => Some(older(what, by_ns)),
                 Taken::Full => Some(crowded(what)),
-                Taken::Refused(why) => Some(unfit(what, why)),
+                Taken::Refused(why) => Some(refused(what, why)),
                 Taken::Newer | Taken::WentBack => None,
             };
             // Those that never change are said again by whoever starts anew.

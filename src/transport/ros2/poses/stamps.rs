@@ -15,25 +15,26 @@ const OFF_NS: u64 = 1_000_000_000;
 /// Most that is told of at once; beyond it the oldest goes.
 const PASSING_MAX: usize = 8;
 
-/// What was wrong a moment ago, and when, nanoseconds of `CLOCK_BOOTTIME`; each once, whatever its numbers.
+/// What was wrong a moment ago: its gist, its words, and when, nanoseconds of `CLOCK_BOOTTIME`. Each gist once.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Passing(VecDeque<(String, u64)>);
+pub(super) struct Passing(VecDeque<(String, String, u64)>);
 
 impl Passing {
     /// Takes what is wrong now.
     pub(super) fn put(&mut self, text: String, now_ns: u64) {
-        let words = gist(&text);
-        self.0.retain(|(other, _)| gist(other) != words);
+        let gist = gist(&text);
+        self.0.retain(|(other, ..)| *other != gist);
         if self.0.len() == PASSING_MAX {
             self.0.pop_front();
         }
-        self.0.push_back((text, now_ns));
+        self.0.push_back((gist, text, now_ns));
     }
 
     /// What is told of now.
     pub(super) fn now(&self, now_ns: u64) -> impl Iterator<Item = String> {
-        let is_fresh = move |(_, at): &&(String, u64)| now_ns.saturating_sub(*at) < TOLD_NS;
-        self.0.iter().filter(is_fresh).map(|(text, _)| text.clone())
+        let all = self.0.iter();
+        let fresh = all.filter(move |(.., at)| now_ns.saturating_sub(*at) < TOLD_NS);
+        fresh.map(|(_, text, _)| text.clone())
     }
 }
 
@@ -66,7 +67,7 @@ pub(super) fn both((kind, name): (&str, &str)) -> String {
 }
 
 /// A link is of no two frames.
-pub(super) fn unfit((kind, name): (&str, &str), why: &str) -> String {
+pub(super) fn refused((kind, name): (&str, &str), why: &str) -> String {
     let name = brief(name);
     format!("{kind} `{name}`: its link is refused, because {why}")
 }
