@@ -25,7 +25,7 @@ use crate::tick::{EditBatch, Engine, TickInput};
 use crate::time::{Budget, Clock, Seldom};
 use crate::transport::{Door, RequestToken, Wake};
 use crate::wire::{Inbox, TickRow};
-use crate::world::TreeOf;
+use crate::world::{SourceState, TreeOf};
 
 use builder::{Asking, Builder, Done, TREE};
 use refusals::Refusals;
@@ -233,13 +233,16 @@ impl<'a> Daemon<'a> {
         }
     }
 
-    /// Whether these edits are what a frame of the leading source waits for: their tick is that frame's, too.
+    /// Whether these edits, or the end of another's wait, are what a frame of the leading source waits for: their tick
+    /// is that frame's, too.
     fn takes_the_leads_frame(&self) -> bool {
         let Mode::OnFrame(lead) = &self.config.mode else {
             return false;
         };
-        let sources = self.engine.world().sources();
-        !self.ready.is_empty() && sources.iter().any(|s| s.name == *lead && s.waits())
+        let now_ns = self.clock.boottime_ns();
+        let takes = |s: &SourceState| !self.ready.is_empty() && s.waits() || s.lets_go(now_ns);
+        let mut sources = self.engine.world().sources().iter();
+        sources.any(|s| s.name == *lead && takes(s))
     }
 
     /// Runs one tick and sends what it filled.

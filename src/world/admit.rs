@@ -334,12 +334,11 @@ impl World {
             let Some(frame) = waiting.take() else {
                 return;
             };
+            waiting.begin_next(state.timeout_ns);
             if is_due {
-                waiting.begin_next(state.timeout_ns);
                 let times = self.times_of(&frame);
                 self.take(source, &frame, times);
             } else {
-                // The stream has waited, not each of its frames.
                 state.note_gap(&frame.header);
                 state.refused += 1;
                 self.note_reject(RejectReason::SceneRevision, Some(source));

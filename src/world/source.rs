@@ -221,6 +221,16 @@ impl SourceState {
         }
     }
 
+    /// Whether a frame is taken at this time (nanoseconds of `CLOCK_BOOTTIME`) that waits for the one before it alone,
+    /// whose wait ends.
+    #[must_use]
+    pub fn lets_go(&self, now_boot_ns: u64) -> bool {
+        let Waiting {
+            frames, until_ns, ..
+        } = &self.waiting;
+        frames.len() > 1 && *until_ns <= now_boot_ns
+    }
+
     /// What waits has nothing to say any more: it is passed over.
     ///
     /// * returns - when the wait of the first would have ended.

@@ -116,6 +116,24 @@ fn bug_a_pause_renewed_poses_that_newer_ones_had_followed_which_were_never_taken
     }
 }
 
+#[test]
+fn bug_a_frame_was_refused_before_its_time_out_with_the_one_before_it() {
+    let mut bench = Bench::of(vec![moving("a", 1), moving("b", 2)]);
+    send(&mut bench, MS, (1, &[row(1, 1.0)]), partial(9));
+    for (seq, own) in [(2, row(2, 2.0)), (3, row(1, 3.0))] {
+        send(&mut bench, 200 * MS, (seq, &[own]), partial(2));
+    }
+    bench.wait(TIMEOUT_NS - 400 * MS);
+    assert_eq!(bench.rejects(RejectReason::SceneRevision), 1);
+    bench.wait(200 * MS);
+    assert_eq!(bench.rejects(RejectReason::SceneRevision), 2);
+    revise(&mut bench, "wall");
+    assert_eq!(
+        (x(&bench, "a"), bench.status("b")),
+        (3.0, BodyStatus::NotReceived)
+    );
+}
+
 /// What is missing is older than the poses that are taken at last, or newer.
 #[test]
 fn a_pause_speaks_of_poses_that_waited_unless_newer_ones_were_lost() {
