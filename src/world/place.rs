@@ -98,10 +98,9 @@ impl World {
             (BodyStatus::Disabled, 0.0)
         } else if !body.moves {
             (BodyStatus::Known, 0.0)
-        } else if vertices().any(|v| v.refused.is_some()) {
+        } else if root.refused || vertices().any(|v| v.refused.is_some()) {
+            // Whatever its speed: who sends what is no pose may have broken more than that.
             (BodyStatus::Rejected, f64::INFINITY)
-        } else if root.refused {
-            (BodyStatus::Rejected, self.reach_of(body, entry.root))
         } else if !(root.has_pose && has_vertices) {
             (BodyStatus::NotReceived, f64::INFINITY)
         } else {
@@ -281,7 +280,7 @@ impl World {
 
 /// Whether the reach of a body grows from tick to tick.
 pub(super) fn grows(status: BodyStatus, reach_m: f64) -> bool {
-    matches!(status, BodyStatus::Stale | BodyStatus::Rejected) && reach_m.is_finite()
+    status == BodyStatus::Stale && reach_m.is_finite()
 }
 
 /// Why the pairs of a body end when it leaves the broad phase.

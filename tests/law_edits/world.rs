@@ -108,13 +108,9 @@ impl World {
         let age_ns = self.now_ns - self.things[&self.root(id).0].since_ns;
         match (self.status(id), self.things[&id].solid.spec.max_speed_mps) {
             (BodyStatus::Known | BodyStatus::Held, _) => 0.0,
-            (BodyStatus::Stale | BodyStatus::Rejected, Some(speed_mps))
-                if self.things[&self.root(id).0].placed =>
-            {
-                Some(speed_mps * age_ns as f64 * 1e-9)
-                    .filter(|reach_m| *reach_m < STALE_REACH_M - 1e-9)
-                    .unwrap_or(f64::INFINITY)
-            }
+            (BodyStatus::Stale, Some(speed_mps)) => Some(speed_mps * age_ns as f64 * 1e-9)
+                .filter(|reach_m| *reach_m < STALE_REACH_M - 1e-9)
+                .unwrap_or(f64::INFINITY),
             _ => f64::INFINITY,
         }
     }

@@ -143,37 +143,6 @@ fn law_3_7_a_stale_body_reaches_as_far_as_its_speed_and_age_say() {
 }
 
 #[test]
-fn bug_a_body_whose_pose_is_refused_reached_no_farther_whatever_its_speed_and_age() {
-    let fast = BodySpec {
-        max_speed_mps: Some(0.5),
-        ..moving("a", 1)
-    };
-    let mut bench = Bench::of(vec![fast]);
-    bench.send(MS, "sim", 1, &[row(1, 0.0)]);
-    for seq in 2..12 {
-        bench.send(100 * MS, "sim", seq, &[row(1, f64::NAN)]);
-        assert_eq!(bench.status("a"), BodyStatus::Rejected);
-        let (reach_m, wanted_m) = (bench.body("a").reach_m, 0.05 * (seq - 1) as f64);
-        assert!((wanted_m..wanted_m + 1e-9).contains(&reach_m), "{reach_m}");
-        assert!(bench.body("a").proxy.max.x >= 0.5 + wanted_m);
-        assert!(!bench.world.filters().keeps(bench.slot("a")));
-    }
-    // Also where nothing comes any more, and no farther than `stale_reach_m`.
-    bench.wait(900 * MS);
-    assert!((0.95..0.9501).contains(&bench.body("a").reach_m));
-    bench.wait(200 * MS);
-    assert_eq!(bench.body("a").reach_m, f64::INFINITY);
-    assert!(bench.world.filters().keeps(bench.slot("a")));
-    bench.send(MS, "sim", 12, &[row(1, 0.0)]);
-    assert_eq!(bench.body("a").reach_m, 0.0);
-    // One that never had a pose is nowhere.
-    bench.edit(sweepd::world::Edit::Reset { source: None });
-    bench.send(MS, "sim", 13, &[row(1, f64::NAN)]);
-    assert_eq!(bench.status("a"), BodyStatus::Rejected);
-    assert_eq!(bench.body("a").reach_m, f64::INFINITY);
-}
-
-#[test]
 fn law_3_7_the_reaches_of_two_stale_bodies_that_approach_add() {
     let fast = |name, id| BodySpec {
         max_speed_mps: Some(1.0),
