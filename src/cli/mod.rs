@@ -26,10 +26,10 @@ mod ros;
 mod run;
 #[cfg(feature = "tui")]
 mod screen;
+mod signals;
 mod worst;
 
 use std::process::ExitCode;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Parser;
@@ -40,6 +40,7 @@ use crate::time::{Clock as _, SystemClock};
 use crate::transport::client::Client;
 use args::{Cli, Command};
 use out::Out;
+use signals::stop;
 
 /// Runs the command line of this process; returns its exit code.
 #[must_use]
@@ -96,33 +97,6 @@ fn dispatch(command: Command, ros_words: Option<&[String]>) -> Result<ExitCode> 
         Err(_) if out.closed() => Ok(ExitCode::SUCCESS),
         Err(error) => Err(error),
     }
-}
-
-/// A flag that SIGINT and SIGTERM raise; a second signal ends the process at once.
-fn stop() -> Result<Arc<AtomicBool>> {
-    flag(true)
-}
-
-/// A flag that SIGINT and SIGTERM raise; a second signal is the caller's.
-#[cfg(feature = "tui")]
-fn stop_at_first() -> Result<Arc<AtomicBool>> {
-    flag(false)
-}
-
-fn flag(second_ends: bool) -> Result<Arc<AtomicBool>> {
-    let failed = |e| Error::io("cannot listen for signals", e);
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        if second_ends {
-            signal_hook::flag::register_conditional_shutdown(signal, 4, Arc::clone(&stop))
-                .map_err(failed)?;
-        }
-        signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(failed)?;
-    }
-    // Beyond the largest file that is allowed a write fails then, and says so, in place of ending the process.
-    let too_large = rustix::process::Signal::XFSZ.as_raw();
-    signal_hook::flag::register(too_large, Arc::default()).map_err(failed)?;
-    Ok(stop)
 }
 
 /// Longest try at a connection before a look at the stop flag, nanoseconds.

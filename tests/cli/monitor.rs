@@ -256,6 +256,37 @@ fn a_signal_ends_it_with_code_0_also_while_it_waits_for_a_daemon() {
     assert_eq!(running.end().0.code(), Some(0), "{}", running.stderr());
 }
 
+/// A second signal ended it with 4, also one that came with the first, as `timeout` sends them.
+#[test]
+fn bug_two_signals_at_once_are_one_and_a_later_one_ends_what_is_stuck() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    // Nobody reads what it writes, and nothing more has room.
+    let (full, _unread) = std::os::unix::net::UnixStream::pair().unwrap();
+    full.set_nonblocking(true).unwrap();
+    while (&full).write(&[b' '; 4096]).is_ok() {}
+    full.set_nonblocking(false).unwrap();
+    let mut stuck = std::process::Command::new(env!("CARGO_BIN_EXE_sweepd"))
+        .args(["monitor", "--json", "--instance", &desk.instance])
+        .stdout(Stdio::from(std::os::fd::OwnedFd::from(full)))
+        .spawn()
+        .unwrap();
+    let pid = rustix::process::Pid::from_child(&stuck);
+    let mut client = desk.source("sim");
+    let soon = std::time::Duration::from_millis(400);
+    let wait = || std::thread::sleep(soon);
+    wait();
+    step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
+    wait();
+    for signal in [Signal::TERM, Signal::TERM, Signal::INT] {
+        rustix::process::kill_process(pid, signal).unwrap();
+    }
+    wait();
+    assert!(stuck.try_wait().unwrap().is_none(), "these were one");
+    rustix::process::kill_process(pid, Signal::TERM).unwrap();
+    assert_eq!(stuck.wait().unwrap().code(), Some(4));
+}
+
 #[test]
 fn stdout_that_is_closed_from_the_start_is_a_normal_end() {
     let desk = Desk::new();

@@ -9,10 +9,9 @@ use rustix::termios::{LocalModes, OptionalActions, SpecialCodeIndex, Termios};
 use signal_hook::consts::{SIGCONT, SIGINT, SIGQUIT, SIGTERM, SIGTSTP};
 use signal_hook::iterator::{Handle, Signals};
 
+use crate::cli::signals::{Asked, EXIT_SIGNALS, stop_at_first};
 use crate::error::{Error, Result};
-
-/// Exit code of a second signal, as of every command.
-const EXIT_SIGNALS: i32 = 4;
+use crate::time::{Clock as _, SystemClock};
 
 /// Reads keys one by one from [`Keys::open`] on.
 #[derive(Debug)]
@@ -28,7 +27,7 @@ impl Keys {
     /// `Error::Io` when signals cannot be listened for.
     pub(super) fn watch() -> Result<(Self, Arc<AtomicBool>)> {
         let failed = |e| Error::io("cannot listen for signals", e);
-        let stop = crate::cli::stop_at_first()?;
+        let stop = stop_at_first()?;
         let terminal = Arc::<Terminal>::default();
         let all = [SIGINT, SIGTERM, SIGQUIT, SIGTSTP, SIGCONT];
         let mut signals = Signals::new(all).map_err(failed)?;
@@ -37,10 +36,9 @@ impl Keys {
             signals: signals.handle(),
         };
         let watch = move || {
-            let mut ends = 0;
+            let mut asked = Asked::default();
             for signal in signals.forever() {
-                ends += u32::from(matches!(signal, SIGINT | SIGTERM));
-                terminal.take(signal, ends);
+                terminal.take(signal, &mut asked);
             }
         };
         let thread = std::thread::Builder::new().name("sweepd-keys".to_owned());
@@ -97,10 +95,9 @@ impl Terminal {
         modes.restore();
     }
 
-    /// * `ends` - signals so far that ask for the end.
-    fn take(&self, signal: i32, ends: u32) {
+    fn take(&self, signal: i32, asked: &mut Asked) {
         match signal {
-            SIGINT | SIGTERM if ends > 1 => {
+            SIGINT | SIGTERM if asked.again(SystemClock.monotonic_ns()) => {
                 self.close();
                 std::process::exit(EXIT_SIGNALS);
             }

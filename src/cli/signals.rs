@@ -1,0 +1,81 @@
+//! The signals that ask a command to end: the first raises a flag, one that comes later ends the process at once.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+
+use crate::error::{Error, Result};
+use crate::time::{Clock as _, SystemClock};
+
+/// What a process ends with that is asked a second time.
+pub(super) const EXIT_SIGNALS: i32 = 4;
+/// What comes so soon after the first signal is no second wish, nanoseconds: `timeout` sends its own to the process and
+/// to the group, and a terminal's Ctrl-C may reach a process that a script sends one, too.
+const ECHO_NS: u64 = 200_000_000;
+
+/// A flag that SIGINT and SIGTERM raise; a second signal ends the process at once.
+///
+/// # Errors
+/// `Error::Io` when signals cannot be listened for.
+pub(super) fn stop() -> Result<Arc<AtomicBool>> {
+    let stop = stop_at_first()?;
+    let mut signals = Signals::new([SIGINT, SIGTERM]).map_err(failed)?;
+    let watch = move || {
+        let mut asked = Asked::default();
+        for _ in signals.forever() {
+            if asked.again(SystemClock.monotonic_ns()) {
+                signal_hook::low_level::exit(EXIT_SIGNALS);
+            }
+        }
+    };
+    let thread = std::thread::Builder::new().name("sweepd-signals".to_owned());
+    thread.spawn(watch).map_err(failed)?;
+    Ok(stop)
+}
+
+/// A flag that SIGINT and SIGTERM raise; a second signal is the caller's.
+///
+/// # Errors
+/// `Error::Io` when signals cannot be listened for.
+pub(super) fn stop_at_first() -> Result<Arc<AtomicBool>> {
+    let stop = Arc::new(AtomicBool::new(false));
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(failed)?;
+    }
+    // Beyond the largest file that is allowed a write fails then, and says so, in place of ending the process.
+    let too_large = rustix::process::Signal::XFSZ.as_raw();
+    signal_hook::flag::register(too_large, Arc::default()).map_err(failed)?;
+    Ok(stop)
+}
+
+fn failed(e: std::io::Error) -> Error {
+    Error::io("cannot listen for signals", e)
+}
+
+/// Since when a process is asked to end.
+#[derive(Debug, Default)]
+pub(super) struct Asked {
+    first_ns: Option<u64>,
+}
+
+impl Asked {
+    /// Takes note of a signal; whether it is a second wish.
+    pub(super) fn again(&mut self, now_ns: u64) -> bool {
+        let first_ns = *self.first_ns.get_or_insert(now_ns);
+        now_ns.saturating_sub(first_ns) >= ECHO_NS
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Asked, ECHO_NS};
+
+    #[test]
+    fn what_comes_at_once_is_an_echo_and_what_comes_later_a_second_wish() {
+        let mut asked = Asked::default();
+        let heard = [0, 1, ECHO_NS - 1, ECHO_NS, ECHO_NS + 1].map(|after| asked.again(7 + after));
+        assert_eq!(heard, [false, false, false, true, true]);
+    }
+}
