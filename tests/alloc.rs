@@ -297,6 +297,10 @@ fn a_tick_allocates_nothing_after_warm_up_whatever_broad_phase_is_asked_for() {
 }
 
 #[test]
+#[cfg_attr(
+    debug_assertions,
+    ignore = "a minute, and allocates alike: run in release"
+)]
 fn a_tick_of_meshes_allocates_nothing_after_warm_up() {
     check("tori", &tori(30), true);
     check("compounds", &compounds(20), true);
