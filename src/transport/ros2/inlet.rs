@@ -197,9 +197,12 @@ impl Inlet {
             return (false, false);
         };
         match line {
-            Line::Clock(from, order) => {
+            Line::Clock(from, order, heard) => {
                 let mut back = false;
-                let taken = drain(from, shared, |message, _| {
+                let taken = drain(from, shared, |message, info| {
+                    if shared.sim_time() {
+                        heard.hear(info.publisher_gid(), receipt.now_ns);
+                    }
                     back |= shared.tick_clock(message.clock, order, receipt.now_ns)
                 });
                 if back {
@@ -272,8 +275,7 @@ impl Inlet {
     fn tell_faults(&mut self, now_ns: u64) {
         let book = self.shared.book();
         let mut all = self.wrongs.words(&book, now_ns, 4 * FAULTS_NS);
-        let feeders = self.lines.iter().filter_map(Line::feeder);
-        all.extend(feeders.filter_map(|feeder| feeder.fault(now_ns)));
+        all.extend(self.lines.iter().filter_map(|line| line.fault(now_ns)));
         all.extend(self.shared_topics());
         for source in &self.sources {
             // Sources of one topic say the same of what is not theirs.

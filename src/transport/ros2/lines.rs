@@ -51,8 +51,8 @@ pub(super) enum Line {
     Pose(Subscription<PoseStamped>, Feeder),
     /// Odometry of one body.
     Odometry(Subscription<Odometry>, Feeder),
-    /// Simulated time, and its order.
-    Clock(Subscription<Clock>, Order),
+    /// Simulated time, its order, and who tells it.
+    Clock(Subscription<Clock>, Order, Heard),
 }
 
 impl Line {
@@ -64,7 +64,7 @@ impl Line {
             Self::Links { from, .. } => registry.register(from, token, wanted),
             Self::Pose(from, _) => registry.register(from, token, wanted),
             Self::Odometry(from, _) => registry.register(from, token, wanted),
-            Self::Clock(from, _) => registry.register(from, token, wanted),
+            Self::Clock(from, ..) => registry.register(from, token, wanted),
         }
     }
 
@@ -84,6 +84,18 @@ impl Line {
     pub(super) fn feeder(&self) -> Option<&Feeder> {
         match self {
             Self::Pose(_, feeder) | Self::Odometry(_, feeder) => Some(feeder),
+            _ => None,
+        }
+    }
+
+    /// What is wrong with who sends.
+    pub(super) fn fault(&self, now_ns: u64) -> Option<String> {
+        match self {
+            Self::Pose(_, feeder) | Self::Odometry(_, feeder) => feeder.fault(now_ns),
+            Self::Clock(.., heard) => heard.are_two(now_ns).then(|| {
+                "/clock: two publishers tell the time, which goes back and forth: stop one of them"
+                    .to_owned()
+            }),
             _ => None,
         }
     }
@@ -108,8 +120,7 @@ impl Feeder {
         self.heard.hear(info.publisher_gid(), now_ns);
     }
 
-    /// What is wrong with who sends.
-    pub(super) fn fault(&self, now_ns: u64) -> Option<String> {
+    fn fault(&self, now_ns: u64) -> Option<String> {
         self.heard.are_two(now_ns).then(|| {
             format!(
                 "topic {}: two publishers send poses of one body: stop one of them",
@@ -122,8 +133,8 @@ impl Feeder {
 /// The publishers last heard of one thing, and when, nanoseconds of `CLOCK_BOOTTIME`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Heard {
-    /// The newest first.
-    last: [Option<(Gid, u64)>; 3],
+    /// The newest first. More that send strictly by turns are not told.
+    last: [Option<(Gid, u64)>; 8],
     /// When one was heard again after another.
     together_ns: Option<u64>,
 }
@@ -209,7 +220,8 @@ pub(super) fn subscribe(
     let clock = names.claim("/clock").map_err(Error::Usage)?;
     let kind = ("rosgraph_msgs", "Clock");
     let clock = subscription(node, context, (&clock, kind), NEWEST)?;
-    let mut lines = vec![Line::Transforms(own), Line::Clock(clock, Order::default())];
+    let clock = Line::Clock(clock, Order::default(), Heard::default());
+    let mut lines = vec![Line::Transforms(own), clock];
     let mut odd = Vec::new();
     let mut trees: Vec<(String, bool, Vec<usize>)> = Vec::new();
     // Bodies last: one that an edit has brought must not take a topic away that the scene says.

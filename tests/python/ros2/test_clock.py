@@ -95,6 +95,27 @@ def test_a_jump_back_ends_every_pair_with_cause_reset_flushes_and_goes_on(room):
     room.until(lambda: begins() == {("a", "b"), ("p", "post")}, "both have begun anew", then=world.step)
 
 
+@pytest.mark.parametrize("sim_time", [True, False])
+def test_two_publishers_of_the_clock_are_told_where_time_is_theirs(room, sim_time):
+    world = World(room, sim_time)
+    other, two = room.node("other").create_publisher(Clock, "/clock", RELIABLE), "/clock: two publishers"
+    said = lambda: any(two in log.msg for log in world.logs)  # noqa: E731
+
+    def both():
+        world.step()
+        message = Clock()
+        message.clock.sec = world.now_ns // 10**9 - 2
+        other.publish(message)
+
+    if sim_time:
+        room.until(said, "a word on /rosout", then=both)
+    else:
+        for _ in range(60):
+            both()
+            room.spin(0.02)
+        assert not said()
+
+
 @pytest.mark.parametrize("step_s", [0.0, 5.0])
 def test_a_clock_that_stands_or_jumps_ahead_ends_nothing(room, step_s):
     world = World(room, True)
