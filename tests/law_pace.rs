@@ -120,7 +120,7 @@ impl Daemon {
     }
 
     fn tick(&mut self, due: Due, now_ns: u64) {
-        self.world.begin_tick(self.ticks.len() as u64 + 1);
+        self.world.begin_tick(self.ticks.len() as u64 + 1, now_ns);
         for edit in self.edits.drain(..) {
             self.world.apply(&[edit]).unwrap();
         }

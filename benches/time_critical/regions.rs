@@ -71,7 +71,7 @@ impl Alone {
         frame
             .transforms
             .extend([row(1, &poses[0]), row(2, &poses[1])]);
-        world.begin_tick(1);
+        world.begin_tick(1, clock.boottime_ns());
         inbox.frames().iter().for_each(|f| {
             world.admit(f, clock.boottime_ns());
         });

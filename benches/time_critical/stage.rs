@@ -254,7 +254,7 @@ impl Stage {
         };
         frame.received_ns = self.clock.boottime_ns();
         frame.transforms.extend(self.courses.rows());
-        self.world.begin_tick(self.tick);
+        self.world.begin_tick(self.tick, self.clock.boottime_ns());
         for frame in self.inbox.frames() {
             self.world.admit(frame, self.clock.boottime_ns());
         }

@@ -16,7 +16,7 @@ impl Engine {
         self.now_ns = now_ns;
         let asked = input.edits.iter().any(|batch| batch.validate);
         let fault = asked.then(|| self.repair()).flatten();
-        self.world.begin_tick(self.tick);
+        self.world.begin_tick(self.tick, now_ns);
         self.edit(input, laps, fault.as_deref());
         self.admit_frames(input.inbox, now_ns);
         let limited = self.config.budget.is_limited();

@@ -292,6 +292,12 @@ impl World {
         self.source_of(body).map_or(u64::MAX, |s| s.timeout_ns)
     }
 
+    /// Whether a body that hangs on no other is too old at a time, whatever happens to it then.
+    pub(super) fn is_too_old(&self, body: &Body, now_ns: u64) -> bool {
+        let age_ns = now_ns.saturating_sub(body.since_ns.unwrap_or_default());
+        age_ns >= self.timeout_of(body)
+    }
+
     /// What happens to a body that is too old, as it or its source says.
     pub(super) fn on_stale_of(&self, body: &Body) -> OnStale {
         let of_source = self.source_of(body).map(|s| s.on_stale);

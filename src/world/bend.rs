@@ -120,6 +120,9 @@ impl World {
         });
         taken.unwrap_or_else(|(source, reason)| {
             self.note_refused(reason, source, &frame.header.source);
+            if let Some(slot) = self.slot_of(BodyId(frame.header.body)) {
+                self.note_refused_body(reason, slot);
+            }
             Admission::Refused { source, reason }
         })
     }

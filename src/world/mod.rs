@@ -124,6 +124,8 @@ pub struct World {
     /// The change set was not taken yet by a tick: what `new` put there.
     first: bool,
     tick: u64,
+    /// When this tick began, nanoseconds of `CLOCK_BOOTTIME`; `now_ns` gets there with its first frame.
+    begun_ns: u64,
     now_ns: u64,
     stale_reach_m: f64,
     viewpoint: Option<Viewpoint>,
@@ -217,24 +219,12 @@ impl World {
             uncounted: false,
             first: false,
             tick: 0,
+            begun_ns: now_ns,
             now_ns,
             stale_reach_m: config.stale_reach_m,
             viewpoint: config.viewpoint.clone(),
             bodies_limit: config.limits.bodies,
         }
-    }
-
-    /// Opens a tick: the change set is empty again, and slots freed in the tick before may be used.
-    pub fn begin_tick(&mut self, tick: u64) {
-        self.tick = tick;
-        if !std::mem::take(&mut self.first) {
-            self.lists.clear();
-            self.names_changed = false;
-            self.edited = false;
-        }
-        self.free.append(&mut self.resting);
-        self.take_timeouts();
-        self.end_travels();
     }
 
     /// What this tick changed so far; complete after [`World::age`].

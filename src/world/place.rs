@@ -122,10 +122,7 @@ impl World {
     /// Age and what follows from it belong to the root; the speed is the body's own.
     fn judge_age(&self, body: &Body, root: BodySlot) -> (BodyStatus, f64) {
         let root_body = self.body(root).unwrap_or(body);
-        let age_ns = self
-            .now_ns
-            .saturating_sub(root_body.since_ns.unwrap_or_default());
-        if age_ns < self.timeout_of(root_body) {
+        if !self.is_too_old(root_body, self.now_ns) {
             return (BodyStatus::Known, 0.0);
         }
         match self.on_stale_of(root_body) {

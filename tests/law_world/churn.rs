@@ -153,7 +153,7 @@ fn whatever_comes_the_structure_holds_and_the_change_sets_tell_all() {
             let now_ns = bench.now_ns + rng.bits() % pause_ns + 1;
             bench.tick += 1;
             bench.now_ns = now_ns;
-            bench.world.begin_tick(bench.tick);
+            bench.world.begin_tick(bench.tick, now_ns);
             while rng.once_in(4) {
                 let edits = [random_edit(&mut rng), random_edit(&mut rng)];
                 applied += u64::from(bench.world.apply(&edits).is_ok());
@@ -201,7 +201,7 @@ fn time_to_admit_ten_thousand_rows() {
             let frame = frame("sim", seq, now_ns, &rows);
             let clock = sweepd::time::SystemClock;
             let from = sweepd::time::Clock::monotonic_ns(&clock);
-            bench.world.begin_tick(seq);
+            bench.world.begin_tick(seq, now_ns);
             bench.world.admit(&frame, now_ns);
             bench.world.age(now_ns);
             let took = sweepd::time::Clock::monotonic_ns(&clock) - from;

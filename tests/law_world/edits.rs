@@ -31,6 +31,66 @@ fn attach(name: &str, to: Option<&str>, pose: Option<Pose>) -> Edit {
     }
 }
 
+/// It was known at its old pose from then on, as young as what it hung on, and the scene clear.
+#[test]
+fn bug_an_attachment_where_a_body_is_needs_bodies_that_are_not_too_old() {
+    let hung = BodySpec {
+        attached_to: Some("b".to_owned()),
+        ..fixed("c", 3, 0.0)
+    };
+    let scene = || {
+        let robot = BodySpec {
+            source: Some(1),
+            ..moving("b", 2)
+        };
+        let mut bench = Bench::of(vec![moving("a", 1), robot, hung.clone()]);
+        bench.send(MS, "sim", 1, &[row(1, 0.0)]);
+        bench.send(MS, "robot", 1, &[row(2, 5.0)]);
+        bench
+    };
+    let hang = |name, to| attach(name, to, None);
+    for (silent, other) in [("sim", "robot"), ("robot", "sim")] {
+        let mut bench = scene();
+        // Too old by now, which no tick has told yet.
+        bench.send(
+            TIMEOUT_NS - 2 * MS,
+            other,
+            2,
+            &[row(if other == "sim" { 1 } else { 2 }, 0.0)],
+        );
+        let now_ns = bench.now_ns + 2 * MS;
+        bench.tick += 1;
+        bench.world.begin_tick(bench.tick, now_ns);
+        let text = bench.refused(&[hang("a", Some("b"))]);
+        assert!(text.contains("wait for their frames"), "{silent}: {text}");
+        if silent == "robot" {
+            let text = bench.refused(&[hang("c", None)]);
+            assert!(text.contains("it is not known where `c` is"), "{text}");
+        }
+        bench.wait(2 * MS);
+        assert_eq!(
+            bench.status(if silent == "sim" { "a" } else { "b" }),
+            BodyStatus::Stale
+        );
+        let text = bench.refused(&[hang("a", Some("b"))]);
+        assert!(text.contains("wait for their frames"), "{silent}: {text}");
+        // Where somebody says where, it is known.
+        bench.edit(attach(
+            "a",
+            Some("b"),
+            Some(Pose::translation(1.0, 0.0, 0.0)),
+        ));
+        assert_eq!(bench.status("a"), bench.status("b"));
+    }
+    let mut bench = scene();
+    bench.edit(hang("a", Some("b")));
+    bench.edit(hang("c", None));
+    assert_eq!(
+        (bench.status("a"), bench.status("c")),
+        (BodyStatus::Known, BodyStatus::Known)
+    );
+}
+
 #[test]
 fn law_3_1_remove_then_put_of_one_name_makes_a_new_generation_with_the_same_id() {
     let mut bench = Bench::of(vec![moving("a", 1), moving("b", 2)]);

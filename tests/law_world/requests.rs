@@ -52,7 +52,7 @@ fn hung(name: &str, to: &str, at_x: f64) -> BodySpec {
 /// A tick with one request.
 fn request(bench: &mut Bench, edits: &[Edit]) {
     bench.tick += 1;
-    bench.world.begin_tick(bench.tick);
+    bench.world.begin_tick(bench.tick, bench.now_ns);
     bench.world.apply(edits).unwrap();
     bench.world.age(bench.now_ns);
     bench.world.validate().unwrap();
@@ -372,7 +372,7 @@ fn bug_a_body_let_go_by_the_request_that_hung_it_on_an_unknown_one_stayed_known(
         bench.send(600 * MS, "sim", 2, &[row(2, 3.0)]);
         bench
     };
-    let edits = || [attach("b", "a", None), detach("b")];
+    let edits = || [attach("b", "a", Some(2.0)), detach("b")];
     let mut one = stale();
     assert_eq!(one.status("b"), BodyStatus::Known);
     request(&mut one, &edits());

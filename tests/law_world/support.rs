@@ -189,7 +189,7 @@ impl Bench {
     ) -> Vec<Admission> {
         self.tick += 1;
         self.now_ns = now_ns;
-        self.world.begin_tick(self.tick);
+        self.world.begin_tick(self.tick, now_ns);
         for edit in edits {
             self.world.apply(std::slice::from_ref(edit)).unwrap();
         }

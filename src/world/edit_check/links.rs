@@ -40,10 +40,13 @@ impl<'a> Sketch<'a> {
     pub(super) fn of_world(world: &'a World, slot: BodySlot) -> Option<Self> {
         let entry = &world.entries[slot.index()];
         let root = &world.entries[entry.root.index()];
+        // Where a body was that is too old says nothing of where it is, and what hangs on another is as young as that.
+        let is_old = |body| world.is_too_old(body, world.begun_ns.max(world.now_ns));
+        let is_old = world.body(entry.root).is_none_or(is_old);
         Some(Self {
             spec: entry.spec.as_deref()?,
             hangs: entry.attach.map(|(to, _)| &*world.names.get(to).text),
-            has_place: root.has_pose && !root.refused,
+            has_place: root.has_pose && !root.refused && !is_old,
             at: 0,
             is_put: false,
         })
