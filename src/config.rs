@@ -1,5 +1,7 @@
 //! How a daemon runs: mode, budget, heartbeat, limits. Read from a scene file, overridden by flags.
 
+pub(crate) mod ros_name;
+
 use crate::limits::{self, RATE_HZ_MAX, RATE_HZ_MIN};
 use crate::time::Budget;
 

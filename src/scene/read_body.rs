@@ -5,6 +5,7 @@ use crate::ids::BodyId;
 use crate::limits::{EXTENT_MAX_M, EXTENT_MIN_M, PRIORITY_MAX, PRIORITY_MIN, SHAPES_PER_BODY_MAX};
 use crate::math::Pose;
 use crate::scene::node::{Fault, Node, Value};
+use crate::scene::read_ros::read_topic;
 use crate::scene::read_shape::{read_pose, read_shape};
 use crate::scene::table::{Table, shortened};
 use crate::scene::{BodySpec, PlacedSpec};
@@ -117,7 +118,7 @@ pub(crate) fn read_body(node: Node, blobs: Option<&[u8]>) -> Result<BodyDraft, F
         continuous: table.flag("continuous")?.unwrap_or(plain.continuous),
         teleport_m: table.number_within("teleport_m", EXTENT_MIN_M, EXTENT_MAX_M)?,
         ros_frame: table.name("ros_frame", ROS_NAME_BYTES_MAX)?,
-        ros_topic: table.name("ros_topic", ROS_NAME_BYTES_MAX)?,
+        ros_topic: read_topic(&mut table, "ros_topic")?,
         group: table.bits("group")?.unwrap_or(plain.group),
         mask: table.bits("mask")?.unwrap_or(plain.mask),
         parent,

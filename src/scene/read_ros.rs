@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::config::{RosKind, RosSource};
+use crate::config::{RosKind, RosSource, ros_name};
 use crate::scene::SourceSpec;
 use crate::scene::node::{Fault, Node};
 use crate::scene::read_body::{BodyDraft, ROS_NAME_BYTES_MAX};
@@ -44,7 +44,7 @@ pub(crate) fn read_ros(node: Option<Node>) -> Result<Option<RosSource>, Fault> {
         return Err(Fault::new(table.at(key), text));
     }
     let mut topic = |key: &str, default: &str| -> Result<String, Fault> {
-        let given = table.name(key, ROS_NAME_BYTES_MAX)?;
+        let given = read_topic(&mut table, key)?;
         Ok(given.unwrap_or_else(|| default.to_owned()))
     };
     let (links, fixed) = (topic("topic", "/tf")?, topic("static_topic", "/tf_static")?);
@@ -54,6 +54,18 @@ pub(crate) fn read_ros(node: Option<Node>) -> Result<Option<RosSource>, Fault> {
         static_topic: fixed,
         max_skew_ns: time_ns(&mut table, "max_skew_ms", 0.0)?.unwrap_or(MAX_SKEW_NS_DEFAULT),
     }))
+}
+
+/// Takes the name of a topic out.
+pub(crate) fn read_topic(table: &mut Table, key: &str) -> Result<Option<String>, Fault> {
+    let at = table.at(key);
+    match table.name(key, ROS_NAME_BYTES_MAX)? {
+        Some(name) if !ros_name::is_topic(&name) => {
+            let why = ros_name::no_topic(&shortened(&name));
+            Err(Fault::new(at, format!("{key}: {why}")))
+        }
+        given => Ok(given),
+    }
 }
 
 /// Why a source of topics cannot lead in lockstep.
@@ -154,6 +166,28 @@ mod tests {
         ] {
             let error = scene(&sources, &bodies).unwrap_err();
             assert!(error.contains(word), "{error}");
+        }
+    }
+
+    /// `check` found such a scene fine, and `run --ros2` told neither line nor body.
+    #[test]
+    fn bug_a_topic_that_is_none_is_told_with_its_line_and_body() {
+        let source = |more: &str| {
+            format!("[[source]]\nname = 's'\nros2 = {{ type = {more} }}\n[[body]]\nname = 'b'\n")
+        };
+        let shape = "shape = { type = 'sphere', radius = 1 }\n";
+        for (text, line) in [
+            (source("'pose'") + "ros_topic = '/a//b'\n" + shape, 6),
+            (source("'tf', topic = 'a b'") + shape, 3),
+            (source("'tf', static_topic = '/1'") + shape, 3),
+        ] {
+            let error = Scene::parse(&text, "s.toml", Path::new("")).unwrap_err();
+            let told = error.to_string();
+            let place = format!("s.toml:{line}:");
+            assert!(
+                told.contains(&place) && told.contains("is no name of a topic"),
+                "{told}"
+            );
         }
     }
 }

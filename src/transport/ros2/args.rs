@@ -6,6 +6,7 @@
 use std::path::PathBuf;
 
 use super::params_file::{Setting, parse_value};
+use crate::config::ros_name::is_token;
 
 /// One remap rule; the first that matches wins.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -121,14 +122,6 @@ impl RosArgs {
             .iter()
             .filter(move |rule| rule.node.as_deref().is_none_or(|own| own == node))
     }
-}
-
-/// A part of a name between slashes.
-pub(super) fn is_token(token: &str) -> bool {
-    let mut chars = token.chars();
-    let head = chars.next();
-    head.is_some_and(|c| c.is_ascii_alphabetic() || c == '_')
-        && chars.all(|c| c.is_ascii_alphanumeric() || c == '_')
 }
 
 /// `NODE:FROM:=TO`, the node optional.

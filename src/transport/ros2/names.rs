@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::args::{RosArgs, is_token};
+use super::args::RosArgs;
+use crate::config::ros_name::{is_topic, no_topic};
 
 /// Makes full names for one node.
 #[derive(Clone, Debug)]
@@ -130,16 +131,10 @@ impl Names {
             None if name.starts_with('/') => name.to_owned(),
             None => format!("{root}/{name}"),
         };
-        let fine = full
-            .split('/')
-            .skip(1)
-            .all(|t| is_token(t) && !t.contains("__"));
-        if fine {
+        if is_topic(&full) {
             Ok(full)
         } else {
-            Err(format!(
-                "`{name}` is no name of a topic or service: write letters, digits, _ (one at a time) and / between them"
-            ))
+            Err(no_topic(name))
         }
     }
 }
