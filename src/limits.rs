@@ -107,6 +107,13 @@ pub const TIMEOUT_MS_DEFAULT: u64 = 500;
 pub const OPEN_FILES_LEAST: u64 = 96;
 /// Bytes that a file of a daemon must be allowed to have: the memory for answers is some 24 MiB from its start on.
 pub const FILE_BYTES_LEAST: u64 = 32 << 20;
+/// Bytes of address space that a daemon must be allowed to have: it maps some 90 MiB of shared memory and the stacks
+/// and heaps of its threads at its start, and uses little of it.
+pub const ADDRESS_BYTES_LEAST: u64 = 192 << 20;
+/// Bytes of shared memory that must be free where a daemon starts: its ports take some 280 KiB before any message.
+pub const SHARED_BYTES_LEAST: u64 = 512 << 10;
+/// Bytes of shared memory that must be free where a client connects.
+pub const SHARED_BYTES_A_CLIENT: u64 = 256 << 10;
 /// Files that a ROS 2 node takes beside its daemon's: sockets of DDS, and some for each writer and reader.
 pub const ROS_FILES: u64 = 200;
 /// Files that it takes for each topic of a body.

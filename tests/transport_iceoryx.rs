@@ -15,6 +15,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
+use iceoryx2::port::update_connections::UpdateConnections as _;
 use iceoryx2::prelude::{Config, FileName, NodeBuilder, Path as IoxPath, SemanticString, ipc};
 use sweepd::time::{Clock, SystemClock};
 use sweepd::transport::Door;
@@ -558,6 +559,44 @@ fn a_daemon_of_another_wire_version_is_refused_with_both_versions() {
         assert!(text.contains(env!("CARGO_PKG_VERSION")), "{text}");
     });
     drop(server);
+}
+
+/// Its topics have other names, and `no daemon runs` was said of it.
+#[test]
+fn bug_a_daemon_that_has_only_the_hello_in_common_is_refused_with_both_versions() {
+    let files = Files::new();
+    std::fs::create_dir_all(&files.root).unwrap();
+    let node = stranger(&files);
+    let hello = node
+        .service_builder(&"cell/hello".try_into().unwrap())
+        .publish_subscribe::<Hello>()
+        .subscriber_max_buffer_size(1)
+        .subscriber_max_borrowed_samples(1)
+        .history_size(1)
+        .create()
+        .unwrap();
+    let publisher = hello.publisher_builder().create().unwrap();
+    let mut theirs = Hello {
+        magic: *b"sweepd\0\0",
+        wire_version: 2,
+        ..Hello::default()
+    };
+    theirs.sweepd_version[..5].copy_from_slice(b"9.9.9");
+    publisher.send_copy(theirs).unwrap();
+    std::thread::scope(|scope| {
+        let client = scope.spawn(|| options(&files, None).connect().map(|_| ()));
+        while !client.is_finished() {
+            publisher.update_connections().unwrap();
+            std::thread::park_timeout(Duration::from_millis(10));
+        }
+        let error = client.join().unwrap().unwrap_err();
+        assert_eq!(error.exit_code(), 4, "{error}");
+        let text = error.to_string();
+        assert!(
+            text.contains("9.9.9") && text.contains("wire version 2"),
+            "{text}"
+        );
+    });
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use rustix::process::{Resource, getrlimit};
 
 use super::{Finding, bytes};
-use crate::limits::{FILE_BYTES_LEAST, OPEN_FILES_LEAST};
+use crate::limits::{ADDRESS_BYTES_LEAST, FILE_BYTES_LEAST, OPEN_FILES_LEAST};
 use crate::transport::open_files::OpenFiles;
 
 /// A limit, and what is needed of it.
@@ -48,9 +48,9 @@ const NEEDS: [Need; 3] = [
         what: "address space",
         flag: "-v",
         unit: 1024,
-        least: 128 << 20,
+        least: ADDRESS_BYTES_LEAST,
         wished: 1 << 30,
-        why: "a daemon maps some 90 MiB of shared memory at its start, of which it uses little",
+        why: "a daemon maps some 90 MiB of shared memory at its start, and its threads' stacks and heaps, of which it uses little",
         show: bytes,
     },
 ];

@@ -8,6 +8,9 @@ use crate::transport::ICEORYX2_VERSION;
 use crate::transport::iceoryx::{IoxLink, Place};
 use crate::wire::{Hello, SOURCE_NAME_LEN, WIRE_VERSION, name_str};
 
+/// Shortest wait for the hello of a daemon whose services are there, nanoseconds.
+const GREET_NS: u64 = 250_000_000;
+
 /// How a client connects over shared memory.
 #[derive(Clone, Debug)]
 pub struct ClientOptions {
@@ -91,12 +94,12 @@ impl Client {
         .connect()
     }
 
-    /// Waits for the hello and checks it.
+    /// Waits for the hello and checks it; for some time in any case, for the daemon has to see who came.
     pub(super) fn greet(&mut self, timeout_ns: u64) -> Result<()> {
-        let until_ns = self.clock.monotonic_ns().saturating_add(timeout_ns);
+        let until_ns = (self.clock.monotonic_ns()).saturating_add(timeout_ns.max(GREET_NS));
         loop {
             if let Some(hello) = self.link.hello()? {
-                check(&hello)?;
+                check_hello(&hello)?;
                 self.hello = hello;
                 return Ok(());
             }
@@ -115,7 +118,7 @@ impl Client {
 }
 
 /// Both versions, when they differ in a way that matters.
-fn check(hello: &Hello) -> Result<()> {
+pub(crate) fn check_hello(hello: &Hello) -> Result<()> {
     let text = |bytes: &[u8]| name_str(bytes).unwrap_or("?").to_owned();
     let (theirs, iceoryx2) = (text(&hello.sweepd_version), text(&hello.iceoryx2_version));
     if hello.magic != *b"sweepd\0\0"

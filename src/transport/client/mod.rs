@@ -11,7 +11,7 @@ mod step;
 mod vertices;
 
 pub use connect::ClientOptions;
-pub(crate) use connect::random_u64;
+pub(crate) use connect::{check_hello, random_u64};
 pub use follow::{Message, View};
 pub use link::{Link, Rows, Topics};
 pub use list::{ContactList, PairList};

@@ -19,10 +19,11 @@ use answers::{Pending, next_answer};
 use news::{News, Spot};
 use read::{Reader, read};
 use send::send_frame;
-use why::{not_found, opened, out_of_files};
+use why::{not_found, of_another_version, opened, out_of_files};
 
 use super::place::Place;
 use super::qos::{self, Ipc, Open, SLEEP_MIN, events, failed};
+use super::room::check_client_room;
 use super::unmet::Unmet;
 use crate::error::{Error, Result};
 use crate::limits;
@@ -80,10 +81,12 @@ impl IoxLink {
     /// Opens the instance's services, again and again until they are there or `until_ns` (monotonic) is reached.
     ///
     /// # Errors
-    /// `Error::Refused` when the files are another user's or of another iceoryx2, or this process may open too few;
+    /// `Error::Refused` when the files are another user's or of another iceoryx2, the daemon speaks another wire
+    /// version, this process may open too few files, or shared memory is full;
     /// `Error::TimedOut` otherwise.
     pub fn open(place: &Place, clock: &dyn Clock, until_ns: u64) -> Result<Self> {
         check_client()?;
+        check_client_room()?;
         loop {
             // a node of ours would make a missing root, which is the daemon's to make
             let tried = if place.check_owner()? {
@@ -96,6 +99,7 @@ impl IoxLink {
             };
             let why = match tried {
                 Ok(link) => return Ok(link),
+                Err(refused @ Error::Refused(_)) => return Err(refused),
                 Err(why) => why,
             };
             if clock.monotonic_ns() >= until_ns {
@@ -113,7 +117,8 @@ impl IoxLink {
             .set_degradation_handler(unmet.handler())
             .create()
             .map_err(|e| failed("hello", e))?;
-        let tick = qos::ticks(&node, place, Open::Existing)?
+        let tick = qos::ticks(&node, place, Open::Existing)
+            .map_err(|why| of_another_version(&hello, why))?
             .subscriber_builder()
             .set_degradation_handler(unmet.handler())
             .create()

@@ -129,7 +129,14 @@ pub(super) fn node_of<S: Service>(place: &Place, role: &str) -> Result<Node<S>> 
         // signals belong to the host program
         .signal_handling_mode(SignalHandlingMode::Disabled)
         .create::<S>()
-        .map_err(|e| failed(format!("no node in {}", place.root().display()), e))
+        .map_err(|e| {
+            let root = place.root();
+            let root = root.display();
+            failed(
+                format!("no node in {root}, of which `sweepd doctor` says what is wrong"),
+                e,
+            )
+        })
 }
 
 pub(super) fn service_name(name: &str) -> Result<ServiceName> {

@@ -9,7 +9,10 @@ use super::lock::LOCK_DIR;
 use super::qos;
 use crate::config::Limits;
 use crate::error::{Error, Result};
-use crate::limits::{FILE_BYTES_LEAST, FILES_A_CLIENT, OPEN_FILES_LEAST, REGIONS_PER_PAIR_MAX};
+use crate::limits::{
+    ADDRESS_BYTES_LEAST, FILE_BYTES_LEAST, FILES_A_CLIENT, OPEN_FILES_LEAST, REGIONS_PER_PAIR_MAX,
+    SHARED_BYTES_A_CLIENT, SHARED_BYTES_LEAST,
+};
 use crate::wire::{BodyRow, ContactRow, NameRow, PairRow, RegionRow, TransformVelRow};
 
 /// Messages of a topic that are there at once: one that is written, one kept for late joiners, one that is read. Where
@@ -83,8 +86,13 @@ fn message<T>(rows: u64) -> u64 {
 /// looked at.
 #[must_use]
 pub fn scarce(needed: u64) -> Option<String> {
+    told(free()?, needed)
+}
+
+/// Bytes of shared memory that are free; `None`: it cannot be looked at.
+fn free() -> Option<u64> {
     let stat = statvfs(LOCK_DIR).ok()?;
-    told(stat.f_bavail.saturating_mul(stat.f_frsize), needed)
+    Some(stat.f_bavail.saturating_mul(stat.f_frsize))
 }
 
 fn told(free: u64, needed: u64) -> Option<String> {
@@ -103,11 +111,49 @@ fn told(free: u64, needed: u64) -> Option<String> {
 /// Refuses to begin where it would end halfway, with an error that names no cause.
 ///
 /// # Errors
-/// `Error::Refused` when this process may open fewer files than a daemon needs, or not make as large ones.
+/// `Error::Refused` when this process may open fewer files than a daemon needs, not make as large ones, or have less
+/// address space; or when shared memory has no room for its ports.
 pub(super) fn check_limits() -> Result<()> {
     let limit = |resource| getrlimit(resource).current;
     enough_files(limit(Resource::Nofile))?;
-    large_enough(limit(Resource::Fsize))
+    large_enough(limit(Resource::Fsize))?;
+    wide_enough(limit(Resource::As))?;
+    has_room("a daemon", free(), SHARED_BYTES_LEAST)
+}
+
+/// The same for a client.
+///
+/// # Errors
+/// `Error::Refused` when shared memory has no room for its ports.
+pub(super) fn check_client_room() -> Result<()> {
+    has_room("a client", free(), SHARED_BYTES_A_CLIENT)
+}
+
+/// * `free` - bytes of shared memory; `None`: not known.
+fn has_room(who: &str, free: Option<u64>, least: u64) -> Result<()> {
+    match free {
+        Some(free) if free < least => Err(Error::Refused(format!(
+            "{LOCK_DIR} has {} KiB free and {who} takes up to {} at its start; who writes beyond the end is killed \
+             (SIGBUS): make it larger (in a container `--shm-size=64m`, else `mount -o remount,size=64m {LOCK_DIR}`), or \
+             remove what fills it",
+            free >> 10,
+            least >> 10
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// * `bytes` - of address space that this process may have; `None`: any number.
+fn wide_enough(bytes: Option<u64>) -> Result<()> {
+    match bytes {
+        Some(bytes) if bytes < ADDRESS_BYTES_LEAST => Err(Error::Refused(format!(
+            "this process may have {} of address space, and a daemon needs {}, most of it mapped and never used: `ulimit \
+             -v unlimited` in the shell that starts it, or in its service's unit",
+            mib(bytes),
+            mib(ADDRESS_BYTES_LEAST)
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// * `files` - that may be open; `None`: any number.
@@ -277,6 +323,30 @@ mod tests {
     }
 
     #[test]
+    fn bug_too_little_address_space_was_told_as_clients_of_another_version() {
+        let text = wide_enough(Some(58 << 20)).unwrap_err().to_string();
+        assert!(
+            text.contains("58 MiB of address space") && text.contains("ulimit -v"),
+            "{text}"
+        );
+        assert!(wide_enough(Some(ADDRESS_BYTES_LEAST)).is_ok() && wide_enough(None).is_ok());
+    }
+
+    /// Both were killed without a word.
+    #[test]
+    fn bug_a_start_without_room_in_shared_memory_is_refused() {
+        let text = has_room("a daemon", Some(100 << 10), SHARED_BYTES_LEAST)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            text.contains("100 KiB free") && text.contains("--shm-size"),
+            "{text}"
+        );
+        assert!(has_room("a client", Some(1 << 20), SHARED_BYTES_A_CLIENT).is_ok());
+        assert!(has_room("a client", None, SHARED_BYTES_A_CLIENT).is_ok());
+    }
+
+    #[test]
     fn the_least_size_of_a_file_is_that_of_the_largest_that_a_daemon_makes_at_its_start() {
         let (root, prefix) = (
             std::env::temp_dir(),
@@ -293,6 +363,12 @@ mod tests {
             .unwrap();
         drop(server);
         std::fs::remove_dir_all(&root).unwrap();
+        // What iceoryx2 keeps for the next node of this prefix, which never comes.
+        for file in std::fs::read_dir(LOCK_DIR).unwrap().flatten() {
+            if file.file_name().to_string_lossy().starts_with(&prefix) {
+                std::fs::remove_file(file.path()).unwrap();
+            }
+        }
         assert!(
             (FILE_BYTES_LEAST / 2..=FILE_BYTES_LEAST).contains(&largest),
             "{largest}"

@@ -1,10 +1,22 @@
 //! Why a client has no ports. In: what iceoryx2 said, and how the process stands. Out: an error that names the cause.
 
+use std::time::Duration;
+
+use iceoryx2::port::subscriber::Subscriber;
+
 use crate::error::{Error, Result};
 use crate::limits::FILES_A_CLIENT;
+use crate::transport::client::check_hello;
 use crate::transport::iceoryx::lock;
 use crate::transport::iceoryx::place::Place;
+use crate::transport::iceoryx::qos::{Ipc, is_away};
 use crate::transport::open_files::OpenFiles;
+use crate::wire::Hello;
+
+/// Between two looks for a hello.
+const LOOK: Duration = Duration::from_millis(10);
+/// So many looks: a daemon that nothing wakes sees who came each tenth of a second.
+const LOOKS: u32 = 30;
 
 /// Why there is no daemon to talk to, with both versions where the holder of the instance says another one.
 pub(super) fn not_found(place: &Place, why: &Error) -> Error {
@@ -26,6 +38,21 @@ pub(super) fn not_found(place: &Place, why: &Error) -> Error {
         env!("CARGO_PKG_VERSION"),
         crate::transport::ICEORYX2_VERSION
     ))
+}
+
+/// Why a daemon's topics are not there: those of another wire version have other names, and only the hello is that of
+/// every version.
+pub(super) fn of_another_version(hello: &Subscriber<Ipc, Hello, ()>, why: Error) -> Error {
+    if !is_away(&why) {
+        return why;
+    }
+    for _ in 0..LOOKS {
+        if let Ok(Some(said)) = hello.receive() {
+            return check_hello(said.payload()).err().unwrap_or(why);
+        }
+        std::thread::park_timeout(LOOK);
+    }
+    why
 }
 
 /// What keeps this process from opening ports; `None`: not its open files.
