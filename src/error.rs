@@ -58,7 +58,11 @@ impl Error {
         let mut text = self.to_string();
         let mut cause = self.source();
         while let Some(beneath) = cause {
-            text += &format!(": {beneath}");
+            // What passes an error on often says it, too.
+            let beneath_text = beneath.to_string();
+            if !text.ends_with(&beneath_text) {
+                text += &format!(": {beneath_text}");
+            }
             cause = beneath.source();
         }
         text

@@ -322,6 +322,11 @@ pub(super) fn nanoseconds(text: &str) -> Result<u64, String> {
         _ => return Err(wanted()),
     };
     let ns = number * scale;
+    if ns >= 1e18 {
+        return Err(format!(
+            "`{text}` is too long: write a time of less than 31 years"
+        ));
+    }
     if !(0.0..1e18).contains(&ns) {
         return Err(wanted());
     }

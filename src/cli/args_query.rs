@@ -36,8 +36,8 @@ pub(super) struct QueryArgs {
     /// No daemon: a file of cases, one JSON object a line (`-`: standard input); one answer a line, in order.
     ///
     /// A case: `{"id", "a": SHAPE, "pose_a": {"t": [x,y,z], "q": [w,x,y,z]}, "b": SHAPE, "pose_b": ...}`, all lengths
-    /// in metres. Keys of a truth that public cases have (`signed_distance`, `bounds`, ..) are passed over, others are
-    /// refused.
+    /// in metres; a shape as in a scene file, one, without a place of its own and not from a file. Other keys of a case
+    /// are passed over, those of shapes and poses are not.
     ///
     /// An answer: `id`; `gap_m`, `gap_min_m`, `gap_max_m`; `normal`, `point_a`, `point_b`; `point_a_rel` and
     /// `point_b_rel`, the points less `pose_a.t`, exact far from the origin, too; `colliding`. Or `id` and `error`.

@@ -19,7 +19,7 @@ impl RejectReason {
             Self::OldFrame => "raise seq with each frame, and epoch when the world resets",
             Self::SceneRevision => "write a scene_rev that the daemon has told, or 0",
             Self::BadLayout => {
-                "write the layout number that msgs/ says, a session other than 0, flags FULL, PARTIAL or PAUSED, and as many rows as that holds"
+                "write the layout number that msgs/ says, a session other than 0, flags FULL, PARTIAL or PAUSED, and as many rows as that holds; of vertices as many as the body has"
             }
             Self::Duplicate => "send each body once a frame",
             Self::NotSteerable => {

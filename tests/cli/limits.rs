@@ -189,7 +189,9 @@ fn a_recording_that_becomes_as_long_as_a_file_may_be_is_ended_and_told_and_the_d
         "{said}"
     );
 
-    let args = [scene, "--record", tape, "--force", "--budget", "none"];
+    // Else its length is taken for that of the next one.
+    std::fs::remove_file(&file).unwrap();
+    let args = [scene, "--record", tape, "--budget", "none"];
     let mut daemon = desk.start("run", &args);
     let mut client = desk.client(None);
     let mut feed = desk.start("feed", &[scene, "--rate", "200"]);

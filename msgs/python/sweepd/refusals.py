@@ -15,9 +15,9 @@ REMEDIES = {
     " let one alone send",
     RejectReason.OLD_FRAME: "a newer one of this client was there before it: send from one thread",
     RejectReason.SCENE_REVISION: "send the edit first, or a smaller `scene_rev`",
-    RejectReason.BAD_LAYOUT: "use the same version of sweepd on both sides",
+    RejectReason.BAD_LAYOUT: "use the same version of sweepd on both sides; of vertices send as many as the body has",
     RejectReason.DUPLICATE: "name each body once in a frame",
-    RejectReason.NOT_STEERABLE: "leave out bodies that cannot move, or that hang on another",
+    RejectReason.NOT_STEERABLE: "leave out bodies that cannot move, or that hang on another, and vertices of those that do not deform",
     RejectReason.TOO_OLD: "send it again",
     RejectReason.OVER_LIMIT: "send fewer rows, or coordinates nearer to the origin",
     RejectReason.BAD_CHAIN: "see what the ROS 2 node says",
@@ -42,7 +42,7 @@ def why_no_result(tick, before, source, scene_rev):
     """What ticks from ``before`` (None: the first) to ``tick`` say that may explain it, each after a semicolon."""
     told = []
     row = source_row(tick, source)
-    if _is_under_way(tick):
+    if is_under_way(tick):
         told.append("a tick is still under way")
     elif row is None:
         known = ", ".join(text(row.name) for row in tick.sources[: tick.sources_len])
@@ -59,6 +59,7 @@ def why_no_result(tick, before, source, scene_rev):
     return "".join(f"; {words}" for words in told)
 
 
-def _is_under_way(tick):
+def is_under_way(tick):
+    """Whether a tick is not there itself yet: it takes longer than a heartbeat, and nothing belongs to what is told of it."""
     # no tick that has ended says so: undecided pairs alone are no reason for unknown
     return tick.header.state == layout.State.UNKNOWN and tick.reasons == 1 << layout.Reason.UNDECIDED
