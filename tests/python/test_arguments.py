@@ -84,6 +84,7 @@ def test_bug_a_pose_that_does_not_fit_is_told_by_the_name_of_its_body(client):
     for wrong in (-1, 0.5, None, 2**40):
         refused("count=", client.loan, wrong)
     refused("time_left_ns=", client.send, POSES, time_left_ns=None)
+    refused(r"step\(foo=\.\.\.\): a frame has stamp_ns, ", client.step, POSES, foo=1)
     for wrong in ([[1, 2, 3], [4, 5]], [[1j, 0, 0]], [["1", "2", "3"]], None, [1, 2, 3]):
         refused("vertices", client.send_vertices, 1, wrong)
     refused("no JSON", client.request, {"edits": [np.zeros(3)]})

@@ -4,6 +4,7 @@ Needs `SWEEPD=path/to/sweepd` and the package of msgs/python with its wheels.
 """
 
 import contextlib
+import gc
 import os
 import resource
 import signal
@@ -216,6 +217,8 @@ def test_bug_a_message_of_a_boot_that_went_unseen_held_back_those_of_the_boot_af
 @contextlib.contextmanager
 def files_left(count):
     """This process may open so many more files."""
+    # what other tests left would give its files back in the midst of this one
+    gc.collect()
     before = resource.getrlimit(resource.RLIMIT_NOFILE)
     has = len(os.listdir("/proc/self/fd")) - 1
     resource.setrlimit(resource.RLIMIT_NOFILE, (has + count, before[1]))

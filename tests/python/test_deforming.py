@@ -5,6 +5,7 @@ Needs `SWEEPD=path/to/sweepd` and the package of msgs/python with its wheels.
 
 import os
 import time
+import warnings
 
 import pytest
 from daemons import NO_TURN, started  # noqa: F401
@@ -124,9 +125,12 @@ def test_vertices_that_are_not_finite_leave_the_last_good_ones_and_the_body_unkn
         assert client.step(POSES, timeout_s=5).state == "clear"
         for wrong, reason in [
             (np.where(np.arange(len(vertices))[:, None] == 7, np.nan, vertices), layout.RejectReason.NOT_FINITE),
+            (vertices * 1e300, layout.RejectReason.NOT_FINITE),
             (vertices[:-1], layout.RejectReason.BAD_LAYOUT),
         ]:
-            client.send_vertices("cloth", wrong)
+            with warnings.catch_warnings(), np.errstate(all="raise"):
+                warnings.simplefilter("error")
+                client.send_vertices("cloth", wrong)
             result = client.step(POSES, timeout_s=5)
             assert result.state == "unknown"
             assert status(client, result, "cloth") == (layout.BodyStatus.REJECTED, reason)

@@ -7,6 +7,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 import time
 
 import pytest
@@ -107,3 +108,59 @@ def test_bug_a_daemon_that_is_killed_or_stopped_is_told_with_what_to_do(tmp_path
         daemon.send_signal(signal.SIGINT)
         assert daemon.wait(timeout=10) == 0
     assert f"start one with `sweepd run SCENE --instance {name}`" in told(client, name, timeout_s=0.1)
+
+
+# A daemon of which a client knows no service but the one that is the same in all versions; no client wakes it.
+OTHER = """
+import ctypes, sys, time
+import iceoryx2 as iox2
+from sweepd import layout
+instance, version, every_s = sys.argv[1], int(sys.argv[2]), float(sys.argv[3])
+iox2.set_log_level_from_env_or(iox2.LogLevel.Fatal)
+node = iox2.NodeBuilder.new().create(iox2.ServiceType.Ipc)
+service = node.service_builder(iox2.ServiceName.new(f"{instance}/hello")).publish_subscribe(layout.Hello)
+service = service.history_size(1).subscriber_max_buffer_size(8).max_subscribers(48).max_publishers(1)
+publisher = service.subscriber_max_borrowed_samples(4).open_or_create().publisher_builder().create()
+hello = layout.Hello(boot_id=9, wire_version=version)
+for name, value in (("magic", b"sweepd"), ("sweepd_version", b"9.9.9"), ("iceoryx2_version", b"0.10.0")):
+    ctypes.memmove(ctypes.addressof(hello) + getattr(layout.Hello, name).offset, value, len(value))
+print("there", flush=True)
+while True:
+    publisher.loan_uninit().write_payload(hello).send()
+    time.sleep(every_s)
+"""
+
+
+@pytest.fixture
+def other():
+    """Starts such a daemon; the name of its instance."""
+    processes = []
+
+    def start(version, every_s):
+        name = f"other_{os.getpid()}_{time.monotonic_ns() % 1_000_000}"
+        command = [sys.executable, "-c", OTHER, name, str(version), str(every_s)]
+        processes.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
+        assert processes[-1].stdout.readline() == "there\n"
+        return name
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize("every_s", [0.02, 0.4])
+def test_bug_a_daemon_of_another_wire_version_was_told_as_none(other, every_s):
+    instance = other(2, every_s)
+    begun = time.monotonic()
+    with pytest.raises(sweepd.Refused) as error:
+        client(instance, timeout_s=60)
+    text = str(error.value)
+    for part in ("the daemon is sweepd 9.9.9 (wire version 2,", f"this client sweepd {sweepd.__version__} (wire version 1,"):
+        assert part in text, text
+    assert time.monotonic() - begun < 30, "told as soon as it is known"
+
+
+def test_a_hello_of_our_version_without_its_services_is_no_daemon(other):
+    instance = other(layout.WIRE_VERSION, 0.02)
+    assert f"no daemon runs as instance `{instance}`" in told(client, instance, timeout_s=0.5)

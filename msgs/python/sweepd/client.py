@@ -18,7 +18,7 @@ from .errors import Refused, Restarted, Skipped, SweepdError, TimedOut
 from .frames import MOVING, POSE, array, blank, columns_of, rows_of, seconds, seconds_to_send, time_left, whole
 from .lists import ContactList, PairList
 from .ports import Ports
-from .refusals import source_row, why_no_result
+from .refusals import is_under_way, source_row, why_no_result
 from .turns import Turns, in_turn
 
 _LOOK_AGAIN_S = 0.05
@@ -27,6 +27,10 @@ _BOOTS_OVER_MAX = 16
 _TICKS_LEFT_MAX = 16
 # ticks that one look takes at most: more than wait in its queues
 _DRAINED_MAX = 32
+# ticks without all that is listened to that are passed over at first, and how far apart they are at least: more than wait where a
+# boot went unseen, and a second. A message that cannot be handed over is no reason to be silent for ever
+_PASSED_MAX = 32
+_PASSED_NS = 1_000_000_000 // _PASSED_MAX
 _NAMES_TOLD = 5
 _TOPICS = {
     "pairs": layout.PairRow,
@@ -41,6 +45,10 @@ _TOPICS = {
 }
 _HEADERS = {"changes": layout.ChangesHeader, "contact_changes": layout.ChangesHeader}
 _LISTS = {"changes": PairList, "contact_changes": ContactList}
+# sent when they change, where all others are each tick's
+_LASTING = ("names", "plan")
+# what `step` takes beside poses and time
+_FRAME_FIELDS = ("stamp_ns", "clock_id", "scene_rev", "deadline_ns", "time_left_ns", "partial")
 _VERTEX = np.dtype(layout.VertexRow)
 #: Poses of bodies as ``Client.send`` describes them: by name, columns, or rows.
 Poses = Union[Mapping[str, Sequence[ArrayLike]], Sequence[ArrayLike], np.ndarray]
@@ -196,6 +204,8 @@ class Client:
         # of the daemon whose ids the names are
         self._boot = self._ports.hello.boot_id
         self._boots_over: list[int] = []
+        # ticks that may yet be passed over until one has all that is listened to, 0: one had; and when the last was sent
+        self._to_pass, self._passed_ns = _PASSED_MAX, 0
         self._names: tuple[Any, dict[str, int]] = (None, {})
         self._named: tuple[Any, dict[int, str]] = (None, {})
         self._wait_names(timeout_s)
@@ -221,8 +231,8 @@ class Client:
     def names(self) -> dict[str, int]:
         """Name to id of every body in the scene, as of the newest tick heard. Ids are those of one start of the daemon."""
         self._ports.check_open("names cannot be told")
-        message = self._now.get("names")
-        if message is None or message[0].boot_id != self._boot:
+        message = self._lasting("names")
+        if message is None:
             return {}
         header, rows = message
         key = (header.boot_id, header.tick)
@@ -235,10 +245,12 @@ class Client:
     def plan(self) -> Optional[dict[str, Any]]:
         """What the daemon chose for the scene, left out, and why: a dict; None where the client does not listen to ``plan``."""
         self._ports.check_open("the plan cannot be told")
-        message = self._now.get("plan")
-        if message is None or message[0].boot_id != self._boot:
-            return None
-        return json.loads(message[1].tobytes())
+        message = self._lasting("plan")
+        return None if message is None else json.loads(message[1].tobytes())
+
+    def _lasting(self, topic):
+        message = self._now.get(topic)
+        return None if message is None or message[0].boot_id != self._boot else message
 
     def name_of(self, body: int) -> Optional[str]:
         """The name of a body by its id, as rows have it; None where the scene has none (any more)."""
@@ -330,7 +342,9 @@ class Client:
             raise SweepdError(
                 f"vertices of shape {given.shape} and dtype {given.dtype}: give real numbers of shape (n, 3)"
             )
-        moved = np.ascontiguousarray(given, dtype=np.float32)
+        with np.errstate(all="ignore"):
+            # what is beyond float32 is infinite, which the daemon refuses and counts
+            moved = np.ascontiguousarray(given, dtype=np.float32)
         self._settle(0.0)
         id_: int = self._ids([body])[0] if isinstance(body, str) else whole("body", body)
         base = self._versions.get(id_)
@@ -362,10 +376,12 @@ class Client:
 
     @in_turn
     def step(self, poses: Poses, timeout_s: float = 1.0, **fields: Any) -> Result:
-        """Sends a frame and returns the :class:`Result` of exactly that frame.
+        """Sends a frame and returns the :class:`Result` of exactly that frame; ``fields`` are those of ``send``.
 
         Raises TimedOut (with what was refused meanwhile), Restarted or Skipped.
         """
+        if unknown := [name for name in fields if name not in _FRAME_FIELDS]:
+            raise SweepdError(f"step({unknown[0]}=...): a frame has {', '.join(_FRAME_FIELDS)}")
         timeout_s = seconds_to_send(timeout_s)
         until = time.monotonic() + timeout_s
         self._drain()
@@ -380,22 +396,34 @@ class Client:
                 continue
             if (row.epoch, row.seq) >= (self._epoch, seq):
                 if row.seq == seq:
+                    self._has_begun()
                     return self._result()
                 raise Skipped(seq)
 
     @in_turn
     def latest(self) -> Optional[Result]:
-        """The newest :class:`Result` there is, without waiting; None before the first tick."""
+        """The newest :class:`Result` there is, without waiting; None before the first tick as ``wait`` has it."""
         self._drain()
-        return None if self._tick is None else self._result()
+        return self._result() if self._tick is not None and self._has_begun() else None
 
     @in_turn
     def wait(self, timeout_s: float = 1.0) -> Result:
-        """The :class:`Result` of the next tick; raises TimedOut or Restarted."""
+        """The :class:`Result` of the next tick; raises TimedOut or Restarted.
+
+        The first, and the first after Restarted, is of a tick that has all that the client listens to: those made before
+        the daemon knew of the client are passed over, and so is what is told of one that is still under way.
+        """
         timeout_s = seconds(timeout_s)
-        if not self._next(time.monotonic() + timeout_s):
+        until = time.monotonic() + timeout_s
+        came = False
+        while self._next(until):
+            if self._has_begun():
+                return self._result()
+            came = True
+        if not came:
             raise TimedOut(f"no tick within {timeout_s} s; {self._ports.silence()}")
-        return self._result()
+        why = "one is still under way" if is_under_way(self._tick) else "they were made before the daemon knew of this client"
+        raise TimedOut(f"no tick within {timeout_s} s had all that this client listens to: {why}; wait again, or for longer")
 
     @in_turn
     def request(self, edits: Any, blobs: Iterable[Any] = (), timeout_s: float = 5.0) -> dict[str, Any]:
@@ -579,6 +607,17 @@ class Client:
                     self._advance(topic, new)
             return True
 
+    def _has_begun(self):
+        """Whether the newest tick may be told: it has all that is listened to, or one before it had."""
+        if self._to_pass:
+            messages = self._messages()
+            if all(self._lasting(topic) if topic in _LASTING else topic in messages for topic in self._topics):
+                self._to_pass = 0
+            elif self._tick.sent_ns >= self._passed_ns + _PASSED_NS and not is_under_way(self._tick):
+                # one that is under way has nothing yet, however often it is told of
+                self._to_pass, self._passed_ns = self._to_pass - 1, self._tick.sent_ns
+        return not self._to_pass
+
     def _restart(self, old, tick):
         self._note_over(old.boot_id)
         ends = np.empty((0, 2), np.uint64)
@@ -592,8 +631,8 @@ class Client:
             rows = rows[there & (rows["certified_verdict"] == layout.Verdict.COLLIDING)]
             ends = np.stack([rows["body_a"], rows["body_b"]], axis=1)
         self._tick, self._held, self._boot = None, tick, tick.header.boot_id
-        # the new one has no vertices
-        self._versions = {}
+        # the new one has no vertices, and may not know of this client yet
+        self._versions, self._to_pass = {}, _PASSED_MAX
         # so that names are new from here on
         self._advance("names", tick.header)
         raise Restarted(old.boot_id, tick.header.boot_id, ends)
@@ -671,6 +710,10 @@ class Client:
         self._ports.renew(topic, _TOPICS[topic], layout.ChangesHeader)
 
     def _result(self):
+        return Result(self._tick, self._messages(), self._lists, self._turns)
+
+    def _messages(self):
+        """What belongs to the newest tick, by topic."""
         tick = self._tick.header
         messages = {}
         for topic, now in self._now.items():
@@ -681,7 +724,7 @@ class Client:
                     messages[topic] = now
             elif (now[0].boot_id, now[0].tick) == (tick.boot_id, tick.tick):
                 messages[topic] = now[1]
-        return Result(self._tick, messages, self._lists, self._turns)
+        return messages
 
     def _why_no_result(self, seq, before, timeout_s, scene_rev=0):
         told = f"no result of frame {seq} of `{self._source}` within {timeout_s} s"

@@ -196,7 +196,7 @@ class Ports:
         self._config = _config(root, prefix)
         self._senders = {}
         self._readers = {}
-        self._client = None
+        self._client = self._hello = self._said = None
         self._pending = []
         self._closed = False
         #: Whether this is a forked process, and the ports are those of its parent.
@@ -207,6 +207,7 @@ class Ports:
             _patiently(self._open, until)
             self.hello = self._greet(until)
         except FileNotFoundError as e:
+            self.close()
             raise TimedOut(self._nobody("its files are missing")) from e
         except _FOREIGN as e:
             self.close()
@@ -244,7 +245,26 @@ class Ports:
 
     def _open(self):
         if not _check_owner(self._config):
+            self._hello = None
             raise FileNotFoundError
+        if self._hello is None:
+            self._open_hello()
+        try:
+            self._tick = self._topic("tick").publish_subscribe(layout.TickRow).open().subscriber_builder().create()
+            self._ready = self._topic("ready").event().open().listener_builder().create()
+            # last: its coming wakes the daemon, which then sends us the newest hello and tick
+            self._wake = self._topic("wake").event().open().notifier_builder().create()
+        except _FOREIGN as e:
+            # a daemon of another wire version has others than these, and says its own in the one that all have
+            hello = self._newest_hello() or self._said
+            if hello is not None:
+                _check_hello(hello)
+            # it says so once; but of one that is away nothing holds
+            self._said = None if _is_away(e) else hello
+            raise
+
+    def _open_hello(self):
+        """Stays open from try to try: nothing of ours wakes a daemon of another version, which says hello by its own clock."""
         self._node = (
             iox2.NodeBuilder.new()
             .config(self._config)
@@ -252,12 +272,8 @@ class Ports:
             .signal_handling_mode(iox2.SignalHandlingMode.Disabled)
             .create(iox2.ServiceType.Ipc)
         )
-        self._hello = self._service(f"{self._instance}/hello").publish_subscribe(layout.Hello).open()
-        self._hello = self._hello.subscriber_builder().create()
-        self._tick = self._topic("tick").publish_subscribe(layout.TickRow).open().subscriber_builder().create()
-        self._ready = self._topic("ready").event().open().listener_builder().create()
-        # last: its coming wakes the daemon, which then sends us the newest hello and tick
-        self._wake = self._topic("wake").event().open().notifier_builder().create()
+        service = self._service(f"{self._instance}/hello").publish_subscribe(layout.Hello).open()
+        self._hello = service.subscriber_builder().create()
 
     def _service(self, name):
         return self._node.service_builder(iox2.ServiceName.new(name))
@@ -267,7 +283,7 @@ class Ports:
 
     def _greet(self, until):
         while True:
-            hello = self._newest_hello()
+            hello = self._newest_hello() or self._said
             if hello is not None:
                 _check_hello(hello)
                 return hello
