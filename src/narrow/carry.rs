@@ -17,6 +17,7 @@ use super::cursor::SLICE_UNITS;
 use super::memo::{Memo, Witness};
 use super::mesh::{CarriedFront, FrontStore, Goal, LeafContact, Search, lead_out, numbered};
 use super::query::{leaf_contact, shape_pose, sound, witness_of};
+use super::widen::widened;
 
 /// What asking two triangles whether they surely cross costs, in tests of a box against a pack, with what it takes to
 /// come to them: when the clock is to be read.
@@ -54,8 +55,9 @@ impl Narrow {
                 memo.retested = self.tick;
             }
             let told = glance(front, (one_shape, other_shape), &pos12, due, meter);
-            let gap = told.gap(memo.now, |gap| sound(gap, one, other, &rel));
-            if gap.max <= 0.0 || gap.min > memo.report_m.max(0.0) {
+            let gap = told.gap(memo.here(), |gap| sound(gap, one, other, &rel));
+            let now = widened(gap, memo.reach_m);
+            if now.max <= 0.0 || now.min > memo.report_m.max(0.0) {
                 memo.gap = gap;
                 memo.note_asked((a, b), &rel, self.tick);
                 (memo.finished, memo.tight) = (false, false);
@@ -70,6 +72,7 @@ impl Narrow {
                 return false;
             }
         }
+        let goal = memo.goal(goal);
         if !front.is_started() {
             front.start(store, one_shape, other_shape, &pos12, self.search);
         }
@@ -140,12 +143,12 @@ impl Memo {
         (a, b, rel): (&Body, &Body, &Pose),
         tick: u64,
     ) -> bool {
-        let (found, now) = (told.gap, self.now);
-        if !told.done && found.min <= now.min && found.max >= now.max {
+        let (found, here) = (told.gap, self.here());
+        if !told.done && found.min <= here.min && found.max >= here.max {
             return false;
         }
         // What was known before holds at these poses too.
-        self.gap = found.meet(now);
+        self.gap = found.meet(here);
         self.note_asked((a, b), rel, tick);
         let whole = told.done && !(goal == Goal::Verdict && self.gap.max <= 0.0);
         self.finished = whole && told.certain;

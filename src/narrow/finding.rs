@@ -45,7 +45,7 @@ impl Narrow {
             Level::Boxes
         } else if memo.cursor != NONE {
             Level::Partial
-        } else if memo.widened_m > 0.0 {
+        } else if memo.widened_m() > 0.0 {
             Level::Carried
         } else if memo.tight {
             Level::Exact

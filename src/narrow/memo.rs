@@ -56,8 +56,10 @@ pub(super) struct Memo {
     pub(super) retested: u64,
     /// At this tick's poses.
     pub(super) now: Interval,
-    /// Motion and reach that `now` was widened by, metres; 0: `now` is `gap`.
-    pub(super) widened_m: f64,
+    /// Motion since the test that `now` was widened by, metres.
+    pub(super) motion_m: f64,
+    /// Reach of both bodies that `now` was widened by, too, metres.
+    pub(super) reach_m: f64,
     /// Nothing moved relative to the test's poses.
     pub(super) rest: bool,
     /// On the list of undecided pairs.
@@ -125,7 +127,8 @@ impl Memo {
             tight: false,
             retested: 0,
             now: Interval::UNKNOWN,
-            widened_m: 0.0,
+            motion_m: 0.0,
+            reach_m: 0.0,
             rest: false,
             queued: false,
             refreshing: false,
@@ -151,7 +154,7 @@ impl Memo {
     /// Finished at just these poses, and 0 cannot be told from the gap. An overlap that is proved is no touch, however
     /// near 0 its upper end: that of meshes is a bound, not a depth.
     pub(super) fn touching(&self) -> bool {
-        self.finished && self.widened_m == 0.0 && self.gap.contains(0.0) && self.gap.max > 0.0
+        self.finished && self.widened_m() == 0.0 && self.gap.contains(0.0) && self.gap.max > 0.0
     }
 
     /// Whether the contacts are of a collision that has ended since: their ids may go on, their points are no more.

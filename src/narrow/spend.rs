@@ -141,7 +141,7 @@ impl Narrow {
         let rel = relative(&a.pose, &b.pose);
         let pos12 = shape_pose(&a.shapes[0], &b.shapes[0], &rel);
         let memo = &mut self.memos[slot.index()];
-        let shell = if memo.widened_m <= FOLLOWED * a.radius.min(b.radius) {
+        let shell = if memo.widened_m() <= FOLLOWED * a.radius.min(b.radius) {
             Some(self.shelves.shell(memo.shell))
         } else {
             self.shelves.give_shell(&mut memo.shell);
@@ -183,6 +183,7 @@ impl Narrow {
         meter: &mut Meter<'_>,
     ) -> Turn {
         let memo = &mut self.memos[slot.index()];
+        let goal = memo.goal(goal);
         let fresh = memo.cursor == NONE;
         let Some(cursor) = self.shelves.cursors.get_or_take(&mut memo.cursor) else {
             return Turn::Finished;
@@ -213,7 +214,7 @@ impl Narrow {
         // What was known before holds at this tick's poses; carried back to the cursor's, it loses the motion between.
         let then = (&cursor.rel, cursor.bent);
         let since = changed_since(a, b, then, &relative(&a.pose, &b.pose));
-        let known_low = (memo.now.min - since).next_down();
+        let known_low = (memo.here().min - since).next_down();
         let whole =
             turn == Turn::Finished && !(cursor.goal == Goal::Verdict && cursor.gap.max <= 0.0);
         let low = if whole { cursor.gap.min } else { known_low };
@@ -278,7 +279,7 @@ impl Narrow {
         // A certified touch at these very poses; the lower end is what motion left of the old one.
         let high = sound(closest.gap, one, other, &rel).max;
         memo.gap = Interval {
-            min: memo.now.min.min(high),
+            min: memo.here().min.min(high),
             max: high,
         };
         memo.note_asked((a, b), &rel, self.tick);

@@ -6,7 +6,8 @@ use crate::pairs::PairSet;
 use crate::wire::{BodyStatus, Verdict};
 use crate::world::World;
 
-use super::memo::{changed_since, closing};
+use super::memo::{Memo, changed_since, closing};
+use super::mesh::Goal;
 use super::{NONE, Narrow};
 
 impl Narrow {
@@ -96,13 +97,12 @@ impl Narrow {
         self.widen_pair(slot, world);
         let memo = &mut self.memos[slot.index()];
         let verdict = memo.verdict();
-        // An unbounded reach cannot be worked away, and a finished test at these very poses has said all it can.
-        let reachable = memo.widened_m < f64::INFINITY;
-        if verdict == Verdict::Possible
-            && reachable
-            && !(memo.finished && memo.rest)
-            && !memo.queued
-        {
+        // An unbounded reach cannot be worked away, and a finished test at these very poses has said all it can; one
+        // for a verdict all but how far the two are apart.
+        let reachable = memo.widened_m() < f64::INFINITY;
+        let has_goal = memo.goal(Goal::Verdict) == Goal::Verdict || memo.tight;
+        let is_told = memo.finished && memo.rest && has_goal;
+        if verdict == Verdict::Possible && reachable && !is_told && !memo.queued {
             memo.queued = true;
             self.undecided.push(slot);
             self.urgencies[slot.index()].note_turn(self.tick);
@@ -143,12 +143,8 @@ impl Narrow {
         let by_pose = changed_since(a, b, (&memo.rel, memo.bent), &rel);
         let motion_m = by_path.min(by_pose).max(0.0);
         memo.rest = motion_m == 0.0;
-        memo.widened_m = motion_m + reach_m;
-        memo.now = match memo.widened_m {
-            0.0 => memo.gap,
-            m if m.is_finite() => memo.gap.widened(m),
-            _ => Interval::UNKNOWN,
-        };
+        (memo.motion_m, memo.reach_m) = (motion_m, reach_m);
+        memo.now = widened(memo.gap, memo.widened_m());
         // Where the pair may want work: what its place in the order of work depends on.
         if memo.now.min <= memo.report_m {
             let priority = a.priority.max(b.priority);
@@ -166,5 +162,42 @@ impl Narrow {
         } else {
             f64::NEG_INFINITY
         };
+    }
+}
+
+impl Memo {
+    /// By how much `now` is wider than `gap`, metres; 0: it is `gap`.
+    pub(super) fn widened_m(&self) -> f64 {
+        self.motion_m + self.reach_m
+    }
+
+    /// At this tick's poses, as if the bodies were there: what a test at them may begin with. `now` would count the
+    /// reach once more with each test.
+    pub(super) fn here(&self) -> Interval {
+        widened(self.gap, self.motion_m)
+    }
+
+    /// What is asked of a pair that wants a verdict: at the poses alone it decides nothing where the bodies may be
+    /// elsewhere, but their gap may.
+    pub(super) fn goal(&self, goal: Goal) -> Goal {
+        match goal {
+            Goal::Verdict if self.reach_m > 0.0 && !self.is_within_reach() => Goal::Gap,
+            goal => goal,
+        }
+    }
+
+    /// Whether no narrower interval decides the pair: both ends are nearer to 0 than the bodies' reach.
+    fn is_within_reach(&self) -> bool {
+        let here = self.here();
+        here.min > -self.reach_m && here.max <= self.reach_m
+    }
+}
+
+/// An interval after bodies may have moved by so much, metres.
+pub(super) fn widened(gap: Interval, by_m: f64) -> Interval {
+    match by_m {
+        0.0 => gap,
+        m if m.is_finite() => gap.widened(m),
+        _ => Interval::UNKNOWN,
     }
 }

@@ -1,6 +1,7 @@
 //! 3.6 the state in one word, 3.7 unknown bodies.
 
-use sweepd::wire::{BodyStatus, Reason, RejectReason, State, Verdict};
+use sweepd::math::{Pose, Vec3};
+use sweepd::wire::{BodyStatus, Demand, Reason, RejectReason, State, Verdict};
 use sweepd::world::Edit;
 
 use crate::rig::{ALL, FRAME_NS, NONE, Rig, ball, body, scene};
@@ -160,6 +161,65 @@ fn law_3_7_a_stale_pair_with_overlapping_boxes_widens_with_its_reach() {
         Verdict::Possible,
         "0.66 m of reach for 0.6 m of gap"
     );
+}
+
+/// The bound that its verdict had needed was told, widened once more by the whole reach in each tick.
+#[test]
+fn bug_a_stale_mesh_was_possible_beyond_its_reach_and_its_interval_grew_from_tick_to_tick() {
+    let cube = "{ type = \"trimesh\", vertices = [[-0.2, -0.2, -0.2], [0.2, -0.2, -0.2], [-0.2, 0.2, -0.2], \
+                [0.2, 0.2, -0.2], [-0.2, -0.2, 0.2], [0.2, -0.2, 0.2], [-0.2, 0.2, 0.2], [0.2, 0.2, 0.2]], \
+                faces = [[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4], [2, 6, 3], [3, 6, 7], \
+                [0, 4, 2], [2, 4, 6], [1, 3, 5], [3, 7, 5]] }";
+    let sphere = "{ type = \"sphere\", radius = 0.1 }";
+    let several = format!("[{cube}, {sphere}]");
+    let compound = body(1, [0.0; 3], &several, "max_speed_mps = 1.0");
+    let single = body(1, [0.0; 3], cube, "max_speed_mps = 1.0");
+    for (first, x) in [
+        (&single, 0.6),
+        (&single, 0.9),
+        (&compound, 0.6),
+        (&compound, 0.9),
+    ] {
+        let mut rig = Rig::new(&scene(
+            "",
+            &[
+                first.clone(),
+                body(2, [0.0; 3], sphere, "max_speed_mps = 0.0"),
+            ],
+        ));
+        let turn =
+            nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_4);
+        rig.place(
+            1,
+            &Pose::from_parts(nalgebra::Translation3::identity(), turn),
+        );
+        rig.place(2, &Pose::translation(x, -0.3, 0.0));
+        // Contacts would want the gap in any case.
+        rig.demand = Demand {
+            pairs: true,
+            ..Demand::default()
+        };
+        rig.send(ALL);
+        let seen = turn.inverse() * Vec3::new(x, -0.3, 0.0);
+        let gap_m = seen.abs().add_scalar(-0.2).map(|out| out.max(0.0)).norm() - 0.1;
+        // From a metre on a reach is no bound.
+        for age in 1..100 {
+            rig.idle(FRAME_NS, ALL);
+            let reach_m = if age < 50 { 0.0 } else { f64::from(age) * 0.01 };
+            let place = format!("{x}, age {age}: {:?}", rig.out.pairs);
+            assert_eq!(
+                rig.verdict(1, 2) == Verdict::Possible,
+                reach_m >= gap_m,
+                "{place}"
+            );
+            // As wide as the reach makes it; and by what the verdict alone had left open, where nothing else decides it.
+            let loose_m = if gap_m > 0.5 { 1e-9 } else { 0.5 };
+            for row in &rig.out.pairs {
+                assert!(row.gap_min_m >= gap_m - reach_m - loose_m, "{place}");
+                assert!(row.gap_max_m <= gap_m + reach_m + 4.0 * loose_m, "{place}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -20,6 +20,7 @@ impl Narrow {
         meter: &mut Meter<'_>,
     ) -> bool {
         let memo = &mut self.memos[slot.index()];
+        let goal = memo.goal(goal);
         let Some(front) = self.compounds.get_or_take(&mut memo.compound) else {
             return false;
         };
