@@ -240,3 +240,12 @@ def test_bug_too_few_open_files_are_told_as_that(start):
         with files_left(1), pytest.raises(sweepd.SweepdError, match=r"cannot be sent: .*`ulimit -n \d+`"):
             client.send(poses())
         assert client.step(poses(), timeout_s=5).state == "clear"
+
+
+def test_bug_a_client_without_room_in_shared_memory_is_refused_and_not_killed(start, monkeypatch):
+    instance = start()
+    real = os.statvfs
+    full = SimpleNamespace(f_bavail=20, f_frsize=1024)
+    monkeypatch.setattr(os, "statvfs", lambda path: full if path == "/dev/shm" else real(path))
+    with pytest.raises(sweepd.Refused, match="20 KiB free.*make it larger"):
+        sweepd.Client(instance, None)

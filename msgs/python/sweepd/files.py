@@ -1,4 +1,4 @@
-"""Open files of this process: who has none left fails in ways that name other causes."""
+"""Open files of this process and room in shared memory: who has none left fails in ways that name other causes, or dies."""
 
 import errno
 import os
@@ -10,6 +10,8 @@ from .errors import Refused
 _LEAST = 56
 #: With fewer left a port that cannot be opened lacks them.
 _FEW = 16
+#: Where shared memory lies, and what must be free there for a client's ports, bytes.
+_SHARED, _SHARED_LEAST = "/dev/shm", 256 << 10
 
 
 def _left():
@@ -40,6 +42,21 @@ def check():
     if left is not None and left[0] < _LEAST:
         has, mend = _told(*left[1:])
         raise Refused(f"{has}, and a client of a daemon takes up to {_LEAST} more: {mend}")
+
+
+def check_room():
+    """Refuses to write beyond the end of shared memory, which would end this process (SIGBUS)."""
+    try:
+        room = os.statvfs(_SHARED)
+    except OSError:
+        return
+    free = room.f_bavail * room.f_frsize
+    if free < _SHARED_LEAST:
+        raise Refused(
+            f"{_SHARED} has {free >> 10} KiB free and a client takes up to {_SHARED_LEAST >> 10} at its start; who writes beyond"
+            f" the end is killed (SIGBUS): make it larger (in a container `--shm-size=64m`, else"
+            f" `mount -o remount,size=64m {_SHARED}`), or remove what fills it"
+        )
 
 
 def short():

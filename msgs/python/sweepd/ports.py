@@ -191,6 +191,7 @@ class Ports:
     def __init__(self, instance, timeout_s, root=None, prefix=None):
         check_name(instance)
         files.check()
+        files.check_room()
         iox2.set_log_level_from_env_or(iox2.LogLevel.Fatal)
         self._instance = instance
         self._config = _config(root, prefix)
