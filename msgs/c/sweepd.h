@@ -833,7 +833,7 @@ typedef struct sweepd_tick_row {
     uint64_t rejects[SWEEPD_REJECTS_LEN];
     /* Bodies in the scene. */
     uint64_t bodies;
-    /* Bodies not received, rejected or stale, and those whose pairs are truncated; not those held or removed by age. */
+    /* Bodies that are stale, rejected or not received, and those whose pairs are truncated; not those held or removed. */
     uint64_t unknown;
     /* Pairs of overlapping boxes. */
     uint64_t candidates;

@@ -11,11 +11,11 @@ use crate::time::{Clock as _, SystemClock};
 
 /// What a process ends with that is asked a second time.
 pub(super) const EXIT_SIGNALS: i32 = 4;
-/// What comes so soon after the first signal is no second wish, nanoseconds: `timeout` sends its own to the process and
-/// to the group, and a terminal's Ctrl-C may reach a process that a script sends one, too.
+/// What comes so soon after the first signal does not ask again, nanoseconds: `timeout` sends its own to the process
+/// and to the group, and a terminal's Ctrl-C reaches also a process to which a script passes it on.
 const ECHO_NS: u64 = 200_000_000;
 
-/// A flag that SIGINT and SIGTERM raise; a second signal ends the process at once.
+/// A flag that SIGINT and SIGTERM raise; one that comes [`ECHO_NS`] later, or more, ends the process at once.
 ///
 /// # Errors
 /// `Error::Io` when signals cannot be listened for.
@@ -61,7 +61,7 @@ pub(super) struct Asked {
 }
 
 impl Asked {
-    /// Takes note of a signal; whether it is a second wish.
+    /// Takes note of a signal; whether it asks once more.
     pub(super) fn again(&mut self, now_ns: u64) -> bool {
         let first_ns = *self.first_ns.get_or_insert(now_ns);
         now_ns.saturating_sub(first_ns) >= ECHO_NS
@@ -73,7 +73,7 @@ mod tests {
     use super::{Asked, ECHO_NS};
 
     #[test]
-    fn what_comes_at_once_is_an_echo_and_what_comes_later_a_second_wish() {
+    fn what_comes_at_once_is_an_echo_and_what_comes_later_asks_again() {
         let mut asked = Asked::default();
         let heard = [0, 1, ECHO_NS - 1, ECHO_NS, ECHO_NS + 1].map(|after| asked.again(7 + after));
         assert_eq!(heard, [false, false, false, true, true]);

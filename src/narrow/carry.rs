@@ -219,14 +219,14 @@ impl Glance {
 
     /// The pair's interval at these very poses.
     ///
-    /// * `now` - what motion left of the one before: the lower end of a pair that touches.
+    /// * `here` - what motion left of the one before: the lower end of a pair that touches.
     /// * `sound` - makes a bound on the two shapes one on the two bodies.
-    pub(super) fn gap(&self, now: Interval, sound: impl Fn(Interval) -> Interval) -> Interval {
+    pub(super) fn gap(&self, here: Interval, sound: impl Fn(Interval) -> Interval) -> Interval {
         match *self {
             // A certified touch; how deep it is at most has not been asked again.
-            Self::Touch(_) => Interval::new(now.min.min(0.0), 0.0),
-            Self::Deep(depth_m) => sound(Interval::new(f64::NEG_INFINITY, -depth_m)).meet(now),
-            Self::Apart(low_m) => sound(Interval::new(low_m, f64::INFINITY)).meet(now),
+            Self::Touch(_) => Interval::new(here.min.min(0.0), 0.0),
+            Self::Deep(depth_m) => sound(Interval::new(f64::NEG_INFINITY, -depth_m)).meet(here),
+            Self::Apart(low_m) => sound(Interval::new(low_m, f64::INFINITY)).meet(here),
             Self::Nothing => Interval::UNKNOWN,
         }
     }

@@ -141,7 +141,7 @@ impl Narrow {
         let rel = relative(&a.pose, &b.pose);
         let pos12 = shape_pose(&a.shapes[0], &b.shapes[0], &rel);
         let memo = &mut self.memos[slot.index()];
-        let shell = if memo.widened_m() <= FOLLOWED * a.radius.min(b.radius) {
+        let shell = if memo.motion_m <= FOLLOWED * a.radius.min(b.radius) {
             Some(self.shelves.shell(memo.shell))
         } else {
             self.shelves.give_shell(&mut memo.shell);
@@ -207,7 +207,7 @@ impl Narrow {
         let (report_m, counters) = (memo.report_m, &mut self.counters);
         let turn = cursor.turn(&mut room, shapes, report_m, meter, counters);
         let high = cursor.upper(shapes);
-        let certified = high <= 0.0 && memo.now.max > 0.0;
+        let certified = high + memo.reach_m <= 0.0 && memo.now.max > 0.0;
         if turn == Turn::Open && !certified {
             return Turn::Open;
         }

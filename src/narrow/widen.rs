@@ -97,11 +97,11 @@ impl Narrow {
         self.widen_pair(slot, world);
         let memo = &mut self.memos[slot.index()];
         let verdict = memo.verdict();
-        // An unbounded reach cannot be worked away, and a finished test at these very poses has said all it can; one
-        // for a verdict all but how far the two are apart.
+        // An unbounded reach cannot be worked away, and a finished test at these very poses has said all it can. Where
+        // it was for a verdict alone, and bodies may be elsewhere, their gap is still to be asked.
         let reachable = memo.widened_m() < f64::INFINITY;
-        let has_goal = memo.goal(Goal::Verdict) == Goal::Verdict || memo.tight;
-        let is_told = memo.finished && memo.rest && has_goal;
+        let has_said_it = memo.goal(Goal::Verdict) == Goal::Verdict || memo.tight;
+        let is_told = memo.finished && memo.rest && has_said_it;
         if verdict == Verdict::Possible && reachable && !is_told && !memo.queued {
             memo.queued = true;
             self.undecided.push(slot);

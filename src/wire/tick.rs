@@ -69,7 +69,7 @@ pub struct TickRow {
     pub rejects: [u64; REJECTS_LEN],
     /// Bodies in the scene.
     pub bodies: u64,
-    /// Bodies not received, rejected or stale, and those whose pairs are truncated; not those held or removed by age.
+    /// Bodies that are stale, rejected or not received, and those whose pairs are truncated; not those held or removed.
     pub unknown: u64,
     /// Pairs of overlapping boxes.
     pub candidates: u64,

@@ -102,6 +102,7 @@ impl World {
             body.stamp_ns = stamp_ns;
             body.since_ns = Some(times.since_ns);
             body.received_ns = times.received_ns;
+            body.lent_timeout_ns = u64::MAX;
             // A body at rest is not settled again for it.
             if other_speed {
                 self.tags.set(slot, Some(Tag::of(body)));
@@ -121,7 +122,9 @@ impl World {
     ) -> Option<Vec3> {
         let body = self.body(slot).filter(|body| body.path.is_some())?;
         let [_, _, _, x, y, z] = *velocity?;
-        if body.stamp_ns == 0 || stamp_ns <= body.stamp_ns {
+        // The stamp of what it hung on is of another clock.
+        let is_own = self.entries[slot.index()].raw[0].is_finite();
+        if !is_own || body.stamp_ns == 0 || stamp_ns <= body.stamp_ns {
             return None;
         }
         #[allow(clippy::cast_precision_loss, reason = "stamps of one body are near")]

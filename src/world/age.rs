@@ -274,7 +274,7 @@ impl World {
     }
 
     /// Gives a body another velocity; whether it is another one.
-    fn take_velocity(&mut self, slot: BodySlot, velocity: Option<[f64; 6]>) -> bool {
+    pub(super) fn take_velocity(&mut self, slot: BodySlot, velocity: Option<[f64; 6]>) -> bool {
         let bits = |v: Option<[f64; 6]>| v.map(|v| v.map(f64::to_bits));
         let Some(body) = self.bodies[slot.index()].as_mut() else {
             return false;
@@ -287,9 +287,11 @@ impl World {
         body.source.and_then(|s| self.sources.get(s.index()))
     }
 
-    /// The time-out of a body's source; none for a body without one, which cannot move.
+    /// The time-out of a body's source, and of the one that its pose is from; none for a body without one, which cannot
+    /// move.
     pub(super) fn timeout_of(&self, body: &Body) -> u64 {
-        self.source_of(body).map_or(u64::MAX, |s| s.timeout_ns)
+        let own_ns = self.source_of(body).map_or(u64::MAX, |s| s.timeout_ns);
+        own_ns.min(body.lent_timeout_ns)
     }
 
     /// Whether a body that hangs on no other is too old at a time, whatever happens to it then.

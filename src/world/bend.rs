@@ -104,12 +104,13 @@ impl World {
     /// Cost: O(rows).
     pub fn admit_vertices(&mut self, frame: &VertexFrame, now_boot_ns: u64) -> Admission {
         self.now_ns = self.now_ns.max(now_boot_ns);
-        let found = self.find_bent(frame);
+        let (found, mut refused) = (self.find_bent(frame), None);
         let taken = found.and_then(|(source, slot)| {
             self.bend(slot, frame).map_err(|reason| {
                 if reason != RejectReason::OldFrame {
                     self.refuse_vertices(slot, reason);
                 }
+                refused = Some(slot);
                 (Some(source), reason)
             })?;
             Ok(Admission::Admitted {
@@ -120,7 +121,7 @@ impl World {
         });
         taken.unwrap_or_else(|(source, reason)| {
             self.note_refused(reason, source, &frame.header.source);
-            if let Some(slot) = self.slot_of(BodyId(frame.header.body)) {
+            if let Some(slot) = refused {
                 self.note_refused_body(reason, slot);
             }
             Admission::Refused { source, reason }

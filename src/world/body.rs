@@ -57,6 +57,8 @@ pub struct Body {
     pub since_ns: Option<u64>,
     /// When `pose` was received, nanoseconds of `CLOCK_BOOTTIME`.
     pub received_ns: u64,
+    /// The time-out of the source that `pose` is from, where that is not the body's own: of what it hung on.
+    pub(super) lent_timeout_ns: u64,
     /// Pairs nearer than this are reported, metres.
     pub report_within_m: f64,
     /// Greatest speed of any of its surface points, metres a second.

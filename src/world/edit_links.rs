@@ -101,11 +101,15 @@ impl World {
         let of_root = &self.entries[root.index()];
         // Else what it hung on is gone, and with it who says where it is.
         let is_root = of_root.attach.is_none();
-        let (has_pose, refused) = (is_root && of_root.has_pose, is_root && of_root.refused);
+        let root_body = self.body(root);
+        let bent = root_body.and_then(|body| body.vertices.as_deref());
+        let has_pose = of_root.has_pose && bent.is_none_or(|v| v.version.is_some());
+        let refused = of_root.refused || bent.is_some_and(|v| v.refused.is_some());
+        let (has_pose, refused) = (is_root && has_pose, is_root && refused);
         let root_moves = of_root.spec.as_ref().is_some_and(|spec| spec.moves);
         let age = |b: &Body| (b.stamp_ns, b.since_ns, b.received_ns, b.reject);
-        let age = self.body(root).map(age);
-        let now_ns = self.now_ns;
+        let age = root_body.map(|body| (age(body), self.timeout_of(body)));
+        let now_ns = self.begun_ns.max(self.now_ns);
         let entry = &mut self.entries[slot.index()];
         let Some(moves) = entry.spec.as_ref().map(|spec| spec.moves) else {
             return false;
@@ -117,8 +121,9 @@ impl World {
         entry.raw = [f64::NAN; 7];
         // Where it is was said by another: no pause of its own source speaks of it.
         entry.seen = 0;
-        if let (Some(body), Some(age)) = (self.bodies[slot.index()].as_mut(), age) {
+        if let (Some(body), Some((age, timeout_ns))) = (self.bodies[slot.index()].as_mut(), age) {
             (body.stamp_ns, body.since_ns, body.received_ns, body.reject) = age;
+            body.lent_timeout_ns = if moves { timeout_ns } else { u64::MAX };
             if !root_moves {
                 // Until now its place was beyond doubt.
                 body.since_ns = Some(now_ns);
@@ -127,6 +132,9 @@ impl World {
         // At once: edits that follow find it on its own.
         self.take_root(slot, (slot, Pose::identity()));
         let told = pose.filter(|_| !moves);
+        let was_in = self.body(slot).is_some_and(|body| body.in_broad);
+        // What moved it does no more, and its own source has not said how it goes.
+        let other_speed = self.take_velocity(slot, None);
         let moved = self.place(slot, told.unwrap_or(&by_now));
         if moved {
             self.forget_way(slot);
@@ -134,6 +142,9 @@ impl World {
         // Also where it was: another says how well that is known, and `take_root` sees no change where the request hung
         // it there.
         self.settle(slot, moved);
+        if other_speed && !moved && was_in {
+            self.lists.restated(slot);
+        }
         places.any_moved |= told.is_some();
         true
     }

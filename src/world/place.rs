@@ -327,6 +327,7 @@ pub(super) fn new_body(spec: &BodySpec, shapes: Parts, generation: u32) -> (Body
         stamp_ns: 0,
         since_ns: None,
         received_ns: 0,
+        lent_timeout_ns: u64::MAX,
         report_within_m: spec.report_within_m,
         max_speed_mps: spec.max_speed_mps,
         priority: spec.priority,

@@ -9,7 +9,7 @@ use crate::wire::{REJECTS_LEN, RejectReason, SOURCE_NAME_LEN, name_str};
 pub(super) struct Refusals {
     counts: [u64; REJECTS_LEN],
     last: [Option<SourceSlot>; REJECTS_LEN],
-    /// The body whose pose was refused last, by reason; `None`: a frame was.
+    /// The body whose pose or vertices were refused last, by reason; `None`: a frame was.
     bodies: [Option<BodyId>; REJECTS_LEN],
     /// The name that the last frame of no source of the scene had.
     stranger: [u8; SOURCE_NAME_LEN],
@@ -44,12 +44,12 @@ impl World {
         self.refusals.bodies[place] = None;
     }
 
-    /// Notes whose pose the refusal was of that was counted last for a reason.
+    /// Notes whose pose or vertices the refusal was of that was counted last for a reason.
     pub(super) fn note_refused_body(&mut self, reason: RejectReason, slot: BodySlot) {
         self.refusals.bodies[usize::from(reason.code())] = self.body(slot).map(|body| body.id);
     }
 
-    /// The body whose pose was refused last for a reason, if it is there still and no frame was since.
+    /// The body whose pose or vertices were refused last for a reason, if it is there still and no frame was since.
     #[must_use]
     pub fn refused_body(&self, reason: RejectReason) -> Option<&str> {
         let id = self.refusals.bodies[usize::from(reason.code())]?;

@@ -266,25 +266,35 @@ fn bug_two_signals_at_once_are_one_and_a_later_one_ends_what_is_stuck() {
     full.set_nonblocking(true).unwrap();
     while (&full).write(&[b' '; 4096]).is_ok() {}
     full.set_nonblocking(false).unwrap();
+    let mut client = desk.source("sim");
+    let readers = || {
+        let listed = out(&output(&["list", "--json"]));
+        let all = listed
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap());
+        let mut ours = all.filter(|one: &serde_json::Value| one["instance"] == *desk.instance);
+        ours.next().map(|one| one["readers"].as_u64())
+    };
+    let before = readers();
     let mut stuck = std::process::Command::new(env!("CARGO_BIN_EXE_sweepd"))
         .args(["monitor", "--json", "--instance", &desk.instance])
         .stdout(Stdio::from(std::os::fd::OwnedFd::from(full)))
         .spawn()
         .unwrap();
     let pid = rustix::process::Pid::from_child(&stuck);
-    let mut client = desk.source("sim");
-    let soon = std::time::Duration::from_millis(400);
-    let wait = || std::thread::sleep(soon);
-    wait();
+    // It listens for signals before it connects.
+    until("it is connected", || readers() > before);
     step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
+    let wait = || std::thread::sleep(std::time::Duration::from_millis(400));
     wait();
     for signal in [Signal::TERM, Signal::TERM, Signal::INT] {
         rustix::process::kill_process(pid, signal).unwrap();
     }
     wait();
-    assert!(stuck.try_wait().unwrap().is_none(), "these were one");
+    let ended = stuck.try_wait().unwrap();
     rustix::process::kill_process(pid, Signal::TERM).unwrap();
     assert_eq!(stuck.wait().unwrap().code(), Some(4));
+    assert_eq!(ended, None, "these were one");
 }
 
 #[test]

@@ -91,6 +91,76 @@ fn bug_an_attachment_where_a_body_is_needs_bodies_that_are_not_too_old() {
     );
 }
 
+/// The time-out of its own source made it known, the velocity of what it had hung on went on, and what hung on a wall
+/// was as old as the tick before.
+#[test]
+fn bug_what_is_let_go_is_as_well_known_as_it_was_and_no_more_driven() {
+    let robot = BodySpec {
+        source: Some(1),
+        ..moving("b", 2)
+    };
+    let hung = |name, id, spec: BodySpec| BodySpec {
+        attached_to: Some(named("b")),
+        name: named(name),
+        id: BodyId(id),
+        ..spec
+    };
+    let bodies = vec![
+        hung("a", 1, moving("a", 1)),
+        robot,
+        hung("c", 3, fixed("c", 3, 2.0)),
+        fixed("wall", 4, 9.0),
+        moving("d", 5),
+    ];
+    let scene = || {
+        let mut bench = Bench::of(bodies.clone());
+        bench.world.set_timeout(0, 100 * TIMEOUT_NS);
+        bench.send(MS, "sim", 1, &[row(5, 20.0)]);
+        bench
+    };
+    let let_go = |name| attach(name, None, None);
+    let mut bench = scene();
+    bench.send(MS, "robot", 1, &[row(2, 5.0)]);
+    bench.wait(TIMEOUT_NS);
+    assert_eq!(bench.status("a"), BodyStatus::Stale);
+    bench.edit(let_go("a"));
+    assert_eq!(bench.status("a"), BodyStatus::Stale);
+    let text = bench.refused(&[attach("a", Some("wall"), None)]);
+    assert!(text.contains("wait for their frames"), "{text}");
+    bench.send(MS, "sim", 2, &[row(1, 5.0)]);
+    bench.wait(50 * TIMEOUT_NS);
+    assert_eq!(bench.status("a"), BodyStatus::Known, "by its own time-out");
+
+    let mut bench = scene();
+    let now_ns = bench.now_ns + MS;
+    let mut goes = frame("robot", 1, now_ns, &[row(2, 5.0)]);
+    goes.velocities = vec![[1.0, 0.0, 0.0, 0.0, 0.0, 0.0]];
+    bench.tick_at(now_ns, &[], &[goes]);
+    assert!(bench.body("a").velocity.is_some() && bench.body("c").velocity.is_some());
+    bench.tick_at(now_ns, &[let_go("a"), let_go("c")], &[]);
+    assert_eq!(
+        (bench.body("a").velocity, bench.body("c").velocity),
+        (None, None)
+    );
+    assert_eq!(bench.status("a"), BodyStatus::Known);
+    bench.wait(10 * TIMEOUT_NS);
+    assert_eq!(
+        bench.status("a"),
+        BodyStatus::Stale,
+        "by the time-out of the one it hung on"
+    );
+    // What cannot move stays where it is.
+    bench.edit(attach("d", Some("c"), None));
+    assert_eq!(bench.status("d"), BodyStatus::Known);
+    let now_ns = bench.now_ns + 200 * TIMEOUT_NS;
+    bench.tick_at(now_ns, &[let_go("d")], &[]);
+    assert_eq!(
+        bench.status("d"),
+        BodyStatus::Known,
+        "until now beyond doubt"
+    );
+}
+
 #[test]
 fn law_3_1_remove_then_put_of_one_name_makes_a_new_generation_with_the_same_id() {
     let mut bench = Bench::of(vec![moving("a", 1), moving("b", 2)]);

@@ -221,7 +221,7 @@ class Turns:
 
 def test_the_loops_of_the_contracts_page_run(fast, capsys):
     (loops,) = [block for block in re.findall("```python\n(.*?)```", PAGE.read_text(), re.S) if "while reading" in block]
-    exec(loops.replace('"default"', repr(fast)), {"sweepd": sweepd, "looking": Turns(3000), "reading": Turns(200)})
+    exec(loops.replace('"default"', repr(fast)), {"sweepd": sweepd, "looking": Turns(20), "reading": Turns(200)})
     lines = capsys.readouterr().out.splitlines()
     states = [line for line in lines if line.startswith(("clear [", "near [", "possible [", "colliding [["))]
     events = lines[len(states) :]

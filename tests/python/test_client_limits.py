@@ -245,7 +245,11 @@ def test_bug_too_few_open_files_are_told_as_that(start):
 def test_bug_a_client_without_room_in_shared_memory_is_refused_and_not_killed(start, monkeypatch):
     instance = start()
     real = os.statvfs
-    full = SimpleNamespace(f_bavail=20, f_frsize=1024)
-    monkeypatch.setattr(os, "statvfs", lambda path: full if path == "/dev/shm" else real(path))
+    full = SimpleNamespace(f_blocks=9, f_bavail=20, f_frsize=1024)
+    endless = SimpleNamespace(f_blocks=0, f_bavail=0, f_frsize=1024)
+    says = lambda room: monkeypatch.setattr(os, "statvfs", lambda path: room if path == "/dev/shm" else real(path))  # noqa: E731
+    says(full)
     with pytest.raises(sweepd.Refused, match="20 KiB free.*make it larger"):
         sweepd.Client(instance, None)
+    says(endless)
+    sweepd.Client(instance, None).close()

@@ -396,15 +396,15 @@ class Client:
                 continue
             if (row.epoch, row.seq) >= (self._epoch, seq):
                 if row.seq == seq:
-                    self._has_begun()
+                    self._begin()
                     return self._result()
                 raise Skipped(seq)
 
     @in_turn
     def latest(self) -> Optional[Result]:
-        """The newest :class:`Result` there is, without waiting; None before the first tick as ``wait`` has it."""
+        """The newest :class:`Result` there is, without waiting; None until a tick had all that the client listens to."""
         self._drain()
-        return self._result() if self._tick is not None and self._has_begun() else None
+        return self._result() if self._tick is not None and self._begin() else None
 
     @in_turn
     def wait(self, timeout_s: float = 1.0) -> Result:
@@ -417,7 +417,7 @@ class Client:
         until = time.monotonic() + timeout_s
         came = False
         while self._next(until):
-            if self._has_begun():
+            if self._begin():
                 return self._result()
             came = True
         if not came:
@@ -607,8 +607,8 @@ class Client:
                     self._advance(topic, new)
             return True
 
-    def _has_begun(self):
-        """Whether the newest tick may be told: it has all that is listened to, or one before it had."""
+    def _begin(self):
+        """Looks at the newest tick until one has all that is listened to; whether it, or one before it, had."""
         if self._to_pass:
             messages = self._messages()
             if all(self._lasting(topic) if topic in _LASTING else topic in messages for topic in self._topics):

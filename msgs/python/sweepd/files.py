@@ -10,7 +10,7 @@ from .errors import Refused
 _LEAST = 56
 #: With fewer left a port that cannot be opened lacks them.
 _FEW = 16
-#: Where shared memory lies, and what must be free there for a client's ports, bytes.
+#: Where shared memory lies, and what must be free there for a client's ports, bytes: as the Rust client has it.
 _SHARED, _SHARED_LEAST = "/dev/shm", 256 << 10
 
 
@@ -51,9 +51,10 @@ def check_room():
     except OSError:
         return
     free = room.f_bavail * room.f_frsize
-    if free < _SHARED_LEAST:
+    # without a limit it says 0 of all
+    if room.f_blocks and free < _SHARED_LEAST:
         raise Refused(
-            f"{_SHARED} has {free >> 10} KiB free and a client takes up to {_SHARED_LEAST >> 10} at its start; who writes beyond"
+            f"{_SHARED} has {free >> 10} KiB free, and a client takes up to {_SHARED_LEAST >> 10} KiB when it starts; who writes beyond"
             f" the end is killed (SIGBUS): make it larger (in a container `--shm-size=64m`, else"
             f" `mount -o remount,size=64m {_SHARED}`), or remove what fills it"
         )

@@ -432,7 +432,7 @@ class TickRow(_Row):
         ("rejects", ctypes.c_uint64 * REJECTS_LEN),
         # Bodies in the scene.
         ("bodies", ctypes.c_uint64),
-        # Bodies not received, rejected or stale, and those whose pairs are truncated; not those held or removed by age.
+        # Bodies that are stale, rejected or not received, and those whose pairs are truncated; not those held or removed.
         ("unknown", ctypes.c_uint64),
         # Pairs of overlapping boxes.
         ("candidates", ctypes.c_uint64),

@@ -132,10 +132,7 @@ pub(super) fn node_of<S: Service>(place: &Place, role: &str) -> Result<Node<S>> 
         .map_err(|e| {
             let root = place.root();
             let root = root.display();
-            failed(
-                format!("no node in {root}, of which `sweepd doctor` says what is wrong"),
-                e,
-            )
+            failed(format!("no node in {root}, see `sweepd doctor`"), e)
         })
 }
 

@@ -89,10 +89,10 @@ pub fn scarce(needed: u64) -> Option<String> {
     told(free()?, needed)
 }
 
-/// Bytes of shared memory that are free; `None`: it cannot be looked at.
+/// Bytes of shared memory that are free; `None`: it cannot be looked at, or has no limit, where it says 0 of all.
 fn free() -> Option<u64> {
     let stat = statvfs(LOCK_DIR).ok()?;
-    Some(stat.f_bavail.saturating_mul(stat.f_frsize))
+    (stat.f_blocks > 0).then(|| stat.f_bavail.saturating_mul(stat.f_frsize))
 }
 
 fn told(free: u64, needed: u64) -> Option<String> {
@@ -133,7 +133,7 @@ pub(super) fn check_client_room() -> Result<()> {
 fn has_room(who: &str, free: Option<u64>, least: u64) -> Result<()> {
     match free {
         Some(free) if free < least => Err(Error::Refused(format!(
-            "{LOCK_DIR} has {} KiB free and {who} takes up to {} at its start; who writes beyond the end is killed \
+            "{LOCK_DIR} has {} KiB free, and {who} takes up to {} KiB when it starts; who writes beyond the end is killed \
              (SIGBUS): make it larger (in a container `--shm-size=64m`, else `mount -o remount,size=64m {LOCK_DIR}`), or \
              remove what fills it",
             free >> 10,

@@ -93,7 +93,7 @@ impl Line {
         match self {
             Self::Pose(_, feeder) | Self::Odometry(_, feeder) => feeder.fault(now_ns),
             Self::Clock(.., heard) => heard.are_two(now_ns).then(|| {
-                "/clock: two publishers tell the time, which goes back and forth: stop one of them"
+                "/clock: two publishers tell the time, so that it may go back and forth: stop one of them"
                     .to_owned()
             }),
             _ => None,

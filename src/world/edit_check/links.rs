@@ -40,13 +40,16 @@ impl<'a> Sketch<'a> {
     pub(super) fn of_world(world: &'a World, slot: BodySlot) -> Option<Self> {
         let entry = &world.entries[slot.index()];
         let root = &world.entries[entry.root.index()];
-        // Where a body was that is too old says nothing of where it is, and what hangs on another is as young as that.
-        let is_old = |body| world.is_too_old(body, world.begun_ns.max(world.now_ns));
-        let is_old = world.body(entry.root).is_none_or(is_old);
+        // Its last pose does not say where a body is that is too old; what hangs on another has the age of its root.
+        let now_ns = world.begun_ns.max(world.now_ns);
+        let root_body = world.body(entry.root);
+        let is_old = root_body.is_none_or(|body| world.is_too_old(body, now_ns));
+        let bent = root_body.and_then(|body| body.vertices.as_deref());
+        let is_bent = bent.is_none_or(|v| v.version.is_some() && v.refused.is_none());
         Some(Self {
             spec: entry.spec.as_deref()?,
             hangs: entry.attach.map(|(to, _)| &*world.names.get(to).text),
-            has_place: root.has_pose && !root.refused && !is_old,
+            has_place: root.has_pose && !root.refused && is_bent && !is_old,
             at: 0,
             is_put: false,
         })
@@ -143,7 +146,7 @@ impl<'a> Draft<'a> {
         let placed = self.is_placed(name);
         if !spec.moves && pose.is_none() && !placed {
             return Err(format!(
-                "it is not known where `{name}` is: say where (`position`)"
+                "it is not known where `{name}` is: wait for the frames of what it hangs on, or put it where it is"
             ));
         }
         // Who says where it is goes with what it hung on, where that is gone.

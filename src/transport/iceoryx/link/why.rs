@@ -15,7 +15,7 @@ use crate::wire::Hello;
 
 /// Between two looks for a hello.
 const LOOK: Duration = Duration::from_millis(10);
-/// So many looks: a daemon that nothing wakes sees who came each tenth of a second.
+/// So many looks: a daemon that nothing wakes sees who came each heartbeat, by default each tenth of a second.
 const LOOKS: u32 = 30;
 
 /// Why there is no daemon to talk to, with both versions where the holder of the instance says another one.
