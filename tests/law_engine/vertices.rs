@@ -7,6 +7,7 @@ use sweepd::wire::{
 
 use crate::rig::{ALL, FRAME_NS, NONE, Rig, body, scene};
 use sweepd::wire::Reason;
+use sweepd::world::Edit;
 
 /// A square of two triangles in the plane of x and y, of side 2.
 const SHEET: &str = "{ type = \"trimesh\", solid = false, \
@@ -358,5 +359,41 @@ fn bug_how_deep_a_compound_can_be_in_a_solid_grows_with_the_solid() {
             "{half}: {row:?}"
         );
         assert!(row.gap_max_m <= 0.0, "{half}: {row:?}");
+    }
+}
+
+/// It was known from then on, as the pose of what it had hung on was.
+#[test]
+fn bug_what_hangs_on_vertices_that_are_not_known_is_not_known_once_it_is_let_go() {
+    let hung = body(2, [0.0, 0.0, -3.0], CUBE, "attached_to = \"b1\"");
+    let fixed = body(3, [0.0, 0.0, -6.0], CUBE, "attached_to = \"b1\"");
+    let bodies = [
+        body(1, [0.0, 0.0, 3.0], SHEET, "deforms = true\n"),
+        hung,
+        fixed.replace("moves = true", "moves = false"),
+    ];
+    let let_go = |name: &str| Edit::Attach {
+        name: name.to_owned(),
+        to: None,
+        pose: None,
+    };
+    let no_vertices: [Vec<VertexFrame>; 0] = [];
+    let refused = [vec![full(1, at(0.0))], vec![full(2, at(f32::NAN))]];
+    for (sent, status) in [
+        (no_vertices.to_vec(), BodyStatus::NotReceived),
+        (refused.to_vec(), BodyStatus::Rejected),
+    ] {
+        let mut rig = Rig::new(&scene("", &bodies));
+        rig.send(ALL);
+        for vertices in sent {
+            rig.vertices = vertices;
+            rig.send(ALL);
+        }
+        let told = |rig: &Rig| rig.out.bodies[1].status;
+        assert_eq!(told(&rig), status.code());
+        rig.edit(vec![let_go("b2")], ALL);
+        assert_eq!(told(&rig), status.code());
+        let text = rig.engine.world().clone().apply(&[let_go("b3")]);
+        assert!(text.unwrap_err().contains("it is not known where `b3` is"));
     }
 }

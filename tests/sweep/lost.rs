@@ -3,9 +3,10 @@
 
 use sweepd::math::Pose;
 use sweepd::wire::{Event, PairRow, Reason, State, Verdict, pair_flags};
+use sweepd::world::Edit;
 
 use crate::cases::{PLATE, SHOT, SWEPT, is_near, plate};
-use crate::rig::{ALL, Rig, body, has, scene};
+use crate::rig::{ALL, FRAME_NS, Rig, body, has, row, scene};
 
 fn at(z: f64) -> Pose {
     Pose::translation(0.0, 0.0, z)
@@ -210,4 +211,42 @@ fn a_wall_that_is_lost_in_the_tick_in_which_something_passes_it_was_there_before
     rig.place(2, &at(-5.0));
     rig.send(ALL);
     assert!(rig.pair(1, 2).is_none());
+}
+
+/// It was swept with the turn of its velocity since the stamp of what it had hung on, past what it touches.
+#[test]
+fn bug_the_first_way_of_a_body_let_go_was_turned_by_a_stamp_of_another() {
+    let sphere = |radius: f64| format!("{{ type = \"sphere\", radius = {radius} }}");
+    let rod = "{ type = \"box\", half_extents = [0.5, 0.01, 0.01] }";
+    let pin = body(3, [0.45, -0.5, 0.0], &sphere(0.01), "");
+    let bodies = [
+        body(1, [0.0, 3.0, 0.0], &sphere(0.1), ""),
+        body(
+            2,
+            [0.0, -4.0, 0.0],
+            rod,
+            "continuous = true\nattached_to = \"b1\"",
+        ),
+        pin.replace("moves = true", "moves = false"),
+    ];
+    let mut rig = Rig::new(&scene("", &bodies));
+    rig.send(ALL);
+    let let_go = Edit::Attach {
+        name: "b2".to_owned(),
+        to: None,
+        pose: None,
+    };
+    rig.edit(vec![let_go], ALL);
+    rig.rows.push(row(2, &Pose::translation(0.0, 1.0, 0.0)));
+    // A whole turn from frame to frame.
+    let spin = std::f64::consts::TAU / (FRAME_NS as f64 * 1e-9);
+    rig.velocities = vec![[0.0; 6], [0.0, 0.0, 0.0, 0.0, 0.0, spin]];
+    rig.send(ALL);
+    let row = rig.pair(2, 3).unwrap();
+    assert!(hit(row), "{row:?}");
+    is_near(row, 0.24, 1e-9);
+    // From now on its own stamps say how far it turns.
+    rig.place(2, &Pose::translation(0.0, -1.0, 0.0));
+    rig.send(ALL);
+    assert!(rig.pair(2, 3).is_none_or(|row| !hit(row)));
 }
