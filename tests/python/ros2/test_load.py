@@ -264,5 +264,6 @@ def test_an_idle_node_is_small(room):
         shares.append((daemon.cpu_s() - used) / took)
     print(f"idle: woken {[round(rate) for rate in rates]} times a second, {[round(100 * share, 2) for share in shares]} % of a core, "
           f"{daemon.memory_kb()} KiB resident")  # fmt: skip
-    # some 80 a second; 0.7 to 0.9 % of a core where nothing else runs, twice that beside programs that fill the caches
-    assert daemon.memory_kb() <= 40 * 1024 and min(rates) <= 200 and min(shares) <= 0.1
+    # some 80 a second; 0.7 to 0.9 % of a core where nothing else runs, twice that beside programs that fill the caches;
+    # 40 MiB, of which 15 are pages of the program, and most of the rest rooms of iceoryx2's and DDS's ports
+    assert daemon.memory_kb() <= 44 * 1024 and min(rates) <= 200 and min(shares) <= 0.1
