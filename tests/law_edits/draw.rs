@@ -84,7 +84,8 @@ impl Draw {
             self.frame();
         }
         let taken = self.twins.tick(&requests, &mut self.rng);
-        // Edits go before frames, and are as old as the tick before.
+        // Edits go before frames, at the begin of the tick.
+        self.world.now_ns = now_ns;
         for (request, taken) in drawn.chunks(together).zip(taken) {
             seen.edits[usize::from(taken)] += request.len() as u64;
             if !taken {
@@ -96,7 +97,6 @@ impl Draw {
                 self.world.apply(edit, solid.clone());
             }
         }
-        self.world.now_ns = now_ns;
         if let Some(sent) = self.twins.take_sent() {
             if sent.is_anew {
                 self.world.reset();

@@ -231,7 +231,14 @@ impl World {
             Edit::Attach { name, to, pose } => match to {
                 Some(to) => {
                     let (id, to) = (self.id_of(name), self.id_of(to));
-                    let by_now = |id: u64| self.by_now(id).1;
+                    let by_now = |id: u64| {
+                        let (root, at) = self.by_now(id);
+                        assert!(
+                            pose.is_some() || root.is_none_or(|root| !self.is_too_old(root)),
+                            "{name} hung where it is, which is not known"
+                        );
+                        at
+                    };
                     let local = pose.unwrap_or_else(|| relative(&by_now(to), &by_now(id)));
                     self.named(name).hangs = Some((to, local));
                 }
@@ -240,6 +247,12 @@ impl World {
             Edit::Reset { .. } => self.reset(),
             Edit::Margin { .. } => {}
         }
+    }
+
+    /// Whether it was received once, and not since.
+    fn is_too_old(&self, id: u64) -> bool {
+        let thing = &self.things[&id];
+        thing.solid.spec.moves && thing.placed && self.now_ns - thing.since_ns >= TIMEOUT_NS
     }
 
     fn named(&mut self, name: &str) -> &mut Thing {
