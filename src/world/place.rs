@@ -219,10 +219,12 @@ impl World {
         let Some(body) = self.bodies[slot.index()].as_ref() else {
             return;
         };
+        // What hangs on another is judged as that is.
+        let root = self.body(self.entries[slot.index()].root).unwrap_or(body);
         let deadline_ns = (body.moves && judged.status == BodyStatus::Known).then(|| {
             body.since_ns
                 .unwrap_or_default()
-                .saturating_add(self.timeout_of(body))
+                .saturating_add(self.timeout_of(root))
         });
         let stamp_ns = (judged.in_broad && body.moves).then_some(body.stamp_ns);
         self.ages.set(slot, deadline_ns, stamp_ns);

@@ -149,8 +149,30 @@ fn bug_what_is_let_go_is_as_well_known_as_it_was_and_no_more_driven() {
         BodyStatus::Stale,
         "by the time-out of the one it hung on"
     );
+    // So is what hangs on it then, and what it hangs on itself has a time-out of its own again.
+    let up = Some(Pose::translation(0.0, 0.0, 3.0));
+    let mut bench = scene();
+    bench.send(MS, "robot", 1, &[row(2, 5.0)]);
+    bench.edit(let_go("a"));
+    bench.edit(attach("d", Some("a"), up));
+    assert_eq!(bench.status("d"), BodyStatus::Known);
+    bench.wait(TIMEOUT_NS);
+    let known = (bench.status("a"), bench.status("d"));
+    assert_eq!(known, (BodyStatus::Stale, BodyStatus::Stale));
+    let mut bench = scene();
+    bench.send(MS, "robot", 1, &[row(2, 5.0)]);
+    bench.tick_at(bench.now_ns, &[let_go("a"), let_go("c")], &[]);
+    bench.edit(attach("a", Some("d"), up));
+    bench.wait(2 * TIMEOUT_NS);
+    assert_eq!(bench.status("a"), BodyStatus::Known);
+    assert!(
+        bench
+            .world
+            .next_timeout()
+            .is_none_or(|next_ns| next_ns > bench.now_ns)
+    );
     // What cannot move stays where it is.
-    bench.edit(attach("d", Some("c"), None));
+    bench.edit(attach("d", Some("c"), up));
     assert_eq!(bench.status("d"), BodyStatus::Known);
     let now_ns = bench.now_ns + 200 * TIMEOUT_NS;
     bench.tick_at(now_ns, &[let_go("d")], &[]);
