@@ -91,10 +91,8 @@ fn bug_an_attachment_where_a_body_is_needs_bodies_that_are_not_too_old() {
     );
 }
 
-/// The time-out of its own source made it known, the velocity of what it had hung on went on, and what hung on a wall
-/// was as old as the tick before.
-#[test]
-fn bug_what_is_let_go_is_as_well_known_as_it_was_and_no_more_driven() {
+/// `a`, and `c` that cannot move, hang on `b` of another source with a shorter time-out; `d` and a wall stand apart.
+fn hung_on_another_source() -> Bench {
     let robot = BodySpec {
         source: Some(1),
         ..moving("b", 2)
@@ -112,12 +110,17 @@ fn bug_what_is_let_go_is_as_well_known_as_it_was_and_no_more_driven() {
         fixed("wall", 4, 9.0),
         moving("d", 5),
     ];
-    let scene = || {
-        let mut bench = Bench::of(bodies.clone());
-        bench.world.set_timeout(0, 100 * TIMEOUT_NS);
-        bench.send(MS, "sim", 1, &[row(5, 20.0)]);
-        bench
-    };
+    let mut bench = Bench::of(bodies);
+    bench.world.set_timeout(0, 100 * TIMEOUT_NS);
+    bench.send(MS, "sim", 1, &[row(5, 20.0)]);
+    bench
+}
+
+/// The time-out of its own source made it known, the velocity of what it had hung on went on, and what hung on a wall
+/// was as old as the tick before.
+#[test]
+fn bug_what_is_let_go_is_as_well_known_as_it_was_and_no_more_driven() {
+    let scene = hung_on_another_source;
     let let_go = |name| attach(name, None, None);
     let mut bench = scene();
     bench.send(MS, "robot", 1, &[row(2, 5.0)]);
