@@ -121,7 +121,7 @@ def test_bug_a_time_that_is_no_number_of_seconds_is_refused(client, instance):
 
 def test_bug_what_a_client_is_opened_with_is_looked_at(instance):
     with sweepd.Client(instance, "sim", quat_order="wxyz", listen="pairs") as client:
-        assert client._topics == ["pairs", "names"]
+        assert client._inbox._topics == ["pairs", "names"]
         result = client.step(POSES, timeout_s=5)
         assert result.pairs is not None and result.contacts is None
     for wrong in ("pair", ["pairs", 3], None, 3, [["pairs"]]):

@@ -16,10 +16,11 @@ from types import SimpleNamespace
 import pytest
 from daemons import FIRST, NO_TURN, started  # noqa: F401
 from needed import needed
+from stand_ins import inbox_of
 
 sweepd = needed("sweepd")
 
-from sweepd import layout  # noqa: E402
+from sweepd import inbox, layout  # noqa: E402
 
 SWEEPD = os.environ.get("SWEEPD")
 pytestmark = pytest.mark.skipif(not SWEEPD, reason="SWEEPD names no binary")
@@ -121,7 +122,7 @@ def test_the_first_result_after_a_restart_has_all_lists(tmp_path, number):
                         reader.wait(timeout_s=5)
                 result = reader.wait(timeout_s=5)
                 assert lacking(reader, result, listen) == []
-                assert result.tick.header.boot_id == reader._boot
+                assert result.tick.header.boot_id == reader._inbox.boot
     finally:
         daemon.send_signal(signal.SIGINT)
         assert daemon.wait(timeout=10) == 0
@@ -153,10 +154,6 @@ def alone(ticks):
     """A reader of pairs to which these ticks come, and no more."""
     client = sweepd.Client.__new__(sweepd.Client)
     client._turns = contextlib.nullcontext()
-    client._topics, client._lists, client._boots_over = ["pairs"], {}, []
-    client._now, client._ahead, client._waited = {"pairs": None}, {"pairs": None}, {"pairs": 0}
-    client._tick, client._held, client._boot = None, None, 7
-    client._to_pass, client._passed_ns = sweepd.client._PASSED_MAX, 0
     queue = {}
 
     def come():
@@ -166,9 +163,8 @@ def alone(ticks):
         queue.update(messages)
         return row
 
-    client._ports = SimpleNamespace(
-        tick=come, message=lambda topic: queue.pop(topic, None), wait=lambda _: None, silence=lambda: "silent", close=lambda: None
-    )
+    client._inbox = inbox_of(["pairs"], boot=7, tick=come, message=lambda topic: queue.pop(topic, None))
+    client._ports = SimpleNamespace(silence=lambda: "silent", close=lambda: None)
     return client
 
 
@@ -189,7 +185,7 @@ def test_a_tick_that_is_under_way_is_not_what_a_reader_begins_with():
 
 
 def test_a_list_that_never_comes_silences_no_reader_for_ever():
-    last = sweepd.client._PASSED_MAX
+    last = inbox._PASSED_MAX
     client = alone([tick(number) for number in range(1, 100)])
     assert [client.wait(timeout_s=0).tick.header.tick for _ in range(2)] == [last, last + 1]
     # looked at again and again it is one tick

@@ -260,7 +260,7 @@ def test_bug_a_list_whose_place_another_reader_took_is_asked_for_again(started, 
 
         monkeypatch.setattr(client._ports, "_read", taken)
         with pytest.raises(sweepd.Refused, match="every place"):
-            client._renew_list("changes")
+            client._inbox._renew_list("changes")
         for step in range(1, 12):
             result = client.step(crowd(step), timeout_s=5)
             if result.listed is not None and result.changes_header.base_tick == 0:

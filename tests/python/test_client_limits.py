@@ -17,10 +17,12 @@ from types import SimpleNamespace
 import pytest
 from daemons import FIRST, NO_TURN, started  # noqa: F401
 from needed import needed
+from stand_ins import inbox_of
 
 sweepd = needed("sweepd")
 
 from sweepd import layout, ports  # noqa: E402
+from sweepd.inbox import Inbox  # noqa: E402
 
 SWEEPD = os.environ.get("SWEEPD")
 pytestmark = pytest.mark.skipif(not SWEEPD, reason="SWEEPD names no binary")
@@ -117,7 +119,7 @@ def test_a_frame_that_is_late_has_the_least_time_and_not_all_of_it(start, monkey
         with pytest.raises(sweepd.SweepdError, match="time_left_ns="):
             client.send(poses(), time_left_ns=2**64)
         for more in ({"first": -1, "total": 9}, {"first": 0, "total": -9}):
-            client._versions[1] = 1
+            client._versions[client._inbox.boot, 1] = 1
             with pytest.raises(sweepd.SweepdError, match="give 0 to"):
                 client.send_vertices(1, [[0, 0, 0]], **more)
         assert len(sent) == 5, "nothing that was refused went out"
@@ -170,7 +172,7 @@ def test_bug_a_look_at_what_is_there_never_ended_where_ticks_came_faster_than_th
             return True
 
     endless = Endless()
-    sweepd.Client._drain(endless)
+    Inbox.drain(endless)
     assert endless.taken > 8, "more than wait in any queue"
 
 
@@ -184,17 +186,12 @@ def test_bug_what_a_boot_that_came_and_went_unseen_left_was_followed_for_ever():
         row.header.boot_id, row.header.tick, row.sent_ns = ticks.pop(0)
         return row
 
-    client = sweepd.Client.__new__(sweepd.Client)
-    client._held = client._tick = None
-    client._boots_over, client._topics, client._now, client._ahead = [], {}, {}, {"names": None}
-    client._waited = {"names": 0}
-    client._lists = {}
-    client._ports = SimpleNamespace(tick=tick, message=lambda topic: None, close=lambda: None)
-    assert client._take()
+    inbox = inbox_of(["names"], boot=1, tick=tick, message=lambda topic: None)
+    assert inbox.next(0)
     with pytest.raises(sweepd.Restarted):
-        client._take()
-    assert client._take() and client._take() and not client._take()
-    assert (client._tick.header.boot_id, client._tick.header.tick) == (3, 2)
+        inbox.next(0)
+    assert inbox.next(0) and inbox.next(0) and not inbox.next(0)
+    assert (inbox.tick.header.boot_id, inbox.tick.header.tick) == (3, 2)
 
 
 def test_bug_a_message_of_a_boot_that_went_unseen_held_back_those_of_the_boot_after_it():
@@ -202,16 +199,18 @@ def test_bug_a_message_of_a_boot_that_went_unseen_held_back_those_of_the_boot_af
         return layout.MessageHeader(boot_id=boot_id, tick=tick)
 
     queue = [(header(2, 5), "of a boot between"), (header(3, 1), "of the boot in force")]
-    client = sweepd.Client.__new__(sweepd.Client)
-    client._boots_over, client._now, client._ahead, client._waited = [1], {"names": None}, {"names": None}, {"names": 0}
-    client._ports = SimpleNamespace(message=lambda topic: queue.pop(0) if queue else None, close=lambda: None)
-    for tick in range(1, 16):
-        client._advance("names", header(3, tick))
-        assert client._now["names"] is None, "ticks of the boot between may still come"
-    for tick in range(16, 20):
-        client._advance("names", header(3, tick))
-    assert client._now["names"][1] == "of the boot in force"
-    assert client._boots_over == [1, 2]
+    ticks = []
+
+    def tick():
+        return ticks.pop(0) if ticks else None
+
+    inbox = inbox_of(["names"], boot=3, tick=tick, message=lambda topic: queue.pop(0) if queue else None)
+    for number in range(1, 20):
+        ticks.append(layout.TickRow(header=header(3, number), sent_ns=number))
+        assert inbox.next(0)
+        if number < 16:
+            assert inbox.lasting("names") is None, "ticks of the boot between may still come"
+    assert inbox.lasting("names")[1] == "of the boot in force"
 
 
 @contextlib.contextmanager

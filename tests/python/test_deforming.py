@@ -107,7 +107,7 @@ def test_a_range_changes_its_places_only_and_one_that_does_not_follow_is_refused
         client.send_vertices("cloth", vertices[middle : middle + 1], first=middle, total=total)
         assert client.step(POSES, timeout_s=5).state == "clear"
         # One is lost on the way.
-        client._versions[client.names["cloth"]] += 1
+        client._versions[client._inbox.boot, client.names["cloth"]] += 1
         client.send_vertices("cloth", down, first=middle, total=total)
         result = client.step(POSES, timeout_s=5)
         assert result.state == "unknown"

@@ -183,7 +183,7 @@ def test_bug_a_list_asked_for_anew_while_no_daemon_is_there_comes_with_the_next_
             # as where the place was another one's
             del client._ports._readers["changes"]
         for _ in range(3):
-            client._renew_list("changes")
+            client._inbox._renew_list("changes")
             assert client._ports.is_open("changes") == is_held
         daemon.start("left", "right")
         until_restarted(lambda: client.send(poses()))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import difflib
 import json
 import operator
@@ -14,39 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import layout
-from .errors import Refused, Restarted, Skipped, SweepdError, TimedOut
+from .errors import Refused, Skipped, SweepdError, TimedOut
 from .frames import MOVING, POSE, array, blank, columns_of, rows_of, seconds, seconds_to_send, time_left, whole
-from .lists import ContactList, PairList
+from .inbox import LOOK_AGAIN_S, Inbox, topics_of
 from .ports import Ports
 from .refusals import is_under_way, source_row, why_no_result
+from .result import Result
 from .turns import Turns, in_turn
 
-_LOOK_AGAIN_S = 0.05
-_BOOTS_OVER_MAX = 16
-# ticks of the boot in force that may still come while a message of the next one is there: what a queue holds, twice
-_TICKS_LEFT_MAX = 16
-# ticks that one look takes at most: more than wait in its queues
-_DRAINED_MAX = 32
-# ticks without all that is listened to that are passed over at first, and how far apart they are at least: more than wait where a
-# boot went unseen, and a second. A message that cannot be handed over is no reason to be silent for ever
-_PASSED_MAX = 32
-_PASSED_NS = 1_000_000_000 // _PASSED_MAX
 _NAMES_TOLD = 5
-_TOPICS = {
-    "pairs": layout.PairRow,
-    "changes": layout.PairRow,
-    "contacts": layout.ContactRow,
-    "contact_changes": layout.ContactRow,
-    "regions": layout.RegionRow,
-    "bodies": layout.BodyRow,
-    "body_verdicts": ctypes.c_uint8,
-    "names": layout.NameRow,
-    "plan": ctypes.c_uint8,
-}
-_HEADERS = {"changes": layout.ChangesHeader, "contact_changes": layout.ChangesHeader}
-_LISTS = {"changes": PairList, "contact_changes": ContactList}
-# sent when they change, where all others are each tick's
-_LASTING = ("names", "plan")
 # what `step` takes beside poses and time
 _FRAME_FIELDS = ("stamp_ns", "clock_id", "scene_rev", "deadline_ns", "time_left_ns", "partial")
 _VERTEX = np.dtype(layout.VertexRow)
@@ -62,81 +37,6 @@ def _bytes_of(source):
         return 0 if "\0" in source else len(source.encode())
     except (AttributeError, TypeError, UnicodeEncodeError):
         return 0
-
-
-def _topics_of(listen):
-    if isinstance(listen, str):
-        listen = (listen,)
-    try:
-        listen = list(listen)
-    except TypeError:
-        listen = [listen]
-    unknown = [topic for topic in listen if not isinstance(topic, str) or topic not in _TOPICS]
-    if unknown:
-        raise SweepdError(f"listen={unknown}: there are {', '.join(_TOPICS)}")
-    return listen
-
-
-class Result:
-    """A tick and what belongs to it.
-
-    ``tick`` is a structure (see ``msgs/README.md``); ``pairs``, ``contacts``, ``regions`` and ``bodies`` are numpy
-    structured arrays over shared memory, None where the client did not listen or a newer one overtook it. Keep as many
-    results as you like: where three arrays of a kind are still there, the next one is a copy. ``changes`` are the rows that
-    changed since the tick before, under ``changes_header`` whose ``base_tick`` is 0 the whole list; None also where the
-    list is not whole (yet, or again). ``contact_changes`` and ``contact_changes_header`` are the same of contacts. Copies
-    (``copy.deepcopy``) and pickles are whole.
-    """
-
-    def __init__(self, tick: layout.TickRow, messages: dict[str, Any], lists: dict[str, Any], turns: Turns) -> None:
-        self.tick = tick
-        self._lists, self._turns = lists, turns
-        self.changes_header: Optional[layout.ChangesHeader]
-        self.changes: Optional[np.ndarray]
-        self.changes_header, self.changes = messages.pop("changes", (None, None))
-        self.contact_changes_header: Optional[layout.ChangesHeader]
-        self.contact_changes: Optional[np.ndarray]
-        self.contact_changes_header, self.contact_changes = messages.pop("contact_changes", (None, None))
-        self.pairs: Optional[np.ndarray] = messages.get("pairs")
-        self.contacts: Optional[np.ndarray] = messages.get("contacts")
-        self.regions: Optional[np.ndarray] = messages.get("regions")
-        self.bodies: Optional[np.ndarray] = messages.get("bodies")
-        self.body_verdicts: Optional[np.ndarray] = messages.get("body_verdicts")
-
-    @property
-    def state(self) -> str:
-        """The tick in one word: clear, near, possible, unknown or colliding."""
-        return layout.State(self.tick.header.state).name.lower()
-
-    @property
-    @in_turn
-    def listed(self) -> Optional[np.ndarray]:
-        """What ``pairs`` would hold, kept from ``changes``: an array of its own; None where ``changes`` is.
-
-        Made when it is asked for, which is to be before the client goes on to the next tick.
-        """
-        return None if self.changes is None else self._rows("changes", "listed")
-
-    @property
-    @in_turn
-    def listed_contacts(self) -> Optional[np.ndarray]:
-        """What ``contacts`` would hold, kept from ``contact_changes``; as ``listed``."""
-        return None if self.contact_changes is None else self._rows("contact_changes", "listed_contacts")
-
-    def _rows(self, topic, name):
-        if not self._lists[topic].is_of(self.tick.header):
-            raise SweepdError(f"the client has gone on to another tick: ask a result for `{name}` before the next step")
-        return self._lists[topic].rows()
-
-    @property
-    def colliding(self) -> np.ndarray:
-        """``(n, 2)`` ids of the pairs certified colliding at the poses of this tick, by id."""
-        rows = self.listed if self.pairs is None else self.pairs
-        if rows is None:
-            raise SweepdError("this client does not listen to pairs or changes, or has not all of them yet")
-        gone = rows["flags"] & int(layout.PairFlags.GONE) != 0
-        rows = rows[(rows["verdict"] == layout.Verdict.COLLIDING) & ~gone]
-        return np.stack([rows["body_a"], rows["body_b"]], axis=1)
 
 
 class Client:
@@ -175,40 +75,28 @@ class Client:
             raise SweepdError(
                 f"source name {source!r}: a text of 1 to {layout.SOURCE_NAME_LEN - 1} bytes of UTF-8, without NUL"
             )
-        listen = _topics_of(listen)
+        topics = topics_of(listen)
         timeout_s = seconds(timeout_s)
         until = time.monotonic() + timeout_s
         self._ports = Ports(instance, timeout_s, root, prefix)
-        self._topics = list(dict.fromkeys([*listen, "names"]))
         try:
-            for topic in self._topics:
-                self._ports.subscribe(topic, _TOPICS[topic], _HEADERS.get(topic, layout.MessageHeader), until)
+            self._inbox = Inbox(self._ports, topics, until)
         except SweepdError:
             # who keeps the error keeps this object, which would keep the places of its ports
             self._ports.close()
             raise
-        self._ahead = {topic: None for topic in self._topics}
-        self._waited = {topic: 0 for topic in self._topics}
-        self._now = {topic: None for topic in self._topics}
-        self._lists = {topic: _LISTS[topic]() for topic in self._topics if topic in _LISTS}
         #: This client's session, drawn at its start.
         self.session: int = secrets.randbits(64) or 1
         self._epoch = 0
         self._seq = 0
-        self._versions: dict[int, int] = {}
+        # of what a daemon, by its boot, has of the vertices of a body
+        self._versions: dict[tuple[int, int], int] = {}
         # messages of vertices of this session
         self._bent = 0
         self._requests = 0
-        self._tick = None
-        self._held = None
-        # of the daemon whose ids the names are
-        self._boot = self._ports.hello.boot_id
-        self._boots_over: list[int] = []
-        # ticks that may yet be passed over until one has all that is listened to, 0: one had; and when the last was sent
-        self._to_pass, self._passed_ns = _PASSED_MAX, 0
         self._names: tuple[Any, dict[str, int]] = (None, {})
         self._named: tuple[Any, dict[int, str]] = (None, {})
-        self._wait_names(timeout_s)
+        self._inbox.wait_names(time.monotonic() + timeout_s)
 
     def __enter__(self) -> Client:
         return self
@@ -219,7 +107,7 @@ class Client:
     @in_turn
     def close(self) -> None:
         """Frees the ports; the session is over."""
-        self._ahead, self._now, self._held = {}, {}, None
+        self._inbox.clear()
         self._ports.close()
 
     @property
@@ -231,7 +119,7 @@ class Client:
     def names(self) -> dict[str, int]:
         """Name to id of every body in the scene, as of the newest tick heard. Ids are those of one start of the daemon."""
         self._ports.check_open("names cannot be told")
-        message = self._lasting("names")
+        message = self._inbox.lasting("names")
         if message is None:
             return {}
         header, rows = message
@@ -245,12 +133,8 @@ class Client:
     def plan(self) -> Optional[dict[str, Any]]:
         """What the daemon chose for the scene, left out, and why: a dict; None where the client does not listen to ``plan``."""
         self._ports.check_open("the plan cannot be told")
-        message = self._lasting("plan")
+        message = self._inbox.lasting("plan")
         return None if message is None else json.loads(message[1].tobytes())
-
-    def _lasting(self, topic):
-        message = self._now.get(topic)
-        return None if message is None or message[0].boot_id != self._boot else message
 
     def name_of(self, body: int) -> Optional[str]:
         """The name of a body by its id, as rows have it; None where the scene has none (any more)."""
@@ -281,7 +165,10 @@ class Client:
           of none: ``{name: (position, quaternion, linear, angular)}``, or two more arrays of shape ``(n, 3)``; metres
           and radians a second, in the scene's frame. An array made by ``rows()`` or ``loan()`` is copied once, as it
           is.
+        * ``stamp_ns``: your own stamp of the poses, nanoseconds of the clock that you call ``clock_id``; both are echoed.
+        * ``scene_rev``: the least revision of the scene that the poses need, 0 any; the frame waits for it, for one time-out.
         * ``partial``: these are some bodies of the source only.
+        * ``deadline_ns``: of the tick, ``time.monotonic_ns()``, 0 none. It can shorten the budget, and never lengthens it.
         * ``time_left_ns``: of the tick, from receipt; 0 says nothing, and less than 0, too late already, leaves it nothing.
 
         Raises Restarted where another daemon is there than that of the ids, TimedOut where it has not said its own yet;
@@ -297,7 +184,7 @@ class Client:
             time_left_ns=time_left(time_left_ns),
         )
         rows = self.rows(poses)
-        if getattr(rows, "boot_id", 0) not in (0, self._boot):
+        if getattr(rows, "boot_id", 0) not in (0, self._inbox.boot):
             raise SweepdError(
                 "these rows were made before the daemon restarted, and their ids may be other bodies' now: make them"
                 " anew with rows() or loan()"
@@ -347,7 +234,8 @@ class Client:
             moved = np.ascontiguousarray(given, dtype=np.float32)
         self._settle(0.0)
         id_: int = self._ids([body])[0] if isinstance(body, str) else whole("body", body)
-        base = self._versions.get(id_)
+        known = (self._inbox.boot, id_)
+        base = self._versions.get(known)
         if first is not None and base is None:
             raise SweepdError("a range of vertices changes those sent before: send all of them first")
         base = base or 0
@@ -369,9 +257,10 @@ class Client:
         )
         self._name(header)
         rows = moved.view(_VERTEX).reshape(len(moved))
-        self._ports.send("vertices", layout.VertexRow, header, rows, wake=False)
-        self._versions[id_] = base + 1
+        # counted first, as in _send
+        self._versions[known] = base + 1
         self._bent += 1
+        self._ports.send("vertices", layout.VertexRow, header, rows, wake=False)
         return base + 1
 
     @in_turn
@@ -384,27 +273,30 @@ class Client:
             raise SweepdError(f"step({unknown[0]}=...): a frame has {', '.join(_FRAME_FIELDS)}")
         timeout_s = seconds_to_send(timeout_s)
         until = time.monotonic() + timeout_s
-        self._drain()
+        self._inbox.drain()
         self._settle(until)
-        before = self._tick
+        before = self._inbox.tick
         seq = self.send(poses, **fields)
         while True:
-            if not self._next(until):
+            if not self._inbox.next(until):
                 raise TimedOut(self._why_no_result(seq, before, timeout_s, fields.get("scene_rev", 0)))
-            row = self._row(self._tick)
+            row = self._row(self._inbox.tick)
             if row is None or row.session != self.session:
                 continue
             if (row.epoch, row.seq) >= (self._epoch, seq):
                 if row.seq == seq:
-                    self._begin()
+                    self._inbox.begin()
                     return self._result()
                 raise Skipped(seq)
 
     @in_turn
     def latest(self) -> Optional[Result]:
-        """The newest :class:`Result` there is, without waiting; None until a tick had all that the client listens to."""
-        self._drain()
-        return self._result() if self._tick is not None and self._begin() else None
+        """The newest :class:`Result` there is, without waiting; None until a tick had all that the client listens to.
+
+        Where no tick comes any more it is the last one, again and again: ``age_s`` says so.
+        """
+        self._inbox.drain()
+        return self._result() if self._inbox.tick is not None and self._inbox.begin() else None
 
     @in_turn
     def wait(self, timeout_s: float = 1.0) -> Result:
@@ -416,13 +308,13 @@ class Client:
         timeout_s = seconds(timeout_s)
         until = time.monotonic() + timeout_s
         came = False
-        while self._next(until):
-            if self._begin():
+        while self._inbox.next(until):
+            if self._inbox.begin():
                 return self._result()
             came = True
         if not came:
             raise TimedOut(f"no tick within {timeout_s} s; {self._ports.silence()}")
-        why = "one is still under way" if is_under_way(self._tick) else "they were made before the daemon knew of this client"
+        why = "one is still under way" if is_under_way(self._inbox.tick) else "they were made before the daemon knew of this client"
         raise TimedOut(f"no tick within {timeout_s} s had all that this client listens to: {why}; wait again, or for longer")
 
     @in_turn
@@ -453,7 +345,7 @@ class Client:
                     raise Refused(answer.get("error", "refused"))
                 # an edit is answered after its tick, with which new names came
                 if isinstance(edits, dict) and "edits" in edits:
-                    self._drain()
+                    self._inbox.drain()
                 return answer
             left = until - time.monotonic()
             if left <= 0:
@@ -461,7 +353,7 @@ class Client:
                     f"no answer within {timeout_s} s: a large request may take longer, give it more by timeout_s;"
                     f" {self._ports.silence()}"
                 )
-            self._ports.wait(min(left, _LOOK_AGAIN_S))
+            self._ports.wait(min(left, LOOK_AGAIN_S))
 
     @in_turn
     def rows(self, poses: Poses) -> np.ndarray:
@@ -487,7 +379,7 @@ class Client:
                     " (ids, positions, quaternions) or rows"
                 ) from None
             rows = rows_of(ids, columns, wxyz)
-        rows.boot_id = self._boot
+        rows.boot_id = self._inbox.boot
         return rows
 
     def loan(self, count: int, *, velocities: bool = False) -> np.ndarray:
@@ -501,7 +393,7 @@ class Client:
         """
         self._ports.check_open("rows cannot be made")
         rows = blank(count, velocities)
-        rows.boot_id = self._boot
+        rows.boot_id = self._inbox.boot
         return rows
 
     def _ids(self, poses):
@@ -510,7 +402,7 @@ class Client:
             return [names[name] for name in poses]
         except KeyError:
             # somebody may have put it since this client last looked
-            self._drain()
+            self._inbox.drain()
         names = self.names
         try:
             return [names[name] for name in poses]
@@ -535,14 +427,15 @@ class Client:
         )
         self._name(header)
         topic, row = _MOTION if rows.dtype == MOVING else _POSES
-        self._ports.send(topic, row, header, rows)
+        # counted first: a signal may end this in the midst, and a number that was sent must never be another frame's
         self._seq += 1
+        self._ports.send(topic, row, header, rows)
         return self._seq
 
     def _settle(self, until):
         """Sees to it that ids are those of the daemon that is there: raises Restarted, or TimedOut where it is silent."""
-        while self._ports.boot() not in (self._boot, *self._boots_over):
-            if not self._next(until):
+        while not self._inbox.is_settled():
+            if not self._inbox.next(until):
                 raise TimedOut(
                     "a daemon has just started, and has not said the ids of its bodies yet: step, or send again in a"
                     " moment"
@@ -553,182 +446,17 @@ class Client:
             raise SweepdError("this client was opened as a reader; name a source to send frames")
         name = self._source.encode()
         header.source[: len(name)] = name
-        header.boot = self._boot & 0xFFFFFFFF
+        header.boot = self._inbox.boot & 0xFFFFFFFF
 
     def _row(self, tick):
         return source_row(tick, self._source)
 
-    def _wait_names(self, timeout_s):
-        """Names come with the newest state, a moment after the connection."""
-        until = time.monotonic() + timeout_s
-        while self._now["names"] is None and self._next(until):
-            pass
-
-    def _drain(self):
-        """Takes what is there, up to the newest tick; raises Restarted."""
-        # where a tick takes longer to read than the next one takes to come, there is always one
-        for _ in range(_DRAINED_MAX):
-            if not self._take():
-                return
-
-    def _next(self, until):
-        """The next newer tick and all that belongs to it; False when the time is up."""
-        while not self._take():
-            left = until - time.monotonic()
-            if left <= 0:
-                return False
-            self._ports.wait(min(left, _LOOK_AGAIN_S))
-        return True
-
-    def _take(self):
-        while True:
-            tick, self._held = self._held or self._ports.tick(), None
-            if tick is None:
-                return False
-            new = tick.header
-            # queues of an old and a new daemon are read in no certain order
-            if new.boot_id in self._boots_over:
-                continue
-            old = self._tick and self._tick.header
-            if old and old.boot_id != new.boot_id:
-                # there is one daemon at a time: what is left of one that came and went unseen is older
-                if tick.sent_ns < self._tick.sent_ns:
-                    self._note_over(new.boot_id)
-                    continue
-                self._restart(old, tick)
-            # a tick that takes longer than a heartbeat is told of under its own number before it is there itself
-            if old and (new.tick, tick.sent_ns) <= (old.tick, self._tick.sent_ns):
-                continue
-            self._tick, self._boot = tick, new.boot_id
-            for topic in self._topics:
-                if topic in self._lists:
-                    self._advance_list(topic, new)
-                else:
-                    self._advance(topic, new)
-            return True
-
-    def _begin(self):
-        """Looks at the newest tick until one has all that is listened to; whether it, or one before it, had."""
-        if self._to_pass:
-            messages = self._messages()
-            if all(self._lasting(topic) if topic in _LASTING else topic in messages for topic in self._topics):
-                self._to_pass = 0
-            elif self._tick.sent_ns >= self._passed_ns + _PASSED_NS and not is_under_way(self._tick):
-                # one that is under way has nothing yet, however often it is told of
-                self._to_pass, self._passed_ns = self._to_pass - 1, self._tick.sent_ns
-        return not self._to_pass
-
-    def _restart(self, old, tick):
-        self._note_over(old.boot_id)
-        ends = np.empty((0, 2), np.uint64)
-        pairs, rows = self._now.get("pairs"), None
-        if pairs is not None and pairs[0].boot_id == old.boot_id:
-            rows = pairs[1]
-        elif "changes" in self._lists and self._lists["changes"].boot_id == old.boot_id:
-            rows = self._lists["changes"].rows()
-        if rows is not None:
-            there = rows["flags"] & int(layout.PairFlags.GONE) == 0
-            rows = rows[there & (rows["certified_verdict"] == layout.Verdict.COLLIDING)]
-            ends = np.stack([rows["body_a"], rows["body_b"]], axis=1)
-        self._tick, self._held, self._boot = None, tick, tick.header.boot_id
-        # the new one has no vertices, and may not know of this client yet
-        self._versions, self._to_pass = {}, _PASSED_MAX
-        # so that names are new from here on
-        self._advance("names", tick.header)
-        raise Restarted(old.boot_id, tick.header.boot_id, ends)
-
-    def _note_over(self, boot_id):
-        self._boots_over = [*self._boots_over[1 - _BOOTS_OVER_MAX :], boot_id]
-
-    def _is_in_vain(self, topic, boot_id):
-        """Whether a message of another boot than the tick's waits for a tick that no longer comes: that boot went unseen."""
-        self._waited[topic] += 1
-        in_vain = self._waited[topic] > _TICKS_LEFT_MAX
-        if in_vain:
-            self._waited[topic] = 0
-            self._note_over(boot_id)
-        return in_vain
-
-    def _advance(self, topic, tick):
-        """Takes messages up to the tick; one of a later tick or boot is kept for then."""
-        while True:
-            ahead = self._ahead[topic]
-            if ahead is None:
-                ahead = self._ahead[topic] = self._ports.message(topic)
-                self._waited[topic] = 0
-            if ahead is None:
-                return
-            header = ahead[0]
-            if header.boot_id in self._boots_over:
-                self._ahead[topic] = None
-            elif header.boot_id == tick.boot_id and header.tick <= tick.tick:
-                now = self._now[topic]
-                if now is None or now[0].boot_id != header.boot_id or now[0].tick < header.tick:
-                    self._now[topic] = ahead
-                self._ahead[topic] = None
-                if header.tick == tick.tick:
-                    # no more is of this tick
-                    return
-            elif header.boot_id == tick.boot_id or not self._is_in_vain(topic, header.boot_id):
-                return
-            ahead = None
-
-    def _advance_list(self, topic, tick):
-        """As ``_advance``, but every message is applied; one that is not for the list has the whole list asked for."""
-        listing = self._lists[topic]
-        if not self._ports.is_open(topic):
-            # the place went to another reader when the port was to be renewed
-            self._renew_list(topic)
-            if not self._ports.is_open(topic):
-                # and now the daemon is away
-                return
-        while True:
-            ahead, self._ahead[topic] = self._ahead[topic], None
-            if ahead is None:
-                ahead, self._waited[topic] = self._ports.message(topic), 0
-            if ahead is None:
-                return
-            header = ahead[0].message
-            if header.boot_id in self._boots_over:
-                continue
-            if header.boot_id != tick.boot_id or header.tick > tick.tick:
-                self._ahead[topic] = ahead
-                if header.boot_id == tick.boot_id or not self._is_in_vain(topic, header.boot_id):
-                    return
-                continue
-            self._now[topic] = None
-            if listing.take(*ahead):
-                ahead = None
-                self._renew_list(topic)
-            elif listing.is_whole:
-                self._now[topic] = ahead
-            if header.tick == tick.tick:
-                return
-            ahead = None
-
-    def _renew_list(self, topic):
-        self._ports.renew(topic, _TOPICS[topic], layout.ChangesHeader)
-
     def _result(self):
-        return Result(self._tick, self._messages(), self._lists, self._turns)
-
-    def _messages(self):
-        """What belongs to the newest tick, by topic."""
-        tick = self._tick.header
-        messages = {}
-        for topic, now in self._now.items():
-            if now is None:
-                continue
-            if topic in self._lists:
-                if self._lists[topic].is_of(tick):
-                    messages[topic] = now
-            elif (now[0].boot_id, now[0].tick) == (tick.boot_id, tick.tick):
-                messages[topic] = now[1]
-        return messages
+        return Result(self._inbox.tick, self._inbox.messages(), self._inbox.lists, self._turns)
 
     def _why_no_result(self, seq, before, timeout_s, scene_rev=0):
         told = f"no result of frame {seq} of `{self._source}` within {timeout_s} s"
-        tick = self._tick
+        tick = self._inbox.tick
         if tick is None or (before is not None and tick.header.tick == before.header.tick):
             return f"{told}: no tick came at all; {self._ports.silence()}"
         return told + why_no_result(tick, before, self._source, scene_rev)

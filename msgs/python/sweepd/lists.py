@@ -42,7 +42,9 @@ class _List:
     def take(self, header, rows):
         """Applies a message; True when it is not for this list, and the whole list is to be asked for."""
         message, had = header.message, self.is_whole
-        self.is_whole = True
+        # until all of it is applied: a signal may end this in the midst
+        self.is_whole = False
+        applied = True
         if header.base_tick == 0:
             self._set_tick(message)
             self._replace(rows)
@@ -50,9 +52,9 @@ class _List:
             self._set_tick(message)
             self._change(rows)
         else:
-            self.is_whole = False
+            applied = False
         # what the sender says of its list is checked, so that a fault of either side is found and mended
-        self.is_whole = self.is_whole and len(self) == header.listed
+        self.is_whole = applied and len(self) == header.listed
         if self.is_whole:
             self._passed = 0
             return False

@@ -110,12 +110,12 @@ class OwnSource:
         As one that has looked who is there right before the daemon changed.
         """
         self._stamp += 1
-        rows, was = client.rows(poses), client._boot
-        client._boot = was if boot is None else boot
+        rows, was = client.rows(poses), client._inbox.boot
+        client._inbox.boot = was if boot is None else boot
         try:
             seq = client._send(rows, sweepd.layout.FrameFlags.FULL, {"stamp_ns": self._stamp})
         finally:
-            client._boot = was
+            client._inbox.boot = was
         frame = Frame(self.name, client.session, client._epoch, seq, self._stamp, poses, void=True)
         self._ledger.put(frame)
 

@@ -357,7 +357,7 @@ class Soak:
         for _ in range(1000):
             try:
                 client.latest()
-                if client._boot == self.boot_id:
+                if client._inbox.boot == self.boot_id:
                     return
             except sweepd.Restarted as e:
                 if e.new_boot != self.boot_id:
