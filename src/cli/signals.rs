@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use crate::error::{Error, Result};
@@ -15,13 +15,14 @@ pub(super) const EXIT_SIGNALS: i32 = 4;
 /// and to the group, and a terminal's Ctrl-C reaches also a process to which a script passes it on.
 const ECHO_NS: u64 = 200_000_000;
 
-/// A flag that SIGINT and SIGTERM raise; one that comes [`ECHO_NS`] later, or more, ends the process at once.
+/// A flag that SIGINT, SIGTERM and a terminal's end raise; one that comes [`ECHO_NS`] later, or more, ends the process
+/// at once.
 ///
 /// # Errors
 /// `Error::Io` when signals cannot be listened for.
 pub(super) fn stop() -> Result<Arc<AtomicBool>> {
     let stop = stop_at_first()?;
-    let mut signals = Signals::new([SIGINT, SIGTERM]).map_err(failed)?;
+    let mut signals = Signals::new(asking()).map_err(failed)?;
     let watch = move || {
         let mut asked = Asked::default();
         for _ in signals.forever() {
@@ -35,19 +36,33 @@ pub(super) fn stop() -> Result<Arc<AtomicBool>> {
     Ok(stop)
 }
 
-/// A flag that SIGINT and SIGTERM raise; a second signal is the caller's.
+/// A flag that SIGINT, SIGTERM and a terminal's end raise; a second signal is the caller's.
 ///
 /// # Errors
 /// `Error::Io` when signals cannot be listened for.
 pub(super) fn stop_at_first() -> Result<Arc<AtomicBool>> {
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [SIGINT, SIGTERM] {
+    for signal in asking() {
         signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(failed)?;
     }
     // Beyond the largest file that is allowed a write fails then, and says so, in place of ending the process.
     let too_large = rustix::process::Signal::XFSZ.as_raw();
     signal_hook::flag::register(too_large, Arc::default()).map_err(failed)?;
     Ok(stop)
+}
+
+/// The signals that ask for an end. SIGHUP, by which a terminal says that it closes, is none under `nohup`.
+fn asking() -> impl Iterator<Item = i32> {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let hup = (!is_ignored(&status, SIGHUP)).then_some(SIGHUP);
+    [SIGINT, SIGTERM].into_iter().chain(hup)
+}
+
+/// Whether who started a process had a signal ignored, by its `/proc/PID/status`.
+fn is_ignored(status: &str, signal: i32) -> bool {
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
 fn failed(e: std::io::Error) -> Error {
@@ -70,7 +85,14 @@ impl Asked {
 
 #[cfg(test)]
 mod tests {
-    use super::{Asked, ECHO_NS};
+    use super::{Asked, ECHO_NS, SIGHUP, SIGTERM, is_ignored};
+
+    #[test]
+    fn a_signal_is_ignored_where_the_kernel_says_so() {
+        let status = "Name:\tsweepd\nSigBlk:\t0000000000000001\nSigIgn:\t0000000000001001\nSigCgt:\t0000000000004000\n";
+        assert!(is_ignored(status, SIGHUP) && !is_ignored(status, SIGTERM));
+        assert!(!is_ignored("", SIGHUP) && !is_ignored("SigIgn:\tx", SIGHUP));
+    }
 
     #[test]
     fn what_comes_at_once_is_an_echo_and_what_comes_later_asks_again() {

@@ -11,7 +11,7 @@ use sweepd::transport::client::{FrameInfo, Heard, Rows, StepError};
 use sweepd::wire::{EndCause, Event};
 
 use crate::live::{
-    Desk, SECOND_NS, TWO_SPHERES, at, finish, output, step, sweepd, tick_until, until,
+    Desk, SECOND_NS, TWO_SPHERES, at, finish, output, step, sweepd, tick_until, until, with_hangups,
 };
 
 /// What `sweepd list --json` says of an instance.
@@ -43,6 +43,25 @@ fn a_signal_ends_the_daemon_within_two_seconds_and_leaves_nothing() {
         let left: Vec<_> = shared.iter().filter(|path| path.exists()).collect();
         assert!(left.is_empty(), "{left:?}");
         assert_eq!(listed(&desk.instance), None);
+    }
+}
+
+#[test]
+fn a_terminal_that_closes_ends_the_daemon_but_under_nohup() {
+    for ignored in [false, true] {
+        let desk = Desk::new();
+        let path = desk.scene(TWO_SPHERES);
+        let mut daemon = desk.start_as(with_hangups(ignored), "run", &[path.to_str().unwrap()]);
+        let mut client = desk.source("sim");
+        step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
+        daemon.signal(Signal::HUP);
+        if ignored {
+            step(&mut client, &[at(1, 0.0), at(2, 0.6)]);
+            daemon.signal(Signal::TERM);
+        }
+        drop(client);
+        assert_eq!(daemon.end().0.code(), Some(0), "{}", daemon.stderr());
+        assert_eq!(desk.files(), Vec::<std::path::PathBuf>::new());
     }
 }
 

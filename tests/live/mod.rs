@@ -76,10 +76,15 @@ impl Desk {
 
     /// `sweepd COMMAND SCENE? --instance OURS ARGS`, its output in files of the desk.
     pub fn start(&self, command: &str, args: &[&str]) -> Running {
+        self.start_as(sweepd(), command, args)
+    }
+
+    /// The same by a binary with surroundings of its own.
+    pub fn start_as(&self, mut binary: Command, command: &str, args: &[&str]) -> Running {
         let number = NUMBERS.fetch_add(1, Ordering::Relaxed);
         let file = |what: &str| self.dir.join(format!("{command}_{number}.{what}"));
         let (stdout, stderr) = (file("out"), file("err"));
-        let child = sweepd()
+        let child = binary
             .arg(command)
             .args(args)
             .args(["--instance", &self.instance])
@@ -155,6 +160,18 @@ pub fn limited(limit: &str) -> Command {
     command
         .args(["-c", &format!("{close}; {limit} && exec \"$@\""), "bash"])
         .arg(env!("CARGO_BIN_EXE_sweepd"));
+    command
+}
+
+/// The binary as a shell starts it that leaves SIGHUP as it is by default, or has it ignored, as `nohup` does.
+pub fn with_hangups(ignored: bool) -> Command {
+    let mut command = Command::new("env");
+    let way = if ignored {
+        "--ignore-signal=HUP"
+    } else {
+        "--default-signal=HUP"
+    };
+    command.arg(way).arg(env!("CARGO_BIN_EXE_sweepd"));
     command
 }
 
