@@ -8,7 +8,7 @@ mod nearest;
 use std::error::Error as StdError;
 
 pub(crate) use counted::counted;
-pub(crate) use nearest::nearest;
+pub(crate) use nearest::{NAMES_COMPARED_MAX, nearest};
 
 /// The cause beneath an [`Error`], as another library or an inner room reported it.
 pub type Source = Box<dyn StdError + Send + Sync + 'static>;

@@ -253,6 +253,19 @@ fn check_says_what_the_daemon_would_do_as_text_and_as_json() {
 }
 
 #[test]
+fn bug_check_counted_the_ignored_pairs_of_bodies_that_are_not_enabled_and_did_not_list_them() {
+    let desk = Desk::new();
+    let scene = desk.scene(&format!("{TWO_SPHERES}parent = \"a\"\nenabled = false\n"));
+    let ended = output(&["check", scene.to_str().unwrap(), "--json", "--ignored"]);
+    let json: serde_json::Value = serde_json::from_slice(&ended.stdout).unwrap();
+    assert_eq!(json["ignored"][0][2], "neighbours", "{json}");
+    assert_eq!(
+        (&json["ignored_pairs"], &json["ignored_left_out"]),
+        (&1.into(), &0.into())
+    );
+}
+
+#[test]
 fn a_closed_pipe_is_a_normal_end() {
     let desk = Desk::new();
     let scene = desk.scene(TWO_SPHERES);

@@ -118,7 +118,7 @@ fn ignored(world: &World) -> (Vec<(&str, &str, String)>, bool) {
     let mut list = Vec::new();
     for (at, (slot_a, a)) in bodies.iter().enumerate() {
         for (slot_b, b) in &bodies[at + 1..] {
-            let because = world.filters().decide(*slot_a, *slot_b);
+            let because = world.filters().decide_if_enabled(*slot_a, *slot_b);
             if because.is_ignored() {
                 if list.len() == IGNORED_SHOWN {
                     return (list, true);

@@ -59,7 +59,7 @@ pub fn gap_between(a: &Body, b: &Body, report_m: f64, meter: &mut Meter<'_>) -> 
         let wholes = whole_bounds(a, b);
         let max = wholes.max.min(found.gap.max);
         Interval {
-            min: wholes.min.min(max),
+            min: wholes.min.max(found.gap.min).min(max),
             max,
         }
     };
@@ -104,9 +104,8 @@ fn of_shapes(
     while turn == Turn::Open && meter.open() {
         turn = cursor.turn(&mut room, shapes, report_m, meter, &mut bench.counters);
     }
-    let max = cursor.upper(shapes);
     Told {
-        gap: Interval::new(cursor.gap.min.min(max), max),
+        gap: cursor.known(shapes),
         done: turn == Turn::Finished,
         certain: cursor.certain,
         witness: cursor.witness,

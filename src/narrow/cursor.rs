@@ -49,9 +49,9 @@ pub(super) struct Cursor {
     found: Run,
     /// Places of the two shapes in their bodies.
     places: (u32, u32),
-    /// The walk over meshes, ...
+    /// The walk over meshes.
     meshes: MeshQuery,
-    /// ... once it is begun.
+    /// Whether the walk over meshes has begun.
     under_way: bool,
     finished: bool,
 }
@@ -133,14 +133,14 @@ impl Cursor {
         contacts.all(&self.found)
     }
 
-    /// An upper bound on the gap of the bodies at the start's pose, from whatever is done by now.
+    /// What is known of the gap of the bodies at the start's pose, from whatever is done by now.
     ///
     /// `one` and `other` are those of [`Cursor::turn`].
-    pub(super) fn upper(&self, (one, other): (&PlacedShape, &PlacedShape)) -> f64 {
+    pub(super) fn known(&self, (one, other): (&PlacedShape, &PlacedShape)) -> Interval {
         if self.under_way && !self.finished {
-            sound(self.meshes.interval(), one, other, &self.rel).max
+            sound(self.meshes.interval(), one, other, &self.rel)
         } else {
-            self.gap.max
+            self.gap
         }
     }
 

@@ -206,7 +206,7 @@ impl Narrow {
         };
         let (report_m, counters) = (memo.report_m, &mut self.counters);
         let turn = cursor.turn(&mut room, shapes, report_m, meter, counters);
-        let high = cursor.upper(shapes);
+        let high = cursor.known(shapes).max;
         let certified = high + memo.reach_m <= 0.0 && memo.now.max > 0.0;
         if turn == Turn::Open && !certified {
             return Turn::Open;

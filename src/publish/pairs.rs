@@ -1,7 +1,7 @@
 //! The list of pairs: every one that is not plainly apart, and every event. Rows of `pairs` are all of it.
 
 use crate::ids::{PairKey, PairSlot, small};
-use crate::math::{Interval, Point, Vec3};
+use crate::math::{Interval, Point};
 use crate::narrow::{Finding, Passage, Witness};
 use crate::wire::{
     BodyStatus, EndCause, Event, Level, MessageHeader, Outbox, PairRow, Verdict, pair_flags,
@@ -299,8 +299,7 @@ fn goes_as_told(tag: &Tag) -> bool {
 fn closing_speed(a: &Body, b: &Body, witness: &Witness) -> f64 {
     let velocity_at = |body: &Body, point: Point| {
         // Who cannot move has none.
-        let [x, y, z, ..] = body.twist_at(&point).unwrap_or_default();
-        Vec3::new(x, y, z)
+        body.twist_at(&point).unwrap_or_default().linear_mps
     };
     let relative = velocity_at(b, witness.point_b) - velocity_at(a, witness.point_a);
     -relative.dot(&(a.pose.rotation * witness.normal))

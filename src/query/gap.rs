@@ -61,7 +61,11 @@ impl GapQuestion {
 /// The slot of a name.
 pub(super) fn find(world: &World, name: &str) -> Result<BodySlot, String> {
     world.slot_named(name).ok_or_else(|| {
-        format!("there is no body \"{name}\" in the scene: the names are those of `names`")
+        let mend = match world.name_meant(name) {
+            Some(meant) => format!("did you mean \"{meant}\"?"),
+            None => "the names are those of `names`".to_owned(),
+        };
+        format!("there is no body \"{name}\" in the scene: {mend}")
     })
 }
 

@@ -57,10 +57,10 @@ impl Goer<'_> {
         } else {
             local.inverse_transform_point(&centre)
         };
-        let [x, y, z, rx, ry, rz] = self.body.velocity.unwrap_or_default();
+        let sent = self.body.velocity.unwrap_or_default();
         Going {
-            linear: Vec3::new(x, y, z),
-            angular: Vec3::new(rx, ry, rz),
+            linear: sent.linear_mps,
+            angular: sent.angular_radps,
             pivot,
         }
     }

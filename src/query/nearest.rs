@@ -6,7 +6,7 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use crate::ids::BodySlot;
+use crate::ids::{BodyId, BodySlot};
 use crate::math::Aabb;
 use crate::world::Body;
 
@@ -17,12 +17,13 @@ pub(super) struct Hit {
     pub(super) bound_m: f64,
     /// Place of what is asked for.
     pub(super) asked: usize,
+    pub(super) id: BodyId,
     pub(super) slot: BodySlot,
 }
 
 impl Ord for Hit {
     fn cmp(&self, other: &Self) -> Ordering {
-        let tie = || (self.slot, self.asked).cmp(&(other.slot, other.asked));
+        let tie = || (self.id, self.asked).cmp(&(other.id, other.asked));
         self.bound_m.total_cmp(&other.bound_m).then_with(tie)
     }
 }
@@ -135,11 +136,12 @@ fn around<'a>(bodies: impl Iterator<Item = &'a Body>) -> Aabb {
 mod tests {
     use super::*;
 
-    fn hit(bound_m: f64, slot: u32) -> Hit {
+    fn hit(bound_m: f64, id: u32) -> Hit {
         Hit {
             bound_m,
             asked: 0,
-            slot: BodySlot(slot),
+            id: BodyId(u64::from(id)),
+            slot: BodySlot(u32::MAX - id),
         }
     }
 
@@ -159,10 +161,10 @@ mod tests {
     #[test]
     fn of_pairs_as_near_as_each_other_those_of_the_first_bodies_are_kept() {
         let mut nearest = Nearest::new(2);
-        for slot in [5, 3, 9, 1] {
-            nearest.take(hit(0.0, slot));
+        for id in [5, 3, 9, 1] {
+            nearest.take(hit(0.0, id));
         }
-        let slots: Vec<u32> = nearest.sorted().iter().map(|hit| hit.slot.0).collect();
-        assert_eq!((slots, 2), (vec![1, 3], 2));
+        let ids: Vec<u64> = nearest.sorted().iter().map(|hit| hit.id.0).collect();
+        assert_eq!(ids, [1, 3]);
     }
 }

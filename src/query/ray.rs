@@ -12,8 +12,8 @@ use std::sync::Arc;
 use nalgebra::Quaternion;
 
 use super::measure::{Measured, WORK_NS, age_ns, fit};
-use super::unknown::Unknown;
-use crate::ids::BodySlot;
+use super::unknown::{Unknown, Whereabouts};
+use crate::ids::{BodyId, BodySlot};
 use crate::limits::RAY_BODIES_MAX;
 use crate::math::{Aabb, Point, Pose, Quat, ROUND, Vec3};
 use crate::scene::Ray;
@@ -24,9 +24,9 @@ use crate::world::{Body, Parts, PlacedShape, World};
 
 /// Pieces of one ray that one body is asked for at most: a hit takes some 50, one that grazes more.
 const LOOKS_MAX: u32 = 400;
-/// The normal is taken so far in front of the hit, in parts of the body's size: nearer, rounding would turn it, ...
+/// The normal is taken so far in front of the hit, in parts of the body's size: nearer, rounding would turn it.
 const STAND_OFF: f64 = 1e-6;
-/// ... and of what has no size, metres.
+/// How far in front of the hit the normal of a body without a finite size is taken, metres.
 const STAND_OFF_M: f64 = 1e-3;
 
 /// A ray, and the bodies whose boxes it passes.
@@ -105,15 +105,15 @@ impl RayQuestion {
 
     fn look_along(&mut self, world: &World, mask: u32) {
         let mut unknown = Unknown::default();
-        let mut hits: Vec<(f64, f64, BodySlot)> = Vec::new();
+        type Hit = (f64, f64, BodyId, BodySlot);
+        let mut hits: Vec<Hit> = Vec::new();
         for (slot, body) in world.bodies_ahead() {
-            let is_lost = body.reach_m.is_infinite() && body.status != BodyStatus::Disabled;
-            let passed = if is_lost {
-                None
-            } else {
-                self.passage(&body.proxy)
+            let place = Whereabouts::of(body);
+            let passed = match place {
+                Whereabouts::Anywhere => None,
+                _ => self.passage(&body.proxy),
             };
-            if passed.is_none() && !is_lost {
+            if passed.is_none() && place == Whereabouts::InItsBox {
                 continue;
             }
             if body.status == BodyStatus::Disabled || !world.filters().is_of(mask, slot) {
@@ -122,12 +122,10 @@ impl RayQuestion {
             }
             unknown.note(body);
             if let (Some((enter_m, leave_m)), Ok(_)) = (passed, fit(body)) {
-                hits.push((enter_m, leave_m, slot));
+                hits.push((enter_m, leave_m, body.id, slot));
             }
         }
-        let order = |one: &(f64, f64, BodySlot), other: &(f64, f64, BodySlot)| {
-            one.0.total_cmp(&other.0).then(one.2.cmp(&other.2))
-        };
+        let order = |one: &Hit, other: &Hit| one.0.total_cmp(&other.0).then(one.2.cmp(&other.2));
         if hits.len() > RAY_BODIES_MAX {
             let (_, first, _) = hits.select_nth_unstable_by(RAY_BODIES_MAX, order);
             self.left_out_from_m = first.0;
@@ -135,7 +133,7 @@ impl RayQuestion {
             hits.truncate(RAY_BODIES_MAX);
         }
         hits.sort_unstable_by(order);
-        let near = hits.into_iter().filter_map(|(enter_m, leave_m, slot)| {
+        let near = hits.into_iter().filter_map(|(enter_m, leave_m, _, slot)| {
             Some(Near {
                 body: world.body(slot)?.still(),
                 enter_m,
@@ -298,6 +296,11 @@ impl RayQuestion {
                 (cast.free_m, cast.hit_m, cast.inside) = (0.0, 0.0, !start.touching);
                 return cast;
             }
+            if end_m <= 0.0 {
+                // There is no piece to look at.
+                cast.misses = start.gap.min > 0.0;
+                return cast;
+            }
         }
         let mut whole = true;
         for _ in 0..LOOKS_MAX {
@@ -340,8 +343,10 @@ impl RayQuestion {
                 cast.touch_m = middle_m;
             }
         }
-        // A ray that grazes touches, and touching counts as a hit.
-        if cast.hit_m.is_infinite() && !cast.misses {
+        // A ray that grazes touches, and touching counts as a hit: where that is told from a way of many pieces, each
+        // within the rounding of its far end, it is not.
+        let is_closed = cast.until_m - cast.free_m <= 4.0 * self.slop_m(cast.until_m);
+        if cast.hit_m.is_infinite() && !cast.misses && is_closed && cast.touch_m <= cast.until_m {
             cast.hit_m = cast.touch_m;
         }
         cast.free_m = cast.free_m.min(cast.hit_m);

@@ -13,7 +13,7 @@ use std::cmp::Reverse;
 use super::gap::find;
 use super::measure::{Measured, WORK_NS, age_ns, fit};
 use super::nearest::{Groups, Hit, Nearest};
-use super::unknown::Unknown;
+use super::unknown::{Unknown, Whereabouts};
 use crate::ids::BodySlot;
 use crate::limits::TOUCHING_ROWS_MAX;
 use crate::math::{Pose, ROUND};
@@ -112,11 +112,9 @@ impl TouchingQuestion {
         let (mut hits, mut unknown) = (Nearest::new(TOUCHING_ROWS_MAX), Unknown::default());
         let groups = Groups::of(&self.asked);
         for (slot, other) in world.bodies_ahead() {
-            let is_lost = other.reach_m.is_infinite() && other.status != BodyStatus::Disabled;
-            let reach_m = if is_lost {
-                f64::INFINITY
-            } else {
-                self.within_m
+            let reach_m = match Whereabouts::of(other) {
+                Whereabouts::InItsBox => self.within_m,
+                Whereabouts::HeldThere | Whereabouts::Anywhere => f64::INFINITY,
             };
             // Most bodies are far from all.
             if groups.whole.distance(&other.proxy) > reach_m || slots.contains(&slot) {
@@ -142,10 +140,11 @@ impl TouchingQuestion {
                     continue;
                 }
                 is_asked = true;
-                if fit(other).is_ok() {
+                if bound_m <= self.within_m && fit(other).is_ok() {
                     hits.take(Hit {
                         bound_m,
                         asked: place,
+                        id: other.id,
                         slot,
                     });
                 }

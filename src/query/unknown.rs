@@ -5,6 +5,28 @@ use crate::limits::UNKNOWN_ROWS_MAX;
 use crate::wire::{BodyStatus, UnknownBody};
 use crate::world::Body;
 
+/// Where a body may be, for who asks around.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Whereabouts {
+    /// Nowhere but within its box.
+    InItsBox,
+    /// There, and elsewhere, too: it is held at a pose of long ago.
+    HeldThere,
+    /// Nothing bounds its place.
+    Anywhere,
+}
+
+impl Whereabouts {
+    pub(super) fn of(body: &Body) -> Self {
+        match body.status {
+            BodyStatus::Disabled => Self::InItsBox,
+            BodyStatus::Held => Self::HeldThere,
+            _ if body.reach_m.is_infinite() => Self::Anywhere,
+            _ => Self::InItsBox,
+        }
+    }
+}
+
 /// Those that were met.
 #[derive(Debug, Default)]
 pub(super) struct Unknown {

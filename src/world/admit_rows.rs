@@ -7,6 +7,7 @@ use super::World;
 use super::admit::{NO_BODY, Times};
 use super::ahead::AHEAD;
 use super::tag::Tag;
+use super::twist::Twist;
 use crate::ids::BodyId;
 use crate::ids::{BodySlot, SourceSlot};
 use crate::limits::{COORDINATE_MAX_M, QUATERNION_NORM_TOLERANCE};
@@ -55,8 +56,9 @@ impl World {
                 Ok(pose) => {
                     let stamp_ns = frame.stamps_ns.get(at).copied();
                     let stamp_ns = stamp_ns.unwrap_or(frame.header.stamp_ns);
+                    let velocity = velocity.map(Twist::of_row);
                     let declared = self.declared_turn(slot, stamp_ns, velocity);
-                    let other_speed = self.renew(slot, stamp_ns, velocity.copied(), times);
+                    let other_speed = self.renew(slot, stamp_ns, velocity, times);
                     let pose = pose.map(|pose| (pose, raw));
                     let moved = self.accept(slot, pose, declared, deadline_ns, young);
                     if other_speed && !moved {
@@ -92,13 +94,12 @@ impl World {
         &mut self,
         slot: BodySlot,
         stamp_ns: u64,
-        velocity: Option<[f64; 6]>,
+        velocity: Option<Twist>,
         times: Times,
     ) -> bool {
         if let Some(body) = self.bodies[slot.index()].as_mut() {
-            let bits = |v: Option<[f64; 6]>| v.map(|v| v.map(f64::to_bits));
-            let other_speed = bits(body.velocity) != bits(velocity);
-            body.velocity = velocity;
+            let was = std::mem::replace(&mut body.velocity, velocity);
+            let other_speed = !Twist::is_same(was, velocity);
             body.stamp_ns = stamp_ns;
             body.since_ns = Some(times.since_ns);
             body.received_ns = times.received_ns;
@@ -118,10 +119,10 @@ impl World {
         &self,
         slot: BodySlot,
         stamp_ns: u64,
-        velocity: Option<&[f64; 6]>,
+        velocity: Option<Twist>,
     ) -> Option<Vec3> {
         let body = self.body(slot).filter(|body| body.path.is_some())?;
-        let [_, _, _, x, y, z] = *velocity?;
+        let turning = velocity?.angular_radps;
         // The stamp of what it hung on is of another clock.
         let is_own = self.entries[slot.index()].raw[0].is_finite();
         if !is_own || body.stamp_ns == 0 || stamp_ns <= body.stamp_ns {
@@ -129,7 +130,7 @@ impl World {
         }
         #[allow(clippy::cast_precision_loss, reason = "stamps of one body are near")]
         let time_s = (stamp_ns - body.stamp_ns) as f64 * 1e-9;
-        Some(Vec3::new(x, y, z) * time_s)
+        Some(turning * time_s)
     }
 
     /// A good row: its pose, where it is not the one the body has.

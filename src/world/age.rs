@@ -8,6 +8,7 @@ use super::body::Body;
 use super::census::{slot_at, source_at};
 use super::place::grows;
 use super::source::SourceState;
+use super::twist::Twist;
 use crate::config::OnStale;
 use crate::ids::{BodySlot, small};
 
@@ -274,13 +275,12 @@ impl World {
     }
 
     /// Gives a body another velocity; whether it is another one.
-    pub(super) fn take_velocity(&mut self, slot: BodySlot, velocity: Option<[f64; 6]>) -> bool {
-        let bits = |v: Option<[f64; 6]>| v.map(|v| v.map(f64::to_bits));
+    pub(super) fn take_velocity(&mut self, slot: BodySlot, velocity: Option<Twist>) -> bool {
         let Some(body) = self.bodies[slot.index()].as_mut() else {
             return false;
         };
         let was = std::mem::replace(&mut body.velocity, velocity);
-        bits(was) != bits(velocity)
+        !Twist::is_same(was, velocity)
     }
 
     fn source_of(&self, body: &Body) -> Option<&SourceState> {

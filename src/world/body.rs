@@ -2,12 +2,13 @@
 
 use crate::config::OnStale;
 use crate::ids::{BodyId, BodySlot, SourceSlot};
-use crate::math::{Aabb, Point, Pose, Vec3, displacement};
+use crate::math::{Aabb, Point, Pose, displacement};
 use crate::wire::{BodyStatus, EndCause, RejectReason};
 
 use super::bend::Vertices;
 use super::parts::Parts;
 use super::path::Path;
+use super::twist::Twist;
 
 /// A body as the engine sees it in this tick.
 #[derive(Clone, Debug)]
@@ -26,9 +27,8 @@ pub struct Body {
     pub unbounded: bool,
     /// Last admitted pose, scene frame.
     pub pose: Pose,
-    /// Linear and angular velocity of that pose, scene frame, where the sender gave them; of a body that hangs on
-    /// another as those of the other move it.
-    pub velocity: Option<[f64; 6]>,
+    /// How fast that pose moves, where the sender said it; of a body that hangs on another as the other moves it.
+    pub velocity: Option<Twist>,
     /// Centre of its geometry in the body frame: the reference point of its motion.
     pub centre: Point,
     /// Greatest distance of its geometry from `centre`, metres.
@@ -72,15 +72,12 @@ pub struct Body {
 }
 
 impl Body {
-    /// Linear and angular velocity of a frame that moves with the body, where the body's own are known: scene frame.
+    /// How fast a frame moves that is fixed to the body, where the body's own velocity is known.
     ///
     /// * `point` - the frame's origin, body frame, metres.
     #[must_use]
-    pub fn twist_at(&self, point: &Point) -> Option<[f64; 6]> {
-        let [x, y, z, rx, ry, rz] = self.velocity?;
-        let (linear, angular) = (Vec3::new(x, y, z), Vec3::new(rx, ry, rz));
-        let there = linear + angular.cross(&(self.pose.rotation * point.coords));
-        Some([there.x, there.y, there.z, rx, ry, rz])
+    pub fn twist_at(&self, point: &Point) -> Option<Twist> {
+        Some(self.velocity?.at(&self.pose, point))
     }
 }
 

@@ -188,7 +188,7 @@ impl Filters {
     }
 
     /// As [`Filters::decide`], enabled or not.
-    fn decide_enabled(&self, a: &Hot, b: &Hot) -> Because {
+    pub(super) fn decide_enabled(&self, a: &Hot, b: &Hot) -> Because {
         if let Some(never) = never(a, b) {
             return never;
         }

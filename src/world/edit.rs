@@ -344,11 +344,7 @@ impl World {
         }
         entry.enabled = enabled;
         if let Some(hot) = self.hot(slot) {
-            hot.flags = if enabled {
-                hot.flags | ENABLED
-            } else {
-                hot.flags & !ENABLED
-            };
+            hot.set(ENABLED, enabled);
         }
         self.settle(slot, false);
         true

@@ -214,9 +214,18 @@ impl<'a> Draft<'a> {
     }
 
     fn must_have(&self, name: &str) -> Result<Sketch<'a>, String> {
-        self.body(name).ok_or_else(|| {
-            format!("there is no body `{name}`: correct the name, or put the body first")
-        })
+        self.body(name)
+            .ok_or_else(|| self.no_body(name, "put the body first"))
+    }
+
+    /// That no body has a name, and what to change: the name, or else.
+    fn no_body(&self, name: &str, or_else: &str) -> String {
+        let meant = self.world.name_meant(name).filter(|meant| self.has(meant));
+        let mend = match meant {
+            Some(meant) => format!("did you mean `{meant}`? If not, {or_else}"),
+            None => format!("correct the name, or {or_else}"),
+        };
+        format!("there is no body `{name}`: {mend}")
     }
 
     fn look_at_put(&mut self, spec: &'a BodySpec, shapes: usize) -> Result<(), String> {

@@ -178,6 +178,17 @@ impl Filters {
         by_default(hot_a, hot_b)
     }
 
+    /// As [`Filters::decide`], as if both were enabled: what [`Filters::ignored_pairs_count`] counts.
+    #[must_use]
+    pub fn decide_if_enabled(&self, a: BodySlot, b: BodySlot) -> Because {
+        match (self.bodies.get(a.index()), self.bodies.get(b.index())) {
+            (Some(hot_a), Some(hot_b)) if a != b && hot_a.flags & hot_b.flags & LIVE != 0 => {
+                self.decide_enabled(hot_a, hot_b)
+            }
+            _ => Because::Disabled,
+        }
+    }
+
     /// Whether what is no body of the scene, of this group and mask, is checked with a body: by the masks alone.
     #[must_use]
     pub fn allows_stranger(&self, group: u32, mask: u32, slot: BodySlot) -> bool {
@@ -185,11 +196,11 @@ impl Filters {
         hot.has(LIVE) && hot.has(ENABLED) && group & hot.mask != 0 && hot.group & mask != 0
     }
 
-    /// Whether a body is of one of these groups.
+    /// Whether a body is of one of these groups; of all groups is each, also one that is of none.
     #[must_use]
     pub fn is_of(&self, groups: u32, slot: BodySlot) -> bool {
         let hot = self.bodies.get(slot.index()).unwrap_or(&Hot::GONE);
-        hot.has(LIVE) && hot.group & groups != 0
+        hot.has(LIVE) && (hot.group & groups != 0 || groups == u32::MAX)
     }
 
     /// The reason text of the rule that decides a pair; `None` where none does.

@@ -2,7 +2,6 @@
 //!
 //! In: what happened to a slot. Out: the change set as the broad phase reads it, removals first.
 
-use super::World;
 use super::body::{ChangeSet, Removed};
 use crate::ids::BodySlot;
 use crate::wire::EndCause;
@@ -35,24 +34,6 @@ impl Places {
 pub(super) struct Lists {
     set: ChangeSet,
     places: Vec<Places>,
-}
-
-impl World {
-    /// Opens a tick: the change set is empty again, and slots freed in the tick before may be used.
-    ///
-    /// * `now_boot_ns` - nanoseconds of `CLOCK_BOOTTIME`.
-    pub fn begin_tick(&mut self, tick: u64, now_boot_ns: u64) {
-        self.tick = tick;
-        self.begun_ns = now_boot_ns;
-        if !std::mem::take(&mut self.first) {
-            self.lists.clear();
-            self.names_changed = false;
-            self.edited = false;
-        }
-        self.free.append(&mut self.resting);
-        self.take_timeouts();
-        self.end_travels();
-    }
 }
 
 impl Lists {

@@ -14,6 +14,7 @@ mod bend;
 mod body;
 mod census;
 mod chain;
+mod counts;
 mod edit;
 mod edit_check;
 mod edit_links;
@@ -35,6 +36,7 @@ mod source;
 mod tag;
 mod travel;
 mod trees;
+mod twist;
 mod validate;
 
 use std::sync::Arc;
@@ -43,6 +45,7 @@ pub use admit::Admission;
 pub use ahead::AHEAD;
 pub use bend::Vertices;
 pub use body::{Body, ChangeSet, Motion, Removed};
+pub use counts::Counts;
 pub use edit::{Applied, Edit};
 pub use filters::{Because, Filters};
 pub use gaze::Gaze;
@@ -52,13 +55,14 @@ pub use path::{Leg, Path};
 pub use source::SourceState;
 pub use tag::Tag;
 pub use trees::{BuiltTree, TreeOf, WornTree};
+pub use twist::Twist;
 
 use crate::config::{Config, Viewpoint};
 use crate::error::{Error, Result};
 use crate::ids::{BodyId, BodySlot, SourceSlot};
 use crate::math::Aabb;
 use crate::scene::Scene;
-use crate::wire::{BodyStatus, Reason};
+use crate::wire::BodyStatus;
 use age::Ages;
 use census::source_at;
 use lists::Lists;
@@ -67,19 +71,6 @@ use place::Entry;
 use refusals::Refusals;
 use source::SessionsOver;
 use tag::Tags;
-
-/// How many bodies are in which state; what the tick row says of them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Bodies in the scene.
-    pub bodies: u64,
-    /// Bodies whose place is not known: not received, rejected or stale.
-    pub unknown: u64,
-    /// Bits of `wire::Reason` that the bodies and sources give.
-    pub reasons: u32,
-    /// Bodies by `BodyStatus`.
-    pub by_status: [u64; BodyStatus::ALL.len()],
-}
 
 /// Bodies, sources, filters and ages.
 #[derive(Clone, Debug)]
@@ -227,6 +218,22 @@ impl World {
         }
     }
 
+    /// Opens a tick: the change set is empty again, and slots freed in the tick before may be used.
+    ///
+    /// * `now_boot_ns` - nanoseconds of `CLOCK_BOOTTIME`.
+    pub fn begin_tick(&mut self, tick: u64, now_boot_ns: u64) {
+        self.tick = tick;
+        self.begun_ns = now_boot_ns;
+        if !std::mem::take(&mut self.first) {
+            self.lists.clear();
+            self.names_changed = false;
+            self.edited = false;
+        }
+        self.free.append(&mut self.resting);
+        self.take_timeouts();
+        self.end_travels();
+    }
+
     /// What this tick changed so far; complete after [`World::age`].
     #[must_use]
     pub fn changes(&self) -> &ChangeSet {
@@ -338,34 +345,6 @@ impl World {
     #[must_use]
     pub fn stamps(&self) -> (u64, u64) {
         self.ages.stamps()
-    }
-
-    /// What the bodies and sources make of the tick.
-    #[must_use]
-    pub fn counts(&self) -> Counts {
-        let of = |status: BodyStatus| self.by_status[usize::from(status.code())];
-        let bodies: u64 = self.by_status.iter().sum();
-        let silent = !self.sources.is_empty() && self.sources.iter().all(|s| s.frames == 0);
-        let reasons = [
-            (Reason::NotReceived, of(BodyStatus::NotReceived) > 0),
-            (Reason::Rejected, of(BodyStatus::Rejected) > 0),
-            (Reason::Stale, of(BodyStatus::Stale) > 0),
-            (Reason::Held, of(BodyStatus::Held) > 0),
-            (Reason::RemovedByAge, of(BodyStatus::RemovedByAge) > 0),
-            (
-                Reason::NoInput,
-                bodies == of(BodyStatus::Disabled) || silent,
-            ),
-        ];
-        Counts {
-            bodies,
-            unknown: of(BodyStatus::NotReceived) + of(BodyStatus::Rejected) + of(BodyStatus::Stale),
-            reasons: reasons
-                .iter()
-                .filter(|(_, holds)| *holds)
-                .fold(0, |bits, (reason, _)| bits | reason.bit()),
-            by_status: self.by_status,
-        }
     }
 
     /// Counts frames that were passed over because a newer one of their source was there, or that never came.

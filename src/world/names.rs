@@ -6,6 +6,8 @@
 use std::collections::BTreeMap;
 use std::ops::Bound;
 
+use super::World;
+use crate::error::{NAMES_COMPARED_MAX, nearest};
 use crate::ids::{BodyId, BodySlot};
 use crate::scene::{is_pattern, literal_ends, pattern_matches};
 
@@ -126,6 +128,17 @@ impl Names {
         }
         self.least_free = id;
         BodyId(id)
+    }
+}
+
+impl World {
+    /// The body that was most likely meant by a name that none has, to be told to who asked for it.
+    ///
+    /// Cost: a comparison with each of the first [`NAMES_COMPARED_MAX`] names.
+    pub(crate) fn name_meant(&self, name: &str) -> Option<&str> {
+        let there = self.bodies().take(NAMES_COMPARED_MAX);
+        let there: Vec<&str> = there.map(|(_, body)| &*body.name).collect();
+        nearest(name, &there)
     }
 }
 

@@ -1,5 +1,6 @@
 //! What a ray hits: against closed forms, cut off at any unit, and where places are not known.
 
+mod doubts;
 mod grazes;
 mod truth;
 

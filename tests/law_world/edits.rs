@@ -301,6 +301,13 @@ fn law_6_a_request_is_done_as_a_whole_or_not_at_all() {
         "edit 3: there is no body `nobody`: correct the name, or put the body first"
     );
     assert!(bench.world.slot_named("b").is_none());
+    let mut arm = Bench::of(vec![moving("arm/hand", 1)]);
+    assert_eq!(
+        arm.refused(&[Edit::Remove {
+            name: named("arm/hnad")
+        }]),
+        "edit 1: there is no body `arm/hnad`: did you mean `arm/hand`? If not, put the body first"
+    );
     // Within a request, what was put before is there, and what was removed is not.
     bench.tick_at(bench.now_ns, &[], &[]);
     let edits = [

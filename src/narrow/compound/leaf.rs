@@ -295,7 +295,7 @@ impl CompoundFront {
         } else {
             f64::NEG_INFINITY
         };
-        let high = cursor.upper(shapes);
+        let high = cursor.known(shapes).max;
         let gap = Interval::new(low.min(high), high).widened(since_m);
         self.known.high = self.known.high.min(gap.max);
         let here = whole && since_m == 0.0;

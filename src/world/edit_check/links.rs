@@ -173,10 +173,8 @@ impl<'a> Draft<'a> {
                 && self.has(&body.name)
                 && let Some(parent) = body.parent.as_deref().filter(|p| !self.has(p))
             {
-                return Err(format!(
-                    "body `{}`: there is no body `{parent}` to be its parent: correct the name, or put it too",
-                    body.name
-                ));
+                let why = self.no_body(parent, "put it too");
+                return Err(format!("body `{}`: its parent: {why}", body.name));
             }
         }
         let world = self.world;

@@ -42,6 +42,26 @@ fn bug_what_is_farther_than_a_shape_may_be_large_is_hit_too() {
     assert!((point.z + 5.0).abs() <= 1e-12, "{found:?}");
 }
 
+/// How far rounding puts the end of a ray astray grows with its length, and is more than its height above a floor far out.
+#[test]
+fn bug_a_ray_along_a_half_space_hit_it_at_the_end_of_the_world() {
+    let floor = "name = \"floor\"\nid = 9\nmoves = false\nshape = { type = \"half_space\", normal = [0, 0, 1], offset = 0.0 }\n";
+    let rig = Rig::new(&scene("", &[floor.to_owned()]));
+    for height in [1e-9, 1e-6, 1e-3, 0.01, 0.1, 1.0] {
+        for (more, may_doubt) in [("", true), (", \"max_m\": 100000", height < 1e-8)] {
+            let from = Vec3::new(0.0, 0.0, height);
+            let found = ask(rig.engine.world(), &json(&from, &Vec3::x(), more));
+            assert_ne!(
+                found.verdict,
+                Verdict::Colliding.code(),
+                "{height} {found:?}"
+            );
+            let apart = found.verdict == Verdict::Apart.code();
+            assert!(apart || may_doubt, "{height} {found:?}");
+        }
+    }
+}
+
 /// What a ray hits of one body that stands at a pose.
 fn cast(shape: &str, pose: &Pose, from: &Vec3, direction: &Vec3) -> RayFound {
     let mut rig = Rig::new(&scene("", &[body(1, [0.0; 3], shape, "")]));

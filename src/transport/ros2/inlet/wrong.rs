@@ -9,7 +9,7 @@ use super::super::poses::{Receipt, off, seconds};
 use super::super::tf::{no_pose, plain, sound};
 use super::super::told::brief;
 use super::frames::{id, velocity};
-use crate::error::nearest;
+use crate::error::{NAMES_COMPARED_MAX, nearest};
 use crate::limits::FRAME_ROWS_MAX;
 use crate::wire::ros::{BodyTransform, BodyTransforms, Book, Twist};
 use crate::wire::{RejectReason, frame_flags};
@@ -18,8 +18,6 @@ use crate::wire::{RejectReason, frame_flags};
 const SENT_OFF_NS: u64 = 1_000_000_000;
 /// Sources named at most where one is missing.
 const SOURCES_TOLD_MAX: usize = 8;
-/// Names of bodies that a missing one is compared with at most: half a millisecond or so each thousand.
-const NAMES_COMPARED_MAX: usize = 4096;
 
 /// What is wrong with a frame.
 #[derive(Clone, Debug, PartialEq)]
