@@ -223,7 +223,7 @@ impl Default for Limits {
             pair_rows: limits::PAIR_ROWS_DEFAULT,
             contact_rows: limits::CONTACT_ROWS_DEFAULT,
             region_rows: limits::REGION_ROWS_DEFAULT,
-            contacts_per_pair: limits::MANIFOLD_POINTS_MAX,
+            contacts_per_pair: limits::CONTACTS_PER_PAIR_DEFAULT,
         }
     }
 }
@@ -243,11 +243,11 @@ impl Default for Config {
             mode: Mode::OnAll,
             budget: Budget::UNLIMITED,
             heartbeat_ns: limits::HEARTBEAT_MS_DEFAULT * 1_000_000,
-            late_ns: 5_000_000,
+            late_ns: limits::LATE_MS_DEFAULT * 1_000_000,
             broad_phase: None,
             threads: None,
             mesh_search: None,
-            stale_reach_m: 1.0,
+            stale_reach_m: limits::STALE_REACH_M_DEFAULT,
             viewpoint: None,
             limits: Limits::default(),
         }

@@ -47,8 +47,10 @@ pub const REGION_TESTS_PER_PAIR: u32 = 64;
 pub const REGION_LOOKS_FREE: usize = 64;
 /// The same for all pairs of one tick, shared by them: some 1 ms at most.
 pub const REGION_LOOKS_PER_TICK: usize = 1 << 11;
-/// Contacts of one shape pair.
+/// Contact points of one manifold: of two convex shapes, or of one flat patch of meshes.
 pub const MANIFOLD_POINTS_MAX: usize = 4;
+/// Contacts of one body pair, unless the scene says another number: one manifold's.
+pub const CONTACTS_PER_PAIR_DEFAULT: usize = MANIFOLD_POINTS_MAX;
 /// Contacts of one body pair, deepest first.
 pub const CONTACTS_PER_PAIR_MAX: usize = 16;
 /// Transforms in one frame; more are refused as `over_limit`.
@@ -98,6 +100,10 @@ pub const RATE_HZ_MIN: f64 = 1e-3;
 pub const RATE_HZ_MAX: f64 = 1e5;
 /// Default heartbeat, milliseconds.
 pub const HEARTBEAT_MS_DEFAULT: u64 = 100;
+/// How long a round of `on_all` waits for the sources still silent after its first frame by default, milliseconds.
+pub const LATE_MS_DEFAULT: u64 = 5;
+/// Beyond this reach a body that is too old makes no new pairs by default, metres.
+pub const STALE_REACH_M_DEFAULT: f64 = 1.0;
 /// Default spin of a wait before it sleeps, microseconds: a wake-up costs 10 to 25, so a peer that answers within this
 /// is heard sooner; longer, and a source at 1 kHz would cost the daemon more than 5 % of a core.
 pub const SPIN_US_DEFAULT: u64 = 50;
@@ -145,6 +151,9 @@ pub const UNKNOWN_ROWS_MAX: usize = 256;
 /// Bytes that wait for the thread that records; beyond it the disk does not follow and the recording ends, the daemon
 /// goes on. A tick of 1,000 bodies takes some 100 kB.
 pub const RECORD_QUEUE_BYTES_MAX: usize = 1 << 26;
+/// The same of what edits came with, which is large and seldom, and in memory anyway while they are done: two of the
+/// largest requests.
+pub const RECORD_EDIT_BYTES_MAX: usize = 2 * REQUEST_BYTES_MAX;
 
 const _: () = {
     assert!(BODIES_MAX < u32::MAX as usize);

@@ -249,7 +249,7 @@ impl TickRecord {
         copy_outbox(out, self.ask.demand, &mut self.out);
     }
 
-    /// Memory of it that is in use, bytes.
+    /// Memory of it that is in use without what was asked for with its edits, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         let (mut bytes, out) = (size_of::<Self>(), &self.out);
@@ -260,16 +260,22 @@ impl TickRecord {
         for frame in self.inbox.vertices() {
             bytes += size_of_val(frame) + size_of_val(&*frame.rows);
         }
-        for edit in &self.edits {
-            bytes += size_of_val(edit);
-            if let Origin::Asked(asked) = &edit.origin {
-                bytes += asked.payload.len();
-                bytes += asked.files.values().map(|file| file.len()).sum::<usize>();
-            }
-        }
+        bytes += size_of_val(&*self.edits);
         bytes += size_of_val(&*out.pairs) + size_of_val(&*out.contacts);
         bytes += size_of_val(&*out.regions) + size_of_val(&*out.bodies);
         bytes + out.body_verdicts.len() + size_of_val(&*out.names) + out.plan.len()
+    }
+
+    /// Memory of the requests and files that its edits came with, bytes.
+    #[must_use]
+    pub fn edit_bytes(&self) -> usize {
+        let asked = self.edits.iter().map(|edit| match &edit.origin {
+            Origin::Asked(asked) => {
+                asked.payload.len() + asked.files.values().map(|file| file.len()).sum::<usize>()
+            }
+            _ => 0,
+        });
+        asked.sum()
     }
 
     /// Empties it, keeps the memory of what each tick has.

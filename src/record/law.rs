@@ -53,7 +53,7 @@ pub(super) fn judge(
                     judged.collisions += u64::from(missed.is_some());
                     two = b.next();
                     missed
-                        .filter(|_| told)
+                        .filter(|row| told && !only_touches(row))
                         .map(|row| spot(row, "verdict", "no row: apart", &words(row)))
                 }
             };
@@ -98,6 +98,16 @@ fn touches(row: &PairRow) -> bool {
     verdict(row) == Verdict::Colliding || has(row, pair_flags::SWEPT_HIT)
 }
 
+/// Whether 0 is within the rounding: then either certificate may be had.
+fn is_touch(row: &PairRow) -> bool {
+    has(row, pair_flags::TOUCHING)
+}
+
+/// A touch within rounding, and none on the way.
+fn only_touches(row: &PairRow) -> bool {
+    is_touch(row) && !has(row, pair_flags::SWEPT_HIT)
+}
+
 fn is_apart(row: &PairRow) -> bool {
     matches!(verdict(row), Verdict::Apart | Verdict::Near)
 }
@@ -114,8 +124,7 @@ fn both(one: &PairRow, two: &PairRow, judged: &mut Judged) -> Option<Spot> {
         let show = |row: &PairRow| format!("{:?} to {:?}", row.gap_min_m, row.gap_max_m);
         return Some(spot(one, "gap interval, metres", &show(one), &show(two)));
     }
-    // Where 0 is within the rounding either certificate may be had.
-    let touching = has(one, pair_flags::TOUCHING) || has(two, pair_flags::TOUCHING);
+    let touching = is_touch(one) || is_touch(two);
     let collides = |row: &PairRow| verdict(row) == Verdict::Colliding;
     let against = (collides(one) && is_apart(two)) || (is_apart(one) && collides(two));
     if against && !touching {
@@ -150,7 +159,7 @@ fn is_of_before(row: &PairRow) -> bool {
 /// A pair that the recording alone tells of: the replay proved it apart, and not near.
 fn alone(one: &PairRow) -> Option<Spot> {
     let wrong = touches(one) || one.gap_max_m <= 0.0;
-    let wrong = wrong && !has(one, pair_flags::TOUCHING);
+    let wrong = wrong && !is_touch(one);
     wrong.then(|| spot(one, "verdict", &words(one), "no row: apart"))
 }
 
@@ -158,13 +167,17 @@ fn alone(one: &PairRow) -> Option<Spot> {
 fn state(recorded: &Outbox, replayed: &Outbox) -> Option<Spot> {
     let word = |out: &Outbox| State::from_code(out.tick.header.state);
     let (one, two) = (word(recorded)?, word(replayed)?);
-    let safe = matches!(one, State::Clear | State::Near);
-    let denied = safe && two == State::Colliding;
+    let is_safe = |state: State| matches!(state, State::Clear | State::Near);
+    // By touches within rounding alone either word may be had.
+    let by_touches = |out: &Outbox| {
+        let mut touching = out.pairs.iter().filter(|row| touches(row)).peekable();
+        touching.peek().is_some() && touching.all(only_touches)
+    };
+    let denied = is_safe(one) && two == State::Colliding && !by_touches(replayed);
     let of_now = |row: &&PairRow| touches(row) && !is_of_before(row);
     let of_before = recorded.pairs.iter().any(is_of_before);
     let of_before = of_before && !recorded.pairs.iter().any(|row| of_now(&row));
-    let invented =
-        one == State::Colliding && matches!(two, State::Clear | State::Near) && !of_before;
+    let invented = one == State::Colliding && is_safe(two) && !of_before && !by_touches(recorded);
     (denied || invented).then(|| Spot {
         field: "state".to_owned(),
         ..Spot::whole("tick", one.word(), two.word())
@@ -224,7 +237,18 @@ mod tests {
         let mut touch = row(2, Verdict::Colliding, -1e-16, 1e-16);
         touch.flags = pair_flags::TOUCHING;
         let near = row(2, Verdict::Near, 1e-17, 2e-16);
-        assert_eq!(field(vec![near], vec![touch]), None);
+        for one in [vec![near], vec![]] {
+            let (mut one, mut two) = (out(one), out(vec![touch]));
+            one.tick.header.state = State::Clear.code();
+            two.tick.header.state = State::Colliding.code();
+            for (recorded, replayed) in [(&one, &two), (&two, &one)] {
+                let judged = &mut Judged::default();
+                assert_eq!(judge(recorded, replayed, Demand::ALL, judged), None);
+            }
+            // One on the way is another matter.
+            two.pairs[0].flags |= pair_flags::SWEPT_HIT;
+            assert!(judge(&one, &two, Demand::ALL, &mut Judged::default()).is_some());
+        }
         // The last row of a pair that is gone says nothing of now.
         let mut gone = deep;
         gone.flags = pair_flags::GONE;

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use super::given::{Ask, Between, EditRecord, Origin, TickRecord};
 use crate::error::{Error, Result};
-use crate::limits::RECORD_QUEUE_BYTES_MAX;
+use crate::limits::{RECORD_EDIT_BYTES_MAX, RECORD_QUEUE_BYTES_MAX};
 use crate::tick::Engine;
 use crate::time::{Clock as _, SystemClock};
 use crate::wire::{Demand, Inbox};
@@ -58,9 +58,10 @@ struct Desk {
 
 #[derive(Default)]
 struct State {
-    /// Records to be written, and what they take.
+    /// Records to be written, what they take, and what their edits came with.
     waiting: VecDeque<Box<TickRecord>>,
     bytes: usize,
+    edit_bytes: usize,
     #[allow(
         clippy::vec_box,
         reason = "they go from list to list, and each is kilobytes by itself"
@@ -199,14 +200,18 @@ impl Recorder {
     fn hand_over(&mut self, state: &mut State) {
         self.spare = state.spare.pop();
         while let Some(record) = self.held.pop_front() {
-            let bytes = record.bytes();
+            let (bytes, edit_bytes) = (record.bytes(), record.edit_bytes());
+            let too_many = state.bytes > 0 && state.bytes + bytes > RECORD_QUEUE_BYTES_MAX;
+            let too_large = state.edit_bytes > 0
+                && edit_bytes > 0
+                && state.edit_bytes + edit_bytes > RECORD_EDIT_BYTES_MAX;
             if state.failed.is_some() {
                 self.over = true;
-            } else if state.bytes > 0 && state.bytes + bytes > RECORD_QUEUE_BYTES_MAX {
+            } else if too_many || too_large {
                 self.over = true;
                 let why = format!(
                     "the disk did not follow: {} MB waited to be written before tick {}",
-                    state.bytes / 1_000_000,
+                    (state.bytes + state.edit_bytes) / 1_000_000,
                     record.out.tick.header.tick
                 );
                 tracing::error!(
@@ -219,6 +224,7 @@ impl Recorder {
                 return;
             }
             state.bytes += bytes;
+            state.edit_bytes += edit_bytes;
             state.waiting.push_back(record);
         }
     }
@@ -262,7 +268,7 @@ fn write(desk: &Desk, mut sink: Box<dyn Sink>) {
         tracing::error!("the recording ends, the daemon goes on: {text}");
         let mut state = desk.lock();
         state.waiting.clear();
-        state.bytes = 0;
+        (state.bytes, state.edit_bytes) = (0, 0);
         state.spare = Vec::new();
         state.failed = Some(error);
     }
@@ -284,11 +290,12 @@ fn write_all(desk: &Desk, sink: &mut dyn Sink) -> Result<()> {
         if let Some(mut record) = next {
             sink.tick(&record, hurried)?;
             is_dirty = true;
-            let bytes = record.bytes();
+            let (bytes, edit_bytes) = (record.bytes(), record.edit_bytes());
             // Requests are large and seldom: their memory is given back here, and not where a tick waits for it.
             record.edits.clear();
             let mut state = desk.lock();
             state.bytes = state.bytes.saturating_sub(bytes);
+            state.edit_bytes = state.edit_bytes.saturating_sub(edit_bytes);
             if state.spare.len() < SPARE_MAX {
                 state.spare.push(record);
             }

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use super::*;
+use crate::record::given::Asked;
 use crate::scene::Scene;
 use crate::tick::TickInput;
 use crate::tick::build::build_shapes;
@@ -131,6 +132,31 @@ fn a_disk_that_does_not_follow_ends_the_recording_and_nothing_else() {
         heard[4].starts_with("end the disk did not follow"),
         "{heard:?}"
     );
+}
+
+#[test]
+fn bug_an_edit_larger_than_what_may_wait_ended_the_recording() {
+    let (mut recorder, heard, let_go) = slow();
+    let mut engine = engine();
+    run(&mut engine, &mut recorder, &Inbox::default());
+    let mut record = Box::<TickRecord>::default();
+    record.edits.push(EditRecord {
+        token: 0,
+        origin: Origin::Asked(Asked {
+            payload: vec![b' '; RECORD_QUEUE_BYTES_MAX + 1],
+            ..Asked::default()
+        }),
+        outcome: Err("a body of that name is there".to_owned()),
+    });
+    recorder.held.push_back(record);
+    for _ in 0..5 {
+        run(&mut engine, &mut recorder, &Inbox::default());
+    }
+    assert!(!recorder.over);
+    drop(let_go);
+    recorder.finish().unwrap();
+    let heard: Vec<_> = heard.try_iter().collect();
+    assert_eq!((heard.len(), &*heard[7]), (8, "end "), "{heard:?}");
 }
 
 #[test]
