@@ -86,7 +86,7 @@ pub(super) struct Mark {
     pub(super) contacts: Span,
     /// There is something new to say of it.
     pub(super) fresh: bool,
-    /// ... and not only that it is a tick older.
+    /// There is more new to say of it than that it is a tick older.
     news: bool,
     /// See [`Row::may_last`].
     lasts: bool,

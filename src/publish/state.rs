@@ -95,9 +95,6 @@ impl Publisher {
         if view.world.has_teleported() {
             reasons |= Reason::Teleported.bit();
         }
-        if counts.bodies == 0 {
-            reasons |= Reason::NoInput.bit();
-        }
         let cut = |&slot: &BodySlot| {
             let body = view.world.body(slot);
             body.is_some_and(|body| body.status == BodyStatus::Known)

@@ -1,8 +1,9 @@
 //! Transports: how frames and requests come in and results go out. In: samples of other processes, copied once and
 //! unchecked. Out: an [`Inbox`] for the engine, and the engine's [`Outbox`] for readers.
 //!
-//! Two doors with one surface: [`iceoryx`] for other processes, [`memory`] for threads of this one (tests, the
-//! embedded feed). [`client`] is the other side of both. A door belongs to the thread that opened it.
+//! Doors with one surface, the trait [`Door`]: [`iceoryx`] for other processes, [`memory`] for threads of this one
+//! (tests, the embedded feed), `ros2` for a ROS 2 graph, and [`Both`] of two. [`client`] is the other side of the first
+//! two. A door belongs to the thread that opened it.
 
 mod both;
 pub mod client;

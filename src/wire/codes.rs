@@ -139,7 +139,7 @@ code! {
         Worn = 4 => "worn",
         /// By counted work, candidates took more than none would.
         Cost = 5 => "cost",
-        /// ... and are not tried again yet.
+        /// Candidates did not pay, or have yet to be tried, and it is not time to try them.
         Spell = 6 => "spell",
         /// Candidates are tried again.
         Trial = 7 => "trial",

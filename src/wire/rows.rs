@@ -4,6 +4,7 @@
 
 use iceoryx2::prelude::ZeroCopySend;
 
+use super::codes::Event;
 pub use crate::limits::SOURCES_MAX;
 /// Bytes of a source's name, NUL-padded UTF-8.
 pub const SOURCE_NAME_LEN: usize = 32;
@@ -267,6 +268,20 @@ pub struct Hello {
     pub iceoryx2_version: [u8; 16],
 }
 
+impl PairRow {
+    /// Its events in the order in which they happened: what ended by cause may have begun anew, what passed on the way
+    /// began and ended.
+    pub fn told_events(&self) -> impl Iterator<Item = Event> {
+        let events = self.events;
+        let mut all = [Event::End, Event::Begin, Event::Persist, Event::Passed];
+        if events & Event::Passed.bit() != 0 {
+            all.swap(0, 1);
+        }
+        all.into_iter()
+            .filter(move |event| events & event.bit() != 0)
+    }
+}
+
 impl Default for NameRow {
     fn default() -> Self {
         Self {
@@ -292,3 +307,23 @@ const _: () = {
     assert!(size_of::<NameRow>() == 128);
     assert!(size_of::<Hello>() == 64);
 };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn events_are_told_in_the_order_in_which_they_happened() {
+        let words = |events| {
+            let row = PairRow {
+                events,
+                ..PairRow::default()
+            };
+            row.told_events().map(Event::word).collect::<Vec<_>>()
+        };
+        let anew = Event::Begin.bit() | Event::End.bit();
+        assert_eq!(words(anew), ["end", "begin"]);
+        let passed = anew | Event::Passed.bit();
+        assert_eq!(words(passed), ["begin", "end", "passed"]);
+    }
+}

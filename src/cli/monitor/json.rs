@@ -104,10 +104,7 @@ fn metres(value: f64) -> Value {
 }
 
 fn pair(row: &PairRow, names: &Names) -> Value {
-    let events = Event::ALL
-        .iter()
-        .filter(|e| row.events & e.bit() != 0)
-        .map(|e| e.word());
+    let events = row.told_events().map(Event::word);
     let mut pair = json!({
         "a": names.of(row.body_a),
         "b": names.of(row.body_b),

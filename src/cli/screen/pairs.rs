@@ -146,7 +146,7 @@ impl PairTable {
 /// What happened to a pair: in full, and as one word.
 fn events(row: &PairRow) -> Vec<(String, &'static str)> {
     let mut events = Vec::new();
-    for event in Event::ALL.iter().filter(|e| row.events & e.bit() != 0) {
+    for event in row.told_events() {
         match event {
             Event::End => {
                 let cause = EndCause::from_code(row.end_cause).map_or("?", EndCause::word);
@@ -218,7 +218,7 @@ mod tests {
                 for flags in [0, pair_flags::SWEPT_HIT | pair_flags::TELEPORTED] {
                     let line = table.row(&row(flags), &names, ink);
                     assert!(columns(&line) <= width, "{width}, {longest}: {line}");
-                    for whole in ["colliding ", " -12.345678 ", " 9.876543 ", "  begin"] {
+                    for whole in ["colliding ", " -12.345678 ", " 9.876543 ", "  end"] {
                         assert!(line.contains(whole), "{width}, {longest}: {line}");
                     }
                     let has_closing = width >= 79 || longest < 4;
@@ -247,7 +247,7 @@ mod tests {
             "{:<24} {:<24} colliding   -12.345678     9.876543    -1.234  ",
             "#1", "#2"
         );
-        assert_eq!(line, format!("{begin}begin, end (source lost)"));
+        assert_eq!(line, format!("{begin}end (source lost), begin"));
     }
 
     #[test]

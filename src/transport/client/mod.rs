@@ -236,8 +236,9 @@ impl Client {
             schema: WIRE_VERSION,
             boot: self.boot(),
         };
-        self.link.send(&header, rows)?;
+        // Counted first: where the link fails once the frame is out, its number must never be another frame's.
         self.frame = id;
+        self.link.send(&header, rows)?;
         Ok(id)
     }
 

@@ -1,7 +1,7 @@
 //! Lockstep: send a frame, get the result of exactly that frame.
 
 use super::{Client, FrameId, FrameInfo, Heard, Restarted, Rows};
-use crate::error::{Error, Result};
+use crate::error::Error;
 use crate::wire::{RejectReason, SourceRow, TickRow, name_str};
 
 /// Why a step has no result.
@@ -77,7 +77,7 @@ impl Client {
         info: &FrameInfo,
         rows: Rows<'_>,
         timeout_ns: u64,
-    ) -> std::result::Result<FrameId, StepError> {
+    ) -> Result<FrameId, StepError> {
         // what is already there is from before the frame
         if let Heard::Restarted(restarted) = self.latest()? {
             return Err(StepError::Restarted(restarted));
@@ -93,7 +93,7 @@ impl Client {
         frame: FrameId,
         before: &TickRow,
         timeout_ns: u64,
-    ) -> std::result::Result<(), StepError> {
+    ) -> Result<(), StepError> {
         let source = self.source.clone().unwrap_or_default();
         let until_ns = self.clock.monotonic_ns().saturating_add(timeout_ns);
         loop {
@@ -148,18 +148,5 @@ impl Client {
             }
         }
         why
-    }
-
-    /// The result of [`Client::step`] as one value, for callers that prefer the public error.
-    ///
-    /// # Errors
-    /// As [`Client::step`], turned into [`Error`].
-    pub fn step_or_error(
-        &mut self,
-        info: &FrameInfo,
-        rows: Rows<'_>,
-        timeout_ns: u64,
-    ) -> Result<FrameId> {
-        Ok(self.step(info, rows, timeout_ns)?)
     }
 }

@@ -66,9 +66,10 @@ impl Client {
             schema: WIRE_VERSION,
             boot: self.boot(),
         };
-        self.link.send_vertices(&header, rows)?;
+        // Counted first, as a frame is.
         self.versions.insert(body, header.version);
         self.bent += 1;
+        self.link.send_vertices(&header, rows)?;
         Ok(header.version)
     }
 }

@@ -59,8 +59,6 @@ pub mod marker_kind {
     pub const TEXT_VIEW_FACING: i32 = 9;
     /// Action: put it there, or change it.
     pub const ADD: i32 = 0;
-    /// Action: take all away.
-    pub const DELETE_ALL: i32 = 3;
 }
 
 /// `std_msgs/ColorRGBA`.
