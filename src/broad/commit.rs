@@ -26,7 +26,7 @@ pub(super) struct Found {
     pub(super) maybe: Vec<PairKey>,
     /// Pairs taken out of the set, with the order of the delta.
     ended: Vec<((BodyId, BodyId), Ended)>,
-    /// ... and those of boxes that parted, in the order of keys.
+    /// Pairs taken out of the set because their boxes parted, in the order of keys.
     parted: Vec<Ended>,
     /// Pairs that may have to be stored, with the order of the delta, while they are put in it.
     ranked: Vec<((BodyId, BodyId), PairKey)>,

@@ -16,12 +16,14 @@ const CHUNK_MIN: usize = 256;
 /// Of a place in the arena so many bits are the item's place in its chunk, those above name the chunk.
 const PLACE_BITS: u32 = 26;
 const CHUNK_MAX: usize = 1 << PLACE_BITS;
-/// Bytes that the operating system gives at once; ...
+/// Bytes that the operating system gives at once.
 const PAGE: usize = 4096;
-/// ... so many times that are touched ahead of their use, ...
+/// Pages that are touched ahead of their use, at most: with fewer a tick's end meets untouched ones, with more memory
+/// is taken that may never be used.
 const PAGES_AHEAD: usize = 8;
-/// ... and at most so many at once, each where so much time is left, nanoseconds.
+/// Pages that one call of [`Arena::touch_ahead`] touches, at most.
 const PAGES_AT_ONCE: usize = 2;
+/// A page is touched only where so much time is left, nanoseconds: that takes up to 30 us on a virtual machine.
 const PAGE_NS: u64 = 40_000;
 /// No block.
 const NONE: u32 = u32::MAX;

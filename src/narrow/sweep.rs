@@ -68,7 +68,7 @@ pub struct Swept {
     pub passage: Passage,
     /// A body of it jumped: that part of the way was not asked.
     pub jumped: bool,
-    /// ... by a teleport, and not by a reset.
+    /// A body of it jumped by a step beyond its `teleport_m`, and not over a reset.
     pub teleported: bool,
 }
 

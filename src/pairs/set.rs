@@ -15,9 +15,10 @@ use lists::Lists;
 
 /// No slot is that high.
 const NONE: u32 = u32::MAX;
-/// Least places that the set grows by, ...
+/// Least places that the set grows by beyond what it needs.
 const LEAST: usize = 16;
-/// ... and one for so many: what the pairs of a scene come and go by. Their memory is most of that of a dense scene.
+/// The set grows by one place in so many beyond what it needs: what the pairs of a scene come and go by. With more of
+/// these places it takes more memory, and that of pairs is most of what a dense scene takes.
 const GROWTH: usize = 8;
 
 /// The pairs of overlapping boxes that the filters allow.

@@ -20,11 +20,11 @@ use crate::scene::read_shape::read_pose;
 use crate::scene::request::need_name;
 use crate::scene::table::Table;
 
-/// Of a question: beyond it nothing that flies is meant, metres a second; ...
+/// Most that a component of a velocity is in a question, metres a second: nothing that is meant flies faster.
 const SPEED_MAX_MPS: f64 = 1e6;
-/// ... nothing that turns, radians a second; ...
+/// Most that a component of an angular velocity is in a question, radians a second: nothing that is meant turns faster.
 const SPIN_MAX_RADPS: f64 = 1e6;
-/// ... and nothing is known of a motion for so long, seconds.
+/// Longest time ahead that a question asks of, seconds: nothing is known of a motion for so long.
 const WITHIN_MAX_S: f64 = 1e5;
 
 /// The keys that ask.

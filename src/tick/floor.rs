@@ -124,9 +124,10 @@ pub(super) struct Floor {
     last_send_ns: u64,
 }
 
-/// Endings remembered one by one, ...
+/// Endings remembered one by one: a window.
 const WINDOW: usize = 128;
-/// ... and windows of which the longest is: of a single one it is exceeded in about one tick in a hundred.
+/// Windows of which the longest ending is remembered: that of a single one is exceeded in about one tick in a hundred.
+/// With more, more is kept back for longer after a spike.
 const WINDOWS: usize = 4;
 /// Ticks after which the median is looked for again.
 const MEDIAN_TICKS: usize = 16;

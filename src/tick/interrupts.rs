@@ -7,11 +7,11 @@
 
 use crate::time::Pause;
 
-/// Pauses remembered, the oldest overwritten first, ...
+/// Pauses remembered, the oldest overwritten first.
 const SEEN: usize = 128;
-/// ... and for how long, nanoseconds. An interrupt that ticks end before is not seen: where each tick has the same
-/// place among them, it has to be met anew when this is over. Longer, and a place is kept to that the timer has left: a
-/// host's clock drifts against the guest's, by 7 us a second where it was measured.
+/// How long a pause is remembered, nanoseconds. An interrupt that ticks end before is not seen: where each tick has the
+/// same place among them, it has to be met anew when this is over. Longer, and a place is kept to that the timer has
+/// left: a host's clock drifts against the guest's, by 7 us a second where it was measured.
 const RECENT_NS: u64 = 10_000_000_000;
 /// Shorter pauses between two reads of the clock are work, nanoseconds.
 const SHORTEST_NS: u64 = 18_000;

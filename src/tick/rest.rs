@@ -17,10 +17,11 @@ use crate::world::{BuiltTree, TreeOf, WornTree};
 const LAST_NS: u64 = 6_000;
 /// Kept back at most, as a part of what the budget leaves above the floor.
 const LAST_PARTS: u64 = 8;
-/// What is kept back grows by this with each tick that passes its end in spite of it, ...
+/// What is kept back grows by this with each tick that passes its end in spite of it, nanoseconds.
 const LATE_NS: u64 = 4_000;
-/// ... and shrinks by this with each that does not, nanoseconds: so, between these bounds, one in a hundred and forty
-/// does.
+/// What is kept back shrinks by this with each tick that does not pass its end, nanoseconds. As a part of [`LATE_NS`]
+/// it says how many do: between the bounds one tick in a hundred and forty. With more, more are late; with less, time
+/// that nothing needs is kept back for longer.
 const IN_TIME_NS: u64 = 28;
 
 /// The last tick's budget after its outbox was handed over.

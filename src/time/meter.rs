@@ -50,10 +50,11 @@ struct Beat<'a> {
 }
 
 /// Cheap units (a box against eight others, some 150 ns each with what they wait for) between two reads of the clock
-/// (some 25 ns): at 8 the reads cost 2 %, at 32 a deadline would be passed by some six microseconds; ...
+/// (some 25 ns): at 8 the reads cost 2 %, at 32 a deadline would be passed by some six microseconds.
 const CHEAP_UNITS_PER_READ: u64 = 8;
-/// ... and where less is left than so many nanoseconds for each of them, fewer: out of cold memory a unit takes half a
-/// microsecond and more, two on a slow machine.
+/// What a cheap unit may take, nanoseconds: where less is left than that for each unit between two reads, there are
+/// fewer. Out of cold memory a unit takes half a microsecond and more, two on a slow machine. With less, a deadline is
+/// passed by more; with more, the clock is read more often before it.
 const CHEAP_UNIT_NS: u64 = 2_000;
 
 impl std::fmt::Debug for Meter<'_> {

@@ -86,7 +86,7 @@ pub(super) struct Afresh {
     /// Boxes compared with a block in the tick that they were laid in; and those beyond since.
     pub(super) usual: u64,
     pub(super) excess: f64,
-    /// ... and in the last tick.
+    /// Boxes beyond `usual` that the last tick compared, reckoned by how the blocks have grown.
     pub(super) last: f64,
 }
 

@@ -126,7 +126,7 @@ impl<'a, T, F: Fn(u32, u32) -> T> Gathered<'a, T, F> {
         self.put_words(words(matrix), blocks);
     }
 
-    /// ... that has them as words.
+    /// Gathers the bits of a matrix that is given as words; see [`Gathered::put`].
     #[inline(always)]
     pub(super) fn put_words(&mut self, words: [u64; WORDS], blocks: [usize; 2]) {
         let [row, lane] = blocks.map(|block| small(block * WIDTH));

@@ -15,15 +15,17 @@ struct Weights {
     lane: u64,
 }
 
-/// While the caches hold what moves ...
+/// What candidates cost while the caches hold what moves, nanoseconds.
 const NEAR_BY: Weights = Weights {
     take: 4,
     test: 8,
     renew: 300,
     lane: 1500,
 };
-/// ... and where more bodies than this move: memory is waited for.
+/// More bodies than this, and the caches do not hold what moves: memory is waited for. Also the number beyond which the
+/// first ticks are worked without candidates (`gear`), and memory that lies idle is given back (`idle`).
 pub(super) const FAR: usize = 1 << 15;
+/// What candidates cost where memory is waited for, nanoseconds.
 const FAR_OFF: Weights = Weights {
     take: 12,
     test: 20,
@@ -37,14 +39,17 @@ pub(super) const MEET: u64 = 12;
 /// blocks that a block's query meets, in sixteenths.
 const MEETS_LEAST: u64 = 2;
 const MEETS_SHARE: u64 = 128;
-/// By a Verlet list (`verlet`) a body takes so much, ...
+/// By a Verlet list (`verlet`) a body takes so much, nanoseconds.
 const LIST_BODY: u64 = 12;
-/// ... an entry looked at, a body looked for alone (where memory is waited for); ...
+/// An entry of a list that is looked at takes so much, nanoseconds.
 pub(super) const LOOK: u64 = 4;
+/// A body that strayed from its swept box and is looked for alone takes so much, nanoseconds.
 const STRAY: u64 = 400;
+/// What [`STRAY`] is where memory is waited for, nanoseconds.
 const STRAY_FAR: u64 = 800;
-/// ... and before there is a list, an overlap is guessed to be worth so much, and the search for it this share of one.
+/// Before there is a list, an overlap is guessed to cost so much in each tick by one, nanoseconds.
 const LIST_HIT: u64 = 9;
+/// Before there is a list, the search for it is guessed to cost each tick one part in so many of a search of all.
 const LIST_SHARE: u64 = 8;
 
 /// A tick with candidates.

@@ -15,9 +15,10 @@ use super::links::room;
 use super::ones;
 use crate::simd::boxes::{Down, WIDTH};
 
-/// What a swept box is padded by, in mean sides: what stands still but for its sender's rounding stays in, ...
+/// What a swept box is padded by, in mean sides: what stands still but for its sender's rounding stays in.
 const PAD: f32 = 0.01;
-/// ... and in ticks of the motion of a body that goes on as it came.
+/// Ticks that a body that goes on as it came is swept for beyond those asked for: with less, who swerves leaves his box
+/// sooner; with more, more is near.
 const SWERVE: f32 = 0.25;
 /// Most that a face is swept, in mean sides.
 const SWEEP_MAX: f32 = 2.0;

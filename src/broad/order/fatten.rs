@@ -34,19 +34,22 @@ const THIN: f32 = 64.0;
 /// A margin that was enough for as long as was hoped shrinks by this factor, so that a body that has calmed is tight
 /// again.
 const SHRINK: f32 = 0.9;
-/// ... and faster where the box has lasted for so many ticks: its body has calmed, and would keep the margin of its way
-/// for ever.
+/// Ticks that a fat box lasts before its body is taken to have calmed: it gets another, for it would keep the margin of
+/// its way for ever.
 const CALMED_TICKS: u32 = 4 * HORIZON;
+/// The margin of a body that has calmed shrinks by this factor besides [`SHRINK`].
 const CALMED_SHRINK: f32 = 0.25;
-/// Bodies that go farther than any margin within so many ticks are wild, ...
+/// A body that goes farther than any margin within so many ticks may be wild.
 const WILD_TICKS: u32 = 1;
-/// ... when they did so often in a row: they get tight boxes, for no box holds them.
+/// Bodies that went farther than any margin within [`WILD_TICKS`] so often in a row are wild: they get tight boxes, for
+/// no box holds them.
 const WILD_AFTER: u8 = 2;
 /// After so many tight boxes a wild body is tried with a fat one again.
 const WILD_RETRY: u8 = 40;
-/// Bodies that left their fat boxes so often in a row, by little and by faces that were not swept, are at rest, ...
+/// Bodies that left their fat boxes so often in a row, by little and by faces that were not swept, are at rest.
 const REST_AFTER: u8 = 2;
-/// ... until they leave so often in a row at once, or have been about by more than `MARGIN_MAX`.
+/// Bodies at rest are so no more when they leave their holds within a tick so often in a row, or have been about by
+/// more than [`MARGIN_MAX`].
 const REST_TRIES: u8 = 12;
 /// What a body that is new among others at rest is given on every side, as a share of what those span. Measured in the
 /// pile of the bench: with less more bodies leave in the ticks after, with more fewer pairs are sure for ever.

@@ -7,23 +7,28 @@ use super::probe::PROBE_TICKS;
 use super::{MANY_MOVED, Work};
 use crate::wire::BroadCause;
 
-/// Ticks that a mean of the work is taken over ...
+/// Ticks that a mean of the work is taken over.
 const MEAN_TICKS: u64 = 16;
-/// ... and ticks after a sort of all that do not count: bodies have yet to learn their margins.
+/// Ticks after a sort of all that do not count in that mean: bodies have yet to learn their margins. With fewer, what
+/// they learn by speaks against candidates; with more, candidates that do not pay are given up later.
 const SETTLE_TICKS: u64 = 16;
-/// After so many ticks candidates that take twice as much as none are given up without a longer look, ...
+/// Ticks after a sort of all that count in no mean at all; by those after them hopeless candidates are given up without
+/// a longer look.
 const EARLY_TICKS: u64 = 8;
-/// ... by the mean of so many ...
+/// Least ticks by the mean of which candidates are told to be hopeless: with fewer one dear tick would do, with more
+/// they are kept for longer.
 const EARLY_MEAN: u64 = 4;
+/// Candidates are hopeless where they take more than so many times what none do.
 const HOPELESS: u64 = 2;
-/// ... and not tried again for so many ticks: a trial costs several times what it tries to save.
+/// Least ticks before hopeless candidates are tried again: a trial costs several times what it tries to save.
 const SPELL_LONG: u32 = 512;
 /// Below so many bodies either way takes next to nothing.
 const BODIES_MIN: u64 = 64;
 /// Of more than `FAR` bodies the first ticks are worked without candidates: until their margins are learned these take
-/// several times as much, and memory that is not needed if they do not pay. A short probe tells whether they may: ...
+/// several times as much, and memory that is not needed if they do not pay. A short probe tells whether they may.
 const FIRST_TICKS: u32 = 24;
-/// ... where no more of 1024 bodies escape in a tick.
+/// The probe of those first ticks speaks for candidates where no more of 1024 bodies than this escape from their fat
+/// boxes in a tick. With more, candidates are tried that do not pay; with fewer, those that would pay wait.
 const FIRST_ESCAPES: u64 = 64;
 /// Ticks without candidates before these are tried again, if a probe promises anything; twice as many when in vain.
 const SPELL_MIN: u32 = 128;

@@ -10,7 +10,8 @@ const ALONG_AGE: u32 = HORIZON / 2;
 
 /// Lanes of bodies that are at rest for long are renewed at one in so many turns of their block.
 const PATIENT_TURNS: u32 = 16;
-/// ... where there is more than one candidate that is not sure for so many bodies.
+/// Bodies that are at rest for long are renewed only where there is more than one candidate that is not sure for so
+/// many bodies: else there is little that it could make sure.
 const OPEN: usize = 4;
 
 /// Stretches of blocks at least, that the turns go round; a stretch is a quarter at most.

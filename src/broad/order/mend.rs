@@ -14,14 +14,16 @@ use super::tree::NO_BOUND;
 use super::{BodySlot, NONE, Order, Proxies, Tick, ones, small};
 use crate::simd::boxes::{Boxes16, Down, WIDTH};
 
-/// A body farther outside its quarter than so many of its mean sides looks for another block, ...
+/// A body farther outside its quarter than so many of its mean sides looks for another block.
 const DRIFT_SIDES: f32 = 0.5;
-/// ... which must be so many times nearer, squared: a lane changed costs a microsecond or two.
+/// A body moves to a block that is so many times nearer than its own part of space, by squares of distances: a lane
+/// changed costs a microsecond or two. With less, lanes change for little; with more, blocks grow long by who stays.
 const NEARER: f32 = 4.0;
 /// Blocks whose bodies have spread so much over what they were dealt are dealt anew: that costs about as much as
 /// renewing all of them once more, and blocks that are so much longer meet twice as many others.
 const MIXED: f32 = 1.2;
-/// ... but not where they overlap so many others, a body: each overlap is carried to the new lanes.
+/// Blocks whose bodies overlap more others than this, a body, are not dealt anew: each overlap is carried to the new
+/// lanes, and that costs more than it saves.
 const CROWD: usize = 128;
 /// Least bodies of a block that is dealt anew: with fewer the blocks would be many and empty.
 const FILL_LEAST: usize = 8;

@@ -17,7 +17,7 @@ pub(super) struct Met {
     firsts: Vec<u32>,
     /// By record: the other block, which is not before its own. Ascending within a block.
     others: Vec<u32>,
-    /// ... and lanes of the other by lane of its own. Within one block only bits above the row's own.
+    /// By record: lanes of the other block, by lane of its own. Within one block only bits above the row's own.
     hits: Vec<Matrix>,
     /// Bits in all of them.
     count: usize,

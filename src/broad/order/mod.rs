@@ -83,7 +83,8 @@ use tree::Tree;
 const NONE: u32 = u32::MAX;
 /// One moved body in so many, and they are looked at by blocks, which takes a fraction of the time for each.
 const MANY_MOVED: usize = 10;
-/// ... and so few, that the list of candidates is let go.
+/// One moved body in so many, and candidates that are listed stay so: to list them again costs as much as some ticks,
+/// so the list is let go later than it is made.
 const STILL_MANY: usize = 14;
 /// So many inserted among all, and everything is sorted anew rather than each put into a free lane.
 const MANY_CAME: usize = 8;
@@ -139,7 +140,7 @@ pub(super) struct Order {
     homes: Vec<Boxes16>,
     /// By sixteen blocks: the part of space that their bodies filled after the last sort of all.
     quarters: Vec<[f32; 6]>,
-    /// ... and the middle of its bodies at its last turn, or NaN.
+    /// By sixteen blocks: the middle of their bodies at their last turn, or NaN.
     middles: Vec<[f32; 3]>,
     mender: mend::Mender,
     /// Blocks that were sorted; those beyond take what finds no free lane.

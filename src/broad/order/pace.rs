@@ -15,12 +15,14 @@ const TICKS_MAX: u32 = 24;
 const AHEAD_SHARE: u32 = 2;
 const AHEAD_MAX: u32 = 4;
 const _: () = assert!(AHEAD_MAX as usize <= RUNS_MAX, "a run of blocks in each");
-/// Lists in a row that take more than a search in each tick would, and there are none ...
+/// After so many lists in a row that take more than a search in each tick would, there are none for a while.
 const VAIN: u32 = 3;
-/// ... for so many ticks; four times as many each time that they prove no better.
+/// Ticks without lists when these have not paid, at first; four times as many each time that they prove no better. With
+/// fewer, more goes into lists that do not pay; with more, it is found out later that they would.
 const REST_MIN: u32 = 64;
+/// Most ticks without lists before one is tried again.
 const REST_MAX: u32 = 2048;
-/// ... and for so many where a list that paid was broken off.
+/// Ticks without lists after one that paid was broken off, for too much happened in one tick.
 const REST_BROKEN: u32 = 8;
 /// Ticks before the first: in one of them bodies are watched.
 const FIRST_REST: u32 = 2;
@@ -48,11 +50,12 @@ pub(super) struct Pace {
     left: u32,
     /// Whether the next one is being made.
     making: bool,
-    /// Work of the list in use, of its last tick, and the ticks it has lasted; ...
+    /// Work of the list in use, of its last tick, and the ticks it has lasted.
     cost: u64,
     tick: u64,
     lasted: u64,
-    /// ... of the one before in the mean, and whether its ticks were more than those of the one before it.
+    /// Work in a tick by the list that was judged last, in the mean, 0 where there was none; and whether the one after
+    /// it was made for more ticks, not for fewer.
     before: u64,
     longer: bool,
     /// What entries and searches may cost a tick, before a search in each costs less.

@@ -14,9 +14,10 @@ use super::load::Taking;
 use super::{BodySlot, Order, Proxies, Tick, ones, parts};
 use crate::simd::boxes::{Lanes, WIDTH, Work};
 
-/// Of so many bodies one may have been renewed in the last tick, ...
+/// Boxes begin to be held against holds alone where no more than one body in so many was renewed in the last tick.
 const CALM: u64 = 64;
-/// ... and of so many where they stand already: to take all boxes again costs as much as some ticks.
+/// Boxes go on to be held against holds alone where no more than one body in so many was renewed in the last tick: to
+/// take all boxes again costs as much as some ticks.
 const STILL_CALM: u64 = 2 * HORIZON as u64;
 
 impl Order {

@@ -111,7 +111,7 @@ struct Scratch {
     /// Blocks near one.
     near: Vec<u32>,
     sides: [Side; TOGETHER],
-    /// ... and its lanes. A word more than there can be: some are read together.
+    /// By side: lanes to compare. A word more than there can be: some are read together.
     lanes: [u16; TOGETHER + SIDES],
     /// As long as the most there can be, and one more.
     hits: Vec<Hit>,

@@ -23,10 +23,11 @@ pub(crate) const BALLS_MAX: usize = 16;
 const PLACES_MAX: usize = 64;
 /// Steps in which a ball shrinks; most have shrunk enough after four.
 const STEPS_MAX: usize = 12;
-/// Balls that are grown before the last choice, ...
+/// Balls that are grown before the last choice.
 const GROWN_MAX: usize = BALLS_MAX;
-/// ... in so many steps at most, and the least step, as a share of the ball.
+/// Steps in which a ball is grown, at most: with fewer it may stay smaller, with more a mesh takes longer to build.
 const GROW_STEPS_MAX: usize = 24;
+/// A ball is grown no further once its next step is not above this share of its radius.
 const GROW_MIN: f64 = 0.01;
 /// A ball is taken in while it reaches so far out of those before, as a share of the mesh's radius.
 const NEW_MIN: f64 = 0.02;
@@ -38,9 +39,10 @@ const SPARE: f64 = 1e-9;
 const SLIVER: f64 = 1e-4;
 
 /// On the way to a ball a point of the surface is near enough when none is nearer than this share of its distance:
-/// at 0.9 a quarter fewer overlaps are told; ...
+/// at 0.9 a quarter fewer overlaps are told.
 pub(super) const NEARLY: f64 = 0.97;
-/// ... or when so many boxes have been looked into: about the middle of a ball all of it is equally near.
+/// Boxes that are looked into for a near point of the surface, at most: about the middle of a ball all of it is equally
+/// near.
 const NEAR_BOXES_MAX: usize = 2_048;
 /// Boxes that are looked into for the radius of a ball that is kept.
 const CLEAR_BOXES_MAX: usize = 32_768;

@@ -14,9 +14,10 @@ const HOPS_MAX: u32 = 48;
 const RING_MAX: u32 = 64;
 /// Faces that a walk over a surface passes.
 const WALK_MAX: u32 = 48;
-/// After so many of them it is told how far the walk has come, ...
+/// Faces after which it is reckoned, once, how far a walk may yet come at the rate at which it has come so far.
 const GLANCE: u32 = 8;
-/// ... and where it would need so many times what is left at that rate, it is given up: two in three end nowhere.
+/// A walk is given up where even so many times its rate so far would not bring it there in the faces left: two in three
+/// end nowhere. With less, walks are given up that would arrive; with more, time goes into those that will not.
 const TOO_FAR: f64 = 1.5;
 /// Steps of a walk between two questions whether it is to go on: out of cold memory each takes half a microsecond.
 const STEPS_PER_ASK: u32 = 4;

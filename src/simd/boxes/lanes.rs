@@ -110,7 +110,7 @@ impl Down {
 /// How much more than the rounding of a face tells two boxes surely overlap: rounding takes 2^-22 of a face's distance
 /// from the origin at most, on either side.
 pub(super) const SLACK_SHARE: f32 = 1.0 / 1_048_576.0;
-/// ... and so much besides, for what is rounded below the normal range.
+/// Slack of a face besides [`SLACK_SHARE`], metres: for what is rounded below the normal range.
 pub(super) const SLACK_LEAST: f32 = 8.0 * LEAST;
 /// What is taken off a face that was rounded to nearest, as a share of it: a step of an f32 or up to two, where
 /// rounding moved it by half a step at most.

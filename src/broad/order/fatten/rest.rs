@@ -10,11 +10,12 @@ use crate::simd::boxes::{Down, Hold, SPARE};
 /// What the places of a body at rest are widened by, as a share of what they span: enough for most of what is to come
 /// after some ten ticks, and little beside what the body's neighbours have.
 const REST_SHARE: f32 = 0.25;
-/// A body at rest that kept to its hold for so many ticks is held to a narrower one: it may have been pushed, once; ...
+/// A body at rest that kept to its hold for so many ticks is held to a narrower one: it may have been pushed, once.
 const REST_TICKS: u32 = 256;
-/// ... to so much of it on either side of its place, ...
+/// A hold is narrowed to this share of itself on either side of the body's place: with less it is left again sooner,
+/// with more it takes longer to become as tight as it can be.
 const NARROW: f32 = 0.125;
-/// ... and after twice as many each time in vain, up to so many times.
+/// Times that the ticks before a narrower hold ([`REST_TICKS`]) are doubled, at most, once for each that was in vain.
 const VAIN_MAX: u8 = 5;
 /// What is added on every side to where a body at rest was seen, as a share of it: after a dozen ticks few of its faces
 /// come beyond.

@@ -19,16 +19,18 @@ use crate::time::Meter;
 const POINTS: u32 = 9;
 /// Steps of the search that goes on, at most.
 const STEPS_MAX: u32 = 64;
-/// Leaves the middles of which are looked at, at most, ...
+/// Leaves the middles of which are looked at, at most.
 const PROBES_MAX: u32 = 16;
-/// ... in how many boxes twice, at most, ...
+/// Boxes of a mesh that a look at one point goes into, at most: so many to tell whether it is inside, and so many to
+/// tell how deep. With fewer, more depths stay unknown; with more, it is longer until the clock is read.
 const BOXES_MAX: usize = 256;
-/// ... and what that costs, in tests of a box against a pack: when the clock is to be read.
+/// What a look at a point costs, in tests of a box against a pack, which say when the clock is to be read again.
 const PROBE_COST: u64 = 16;
 /// Leaves are in line below this sine: the middle of neither lies deep in the other. Where they face one way, both
-/// solids are behind them ...
+/// solids are behind them.
 const IN_LINE: f64 = 1e-6;
-/// ... and what is behind by this share of the smaller one's size is looked at.
+/// How far behind two leaves in line it is looked for what both solids hold, as a share of the smaller one's size (the
+/// root of twice its area).
 const BELOW: f64 = 0.1;
 /// After a search in vain the next is made where the two have moved by this share of the smaller one's radius.
 const VAIN: f64 = 1e-4;

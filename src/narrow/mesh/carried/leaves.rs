@@ -9,10 +9,11 @@ use crate::narrow::mesh::{manifold, side};
 use crate::shape::{Held, Obb};
 use crate::time::Meter;
 
-/// What two leaves cost, in tests of a box against a pack, which say when the clock is to be read again: a proof that
-/// they are apart, ...
+/// What a proof that two leaves are apart costs, in tests of a box against a pack, which say when the clock is to be
+/// read again.
 const PROOF_COST: u64 = 4;
-/// ... and their distance. Contact points look at the clock themselves.
+/// What the distance of two leaves costs, in tests of a box against a pack: told too low, a deadline is passed by more;
+/// too high, the clock is read more often than need be. Contact points look at the clock themselves.
 pub(super) const LEAF_COST: u64 = 16;
 /// Every so many times that walks for contact points ask whether to go on the clock is read: at each, being stoppable
 /// costs a contact set 6 % (`benches/time_critical`).
