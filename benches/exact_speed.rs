@@ -1,39 +1,34 @@
 //! Nanoseconds a query, against parry3d-f64's `contact` and `contact_manifolds` on the same pairs.
 //!
-//! Run by hand: `cargo test --release --test exact_speed -- --ignored --nocapture`.
+//! `cargo bench --bench exact_speed`
 #![allow(
     clippy::unwrap_used,
     clippy::print_stdout,
     clippy::disallowed_methods,
-    reason = "a timing by hand"
+    reason = "a bench"
 )]
 
+mod common;
+
+use std::fmt::Write as _;
 use std::time::Instant;
 
+use common::{provenance, save};
 use nalgebra::UnitQuaternion;
 use parry3d_f64::query::{self, ContactManifold};
 use parry3d_f64::shape::{self as parry, Shape};
+use sweepd::builtin::Random;
 use sweepd::math::{Point, Pose, Vec3};
 use sweepd::narrow::exact::{Manifold, Warm, convex_gap, manifold};
 use sweepd::shape::Convex;
 
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-    fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.unit() - 0.5, self.unit() - 0.5, self.unit() - 0.5)
-    }
+/// Within a cube of edge 1 about the origin.
+fn vector(r: &mut Random) -> Vec3 {
+    Vec3::from_fn(|_, _| r.range(-0.5, 0.5))
 }
 
 fn hull_points(r: &mut Random, count: usize) -> Vec<Vec3> {
-    (0..count).map(|_| r.vector().normalize() * 0.5).collect()
+    (0..count).map(|_| vector(r).normalize() * 0.5).collect()
 }
 
 fn to_parry(pose: &Pose) -> glamx::DPose3 {
@@ -56,11 +51,32 @@ fn nanos(poses: &[Pose], mut each: impl FnMut(usize, &Pose)) -> f64 {
     best
 }
 
+/// Which of [`shapes`] are asked against which.
+const PAIRS: [(usize, usize); 11] = [
+    (0, 0),
+    (0, 1),
+    (1, 1),
+    (2, 2),
+    (1, 2),
+    (5, 5),
+    (6, 6),
+    (3, 3),
+    (1, 3),
+    (4, 4),
+    (1, 5),
+];
+/// A name, and between which gaps the poses are, metres.
+const REGIMES: [(&str, f64, f64); 3] = [
+    ("apart", 0.05, 0.6),
+    ("touch", -0.01, 0.01),
+    ("deep", -0.25, -0.05),
+];
+
 /// A name, the shape, and the same of parry.
 type Both = (&'static str, Convex, Box<dyn Shape>);
 
 fn shapes() -> Vec<Both> {
-    let mut r = Random(5);
+    let mut r = Random::new(5);
     let (h1, h2) = (hull_points(&mut r, 12), hull_points(&mut r, 64));
     let hull = |p: &[Vec3]| {
         let points: Vec<Point> = p.iter().map(|v| Point::from(*v)).collect();
@@ -105,9 +121,9 @@ fn shapes() -> Vec<Both> {
 fn poses_of(r: &mut Random, a: &Both, b: &Both, low: f64, high: f64) -> Vec<Pose> {
     let mut poses = Vec::new();
     while poses.len() < 1000 {
-        let rotation = UnitQuaternion::from_scaled_axis(r.vector() * 6.0);
-        let mut at = r.vector().normalize();
-        let target = low + (high - low) * r.unit();
+        let rotation = UnitQuaternion::from_scaled_axis(vector(r) * 6.0);
+        let mut at = vector(r).normalize();
+        let target = low + (high - low) * r.range(0.0, 1.0);
         for _ in 0..2 {
             let pose = Pose::from_parts(at.into(), rotation);
             let c = convex_gap(&a.1, &b.1, &pose, &mut Warm::default());
@@ -188,40 +204,40 @@ fn parrys(a: &Both, b: &Both, poses: &[Pose]) -> [f64; 4] {
     [distance, contact, cold_m, warm_m]
 }
 
-#[test]
-#[ignore = "timing; SWEEPD_CI_SLOW=1 .ci/run runs it"]
-fn nanoseconds_a_query() {
-    let mut r = Random(5);
+/// The two engines measure the same: the distances of what is apart are equal.
+fn agree(a: &Both, b: &Both, poses: &[Pose]) {
+    for pose in poses {
+        let gap = convex_gap(&a.1, &b.1, pose, &mut Warm::default());
+        let distance =
+            query::distance(&glamx::DPose3::IDENTITY, &*a.2, &to_parry(pose), &*b.2).unwrap();
+        let off = (gap.best_m - distance.distance).abs();
+        assert!(off < 1e-4, "{} {}: {off} m apart", a.0, b.0);
+    }
+}
+
+fn main() {
+    let mut r = Random::new(5);
     let shapes = shapes();
-    println!(
-        "pair               regime    cold    warm  manifold | parry distance contact manifold-cold manifold-warm"
+    let from = provenance();
+    let mut csv = String::from(
+        "machine,commit,compiler,seed,shapes,regime,cold_ns,warm_ns,manifold_ns,parry_distance_ns,parry_contact_ns,\
+         parry_manifold_cold_ns,parry_manifold_warm_ns\n",
     );
-    for (i, j) in [
-        (0, 0),
-        (0, 1),
-        (1, 1),
-        (2, 2),
-        (1, 2),
-        (5, 5),
-        (6, 6),
-        (3, 3),
-        (1, 3),
-        (4, 4),
-        (1, 5),
-    ] {
+    for (i, j) in PAIRS {
         let (a, b) = (&shapes[i], &shapes[j]);
-        for (regime, low, high) in [
-            ("apart", 0.05, 0.6),
-            ("touch", -0.01, 0.01),
-            ("deep", -0.25, -0.05),
-        ] {
+        for (regime, low, high) in REGIMES {
             let poses = poses_of(&mut r, a, b, low, high);
+            if regime == "apart" {
+                agree(a, b, &poses);
+            }
             let [cold, warm, points] = ours(a, b, &poses);
             let [distance, contact, cold_m, warm_m] = parrys(a, b, &poses);
-            println!(
-                "{:8} {:8} {regime:6} {cold:7.0} {warm:7.0} {points:7.0}   | {distance:7.0} {contact:7.0} {cold_m:7.0} {warm_m:7.0}",
+            let _ = writeln!(
+                csv,
+                "{from},5,{}-{},{regime},{cold:.0},{warm:.0},{points:.0},{distance:.0},{contact:.0},{cold_m:.0},{warm_m:.0}",
                 a.0, b.0
             );
         }
     }
+    save("exact_speed.csv", &csv);
 }

@@ -24,11 +24,11 @@ use sweepd::builtin::{Pattern, pile, pool};
 use sweepd::time::Budget;
 use sweepd::wire::{ContactRow, Demand, Outbox, PairRow};
 
-/// Moving bodies of a scene, ...
+/// Moving bodies of a scene.
 const BODIES: usize = 200;
-/// ... ticks, ...
+/// Ticks that a scene is run for.
 const TICKS: u64 = 50;
-/// ... and work units a tick where they are limited: too few for a scene that moves.
+/// Work units of a tick where they are limited: too few for a scene that moves, so that ticks are cut off.
 const UNITS: u64 = 12;
 /// Pairs nearer than this are told as near, metres.
 const NEAR: &str = "moves = true\nreport_within_m = 0.1\n";

@@ -182,31 +182,3 @@ fn whatever_comes_the_structure_holds_and_the_change_sets_tell_all() {
     // The test would say nothing if nothing were let through.
     assert!(applied > 1000 && poses > 1000, "{applied} {poses}");
 }
-
-#[test]
-#[ignore = "timing; SWEEPD_CI_SLOW=1 .ci/run runs it"]
-fn time_to_admit_ten_thousand_rows() {
-    let bodies: Vec<_> = (1..=10_000)
-        .map(|id| moving(&format!("b{id}"), id))
-        .collect();
-    let mut bench = Bench::of(bodies);
-    for moved in [false, true] {
-        let mut best_us = f64::INFINITY;
-        for k in 1..=40 {
-            let seq = k + if moved { 100 } else { 0 };
-            let x = if moved { k as f64 } else { 0.0 };
-            let rows: Vec<_> = (1..=10_000).map(|id| row(id, x + id as f64)).collect();
-            let now_ns = bench.now_ns + MS;
-            bench.now_ns = now_ns;
-            let frame = frame("sim", seq, now_ns, &rows);
-            let clock = sweepd::time::SystemClock;
-            let from = sweepd::time::Clock::monotonic_ns(&clock);
-            bench.world.begin_tick(seq, now_ns);
-            bench.world.admit(&frame, now_ns);
-            bench.world.age(now_ns);
-            let took = sweepd::time::Clock::monotonic_ns(&clock) - from;
-            best_us = best_us.min(took as f64 / 1e3);
-        }
-        println!("10,000 rows, moved {moved}: {best_us} us");
-    }
-}

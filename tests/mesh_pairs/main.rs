@@ -28,7 +28,6 @@ mod odd;
 mod profile;
 mod public_cases;
 mod support;
-mod timing;
 
 use oracle::meshes;
 use oracle::rng::Rng;

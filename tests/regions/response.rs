@@ -16,9 +16,9 @@ const SEEDS: u64 = if cfg!(debug_assertions) { 3 } else { 16 };
 const TICKS: usize = 40;
 /// One part of so many of the work is the budget.
 const PARTS: u64 = 10;
-/// Shares of the diameter: what they overlap by at first, ...
+/// What the two overlap by at first, as a share of the diameter.
 const OVERLAP: f64 = 0.2;
-/// ... and what they may in the end.
+/// What the two may still overlap by in the end, as a share of the diameter.
 const TOUCH: f64 = 0.01;
 /// Halvings that say how far they overlap.
 const HALVINGS: usize = 14;
