@@ -601,6 +601,25 @@ fn law_4_4_vertices_wait_for_the_frame_that_they_belong_with() {
 }
 
 #[test]
+fn law_4_4_bug_vertices_of_a_round_that_is_under_way_went_ahead_of_their_frame() {
+    let mut daemon = Daemon::of(Mode::OnAll);
+    let frames = (1..=5).flat_map(|k| [(k as f64, sim(k)), (k as f64, robot(k))]);
+    daemon.run(6.0, frames.collect());
+    bend(&mut daemon, "sim", 1, 6, 1);
+    *daemon.drained.push() = sim(6);
+    let now_ns = daemon.clock.boottime_ns();
+    daemon
+        .pacer
+        .take(&mut daemon.drained, &daemon.world, now_ns);
+    // The tick of an edit leaves the round alone.
+    let due = daemon.pacer.due(now_ns, true, None, &mut daemon.inbox);
+    assert_eq!(due.unwrap().cause, TickCause::Edit);
+    assert!(daemon.inbox.frames().is_empty() && daemon.inbox.vertices().is_empty());
+    *daemon.drained.push() = robot(6);
+    assert_eq!(next(&mut daemon), Some((vec![(1, 6), (1, 6)], vec![1])));
+}
+
+#[test]
 fn law_4_2_bug_vertices_of_another_session_wait_for_the_frames_of_the_one_in_force() {
     let mut daemon = Daemon::of(Mode::OnFrame("sim".to_owned()));
     daemon.run(5.0, vec![(1.0, robot(1)), (2.0, sim(1))]);

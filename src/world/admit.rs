@@ -211,10 +211,12 @@ impl World {
         self.sources[source.index()].rows = rows;
         let all = u64::try_from(frame.transforms.len()).unwrap_or(u64::MAX);
         let poses = all.saturating_sub(refused_rows);
+        let refused_rows = refused_rows + self.refuse_bodies(source, frame);
+        self.bend_with(source, &frame.header);
         Admission::Admitted {
             source,
             poses,
-            refused_rows: refused_rows + self.refuse_bodies(source, frame),
+            refused_rows,
         }
     }
 

@@ -194,6 +194,7 @@ impl World {
             let age_ns = self.now_ns.saturating_sub(source.since_ns);
             source.alive = source.newest.is_some() && age_ns < source.timeout_ns;
         }
+        self.admits = false;
         self.settle_attached();
         self.recount();
         self.ages.sweep();

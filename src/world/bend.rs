@@ -101,9 +101,21 @@ impl World {
     /// vertices of the right sender leaves the body unknown until good ones of all vertices come; an older version, or
     /// the same again, changes nothing.
     ///
+    /// What belongs with a frame that waits for a scene revision waits with it.
+    ///
     /// Cost: O(rows).
     pub fn admit_vertices(&mut self, frame: &VertexFrame, now_boot_ns: u64) -> Admission {
         self.now_ns = self.now_ns.max(now_boot_ns);
+        let source = name_str(&frame.header.source).and_then(|name| self.source_named(name));
+        let waits = source.filter(|source| self.bends_later(*source, frame));
+        match waits {
+            Some(source) => Admission::Waiting { source },
+            None => self.admit_vertices_now(frame),
+        }
+    }
+
+    /// As [`World::admit_vertices`], whatever waits.
+    pub(super) fn admit_vertices_now(&mut self, frame: &VertexFrame) -> Admission {
         let (found, mut refused) = (self.find_bent(frame), None);
         let taken = found.and_then(|(source, slot)| {
             self.bend(slot, frame).map_err(|reason| {
@@ -272,7 +284,7 @@ impl World {
     }
 
     /// The newest vertices of a body were refused: it is unknown until good ones come; its last good ones are kept.
-    fn refuse_vertices(&mut self, slot: BodySlot, reason: RejectReason) {
+    pub(super) fn refuse_vertices(&mut self, slot: BodySlot, reason: RejectReason) {
         if let Some(body) = self.bodies[slot.index()].as_mut()
             && let Some(vertices) = body.vertices.as_mut()
         {

@@ -32,7 +32,7 @@ impl World {
     }
 
     /// Whether a continuous body has gone in this tick, and where is known.
-    fn goes_as_told(&self, slot: BodySlot) -> bool {
+    pub(super) fn goes_as_told(&self, slot: BodySlot) -> bool {
         let Some(body) = self.body(slot) else {
             return false;
         };

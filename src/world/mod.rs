@@ -11,6 +11,7 @@ mod admit_rows;
 mod age;
 mod ahead;
 mod bend;
+mod bends_waiting;
 mod body;
 mod census;
 mod chain;
@@ -64,6 +65,7 @@ use crate::math::Aabb;
 use crate::scene::Scene;
 use crate::wire::BodyStatus;
 use age::Ages;
+use bends_waiting::BendsWaiting;
 use census::source_at;
 use lists::Lists;
 use names::Names;
@@ -115,6 +117,8 @@ pub struct World {
     /// The change set was not taken yet by a tick: what `new` put there.
     first: bool,
     tick: u64,
+    /// Frames are being admitted: ages are judged for good once all are.
+    admits: bool,
     /// When this tick began, nanoseconds of `CLOCK_BOOTTIME`; `now_ns` gets there with its first frame.
     begun_ns: u64,
     now_ns: u64,
@@ -210,6 +214,7 @@ impl World {
             uncounted: false,
             first: false,
             tick: 0,
+            admits: false,
             begun_ns: now_ns,
             now_ns,
             stale_reach_m: config.stale_reach_m,
@@ -232,6 +237,7 @@ impl World {
         self.free.append(&mut self.resting);
         self.take_timeouts();
         self.end_travels();
+        self.admits = true;
     }
 
     /// What this tick changed so far; complete after [`World::age`].
@@ -362,6 +368,7 @@ impl World {
                 self.over.put(source_at(place), session);
                 state.session = 0;
                 state.order = None;
+                state.bends = BendsWaiting::default();
                 state.pass_over_waiting();
             }
         }

@@ -110,6 +110,8 @@ impl World {
             BodyStatus::Known | BodyStatus::Stale | BodyStatus::Held => true,
             // Its last good pose is kept; without one there is nothing to keep.
             BodyStatus::Rejected => root.has_pose && has_vertices,
+            // In the tick in which it is removed it is asked for the way that it still went.
+            BodyStatus::RemovedByAge => body.in_broad && self.goes_as_told(slot),
             _ => false,
         };
         Judgement {
@@ -126,6 +128,8 @@ impl World {
             return (BodyStatus::Known, 0.0);
         }
         match self.on_stale_of(root_body) {
+            // A younger frame may follow in this tick, of which alone the tick tells.
+            OnStale::Remove if self.admits && root_body.in_broad => (BodyStatus::Known, 0.0),
             OnStale::Hold => (BodyStatus::Held, 0.0),
             OnStale::Remove => (BodyStatus::RemovedByAge, f64::INFINITY),
             OnStale::Unknown => (BodyStatus::Stale, self.reach_of(body, root)),

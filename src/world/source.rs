@@ -5,6 +5,7 @@
 
 use std::collections::VecDeque;
 
+use super::bends_waiting::BendsWaiting;
 use super::body::Body;
 use crate::config::OnStale;
 use crate::ids::{BodySlot, SourceSlot};
@@ -51,6 +52,8 @@ pub struct SourceState {
     pub(super) rows: Vec<BodySlot>,
     /// Frames that wait for a later scene revision.
     pub(super) waiting: Waiting,
+    /// Vertices that belong with those.
+    pub(super) bends: BendsWaiting,
     /// A frame with poses, whose number in the epoch is below this, was lost or refused, and none of a later number has
     /// been taken since; 0: none.
     pub(super) gap: u64,
@@ -138,6 +141,7 @@ impl SourceState {
             pose_frame: 0,
             rows: Vec::with_capacity(bodies),
             waiting: Waiting::default(),
+            bends: BendsWaiting::default(),
             gap: 0,
             followed: false,
         }
@@ -322,7 +326,7 @@ pub(super) fn stand(
         source.order = Some(order);
         // Nothing of this session has been taken yet.
         (source.newest, source.alive, source.bent) = (None, false, 0);
-        source.gap = 0;
+        (source.gap, source.bends) = (0, BendsWaiting::default());
         return Standing::Afresh;
     }
     source.heard_ns = source.heard_ns.max(received_ns);
@@ -337,7 +341,7 @@ pub(super) fn stand(
         }
         _ => {
             source.order = Some(order);
-            source.gap = 0;
+            (source.gap, source.bends) = (0, BendsWaiting::default());
             Standing::Afresh
         }
     }

@@ -12,6 +12,7 @@ use super::path::Path;
 use super::place::tight_box;
 use crate::ids::BodySlot;
 use crate::math::{Aabb, Pose, Vec3};
+use crate::wire::BodyStatus;
 
 impl World {
     /// Bodies with a path in this tick: those that are swept, and those that only carry one that is. Complete after
@@ -48,6 +49,14 @@ impl World {
                 if body.in_broad {
                     self.lists.moved(slot);
                 }
+            }
+        }
+        // Who was removed on its way has been asked for it.
+        for at in 0..self.travelled.len() {
+            let slot = self.travelled[at];
+            let body = self.body(slot);
+            if body.is_some_and(|body| body.in_broad && body.status == BodyStatus::RemovedByAge) {
+                self.settle(slot, false);
             }
         }
         self.travelled.clear();

@@ -104,7 +104,7 @@ pub(crate) struct Rig {
     pub(crate) pulses: Vec<TickRow>,
     /// Whether the whole structure is checked after each tick.
     pub(crate) checked: bool,
-    seq: u64,
+    pub(crate) seq: u64,
     inbox: Inbox,
 }
 

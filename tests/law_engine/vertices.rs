@@ -397,3 +397,72 @@ fn bug_what_hangs_on_vertices_that_are_not_known_is_not_known_once_it_is_let_go(
         assert!(text.unwrap_err().contains("it is not known where `b3` is"));
     }
 }
+
+/// The version of the sheet's vertices, and whether the tick is clear.
+fn version(rig: &Rig) -> (Option<u64>, bool) {
+    let world = rig.engine.world();
+    let sheet = world.body(world.slot_named("b1").unwrap()).unwrap();
+    let version = sheet.vertices.as_ref().unwrap().version;
+    (version, rig.state() == State::Clear)
+}
+
+/// In its own frame the sheet goes down by as much as its pose goes up: no tick is to have the one without the other.
+#[test]
+fn law_4_3_bug_vertices_bent_the_old_pose_while_their_frame_waited_for_the_scene() {
+    for wait_ends in [true, false] {
+        let mut rig = rig();
+        known(&mut rig);
+        assert_eq!(version(&rig), (Some(1), true));
+        rig.scene_rev = rig.out.tick.header.scene_rev + 1;
+        rig.row(1).position[2] = 6.0;
+        let mut bent = full(2, at(-3.0));
+        bent.header.seq = rig.seq + 1;
+        send(&mut rig, vec![bent]);
+        assert_eq!(version(&rig), (Some(1), true));
+        rig.idle(FRAME_NS, ALL);
+        assert_eq!(version(&rig), (Some(1), true));
+        let scene_rev = rig.scene_rev;
+        rig.scene_rev = 0;
+        if wait_ends {
+            let margin = Edit::Margin {
+                name: None,
+                report_within_m: Some(0.25),
+            };
+            rig.edit(vec![margin], ALL);
+            assert_eq!(rig.out.tick.header.scene_rev, scene_rev);
+            assert_eq!(version(&rig), (Some(2), true));
+        } else {
+            // The revision does not come, and the next frame has all of it.
+            rig.idle(600_000_000, ALL);
+            assert_eq!(version(&rig).0, Some(1));
+            rig.send(ALL);
+            assert_eq!(version(&rig), (Some(2), true));
+        }
+        // In order behind what waits, and on.
+        send(&mut rig, vec![range(3, 2, 0, at(-2.5))]);
+        assert_eq!(version(&rig), (Some(3), true));
+        assert_eq!(status(&rig, 1), BodyStatus::Known);
+    }
+}
+
+/// A body that the awaited edit puts has nothing to bend before.
+#[test]
+fn law_4_3_bug_vertices_of_a_body_that_is_not_there_yet_were_refused_while_its_frame_waited() {
+    let mut rig = rig();
+    known(&mut rig);
+    rig.edit(vec![Edit::Remove { name: "b1".into() }], ALL);
+    let text = scene("", &[body(1, [0.0, 0.0, 3.0], SHEET, "deforms = true\n")]);
+    let all = sweepd::scene::Scene::parse(&text, "s.toml", std::path::Path::new(".")).unwrap();
+    let put = Edit::Put {
+        body: std::sync::Arc::new(all.bodies[0].clone()),
+        shapes: sweepd::tick::build::build_shapes(&all).unwrap().bodies[0].clone(),
+    };
+    rig.scene_rev = rig.out.tick.header.scene_rev + 1;
+    let mut bent = full(1, at(0.5));
+    bent.header.seq = rig.seq + 1;
+    send(&mut rig, vec![bent]);
+    rig.edit(vec![put], ALL);
+    assert_eq!(version(&rig), (Some(1), true));
+    assert_eq!(status(&rig, 1), BodyStatus::Known);
+    assert_eq!(rig.rejects(RejectReason::UnknownBody), 0);
+}

@@ -194,6 +194,70 @@ fn bug_what_went_on_its_way_in_a_frame_that_is_too_old_by_now_was_never_asked() 
     }
 }
 
+/// A stall lets frames come together of which the first is too old by now.
+#[test]
+fn bug_a_frame_too_old_took_a_body_out_of_the_tick_whose_younger_one_it_is() {
+    let wall = body(1, [0.0; 3], PLATE, "").replace("moves = true", "moves = false");
+    let removed = format!("{SWEPT}\non_stale = \"remove\"");
+    let mut rig = Rig::new(&scene("", &[wall, body(2, [0.0; 3], SHOT, &removed)]));
+    rig.place(2, &at(5.0));
+    rig.send(ALL);
+    let frame = |k: usize, rig: &mut Rig| {
+        rig.waited_ns = [600_000_000, 0][k];
+        rig.place(2, &at([-5.0, -6.0][k]));
+    };
+    rig.send_several(2, frame, ALL);
+    let row = rig.pair(1, 2).unwrap();
+    assert!(hit(row) && has(row, Event::Passed), "{row:?}");
+    assert_eq!(rig.state(), State::Colliding);
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+
+    // What lies in contact meanwhile goes on to do so.
+    rig.place(2, &at(0.005));
+    rig.send(ALL);
+    let frame = |k: usize, rig: &mut Rig| {
+        rig.waited_ns = [600_000_000, 0][k];
+        rig.place(2, &at([0.004, 0.005][k]));
+    };
+    rig.send_several(2, frame, ALL);
+    let row = rig.pair(1, 2).unwrap();
+    assert!(!has(row, Event::End) && !has(row, Event::Begin), "{row:?}");
+}
+
+#[test]
+fn bug_the_way_on_which_a_body_was_removed_by_its_age_was_never_asked() {
+    let wall = body(1, [0.0; 3], PLATE, "").replace("moves = true", "moves = false");
+    let removed = format!("{SWEPT}\non_stale = \"remove\"");
+    let child = body(
+        3,
+        [0.0, 0.0, 0.0],
+        SHOT,
+        &format!("{SWEPT}\nattached_to = \"b2\""),
+    );
+    let mut rig = Rig::new(&scene(
+        "",
+        &[wall, body(2, [0.0; 3], SHOT, &removed), child],
+    ));
+    rig.place(2, &at(5.0));
+    rig.send(ALL);
+    rig.waited_ns = 600_000_000;
+    rig.place(2, &at(-5.0));
+    rig.send(ALL);
+    for id in [2, 3] {
+        let row = rig.pair(1, id).unwrap();
+        assert!(hit(row), "{id} {row:?}");
+    }
+    assert!(rig.because(Reason::RemovedByAge));
+    assert_eq!(rig.state(), State::Colliding);
+    rig.idle(FRAME_NS, ALL);
+    assert!(rig.pair(1, 2).is_none_or(|row| !hit(row)));
+    assert_eq!(rig.state(), State::Unknown);
+    rig.waited_ns = 0;
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+}
+
 #[test]
 fn a_wall_that_is_lost_in_the_tick_in_which_something_passes_it_was_there_before() {
     let mut rig = plate(SWEPT);

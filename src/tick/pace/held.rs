@@ -119,8 +119,8 @@ impl Queue {
 ///
 /// None is passed over for a newer one, and those of a session go out in the order of their sending: a range stands on
 /// the version before. Those of the source whose frames make ticks wait for the frame of their session that they belong
-/// with, so that a tick has vertices and poses of one moment; without it those of a new session wait for the frames of
-/// the one before.
+/// with, so that a tick has vertices and poses of one moment, and so do those whose frame is in a round that is under
+/// way; without it those of a new session wait for the frames of the one before.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Vertices {
     waiting: Vec<Bent>,
@@ -247,7 +247,9 @@ impl Bent {
             let nobody_else = |session| session == header.session;
             self.source == Some(lead.source) && lead.session.is_none_or(nobody_else)
         };
-        header.seq != 0 && lead.is_some_and(speaks)
+        // Its frame is in a round that is under way.
+        let comes_later = |held: &Held| held.whose.speaks && belongs(header, &held.frame);
+        header.seq != 0 && (lead.is_some_and(speaks) || frames.iter().any(comes_later))
             || frames.iter().any(before) && !into.frames().iter().any(own)
     }
 }
