@@ -208,6 +208,42 @@ fn bug_in_lockstep_a_frame_behind_one_whose_wait_ends_had_no_units() {
 }
 
 #[test]
+fn bug_in_lockstep_frames_that_waited_together_were_used_up_in_one_tick_and_not_counted() {
+    let (hub, clock) = (Hub::new(), Arc::new(ManualClock::new(1_000 * MS)));
+    let scene = scene(MODES[0], 2);
+    let mut door = MemoryServer::open(&hub, 7, HEARTBEAT_NS).unwrap();
+    let shapes = build_shapes(&scene).unwrap();
+    let mut daemon = Daemon::new(&scene, shapes, 7, clock.clone(), &mut door).unwrap();
+    let mut ear = Ear::of(&hub, &clock);
+    let mut send = |ear: &mut Ear, scene_rev, apart| {
+        let info = FrameInfo {
+            scene_rev,
+            partial: true,
+            ..FrameInfo::default()
+        };
+        let rows = pairs(2, apart);
+        ear.client.send(&info, Rows::Poses(&rows)).unwrap();
+        daemon.round(None).unwrap();
+        ear.heard().pop().unwrap().0
+    };
+    send(&mut ear, 0, APART);
+    send(&mut ear, 99, APART);
+    clock.advance(TIMEOUT_NS / 2);
+    send(&mut ear, 0, TOUCHING);
+    let last = send(&mut ear, 0, APART);
+    assert_eq!((last.sources[0].seq, last.sources[0].skipped), (1, 0));
+    clock.advance(TIMEOUT_NS / 2);
+    daemon.round(None).unwrap();
+    let (tick, _) = ear.heard().pop().unwrap();
+    assert_eq!((tick.sources[0].seq, tick.colliding), (4, 0));
+    // The third was touching, and no tick was of it: the next one says so.
+    clock.advance(HEARTBEAT_NS);
+    daemon.round(None).unwrap();
+    let (tick, _) = ear.heard().pop().unwrap();
+    assert_eq!((tick.sources[0].skipped, tick.sources[0].frames), (1, 3));
+}
+
+#[test]
 fn law_3_8_a_machine_that_was_suspended_wakes_to_a_tick_that_says_its_data_is_old_in_each_mode() {
     const HOUR_NS: u64 = 3_600_000 * MS;
     for mode in MODES {

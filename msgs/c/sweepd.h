@@ -312,7 +312,8 @@ enum {
 
 /* Bits of ContactRow::flags. */
 enum {
-    /* Taken at an older pose and carried along with body A. */
+    /* Taken at an older pose and carried along, each point with its body; the interval is that of the bodies' gap by now,
+     * its upper end infinite where a body has several shapes. */
     SWEEPD_CONTACT_FLAGS_ESTIMATE = 1,
 };
 

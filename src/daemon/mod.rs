@@ -248,6 +248,7 @@ impl<'a> Daemon<'a> {
     /// Runs one tick and sends what it filled.
     fn tick(&mut self, due: Due, woke_ns: u64) -> Result<()> {
         self.tell_passed();
+        let taken = self.taken_of_lead();
         let mut demand = self.door.demand();
         if let Some(recorder) = &mut self.recorder {
             demand = recorder.listen(demand, self.clock.boottime_ns());
@@ -288,6 +289,7 @@ impl<'a> Daemon<'a> {
         if let Some(recorder) = &mut self.recorder {
             recorder.tick(&self.due, ask, &self.engine);
         }
+        self.tell_used_up(taken);
         let send_ns = self.clock.monotonic_ns().saturating_sub(start_ns);
         if let Some(lost) = self.unsent.note(lost, start_ns) {
             tracing::warn!(

@@ -164,9 +164,19 @@ pub(super) fn push_rows(view: &View<'_>, slot: PairSlot, out: &mut Vec<ContactRo
     let (contacts, tick) = view.narrow.contacts(slot);
     let current = finding.level == Level::Exact && tick >= finding.tested;
     let start = out.len();
+    let is_one_pair = a.shapes.len() == 1 && b.shapes.len() == 1;
     for contact in contacts {
         let mut row = contact_row(a, b, contact);
-        row.flags = if current { 0 } else { contact_flags::ESTIMATE };
+        if !current {
+            row.flags = contact_flags::ESTIMATE;
+            // What was proved of these shapes held at another pose: what holds at this one is said of the bodies.
+            row.gap_min_m = finding.gap.min;
+            row.gap_max_m = if is_one_pair {
+                finding.gap.max
+            } else {
+                f64::INFINITY
+            };
+        }
         out.push(row);
     }
     out[start..].sort_unstable_by_key(|row| {

@@ -338,7 +338,8 @@ pub mod pair_flags {
 
 /// Bits of `ContactRow::flags`.
 pub mod contact_flags {
-    /// Taken at an older pose and carried along with body A.
+    /// Taken at an older pose and carried along, each point with its body; the interval is that of the bodies' gap by
+    /// now, its upper end infinite where a body has several shapes.
     pub const ESTIMATE: u32 = 1;
 }
 

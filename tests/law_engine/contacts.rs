@@ -4,10 +4,10 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use sweepd::math::{Pose, Quat, Vec3};
 use sweepd::time::Budget;
-use sweepd::wire::Verdict;
+use sweepd::wire::{Verdict, contact_flags};
 
 use crate::oracle::rng::Rng;
-use crate::rig::{ALL, Rig, body, scene};
+use crate::rig::{ALL, NONE, Rig, body, scene};
 
 /// A box of half a side `half` and 1 m high, of this id.
 fn cuboid(id: u64, half: f64) -> String {
@@ -361,5 +361,24 @@ fn bug_closest_points_of_compounds_with_meshes_were_missing_or_of_other_shapes()
             );
             assert_eq!(told.flags, 0, "{case}");
         }
+    }
+}
+
+/// The interval of a contact that was carried along was that of the pose it was taken at.
+#[test]
+fn bug_contacts_of_an_older_pose_had_intervals_without_the_truth() {
+    let mut rig = Rig::new(&scene("", &[cuboid(1, 0.5), cuboid(2, 0.5)]));
+    rig.move_x(2, 0.98);
+    rig.send(ALL);
+    assert!(rig.out.contacts.iter().all(|row| row.flags == 0) && !rig.out.contacts.is_empty());
+    rig.move_x(2, 0.995);
+    rig.send(NONE);
+    assert_eq!(rig.out.contacts.len(), 4);
+    for row in &rig.out.contacts {
+        assert_eq!(row.flags, contact_flags::ESTIMATE);
+        assert!(
+            row.gap_min_m <= -0.005 && -0.005 <= row.gap_max_m,
+            "{row:?}"
+        );
     }
 }

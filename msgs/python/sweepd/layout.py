@@ -832,7 +832,8 @@ class PairFlags(IntFlag):
 class ContactFlags(IntFlag):
     """Bits of ContactRow::flags."""
 
-    # Taken at an older pose and carried along with body A.
+    # Taken at an older pose and carried along, each point with its body; the interval is that of the bodies' gap by now,
+    # its upper end infinite where a body has several shapes.
     ESTIMATE = 1
 
 
