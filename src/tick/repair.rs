@@ -47,7 +47,10 @@ impl Engine {
         self.renew = true;
         self.carried = self.pairs.iter().map(|(_, key)| key).collect();
         let limits = self.config.limits;
-        self.pairs = PairSet::new(limits.pairs);
+        // Whose pairs were not all there is not found by boxes, where its place is not known.
+        let mut pairs = PairSet::new(limits.pairs);
+        pairs.go_on_missing(self.pairs.missing(), self.pairs.truncated());
+        self.pairs = pairs;
         self.narrow = Narrow::renewed(
             limits.contacts_per_pair,
             &self.world,
