@@ -28,6 +28,11 @@ pub(crate) fn small(index: usize) -> u32 {
 }
 
 impl BodySlot {
+    /// Of an index.
+    pub(crate) fn at(index: usize) -> Self {
+        Self(small(index))
+    }
+
     /// As an index.
     #[must_use]
     pub fn index(self) -> usize {
@@ -44,6 +49,11 @@ impl PairSlot {
 }
 
 impl SourceSlot {
+    /// Of an index.
+    pub(crate) fn at(index: usize) -> Self {
+        Self(small(index))
+    }
+
     /// As an index.
     #[must_use]
     pub fn index(self) -> usize {

@@ -218,7 +218,10 @@ impl Pacer {
     pub fn drain_passed(&mut self, mut each: impl FnMut(Option<SourceSlot>, u64)) {
         for (place, source) in self.sources.iter_mut().enumerate() {
             if source.passed > 0 {
-                each(Some(slot(place)), std::mem::take(&mut source.passed));
+                each(
+                    Some(SourceSlot::at(place)),
+                    std::mem::take(&mut source.passed),
+                );
             }
         }
         if self.passed_of_none > 0 {
@@ -245,7 +248,7 @@ impl Pacer {
                     whose.source != Some(lead)
                         || first && (!whose.speaks || std::mem::take(&mut first))
                 });
-                Some(by_frame(Some(slot(lead))))
+                Some(by_frame(Some(SourceSlot::at(lead))))
             }
             Beat::OnAll { late_ns, .. } => {
                 if self.round_ends_ns(now_ns)? > now_ns {
@@ -350,9 +353,4 @@ fn hear(sources: &mut [Source], frame: &Frame, whose: &mut Whose, ended: &[u64],
     if whose.speaks && !before {
         source.passed += source.lost_before(&frame.header);
     }
-}
-
-/// There are at most 16 sources.
-fn slot(place: usize) -> SourceSlot {
-    SourceSlot(u32::try_from(place).unwrap_or(u32::MAX))
 }

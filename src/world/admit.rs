@@ -280,7 +280,7 @@ impl World {
     /// What was known of a source's bodies is void: their pairs end, they are not received.
     pub(super) fn forget_poses(&mut self, source: SourceSlot) {
         for index in 0..self.bodies.len() {
-            let slot = super::census::slot_at(index);
+            let slot = BodySlot::at(index);
             let own = self.entries[index].root == slot;
             if own && self.body(slot).is_some_and(|body| owns(source, body)) {
                 self.forget_pose(slot);

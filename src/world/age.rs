@@ -5,12 +5,11 @@
 
 use super::World;
 use super::body::Body;
-use super::census::{slot_at, source_at};
 use super::place::grows;
 use super::source::SourceState;
 use super::twist::Twist;
 use crate::config::OnStale;
-use crate::ids::{BodySlot, small};
+use crate::ids::{BodySlot, SourceSlot, small};
 
 /// No deadline, no stamp.
 const NONE: u64 = u64::MAX;
@@ -177,7 +176,7 @@ impl World {
             state.timeout_ns = timeout_ns;
             for (_, slot) in &self.order {
                 let body = self.bodies[slot.index()].as_ref();
-                if body.is_some_and(|body| body.source == Some(source_at(place))) {
+                if body.is_some_and(|body| body.source == Some(SourceSlot::at(place))) {
                     self.ages.set_due(*slot);
                 }
             }
@@ -189,7 +188,7 @@ impl World {
     pub fn age(&mut self, now_boot_ns: u64) {
         self.now_ns = self.now_ns.max(now_boot_ns);
         for place in 0..self.sources.len() {
-            self.flush_waiting(source_at(place));
+            self.flush_waiting(SourceSlot::at(place));
             let source = &mut self.sources[place];
             let age_ns = self.now_ns.saturating_sub(source.since_ns);
             source.alive = source.newest.is_some() && age_ns < source.timeout_ns;
@@ -218,7 +217,7 @@ impl World {
 
     fn settle_expired(&mut self) {
         for index in 0..self.bodies.len() {
-            let slot = slot_at(index);
+            let slot = BodySlot::at(index);
             if self
                 .ages
                 .deadline_ns(slot)

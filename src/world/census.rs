@@ -14,7 +14,7 @@ use super::filters::{
 };
 use super::names::{NameId, Names};
 use super::rules::{SIDE_A, SIDE_B, ignores};
-use crate::ids::{BodySlot, PairKey, SourceSlot};
+use crate::ids::{BodySlot, PairKey, small};
 
 /// Most pairs one rule may force to be candidates; a rule with more widens the boxes of its bodies instead.
 pub(super) const FORCED_PER_RULE_MAX: usize = 1 << 12;
@@ -82,7 +82,7 @@ impl Filters {
             }
             let sided = self.rules.sided_of(hot.name);
             let key = (sided, hot.flags & (MOVES | UNBOUNDED));
-            let next = slot_at(list.len()).0;
+            let next = small(list.len());
             let place = *places.entry(key).or_insert(next);
             if place == next {
                 list.push(Class {
@@ -106,7 +106,7 @@ impl Filters {
                 let lists = of_rule.entry(rule).or_default();
                 for (side, list) in [SIDE_A, SIDE_B].into_iter().zip(lists) {
                     if sides & side != 0 {
-                        list.push(slot_at(place).0);
+                        list.push(small(place));
                     }
                 }
             }
@@ -115,7 +115,7 @@ impl Filters {
         // Which class each one was decided with last: rules may speak of a pair more than once.
         let mut decided = vec![u32::MAX; classes.list.len()];
         for (place, class) in classes.list.iter().enumerate() {
-            let a = slot_at(place).0;
+            let a = small(place);
             for &(rule, sides) in class.sided {
                 let Some(lists) = of_rule.get(&rule) else {
                     continue;
@@ -203,7 +203,7 @@ impl Filters {
     fn exceptions(&self, names: &Names) -> BTreeSet<PairKey> {
         let mut keys = BTreeSet::new();
         let mut put = |slot: usize, other: NameId| {
-            let slot = slot_at(slot);
+            let slot = BodySlot::at(slot);
             if let Some(other) = names.all().get(other.index()).and_then(|n| n.slot)
                 && other != slot
             {
@@ -279,14 +279,4 @@ fn pairs_of(count_a: u64, count_b: u64, same: bool) -> u64 {
     } else {
         count_a * count_b
     }
-}
-
-/// As [`slot_at`], of a source.
-pub(super) fn source_at(place: usize) -> SourceSlot {
-    SourceSlot(slot_at(place).0)
-}
-
-/// Slots are u32.
-pub(super) fn slot_at(index: usize) -> BodySlot {
-    BodySlot(u32::try_from(index).unwrap_or(u32::MAX))
 }

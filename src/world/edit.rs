@@ -6,14 +6,13 @@
 use std::sync::Arc;
 
 use super::World;
-use super::census::{slot_at, source_at};
 use super::edit_links::Places;
 use super::edit_same::Touch;
 use super::filters::{ENABLED, Hot, LIVE, MOVES, NO_GROUP, UNBOUNDED};
 use super::names::NameId;
 use super::parts::Parts;
 use super::place::{Entry, new_body};
-use crate::ids::{BodyId, BodySlot};
+use crate::ids::{BodyId, BodySlot, SourceSlot};
 use crate::math::Pose;
 use crate::scene::{BodySpec, PairRule};
 use crate::wire::EndCause;
@@ -221,7 +220,7 @@ impl World {
         kept.generation += 1;
         let (mut body, tight) = new_body(spec, shapes.clone(), kept.generation);
         body.id = id;
-        body.source = spec.source.map(source_at);
+        body.source = spec.source.map(SourceSlot::at);
         let mut entry = Entry::gone(slot);
         entry.enabled = spec.enabled;
         entry.has_pose = !spec.moves;
@@ -260,7 +259,7 @@ impl World {
     }
 
     fn new_slot(&mut self) -> BodySlot {
-        let slot = slot_at(self.bodies.len());
+        let slot = BodySlot::at(self.bodies.len());
         self.bodies.push(None);
         self.entries.push(Entry::gone(slot));
         self.filters.bodies.push(Hot::GONE);

@@ -6,10 +6,9 @@ use std::collections::BTreeMap;
 
 use super::World;
 use super::body::Body;
-use super::census::{slot_at, source_at};
 use super::chain::Chain;
 use super::filters::MOVES;
-use crate::ids::BodySlot;
+use crate::ids::{BodySlot, SourceSlot};
 use crate::math::{Pose, relative};
 
 /// Where bodies are after the edits of a request so far, as far as that was asked.
@@ -156,7 +155,7 @@ impl World {
         self.attached.clear();
         let mut known = BTreeMap::new();
         for index in 0..self.bodies.len() {
-            let slot = slot_at(index);
+            let slot = BodySlot::at(index);
             if self.bodies[index].is_none() {
                 continue;
             }
@@ -251,7 +250,7 @@ impl World {
             return false;
         };
         let source = spec.source.filter(|_| spec.moves);
-        let source = source.map(source_at);
+        let source = source.map(SourceSlot::at);
         let Some(body) = self.bodies[slot.index()].as_mut() else {
             return false;
         };

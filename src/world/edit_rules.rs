@@ -3,7 +3,6 @@
 use std::collections::BTreeSet;
 
 use super::World;
-use super::census::slot_at;
 use super::edit::Edit;
 use super::rule_draft::RuleDraft;
 use crate::ids::BodySlot;
@@ -51,7 +50,7 @@ impl World {
             }
         }
         for (index, _) in named.iter().enumerate().filter(|(_, named)| **named) {
-            self.requery(slot_at(index));
+            self.requery(BodySlot::at(index));
         }
     }
 
@@ -60,7 +59,7 @@ impl World {
         let Some(name) = name else {
             let slots = 0..self.bodies.len();
             return slots.fold(false, |any, slot| {
-                self.set_margin(slot_at(slot), report_within_m) | any
+                self.set_margin(BodySlot::at(slot), report_within_m) | any
             });
         };
         let slot = self.slot_named(name);
@@ -95,7 +94,7 @@ impl World {
             return;
         }
         for index in 0..self.bodies.len() {
-            let slot = slot_at(index);
+            let slot = BodySlot::at(index);
             let Some(body) = self.body(slot) else {
                 continue;
             };
@@ -129,7 +128,7 @@ impl World {
         self.filters.count_ignored(&self.names);
         self.filters.find_forced(&self.names);
         for index in 0..self.bodies.len() {
-            let slot = slot_at(index);
+            let slot = BodySlot::at(index);
             let Some(body) = self.body(slot) else {
                 continue;
             };

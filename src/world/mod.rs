@@ -66,7 +66,6 @@ use crate::scene::Scene;
 use crate::wire::BodyStatus;
 use age::Ages;
 use bends_waiting::BendsWaiting;
-use census::source_at;
 use lists::Lists;
 use names::Names;
 use place::Entry;
@@ -300,7 +299,7 @@ impl World {
     #[must_use]
     pub fn source_named(&self, name: &str) -> Option<SourceSlot> {
         let place = self.sources.iter().position(|s| s.name == name)?;
-        Some(source_at(place))
+        Some(SourceSlot::at(place))
     }
 
     /// The moment that it stands at, nanoseconds of `CLOCK_BOOTTIME`: that of the newest tick.
@@ -365,7 +364,7 @@ impl World {
     pub fn end_session(&mut self, session: u64) {
         for (place, state) in self.sources.iter_mut().enumerate() {
             if session != 0 && state.session == session {
-                self.over.put(source_at(place), session);
+                self.over.put(SourceSlot::at(place), session);
                 state.session = 0;
                 state.order = None;
                 state.bends = BendsWaiting::default();

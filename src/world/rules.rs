@@ -4,6 +4,7 @@
 //! of two plain names costs one search; a rule with patterns is matched with each name once, when either turns up.
 
 use super::names::{NameId, Names};
+use crate::ids::small;
 use crate::scene::{PairAction, PairRule, is_pattern, pattern_matches as matches};
 
 /// New names that are matched with the patterns one by one; of more, each pattern looks for its own.
@@ -59,13 +60,13 @@ impl Rules {
         // Plain names first, so that every name of a rule has its number before patterns are matched.
         for (place, rule) in self.list.iter().enumerate() {
             if is_pattern(&rule.a) || is_pattern(&rule.b) {
-                self.patterned.push(number(place));
+                self.patterned.push(small(place));
                 continue;
             }
             let (a, b) = (names.intern(&rule.a), names.intern(&rule.b));
             self.of_name.resize_with(names.len(), OfName::default);
-            self.of_name[a.index()].exact.push((b.0, number(place)));
-            self.of_name[b.index()].exact.push((a.0, number(place)));
+            self.of_name[a.index()].exact.push((b.0, small(place)));
+            self.of_name[b.index()].exact.push((a.0, small(place)));
         }
         for of_name in &mut self.of_name {
             keep_last(&mut of_name.exact);
@@ -210,11 +211,6 @@ fn last_sided(a: &[(u32, u8)], b: &[(u32, u8)]) -> Option<u32> {
         }
     }
     None
-}
-
-/// The number of rules is limited far below u32.
-fn number(place: usize) -> u32 {
-    u32::try_from(place).unwrap_or(u32::MAX)
 }
 
 #[cfg(test)]

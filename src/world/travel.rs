@@ -7,7 +7,6 @@
 //! goes its way.
 
 use super::World;
-use super::census::slot_at;
 use super::path::Path;
 use super::place::tight_box;
 use crate::ids::BodySlot;
@@ -183,7 +182,7 @@ impl World {
             source.followed = false;
         }
         for index in 0..self.bodies.len() {
-            let slot = slot_at(index);
+            let slot = BodySlot::at(index);
             let entry = &self.entries[index];
             let (root, local) = (entry.root, entry.root_pose);
             self.note_followed(slot, root);
