@@ -80,7 +80,9 @@ impl Daemon<'_> {
     fn tell_bodies(&mut self) {
         let world = self.engine.world();
         let done = self.ready.iter().zip(self.engine.outcomes());
-        let edits = done.filter(|(_, outcome)| outcome.result.is_ok());
+        // A put of what is there makes no subscription anew.
+        let edits =
+            done.filter(|(_, outcome)| outcome.result.as_ref().is_ok_and(|done| done.changed));
         let change = |edit: &Edit| match edit {
             Edit::Put { body, shapes } => {
                 // A later edit of the same request may have taken it out again: then that edit speaks for it.
@@ -111,5 +113,94 @@ fn refusal(why: String) -> Answer {
     Answer {
         error: Some(why),
         ..Answer::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use super::super::build_shapes;
+    use super::*;
+    use crate::error::Result;
+    use crate::scene::Scene;
+    use crate::time::{Clock, SystemClock};
+    use crate::transport::client::Client;
+    use crate::transport::memory::{Hub, MemoryServer};
+    use crate::transport::{Door, Wake};
+    use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow};
+
+    const SECOND_NS: u64 = 1_000_000_000;
+
+    /// A door over memory that notes what it is told of bodies.
+    struct Told(MemoryServer, Vec<BodyChange>);
+
+    impl Door for Told {
+        fn wait(&mut self, timeout_ns: u64, clock: &dyn Clock) -> Result<Wake> {
+            self.0.wait(timeout_ns, clock)
+        }
+        fn receive(&mut self, inbox: &mut Inbox, clock: &dyn Clock) {
+            self.0.receive(inbox, clock);
+        }
+        fn demand(&mut self) -> Demand {
+            self.0.demand()
+        }
+        fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
+            self.0.publish(outbox)
+        }
+        fn publish_tick(&mut self, tick: &TickRow) -> Result<()> {
+            self.0.publish_tick(tick)
+        }
+        fn requests(&mut self, take: &mut dyn FnMut(RequestToken, RequestHeader, Vec<u8>)) {
+            self.0.requests(take);
+        }
+        fn answer(&mut self, token: RequestToken, ok: bool, json: &str) -> Result<()> {
+            self.0.answer(token, ok, json)
+        }
+        fn follows_bodies(&self) -> bool {
+            true
+        }
+        fn bodies(&mut self, changes: &[BodyChange]) {
+            self.1.extend_from_slice(changes);
+        }
+        fn housekeeping(&mut self) {
+            self.0.housekeeping();
+        }
+    }
+
+    #[test]
+    fn bug_a_request_that_changes_nothing_was_told_as_bodies_that_came() {
+        let hub = Hub::new();
+        let scene = Scene::parse("", "empty.toml", Path::new("")).unwrap();
+        let shapes = build_shapes(&scene).unwrap();
+        let server = MemoryServer::open(&hub, 7, SECOND_NS).unwrap();
+        let mut door = Told(server, Vec::new());
+        let clock = Arc::new(SystemClock);
+        let mut daemon = Daemon::new(&scene, shapes, 7, clock.clone(), &mut door).unwrap();
+        let mut client = Client::over(Box::new(hub.link()), clock, None, SECOND_NS).unwrap();
+        for radius in [1.0, 1.0, 2.0] {
+            let shape = format!(r#"{{"type": "sphere", "radius": {radius}}}"#);
+            let body = format!(r#"{{"name": "a", "moves": false, "shape": {shape}}}"#);
+            let json = format!(r#"{{"edits": [{{"put": {body}}}]}}"#);
+            let request = client.ask(&json, &[]).unwrap();
+            let until_ns = SystemClock.monotonic_ns() + 30 * SECOND_NS;
+            let answer = loop {
+                assert!(SystemClock.monotonic_ns() < until_ns);
+                daemon.round(None).unwrap();
+                if let Some(answer) = client.answer_text(request, 0).unwrap() {
+                    break answer;
+                }
+            };
+            assert!(answer.contains(r#""ok":true"#), "{answer}");
+        }
+        drop(daemon);
+        let radii: Vec<_> = (door.1.iter())
+            .map(|change| match change {
+                BodyChange::Put(body) => body.bounds.map(|(_, half)| half[0]),
+                BodyChange::Removed(_) => None,
+            })
+            .collect();
+        assert_eq!(radii, [Some(1.0), Some(2.0)]);
     }
 }

@@ -122,6 +122,7 @@ impl RosNode {
         // Behind all that is the node's own: no body has a name of these.
         let (lines, unheard) = subscribe(&mut node, &context, &mut names, &sources, scene.again)?;
         odd.extend(unheard);
+        let topics = Topics::of(scene, &names, &lines);
         shared.set_rosout(Some(node.rosout_writer()));
         let namesakes = Namesakes::of(&context, node.fully_qualified_name())?;
         table.run();
@@ -160,7 +161,7 @@ impl RosNode {
             readers,
             read: Read::default(),
             namesakes,
-            topics: Topics::of(scene, &names),
+            topics,
             names: names.clone(),
             sources: scene.sources.clone(),
         };

@@ -6,6 +6,7 @@
 mod heard;
 mod owed;
 mod publishers;
+mod roster;
 mod unsent;
 
 use std::sync::Arc;
@@ -20,7 +21,6 @@ use serde::Serialize;
 pub(super) use unsent::Unsent;
 
 use super::diagnose::Diagnoser;
-use super::lines::{Arrival, Line, of_body};
 use super::markers::{Boxes, CONTACTS_MAX, collisions, markers};
 use super::names::Names;
 use super::namesakes::Namesakes;
@@ -32,10 +32,8 @@ use super::stamp::stamp_of;
 use super::strangers::Strangers;
 use super::wheel::{Means, Sent, Wheel};
 use super::{RosSourceSpec, open};
-use crate::config::RosKind;
-use crate::error::Error;
 use crate::time::{Clock as _, SystemClock};
-use crate::transport::{BodyChange, BodyNote, open_files};
+use crate::transport::open_files;
 use crate::wire::ros::{Counts, Speaker};
 use crate::wire::{Demand, NameRow, TickRow};
 
@@ -136,47 +134,6 @@ impl Outlet {
                 }
             }
         }
-    }
-
-    /// Boxes and subscriptions of bodies that edits put: only this thread has the node.
-    fn follow_edits(&mut self) {
-        let changes = std::mem::take(&mut *open(&self.shared.changes));
-        for change in changes {
-            let (BodyChange::Put(BodyNote { name, .. }) | BodyChange::Removed(name)) = &change;
-            if let Some(topic) = self.topics.remove(name, &mut self.names) {
-                self.strangers.part(&topic);
-            }
-            let line = match &change {
-                BodyChange::Put(body) => self.meet(body),
-                BodyChange::Removed(_) => None,
-            };
-            open(&self.shared.arrivals).push(Arrival { change, line });
-        }
-    }
-
-    /// Takes a body that came; the subscription it needs, if it needs one.
-    fn meet(&mut self, body: &BodyNote) -> Option<Line> {
-        match body.bounds {
-            Some(bounds) => self.boxes.insert(body.id, bounds),
-            None => self.boxes.remove(&body.id),
-        };
-        let kind = self.sources.get(body.source?)?.ros2.as_ref()?.kind;
-        if kind == RosKind::Tf {
-            return None;
-        }
-        let topic = self
-            .topics
-            .put(&body.name, &body.topic, &mut self.names)
-            .map_err(Error::Usage);
-        if let Ok(topic) = &topic {
-            self.strangers.meet(topic, kind);
-        }
-        let line = topic.and_then(|topic| of_body(&mut self.node, &self.context, kind, &topic));
-        line.map_err(|e| {
-            let text = format!("body {}: no poses of it can come: {e}", body.name);
-            self.shared.say(Say::Error, &text);
-        })
-        .ok()
     }
 
     /// Tells who was lost, and asks for a new node when one of them is back.

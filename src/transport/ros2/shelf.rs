@@ -98,6 +98,15 @@ impl Shelf {
         }
     }
 
+    /// Gives the body at a place of a group another id; what waits there stays.
+    pub(super) fn set_id(&self, group: usize, member: usize, body: u64) {
+        let mut waiting = open(&self.waiting);
+        let group = waiting.groups.get_mut(group);
+        if let Some(id) = group.and_then(|group| group.bodies.get_mut(member)) {
+            *id = body;
+        }
+    }
+
     /// An emptied frame whose memory has been used before.
     pub(super) fn spare(&self) -> Frame {
         open(&self.waiting).spare.pop().unwrap_or_default()

@@ -9,6 +9,7 @@ use super::super::lines::{Arrival, Feeder};
 use super::super::open;
 use super::super::poses::Source;
 use super::super::shared::Say;
+use super::super::shelf::Shelf;
 use super::Inlet;
 use crate::transport::{BodyChange, BodyNote};
 
@@ -20,6 +21,11 @@ impl Inlet {
     pub(super) fn follow_edits(&mut self) {
         let arrivals = std::mem::take(&mut *open(&self.shared.arrivals));
         for Arrival { change, line } in arrivals {
+            if let (BodyChange::Put(body), None) = (&change, &line)
+                && keep(&mut self.sources, &self.shelf, body)
+            {
+                continue;
+            }
             let (BodyChange::Put(BodyNote { name, .. }) | BodyChange::Removed(name)) = &change;
             for (at, source) in self.sources.iter_mut().enumerate() {
                 let Some(member) = source.remove_body(name) else {
@@ -68,5 +74,112 @@ impl Inlet {
             )
         };
         twice.map(text).collect()
+    }
+}
+
+/// Gives a body that is heard where it was its new id, and keeps what is known and what waits of it; whether it is one.
+fn keep(sources: &mut [Source], shelf: &Shelf, body: &BodyNote) -> bool {
+    let mut sources = sources.iter_mut().enumerate();
+    let source = sources.find(|(_, source)| Some(source.place) == body.source);
+    let kept = source.and_then(|(at, source)| Some((at, source.keep_body(body)?)));
+    if let Some((at, member)) = kept {
+        shelf.set_id(at, member, body.id);
+    }
+    kept.is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use ros2_client::Gid;
+
+    use super::super::super::poses::Receipt;
+    use super::super::super::{RosScene, RosSourceSpec};
+    use super::*;
+    use crate::config::{RosKind, RosSource};
+    use crate::wire::Inbox;
+    use crate::wire::ros::{PoseStamped, Time};
+
+    const MS: u64 = 1_000_000;
+
+    fn body(id: u64) -> BodyNote {
+        BodyNote {
+            id,
+            name: "a".to_owned(),
+            source: Some(0),
+            frame: "a".to_owned(),
+            topic: "/a".to_owned(),
+            bounds: None,
+        }
+    }
+
+    fn source() -> Source {
+        let ros2 = RosSource {
+            kind: RosKind::Pose,
+            topic: String::new(),
+            static_topic: String::new(),
+            max_skew_ns: 0,
+        };
+        let scene = RosScene {
+            frame_id: "world".to_owned(),
+            sources: vec![RosSourceSpec {
+                name: "s".to_owned(),
+                timeout_ns: 500 * MS,
+                ros2: Some(ros2),
+            }],
+            bodies: vec![body(1)],
+            ..RosScene::default()
+        };
+        Source::of(&scene).remove(0)
+    }
+
+    /// A pose with this stamp; what it says of the body.
+    fn send(source: &mut Source, shelf: &Shelf, stamp_ns: u64) {
+        let mut message = PoseStamped::default();
+        message.header.frame_id = "world".to_owned();
+        message.header.stamp = Time::from_ns(stamp_ns);
+        message.pose.orientation.w = 1.0;
+        let receipt = Receipt {
+            now_ns: stamp_ns,
+            waited: false,
+            ros_now_ns: 0,
+            from: Gid::ZERO,
+        };
+        let mut updates = Vec::new();
+        source.take_pose(0, &message, receipt, &mut updates);
+        shelf.merge(0, &updates);
+    }
+
+    #[test]
+    fn bug_a_body_that_was_put_again_lost_the_pose_that_waited_and_the_order_of_its_stamps() {
+        let (mut sources, shelf) = ([source()], Shelf::default());
+        shelf.add_group(sources[0].name, 9, sources[0].bodies());
+        send(&mut sources[0], &shelf, 100 * MS);
+        assert!(keep(&mut sources, &shelf, &body(7)));
+        // Late, and late it stays.
+        send(&mut sources[0], &shelf, 90 * MS);
+        let mut inbox = Inbox::default();
+        shelf.drain(&mut inbox);
+        let frame = &inbox.frames()[0];
+        assert_eq!(
+            (frame.transforms[0].body, frame.stamps_ns[0]),
+            (7, 100 * MS)
+        );
+        assert_eq!(sources[0].bodies(), [7]);
+    }
+
+    #[test]
+    fn a_body_that_is_heard_elsewhere_or_came_now_is_not_kept() {
+        let (mut sources, shelf) = ([source()], Shelf::default());
+        shelf.add_group(sources[0].name, 9, sources[0].bodies());
+        let topic = "/b".to_owned();
+        assert!(!keep(&mut sources, &shelf, &BodyNote { topic, ..body(1) }));
+        let frame = "b".to_owned();
+        assert!(!keep(&mut sources, &shelf, &BodyNote { frame, ..body(1) }));
+        let name = "b".to_owned();
+        assert!(!keep(&mut sources, &shelf, &BodyNote { name, ..body(1) }));
+        let source = None;
+        assert!(!keep(&mut sources, &shelf, &BodyNote { source, ..body(1) }));
+        sources[0].remove_body("a");
+        assert!(!keep(&mut sources, &shelf, &body(1)));
     }
 }

@@ -5,22 +5,46 @@
 use std::collections::BTreeMap;
 
 use super::super::RosScene;
+use super::super::lines::Line;
 use super::super::names::Names;
 use crate::config::RosKind;
+use crate::transport::BodyNote;
 
 /// The topics of bodies, by the names of these.
 #[derive(Clone, Debug, Default)]
 pub(in super::super) struct Topics {
-    of: BTreeMap<String, String>,
+    of: BTreeMap<String, Topic>,
+}
+
+/// A topic that a body has.
+#[derive(Clone, Debug)]
+struct Topic {
+    /// Place of the body's source.
+    source: usize,
+    /// Its name as the body says it.
+    given: String,
+    full: String,
+    /// Whether there is a subscription.
+    heard: bool,
 }
 
 impl Topics {
     /// Those of a scene, whose names have been given out. A body whose topic is another thing's has none.
-    pub(in super::super) fn of(scene: &RosScene, names: &Names) -> Self {
+    ///
+    /// * `lines` - all subscriptions.
+    pub(in super::super) fn of(scene: &RosScene, names: &Names, lines: &[Line]) -> Self {
         let own = scene.bodies.iter().filter_map(|body| {
-            let ros = scene.sources.get(body.source?)?.ros2.as_ref()?;
+            let source = body.source?;
+            let ros = scene.sources.get(source)?.ros2.as_ref()?;
             let is_own = ros.kind != RosKind::Tf;
-            let topic = names.of_body(&body.topic).filter(|_| is_own)?;
+            let full = names.of_body(&body.topic).filter(|_| is_own)?;
+            let mut feeders = lines.iter().filter_map(Line::feeder);
+            let topic = Topic {
+                source,
+                given: body.topic.clone(),
+                heard: feeders.any(|feeder| feeder.topic == full),
+                full,
+            };
             Some((body.name.clone(), topic))
         });
         Self { of: own.collect() }
@@ -30,21 +54,35 @@ impl Topics {
     ///
     /// # Errors
     /// One text, when it is no name or another thing has it.
-    pub(super) fn put(
-        &mut self,
-        body: &str,
-        topic: &str,
-        names: &mut Names,
-    ) -> Result<String, String> {
-        let full = names.claim_for_body(topic)?;
-        self.of.insert(body.to_owned(), full.clone());
+    pub(super) fn put(&mut self, body: &BodyNote, names: &mut Names) -> Result<String, String> {
+        let full = names.claim_for_body(&body.topic)?;
+        let topic = Topic {
+            source: body.source.unwrap_or(usize::MAX),
+            given: body.topic.clone(),
+            full: full.clone(),
+            heard: false,
+        };
+        self.of.insert(body.name.clone(), topic);
         Ok(full)
+    }
+
+    /// There is a subscription to the topic of a body.
+    pub(super) fn note_heard(&mut self, body: &str) {
+        if let Some(topic) = self.of.get_mut(body) {
+            topic.heard = true;
+        }
+    }
+
+    /// Whether a body of this name is heard already where this one is to be.
+    pub(super) fn hears(&self, body: &BodyNote) -> bool {
+        let own = self.of.get(&body.name).filter(|topic| topic.heard);
+        own.is_some_and(|own| (Some(own.source), &own.given) == (body.source, &body.topic))
     }
 
     /// A body has left, or comes anew: the topic it had, where no other body has it.
     pub(super) fn remove(&mut self, body: &str, names: &mut Names) -> Option<String> {
-        let topic = self.of.remove(body)?;
-        if self.of.values().any(|other| *other == topic) {
+        let topic = self.of.remove(body)?.full;
+        if self.of.values().any(|other| other.full == topic) {
             return None;
         }
         names.release(&topic);
@@ -58,19 +96,30 @@ mod tests {
     use super::super::super::args::RosArgs;
     use super::*;
     use crate::config::RosSource;
-    use crate::transport::BodyNote;
+
+    fn body(name: &str, topic: &str) -> BodyNote {
+        BodyNote {
+            name: name.to_owned(),
+            source: Some(0),
+            topic: topic.to_owned(),
+            ..BodyNote::default()
+        }
+    }
 
     #[test]
     fn bug_the_topic_of_a_body_that_has_left_is_free_for_another_thing() {
         let words = ["-r", "/left:=/right"].map(str::to_owned);
         let mut names = Names::new(&RosArgs::parse(&words).unwrap(), "sweepd").unwrap();
         let mut topics = Topics::default();
-        topics.put("a", "/left", &mut names).unwrap();
-        topics.put("b", "/left", &mut names).unwrap();
+        topics.put(&body("a", "/left"), &mut names).unwrap();
+        topics.put(&body("b", "/left"), &mut names).unwrap();
         assert_eq!(topics.remove("a", &mut names), None, "b has it");
-        assert!(topics.put("c", "/right", &mut names).is_err());
+        assert!(topics.put(&body("c", "/right"), &mut names).is_err());
         assert_eq!(topics.remove("b", &mut names).unwrap(), "/right");
-        assert_eq!(topics.put("c", "/right", &mut names).unwrap(), "/right");
+        assert_eq!(
+            topics.put(&body("c", "/right"), &mut names).unwrap(),
+            "/right"
+        );
         assert_eq!(topics.remove("nobody", &mut names), None);
     }
 
@@ -89,22 +138,45 @@ mod tests {
                 max_skew_ns: 0,
             }),
         };
-        let body = BodyNote {
-            name: "a".to_owned(),
-            source: Some(0),
-            topic: "~/tick".to_owned(),
-            ..BodyNote::default()
-        };
         let scene = RosScene {
             sources: vec![source],
-            bodies: vec![body],
+            bodies: vec![body("a", "~/tick")],
             ..RosScene::default()
         };
-        let mut topics = Topics::of(&scene, &names);
+        let mut topics = Topics::of(&scene, &names, &[]);
         assert_eq!(topics.remove("a", &mut names), None);
         assert!(
             names.claim_for_body("~/tick").is_err(),
             "it is still the node's"
         );
+    }
+
+    #[test]
+    fn bug_a_body_that_was_put_again_where_it_is_heard_lost_its_subscription() {
+        let mut names = Names::new(&RosArgs::parse(&[]).unwrap(), "sweepd").unwrap();
+        let mut topics = Topics::default();
+        let one = BodyNote {
+            id: 1,
+            ..body("a", "/a")
+        };
+        topics.put(&one, &mut names).unwrap();
+        assert!(!topics.hears(&one), "no files were left for it");
+        topics.note_heard("a");
+        let other = BodyNote {
+            id: 2,
+            bounds: Some(([0.0; 3], [1.0; 3])),
+            ..one.clone()
+        };
+        assert!(topics.hears(&one) && topics.hears(&other));
+        for source in [None, Some(1)] {
+            let elsewhere = BodyNote {
+                source,
+                ..one.clone()
+            };
+            assert!(!topics.hears(&elsewhere));
+        }
+        assert!(!topics.hears(&body("a", "/b")) && !topics.hears(&body("b", "/a")));
+        topics.remove("a", &mut names);
+        assert!(!topics.hears(&one));
     }
 }

@@ -35,6 +35,21 @@ impl Source {
         place
     }
 
+    /// Takes a body that was put again, where it is heard as before: what was heard of it stays; its place.
+    pub(in super::super) fn keep_body(&mut self, body: &BodyNote) -> Option<usize> {
+        let frame = self.tree.pin(&body.frame);
+        self.tree.unpin(frame);
+        let place = self.place_of(&body.name)?;
+        let member = self.members.get_mut(place)?;
+        if (member.frame, &member.topic) != (frame, &body.topic) {
+            return None;
+        }
+        member.body = body.id;
+        // What it is made of may be new, and then nobody knows where that is: its chain says so again.
+        member.last = None;
+        Some(place)
+    }
+
     /// Lets a body go; the place it had, if it had one.
     pub(in super::super) fn remove_body(&mut self, name: &str) -> Option<usize> {
         let place = self.place_of(name)?;
