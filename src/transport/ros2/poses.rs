@@ -215,9 +215,14 @@ impl Source {
                     )
                 })
                 .map_err(Clone::clone);
-            // A chain that never changes is said again and again, because its source vouches for it.
+            // A chain that never changes is said again and again, because its source vouches for it; so is one that is
+            // broken, because what is said where the process has just stood still is not taken.
             let due = receipt.now_ns.saturating_sub(member.told_ns) >= self.timeout_ns / 3;
-            let renewed = due && matches!(&found, Ok(found) if found.received_ns.is_none());
+            let lasts = match &found {
+                Ok(found) => found.received_ns.is_none(),
+                Err(why) => matches!(why, Missing::Loop(_) | Missing::Bad(..)),
+            };
+            let renewed = due && lasts;
             if member.last.as_ref() == Some(&mark) && !renewed {
                 continue;
             }

@@ -2,10 +2,11 @@
 
 #![allow(clippy::float_cmp, reason = "poses are handed on bit by bit")]
 
+mod renewed;
+
 use super::*;
 use crate::config::RosSource;
-use crate::transport::BodyNote;
-use crate::transport::ros2::RosSourceSpec;
+use crate::transport::{BodyNote, ros2::RosSourceSpec};
 use crate::wire::ros::{Header, Time, Transform, TransformStamped};
 
 const MS: u64 = 1_000_000;
@@ -31,7 +32,7 @@ fn source(kind: RosKind, max_skew_ns: u64, frame: &str) -> Source {
             source: Some(0),
             frame: frame.to_owned(),
             topic: "/a".to_owned(),
-            bounds: None,
+            ..BodyNote::default()
         }],
         ..RosScene::default()
     };
@@ -387,8 +388,7 @@ fn bug_a_body_that_is_put_after_frames_without_end_is_not_at_the_scenes_origin()
         name: "late".to_owned(),
         source: Some(0),
         frame: "late".to_owned(),
-        topic: String::new(),
-        bounds: None,
+        ..BodyNote::default()
     };
     one.put_body(&late);
     assert!(look(&mut one, 2 * MS).is_empty(), "nobody has said where");

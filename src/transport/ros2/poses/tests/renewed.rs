@@ -1,0 +1,47 @@
+//! What is said again although nothing is new.
+
+use super::*;
+
+/// A chain that is a loop, or whose link is no pose.
+fn broken(zero: bool) -> Source {
+    let mut one = tf("a");
+    let mut message = link("world", "a", 2 * MS);
+    if zero {
+        message.transforms[0].transform.rotation = [0.0; 4].into();
+    } else {
+        one.take_links(&link("b", "a", MS), false, at(MS));
+        message = link("a", "b", MS);
+    }
+    one.take_links(&message, false, at(2 * MS));
+    one
+}
+
+#[test]
+fn bug_a_refusal_that_was_said_where_the_process_had_stood_still_was_never_said_again() {
+    for (zero, reason) in [
+        (false, RejectReason::BadChain),
+        (true, RejectReason::BadQuaternion),
+    ] {
+        let mut one = broken(zero);
+        let mut updates = Vec::new();
+        let waited = Receipt {
+            waited: true,
+            ..at(2 * MS)
+        };
+        one.look(waited, &mut updates);
+        assert!(updates[0].waited && updates[0].result == Err(reason));
+        assert!(look(&mut one, 100 * MS).is_empty());
+        let said = look(&mut one, 200 * MS);
+        assert!(!said[0].waited && said[0].result == Err(reason));
+        assert!(look(&mut one, 300 * MS).is_empty());
+    }
+}
+
+#[test]
+fn a_chain_that_ends_is_never_said() {
+    let mut one = tf("tool");
+    one.take_links(&link("base", "tool", MS), false, at(MS));
+    for now_ms in [1, 200, 400] {
+        assert!(look(&mut one, now_ms * MS).is_empty());
+    }
+}
