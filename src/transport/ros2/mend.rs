@@ -100,11 +100,14 @@ impl LastingNode {
     }
 
     /// Gives a dead node away, takes the new one.
-    fn exchange(&mut self) {
+    fn exchange(&mut self, inbox: &mut Inbox, clock: &dyn Clock) {
         let is_back = self.live.as_ref().is_some_and(RosNode::is_to_open_anew);
         self.flags.back.store(is_back, Ordering::Relaxed);
         if self.live.is_some() && self.flags.dead.load(Ordering::Acquire) {
-            if let (Some(node), Some(broken)) = (self.live.take(), &self.broken) {
+            if let (Some(mut node), Some(broken)) = (self.live.take(), &self.broken) {
+                // Nobody else says that it is over: the next node would be a stranger for a time-out.
+                node.receive(inbox, clock);
+                inbox.end_session(node.session);
                 // A watcher that is gone drops it: there is nobody to mend it.
                 let _gone = broken.send(node);
             }
@@ -210,7 +213,7 @@ impl Door for LastingNode {
     }
 
     fn receive(&mut self, inbox: &mut Inbox, clock: &dyn Clock) {
-        self.exchange();
+        self.exchange(inbox, clock);
         if let Some(node) = &mut self.live {
             node.receive(inbox, clock);
         }
@@ -289,5 +292,45 @@ impl Door for LastingNode {
         if let Some(node) = &mut self.live {
             node.housekeeping();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::RosOptions;
+    use super::super::args::RosArgs;
+    use super::super::env::{Network, Range};
+    use super::super::wheel::tests::domain;
+    use super::*;
+
+    #[test]
+    fn bug_the_session_of_a_node_that_is_given_up_was_not_over_until_its_time_out() {
+        let network = Network {
+            domain: domain(5),
+            range: Range::Localhost,
+            pinned: false,
+            unsecured: false,
+            cyclone: false,
+        };
+        let opener = move |scene: &RosScene| {
+            let options = RosOptions {
+                args: RosArgs::parse(&[]).map_err(Error::Usage)?,
+                network,
+                boot_id: 7,
+                session: 9,
+            };
+            RosNode::open(&options, scene, Box::new(|| {}))
+        };
+        let mut node = LastingNode::open(RosScene::default(), Box::new(opener)).unwrap();
+        let mut inbox = Inbox::default();
+        node.receive(&mut inbox, &SystemClock);
+        assert!(inbox.is_empty());
+        // As the thread that looks says it.
+        node.flags.dead.store(true, Ordering::Release);
+        node.receive(&mut inbox, &SystemClock);
+        assert_eq!(inbox.ended(), [9]);
+        inbox.clear();
+        node.receive(&mut inbox, &SystemClock);
+        assert!(inbox.is_empty(), "said once");
     }
 }

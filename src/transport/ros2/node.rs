@@ -70,6 +70,8 @@ pub struct RosNode {
     receiving: Option<JoinHandle<()>>,
     sending: Option<JoinHandle<()>>,
     demand: Demand,
+    /// Of its sources of common topics: it is over when the node is given up.
+    pub(super) session: u64,
     /// Who waits for the next tick.
     ticks_asked: Vec<u64>,
 }
@@ -107,8 +109,7 @@ impl RosNode {
         let mut node = make(options, &context, &names)?;
         shared.take(table.effects());
         // Before any writer, so that no reader of one is missed.
-        let readers = Readers::of(&context);
-        let sources = Source::of(scene);
+        let (readers, sources) = (Readers::of(&context), Source::of(scene));
         let shelf = Arc::new(shelf(&sources, options.session));
         let heartbeat_ns = scene.config.heartbeat_ns;
         let publishers = Publishers::create(
@@ -174,6 +175,7 @@ impl RosNode {
             receiving: None,
             sending: None,
             demand: Demand::default(),
+            session: options.session,
             ticks_asked: Vec::new(),
         };
         open.start(inlet, outlet)?;
