@@ -5,6 +5,9 @@
 //! was down, and an old pose must not become the newest. A clock that began anew (a simulator that was started again)
 //! goes on from there, so it is known by what follows, within the age that its bodies have yet.
 
+/// What is late by less is no sign of another clock, nanoseconds; nor is what is late by less than a time-out. Where
+/// that is longer, a simulator that is started again soon has stamps within it.
+const LATE_NS: u64 = 500_000_000;
 /// Stamps in a row that make a clock that began anew.
 const ROW: u32 = 3;
 
@@ -48,8 +51,8 @@ impl Order {
     /// Takes a stamp.
     ///
     /// * `now_ns` - its receipt, nanoseconds of `CLOCK_BOOTTIME`.
-    /// * `timeout_ns` - the time-out of its source. What is late by less is no sign of another clock; and what is
-    ///   late by more comes in one burst, while a clock that began anew goes on for half of that.
+    /// * `timeout_ns` - the time-out of its source. What is late comes in one burst, while a clock that began anew goes
+    ///   on for half of that.
     pub(super) fn take(&mut self, stamp_ns: u64, now_ns: u64, timeout_ns: u64) -> Step {
         // A stamp of 0 says nothing, as of a sender without a clock that takes the place of one with.
         if stamp_ns == 0 || stamp_ns >= self.newest_ns {
@@ -57,7 +60,7 @@ impl Order {
             return Step::On;
         }
         let by_ns = self.newest_ns - stamp_ns;
-        if by_ns <= timeout_ns {
+        if by_ns <= timeout_ns.min(LATE_NS) {
             return Step::Late(by_ns);
         }
         let low = match self.low {
@@ -122,6 +125,28 @@ mod tests {
         // At 260 ms: half a time-out, where the newest pose is 280 ms old.
         assert_eq!(anew, Some(13));
         assert!(steps[14..].iter().all(|step| *step == Step::On));
+    }
+
+    #[test]
+    fn bug_a_clock_that_began_anew_within_a_long_time_out_was_late_until_it_was_where_it_had_been()
+    {
+        let timeout = 10 * S;
+        let mut order = Order::from(8 * S);
+        let steps = (0..400_u64).map(|n| order.take(MS + n * 20 * MS, n * 20 * MS, timeout));
+        let anew = steps.enumerate().find(|(_, step)| *step == Step::Anew);
+        // At 5 s: half a time-out.
+        assert_eq!(anew.map(|(n, _)| n), Some(250));
+        // What was held back comes late by as much, and not for as long.
+        let mut order = Order::from(8 * S);
+        for n in 0..200 {
+            let step = order.take(MS + n * 20 * MS, n * 20 * MS, timeout);
+            assert!(matches!(step, Step::Late(_)), "{n}");
+        }
+        assert_eq!(order.take(9 * S, 4 * S, timeout), Step::On);
+        for n in 0..200 {
+            let step = order.take(5 * S + n * MS, 4 * S + n * 20 * MS, timeout);
+            assert!(matches!(step, Step::Late(_)), "{n}");
+        }
     }
 
     #[test]
