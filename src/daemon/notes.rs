@@ -14,6 +14,7 @@ pub fn body_note(spec: &BodySpec, id: BodyId, placed: &[PlacedShape]) -> BodyNot
         source: spec.source,
         frame: spec.ros_frame.as_ref().unwrap_or(&spec.name).clone(),
         topic: spec.ros_topic.clone().unwrap_or_default(),
+        continuous: spec.continuous,
         bounds: bounds(placed),
     }
 }

@@ -85,6 +85,8 @@ pub struct BodyNote {
     pub frame: String,
     /// Its topic; empty: none.
     pub topic: String,
+    /// Whether each of its poses is a part of its way.
+    pub continuous: bool,
     /// Centre and half extents of its box in its own frame, metres; `None`: it has no end.
     pub bounds: Option<([f64; 3], [f64; 3])>,
 }

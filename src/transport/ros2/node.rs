@@ -273,7 +273,7 @@ fn shared(options: &RosOptions, scene: &RosScene, names: &Names, book: Book) -> 
 fn shelf(sources: &[Source], session: u64) -> Shelf {
     let shelf = Shelf::default();
     for source in sources {
-        shelf.add_group(source.name, session, source.bodies());
+        shelf.add_group(source.name, session, source.seats());
     }
     shelf
 }

@@ -14,7 +14,7 @@ use ros2_client::Gid;
 
 use super::RosScene;
 use super::order::{Order, Step};
-use super::shelf::Update;
+use super::shelf::{Seat, Update};
 use super::tf::{Missing, Taken, Tree, no_pose, plain, sound};
 use super::told::brief;
 use crate::config::RosKind;
@@ -35,13 +35,16 @@ pub(super) struct Receipt {
     pub(super) from: Gid,
 }
 
-/// In place of the id of a body that has left: no body has it.
-const NOBODY: u64 = 0;
+/// In place of a body that has left: no body has this id.
+const NOBODY: Seat = Seat {
+    body: 0,
+    continuous: false,
+};
 
 /// One body of a source of common topics.
 #[derive(Debug)]
 struct Member {
-    body: u64,
+    seat: Seat,
     name: String,
     /// Number of its frame in the tree (kind `tf`).
     frame: usize,
@@ -114,9 +117,9 @@ impl Source {
         all
     }
 
-    /// Ids of its bodies.
-    pub(super) fn bodies(&self) -> Vec<u64> {
-        self.members.iter().map(|member| member.body).collect()
+    /// The seats of its bodies, in their order.
+    pub(super) fn seats(&self) -> Vec<Seat> {
+        self.members.iter().map(|member| member.seat).collect()
     }
 
     /// The topic of each of its bodies.
@@ -127,7 +130,7 @@ impl Source {
     /// What is wrong with its bodies now, at most `most` of them.
     pub(super) fn faults(&self, most: usize, now_ns: u64) -> Vec<String> {
         let members = self.members.iter();
-        let members = members.filter(|member| member.body != NOBODY);
+        let members = members.filter(|member| member.seat != NOBODY);
         let faulty = members.filter_map(|member| {
             let fault = member.fault.clone();
             let fault = fault.or_else(|| self.silence(member, now_ns))?;
@@ -199,7 +202,7 @@ impl Source {
         }
         let (mut skew_ns, root) = (None, self.root.1);
         let members = self.members.iter_mut().enumerate();
-        for (place, member) in members.filter(|(_, member)| member.body != NOBODY) {
+        for (place, member) in members.filter(|(_, member)| member.seat != NOBODY) {
             let found = self.tree.find(member.frame, root);
             if let Ok(found) = &found
                 && found.received_ns.is_some()

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::open;
 use crate::limits::FRAMES_PER_DRAIN_MAX;
+use crate::transport::BodyNote;
 use crate::wire::{
     Frame, FrameHeader, Inbox, RejectReason, SOURCE_NAME_LEN, TransformRow, WIRE_VERSION,
     frame_flags,
@@ -35,6 +36,23 @@ pub(super) struct Update {
     pub(super) waited: bool,
 }
 
+/// A body's place in a group; nobody's: id 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Seat {
+    pub(super) body: u64,
+    /// Whether each of its poses is a part of its way, so that one that gave way to a newer one is missing.
+    pub(super) continuous: bool,
+}
+
+impl Seat {
+    pub(super) fn of(body: &BodyNote) -> Self {
+        Self {
+            body: body.id,
+            continuous: body.continuous,
+        }
+    }
+}
+
 /// The newest poses of one source of common topics; they go out as one partial frame.
 #[derive(Debug)]
 struct Group {
@@ -42,8 +60,9 @@ struct Group {
     session: u64,
     epoch: u64,
     seq: u64,
-    /// Body ids.
-    bodies: Vec<u64>,
+    /// Poses of continuous bodies that gave way since the last frame: its number tells how many are missing.
+    missing: u64,
+    seats: Vec<Seat>,
     /// The newest update of each body since the last frame.
     newest: Vec<Option<Update>>,
     /// Members that have one.
@@ -67,43 +86,44 @@ pub(super) struct Shelf {
 
 impl Shelf {
     /// Adds a source of common topics; groups are numbered in the order they are added.
-    pub(super) fn add_group(&self, name: [u8; SOURCE_NAME_LEN], session: u64, bodies: Vec<u64>) {
+    pub(super) fn add_group(&self, name: [u8; SOURCE_NAME_LEN], session: u64, seats: Vec<Seat>) {
         open(&self.waiting).groups.push(Group {
             name,
             session,
             epoch: 1,
             seq: 0,
-            newest: vec![None; bodies.len()],
-            touched: Vec::with_capacity(bodies.len()),
-            bodies,
+            missing: 0,
+            newest: vec![None; seats.len()],
+            touched: Vec::with_capacity(seats.len()),
+            seats,
         });
     }
 
-    /// Gives a place of a group to a body, or to nobody (id 0); what waits there is dropped.
-    pub(super) fn set_member(&self, group: usize, member: usize, body: u64) {
+    /// Gives a place of a group to a body, or to nobody; what waits there is dropped.
+    pub(super) fn set_member(&self, group: usize, member: usize, seat: Seat) {
         let mut waiting = open(&self.waiting);
         let Some(group) = waiting.groups.get_mut(group) else {
             return;
         };
-        if member >= group.bodies.len() {
-            group.bodies.resize(member + 1, 0);
+        if member >= group.seats.len() {
+            group.seats.resize(member + 1, Seat::default());
             group.newest.resize(member + 1, None);
         }
-        if let (Some(id), Some(newest)) =
-            (group.bodies.get_mut(member), group.newest.get_mut(member))
+        if let (Some(old), Some(newest)) =
+            (group.seats.get_mut(member), group.newest.get_mut(member))
         {
-            *id = body;
+            *old = seat;
             *newest = None;
             group.touched.retain(|&touched| touched != member);
         }
     }
 
-    /// Gives the body at a place of a group another id; what waits there stays.
-    pub(super) fn set_id(&self, group: usize, member: usize, body: u64) {
+    /// The body at a place of a group is another now, by its id or by what it is; what waits there stays.
+    pub(super) fn renew_member(&self, group: usize, member: usize, seat: Seat) {
         let mut waiting = open(&self.waiting);
         let group = waiting.groups.get_mut(group);
-        if let Some(id) = group.and_then(|group| group.bodies.get_mut(member)) {
-            *id = body;
+        if let Some(old) = group.and_then(|group| group.seats.get_mut(member)) {
+            *old = seat;
         }
     }
 
@@ -139,9 +159,15 @@ impl Shelf {
             let Some(slot) = group.newest.get_mut(update.member) else {
                 continue;
             };
-            if slot.replace(*update).is_none() {
+            let Some(old) = slot.replace(*update) else {
                 group.touched.push(update.member);
-            }
+                continue;
+            };
+            // The very same, said again, is no part of a way.
+            let is_other = (old.result, old.stamp_ns) != (update.result, update.stamp_ns);
+            let seat = group.seats.get(update.member);
+            let goes_on = seat.is_some_and(|seat| seat.continuous);
+            group.missing += u64::from(goes_on && is_other && old.result.is_ok());
         }
     }
 
@@ -149,7 +175,7 @@ impl Shelf {
     pub(super) fn reset(&self, group: usize) {
         if let Some(group) = open(&self.waiting).groups.get_mut(group) {
             group.epoch += 1;
-            group.seq = 0;
+            (group.seq, group.missing) = (0, 0);
             for member in group.touched.drain(..) {
                 if let Some(slot) = group.newest.get_mut(member) {
                     *slot = None;
@@ -211,10 +237,10 @@ impl Group {
 
     /// One partial frame of those whose ages count from before `until_ns`.
     fn fill_one(&mut self, touched: &mut Vec<usize>, until_ns: u64, frame: &mut Frame) {
-        self.seq += 1;
+        self.seq += 1 + std::mem::take(&mut self.missing);
         let (mut received_ns, mut since_ns, mut newest_stamp_ns) = (u64::MAX, u64::MAX, 0);
         touched.retain(|&member| {
-            let body = self.bodies.get(member).copied().unwrap_or_default();
+            let Seat { body, .. } = self.seats.get(member).copied().unwrap_or_default();
             let slot = self.newest.get_mut(member);
             let Some(update) = slot.and_then(|slot| slot.take_if(|u| u.since_ns < until_ns)) else {
                 return self.newest.get(member).is_some_and(Option::is_some);
@@ -250,143 +276,4 @@ impl Group {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::wire::name_bytes;
-
-    fn update(member: usize, x: f64, stamp_ns: u64) -> Update {
-        let row = TransformRow {
-            position: [x, 0.0, 0.0],
-            ..TransformRow::default()
-        };
-        Update {
-            member,
-            result: Ok(row),
-            velocity: None,
-            stamp_ns,
-            received_ns: 100 - stamp_ns,
-            since_ns: 90,
-            waited: false,
-        }
-    }
-
-    #[test]
-    fn poses_of_a_source_go_out_as_one_partial_frame_with_the_newest_of_each_body() {
-        let shelf = Shelf::default();
-        shelf.add_group(name_bytes("tf"), 9, vec![11, 12, 13]);
-        shelf.merge(0, &[update(2, 1.0, 5), update(0, 1.0, 6)]);
-        let refused = Update {
-            result: Err(RejectReason::BadChain),
-            ..update(1, 0.0, 0)
-        };
-        shelf.merge(0, &[update(2, 2.0, 7), refused]);
-        let mut inbox = Inbox::default();
-        shelf.drain(&mut inbox);
-        let frame = &inbox.frames()[0];
-        let rows: Vec<_> = frame
-            .transforms
-            .iter()
-            .map(|row| (row.body, row.position[0]))
-            .collect();
-        assert_eq!(rows, [(13, 2.0), (11, 1.0)]);
-        assert_eq!(frame.stamps_ns, [7, 6]);
-        assert_eq!(frame.refused_bodies, [(12, RejectReason::BadChain)]);
-        assert_eq!(
-            (frame.received_ns, frame.header.sent_ns, frame.header.flags),
-            (93, 90, frame_flags::PARTIAL)
-        );
-        inbox.clear();
-        shelf.drain(&mut inbox);
-        assert!(inbox.is_empty());
-    }
-
-    #[test]
-    fn a_flood_of_one_source_keeps_its_newest_frames_and_spares_the_others() {
-        let shelf = Shelf::default();
-        let frame = |source: &str, seq| {
-            let mut frame = shelf.spare();
-            frame.header.source = name_bytes(source);
-            frame.header.seq = seq;
-            frame
-        };
-        shelf.put(Some(0), frame("quiet", 1));
-        (0..1000).for_each(|seq| shelf.put(Some(1), frame("flood", seq)));
-        let mut inbox = Inbox::default();
-        shelf.drain(&mut inbox);
-        assert_eq!(inbox.frames().len(), 1 + FRAMES_PER_DRAIN_MAX);
-        assert_eq!(inbox.frames()[FRAMES_PER_DRAIN_MAX].header.seq, 999);
-        assert_eq!(inbox.frames()[0].header.source, name_bytes("quiet"));
-        assert_eq!(shelf.take_passed_over(), 1000 - FRAMES_PER_DRAIN_MAX as u64);
-    }
-
-    #[test]
-    fn bug_frames_of_sources_that_the_scene_lacks_share_the_room_of_one() {
-        let shelf = Shelf::default();
-        for number in 0..1000 {
-            let mut frame = shelf.spare();
-            frame.header.source = name_bytes(&format!("source_{number}"));
-            shelf.put(None, frame);
-        }
-        let mut inbox = Inbox::default();
-        shelf.drain(&mut inbox);
-        assert_eq!(inbox.frames().len(), FRAMES_PER_DRAIN_MAX);
-        assert_eq!(shelf.take_passed_over(), 1000 - FRAMES_PER_DRAIN_MAX as u64);
-    }
-
-    #[test]
-    fn time_that_goes_back_raises_the_epoch_and_drops_what_waits() {
-        let shelf = Shelf::default();
-        shelf.add_group(name_bytes("tf"), 9, vec![1]);
-        shelf.merge(0, &[update(0, 1.0, 5)]);
-        shelf.reset(0);
-        shelf.merge(0, &[update(0, 3.0, 1)]);
-        let mut inbox = Inbox::default();
-        shelf.drain(&mut inbox);
-        let frame = &inbox.frames()[0];
-        assert_eq!(
-            (
-                frame.header.epoch,
-                frame.header.seq,
-                frame.transforms[0].position[0]
-            ),
-            (2, 1, 3.0)
-        );
-    }
-
-    #[test]
-    fn bodies_of_old_chains_have_frames_of_their_own_that_others_do_not_age_with() {
-        let shelf = Shelf::default();
-        shelf.add_group(name_bytes("tf"), 9, vec![1, 2, 3, 4]);
-        let aged = |member, since_ns| Update {
-            received_ns: 1000,
-            since_ns,
-            ..update(member, 1.0, 5)
-        };
-        shelf.merge(
-            0,
-            &[aged(0, 1000), aged(1, 500), aged(2, 990), aged(3, 700)],
-        );
-        let mut inbox = Inbox::default();
-        shelf.drain(&mut inbox);
-        let seen: Vec<_> = (inbox.frames().iter())
-            .map(|frame| {
-                let bodies: Vec<u64> = frame.transforms.iter().map(|row| row.body).collect();
-                (
-                    frame.header.seq,
-                    frame.header.sent_ns,
-                    frame.received_ns,
-                    bodies,
-                )
-            })
-            .collect();
-        let wanted = [
-            (1, 500, 1000, vec![2]),
-            (2, 700, 1000, vec![4]),
-            (3, 990, 1000, vec![1, 3]),
-        ];
-        assert_eq!(seen, wanted);
-        shelf.merge(0, &[aged(0, 1010)]);
-        shelf.drain(&mut inbox);
-        assert_eq!(inbox.frames().last().map(|frame| frame.header.seq), Some(4));
-    }
-}
+mod tests;

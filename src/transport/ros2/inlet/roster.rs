@@ -9,7 +9,7 @@ use super::super::lines::{Arrival, Feeder};
 use super::super::open;
 use super::super::poses::Source;
 use super::super::shared::Say;
-use super::super::shelf::Shelf;
+use super::super::shelf::{Seat, Shelf};
 use super::Inlet;
 use crate::transport::{BodyChange, BodyNote};
 
@@ -31,7 +31,7 @@ impl Inlet {
                 let Some(member) = source.remove_body(name) else {
                     continue;
                 };
-                self.shelf.set_member(at, member, 0);
+                self.shelf.set_member(at, member, Seat::default());
                 let own = |f: &Feeder| (f.source, f.member) == (at, member);
                 self.lines.retain(|line| !line.feeder().is_some_and(own));
             }
@@ -47,7 +47,7 @@ impl Inlet {
                 .get_mut(at)
                 .map(|source| source.put_body(&body));
             let Some(member) = member else { continue };
-            self.shelf.set_member(at, member, body.id);
+            self.shelf.set_member(at, member, Seat::of(&body));
             let Some(mut line) = line else { continue };
             line.feed(at, member);
             match line.register(self.poll.registry(), LATER) {
@@ -77,13 +77,15 @@ impl Inlet {
     }
 }
 
-/// Gives a body that is heard where it was its new id, and keeps what is known and what waits of it; whether it is one.
+/// Gives a body that is heard where it was its new seat, and keeps what is known and what waits of it.
+///
+/// * returns - whether it is such a body.
 fn keep(sources: &mut [Source], shelf: &Shelf, body: &BodyNote) -> bool {
     let mut sources = sources.iter_mut().enumerate();
     let source = sources.find(|(_, source)| Some(source.place) == body.source);
     let kept = source.and_then(|(at, source)| Some((at, source.keep_body(body)?)));
     if let Some((at, member)) = kept {
-        shelf.set_id(at, member, body.id);
+        shelf.renew_member(at, member, Seat::of(body));
     }
     kept.is_some()
 }
@@ -108,7 +110,7 @@ mod tests {
             source: Some(0),
             frame: "a".to_owned(),
             topic: "/a".to_owned(),
-            bounds: None,
+            ..BodyNote::default()
         }
     }
 
@@ -152,7 +154,7 @@ mod tests {
     #[test]
     fn bug_a_body_that_was_put_again_lost_the_pose_that_waited_and_the_order_of_its_stamps() {
         let (mut sources, shelf) = ([source()], Shelf::default());
-        shelf.add_group(sources[0].name, 9, sources[0].bodies());
+        shelf.add_group(sources[0].name, 9, sources[0].seats());
         send(&mut sources[0], &shelf, 100 * MS);
         assert!(keep(&mut sources, &shelf, &body(7)));
         // Late, and late it stays.
@@ -164,13 +166,13 @@ mod tests {
             (frame.transforms[0].body, frame.stamps_ns[0]),
             (7, 100 * MS)
         );
-        assert_eq!(sources[0].bodies(), [7]);
+        assert_eq!(sources[0].seats(), [Seat::of(&body(7))]);
     }
 
     #[test]
     fn a_body_that_is_heard_elsewhere_or_came_now_is_not_kept() {
         let (mut sources, shelf) = ([source()], Shelf::default());
-        shelf.add_group(sources[0].name, 9, sources[0].bodies());
+        shelf.add_group(sources[0].name, 9, sources[0].seats());
         let topic = "/b".to_owned();
         assert!(!keep(&mut sources, &shelf, &BodyNote { topic, ..body(1) }));
         let frame = "b".to_owned();

@@ -1,6 +1,7 @@
 //! Which bodies a source of common topics has: those of the scene, and what edits make of them while the node runs.
 
 use super::super::order::Order;
+use super::super::shelf::Seat;
 use super::super::tf::Tree;
 use super::{Member, NOBODY, Source};
 use crate::transport::BodyNote;
@@ -8,7 +9,7 @@ use crate::transport::BodyNote;
 impl Member {
     pub(super) fn of(body: &BodyNote, tree: &mut Tree) -> Self {
         Self {
-            body: body.id,
+            seat: Seat::of(body),
             name: body.name.clone(),
             frame: tree.pin(&body.frame),
             topic: body.topic.clone(),
@@ -26,7 +27,7 @@ impl Source {
     pub(in super::super) fn put_body(&mut self, body: &BodyNote) -> usize {
         let member = Member::of(body, &mut self.tree);
         let mut members = self.members.iter();
-        let free = members.position(|member| member.body == NOBODY);
+        let free = members.position(|member| member.seat == NOBODY);
         let place = free.unwrap_or(self.members.len());
         match self.members.get_mut(place) {
             Some(slot) => *slot = member,
@@ -44,7 +45,7 @@ impl Source {
         if (member.frame, &member.topic) != (frame, &body.topic) {
             return None;
         }
-        member.body = body.id;
+        member.seat = Seat::of(body);
         // What it is made of may be new, and then nobody knows where that is: its chain says so again.
         member.last = None;
         Some(place)
@@ -54,7 +55,7 @@ impl Source {
     pub(in super::super) fn remove_body(&mut self, name: &str) -> Option<usize> {
         let place = self.place_of(name)?;
         let member = self.members.get_mut(place)?;
-        member.body = NOBODY;
+        member.seat = NOBODY;
         member.fault = None;
         member.last = None;
         self.tree.unpin(member.frame);
@@ -63,6 +64,6 @@ impl Source {
 
     fn place_of(&self, name: &str) -> Option<usize> {
         let mut members = self.members.iter();
-        members.position(|member| member.body != NOBODY && member.name == name)
+        members.position(|member| member.seat != NOBODY && member.name == name)
     }
 }

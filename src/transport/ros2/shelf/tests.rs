@@ -1,0 +1,178 @@
+//! What waits, what gives way, and what is told of it.
+
+use super::*;
+use crate::wire::name_bytes;
+
+/// Of bodies with these ids.
+fn seats(ids: &[u64]) -> Vec<Seat> {
+    let seat = |&body| Seat {
+        body,
+        continuous: false,
+    };
+    ids.iter().map(seat).collect()
+}
+
+fn update(member: usize, x: f64, stamp_ns: u64) -> Update {
+    let row = TransformRow {
+        position: [x, 0.0, 0.0],
+        ..TransformRow::default()
+    };
+    Update {
+        member,
+        result: Ok(row),
+        velocity: None,
+        stamp_ns,
+        received_ns: 100 - stamp_ns,
+        since_ns: 90,
+        waited: false,
+    }
+}
+
+#[test]
+fn poses_of_a_source_go_out_as_one_partial_frame_with_the_newest_of_each_body() {
+    let shelf = Shelf::default();
+    shelf.add_group(name_bytes("tf"), 9, seats(&[11, 12, 13]));
+    shelf.merge(0, &[update(2, 1.0, 5), update(0, 1.0, 6)]);
+    let refused = Update {
+        result: Err(RejectReason::BadChain),
+        ..update(1, 0.0, 0)
+    };
+    shelf.merge(0, &[update(2, 2.0, 7), refused]);
+    let mut inbox = Inbox::default();
+    shelf.drain(&mut inbox);
+    let frame = &inbox.frames()[0];
+    let rows: Vec<_> = frame
+        .transforms
+        .iter()
+        .map(|row| (row.body, row.position[0]))
+        .collect();
+    assert_eq!(rows, [(13, 2.0), (11, 1.0)]);
+    assert_eq!(frame.stamps_ns, [7, 6]);
+    assert_eq!(frame.refused_bodies, [(12, RejectReason::BadChain)]);
+    assert_eq!(
+        (frame.received_ns, frame.header.sent_ns, frame.header.flags),
+        (93, 90, frame_flags::PARTIAL)
+    );
+    inbox.clear();
+    shelf.drain(&mut inbox);
+    assert!(inbox.is_empty());
+}
+
+#[test]
+fn a_flood_of_one_source_keeps_its_newest_frames_and_spares_the_others() {
+    let shelf = Shelf::default();
+    let frame = |source: &str, seq| {
+        let mut frame = shelf.spare();
+        frame.header.source = name_bytes(source);
+        frame.header.seq = seq;
+        frame
+    };
+    shelf.put(Some(0), frame("quiet", 1));
+    (0..1000).for_each(|seq| shelf.put(Some(1), frame("flood", seq)));
+    let mut inbox = Inbox::default();
+    shelf.drain(&mut inbox);
+    assert_eq!(inbox.frames().len(), 1 + FRAMES_PER_DRAIN_MAX);
+    assert_eq!(inbox.frames()[FRAMES_PER_DRAIN_MAX].header.seq, 999);
+    assert_eq!(inbox.frames()[0].header.source, name_bytes("quiet"));
+    assert_eq!(shelf.take_passed_over(), 1000 - FRAMES_PER_DRAIN_MAX as u64);
+}
+
+#[test]
+fn bug_frames_of_sources_that_the_scene_lacks_share_the_room_of_one() {
+    let shelf = Shelf::default();
+    for number in 0..1000 {
+        let mut frame = shelf.spare();
+        frame.header.source = name_bytes(&format!("source_{number}"));
+        shelf.put(None, frame);
+    }
+    let mut inbox = Inbox::default();
+    shelf.drain(&mut inbox);
+    assert_eq!(inbox.frames().len(), FRAMES_PER_DRAIN_MAX);
+    assert_eq!(shelf.take_passed_over(), 1000 - FRAMES_PER_DRAIN_MAX as u64);
+}
+
+#[test]
+fn time_that_goes_back_raises_the_epoch_and_drops_what_waits() {
+    let shelf = Shelf::default();
+    shelf.add_group(name_bytes("tf"), 9, seats(&[1]));
+    shelf.merge(0, &[update(0, 1.0, 5)]);
+    shelf.reset(0);
+    shelf.merge(0, &[update(0, 3.0, 1)]);
+    let mut inbox = Inbox::default();
+    shelf.drain(&mut inbox);
+    let frame = &inbox.frames()[0];
+    assert_eq!(
+        (
+            frame.header.epoch,
+            frame.header.seq,
+            frame.transforms[0].position[0]
+        ),
+        (2, 1, 3.0)
+    );
+}
+
+#[test]
+fn bodies_of_old_chains_have_frames_of_their_own_that_others_do_not_age_with() {
+    let shelf = Shelf::default();
+    shelf.add_group(name_bytes("tf"), 9, seats(&[1, 2, 3, 4]));
+    let aged = |member, since_ns| Update {
+        received_ns: 1000,
+        since_ns,
+        ..update(member, 1.0, 5)
+    };
+    shelf.merge(
+        0,
+        &[aged(0, 1000), aged(1, 500), aged(2, 990), aged(3, 700)],
+    );
+    let mut inbox = Inbox::default();
+    shelf.drain(&mut inbox);
+    let seen: Vec<_> = (inbox.frames().iter())
+        .map(|frame| {
+            let bodies: Vec<u64> = frame.transforms.iter().map(|row| row.body).collect();
+            (
+                frame.header.seq,
+                frame.header.sent_ns,
+                frame.received_ns,
+                bodies,
+            )
+        })
+        .collect();
+    let wanted = [
+        (1, 500, 1000, vec![2]),
+        (2, 700, 1000, vec![4]),
+        (3, 990, 1000, vec![1, 3]),
+    ];
+    assert_eq!(seen, wanted);
+    shelf.merge(0, &[aged(0, 1010)]);
+    shelf.drain(&mut inbox);
+    assert_eq!(inbox.frames().last().map(|frame| frame.header.seq), Some(4));
+}
+
+#[test]
+fn bug_poses_of_a_continuous_body_that_gave_way_to_newer_ones_were_not_missing() {
+    let shelf = Shelf::default();
+    let mut all = seats(&[1, 2]);
+    all[1].continuous = true;
+    shelf.add_group(name_bytes("poses"), 9, all);
+    let mut inbox = Inbox::default();
+    let mut number = |updates: &[Update]| {
+        shelf.merge(0, updates);
+        inbox.clear();
+        shelf.drain(&mut inbox);
+        inbox.frames()[0].header.seq
+    };
+    assert_eq!(number(&[update(1, 1.0, 5)]), 1);
+    assert_eq!(
+        number(&[update(1, 2.0, 6), update(1, 3.0, 7), update(1, 4.0, 8)]),
+        4
+    );
+    assert_eq!(number(&[update(1, 4.0, 9)]), 5, "none gave way");
+    // Of a body that is where its newest pose says nothing is missing; nor is what was said twice, or refused.
+    assert_eq!(number(&[update(0, 2.0, 6), update(0, 3.0, 7)]), 6);
+    assert_eq!(number(&[update(1, 5.0, 10), update(1, 5.0, 10)]), 7);
+    let refused = Update {
+        result: Err(RejectReason::BadChain),
+        ..update(1, 0.0, 11)
+    };
+    assert_eq!(number(&[refused, update(1, 6.0, 12)]), 8);
+}
