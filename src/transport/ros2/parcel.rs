@@ -183,7 +183,7 @@ pub(super) enum Next {
 }
 
 impl Parcels {
-    /// Puts a tick into the queue; the oldest gives way.
+    /// Puts a tick into the queue; the oldest gives way, and one that is alone before others.
     ///
     /// * returns - ticks that gave way.
     pub(super) fn put(&self, outbox: &Outbox, demand: Demand, caps: Caps) -> u64 {
@@ -212,15 +212,17 @@ impl Parcels {
 
     fn push(&self, parcel: Parcel, names: Option<(u64, Vec<NameRow>)>) -> u64 {
         let mut line = open(&self.line);
-        let mut gone = 0;
-        if line.ready.len() >= QUEUE_MAX
-            && let Some(oldest) = line.ready.pop_front()
-        {
-            line.spare.push(oldest);
-            line.dropped += 1;
-            gone = 1;
-        }
         line.ready.push_back(parcel);
+        let mut gone = 0;
+        if line.ready.len() > QUEUE_MAX {
+            // One that is sent from within a tick has nothing but that tick: rows and events are worth more.
+            let bare = line.ready.iter().position(|parcel| !parcel.done);
+            if let Some(parcel) = line.ready.remove(bare.unwrap_or_default()) {
+                line.spare.push(parcel);
+                line.dropped += 1;
+                gone = 1;
+            }
+        }
         if names.is_some() {
             line.names = names;
         }
@@ -263,130 +265,4 @@ impl Parcels {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const CAPS: Caps = Caps {
-        pairs: 3,
-        contacts: 2,
-    };
-
-    fn outbox(tick: u64) -> Outbox {
-        let pair = |id, verdict: Verdict, gap_min_m, events| PairRow {
-            body_a: id,
-            verdict: verdict.code(),
-            gap_min_m,
-            events,
-            ..PairRow::default()
-        };
-        let contact = |id, gap_m| ContactRow {
-            id,
-            gap_m,
-            ..ContactRow::default()
-        };
-        let mut outbox = Outbox {
-            pairs: vec![
-                pair(1, Verdict::Near, 0.1, 0),
-                pair(2, Verdict::Colliding, -0.1, Event::Persist.bit()),
-                pair(3, Verdict::Possible, -9.0, 0),
-                pair(4, Verdict::Apart, 1.0, Event::End.bit()),
-                pair(5, Verdict::Colliding, -0.2, Event::Persist.bit()),
-            ],
-            contacts: vec![contact(1, -0.1), contact(2, -0.3), contact(3, -0.2)],
-            ..Outbox::default()
-        };
-        outbox.tick.header.tick = tick;
-        outbox.contacts_header.truncated = 5;
-        outbox
-    }
-
-    fn next(parcels: &Parcels) -> Parcel {
-        match parcels.next(Duration::ZERO) {
-            Next::Parcel(parcel, _) => *parcel,
-            other => panic!("{other:?}"),
-        }
-    }
-
-    #[test]
-    fn the_rows_of_best_rank_are_kept_in_their_order_and_the_rest_is_counted() {
-        let parcels = Parcels::default();
-        parcels.put(&outbox(1), Demand::ALL, CAPS);
-        let parcel = next(&parcels);
-        let pairs: Vec<_> = parcel.pairs.iter().map(|row| row.body_a).collect();
-        assert_eq!((pairs, parcel.pairs_header.truncated), (vec![2, 4, 5], 2));
-        let contacts: Vec<_> = parcel.contacts.iter().map(|row| row.id).collect();
-        assert_eq!(
-            (contacts, parcel.contacts_header.truncated),
-            (vec![2, 3], 6)
-        );
-    }
-
-    #[test]
-    fn no_event_is_left_out_and_what_is_cut_is_told_in_the_tick() {
-        let parcels = Parcels::default();
-        let mut all = outbox(1);
-        all.pairs
-            .iter_mut()
-            .take(4)
-            .for_each(|row| row.events = Event::End.bit());
-        all.tick.header.truncated = 5;
-        parcels.put(&all, Demand::ALL, CAPS);
-        let parcel = next(&parcels);
-        let pairs: Vec<_> = parcel.pairs.iter().map(|row| row.body_a).collect();
-        assert_eq!(
-            (pairs, parcel.pairs_header.truncated),
-            (vec![1, 2, 3, 4], 1)
-        );
-        assert_eq!(parcel.tick.header.truncated, 5 + 1 + 1);
-        assert_eq!(parcel.tick.reasons, Reason::Truncated.bit());
-    }
-
-    #[test]
-    fn a_cap_of_zero_keeps_nothing_and_says_so() {
-        let parcels = Parcels::default();
-        let caps = Caps {
-            pairs: 0,
-            contacts: 0,
-        };
-        let mut clear = outbox(1);
-        clear.tick.header.state = State::Clear.code();
-        parcels.put(&clear, Demand::ALL, caps);
-        let parcel = next(&parcels);
-        assert_eq!((parcel.pairs.len(), parcel.pairs_header.truncated), (0, 5));
-        assert_eq!(parcel.tick.header.state, State::Unknown.code());
-    }
-
-    #[test]
-    fn the_newest_ticks_win_and_names_are_not_lost_with_the_old() {
-        let parcels = Parcels::default();
-        let mut named = outbox(1);
-        named.names_changed = true;
-        named.names = vec![NameRow::default()];
-        parcels.put(&named, Demand::default(), CAPS);
-        for tick in 2..=4 {
-            parcels.put(&outbox(tick), Demand::default(), CAPS);
-        }
-        assert_eq!(parcels.dropped(), 2);
-        let Next::Parcel(parcel, names) = parcels.next(Duration::ZERO) else {
-            panic!("a parcel waits");
-        };
-        assert_eq!(
-            (parcel.tick.header.tick, names.map(|n| n.1.len())),
-            (3, Some(1))
-        );
-        assert!(parcel.pairs.is_empty());
-        parcels.stop();
-        assert!(matches!(parcels.next(Duration::MAX), Next::Stop));
-    }
-
-    #[test]
-    fn a_tick_that_is_not_done_says_so_in_memory_that_was_used_before() {
-        let parcels = Parcels::default();
-        parcels.put(&outbox(1), Demand::default(), CAPS);
-        let parcel = next(&parcels);
-        assert!(parcel.done);
-        parcels.give_back(parcel);
-        parcels.put_tick(&outbox(2).tick);
-        assert!(!next(&parcels).done);
-    }
-}
+mod tests;
