@@ -25,9 +25,11 @@ if [ "${1:-}" != --rust-only ]; then
   export SWEEPD_PYTHON=$venv/bin/python
 fi
 
-# Tests against oracles count their cases by build: these run with the large counts, in release. The small ones, with the
-# checks of a debug build, are left to SWEEPD_CI_SLOW=1 (and to a plain `cargo test`).
-counted=(alloc engine soundness exact_pairs mesh_pairs broad_phase geometry_cases mesh_manifolds sweep regions)
+# Tests against oracles count their cases by build: these run with the large counts, in release. In a debug build, with
+# its checks of assertions and overflows, soundness and sweep run, too; the small counts of all with SWEEPD_CI_SLOW=1
+# (and by a plain `cargo test`).
+counted=(alloc engine exact_pairs mesh_pairs broad_phase geometry_cases mesh_manifolds regions)
+both=(soundness sweep)
 others=()
 for file in tests/*.rs tests/*/main.rs; do
   name=${file#tests/} name=${name%/main.rs} name=${name%.rs}
@@ -39,7 +41,7 @@ else
   cargo test --no-fail-fast --lib --bins "${others[@]}"
   cargo test --doc
 fi
-cargo test --release --no-fail-fast "${counted[@]/#/--test=}"
+cargo test --release --no-fail-fast "${counted[@]/#/--test=}" "${both[@]/#/--test=}"
 
 if [ "${1:-}" != --rust-only ]; then
   cargo build --quiet --release --bin sweepd

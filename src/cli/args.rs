@@ -27,7 +27,7 @@ pub(super) struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// Run the daemon for a scene until SIGINT or SIGTERM.
+    /// Run the daemon for a scene until SIGINT or SIGTERM (or SIGHUP, but under `nohup`).
     Run(RunArgs),
     /// Read and validate a scene; print the plan, ignored pairs and warnings.
     Check(CheckArgs),

@@ -73,7 +73,7 @@ impl Screen {
         }
     }
 
-    /// The flag that SIGINT and SIGTERM raise; a second one ends the process, the terminal as it was.
+    /// The flag that a signal raises which asks for an end; a second one ends the process, the terminal as it was.
     pub(super) fn stop(&mut self) -> Result<Arc<AtomicBool>> {
         let (keys, stop) = Keys::watch()?;
         self.keys = Some(keys);

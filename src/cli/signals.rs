@@ -52,7 +52,7 @@ pub(super) fn stop_at_first() -> Result<Arc<AtomicBool>> {
 }
 
 /// The signals that ask for an end. SIGHUP, by which a terminal says that it closes, is none under `nohup`.
-fn asking() -> impl Iterator<Item = i32> {
+pub(super) fn asking() -> impl Iterator<Item = i32> {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let hup = (!is_ignored(&status, SIGHUP)).then_some(SIGHUP);
     [SIGINT, SIGTERM].into_iter().chain(hup)

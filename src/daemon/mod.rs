@@ -8,6 +8,7 @@ mod record;
 mod refusals;
 mod requests;
 mod settings;
+mod skipped;
 #[cfg(test)]
 mod tests;
 mod watchdog;

@@ -165,6 +165,10 @@ pub(super) fn push_rows(view: &View<'_>, slot: PairSlot, out: &mut Vec<ContactRo
     let current = finding.level == Level::Exact && tick >= finding.tested;
     let start = out.len();
     let is_one_pair = a.shapes.len() == 1 && b.shapes.len() == 1;
+    // Of meshes the gap of a contact is measured along its own normal.
+    let are_convex = [a, b]
+        .iter()
+        .all(|body| body.shapes.iter().all(|p| p.shape.mesh().is_none()));
     for contact in contacts {
         let mut row = contact_row(a, b, contact);
         if !current {
@@ -176,6 +180,9 @@ pub(super) fn push_rows(view: &View<'_>, slot: PairSlot, out: &mut Vec<ContactRo
             } else {
                 f64::INFINITY
             };
+            if are_convex {
+                row.gap_m = row.gap_m.max(row.gap_min_m).min(row.gap_max_m);
+            }
         }
         out.push(row);
     }

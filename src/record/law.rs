@@ -170,8 +170,9 @@ fn state(recorded: &Outbox, replayed: &Outbox) -> Option<Spot> {
     let is_safe = |state: State| matches!(state, State::Clear | State::Near);
     // By touches within rounding alone either word may be had.
     let by_touches = |out: &Outbox| {
-        let mut touching = out.pairs.iter().filter(|row| touches(row)).peekable();
-        touching.peek().is_some() && touching.all(only_touches)
+        let news = |row: &&PairRow| touches(row) && !is_of_before(row);
+        let mut touching = live(&out.pairs).filter(news).peekable();
+        is_whole(&out.pairs_header) && touching.peek().is_some() && touching.all(only_touches)
     };
     let denied = is_safe(one) && two == State::Colliding && !by_touches(replayed);
     let of_now = |row: &&PairRow| touches(row) && !is_of_before(row);

@@ -74,6 +74,7 @@ mod tests {
     use super::*;
     use crate::broad::{BroadPhase, Method};
     use crate::daemon::build_shapes;
+    use crate::ids::BodySlot;
     use crate::scene::Scene;
     use crate::tick::{EditBatch, TickInput};
     use crate::time::{Budget, Clock, ManualClock};
@@ -201,6 +202,26 @@ mod tests {
         assert_eq!(rig.engine.outbox().tick.rebuilds, 1);
         assert_eq!(rig.engine.outbox().pairs.len(), 1);
         rig.engine.validate().unwrap();
+    }
+
+    #[test]
+    fn bug_a_repair_forgot_whose_pairs_had_found_no_room() {
+        let mut rig = Rig::new();
+        rig.engine.config.limits.pairs = 1;
+        rig.engine.pairs = PairSet::new(1);
+        // The second of three in a row touches both others.
+        rig.x_m[2] = 1.8;
+        rig.tick(false);
+        let cut = |rig: &Rig| [1, 2].map(|slot| rig.engine.pairs.is_truncated(BodySlot(slot)));
+        assert_eq!(cut(&rig), [true; 2]);
+        // Its place is not known from here on, and no box says whom it touches.
+        rig.x_m[2] = f64::NAN;
+        rig.tick(false);
+        assert_eq!(cut(&rig), [true; 2]);
+        rig.engine.broad = BroadPhase::new(rig.engine.method);
+        rig.tick(true);
+        assert_eq!(rig.engine.outbox().tick.rebuilds, 1);
+        assert_eq!(cut(&rig), [true; 2]);
     }
 
     #[test]

@@ -192,8 +192,11 @@ impl World {
         }
         if frame.header.flags == frame_flags::PAUSED {
             // The poses that hold are those of its sender's last pose frame, which may not be those that are known.
-            if state.gap == 0 && !state.waits() {
-                self.renew_last_poses(source, times);
+            if !state.waits() {
+                if state.gap == 0 {
+                    self.renew_last_poses(source, times);
+                }
+                self.bend_with(source);
             }
             return Admission::Admitted {
                 source,
@@ -212,7 +215,7 @@ impl World {
         let all = u64::try_from(frame.transforms.len()).unwrap_or(u64::MAX);
         let poses = all.saturating_sub(refused_rows);
         let refused_rows = refused_rows + self.refuse_bodies(source, frame);
-        self.bend_with(source, &frame.header);
+        self.bend_with(source);
         Admission::Admitted {
             source,
             poses,

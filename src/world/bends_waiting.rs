@@ -9,7 +9,7 @@ use super::World;
 use super::source::SourceState;
 use crate::ids::{BodyId, SourceSlot};
 use crate::limits::{VERTEX_FRAMES_WAITING_MAX, VERTEX_ROWS_WAITING_MAX};
-use crate::wire::{FrameHeader, RejectReason, VertexFrame, VertexHeader};
+use crate::wire::{RejectReason, VertexFrame, VertexHeader};
 
 /// Messages of one source, the oldest first.
 #[derive(Clone, Debug, Default)]
@@ -83,12 +83,23 @@ impl World {
         true
     }
 
-    /// A frame has been taken: what belongs with it, or with one before it, bends now.
-    pub(super) fn bend_with(&mut self, source: SourceSlot, frame: &FrameHeader) {
-        let number = (frame.epoch, frame.seq);
+    /// A frame has been taken: what belongs with the newest taken, or with one before it, bends now; but not before
+    /// those that still wait, which a pause may have overtaken.
+    pub(super) fn bend_with(&mut self, source: SourceSlot) {
+        let state = &self.sources[source.index()];
+        let Some(newest) = &state.newest else {
+            return;
+        };
+        let first = state.waiting.first();
+        let first = first.map(|frame| (frame.header.epoch, frame.header.seq));
+        let newest = (newest.epoch, newest.seq);
+        let may_bend = move |header: &VertexHeader| {
+            let number = (header.epoch, header.seq);
+            number <= newest && first.is_none_or(|first| number < first)
+        };
         loop {
             let bends = &mut self.sources[source.index()].bends;
-            let Some(vertices) = bends.take(|header| (header.epoch, header.seq) <= number) else {
+            let Some(vertices) = bends.take(may_bend) else {
                 return;
             };
             self.admit_vertices_now(&vertices);
@@ -97,6 +108,8 @@ impl World {
 
     /// Vertices that are never taken: the body is not what its sender said last.
     fn lose_bend(&mut self, source: SourceSlot, vertices: &VertexFrame) {
+        // Its loss is told of this body here, and not of all by the gap in the numbers.
+        let _of_before = self.sources[source.index()].note_bent(&vertices.header);
         let Some(slot) = self.slot_of(BodyId(vertices.header.body)) else {
             return;
         };

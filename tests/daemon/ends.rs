@@ -56,7 +56,11 @@ fn a_terminal_that_closes_ends_the_daemon_but_under_nohup() {
         step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
         daemon.signal(Signal::HUP);
         if ignored {
-            step(&mut client, &[at(1, 0.0), at(2, 0.6)]);
+            // It would have ended within these.
+            for x in [0.6, 0.7] {
+                std::thread::sleep(Duration::from_millis(500));
+                step(&mut client, &[at(1, 0.0), at(2, x)]);
+            }
             daemon.signal(Signal::TERM);
         }
         drop(client);

@@ -1,8 +1,8 @@
 //! Law 3.7 and 4.2 for vertices: what a sender may say, and what becomes of what it may not.
 
 use sweepd::wire::{
-    BodyStatus, RejectReason, State, Verdict, VertexFrame, VertexHeader, WIRE_VERSION, name_bytes,
-    vertex_flags,
+    BodyStatus, RejectReason, State, Verdict, VertexFrame, VertexHeader, WIRE_VERSION, frame_flags,
+    name_bytes, vertex_flags,
 };
 
 use crate::rig::{ALL, FRAME_NS, NONE, Rig, body, scene};
@@ -465,4 +465,35 @@ fn law_4_3_bug_vertices_of_a_body_that_is_not_there_yet_were_refused_while_its_f
     assert_eq!(version(&rig), (Some(1), true));
     assert_eq!(status(&rig, 1), BodyStatus::Known);
     assert_eq!(rig.rejects(RejectReason::UnknownBody), 0);
+}
+
+/// A pause overtakes frames that wait, and its number is beyond theirs.
+#[test]
+fn bug_vertices_behind_a_frame_that_waited_were_held_for_ever_by_a_pause() {
+    let mut rig = rig();
+    known(&mut rig);
+    rig.scene_rev = rig.out.tick.header.scene_rev + 1;
+    let with = |rig: &Rig, version| {
+        let mut frame = full(version, at(0.0));
+        frame.header.seq = rig.seq + 1;
+        frame
+    };
+    let first = with(&rig, 2);
+    send(&mut rig, vec![first]);
+    rig.scene_rev = 0;
+    rig.flags = frame_flags::PAUSED;
+    let rows = std::mem::take(&mut rig.rows);
+    let second = with(&rig, 3);
+    send(&mut rig, vec![second]);
+    assert_eq!(version(&rig).0, Some(1), "both wait for the frame");
+    let margin = Edit::Margin {
+        name: None,
+        report_within_m: Some(0.25),
+    };
+    rig.edit(vec![margin], ALL);
+    assert_eq!(version(&rig).0, Some(3), "the pause was of a later number");
+    let third = with(&rig, 4);
+    send(&mut rig, vec![third]);
+    assert_eq!(version(&rig).0, Some(4));
+    rig.rows = rows;
 }

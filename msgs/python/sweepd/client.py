@@ -220,7 +220,7 @@ class Client:
           those sent before; without them these are all.
 
         Where the daemon has missed or refused vertices of the body, it needs all of them again: the body's pairs are
-        possible and ``bodies`` say why.
+        possible and ``bodies`` say why. So it does of each body that this source bends where this failed as it sent.
         """
         if (first is None) != (total is None):
             raise SweepdError("a range of vertices needs first and total")

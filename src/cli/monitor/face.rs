@@ -52,7 +52,7 @@ impl Face {
         ))
     }
 
-    /// The flag that SIGINT and SIGTERM raise.
+    /// The flag that a signal raises which asks for an end.
     pub(super) fn stop(&mut self) -> Result<Arc<AtomicBool>> {
         match self {
             Self::Lines => crate::cli::stop(),

@@ -6,10 +6,10 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rustix::termios::{LocalModes, OptionalActions, SpecialCodeIndex, Termios};
-use signal_hook::consts::{SIGCONT, SIGINT, SIGQUIT, SIGTERM, SIGTSTP};
+use signal_hook::consts::{SIGCONT, SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP};
 use signal_hook::iterator::{Handle, Signals};
 
-use crate::cli::signals::{Asked, EXIT_SIGNALS, stop_at_first};
+use crate::cli::signals::{Asked, EXIT_SIGNALS, asking, stop_at_first};
 use crate::error::{Error, Result};
 use crate::time::{Clock as _, SystemClock};
 
@@ -21,7 +21,8 @@ pub(super) struct Keys {
 }
 
 impl Keys {
-    /// Watches signals, so that none leaves the terminal changed; returns also the flag that SIGINT and SIGTERM raise.
+    /// Watches signals, so that none leaves the terminal changed; returns also the flag that those raise which ask for an
+    /// end.
     ///
     /// # Errors
     /// `Error::Io` when signals cannot be listened for.
@@ -29,7 +30,7 @@ impl Keys {
         let failed = |e| Error::io("cannot listen for signals", e);
         let stop = stop_at_first()?;
         let terminal = Arc::<Terminal>::default();
-        let all = [SIGINT, SIGTERM, SIGQUIT, SIGTSTP, SIGCONT];
+        let all = asking().chain([SIGQUIT, SIGTSTP, SIGCONT]);
         let mut signals = Signals::new(all).map_err(failed)?;
         let keys = Self {
             terminal: Arc::clone(&terminal),
@@ -97,7 +98,7 @@ impl Terminal {
 
     fn take(&self, signal: i32, asked: &mut Asked) {
         match signal {
-            SIGINT | SIGTERM if asked.again(SystemClock.monotonic_ns()) => {
+            SIGINT | SIGTERM | SIGHUP if asked.again(SystemClock.monotonic_ns()) => {
                 self.close();
                 std::process::exit(EXIT_SIGNALS);
             }

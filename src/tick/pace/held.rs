@@ -249,7 +249,8 @@ impl Bent {
         };
         // Its frame is in a round that is under way.
         let comes_later = |held: &Held| held.whose.speaks && belongs(header, &held.frame);
-        header.seq != 0 && (lead.is_some_and(speaks) || frames.iter().any(comes_later))
+        let in_round = || lead.is_none() && frames.iter().any(comes_later);
+        header.seq != 0 && (lead.is_some_and(speaks) || in_round())
             || frames.iter().any(before) && !into.frames().iter().any(own)
     }
 }

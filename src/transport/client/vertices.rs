@@ -29,7 +29,7 @@ impl Client {
     ///
     /// # Errors
     /// `Error::Usage` when the client was opened without a source, or a range is sent before all have been; `Error::Io`
-    /// when they cannot be handed over.
+    /// when they cannot be handed over: the daemon then needs all vertices again of each body that this source bends.
     pub fn send_vertices(&mut self, body: u64, part: Part, rows: &[VertexRow]) -> Result<u64> {
         let source = self.source.as_deref().ok_or_else(|| {
             Error::Usage(
