@@ -18,6 +18,7 @@ use super::placed::Placed;
 use super::retest::tree_of;
 use super::side::Side;
 use crate::math::{Pose, Vec3};
+use crate::narrow::bent::Bent;
 use crate::shape::Shape;
 use crate::time::Meter;
 
@@ -92,7 +93,7 @@ impl Parting {
         self.lack = if new {
             Lack::default()
         } else {
-            Lack::of(pos12, -best)
+            Lack::of(pos12, Bent::of_shapes(a, b), -best)
         };
         let points = (side_a.points() + side_b.points()) / POINTS_A_QUARTER;
         let cost = tries * (TRY_COST_QUARTERS + points as u64) / 4 + 1;
@@ -116,4 +117,43 @@ fn across(normal: &Vec3) -> [Vec3; 4] {
     let one = normal.cross(&Vec3::ith(normal.iamin(), 1.0)).normalize();
     let other = normal.cross(&one);
     [one, other, -one, -other]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::{Geometry, Mesh};
+    use crate::time::ManualClock;
+
+    fn sheet() -> Shape {
+        let corners = at(0.0).map(|[x, y, z]| [x, y, z].map(f64::from).into());
+        let mesh = Mesh::new(corners.to_vec(), vec![[0, 1, 2]], Some(false)).unwrap();
+        let shape = Shape {
+            aabb: mesh.aabb(),
+            centre: mesh.centre(),
+            radius: mesh.radius(),
+            geometry: Geometry::Mesh(mesh),
+        };
+        shape.to_deforming().unwrap()
+    }
+
+    fn at(z: f32) -> [[f32; 3]; 3] {
+        [[-1.0, -1.0, z], [1.0, -1.0, z], [0.0, 1.0, z]]
+    }
+
+    #[test]
+    fn bug_a_plane_that_was_missed_once_is_looked_for_again_after_a_bend_at_the_same_pose() {
+        let (mut a, b) = (sheet(), sheet());
+        let clock = ManualClock::new(0);
+        let mut meter = Meter::unlimited(&clock);
+        let (mut parting, pose) = (Parting::default(), Pose::translation(0.0, 0.0, 0.1));
+        a.bend(0, &at(0.5));
+        a.bend(0, &[[-1.0, -1.0, -0.5]]);
+        for _ in 0..3 {
+            assert_eq!(parting.low(&a, &b, &pose, &mut meter), None);
+        }
+        a.bend(0, &at(-0.5));
+        let low = parting.low(&a, &b, &pose, &mut meter);
+        assert!(low.is_some_and(|low| low <= 0.6), "{low:?}");
+    }
 }

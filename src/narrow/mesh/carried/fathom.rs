@@ -143,7 +143,7 @@ impl CarriedFront {
         }
         self.known.fathomed.steps += 1;
         if self.known.fathomed.steps == STEPS_MAX {
-            self.vain = Lack::of(&self.at.pos12, VAIN * a.radius().min(b.radius()));
+            self.vain = Lack::of(&self.at.pos12, self.bent, VAIN * a.radius().min(b.radius()));
         }
     }
 
