@@ -70,6 +70,20 @@ pub(super) struct Deform {
     revision: u32,
 }
 
+impl Deform {
+    /// A box and a radius that hold all triangles, where a refit has ended since the last vertices came.
+    fn fitted(&self, centre: &Point) -> Option<(Aabb, f64)> {
+        let root = self.around.first().filter(|_| self.stale_m == 0.0)?;
+        let bounds = aabb(root);
+        let farthest = (bounds.centre() - centre).abs() + bounds.half_extents();
+        let radius = farthest.norm() * (1.0 + 8.0 * ROUND);
+        Some((
+            bounds,
+            radius + 8.0 * ROUND * (centre.coords.amax() + bounds.centre().coords.amax()),
+        ))
+    }
+}
+
 impl Mesh {
     /// The same mesh as one that deforms.
     ///
@@ -212,6 +226,7 @@ impl Mesh {
         // Differences, squares and a root of f64: a few units of roundoff.
         let up = |square: f64| square.sqrt() * (1.0 + 8.0 * ROUND);
         let (step_m, far_m) = (up(step), up(far) + 8.0 * ROUND * self.centre.coords.amax());
+        let before = deform.fitted(&self.centre);
         let add = |sum: f64| (sum + step_m) * (1.0 + 2.0 * ROUND);
         deform.bent_m = add(deform.bent_m);
         deform.stale_m = add(deform.stale_m);
@@ -222,8 +237,11 @@ impl Mesh {
         if whole {
             (self.bounds, self.radius) = (bounds, far_m);
         } else if !moved.is_empty() {
-            self.bounds = self.bounds.merged(&bounds);
-            self.radius = self.radius.max(far_m);
+            // What stays is within the root's boxes where these are of the vertices before: no wider than all that has
+            // ever been there.
+            let (around, radius) = before.unwrap_or((self.bounds, self.radius));
+            self.bounds = around.merged(&bounds);
+            self.radius = radius.min(self.radius).max(far_m);
         }
         step_m
     }

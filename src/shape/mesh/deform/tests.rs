@@ -207,3 +207,27 @@ fn a_tree_that_was_built_elsewhere_holds_what_has_moved_meanwhile() {
     assert!(mesh.worn_tree().is_none());
     assert!(!mesh.take_tree(late.build()), "of a tree that is gone");
 }
+
+#[test]
+fn bug_a_mesh_whose_vertices_come_in_parts_shrinks_again_after_a_refit() {
+    let mut mesh = ball(12, 0.1).into_deforming().unwrap();
+    let (bounds, radius) = (mesh.aabb(), mesh.radius());
+    let one = rows(&mesh, |_, v| *v)[7];
+    let far = one.map(|x| 5.0 * x);
+    for _ in 0..3 {
+        mesh.bend(7, &[far]);
+        boxes_hold(&mesh);
+        assert!(mesh.radius() > 4.0 * radius);
+        // Until the boxes hold the vertices again, they may be anywhere that they have been.
+        mesh.bend(7, &[one]);
+        assert!(mesh.radius() > 4.0 * radius);
+        boxes_hold(&mesh);
+        while mesh.refit(5) > 0 {
+            boxes_hold(&mesh);
+        }
+        mesh.bend(7, &[one]);
+        boxes_hold(&mesh);
+        assert!(mesh.radius() <= 1.8 * radius, "{} {radius}", mesh.radius());
+        assert!((mesh.aabb().max - bounds.max).norm() < 1e-6);
+    }
+}
