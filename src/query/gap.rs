@@ -42,6 +42,11 @@ impl GapQuestion {
         })
     }
 
+    /// The bodies that the answer is worked out with.
+    pub(super) fn bodies_mut(&mut self) -> impl Iterator<Item = &mut Body> {
+        [&mut self.a, &mut self.b].into_iter()
+    }
+
     /// Works on the answer, for a second at most.
     #[must_use]
     pub fn answer(&self, clock: &dyn Clock) -> GapFound {
@@ -91,8 +96,8 @@ pub(super) fn both<'w>(
         return Err("a body has just been taken out: ask again".to_owned());
     };
     let mut warnings = Vec::new();
-    for body in [one, other] {
-        warnings.extend(fit(body)?);
+    for (slot, body) in [(slot_a, one), (slot_b, other)] {
+        warnings.extend(fit(world, slot, body)?);
     }
     if one.unbounded && other.unbounded {
         return Err(format!(

@@ -66,6 +66,11 @@ impl ImpactQuestion {
         })
     }
 
+    /// As of a gap.
+    pub(super) fn bodies_mut(&mut self) -> impl Iterator<Item = &mut Body> {
+        [&mut self.a, &mut self.b].into_iter()
+    }
+
     /// Works on the answer, for a second at most.
     #[must_use]
     pub fn answer(&self, clock: &dyn Clock) -> ImpactFound {

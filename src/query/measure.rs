@@ -1,11 +1,12 @@
 //! Two bodies measured for a question: what answers about a gap have in common. In: bodies as they stand, a [`Meter`].
 //! Out: a sound interval with its verdict and witness, scene frame; and whether a body's place is known at all.
 
+use crate::ids::{BodyId, BodySlot};
 use crate::math::{Interval, Point, Vec3};
 use crate::narrow::gap_between;
 use crate::time::Meter;
 use crate::wire::{BodyStatus, GapKnown, Verdict};
-use crate::world::Body;
+use crate::world::{Body, Parts, World};
 
 /// Longest work on one answer, nanoseconds; then what is proved by then is the answer, an interval that is sound.
 pub(super) const WORK_NS: u64 = 1_000_000_000;
@@ -75,28 +76,33 @@ pub(super) fn age_ns(body: &Body, now_ns: u64) -> Option<u64> {
     Some(now_ns.saturating_sub(since_ns))
 }
 
+/// Fits the boxes of bodies that deform to their vertices, in copies of their own: the engine fits those alone of which
+/// a pair waits, and boxes of long ago tell nothing apart. A body that is there several times is fitted once.
+pub(super) fn fit_boxes<'b>(bodies: impl Iterator<Item = &'b mut Body>) {
+    let mut fitted: Vec<(BodyId, Parts)> = Vec::new();
+    for body in bodies.filter(|body| body.lags()) {
+        if let Some((_, shapes)) = fitted.iter().find(|(id, _)| *id == body.id) {
+            body.shapes = shapes.clone();
+        } else {
+            body.fit_boxes();
+            fitted.push((body.id, body.shapes.clone()));
+        }
+    }
+}
+
 /// Whether a body's place is known; what is odd about it, but legal.
 ///
 /// # Errors
 /// Why it is not, which body, and what to change.
-pub(super) fn fit(body: &Body) -> Result<Option<String>, String> {
+pub(super) fn fit(world: &World, slot: BodySlot, body: &Body) -> Result<Option<String>, String> {
     let name = &body.name;
     match body.status {
         BodyStatus::Known | BodyStatus::Truncated => Ok(None),
         BodyStatus::Held => Ok(Some(format!(
             "body \"{name}\" is held: its pose is too old, and it may be elsewhere"
         ))),
-        BodyStatus::NotReceived => Err(format!(
-            "body \"{name}\" is not_received: no pose of it has come yet; ask again when its source sends"
-        )),
-        BodyStatus::Rejected => {
-            let why = body
-                .reject
-                .map_or_else(String::new, |why| format!(" ({why})"));
-            Err(format!(
-                "body \"{name}\" is rejected: its newest pose was refused{why}; ask again after a good one"
-            ))
-        }
+        BodyStatus::NotReceived => Err(not_received(world, slot, body)),
+        BodyStatus::Rejected => Err(rejected(world, slot, body)),
         BodyStatus::Stale => Err(format!(
             "body \"{name}\" is stale: its pose is older than its time-out; ask again when its source sends"
         )),
@@ -106,6 +112,79 @@ pub(super) fn fit(body: &Body) -> Result<Option<String>, String> {
         BodyStatus::Disabled => Err(format!(
             "body \"{name}\" is disabled: enable it, then ask again"
         )),
+    }
+}
+
+/// A body and the one that it hangs on in the end, where it does: what both lack it lacks.
+fn kin<'w>(world: &'w World, slot: BodySlot, body: &'w Body) -> [Option<&'w Body>; 2] {
+    let root = world.root_of(slot).0;
+    let root = world.body(root).filter(|_| root != slot);
+    [Some(body), root]
+}
+
+/// How a body is called where it is asked for another one, or for itself.
+fn called(of: &Body, asked: &Body) -> String {
+    if of.id == asked.id {
+        "it".to_owned()
+    } else {
+        format!("\"{}\", on which it hangs,", of.name)
+    }
+}
+
+/// What has not come of a body.
+fn not_received(world: &World, slot: BodySlot, body: &Body) -> String {
+    let name = &body.name;
+    let [own, root] = kin(world, slot, body);
+    let mover = root.unwrap_or(body);
+    let lacks = |body: &&Body| {
+        body.vertices
+            .as_deref()
+            .is_some_and(|v| v.version.is_none())
+    };
+    let (what, of) = if mover.since_ns.is_none() && mover.moves {
+        ("pose", mover)
+    } else {
+        let found = [own, root].into_iter().flatten().find(lacks);
+        found.map_or(("pose", mover), |lacking| ("vertices", lacking))
+    };
+    let (of, verb) = (
+        called(of, body),
+        if what == "pose" { "has" } else { "have" },
+    );
+    format!(
+        "body \"{name}\" is not_received: no {what} of {of} {verb} come yet; ask again when its source sends"
+    )
+}
+
+/// What was refused of a body.
+fn rejected(world: &World, slot: BodySlot, body: &Body) -> String {
+    let name = &body.name;
+    let refused = |body: &&Body| {
+        body.vertices
+            .as_deref()
+            .is_some_and(|v| v.refused.is_some())
+    };
+    let kin = kin(world, slot, body);
+    let bent = kin.into_iter().flatten().find(refused);
+    let why = match bent {
+        Some(bent) => bent.vertices.as_deref().and_then(|v| v.refused),
+        None => body.reject,
+    };
+    let why = why.map_or_else(String::new, |why| format!(" ({why})"));
+    let newest = |of: &Body, what: &str| match called(of, body) {
+        called if called == "it" => format!("its newest {what}"),
+        called => format!("the newest {what} of {called}"),
+    };
+    let mover = kin[1].unwrap_or(body);
+    match bent {
+        Some(bent) => format!(
+            "body \"{name}\" is rejected: {} were refused{why}; ask again after all of them have come",
+            newest(bent, "vertices")
+        ),
+        None => format!(
+            "body \"{name}\" is rejected: {} was refused{why}; ask again after a good one",
+            newest(mover, "pose")
+        ),
     }
 }
 

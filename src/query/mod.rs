@@ -14,6 +14,8 @@ pub use impact::ImpactQuestion;
 pub use ray::RayQuestion;
 pub use touching::TouchingQuestion;
 
+use measure::fit_boxes;
+
 use crate::scene::Question;
 use crate::time::Clock;
 use crate::wire::{Answer, MessageHeader};
@@ -77,6 +79,12 @@ impl Query {
             warnings: std::mem::take(self.warnings()),
             ..Answer::default()
         };
+        match &mut self {
+            Self::Gap(question) => fit_boxes(question.bodies_mut()),
+            Self::Touching(question) => fit_boxes(question.bodies_mut()),
+            Self::Ray(question) => fit_boxes(question.bodies_mut()),
+            Self::Impact(question) => fit_boxes(question.bodies_mut()),
+        }
         let header = match self {
             Self::Gap(question) => answer.gap.insert(question.answer(clock)).tick_header,
             Self::Touching(question) => answer.touching.insert(question.answer(clock)).tick_header,

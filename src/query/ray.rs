@@ -4,8 +4,7 @@
 //! How: the ray is cut where it passes the boxes of bodies, nearest first. A piece of it is a body without thickness:
 //! what the query of two bodies proves apart is free, what it certifies to collide is hit, so halving the first piece
 //! that is not free closes in on the hit from both sides, for every kind of shape, surfaces too. From a free piece the
-//! ray is free for another stretch as long as the gap. Refused: a formula a shape, which would need a proof of rounding
-//! each.
+//! ray is free for another stretch as long as the gap. Refused: a formula a shape, each with its proof of rounding.
 
 use std::sync::Arc;
 
@@ -52,9 +51,8 @@ pub struct RayQuestion {
 #[derive(Clone, Debug)]
 struct Near {
     body: Body,
-    /// It is within the box from here on, metres along the ray; before, it is free.
+    /// It is within the box from here to `leave_m`, metres along the ray; before, it is free.
     enter_m: f64,
-    /// Until here.
     leave_m: f64,
 }
 
@@ -121,7 +119,7 @@ impl RayQuestion {
                 continue;
             }
             unknown.note(body);
-            if let (Some((enter_m, leave_m)), Ok(_)) = (passed, fit(body)) {
+            if let (Some((enter_m, leave_m)), Ok(_)) = (passed, fit(world, slot, body)) {
                 hits.push((enter_m, leave_m, body.id, slot));
             }
         }
@@ -177,6 +175,11 @@ impl RayQuestion {
             }
         }
         (enter_m <= leave_m).then_some((enter_m, leave_m))
+    }
+
+    /// As of a gap.
+    pub(super) fn bodies_mut(&mut self) -> impl Iterator<Item = &mut Body> {
+        self.near.iter_mut().map(|near| &mut near.body)
     }
 
     /// Works on the answer, for a second at most.

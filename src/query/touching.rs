@@ -140,7 +140,7 @@ impl TouchingQuestion {
                     continue;
                 }
                 is_asked = true;
-                if bound_m <= self.within_m && fit(other).is_ok() {
+                if bound_m <= self.within_m && fit(world, slot, other).is_ok() {
                     hits.take(Hit {
                         bound_m,
                         asked: place,
@@ -173,6 +173,12 @@ impl TouchingQuestion {
                 })
             })
             .collect();
+    }
+
+    /// As of a gap.
+    pub(super) fn bodies_mut(&mut self) -> impl Iterator<Item = &mut Body> {
+        let near = self.near.iter_mut().map(|near| &mut near.body);
+        self.asked.iter_mut().chain(near)
     }
 
     /// Works on the answer, for a second at most.
@@ -268,7 +274,7 @@ fn parts_of(
     let body = body.ok_or_else(|| "a body has just been taken out: ask again".to_owned())?;
     let has_vertices = |v: &crate::world::Vertices| v.version.is_some() && v.refused.is_none();
     match pose {
-        None => warnings.extend(fit(body)?),
+        None => warnings.extend(fit(world, slot, body)?),
         Some(_) if body.status == BodyStatus::Disabled => {
             return Err(format!(
                 "body \"{name}\" is disabled: enable it, or ask for its `shape`"

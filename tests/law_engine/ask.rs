@@ -1,9 +1,10 @@
 //! A gap asked for beside the pair set: sound wherever its work stops, and in the end that of the pair.
 
 use sweepd::narrow::gap_between;
-use sweepd::query::GapQuestion;
+use sweepd::query::{GapQuestion, Query};
+use sweepd::scene::Question;
 use sweepd::time::{ManualClock, Meter, SystemClock};
-use sweepd::wire::Verdict;
+use sweepd::wire::{Verdict, VertexFrame, VertexHeader, WIRE_VERSION, name_bytes, vertex_flags};
 use sweepd::world::Body;
 
 use crate::rig::{ALL, Rig, body, scene};
@@ -180,4 +181,142 @@ fn bug_solids_that_overlap_along_faces_in_line_are_no_touch() {
         assert_eq!(row.gap_max_m <= 0.0, depth > 0.0, "{what} {row:?}");
         assert!(row.gap_best_m.is_nan() || row.gap_best_m <= row.gap_max_m);
     }
+}
+
+/// A tent of 2 m that hangs over the first body.
+const TENT: &str = "{ type = \"trimesh\", solid = false, vertices = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0], [0, 0, 1]], faces = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]] }";
+
+fn bent(version: u64, rows: Vec<[f32; 3]>) -> VertexFrame {
+    let count = u32::try_from(rows.len()).unwrap();
+    VertexFrame {
+        header: VertexHeader {
+            session: 11,
+            epoch: 1,
+            body: 2,
+            version,
+            source: name_bytes("feed"),
+            count,
+            total: 5,
+            flags: vertex_flags::FULL,
+            schema: WIRE_VERSION,
+            ..VertexHeader::default()
+        },
+        rows,
+        ..VertexFrame::default()
+    }
+}
+
+fn tent(z: f32) -> Vec<[f32; 3]> {
+    let corners = [
+        [-1.0, -1.0],
+        [1.0, -1.0],
+        [1.0, 1.0],
+        [-1.0, 1.0],
+        [0.0, 0.0],
+    ];
+    let rows = corners.iter().zip([0.0, 0.0, 0.0, 0.0, 1.0]);
+    rows.map(|(&[x, y], up)| [x, y, z + up]).collect()
+}
+
+#[test]
+fn bug_boxes_that_no_pair_has_had_fitted_are_fitted_for_a_question() {
+    let bodies = [
+        body(
+            1,
+            [0.0, 0.0, 50.0],
+            "{ type = \"sphere\", radius = 1.0 }",
+            "",
+        ),
+        body(2, [0.0; 3], TENT, "deforms = true\n"),
+    ];
+    let mut rig = Rig::new(&scene("", &bodies));
+    for version in 1..200_u64 {
+        let z = if version % 2 == 0 { 0.0 } else { 0.05 };
+        rig.vertices = vec![bent(version, tent(z))];
+        rig.send(ALL);
+    }
+    let (_, cloth) = two(&rig);
+    assert!(cloth.lags());
+    let mut own = cloth.still();
+    own.fit_boxes();
+    assert!(
+        !own.lags() && cloth.lags(),
+        "what others hold stays as it was"
+    );
+    let world = rig.engine.world();
+    let ask = |asked: Question| {
+        let header = rig.out.tick.header;
+        let query = Query::new(world, header, &asked, None).unwrap();
+        // Each look at the clock takes so long that few are left.
+        let clock = ManualClock::new(1);
+        clock.step_each_read(20_000_000);
+        query.answer(&clock)
+    };
+    let gap = ask(Question::Gap {
+        a: "b1".to_owned(),
+        b: "b2".to_owned(),
+    });
+    let gap = gap.gap.unwrap().known;
+    let truth = 48.0 - 0.05;
+    let (low, high) = (gap.gap_min_m.unwrap(), gap.gap_max_m.unwrap());
+    assert!(low <= truth + 1e-6 && high >= truth - 1e-6, "{gap:?}");
+    assert!(high - low < 1e-3, "{gap:?}");
+}
+
+#[test]
+fn bug_an_answer_says_what_has_not_come_of_a_body_or_of_what_it_hangs_on() {
+    let bodies = [
+        body(
+            1,
+            [0.0, 0.0, 50.0],
+            "{ type = \"sphere\", radius = 1.0 }",
+            "",
+        ),
+        body(2, [0.0; 3], TENT, "deforms = true\n"),
+        body(
+            3,
+            [0.0; 3],
+            "{ type = \"sphere\", radius = 1.0 }",
+            "attached_to = \"b2\"\n",
+        ),
+    ];
+    let mut rig = Rig::new(&scene("", &bodies));
+    let why = |rig: &Rig, name: &str| {
+        let header = rig.out.tick.header;
+        GapQuestion::new(rig.engine.world(), header, "b1", name).unwrap_err()
+    };
+    rig.idle(1, ALL);
+    let told = GapQuestion::new(rig.engine.world(), rig.out.tick.header, "b1", "b2").unwrap_err();
+    assert!(
+        told.contains("\"b1\" is not_received: no pose of it has come yet"),
+        "{told}"
+    );
+    rig.send(ALL);
+    let told = why(&rig, "b2");
+    assert!(
+        told.contains("\"b2\" is not_received: no vertices of it have come yet"),
+        "{told}"
+    );
+    let told = why(&rig, "b3");
+    assert!(
+        told.contains("no vertices of \"b2\", on which it hangs, have come yet"),
+        "{told}"
+    );
+    rig.vertices = vec![bent(1, tent(0.0))];
+    rig.send(ALL);
+    assert!(GapQuestion::new(rig.engine.world(), rig.out.tick.header, "b1", "b3").is_ok());
+    let mut nan = tent(0.0);
+    nan[0][0] = f32::NAN;
+    rig.vertices = vec![bent(2, nan)];
+    rig.send(ALL);
+    let told = why(&rig, "b2");
+    assert!(
+        told.contains("its newest vertices were refused (not_finite)"),
+        "{told}"
+    );
+    let told = why(&rig, "b3");
+    assert!(
+        told.contains("the newest vertices of \"b2\", on which it hangs, were refused"),
+        "{told}"
+    );
 }
