@@ -35,7 +35,7 @@ mod tests {
     use super::*;
     use crate::daemon::build_shapes;
     use crate::math::{Point, Pose};
-    use crate::narrow::memo::changed_since;
+    use crate::narrow::change::changed_since;
     use crate::narrow::mesh::{CarriedFront, FrontStore, Goal, Search};
     use crate::scene::Scene;
     use crate::shape::{Geometry, Mesh};

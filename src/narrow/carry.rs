@@ -100,7 +100,7 @@ impl Narrow {
                 self.found
                     .extend(found_on(front, store, (one_shape, other_shape), &pos12).map(seen));
             }
-            self.keep_contacts(slot, a.radius.min(b.radius));
+            self.keep_contacts(slot, a.radius.min(b.radius), self.tick);
         }
         !done
     }

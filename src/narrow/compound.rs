@@ -33,9 +33,10 @@ use crate::world::Body;
 
 use super::arena::Run;
 use super::bent::Bent;
+use super::change::relative_motion;
 use super::cover::{Cover, Group, Open, Wear};
 use super::holdings::Holdings;
-use super::memo::{Witness, relative_motion};
+use super::memo::Witness;
 use super::mesh::{CarriedFront, Goal, Placed, Search};
 use super::shelves::Shelves;
 
@@ -203,6 +204,15 @@ impl CompoundFront {
     /// Whether 0 in the interval of a reached goal means touching (law 3.4).
     pub(super) fn is_certain(&self) -> bool {
         self.known.certain && self.cover.holds_lumped()
+    }
+
+    /// As [`CarriedFront::is_lost`], of any pair of shapes.
+    pub(super) fn is_lost(&self, shelves: &Shelves) -> bool {
+        let mut fronts = self
+            .inner
+            .iter()
+            .filter_map(|inner| shelves.fronts.get(inner.front));
+        self.started && (self.cover.is_lost() || fronts.any(CarriedFront::is_lost))
     }
 
     /// Where the pair of shapes that is nearest or deepest of those asked at this pose is so.

@@ -127,7 +127,7 @@ impl Cover {
     }
 
     /// Whether what was lumped together is no longer proved apart, so that nothing but a new start helps.
-    fn is_lost(&self) -> bool {
+    pub(super) fn is_lost(&self) -> bool {
         self.is_lumped() && !self.holds_lumped()
     }
 

@@ -43,7 +43,7 @@ impl Narrow {
         let memo = &self.memos[slot.index()];
         let level = if memo.tested == 0 {
             Level::Boxes
-        } else if memo.cursor != NONE {
+        } else if memo.cursor != NONE || memo.report_cursor != NONE {
             Level::Partial
         } else if memo.widened_m() > 0.0 {
             Level::Carried

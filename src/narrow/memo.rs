@@ -1,7 +1,7 @@
 //! What is remembered of a pair: its certificate, its verdict, its witness.
 
 use crate::ids::{BodySlot, PairSlot};
-use crate::math::{Interval, Point, Pose, ROUND, Vec3, chord, displacement, relative};
+use crate::math::{Interval, Point, Pose, Vec3, relative};
 use crate::pairs::PairSet;
 use crate::shape::Geometry;
 use crate::wire::{NO_INDEX, Verdict};
@@ -84,7 +84,9 @@ pub(super) struct Memo {
     pub(super) active_at: u32,
     /// The surface that proved the last depth.
     pub(super) shell: u32,
+    /// Its walk for a verdict, where one of the two is a half-space, and that for whoever listens.
     pub(super) cursor: u32,
+    pub(super) report_cursor: u32,
     pub(super) front: u32,
     pub(super) compound: u32,
     pub(super) contacts: u32,
@@ -143,6 +145,7 @@ impl Memo {
             active_at: NONE,
             shell: NONE,
             cursor: NONE,
+            report_cursor: NONE,
             front: NONE,
             compound: NONE,
             contacts: NONE,
@@ -176,47 +179,6 @@ impl Memo {
     }
 }
 
-/// An upper bound on how much the gap of two bodies changed since a test, by their relative pose then and by how much
-/// they had deformed then, metres.
-pub(super) fn changed_since(a: &Body, b: &Body, (then, bent): (&Pose, Bent), now: &Pose) -> f64 {
-    let bent_m = Bent::of_bodies(a, b).since_m(&bent);
-    let moved_m = relative_motion(a, b, then, now);
-    if bent_m > 0.0 {
-        (moved_m + bent_m) * (1.0 + 2.0 * ROUND)
-    } else {
-        moved_m
-    }
-}
-
-/// An upper bound on how much the gap of two bodies changed between two relative poses, metres; what they deformed by
-/// meanwhile comes on top.
-///
-/// The displacement of the smaller body's surface seen from the other; for a half-space the change of the centre's
-/// height above its plane, plus what the relative turn adds.
-pub(super) fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f64 {
-    if then == now {
-        return 0.0;
-    }
-    if !(a.unbounded || b.unbounded) {
-        return if a.radius < b.radius {
-            displacement(&then.inverse(), &now.inverse(), &a.centre, a.radius)
-        } else {
-            displacement(then, now, &b.centre, b.radius)
-        };
-    }
-    match (half_space_of(a), half_space_of(b)) {
-        (Some(normal), _) => plane_motion(&normal, then, now, &b.centre, b.radius),
-        (None, Some(normal)) => plane_motion(
-            &normal,
-            &then.inverse(),
-            &now.inverse(),
-            &a.centre,
-            a.radius,
-        ),
-        (None, None) => f64::INFINITY,
-    }
-}
-
 /// How far two bodies came nearer between the test's relative pose and this one, metres: along the witness, or along
 /// the line of their centres where there is none. For the order of work, no bound.
 pub(super) fn closing(a: &Body, b: &Body, memo: &Memo, rel: &Pose) -> f64 {
@@ -228,23 +190,6 @@ pub(super) fn closing(a: &Body, b: &Body, memo: &Memo, rel: &Pose) -> f64 {
         }
     };
     direction.dot(&(memo.rel * point - rel * point))
-}
-
-fn plane_motion(normal: &Vec3, then: &Pose, now: &Pose, centre: &Point, radius: f64) -> f64 {
-    let (from, to) = (then * centre, now * centre);
-    let height = normal.dot(&(to - from)).abs();
-    let magnitude = from.coords.amax().max(to.coords.amax()) + centre.coords.amax() + radius;
-    (height + chord(&then.rotation, &now.rotation) * radius) * (1.0 + 8.0 * f64::EPSILON)
-        + 16.0 * f64::EPSILON * magnitude
-}
-
-/// The outward normal in the body's frame, when the body is one half-space and nothing else.
-fn half_space_of(body: &Body) -> Option<Vec3> {
-    let [placed] = &*body.shapes else { return None };
-    match &placed.shape.geometry {
-        Geometry::HalfSpace { normal, .. } => Some(placed.pose.rotation * normal),
-        Geometry::Convex(_) | Geometry::Mesh(_) => None,
-    }
 }
 
 fn meshed(body: &Body) -> bool {
@@ -339,6 +284,7 @@ impl Narrow {
         if verdict == Verdict::Apart {
             self.contact_sets.give(&mut memo.contacts);
             self.kept.give(&mut memo.regions);
+            self.shelves.give_cursor(&mut memo.report_cursor);
             memo.contacts_tick = 0;
             self.deactivate(slot);
             self.left.push(slot);

@@ -24,6 +24,7 @@ mod around;
 mod ask;
 mod bent;
 mod carry;
+mod change;
 mod compound;
 mod contacts;
 mod cover;
@@ -34,6 +35,7 @@ mod holdings;
 mod memo;
 mod order;
 mod pass;
+mod plane;
 mod pool;
 mod query;
 mod refit;
@@ -110,6 +112,8 @@ pub struct Narrow {
     left_is_news: bool,
     /// Pairs that lack a verdict at this tick's poses and can get one by work.
     undecided: Vec<PairSlot>,
+    /// Pairs whose work came to its end without a verdict, for want of room: they start anew in the next tick.
+    lost: Vec<PairSlot>,
     /// Active pairs whose bounds or contacts are older than their poses.
     refresh: Vec<PairSlot>,
     /// What is carried of pairs of which one body has several shapes.
@@ -286,6 +290,18 @@ impl Narrow {
             memo.queued &= hot.live && hot.verdict == Verdict::Possible;
             memo.queued
         });
+        // At rest nobody else would come to them. What they hold may be just what they lack.
+        for at in 0..self.lost.len() {
+            let slot = self.lost[at];
+            let hot = &self.hot[slot.index()];
+            if hot.live && hot.verdict == Verdict::Possible && !self.memos[slot.index()].queued {
+                self.give_back(slot);
+                self.memos[slot.index()].queued = true;
+                self.undecided.push(slot);
+            }
+        }
+        self.lost.clear();
+        let (hot, memos) = (&self.hot, &mut self.memos);
         self.refresh.retain(|slot| {
             let (hot, memo) = (&hot[slot.index()], &mut memos[slot.index()]);
             let reported = matches!(hot.verdict, Verdict::Near | Verdict::Colliding);

@@ -92,7 +92,7 @@ impl Shelves {
         let inner = || compounds.all().iter().flat_map(CompoundFront::places);
         let shells = memos.iter().map(|memo| memo.shell);
         self.shells.validate("shells", shells)?;
-        let cursors = memos.iter().map(|memo| memo.cursor);
+        let cursors = (memos.iter()).flat_map(|memo| [memo.cursor, memo.report_cursor]);
         (self.cursors).validate("queries", cursors.chain(inner().map(|inner| inner.1)))?;
         let fronts = memos.iter().map(|memo| memo.front);
         (self.fronts).validate("fronts", fronts.chain(inner().map(|inner| inner.0)))?;
@@ -115,11 +115,23 @@ impl Shelves {
 }
 
 impl Narrow {
+    /// Whether work on a pair has come to its end without an answer, for want of room.
+    pub(super) fn is_lost(&self, slot: PairSlot) -> bool {
+        let memo = &self.memos[slot.index()];
+        let (front, fronts) = (
+            self.shelves.fronts.get(memo.front),
+            self.compounds.get(memo.compound),
+        );
+        front.is_some_and(CarriedFront::is_lost)
+            || fronts.is_some_and(|fronts| fronts.is_lost(&self.shelves))
+    }
+
     /// Gives back what work on a pair keeps from turn to turn.
     pub(super) fn give_back(&mut self, slot: PairSlot) {
         let memo = &mut self.memos[slot.index()];
         self.shelves.give_shell(&mut memo.shell);
         self.shelves.give_cursor(&mut memo.cursor);
+        self.shelves.give_cursor(&mut memo.report_cursor);
         self.shelves.give_front(&mut memo.front);
         if let Some(front) = self.compounds.get_mut(memo.compound) {
             front.release(&mut self.shelves);

@@ -4,12 +4,11 @@ use crate::ids::PairSlot;
 use crate::math::{Interval, relative};
 use crate::time::Meter;
 use crate::wire::Verdict;
-use crate::world::{Body, PlacedShape, World};
+use crate::world::{Body, World};
 
-use super::bent::Bent;
 use super::contacts::{ContactSet, TREMBLE_TICKS};
-use super::cursor::{Room, Turn};
-use super::memo::{Witness, changed_since};
+use super::cursor::Turn;
+use super::memo::Witness;
 use super::mesh::{Goal, has_front};
 use super::order::Order;
 use super::pass::Pass;
@@ -25,10 +24,10 @@ const QUERY_NS_MAX: u64 = 100_000;
 const FOLLOWED: f64 = 0.1;
 
 /// What a query found, and when and where it holds.
-struct Answer {
-    gap: Interval,
-    finished: bool,
-    witness: Option<Witness>,
+pub(super) struct Answer {
+    pub(super) gap: Interval,
+    pub(super) finished: bool,
+    pub(super) witness: Option<Witness>,
 }
 
 impl Narrow {
@@ -59,6 +58,9 @@ impl Narrow {
         self.undecided = self.spend_on(work, &pass, meter, |narrow, slot, meter| {
             let done = (pass.idle)(narrow, slot) || narrow.work(slot, goal, world, meter);
             narrow.memos[slot.index()].queued = !done;
+            if done && narrow.is_lost(slot) {
+                narrow.lost.push(slot);
+            }
             done
         });
         self.undecided.is_empty()
@@ -99,9 +101,10 @@ impl Narrow {
             && has_front(&one.shape, &other.shape)
         {
             open = self.turn_front(slot, (a, b), goal, meter);
-        } else if goal == Goal::Verdict && self.witness_due(slot) {
-            self.retest_witness(slot, (a, b));
-            meter.charge_dear(1);
+        } else if goal == Goal::Verdict
+            && self.witness_due(slot)
+            && self.retest_witness(slot, (a, b), meter)
+        {
             open = true;
         } else if let ([one], [other]) = (&*a.shapes, &*b.shapes) {
             let turn = self.turn_cursor(slot, (a, b), (one, other), goal, meter);
@@ -169,82 +172,8 @@ impl Narrow {
             self.found.clear();
             let found = &mut self.found;
             add_manifold((a, b), (0, 0), &pos12, (&closest, gap), found);
-            self.keep_contacts(slot, a.radius.min(b.radius));
+            self.keep_contacts(slot, a.radius.min(b.radius), self.tick);
         }
-    }
-
-    /// One turn of a mesh and a half-space: resumed where it stopped, or started at this tick's poses.
-    fn turn_cursor(
-        &mut self,
-        slot: PairSlot,
-        (a, b): (&Body, &Body),
-        shapes: (&PlacedShape, &PlacedShape),
-        goal: Goal,
-        meter: &mut Meter<'_>,
-    ) -> Turn {
-        let memo = &mut self.memos[slot.index()];
-        let goal = memo.goal(goal);
-        let fresh = memo.cursor == NONE;
-        let Some(cursor) = self.shelves.cursors.get_or_take(&mut memo.cursor) else {
-            return Turn::Finished;
-        };
-        if fresh || (cursor.goal == Goal::Verdict && goal != Goal::Verdict) {
-            let credit_m = a.motion.credit_m() + b.motion.credit_m();
-            let rel = relative(&a.pose, &b.pose);
-            cursor.start(
-                (0, 0),
-                (rel, Bent::of_bodies(a, b)),
-                credit_m,
-                self.tick,
-                goal,
-            );
-        }
-        let mut room = Room {
-            search: self.search,
-            fronts: &mut self.shelves.store,
-            contacts: &mut self.shelves.contacts,
-        };
-        let (report_m, counters) = (memo.report_m, &mut self.counters);
-        let turn = cursor.turn(&mut room, shapes, report_m, meter, counters);
-        let high = cursor.known(shapes).max;
-        let certified = high + memo.reach_m <= 0.0 && memo.now.max > 0.0;
-        if turn == Turn::Open && !certified {
-            return Turn::Open;
-        }
-        // What was known before holds at this tick's poses; carried back to the cursor's, it loses the motion between.
-        let then = (&cursor.rel, cursor.bent);
-        let since = changed_since(a, b, then, &relative(&a.pose, &b.pose));
-        let known_low = (memo.here().min - since).next_down();
-        let whole =
-            turn == Turn::Finished && !(cursor.goal == Goal::Verdict && cursor.gap.max <= 0.0);
-        let low = if whole { cursor.gap.min } else { known_low };
-        memo.rel = cursor.rel;
-        memo.credit_m = cursor.credit_m;
-        memo.bent = cursor.bent;
-        memo.tested = cursor.tick;
-        memo.tight = whole && cursor.goal != Goal::Verdict;
-        let answer = Answer {
-            gap: Interval {
-                min: low.min(high),
-                max: high,
-            },
-            finished: whole && cursor.certain,
-            witness: cursor.witness,
-        };
-        let contacts = cursor.goal == Goal::Contacts && turn == Turn::Finished;
-        if contacts {
-            self.found.clear();
-            (self.found).extend_from_slice(cursor.found(&self.shelves.contacts));
-        }
-        if turn == Turn::Finished {
-            cursor.release(&mut self.shelves.store, &mut self.shelves.contacts);
-            self.shelves.cursors.give(&mut memo.cursor);
-        }
-        self.store(slot, &answer);
-        if contacts {
-            self.keep_contacts(slot, a.radius.min(b.radius));
-        }
-        turn
     }
 
     /// Whether last tick's contact is worth a look before anything else.
@@ -254,28 +183,42 @@ impl Narrow {
     }
 
     /// Asks the shapes (and triangles) that touched last whether they still do: one unit, and while contact lasts the
-    /// verdict costs no more.
-    fn retest_witness(&mut self, slot: PairSlot, (a, b): (&Body, &Body)) {
+    /// verdict costs no more. Whether that was all of this turn: a pair that has waited for its verdict goes on at once
+    /// where it was in vain, or pairs that part would have their units spent on witnesses alone, tick after tick.
+    fn retest_witness(
+        &mut self,
+        slot: PairSlot,
+        (a, b): (&Body, &Body),
+        meter: &mut Meter<'_>,
+    ) -> bool {
         let memo = &mut self.memos[slot.index()];
         memo.retested = self.tick;
-        let Some(last) = memo.witness else { return };
+        let has_waited = memo.undecided_since != 0 && memo.undecided_since < self.tick;
+        self.counters.queries += 1;
+        meter.charge_dear(1);
+        self.still_touches(slot, (a, b)) || !has_waited
+    }
+
+    /// Whether the witness is certified to touch at this tick's poses; then it is the pair's new certificate.
+    fn still_touches(&mut self, slot: PairSlot, (a, b): (&Body, &Body)) -> bool {
+        let memo = &mut self.memos[slot.index()];
+        let Some(last) = memo.witness else {
+            return false;
+        };
         let places = (last.shape_a, last.shape_b);
         let (Some(one), Some(other)) = (
             a.shapes.get(places.0 as usize),
             b.shapes.get(places.1 as usize),
         ) else {
-            return;
+            return false;
         };
         let rel = relative(&a.pose, &b.pose);
         let pos12 = shape_pose(one, other, &rel);
-        self.counters.queries += 1;
         let triangles = (last.triangle_a, last.triangle_b);
-        let Some(closest) = retest(&one.shape, &other.shape, &pos12, triangles) else {
-            return;
+        let closest = retest(&one.shape, &other.shape, &pos12, triangles);
+        let Some(closest) = closest.filter(|closest| closest.gap.max <= 0.0) else {
+            return false;
         };
-        if closest.gap.max > 0.0 {
-            return;
-        }
         // A certified touch at these very poses; the lower end is what motion left of the old one.
         let high = sound(closest.gap, one, other, &rel).max;
         memo.gap = Interval {
@@ -290,9 +233,10 @@ impl Narrow {
             triangle_b: last.triangle_b,
             ..witness_of(one, other, &pos12, &closest, places)
         });
+        true
     }
 
-    fn store(&mut self, slot: PairSlot, answer: &Answer) {
+    pub(super) fn store(&mut self, slot: PairSlot, answer: &Answer) {
         let memo = &mut self.memos[slot.index()];
         memo.gap = answer.gap;
         memo.finished = answer.finished;
@@ -302,7 +246,9 @@ impl Narrow {
     }
 
     /// Hands `found` to the pair's contact set; ids go on where the contact does.
-    pub(super) fn keep_contacts(&mut self, slot: PairSlot, radius: f64) {
+    ///
+    /// * `tick` - of the poses that they were found at.
+    pub(super) fn keep_contacts(&mut self, slot: PairSlot, radius: f64, tick: u64) {
         let most = self.contacts_per_pair;
         let memo = &mut self.memos[slot.index()];
         if memo.contacts == NONE {
@@ -312,7 +258,7 @@ impl Narrow {
             }
         }
         let long_over = memo.contacts_are_over() && self.tick - memo.parted >= TREMBLE_TICKS;
-        memo.contacts_tick = memo.tested;
+        memo.contacts_tick = tick;
         if let Some(set) = self.contact_sets.get_mut(memo.contacts) {
             if long_over {
                 set.clear();

@@ -33,11 +33,11 @@ use crate::pairs::PairSet;
 use crate::time::{Meter, Share};
 use crate::world::{Body, World};
 
+use super::change::changed_since;
 use super::exact::Warm;
-use super::memo::{Memo, changed_since};
+use super::memo::Memo;
 use super::order::Order;
 use super::{NONE, Narrow, Wanted};
-
 use advance::{Ahead, Tools, Work};
 use motion::{Moment, length, way};
 

@@ -6,7 +6,8 @@ use crate::pairs::PairSet;
 use crate::wire::{BodyStatus, Verdict};
 use crate::world::World;
 
-use super::memo::{Memo, changed_since, closing};
+use super::change::changed_since;
+use super::memo::{Memo, closing};
 use super::mesh::Goal;
 use super::{NONE, Narrow};
 

@@ -6,11 +6,12 @@ use crate::narrow::Counters;
 use crate::narrow::arena::Arena;
 use crate::narrow::bent::Bent;
 use crate::narrow::carry::{found_on, glance, seen_at};
+use crate::narrow::change::changed_since;
 use crate::narrow::contacts::Contact;
 use crate::narrow::cover::{Group, Open};
 use crate::narrow::cursor::{Room, Turn};
 use crate::narrow::exact::Warm;
-use crate::narrow::memo::{Witness, changed_since};
+use crate::narrow::memo::Witness;
 use crate::narrow::mesh::{Goal, LeafContact, Search, has_front};
 use crate::narrow::pool::NONE;
 use crate::narrow::query::{
@@ -278,7 +279,9 @@ impl CompoundFront {
         } = &mut *tools.shelves;
         let fresh = inner.cursor == NONE;
         let cursor = cursors.get_or_take(&mut inner.cursor)?;
-        if fresh || cursor.goal < goal {
+        // A walk at another pose tells no more than a verdict: one for more is not waited for.
+        let here = (cursor.rel, cursor.bent) == now;
+        if fresh || cursor.goal < goal || cursor.goal > Goal::Verdict && !here {
             cursor.start(pair.places, now, 0.0, tools.tick, goal);
         }
         let shapes = (pair.one, pair.other);

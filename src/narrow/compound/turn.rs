@@ -49,7 +49,7 @@ impl Narrow {
         if done && goal == Goal::Contacts {
             self.found.clear();
             (self.found).extend_from_slice(front.contacts(&self.shelves.contacts));
-            self.keep_contacts(slot, a.radius.min(b.radius));
+            self.keep_contacts(slot, a.radius.min(b.radius), self.tick);
         }
         !done
     }

@@ -249,6 +249,11 @@ impl CarriedFront {
         self.started
     }
 
+    /// Whether something found no room, or what was lumped together is used up: nothing but a new start helps.
+    pub(in crate::narrow) fn is_lost(&self) -> bool {
+        self.started && self.cover.is_lost()
+    }
+
     /// Whether it holds no entry.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -15,10 +15,9 @@ use crate::time::Meter;
 /// A vertex: its height over the plane, metres; where; of which triangle; its place in the mesh.
 type Lowest = (f64, Point, u32, u32);
 
-/// The walk.
-#[derive(Debug, Default)]
-pub(super) struct HalfSpaceWalk {
-    waiting: Waiting,
+/// A mesh as it stands over the plane.
+#[derive(Clone, Copy, Debug, Default)]
+struct Stand {
     /// Pose of the mesh seen from the half-space.
     pose: Pose,
     half_space_is_b: bool,
@@ -28,7 +27,15 @@ pub(super) struct HalfSpaceWalk {
     down_there: Vec3,
     /// Height of the tree's origin over the plane, metres.
     origin_height_m: f64,
+    /// By how much a height may be off, metres; not finite where no height is known.
     slop: f64,
+}
+
+/// The walk.
+#[derive(Debug, Default)]
+pub(super) struct HalfSpaceWalk {
+    waiting: Waiting,
+    stand: Stand,
     /// Vertices up to this height count as contacts, metres: of a body at rest all do, though rounding lifts some.
     near_m: f64,
     /// Least height met, metres; where; which triangle.
@@ -75,6 +82,59 @@ impl Waiting {
     }
 }
 
+impl Stand {
+    /// * `plane` - normal and offset in the half-space's own frame.
+    fn new(mesh: &Mesh, plane: (&Vec3, f64), pos12: &Pose, half_space_is_b: bool) -> Self {
+        let (normal, offset) = plane;
+        let pose = if half_space_is_b {
+            pos12.inverse()
+        } else {
+            *pos12
+        };
+        let down_there = -normal;
+        let origin = mesh.places_origin();
+        // Of a mesh that deforms the origin is its frame's, and the vertices may be far from there.
+        let far = origin.coords.norm().max(mesh.centre().coords.norm());
+        let size = pose.translation.vector.norm() + offset.abs() + far + mesh.radius();
+        Self {
+            pose,
+            half_space_is_b,
+            down: pose.rotation.inverse() * down_there,
+            down_there,
+            origin_height_m: normal.dot(&(pose * origin).coords) - offset,
+            slop: 32.0 * ROUND * size,
+        }
+    }
+
+    /// The corners of a triangle, with their heights.
+    fn corners(&self, mesh: &Mesh, face: u32) -> [Lowest; 3] {
+        mesh.faces()[face as usize].map(|vertex| {
+            let corner = mesh.vertices()[vertex as usize];
+            let height = self.origin_height_m - self.down.dot(&(corner - mesh.places_origin()));
+            (height, corner, face, vertex)
+        })
+    }
+}
+
+/// The lowest corner of a triangle of a mesh over the plane: the upper end of its interval holds for the whole mesh.
+///
+/// * `plane` - normal and offset in the half-space's own frame.
+pub(super) fn retest(
+    mesh: &Mesh,
+    plane: (&Vec3, f64),
+    pos12: &Pose,
+    half_space_is_b: bool,
+    face: u32,
+) -> Option<Closest> {
+    let stand = Stand::new(mesh, plane, pos12, half_space_is_b);
+    if !stand.slop.is_finite() || face as usize >= mesh.faces().len() {
+        return None;
+    }
+    let corners = stand.corners(mesh, face);
+    let lowest = corners.iter().min_by(|x, y| x.0.total_cmp(&y.0))?;
+    Some(stand.contact(lowest).closest)
+}
+
 impl HalfSpaceWalk {
     /// * `plane` - normal and offset in the half-space's own frame.
     /// * returns - false when numbers are not finite.
@@ -85,29 +145,15 @@ impl HalfSpaceWalk {
         pos12: &Pose,
         half_space_is_b: bool,
     ) -> bool {
-        let (normal, offset) = plane;
-        self.pose = if half_space_is_b {
-            pos12.inverse()
-        } else {
-            *pos12
-        };
-        self.half_space_is_b = half_space_is_b;
-        self.down_there = -normal;
-        self.down = self.pose.rotation.inverse() * self.down_there;
-        let origin = mesh.places_origin();
-        self.origin_height_m = normal.dot(&(self.pose * origin).coords) - offset;
-        // Of a mesh that deforms the origin is its frame's, and the vertices may be far from there.
-        let far = origin.coords.norm().max(mesh.centre().coords.norm());
-        let size = self.pose.translation.vector.norm() + offset.abs() + far + mesh.radius();
-        self.slop = 32.0 * ROUND * size;
-        self.near_m = self.slop.max(PREDICTION * mesh.radius());
+        self.stand = Stand::new(mesh, plane, pos12, half_space_is_b);
+        self.near_m = self.stand.slop.max(PREDICTION * mesh.radius());
         self.lowest = None;
         self.collects = false;
         self.contacts.clear();
         self.waiting.start(self.bound(mesh, 0));
         // Any vertex bounds the least from above.
         self.offer(mesh, 0, None);
-        size.is_finite()
+        self.stand.slop.is_finite()
     }
 
     /// Goes on until the goal is reached (true), `end_units` are spent in all, or the meter closes.
@@ -122,7 +168,7 @@ impl HalfSpaceWalk {
         if goal == Goal::Contacts && !self.collects {
             // All vertices under the plane are wanted: the walk begins again, and what is known stays known.
             self.collects = true;
-            self.waiting.start(self.interval().min + self.slop);
+            self.waiting.start(self.interval().min + self.stand.slop);
         }
         loop {
             if self.reached(goal) {
@@ -162,12 +208,12 @@ impl HalfSpaceWalk {
             .all()
             .iter()
             .fold(high, |low, entry| low.min(entry.0));
-        Interval::new(low - self.slop, high + self.slop)
+        Interval::new(low - self.stand.slop, high + self.stand.slop)
     }
 
     /// The lowest vertex met so far, in A's frame.
     pub(super) fn witness(&self) -> Option<LeafContact> {
-        self.lowest.map(|l| self.contact(&l))
+        self.lowest.map(|l| self.stand.contact(&l))
     }
 
     /// Tests one node.
@@ -209,25 +255,24 @@ impl HalfSpaceWalk {
     }
 
     fn bound(&self, mesh: &Mesh, place: u32) -> f64 {
-        self.origin_height_m - mesh.node(place).reach(&self.down)
+        self.stand.origin_height_m - mesh.node(place).reach(&self.stand.down)
     }
 
     fn offer(&mut self, mesh: &Mesh, face: u32, mut arena: Option<&mut Arena<LeafContact>>) {
-        for vertex in mesh.faces()[face as usize] {
-            let corner = mesh.vertices()[vertex as usize];
-            let height = self.origin_height_m - self.down.dot(&(corner - mesh.places_origin()));
-            let here = (height, corner, face, vertex);
-            if self.lowest.is_none_or(|l| height < l.0) {
+        for here in self.stand.corners(mesh, face) {
+            if self.lowest.is_none_or(|l| here.0 < l.0) {
                 self.lowest = Some(here);
             }
             if let Some(arena) = arena.as_deref_mut()
-                && height <= self.near_m
+                && here.0 <= self.near_m
             {
-                self.contacts.add(arena, &self.contact(&here));
+                self.contacts.add(arena, &self.stand.contact(&here));
             }
         }
     }
+}
 
+impl Stand {
     fn contact(&self, &(height, corner, face, vertex): &Lowest) -> LeafContact {
         let (on_mesh, down) = if self.half_space_is_b {
             (corner, self.down)

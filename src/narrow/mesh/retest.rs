@@ -1,10 +1,11 @@
 //! Last tick's contact first: one leaf pair, queried again at a new pose.
 
+use super::half_space;
 use super::placed::Placed;
 use super::side::{Side, leaf};
 use crate::math::{Point, Pose};
 use crate::narrow::exact::Closest;
-use crate::shape::{Node, Shape};
+use crate::shape::{Geometry, Node, Shape};
 
 /// The root box of a side and what it is relative to, own frame.
 pub(super) fn tree_of(shape: &Shape, side: Side<'_>) -> (Node, Point) {
@@ -38,6 +39,16 @@ pub fn retest_witness(
     triangle_a: u32,
     triangle_b: u32,
 ) -> Option<Closest> {
+    let plane = |shape: &Shape| match &shape.geometry {
+        Geometry::HalfSpace { normal, offset } => Some((*normal, *offset)),
+        Geometry::Convex(_) | Geometry::Mesh(_) => None,
+    };
+    if let (Some(mesh), Some((normal, offset))) = (a.mesh(), plane(b)) {
+        return half_space::retest(mesh, (&normal, offset), pos12, true, triangle_a);
+    }
+    if let (Some((normal, offset)), Some(mesh)) = (plane(a), b.mesh()) {
+        return half_space::retest(mesh, (&normal, offset), pos12, false, triangle_b);
+    }
     let (side_a, side_b) = (Side::of(a)?, Side::of(b)?);
     let there = |side: Side<'_>, i: u32| match side {
         Side::Mesh(mesh) => (i as usize) < mesh.faces().len(),

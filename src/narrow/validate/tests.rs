@@ -12,6 +12,7 @@ use crate::narrow::cover::Open;
 use crate::narrow::cursor::Cursor;
 use crate::narrow::holdings::Holdings;
 use crate::narrow::memo::Hot;
+use crate::narrow::mesh::{FrontStore, Search};
 use crate::narrow::shelves::Shelves;
 use crate::narrow::{NONE, Order, Wanted};
 use crate::pairs::{Ended, PairDelta};
@@ -255,5 +256,42 @@ fn what_is_broken_when_all_is_done_is_found() {
         fault(&mut stage.narrow);
         let why = stage.why();
         assert!(why.contains(told), "{why}, not {told}");
+    }
+}
+
+/// Two balls of triangles that are near each other, at rest: the boxes around them overlap.
+#[test]
+fn bug_a_pair_at_rest_that_found_no_room_is_asked_again_in_the_next_tick() {
+    let (mesh, more) = (
+        mesh(),
+        "{ type = \"sphere\", radius = 0.1, position = [-9.0, 0.0, 0.0] }",
+    );
+    for shape in [mesh.clone(), format!("[{mesh}, {more}]")] {
+        let text = format!(
+            "[[body]]\nname = \"a\"\nid = 1\nmoves = false\nshape = {shape}\n\
+             [[body]]\nname = \"b\"\nid = 2\nmoves = false\nposition = [1.165, 1.165, 1.165]\nshape = {mesh}\n"
+        );
+        let scene = Scene::parse(&text, "test", Path::new(".")).unwrap();
+        let shapes = build_shapes(&scene).unwrap().bodies;
+        let mut stage = Stage::new(&(scene, shapes), Some(0));
+        let slot = stage.pairs.iter().next().unwrap().0;
+        // No glance that decides it, and no room for a search.
+        stage.narrow.set_search(Search::Restart);
+        stage.narrow.shelves.store = FrontStore::with_room(0, 0);
+        let none = PairDelta::default();
+        for tick in 2..5 {
+            let turns = stage.narrow.memos[slot.index()].turns;
+            stage.tick(tick, &none, None);
+            stage.narrow.validate(&stage.pairs).unwrap();
+            assert_eq!(stage.narrow.hot[slot.index()].verdict, Verdict::Possible);
+            assert!(
+                stage.narrow.memos[slot.index()].turns > turns,
+                "tick {tick}"
+            );
+        }
+        stage.narrow.give_back(slot);
+        stage.narrow.shelves.store = FrontStore::default();
+        stage.tick(5, &none, None);
+        assert_eq!(stage.narrow.hot[slot.index()].verdict, Verdict::Apart);
     }
 }

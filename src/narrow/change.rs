@@ -1,0 +1,77 @@
+//! By how much a gap may have changed since a test: by the relative pose of then, and by what was deformed.
+
+use crate::math::{Point, Pose, ROUND, Vec3, chord, displacement};
+use crate::shape::Geometry;
+use crate::world::Body;
+
+use super::bent::Bent;
+
+/// An upper bound on how much the gap of two bodies changed since a test, by their relative pose then and by how much
+/// they had deformed then, metres.
+pub(super) fn changed_since(a: &Body, b: &Body, (then, bent): (&Pose, Bent), now: &Pose) -> f64 {
+    let bent_m = Bent::of_bodies(a, b).since_m(&bent);
+    let moved_m = relative_motion(a, b, then, now);
+    if bent_m > 0.0 {
+        (moved_m + bent_m) * (1.0 + 2.0 * ROUND)
+    } else {
+        moved_m
+    }
+}
+
+/// An upper bound on how much the gap of two bodies changed between two relative poses, metres; what they deformed by
+/// meanwhile comes on top.
+///
+/// The displacement of the smaller body's surface seen from the other; for a half-space the change of the centre's
+/// height above its plane, plus what the relative turn adds.
+///
+/// Of a body of half-spaces and other shapes: the displacement of the bounded one seen from it. Each gap (DESIGN 3.2)
+/// changes by no more. Say no point of B moves by more than `d` as A sees it. A convex piece of B then reaches along no
+/// direction by more than `d` farther or less, and so do distance and least translation along it. A point of B under
+/// the surface of a solid of A comes nearer to that surface by `d` at most. And a ball of radius `r` within a solid of
+/// B about a point of A is, moved along, a ball about a point within `d` of that one, so it still holds a ball of
+/// `r - d` about it. How far A's own points move, seen from B, is nowhere asked: far out, that has no bound.
+pub(super) fn relative_motion(a: &Body, b: &Body, then: &Pose, now: &Pose) -> f64 {
+    if then == now {
+        return 0.0;
+    }
+    if !(a.unbounded || b.unbounded) {
+        return if a.radius < b.radius {
+            displacement(&then.inverse(), &now.inverse(), &a.centre, a.radius)
+        } else {
+            displacement(then, now, &b.centre, b.radius)
+        };
+    }
+    match (half_space_of(a), half_space_of(b)) {
+        (Some(normal), _) => plane_motion(&normal, then, now, &b.centre, b.radius),
+        (None, Some(normal)) => plane_motion(
+            &normal,
+            &then.inverse(),
+            &now.inverse(),
+            &a.centre,
+            a.radius,
+        ),
+        (None, None) if !b.unbounded => displacement(then, now, &b.centre, b.radius),
+        (None, None) if !a.unbounded => {
+            displacement(&then.inverse(), &now.inverse(), &a.centre, a.radius)
+        }
+        // Two that have half-spaces are no pair.
+        (None, None) => f64::INFINITY,
+    }
+}
+
+fn plane_motion(normal: &Vec3, then: &Pose, now: &Pose, centre: &Point, radius: f64) -> f64 {
+    let (from, to) = (then * centre, now * centre);
+    let height = normal.dot(&(to - from)).abs();
+    let magnitude = from.coords.amax().max(to.coords.amax()) + centre.coords.amax() + radius;
+    (height + chord(&then.rotation, &now.rotation) * radius) * (1.0 + 8.0 * f64::EPSILON)
+        + 16.0 * f64::EPSILON * magnitude
+}
+
+/// The outward normal in the body's frame, when the body is one half-space and nothing else.
+fn half_space_of(body: &Body) -> Option<Vec3> {
+    let [placed] = &*body.shapes else { return None };
+    match &placed.shape.geometry {
+        Geometry::HalfSpace { normal, .. } => Some(placed.pose.rotation * normal),
+        Geometry::Convex(_) | Geometry::Mesh(_) => None,
+    }
+}
