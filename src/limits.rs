@@ -55,8 +55,8 @@ pub const CONTACTS_PER_PAIR_DEFAULT: usize = MANIFOLD_POINTS_MAX;
 pub const CONTACTS_PER_PAIR_MAX: usize = 16;
 /// Transforms in one frame; more are refused as `over_limit`.
 pub const FRAME_ROWS_MAX: usize = BODIES_MAX;
-/// Vertex messages of one source that wait for their tick, and as many that wait for the scene; beyond it the oldest go,
-/// and what the source has bent is unknown until all of its vertices come again.
+/// Vertex messages of one source that wait for their tick, and as many that wait for the scene; beyond it the oldest
+/// go, and what the source has bent is unknown until all of its vertices come again.
 pub const VERTEX_FRAMES_WAITING_MAX: usize = 1024;
 /// Vertices of one source that wait for their tick, in all of its messages: as many as its queue in shared memory
 /// holds.

@@ -21,8 +21,8 @@ pub(super) struct Keys {
 }
 
 impl Keys {
-    /// Watches signals, so that none leaves the terminal changed; returns also the flag that those raise which ask for an
-    /// end.
+    /// Watches signals, so that none leaves the terminal changed; returns also the flag that those raise which ask for
+    /// an end.
     ///
     /// # Errors
     /// `Error::Io` when signals cannot be listened for.
