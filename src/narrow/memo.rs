@@ -10,6 +10,7 @@ use crate::world::{Body, World};
 use super::around::box_bounds;
 use super::bent::Bent;
 use super::exact::Warm;
+use super::mesh::Goal;
 use super::order::Urgency;
 use super::{NONE, Narrow};
 
@@ -281,9 +282,15 @@ impl Narrow {
         if verdict == Verdict::Near && !memo.contacts_are_over() {
             memo.parted = self.tick;
         }
+        let walk = self.shelves.cursors.get(memo.report_cursor);
+        if verdict == Verdict::Near && walk.is_some_and(|walk| walk.goal == Goal::Contacts) {
+            // Its contacts are those of a collision that is over.
+            self.shelves.give_cursor(&mut memo.report_cursor);
+        }
         if verdict == Verdict::Apart {
             self.contact_sets.give(&mut memo.contacts);
             self.kept.give(&mut memo.regions);
+            self.shelves.give_cursor(&mut memo.cursor);
             self.shelves.give_cursor(&mut memo.report_cursor);
             memo.contacts_tick = 0;
             self.deactivate(slot);

@@ -221,6 +221,10 @@ impl Narrow {
         };
         // A certified touch at these very poses; the lower end is what motion left of the old one.
         let high = sound(closest.gap, one, other, &rel).max;
+        if high + memo.reach_m > 0.0 {
+            // No touch by now, and what a walk has found so far is worth more.
+            return false;
+        }
         memo.gap = Interval {
             min: memo.here().min.min(high),
             max: high,

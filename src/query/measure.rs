@@ -4,12 +4,14 @@
 use crate::ids::{BodyId, BodySlot};
 use crate::math::{Interval, Point, Vec3};
 use crate::narrow::gap_between;
-use crate::time::Meter;
+use crate::time::{Clock, Meter};
 use crate::wire::{BodyStatus, GapKnown, Verdict};
 use crate::world::{Body, Parts, World};
 
 /// Longest work on one answer, nanoseconds; then what is proved by then is the answer, an interval that is sound.
 pub(super) const WORK_NS: u64 = 1_000_000_000;
+/// Before that its boxes are fitted, for so long at most, nanoseconds.
+const FIT_NS: u64 = WORK_NS / 4;
 
 /// What is known of the gap of A and B. Metres, scene frame.
 #[derive(Clone, Copy, Debug)]
@@ -78,9 +80,15 @@ pub(super) fn age_ns(body: &Body, now_ns: u64) -> Option<u64> {
 
 /// Fits the boxes of bodies that deform to their vertices, in copies of their own: the engine fits those alone of which
 /// a pair waits, and boxes of long ago tell nothing apart. A body that is there several times is fitted once.
-pub(super) fn fit_boxes<'b>(bodies: impl Iterator<Item = &'b mut Body>) {
+///
+/// For [`FIT_NS`] at most, and the last of them: the others are measured as they are, which takes longer.
+pub(super) fn fit_boxes<'b>(bodies: impl Iterator<Item = &'b mut Body>, clock: &dyn Clock) {
+    let end_ns = clock.monotonic_ns().saturating_add(FIT_NS);
     let mut fitted: Vec<(BodyId, Parts)> = Vec::new();
     for body in bodies.filter(|body| body.lags()) {
+        if clock.monotonic_ns() >= end_ns {
+            return;
+        }
         if let Some((_, shapes)) = fitted.iter().find(|(id, _)| *id == body.id) {
             body.shapes = shapes.clone();
         } else {

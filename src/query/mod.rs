@@ -71,7 +71,7 @@ impl Query {
         }
     }
 
-    /// Works on the answer, for a second at most.
+    /// Works on the answer, for a second at most, and before that for a quarter of one where boxes are to be fitted.
     #[must_use]
     pub fn answer(mut self, clock: &dyn Clock) -> Answer {
         let mut answer = Answer {
@@ -80,10 +80,10 @@ impl Query {
             ..Answer::default()
         };
         match &mut self {
-            Self::Gap(question) => fit_boxes(question.bodies_mut()),
-            Self::Touching(question) => fit_boxes(question.bodies_mut()),
-            Self::Ray(question) => fit_boxes(question.bodies_mut()),
-            Self::Impact(question) => fit_boxes(question.bodies_mut()),
+            Self::Gap(question) => fit_boxes(question.bodies_mut(), clock),
+            Self::Touching(question) => fit_boxes(question.bodies_mut(), clock),
+            Self::Ray(question) => fit_boxes(question.bodies_mut(), clock),
+            Self::Impact(question) => fit_boxes(question.bodies_mut(), clock),
         }
         let header = match self {
             Self::Gap(question) => answer.gap.insert(question.answer(clock)).tick_header,

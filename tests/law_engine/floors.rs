@@ -121,6 +121,38 @@ fn law_4_7_bug_the_verdict_of_a_cloth_on_a_floor_waits_for_no_contacts_of_an_old
     );
 }
 
+/// The cloth touches, is near, touches for too short a time for its contacts to be found, is near, and touches again.
+#[test]
+fn bug_contacts_of_a_collision_that_was_over_were_told_in_the_next_one() {
+    let cloth = body(1, [0.0; 3], &sheet(SIDE), "report_within_m = 0.05\n");
+    let mut rig = Rig::new(&scene("", &[cloth, floor(2, FLOOR)]));
+    rig.demand.regions = false;
+    for z in [-1e-4, 0.01] {
+        rig.place(1, &Pose::translation(0.0, 0.0, z));
+        rig.send(ALL);
+    }
+    for (z, verdict) in [(-2e-4, Verdict::Colliding), (0.01, Verdict::Near)] {
+        rig.place(1, &Pose::translation(0.0, 0.0, z));
+        rig.send(units(1_000));
+        assert_eq!(rig.verdict(1, 2), verdict);
+        assert!(rig.out.contacts.len() <= 1, "the closest points at most");
+    }
+    rig.place(1, &Pose::translation(0.0, 0.0, -4e-4));
+    let mut ticks = 0;
+    while {
+        rig.send(units(1_000));
+        assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+        rig.out.contacts.is_empty()
+    } {
+        ticks += 1;
+        assert!(ticks < 100);
+    }
+    assert!(ticks > 1, "found in one tick: nothing was cut off");
+    for row in &rig.out.contacts {
+        assert!(row.gap_m < -3e-4, "{row:?}");
+    }
+}
+
 #[test]
 fn contacts_on_a_floor_are_those_of_the_tick_where_the_budget_reaches() {
     let mut rig = Rig::new(&scene(

@@ -26,8 +26,9 @@ pub(super) fn reach_of(shape: &Shape) -> f64 {
 
 /// Queries the leaf pair of last tick's contact again: one unit. `None` when the two have no such leaves.
 ///
-/// The upper end of its interval holds for the two shapes. Where one of them is solid it says of an overlap no more
-/// than that it is one: the depth of a solid is that of a point, and the translation that parts two leaves can be more.
+/// The upper end of its interval holds for the two shapes. Where one of them is a solid mesh it says of an overlap no
+/// more than that it is one: the depth of a solid is that of a point, and the translation that parts two leaves can be
+/// more. Over a half-space it is the depth of the triangle's lowest corner.
 ///
 /// * `triangle_a`, `triangle_b` - of a [`super::Witness`] or [`super::LeafContact`]; `u32::MAX` for a side that is no
 ///   mesh.

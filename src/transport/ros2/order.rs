@@ -5,8 +5,8 @@
 //! was down, and an old pose must not become the newest. A clock that began anew (a simulator that was started again)
 //! goes on from there, so it is known by what follows, within the age that its bodies have yet.
 
-/// What is late by less is no sign of another clock, nanoseconds; nor is what is late by less than a time-out. Where
-/// that is longer, a simulator that is started again soon has stamps within it.
+/// What is late by less is no sign of another clock, nor, where that is shorter, what is late by less than a time-out;
+/// nanoseconds. A simulator that is started again soon has stamps within a long time-out.
 const LATE_NS: u64 = 500_000_000;
 /// Stamps in a row that make a clock that began anew.
 const ROW: u32 = 3;

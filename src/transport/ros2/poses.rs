@@ -56,6 +56,8 @@ struct Member {
     last: Option<Result<(u64, u64), Missing>>,
     /// When it was last handed on, nanoseconds of `CLOCK_BOOTTIME`.
     told_ns: u64,
+    /// It was then said of a moment at which the process had just stood still, and may not have been taken.
+    told_late: bool,
     /// From when on its pose grows old, nanoseconds of `CLOCK_BOOTTIME`; `None`: it has none that does.
     since_ns: Option<u64>,
     /// What is wrong with it now, for people.
@@ -218,15 +220,14 @@ impl Source {
                     )
                 })
                 .map_err(Clone::clone);
-            // A chain that never changes is said again and again, because its source vouches for it; so is one that is
-            // broken, because what is said where the process has just stood still is not taken.
+            // A chain that never changes is said again and again, because its source vouches for it; one that is broken
+            // until it was said in time.
             let due = receipt.now_ns.saturating_sub(member.told_ns) >= self.timeout_ns / 3;
             let lasts = match &found {
                 Ok(found) => found.received_ns.is_none(),
-                Err(why) => matches!(why, Missing::Loop(_) | Missing::Bad(..)),
+                Err(_) => member.told_late,
             };
-            let renewed = due && lasts;
-            if member.last.as_ref() == Some(&mark) && !renewed {
+            if member.last.as_ref() == Some(&mark) && !(due && lasts) {
                 continue;
             }
             member.last = Some(mark);
@@ -239,7 +240,7 @@ impl Source {
             );
             member.fault = fault;
             let Some(result) = result else { continue };
-            member.told_ns = receipt.now_ns;
+            (member.told_ns, member.told_late) = (receipt.now_ns, receipt.waited);
             // A chain is as old as its oldest link (law 3.8); that there is no pose is news of now.
             let earliest = found.as_ref().ok().and_then(|found| found.received_ns);
             let since_ns = earliest.filter(|_| result.is_ok()).map(|(_, ns)| ns);

@@ -16,6 +16,7 @@ impl Member {
             order: Order::default(),
             last: None,
             told_ns: 0,
+            told_late: false,
             since_ns: None,
             fault: None,
         }
