@@ -31,7 +31,20 @@ fn hull_points(r: &mut Random, count: usize) -> Vec<Vec3> {
     (0..count).map(|_| vector(r).normalize() * 0.5).collect()
 }
 
-fn to_parry(pose: &Pose) -> glamx::DPose3 {
+/// Parry's capsules, cylinders and cones stand along y, ours along z.
+fn upright(of: &Both) -> Pose {
+    let turned = ["capsule", "cylinder", "cone"].contains(&of.0);
+    let angle = if turned {
+        std::f64::consts::FRAC_PI_2
+    } else {
+        0.0
+    };
+    Pose::rotation(Vec3::x() * angle)
+}
+
+/// The pose of the second in the frame of the first, as parry has these.
+fn to_parry(a: &Both, b: &Both, pose: &Pose) -> glamx::DPose3 {
+    let pose = upright(a).inverse() * pose * upright(b);
     let (t, q) = (&pose.translation.vector, pose.rotation.as_vector());
     glamx::DPose3 {
         rotation: glamx::DQuat::from_xyzw(q.x, q.y, q.z, q.w),
@@ -157,7 +170,7 @@ fn ours(a: &Both, b: &Both, poses: &[Pose]) -> [f64; 3] {
 
 /// Distance, contact, manifold cold and warm.
 fn parrys(a: &Both, b: &Both, poses: &[Pose]) -> [f64; 4] {
-    let parry_poses: Vec<_> = poses.iter().map(to_parry).collect();
+    let parry_poses: Vec<_> = poses.iter().map(|pose| to_parry(a, b, pose)).collect();
     let distance = nanos(poses, |k, _| {
         let _ = std::hint::black_box(query::distance(
             &glamx::DPose3::IDENTITY,
@@ -208,8 +221,13 @@ fn parrys(a: &Both, b: &Both, poses: &[Pose]) -> [f64; 4] {
 fn agree(a: &Both, b: &Both, poses: &[Pose]) {
     for pose in poses {
         let gap = convex_gap(&a.1, &b.1, pose, &mut Warm::default());
-        let distance =
-            query::distance(&glamx::DPose3::IDENTITY, &*a.2, &to_parry(pose), &*b.2).unwrap();
+        let distance = query::distance(
+            &glamx::DPose3::IDENTITY,
+            &*a.2,
+            &to_parry(a, b, pose),
+            &*b.2,
+        )
+        .unwrap();
         let off = (gap.best_m - distance.distance).abs();
         assert!(off < 1e-4, "{} {}: {off} m apart", a.0, b.0);
     }
