@@ -196,7 +196,8 @@ fn a_recording_that_becomes_as_long_as_a_file_may_be_is_ended_and_told_and_the_d
     let mut client = desk.client(None);
     let mut feed = desk.start("feed", &[scene, "--rate", "200"]);
     let bytes = || std::fs::metadata(&file).map_or(0, |meta| meta.len());
-    until("some of it is written", || bytes() > 300_000);
+    // A chunk is of 1 MiB, and its length may be seen while it is being written: the first one is whole.
+    until("a chunk is written", || bytes() > 2_000_000);
     let most = bytes() + 500_000;
     daemon.limit(Resource::Fsize, most);
     until("its end is told", || {
