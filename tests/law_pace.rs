@@ -1,4 +1,4 @@
-//! Goal: the modes of DESIGN 4.4, and that silence is never taken for safety. Method: the pacer and a world, a clock
+//! Goal: what makes a tick in each mode, and that silence is never taken for safety. Method: the pacer and a world, a clock
 //! turned by hand from wake-up to wake-up, frames delivered at given times; every tick is noted down.
 #![allow(
     clippy::unwrap_used,

@@ -5,7 +5,7 @@ use crate::world::Body;
 
 /// Bounds on the gap of two bodies from their boxes (or a half-space's plane) alone.
 ///
-/// Lower: along each axis, what separates the boxes, or how deep they overlap. It holds for every gap of DESIGN 3.2:
+/// Lower: along each axis, what separates the boxes, or how deep they overlap. It holds for every kind of gap:
 /// a translation by the overlap separates convex pieces, and a point of the one under the surface of the other leaves
 /// the other's box within the overlap. Upper: any two points of the two are no farther apart than this.
 pub(super) fn box_bounds(a: &Body, b: &Body) -> Interval {

@@ -24,7 +24,7 @@ pub(super) fn changed_since(a: &Body, b: &Body, (then, bent): (&Pose, Bent), now
 /// The displacement of the smaller body's surface seen from the other; for a half-space the change of the centre's
 /// height above its plane, plus what the relative turn adds.
 ///
-/// Of a body of half-spaces and other shapes: the displacement of the bounded one seen from it. Each gap (DESIGN 3.2)
+/// Of a body of half-spaces and other shapes: the displacement of the bounded one seen from it. Every kind of gap
 /// changes by no more. Say no point of B moves by more than `d` as A sees it. A convex piece of B then reaches along no
 /// direction by more than `d` farther or less, and so do distance and least translation along it. A point of B under
 /// the surface of a solid of A comes nearer to that surface by `d` at most. And a ball of radius `r` within a solid of

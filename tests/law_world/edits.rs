@@ -1,4 +1,4 @@
-//! Scene edits and attached bodies: DESIGN 3.1, 3.5, 3.10, 6.
+//! Scene edits and attached bodies.
 
 use std::path::Path;
 use std::sync::Arc;

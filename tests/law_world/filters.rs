@@ -1,4 +1,4 @@
-//! Which pairs are checked: DESIGN 3.10, 3.2 (half-spaces), 3.4 (report distances), against a twin that walks all
+//! Which pairs are checked (pair rules, half-spaces, report distances), against a twin that walks all
 //! rules of all pairs by name.
 
 use sweepd::ids::{BodySlot, PairKey};

@@ -1,4 +1,4 @@
-//! Frames that wait, are refused or are lost, and pauses after them: DESIGN 3.7, 4.3.
+//! Frames that wait, are refused or are lost, and pauses after them.
 
 use sweepd::ids::SourceSlot;
 use sweepd::wire::{BodyStatus, Frame, RejectReason, TransformRow, frame_flags};

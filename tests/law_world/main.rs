@@ -1,4 +1,4 @@
-//! Goal: each rule of DESIGN 3.5 to 3.10 and 4.1 to 4.4 that the world keeps, with the counter-example that it must
+//! Goal: each rule of the contract (`msgs/README.md`) that the world keeps, with the counter-example that it must
 //! withstand. Method: a world of cubes is fed frames and edits by hand; its structure is checked after every tick.
 #![allow(
     clippy::unwrap_used,

@@ -1,4 +1,4 @@
-//! Requests of several edits: each finds the scene as those before it made it (DESIGN 3.1, 3.10, 6).
+//! Requests of several edits: each finds the scene as those before it made it.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Pair rules of long requests: DESIGN 3.10, against requests of one edit each and against a walk over all pairs.
+//! Pair rules of long requests, against requests of one edit each and against a walk over all pairs.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Sources, sessions, epochs and frames: DESIGN 4.1 to 4.3, 4.8.
+//! Sources, sessions, epochs and frames.
 
 use sweepd::ids::SourceSlot;
 use sweepd::scene::BodySpec;

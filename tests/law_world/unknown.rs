@@ -1,4 +1,4 @@
-//! Which bodies are known: DESIGN 3.7 and 3.8.
+//! Which bodies are known.
 
 use sweepd::config::OnStale;
 use sweepd::math::Pose;

@@ -9,7 +9,7 @@
 //! them).
 //!
 //! The path `S` runs over anchors (poses), and `d` is the displacement from the newest: what is apart by `g` now holds
-//! while `S + d < g + S - d` (DESIGN 4.6; here of the relative pose, so two that move together do not move). An anchor
+//! while `S + d < g + S - d` (here of the relative pose, so two that move together do not move). An anchor
 //! is taken where the pair goes on away from the last two, and where the bounds are to be exact; so a drift adds up its
 //! length, and a pair that trembles about its place adds nothing.
 //!
