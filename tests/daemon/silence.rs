@@ -16,7 +16,7 @@ fn scene(mode: &str) -> String {
         format!("mode = \"{mode}\"")
     };
     let sources =
-        ["sim", "arm"].map(|name| format!("[[source]]\nname = \"{name}\"\ntimeout_ms = 300\n"));
+        ["sim", "arm"].map(|name| format!("[[source]]\nname = \"{name}\"\ntimeout_ms = 800\n"));
     let bodies = [("a", "sim", 0), ("b", "arm", 5)].map(|(name, source, x)| {
         format!(
             "[[body]]\nname = \"{name}\"\nsource = \"{source}\"\nposition = [{x}.0, 0.0, 0.0]\n\
