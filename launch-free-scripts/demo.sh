@@ -1,22 +1,22 @@
 #!/usr/bin/env bash
-# Shows sweepd at work: a daemon, a source that moves bodies, and a monitor, each a process of its own, joined by shared
-# memory. Ends by itself (or at Ctrl-C) and leaves nothing behind.
+# Shows sweepd at work: a daemon, a source that moves bodies, and a monitor, each a process of its own, connected by
+# shared memory. It ends by itself (or at Ctrl-C) and leaves nothing behind.
 #
 #   ./launch-free-scripts/demo.sh [--seconds N] [--count N] [--pile] [--deadline] [--mujoco [MODEL.xml]]
 #
 #   --seconds N   how long to run (default 10)
 #   --count N     bodies of the built-in scene (default 60)
 #   --pile        bodies on a floor instead of bodies in free space
-#   --deadline    a source that works 7 to 15 ms of each frame, and leaves what is left of its 20 ms to the daemon (2,000
-#                 bodies unless --count says otherwise): a table of when the results were there
-#   --mujoco      a real simulator as the source: installs MuJoCo into a virtual environment of its own (.venv-demo)
+#   --deadline    a source that works 7 to 15 ms of each frame and leaves the rest of its 20 ms to the daemon (2,000
+#                 bodies unless --count says otherwise); prints a table of when the results were there
+#   --mujoco      a real simulator as the source; installs MuJoCo into a virtual environment of its own (.venv-demo)
 #
-# Builds sweepd without ROS 2 and recording; SWEEPD=FILE names one that is built already.
+# The script builds sweepd without ROS 2 and recording. Set SWEEPD=FILE to use a binary that is already built.
 set -euo pipefail
 
 usage() { sed -n '2,/^set /p' "$0" | sed '$d; s/^# \{0,1\}//'; }
 
-# What follows an option, which is to be a whole number from 1 on.
+# The value of an option, which must be a whole number from 1 on.
 number() {
   [[ ${2:-} =~ ^[1-9][0-9]{0,8}$ ]] || { echo "demo.sh: $1${2:+ $2}: give a whole number from 1 on" >&2; exit 2; }
   echo "$2"
@@ -42,7 +42,7 @@ work=$(mktemp -d)
 pids=()
 interrupted=''
 
-# Files in shared memory that our processes have mapped; iceoryx2 keeps one of its own for ever.
+# Files in shared memory that our processes have mapped; iceoryx2 keeps one of its own forever.
 mapped() {
   for pid in "${pids[@]}"; do cat "/proc/$pid/maps" 2>/dev/null || true; done \
     | grep -o '/dev/shm/[^ ]*' | grep -v global_mgmt | sort -u || true
@@ -57,7 +57,7 @@ finish() {
   trap - EXIT INT TERM
   local files left
   files=$(mapped)
-  # Ctrl-C goes to all of them: a second signal would cut short how they end.
+  # Ctrl-C goes to all of them: a second signal would cut their shutdown short.
   for _ in $(seq 30); do
     [ -n "$interrupted" ] && any_runs || break
     sleep 0.1
@@ -73,8 +73,8 @@ finish() {
   fi
 }
 
-# Runs what is watched until it ends. Beside the script and not in front of it: of a Ctrl-C that a program in front takes
-# for its own end the shell hears nothing, and would go on.
+# Runs what is watched until it ends, beside the script and not in the foreground: if a program in the foreground takes
+# a Ctrl-C as its own end, the shell hears nothing of it and would go on.
 watch() {
   "$@" & pids+=($!)
   wait "$!"
@@ -103,14 +103,14 @@ scene=$work/scene.toml
 if [ -n "$deadline" ]; then
   "$sweepd" feed --write-scene "$scene" --kind "$kind" --count "${count:-2000}" --seed 7
   "$sweepd" --quiet run "$scene" --instance "$instance" --mode on_frame=feed --budget none & pids+=($!)
-  # Somebody who listens: else there is nothing to compute but verdicts.
+  # A listener: without one there is nothing to compute but verdicts.
   "$sweepd" --quiet monitor --instance "$instance" --contacts --json >"$work/ticks.jsonl" & pids+=($!)
   watch "$sweepd" --quiet feed "$scene" --instance "$instance" --rate 50 --work 7ms..15ms --frames "$((seconds * 50))"
   finish
   echo "done: daemon, source and monitor have ended, shared memory is clean"
   exit 0
 fi
-# Lines that hold this, of what was heard until the end.
+# How many lines of what was heard until the end contain this.
 heard() { grep -c "$1" "$work/heard.jsonl" || true; }
 
 "$sweepd" feed --write-scene "$scene" --kind "$kind" --count "${count:-60}" --seed 7

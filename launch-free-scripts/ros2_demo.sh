@@ -1,19 +1,19 @@
 #!/usr/bin/env bash
 # Shows sweepd as a ROS 2 node: the daemon, an rclpy publisher that moves two robots through each other (one by
-# ~/transforms, one by /tf), and an rclpy subscriber that prints the pairs. Ends by itself (or at Ctrl-C) and leaves
+# ~/transforms, one by /tf), and an rclpy subscriber that prints the pairs. It ends by itself (or at Ctrl-C) and leaves
 # nothing behind. No ROS 2 installation is needed: rclpy comes from PyPI (see ros2_env.sh).
 #
 #   ./launch-free-scripts/ros2_demo.sh [--seconds N]
 #
 #   --seconds N   how long to run (default 15)
 #
-# Watch it meanwhile in RViz or Foxglove (see README). ROS_DOMAIN_ID is as it is set; the node stays on loopback unless
-# ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET.
+# Meanwhile you can watch it in RViz or Foxglove (see README). ROS_DOMAIN_ID is used as it is set. The node stays on
+# loopback unless ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET.
 set -euo pipefail
 
 usage() { sed -n '2,/^set /p' "$0" | sed '$d; s/^# \{0,1\}//'; }
 
-# What follows an option, which is to be a whole number from 1 on.
+# The value of an option, which must be a whole number from 1 on.
 number() {
   [[ ${2:-} =~ ^[1-9][0-9]{0,8}$ ]] || { echo "ros2_demo.sh: $1${2:+ $2}: give a whole number from 1 on" >&2; exit 2; }
   echo "$2"

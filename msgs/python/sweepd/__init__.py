@@ -1,7 +1,7 @@
 """Talk to sweepd, a collision server, over shared memory.
 
-``sweepd.layout`` needs nothing but the standard library; ``sweepd.Client`` needs iceoryx2 and numpy, and loads them
-when it is first named.
+``sweepd.layout`` needs only the standard library. ``sweepd.Client`` needs iceoryx2 and numpy, which are loaded when it
+is first named.
 """
 
 from typing import TYPE_CHECKING

@@ -42,14 +42,16 @@ def _bytes_of(source):
 class Client:
     """A client of one instance: a source of frames, or with ``source=None`` a reader.
 
-    For one thread at a time: what another one asks in the midst of a call is refused, but for ``names`` and ``plan``. It
-    waits without Python's lock, so other threads go on. In a forked process it is the parent's: make another one there.
+    A client is for one thread at a time: while a call runs, calls from other threads are refused, except for ``names``
+    and ``plan``. It waits without Python's lock, so other threads go on. After a fork it belongs to the parent: make
+    another client in the child.
 
     * ``quat_order``: how you write quaternions, ``"xyzw"`` (ROS) or ``"wxyz"`` (MuJoCo). A source must say it.
-    * ``listen``: the messages to listen to, or one, of ``pairs``, ``changes``, ``contacts``, ``contact_changes``,
-      ``regions``, ``bodies``, ``body_verdicts``, ``plan``; the daemon computes what somebody listens to. ``names`` are always.
+    * ``listen``: which messages, or which one, to listen to, of ``pairs``, ``changes``, ``contacts``,
+      ``contact_changes``, ``regions``, ``bodies``, ``body_verdicts``, ``plan``. The daemon computes what somebody
+      listens to. Every client listens to ``names``.
     * ``timeout_s``: how long to look for a daemon.
-    * ``root``, ``prefix``: other files than iceoryx2's default ones; the daemon's must be the same.
+    * ``root``, ``prefix``: files other than iceoryx2's default ones; the daemon must use the same.
     """
 
     def __init__(
@@ -131,13 +133,13 @@ class Client:
 
     @property
     def plan(self) -> Optional[dict[str, Any]]:
-        """What the daemon chose for the scene, left out, and why: a dict; None where the client does not listen to ``plan``."""
+        """What the daemon chose for the scene and left out, and why: a dict; None if the client does not listen."""
         self._ports.check_open("the plan cannot be told")
         message = self._inbox.lasting("plan")
         return None if message is None else json.loads(message[1].tobytes())
 
     def name_of(self, body: int) -> Optional[str]:
-        """The name of a body by its id, as rows have it; None where the scene has none (any more)."""
+        """The name of a body by its id, as rows have it; None if the scene does not have the body (any more)."""
         names = self.names
         if self._named[0] != self._names[0]:
             self._named = (self._names[0], {id_: name for name, id_ in names.items()})
@@ -167,12 +169,13 @@ class Client:
           is.
         * ``stamp_ns``: your own stamp of the poses, nanoseconds of the clock that you call ``clock_id``; both are echoed.
         * ``scene_rev``: the least revision of the scene that the poses need, 0 any; the frame waits for it, for one time-out.
-        * ``partial``: these are some bodies of the source only.
-        * ``deadline_ns``: of the tick, ``time.monotonic_ns()``, 0 none. It can shorten the budget, and never lengthens it.
-        * ``time_left_ns``: of the tick, from receipt; 0 says nothing, and less than 0, too late already, leaves it nothing.
+        * ``partial``: these are only some of the bodies of the source.
+        * ``deadline_ns``: when the tick must end, as ``time.monotonic_ns()``; 0 none. It can only shorten the budget.
+        * ``time_left_ns``: what the tick has left from receipt; 0 says nothing. Below 0 it is already too late, and the
+          tick has nothing left.
 
-        Raises Restarted where another daemon is there than that of the ids, TimedOut where it has not said its own yet;
-        rows made before that are refused.
+        Raises Restarted if the daemon is not the one that the ids are of, and TimedOut if a new daemon has not said its
+        ids yet; rows made before a restart are refused.
         """
         self._settle(0.0)
         flags = layout.FrameFlags.PARTIAL if partial else layout.FrameFlags.FULL
@@ -198,7 +201,7 @@ class Client:
 
     @in_turn
     def reset_epoch(self) -> None:
-        """Says that the world was reset: with the next frame every pair of the source's bodies ends."""
+        """Says that the world was reset: every pair of the source's bodies ends with the next frame."""
         self._epoch += 1
         # what the daemon had of vertices is void with it
         self._versions = {}
@@ -212,15 +215,16 @@ class Client:
         first: Optional[int] = None,
         total: Optional[int] = None,
     ) -> int:
-        """Sends vertices of a body that deforms; they belong with the frame that is sent next. Returns their version.
+        """Sends vertices of a deforming body; they belong to the frame that is sent next. Returns their version.
 
         * ``body``: name or id.
         * ``vertices``: ``(n, 3)`` positions in the body's frame, metres; they go out as float32.
-        * ``first``, ``total``: these are ``n`` of ``total`` vertices, from place ``first`` on, and take the place of
-          those sent before; without them these are all.
+        * ``first``, ``total``: these are ``n`` of ``total`` vertices, from place ``first`` on, and replace those sent
+          before. Without ``first`` and ``total`` these are all vertices.
 
-        Where the daemon has missed or refused vertices of the body, it needs all of them again: the body's pairs are
-        possible and ``bodies`` say why. So it does of each body that this source bends where this failed as it sent.
+        If the daemon has missed or refused vertices of the body, it needs all of them again: the body's pairs are
+        possible and ``bodies`` say why. If this call fails while it sends, that holds for each body whose vertices this
+        source sends.
         """
         if (first is None) != (total is None):
             raise SweepdError("a range of vertices needs first and total")
@@ -291,9 +295,9 @@ class Client:
 
     @in_turn
     def latest(self) -> Optional[Result]:
-        """The newest :class:`Result` there is, without waiting; None until a tick had all that the client listens to.
+        """The newest :class:`Result`, without waiting; None until a tick has had all that the client listens to.
 
-        Where no tick comes any more it is the last one, again and again: ``age_s`` says so.
+        If no more ticks come, it is the last one, again and again: ``age_s`` says so.
         """
         self._inbox.drain()
         return self._result() if self._inbox.tick is not None and self._inbox.begin() else None
@@ -302,8 +306,8 @@ class Client:
     def wait(self, timeout_s: float = 1.0) -> Result:
         """The :class:`Result` of the next tick; raises TimedOut or Restarted.
 
-        The first, and the first after Restarted, is of a tick that has all that the client listens to: those made before
-        the daemon knew of the client are passed over, and so is what is told of one that is still under way.
+        The first one, and the first after Restarted, is of a tick that has all that the client listens to. Ticks made
+        before the daemon knew of the client are passed over, and so are reports of a tick that is still under way.
         """
         timeout_s = seconds(timeout_s)
         until = time.monotonic() + timeout_s
@@ -359,7 +363,7 @@ class Client:
     def rows(self, poses: Poses) -> np.ndarray:
         """Poses as an array of TransformRow, to be filled once and changed in place for later frames.
 
-        With velocities (see ``send``) of TransformVelRow, whose field ``transform`` is the pose.
+        With velocities (see ``send``) it is an array of TransformVelRow, whose field ``transform`` is the pose.
         """
         if isinstance(poses, np.ndarray) and poses.dtype in (POSE, MOVING):
             if poses.ndim != 1:
@@ -383,13 +387,14 @@ class Client:
         return rows
 
     def loan(self, count: int, *, velocities: bool = False) -> np.ndarray:
-        """An array of ``count`` rows to be filled: ``body``, ``position`` and ``orientation`` of each.
+        """An array of ``count`` rows for you to fill: ``body``, ``position`` and ``orientation`` of each.
 
-        TransformRow, or with ``velocities`` TransformVelRow, whose velocities are 0 at first. ``orientation`` is
-        x, y, z, w, whatever order was said. A row that is not filled is no pose, and refused by the daemon.
+        The rows are TransformRow, or with ``velocities`` TransformVelRow, whose velocities are 0 at first.
+        ``orientation`` is x, y, z, w, whatever ``quat_order`` says. A row that is not filled is no pose, and the daemon
+        refuses it.
 
-        The rows are yours: each ``send`` or ``step`` copies them as they are then, and they may be changed and sent
-        again. A view of a field is one of this array alone; rows of another call have their own memory.
+        The rows are yours: each ``send`` or ``step`` copies them as they are then, and you may change and send them
+        again. A view of a field belongs to this array alone; rows of another call have their own memory.
         """
         self._ports.check_open("rows cannot be made")
         rows = blank(count, velocities)

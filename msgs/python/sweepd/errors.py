@@ -1,4 +1,4 @@
-"""What can go wrong for a client; every message says what to change."""
+"""The errors of a client; every message says what to change."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ class TimedOut(SweepdError):
 
 
 class Refused(SweepdError):
-    """The daemon, its version or its files do not fit this client, or no place is left for it; or it said no."""
+    """The daemon, its version or its files do not fit this client, no place is left for it, or the daemon refused."""
 
 
 class Restarted(SweepdError):
-    """The daemon restarted: every pair has ended, and so have the ids of bodies.
+    """The daemon restarted: every pair has ended, and the ids of bodies are no longer valid.
 
-    ``names`` are those of the new one now, and the next step or send goes on with it. Make ``rows()`` anew, look up ids
-    that you keep, and send all vertices of bodies that deform.
+    ``names`` are now those of the new daemon, and the next step or send goes on with it. Make ``rows()`` anew, look up
+    the ids that you keep, and send all vertices of deforming bodies again.
     """
 
     def __init__(self, old_boot: int, new_boot: int, ends: np.ndarray) -> None:
@@ -32,7 +32,7 @@ class Restarted(SweepdError):
         super().__init__(old_boot, new_boot, ends)
         self.old_boot = old_boot
         self.new_boot = new_boot
-        #: ``(body_a, body_b)`` of each pair that was certified colliding when last heard of.
+        #: ``(body_a, body_b)`` of each pair that was certified colliding when it was last heard of.
         self.ends = ends
 
     def __str__(self) -> str:

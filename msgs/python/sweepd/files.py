@@ -1,4 +1,4 @@
-"""Open files of this process and room in shared memory: who has none left fails in ways that name other causes, or dies."""
+"""Open files of this process and room in shared memory: without them a client fails under other causes, or dies."""
 
 import errno
 import os
@@ -37,7 +37,7 @@ def _told(count, most):
 
 
 def check():
-    """Refuses what a client cannot do with the files that this process has left."""
+    """Raises Refused if this process may not open enough more files for a client."""
     left = _left()
     if left is not None and left[0] < _LEAST:
         has, mend = _told(*left[1:])
@@ -45,7 +45,7 @@ def check():
 
 
 def check_room():
-    """Refuses to write beyond the end of shared memory, which would end this process (SIGBUS)."""
+    """Raises Refused if shared memory has too little room: writing beyond its end would end this process (SIGBUS)."""
     try:
         room = os.statvfs(_SHARED)
     except OSError:
@@ -61,7 +61,7 @@ def check_room():
 
 
 def short():
-    """What keeps this process from opening ports, in words; None: not its open files."""
+    """What keeps this process from opening ports, in words; None if it is not the number of its open files."""
     left = _left()
     if left is None or left[0] >= _FEW:
         return None

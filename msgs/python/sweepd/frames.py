@@ -1,4 +1,4 @@
-"""What a frame is made of: rows that know for which daemon they were made, and numbers that fit their fields."""
+"""The parts of a frame: rows that know which daemon they were made for, and numbers that fit their fields."""
 
 import math
 import operator
@@ -15,7 +15,7 @@ _ROWS_MAX = 1 << 20
 
 
 class Rows(np.ndarray):
-    """An array of rows, its copies and its parts; the ids in it are those of one start of the daemon."""
+    """An array of rows, and its copies and parts; its ids are those of one start of the daemon."""
 
     #: Boot id of that start; 0: not known.
     boot_id = 0
@@ -25,9 +25,9 @@ class Rows(np.ndarray):
 
 
 def rows_of(ids, columns, wxyz, names=None):
-    """Rows from columns: positions, quaternions, and of a frame with velocities linear and angular ones.
+    """Rows from columns: positions and quaternions, and for a frame with velocities also linear and angular ones.
 
-    ``names`` of the bodies, where there are some, are for what is told of a pose that does not fit.
+    ``names`` of the bodies, if given, are used to report a pose that does not fit.
     """
     if len(columns) not in (2, 4):
         raise SweepdError("a pose is a position and a quaternion, or these, a linear and an angular velocity")
@@ -46,7 +46,7 @@ def rows_of(ids, columns, wxyz, names=None):
 
 
 def blank(count, moving):
-    """Rows without poses: what is not written is refused by the daemon, and never a pose that some memory held."""
+    """Rows without poses: a row that is not written is refused by the daemon, and is never a pose left in memory."""
     count = whole("count", count)
     if count > _ROWS_MAX:
         raise SweepdError(f"count={count}: a frame has at most {_ROWS_MAX} rows")
@@ -108,7 +108,7 @@ def _short(value):
 
 
 def array(what, values):
-    """What was given as a numpy array of whatever kind."""
+    """What was given, as a numpy array of any kind."""
     try:
         return np.asarray(values)
     except Exception as e:
@@ -131,7 +131,7 @@ def columns_of(poses):
 
 
 def whole(name, value, bits=64):
-    """A number for an unsigned field: ctypes would take -1 as the largest there is."""
+    """A number for an unsigned field: ctypes would take -1 as the largest value."""
     try:
         number = operator.index(value)
     except TypeError:
@@ -142,7 +142,7 @@ def whole(name, value, bits=64):
 
 
 def time_left(value):
-    """Late is not without a limit: less than nothing left is sent as the least there is, 1 ns; 0 says nothing."""
+    """Late does not mean without a limit: less than 0 is sent as the least value, 1 ns; 0 says nothing."""
     try:
         late = bool(value < 0)
     except (TypeError, ValueError):
@@ -151,7 +151,7 @@ def time_left(value):
 
 
 def seconds_to_send(timeout_s):
-    """As ``seconds``; but where the time is over already, nothing is to be sent."""
+    """As ``seconds``, but raises TimedOut if the time is already over, so that nothing is sent."""
     left = seconds(timeout_s)
     if left < 0:
         raise TimedOut(f"timeout_s={left}: the time was over before anything was sent, and nothing was")
@@ -159,7 +159,7 @@ def seconds_to_send(timeout_s):
 
 
 def seconds(timeout_s):
-    """A time to wait for; below 0 it is over. NaN never is, and would end the process within iceoryx2."""
+    """A time to wait; below 0 it is over. NaN is refused: it never is, and would end the process within iceoryx2."""
     try:
         unfit = math.isnan(timeout_s)
     except (TypeError, ValueError, OverflowError):

@@ -172,7 +172,7 @@ class MessageHeader(_Row):
 
 
 class ChangesHeader(_Row):
-    """User header of changes and contact_changes: what the rows are to be applied to, and what that makes."""
+    """User header of changes and contact_changes: what the rows apply to, and what results from that."""
 
     TYPE_NAME = "sweepd.v1.ChangesHeader"
     _fields_ = [
@@ -482,7 +482,7 @@ class TickRow(_Row):
 
 
 class Hello(_Row):
-    """What a client reads before anything else. This layout is frozen for ever."""
+    """What a client reads before anything else. This layout is frozen forever."""
 
     TYPE_NAME = "sweepd.Hello"
     _fields_ = [
@@ -553,7 +553,7 @@ class Verdict(IntEnum):
 
 
 class State(IntEnum):
-    """The tick in one word: the first that applies, from the last to the first here."""
+    """The tick in one word: the first that applies, counting from the last listed here to the first."""
 
     # At least one body, all known, every enabled pair proved apart, nothing cut off.
     CLEAR = 0

@@ -1,6 +1,6 @@
 """The lists of pairs and of contacts, kept from ``changes`` and ``contact_changes``.
 
-Each message is applied in its order, none to a list that it is not for.
+Messages are applied in order, and none is applied to a list that it is not for.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ _TOLD = int(layout.PairFlags.SWEPT_HIT | layout.PairFlags.SWEPT_OPEN)
 
 
 def has_left(rows):
-    """Which rows of ``changes`` say that their pair is no longer listed; any other takes the place of the pair's row."""
+    """Which rows of ``changes`` say that their pair is no longer listed; any other row replaces the pair's row."""
     quiet = (rows["events"] == 0) & (rows["flags"] & _TOLD == 0)
     return quiet & (rows["verdict"] <= layout.Verdict.APART)
 
@@ -36,11 +36,11 @@ class _List:
         self._replace(np.empty(0, row))
 
     def is_of(self, header):
-        """Whether it is whole, and that of a tick."""
+        """Whether it is whole and belongs to this tick."""
         return self.is_whole and (self.boot_id, self.tick) == (header.boot_id, header.tick)
 
     def take(self, header, rows):
-        """Applies a message; True when it is not for this list, and the whole list is to be asked for."""
+        """Applies a message. True if it is not for this list and the whole list must be requested."""
         message, had = header.message, self.is_whole
         # until all of it is applied: a signal may end this in the midst
         self.is_whole = False
@@ -69,7 +69,7 @@ class _List:
 
 
 class PairList(_List):
-    """The rows of ``pairs`` as ``changes`` make them. To apply a message costs as much as it has rows."""
+    """The rows of ``pairs``, built from ``changes``. The cost of applying a message is proportional to its rows."""
 
     def __init__(self):
         super().__init__(_PAIR)
@@ -78,7 +78,7 @@ class PairList(_List):
         return len(self._places)
 
     def rows(self):
-        """The rows by ids, with the ages of the tick: an array of their own."""
+        """The rows sorted by ids, with their ages as of the tick: a new array."""
         places = np.fromiter(self._places.values(), np.intp, len(self._places))
         rows = self._rows[places]
         ticks = np.uint64(self.tick) - self._sent[places]
@@ -121,7 +121,7 @@ class PairList(_List):
 
 
 class ContactList(_List):
-    """The rows of ``contacts`` as ``contact_changes`` make them. To apply a message costs as much as it has rows."""
+    """The rows of ``contacts``, built from ``contact_changes``. Applying a message costs in proportion to its rows."""
 
     def __init__(self):
         super().__init__(_CONTACT)
@@ -130,7 +130,7 @@ class ContactList(_List):
         return self._len
 
     def rows(self):
-        """The rows in the order of ``contacts``: an array of their own."""
+        """The rows in the order of ``contacts``: a new array."""
         pairs = [self._pairs[key] for key in sorted(self._pairs)]
         return np.concatenate(pairs) if pairs else np.empty(0, _CONTACT)
 

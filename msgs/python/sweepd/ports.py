@@ -1,7 +1,7 @@
-"""Shared memory: iceoryx2's ports of one client, as numpy arrays without copies.
+"""Shared memory: the iceoryx2 ports of one client, as numpy arrays without copies.
 
 An array over a received message keeps its sample alive, and with it the place in shared memory. A reader may hold four
-messages of a kind: where three are held, the next one is copied.
+messages of a kind: while three are held, the next one is copied.
 """
 
 import ctypes
@@ -148,7 +148,7 @@ def _patiently(act, until):
 
 
 def check_name(instance):
-    """Refuses what cannot be an instance's name."""
+    """Raises Refused for what cannot be the name of an instance."""
     fits = isinstance(instance, str) and 1 <= len(instance) <= 32
     fits = fits and all(c in "abcdefghijklmnopqrstuvwxyz0123456789_" for c in instance)
     if not fits:
@@ -186,7 +186,7 @@ def _check_owner(config):
 
 
 class Ports:
-    """The ports of one client. For one thread at a time, as the client sees to."""
+    """The ports of one client. They are for one thread at a time, which the client ensures."""
 
     def __init__(self, instance, timeout_s, root=None, prefix=None):
         check_name(instance)
@@ -219,7 +219,7 @@ class Ports:
         self._boot = self.hello.boot_id
 
     def check_open(self, what):
-        """Raises where the client is closed, or another process's."""
+        """Raises if the client is closed, or belongs to another process."""
         if self.forked:
             raise SweepdError(f"{what}: this client is that of the process that forked this one; make a client after the fork")
         if self._closed:
@@ -236,7 +236,7 @@ class Ports:
         return f"sweepd run SCENE{of_it}"
 
     def silence(self):
-        """What it means that the daemon says nothing, and what to do."""
+        """What it means that the daemon is silent, and what to do."""
         short = files.short()
         files_told = "" if short is None else f"messages may not pass, for {short}; else, "
         return (
@@ -309,14 +309,14 @@ class Ports:
         return self._boot
 
     def wake(self, event):
-        """Tells the daemon; one that is away finds what was sent when it is back."""
+        """Wakes the daemon; one that is away finds what was sent when it is back."""
         try:
             self._wake.notify_with_custom_event_id(iox2.EventId.new(event))
         except iox2.NotifierNotifyError:
             pass
 
     def wait(self, timeout_s):
-        """Sleeps until the daemon has sent something, a signal came, or the time is up."""
+        """Sleeps until the daemon has sent something, a signal has come, or the time is up."""
         try:
             # iceoryx2 0.10 hands the system whole microseconds, rounded down, and 0 is for ever; in this order NaN is less
             self._ready.timed_wait(iox2.Duration.from_secs_f64(max(2e-6, timeout_s)))
@@ -326,14 +326,14 @@ class Ports:
                 raise SweepdError(f"`ready` cannot be waited for: {e}") from e
 
     def subscribe(self, topic, row, header=layout.MessageHeader, until=0.0):
-        """Listens to a message kind from now on; ``until`` when to wait for a place where all are taken."""
+        """Listens to a message kind from now on; ``until`` says how long to wait for a place if all are taken."""
         if topic not in self._readers:
             self._read(topic, row, header, lambda: self._messages(topic, row, header), until)
 
     def renew(self, topic, row, header):
-        """Opens the port of a message kind anew: what waits in it is gone, and the daemon sees a new reader.
+        """Reopens the port of a message kind: what waits in it is lost, and the daemon sees a new reader.
 
-        Where no daemon is there, all stays as it is. Raises Refused where another one took the place meanwhile; the
+        If no daemon is there, everything stays as it is. Raises Refused if another reader took the place meanwhile; the
         topic is not open then.
         """
         try:
@@ -366,7 +366,7 @@ class Ports:
         return TimedOut(self._nobody(e)) if _is_away(e) else Refused(f"{what}: {_why(e)}")
 
     def is_open(self, topic):
-        """Whether the topic is listened to."""
+        """Whether the client listens to the topic."""
         return topic in self._readers
 
     @_ours("`tick` cannot be received")
@@ -379,7 +379,7 @@ class Ports:
 
     @_ours("a message cannot be received")
     def message(self, topic):
-        """The next message of a kind as ``(header, rows)``, or None; the rows mostly lie in shared memory."""
+        """The next message of a kind as ``(header, rows)``, or None; the rows are mostly in shared memory."""
         reader, kind, header, held = self._readers[topic]
         sample = reader.receive()
         if sample is None:
@@ -402,7 +402,7 @@ class Ports:
 
     @_ours("a frame cannot be sent")
     def send(self, topic, row, header, rows, wake=True):
-        """Hands rows over and, where said, wakes the daemon."""
+        """Hands rows over and, if ``wake``, wakes the daemon."""
         sample = self._sender(topic, row, type(header), len(rows)).loan_slice_uninit(len(rows))
         _fill(sample.payload_ptr, rows)
         ctypes.memmove(sample.user_header_ptr, ctypes.byref(header), ctypes.sizeof(header))
@@ -436,7 +436,7 @@ class Ports:
 
     @_ours("an answer cannot be received")
     def answer(self):
-        """The next answer as ``(header, bytes)``, or None. What no daemon will answer is refused here."""
+        """The next answer as ``(header, bytes)``, or None. A request that no daemon will answer is refused here."""
         for one in self._pending:
             pending, request = one
             # before it is looked for: no answer is sent after a request was let go of

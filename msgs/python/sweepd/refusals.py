@@ -1,4 +1,4 @@
-"""Why a frame has no result, and what to do about it, as far as ticks tell."""
+"""Why a frame has no result and what to do about it, as far as ticks say."""
 
 from . import layout
 from .layout import RejectReason
@@ -31,7 +31,7 @@ def text(chars):
 
 
 def source_row(tick, source):
-    """The row of a source in a tick; None where the scene has no such source."""
+    """The row of a source in a tick; None if the scene has no such source."""
     for row in tick.sources[: tick.sources_len]:
         if text(row.name) == source:
             return row
@@ -39,7 +39,7 @@ def source_row(tick, source):
 
 
 def why_no_result(tick, before, source, scene_rev):
-    """What ticks from ``before`` (None: the first) to ``tick`` say that may explain it, each after a semicolon."""
+    """What the ticks from ``before`` (None: the first) to ``tick`` say that may explain it, each after a semicolon."""
     told = []
     row = source_row(tick, source)
     if is_under_way(tick):
@@ -60,6 +60,6 @@ def why_no_result(tick, before, source, scene_rev):
 
 
 def is_under_way(tick):
-    """Whether a tick is not there itself yet: it takes longer than a heartbeat, and nothing belongs to what is told of it."""
+    """Whether a tick is still under way: it takes longer than a heartbeat, and nothing belongs to this report of it."""
     # no tick that has ended says so: undecided pairs alone are no reason for unknown
     return tick.header.state == layout.State.UNKNOWN and tick.reasons == 1 << layout.Reason.UNDECIDED

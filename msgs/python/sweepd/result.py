@@ -1,4 +1,4 @@
-"""What a tick told: its row, and the arrays that belong to it."""
+"""What a tick reported: its row, and the arrays that belong to it."""
 
 from __future__ import annotations
 
@@ -15,12 +15,15 @@ from .turns import Turns, in_turn
 class Result:
     """A tick and what belongs to it.
 
-    ``tick`` is a structure (see ``msgs/README.md``); ``pairs``, ``contacts``, ``regions`` and ``bodies`` are numpy
-    structured arrays over shared memory, None where the client did not listen or a newer one overtook it. Keep as many
-    results as you like: where three arrays of a kind are still there, the next one is a copy. ``changes`` are the rows that
-    changed since the tick before, under ``changes_header`` whose ``base_tick`` is 0 the whole list; None also where the
-    list is not whole (yet, or again). ``contact_changes`` and ``contact_changes_header`` are the same of contacts. Copies
-    (``copy.deepcopy``) and pickles are whole.
+    * ``tick`` is a structure (see ``msgs/README.md``).
+    * ``pairs``, ``contacts``, ``regions`` and ``bodies`` are numpy structured arrays over shared memory, None if the
+      client did not listen or a newer one overtook it. Keep as many results as you like: while three arrays of a kind
+      are still there, the next one is a copy.
+    * ``changes`` are the rows that changed since the tick before, or the whole list if ``base_tick`` of their
+      ``changes_header`` is 0. They are also None while the list is not whole (yet, or again).
+    * ``contact_changes`` and ``contact_changes_header`` are the same for contacts.
+
+    Copies (``copy.deepcopy``) and pickles are whole.
     """
 
     def __init__(self, tick: layout.TickRow, messages: dict[str, Any], lists: dict[str, Any], turns: Turns) -> None:
@@ -45,22 +48,22 @@ class Result:
 
     @property
     def age_s(self) -> float:
-        """How long ago the tick was sent, seconds: more than a few heartbeats where the daemon is gone or stuck."""
+        """How long ago the tick was sent, seconds: more than a few heartbeats if the daemon is gone or stuck."""
         return (time.clock_gettime_ns(time.CLOCK_BOOTTIME) - self.tick.sent_ns) * 1e-9
 
     @property
     @in_turn
     def listed(self) -> Optional[np.ndarray]:
-        """What ``pairs`` would hold, kept from ``changes``: an array of its own; None where ``changes`` is.
+        """What ``pairs`` would hold, maintained from ``changes``: an array of its own; None if ``changes`` is None.
 
-        Made when it is asked for, which is to be before the client goes on to the next tick.
+        It is built when you ask for it, which you must do before the client goes on to the next tick.
         """
         return None if self.changes is None else self._rows("changes", "listed")
 
     @property
     @in_turn
     def listed_contacts(self) -> Optional[np.ndarray]:
-        """What ``contacts`` would hold, kept from ``contact_changes``; as ``listed``."""
+        """What ``contacts`` would hold, maintained from ``contact_changes``; otherwise as ``listed``."""
         return None if self.contact_changes is None else self._rows("contact_changes", "listed_contacts")
 
     def _rows(self, topic, name):
@@ -70,7 +73,7 @@ class Result:
 
     @property
     def colliding(self) -> np.ndarray:
-        """``(n, 2)`` ids of the pairs certified colliding at the poses of this tick, by id."""
+        """``(n, 2)`` ids of the pairs certified colliding at the poses of this tick, sorted by id."""
         rows = self.listed if self.pairs is None else self.pairs
         if rows is None:
             raise SweepdError("this client does not listen to pairs or changes, or has not all of them yet")

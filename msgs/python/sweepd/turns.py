@@ -12,7 +12,7 @@ _Method = TypeVar("_Method", bound=Callable[..., Any])
 
 
 class Turns:
-    """Lets one thread in, as deep as it likes, and refuses others meanwhile."""
+    """Lets one thread in, as often nested as it likes, and refuses others meanwhile."""
 
     def __init__(self):
         self._lock = threading.RLock()
@@ -32,7 +32,7 @@ class Turns:
 
 
 def in_turn(method: _Method) -> _Method:
-    """A method of what has ``_turns``, for one thread at a time."""
+    """Lets one thread at a time into a method of an object that has ``_turns``."""
 
     @functools.wraps(method)
     def call(self, *args, **kwargs):
