@@ -42,8 +42,8 @@ def _bytes_of(source):
 class Client:
     """A client of one instance: a source of frames, or with ``source=None`` a reader.
 
-    A client is for one thread at a time: while a call runs, calls from other threads are refused, except for ``names``
-    and ``plan``. It waits without Python's lock, so other threads go on. After a fork it belongs to the parent: make
+    A client is for one thread at a time: while a call runs, calls from other threads are refused, except for ``names``,
+    ``name_of`` and ``plan``. It waits without Python's lock, so other threads go on. After a fork it belongs to the parent: make
     another client in the child.
 
     * ``quat_order``: how you write quaternions, ``"xyzw"`` (ROS) or ``"wxyz"`` (MuJoCo). A source must say it.
