@@ -38,6 +38,41 @@ pub(super) struct PairEvent {
     pub(super) pass: Option<Ticks>,
 }
 
+impl PairEvent {
+    /// Takes what happened next to the same pair; returns how many begins and their ends that were never sent cancel.
+    pub(super) fn follow(&mut self, next: &Self) -> u64 {
+        // Whatever follows a pass that was never sent: its begin and its end cancel.
+        let mut cancelled = u64::from(self.pass.take().is_some());
+        self.pass = next.pass;
+        if next.end.is_some() {
+            if self.begin.take().is_some() {
+                cancelled += 1;
+            } else {
+                self.end = next.end;
+            }
+        }
+        if next.begin.is_some() {
+            self.begin = next.begin;
+        }
+        // A row has one cause: that the pair touched on its way as well is told by its flag.
+        let by_cause = (self.end).is_some_and(|(_, cause)| cause != EndCause::Separated);
+        if by_cause && self.pass.take().is_some() {
+            cancelled += 1;
+        }
+        cancelled
+    }
+
+    /// Whether nothing is left of it to tell.
+    pub(super) fn is_over(&self) -> bool {
+        self.end.is_none() && self.begin.is_none() && self.pass.is_none()
+    }
+
+    /// Whether it is a pass and nothing else.
+    pub(super) fn is_pass_alone(&self) -> bool {
+        self.pass.is_some() && self.end.is_none() && self.begin.is_none()
+    }
+}
+
 /// What is certified about a pair.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct History {
@@ -89,6 +124,8 @@ pub(super) struct Events {
     adrift: Vec<Adrift>,
     /// By ids; one entry a pair after [`Events::merge`].
     waiting: Vec<PairEvent>,
+    /// Those that the messages of the last tick told, by ids.
+    told: Vec<PairEvent>,
     seq: u64,
     /// `seq` before this tick.
     before: u64,
@@ -158,9 +195,22 @@ impl Events {
         seq.filter(|seq| *seq <= self.before).unwrap_or(u64::MAX)
     }
 
-    /// Forgets what was sent: all events but those `kept` says to keep.
+    /// Events that the messages of the last tick told, by ids.
+    pub(super) fn told(&self) -> &[PairEvent] {
+        &self.told
+    }
+
+    /// Nothing waits any more of what was sent: all events but those `kept` says to keep.
     pub(super) fn sent(&mut self, mut kept: impl FnMut(Ids) -> bool) {
-        self.waiting.retain(|event| kept(event.ids));
+        let told = &mut self.told;
+        told.clear();
+        self.waiting.retain(|event| {
+            let kept = kept(event.ids);
+            if !kept {
+                told.push(*event);
+            }
+            kept
+        });
     }
 
     /// Takes a pair's verdict of this tick.
@@ -265,37 +315,13 @@ impl Events {
             .sort_unstable_by_key(|event| (event.ids, event.seq));
         let cancelled = &mut self.cancelled;
         self.waiting.dedup_by(|next, kept| {
-            if next.ids != kept.ids {
-                return false;
+            let same = next.ids == kept.ids;
+            if same {
+                *cancelled += kept.follow(next);
             }
-            // Whatever follows a pass that was never sent: its begin and its end cancel.
-            if kept.pass.take().is_some() {
-                *cancelled += 1;
-            }
-            kept.pass = next.pass;
-            if next.end.is_some() {
-                if kept.begin.take().is_some() {
-                    *cancelled += 1;
-                } else {
-                    kept.end = next.end;
-                }
-            }
-            if next.begin.is_some() {
-                kept.begin = next.begin;
-            }
-            // A row has one cause: that the pair touched on its way as well is told by its flag.
-            if kept.pass.is_some()
-                && kept
-                    .end
-                    .is_some_and(|(_, cause)| cause != EndCause::Separated)
-            {
-                kept.pass = None;
-                *cancelled += 1;
-            }
-            true
+            same
         });
-        self.waiting
-            .retain(|event| event.end.is_some() || event.begin.is_some() || event.pass.is_some());
+        self.waiting.retain(|event| !event.is_over());
     }
 }
 
