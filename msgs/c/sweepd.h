@@ -848,7 +848,7 @@ typedef struct sweepd_tick_row {
     uint64_t ignored;
     /* Ticks of this boot that ended after their budget or a frame's deadline. */
     uint64_t missed;
-    /* Begins and their ends that were never sent, because rows did not fit. */
+    /* Begins and their ends that were both never sent. */
     uint64_t cancelled_events;
     /* Body ids of the worst pair (smaller first); 0: none. */
     uint64_t worst_a;

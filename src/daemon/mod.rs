@@ -286,13 +286,14 @@ impl<'a> Daemon<'a> {
             return Err(error);
         }
         let start_ns = self.clock.monotonic_ns();
-        let lost = self.door.publish(outbox)?;
+        let unsent = self.door.publish(outbox)?;
+        self.engine.note_undelivered(unsent);
         if let Some(recorder) = &mut self.recorder {
             recorder.tick(&self.due, ask, &self.engine);
         }
         self.tell_used_up(taken);
         let send_ns = self.clock.monotonic_ns().saturating_sub(start_ns);
-        if let Some(lost) = self.unsent.note(lost, start_ns) {
+        if let Some(lost) = self.unsent.note(unsent.messages, start_ns) {
             tracing::warn!(
                 "{lost} messages up to tick {} could not be handed over: shared memory may be full, see \
                  `sweepd doctor`",

@@ -129,7 +129,7 @@ mod tests {
     use crate::transport::client::Client;
     use crate::transport::memory::{Hub, MemoryServer};
     use crate::transport::{Door, Wake};
-    use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow};
+    use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow, Undelivered};
 
     const SECOND_NS: u64 = 1_000_000_000;
 
@@ -146,7 +146,7 @@ mod tests {
         fn demand(&mut self) -> Demand {
             self.0.demand()
         }
-        fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
+        fn publish(&mut self, outbox: &Outbox) -> Result<Undelivered> {
             self.0.publish(outbox)
         }
         fn publish_tick(&mut self, tick: &TickRow) -> Result<()> {

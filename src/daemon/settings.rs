@@ -72,7 +72,7 @@ mod tests {
     use crate::scene::Scene;
     use crate::time::{Clock, ManualClock};
     use crate::transport::{Door, RequestToken, Setting, Wake};
-    use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickCause, TickRow};
+    use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickCause, TickRow, Undelivered};
 
     const SCENE: &str = "[run]\nmode = \"on_all\"\n[[source]]\nname = \"sim\"\ntimeout_ms = 500\n\
         [[body]]\nname = \"a\"\nshape = { type = \"sphere\", radius = 1.0 }\n";
@@ -94,12 +94,12 @@ mod tests {
         fn demand(&mut self) -> Demand {
             Demand::default()
         }
-        fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
+        fn publish(&mut self, outbox: &Outbox) -> Result<Undelivered> {
             self.ticks.push(outbox.tick);
             if outbox.plan_changed {
                 self.plans.push(outbox.plan.clone());
             }
-            Ok(0)
+            Ok(Undelivered::default())
         }
         fn publish_tick(&mut self, _: &TickRow) -> Result<()> {
             Ok(())

@@ -98,6 +98,13 @@ impl Narrow {
         &self.left
     }
 
+    /// Pairs whose verdicts changed in the last [`Narrow::go_on`]: of the tick's poses, when its findings were taken
+    /// already. Of no meaning once the next tick has begun.
+    #[must_use]
+    pub fn late(&self) -> &[PairSlot] {
+        &self.late
+    }
+
     /// Whether what there is to say of a pair may have changed since [`Narrow::told`]: it was looked at or worked on, a
     /// body of it moved, or its slot holds another pair.
     #[must_use]

@@ -277,6 +277,9 @@ impl Narrow {
         if before == verdict {
             return;
         }
+        if self.left_is_news {
+            self.late.push(slot);
+        }
         self.counts[usize::from(before.code())] -= 1;
         self.counts[usize::from(verdict.code())] += 1;
         if verdict == Verdict::Near && !memo.contacts_are_over() {

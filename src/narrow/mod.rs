@@ -110,6 +110,8 @@ pub struct Narrow {
     left: Vec<PairSlot>,
     /// They stopped after their findings were taken: the next tick is to hear of them.
     left_is_news: bool,
+    /// Pairs that got their verdicts in the last [`Narrow::go_on`]; some may stand here twice.
+    late: Vec<PairSlot>,
     /// Pairs that lack a verdict at this tick's poses and can get one by work.
     undecided: Vec<PairSlot>,
     /// Pairs whose work came to its end without a verdict, for want of room: they start anew in the next tick.
@@ -252,11 +254,13 @@ impl Narrow {
             && self.spend_on_reports(world, wanted, meter))
     }
 
-    /// As [`Narrow::spend`], after the tick's findings were taken: what is found now is told in the next tick.
+    /// As [`Narrow::spend`], after the tick's findings were taken: what is found now is told in the next tick, and is
+    /// of this one's poses ([`Narrow::late`]).
     pub fn go_on(&mut self, world: &mut World, wanted: Wanted, meter: &mut Meter<'_>) -> bool {
         if !std::mem::replace(&mut self.left_is_news, true) {
             self.left.clear();
         }
+        self.late.clear();
         self.shelves.store.touch_ahead(meter);
         self.go_on_with_refits(world, meter);
         self.spend_on_verdicts(world, wanted, meter) && self.spend_on_reports(world, wanted, meter)

@@ -11,6 +11,7 @@ use crate::wire::{ChangesHeader, MessageHeader, Outbox, PairRow};
 
 use super::events::Ids;
 use super::listing::NO_EVENT;
+use super::owed::Debt;
 use super::{AHEAD, Publisher, View};
 
 /// What the next message builds on, and memory kept over calls.
@@ -20,6 +21,8 @@ pub(super) struct Chain {
     base_tick: u64,
     /// Pairs whose rows, or whose contacts, were dropped in this tick, by ids.
     pub(super) dropped: Vec<Ids>,
+    /// Pairs that the last message told of and that are not in the list of then.
+    added: Vec<Ids>,
     /// Places of the rows of the pairs that are told, by ids.
     pub(super) places: Vec<u32>,
 }
@@ -28,6 +31,7 @@ impl Chain {
     /// Begins a tick.
     pub(super) fn begin(&mut self) {
         self.dropped.clear();
+        self.dropped.append(&mut self.added);
     }
 
     /// What was told of a pair is dropped; it may get another row yet.
@@ -45,6 +49,14 @@ impl Chain {
             self.base_tick
         } else {
             0
+        }
+    }
+
+    /// Those that were told of in the whole list, and that it does not have, leave it with the next tick.
+    fn keep_added(&mut self, whole: bool) {
+        self.added.clear();
+        if whole {
+            self.added.append(&mut self.dropped);
         }
     }
 
@@ -96,21 +108,30 @@ impl Publisher {
         out: &mut Outbox,
     ) {
         out.changes.clear();
+        let owes = self.begin_owed_changes(view.demand.changes);
         if !view.demand.changes {
             self.chain.break_off();
             return;
         }
-        let holds = left_out == 0 && !view.demand.changes_anew;
+        let holds = left_out == 0 && !view.demand.changes_anew && !owes;
         let base_tick = self.choose_changes(holds, view.tick);
-        self.push_changes(view, &mut out.changes);
+        let whole = base_tick == 0;
+        let mut debt = std::mem::take(&mut self.owed.changes);
+        self.push_changes(view, whole, &mut debt, &mut out.changes);
+        self.owed.changes = debt;
         out.changes_header = ChangesHeader {
             message: MessageHeader {
                 truncated: left_out,
                 ..header
             },
             base_tick,
-            listed: self.listing.len() as u64 - left_out,
+            listed: if whole {
+                out.changes.len() as u64
+            } else {
+                self.listing.len() as u64
+            },
         };
+        self.chain.keep_added(whole);
         let all = self.listing.len();
         self.chain
             .end(if left_out == 0 { view.tick } else { 0 }, all);
@@ -128,6 +149,9 @@ impl Publisher {
         chain.places.clear();
         if holds && base_tick != 0 {
             chain.dropped.retain(|ids| listing.find(*ids).is_err());
+            if !chain.dropped.is_sorted() {
+                chain.dropped.sort_unstable();
+            }
             chain.places.extend(listing.news());
             if chain.places.len() + chain.dropped.len() <= listing.len() {
                 return base_tick;
@@ -138,11 +162,22 @@ impl Publisher {
         let cut = listing.len() > self.limits.pair_rows;
         let is_sent = |at: &u32| !cut || chosen.get(*at as usize) == Some(&true);
         chain.places.extend((0..all).filter(is_sent));
+        let places = chain.places.len();
+        self.owed_of_unlisted(places);
         0
     }
 
     /// Appends the chosen rows, and those that say which pairs have left the list.
-    fn push_changes(&self, view: &mut View<'_>, rows: &mut Vec<PairRow>) {
+    ///
+    /// * `whole` - whether they are the whole list.
+    /// * `debt` - what is owed to its readers: that is told as well.
+    fn push_changes(
+        &self,
+        view: &mut View<'_>,
+        whole: bool,
+        debt: &mut Debt,
+        rows: &mut Vec<PairRow>,
+    ) {
         let places = &self.chain.places;
         let mut dropped = self.chain.dropped.iter().copied().peekable();
         for (nth, &at) in places.iter().enumerate() {
@@ -153,20 +188,25 @@ impl Publisher {
             }
             let row = self.listing.row(at as usize);
             while let Some(ids) = dropped.next_if(|ids| *ids < row.ids) {
-                rows.push(self.last_row(view, ids));
+                rows.push(self.last_row(view, ids, debt));
             }
-            rows.push(self.pair_row(view, row));
+            let row = self.owed_row(view, row, debt);
+            // It was listed for an event that cancels what is owed.
+            if !(whole && row.has_left()) {
+                rows.push(row);
+            }
         }
         for ids in dropped {
-            rows.push(self.last_row(view, ids));
+            rows.push(self.last_row(view, ids, debt));
         }
     }
 
-    /// The row of a pair that has left the list.
-    fn last_row(&self, view: &mut View<'_>, ids: Ids) -> PairRow {
+    /// The row of a pair that has left the list, or is told of for what is owed alone.
+    fn last_row(&self, view: &mut View<'_>, ids: Ids, debt: &mut Debt) -> PairRow {
         let row = Self::row_of_apart(view, ids, NO_EVENT);
-        let row = self.pair_row(view, &row);
-        debug_assert!(row.has_left(), "what is new of {ids:?} is listed");
+        let row = self.owed_row(view, &row, debt);
+        let owes = !debt.is_empty();
+        debug_assert!(row.has_left() || owes, "what is new of {ids:?} is listed");
         row
     }
 }
@@ -181,7 +221,7 @@ mod tests {
         let chain = |base_tick, dropped: &[u64]| Chain {
             base_tick,
             dropped: dropped.iter().map(|id| (BodyId(*id), BodyId(9))).collect(),
-            places: Vec::new(),
+            ..Chain::default()
         };
         chain(4, &[]).validate(4).unwrap();
         assert!(chain(5, &[]).validate(4).unwrap_err().contains("tick 5"));

@@ -5,6 +5,7 @@
 //! continuous body that is over at this tick's poses is a begin and an end of one tick: a pass.
 
 mod adrift;
+mod late;
 mod validate;
 
 use crate::ids::{BodyId, PairSlot};
@@ -35,6 +36,41 @@ pub(super) struct PairEvent {
     pub(super) begin: Option<Ticks>,
     /// A begin and an end between the poses of two ticks.
     pub(super) pass: Option<Ticks>,
+}
+
+impl PairEvent {
+    /// Takes what happened next to the same pair; returns how many begins and their ends that were never sent cancel.
+    pub(super) fn follow(&mut self, next: &Self) -> u64 {
+        // Whatever follows a pass that was never sent: its begin and its end cancel.
+        let mut cancelled = u64::from(self.pass.take().is_some());
+        self.pass = next.pass;
+        if next.end.is_some() {
+            if self.begin.take().is_some() {
+                cancelled += 1;
+            } else {
+                self.end = next.end;
+            }
+        }
+        if next.begin.is_some() {
+            self.begin = next.begin;
+        }
+        // A row has one cause: that the pair touched on its way as well is told by its flag.
+        let by_cause = (self.end).is_some_and(|(_, cause)| cause != EndCause::Separated);
+        if by_cause && self.pass.take().is_some() {
+            cancelled += 1;
+        }
+        cancelled
+    }
+
+    /// Whether nothing is left of it to tell.
+    pub(super) fn is_over(&self) -> bool {
+        self.end.is_none() && self.begin.is_none() && self.pass.is_none()
+    }
+
+    /// Whether it is a pass and nothing else.
+    pub(super) fn is_pass_alone(&self) -> bool {
+        self.pass.is_some() && self.end.is_none() && self.begin.is_none()
+    }
 }
 
 /// What is certified about a pair.
@@ -88,6 +124,8 @@ pub(super) struct Events {
     adrift: Vec<Adrift>,
     /// By ids; one entry a pair after [`Events::merge`].
     waiting: Vec<PairEvent>,
+    /// Those that the messages of the last tick told, by ids.
+    told: Vec<PairEvent>,
     seq: u64,
     /// `seq` before this tick.
     before: u64,
@@ -157,9 +195,22 @@ impl Events {
         seq.filter(|seq| *seq <= self.before).unwrap_or(u64::MAX)
     }
 
-    /// Forgets what was sent: all events but those `kept` says to keep.
+    /// Events that the messages of the last tick told, by ids.
+    pub(super) fn told(&self) -> &[PairEvent] {
+        &self.told
+    }
+
+    /// Nothing waits any more of what was sent: all events but those `kept` says to keep.
     pub(super) fn sent(&mut self, mut kept: impl FnMut(Ids) -> bool) {
-        self.waiting.retain(|event| kept(event.ids));
+        let told = &mut self.told;
+        told.clear();
+        self.waiting.retain(|event| {
+            let kept = kept(event.ids);
+            if !kept {
+                told.push(*event);
+            }
+            kept
+        });
     }
 
     /// Takes a pair's verdict of this tick.
@@ -264,37 +315,13 @@ impl Events {
             .sort_unstable_by_key(|event| (event.ids, event.seq));
         let cancelled = &mut self.cancelled;
         self.waiting.dedup_by(|next, kept| {
-            if next.ids != kept.ids {
-                return false;
+            let same = next.ids == kept.ids;
+            if same {
+                *cancelled += kept.follow(next);
             }
-            // Whatever follows a pass that was never sent: its begin and its end cancel.
-            if kept.pass.take().is_some() {
-                *cancelled += 1;
-            }
-            kept.pass = next.pass;
-            if next.end.is_some() {
-                if kept.begin.take().is_some() {
-                    *cancelled += 1;
-                } else {
-                    kept.end = next.end;
-                }
-            }
-            if next.begin.is_some() {
-                kept.begin = next.begin;
-            }
-            // A row has one cause: that the pair touched on its way as well is told by its flag.
-            if kept.pass.is_some()
-                && kept
-                    .end
-                    .is_some_and(|(_, cause)| cause != EndCause::Separated)
-            {
-                kept.pass = None;
-                *cancelled += 1;
-            }
-            true
+            same
         });
-        self.waiting
-            .retain(|event| event.end.is_some() || event.begin.is_some() || event.pass.is_some());
+        self.waiting.retain(|event| !event.is_over());
     }
 }
 
@@ -306,90 +333,4 @@ fn earlier(one: Option<u64>, other: Option<u64>) -> Option<u64> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn ticks(first: u64, last: u64) -> Ticks {
-        Ticks { first, last }
-    }
-
-    #[test]
-    fn law_3_9_a_begin_and_its_end_that_were_never_sent_cancel_and_are_counted() {
-        let ids = (BodyId(1), BodyId(2));
-        let mut events = Events::default();
-        events.push(ids, None, Some(ticks(3, 4)));
-        events.push(ids, Some((ticks(5, 5), EndCause::Separated)), None);
-        events.merge();
-        assert!(events.waiting().is_empty());
-        assert_eq!(events.cancelled, 1);
-    }
-
-    #[test]
-    fn law_3_5_an_end_and_a_begin_of_one_pair_share_a_row_in_that_order() {
-        let ids = (BodyId(1), BodyId(2));
-        let mut events = Events::default();
-        events.push(ids, Some((ticks(5, 5), EndCause::Removed)), None);
-        events.push(ids, None, Some(ticks(6, 7)));
-        events.merge();
-        let [event] = events.waiting() else {
-            panic!("one row")
-        };
-        assert_eq!(event.end, Some((ticks(5, 5), EndCause::Removed)));
-        assert_eq!(event.begin, Some(ticks(6, 7)));
-        assert_eq!(events.cancelled, 0);
-    }
-
-    #[test]
-    fn bug_an_end_by_cause_was_told_as_the_separated_end_of_a_pass() {
-        let ids = (BodyId(1), BodyId(2));
-        for cause in [EndCause::Reset, EndCause::Separated] {
-            let mut events = Events::default();
-            events.push(ids, Some((ticks(5, 5), cause)), None);
-            events.push_pass(ids, ticks(5, 5));
-            events.merge();
-            let [event] = events.waiting() else {
-                panic!("one row")
-            };
-            let by_cause = cause == EndCause::Reset;
-            assert_eq!(event.end, Some((ticks(5, 5), cause)));
-            assert_eq!(
-                (event.pass.is_none(), events.cancelled),
-                (by_cause, u64::from(by_cause))
-            );
-        }
-    }
-
-    #[test]
-    fn law_3_9_a_pass_that_was_never_sent_cancels_when_more_happens_and_waits_while_nothing_does() {
-        let ids = (BodyId(1), BodyId(2));
-        let mut events = Events::default();
-        events.push(ids, Some((ticks(2, 2), EndCause::Separated)), None);
-        events.push_pass(ids, ticks(3, 3));
-        events.merge();
-        events.merge();
-        assert_eq!(events.waiting()[0].pass, Some(ticks(3, 3)));
-        events.push(ids, None, Some(ticks(5, 5)));
-        events.merge();
-        let [event] = events.waiting() else {
-            panic!("one row")
-        };
-        assert_eq!((event.pass, event.begin), (None, Some(ticks(5, 5))));
-        assert_eq!(event.end, Some((ticks(2, 2), EndCause::Separated)));
-        assert_eq!(events.cancelled, 1);
-    }
-
-    #[test]
-    fn law_3_9_an_unsent_end_survives_a_begin_that_is_cancelled_later() {
-        let ids = (BodyId(1), BodyId(2));
-        let mut events = Events::default();
-        events.push(ids, Some((ticks(5, 5), EndCause::Separated)), None);
-        events.push(ids, None, Some(ticks(6, 6)));
-        events.push(ids, Some((ticks(7, 7), EndCause::Removed)), None);
-        events.merge();
-        let [event] = events.waiting() else {
-            panic!("one row")
-        };
-        assert_eq!(event.end, Some((ticks(5, 5), EndCause::Separated)));
-        assert_eq!(event.begin, None);
-    }
-}
+mod tests;

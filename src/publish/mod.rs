@@ -11,6 +11,7 @@ mod events;
 mod kept;
 mod leaders;
 mod listing;
+mod owed;
 mod pairs;
 mod regions;
 mod review;
@@ -27,6 +28,7 @@ use changes::Chain;
 use events::Events;
 use kept::Kept;
 use listing::Listing;
+use owed::Owed;
 use state::Survey;
 
 /// How many pairs ahead of the one at hand what is known of a pair is asked for: a pair takes some 50 ns, memory about
@@ -67,6 +69,8 @@ pub struct View<'a> {
 pub struct Publisher {
     limits: Limits,
     events: Events,
+    /// Events of messages that could not be handed over.
+    owed: Owed,
     listing: Listing,
     survey: Survey,
     /// Which were listened to in the last tick.
@@ -99,6 +103,7 @@ impl Publisher {
         Self {
             limits,
             events: Events::default(),
+            owed: Owed::default(),
             listing: Listing::default(),
             survey: Survey::default(),
             heard: Heard::default(),

@@ -8,7 +8,7 @@ use crate::wire::{
 };
 use crate::world::{Body, Tag};
 
-use super::events::Ids;
+use super::events::{Ids, PairEvent};
 use super::kept::{Kept, Span};
 use super::listing::{Mark, NO_EVENT, Row};
 use super::{AHEAD, Publisher, View};
@@ -38,6 +38,7 @@ impl Publisher {
             0
         };
         self.fill_pairs(view, header, left_out, out);
+        self.fill_owed(view, out);
         self.fill_changes(view, header, left_out, out);
         // Who begins to listen later sees the full state; there is nobody to tell what happened before.
         let (listing, chosen, cut) = (&self.listing, &self.chosen, left_out > 0);
@@ -168,6 +169,16 @@ impl Publisher {
     }
 
     pub(super) fn pair_row(&self, view: &View<'_>, row: &Row) -> PairRow {
+        self.pair_row_with(view, row, self.events.waiting().get(row.event as usize))
+    }
+
+    /// The row of a pair, with this event.
+    pub(super) fn pair_row_with(
+        &self,
+        view: &View<'_>,
+        row: &Row,
+        event: Option<&PairEvent>,
+    ) -> PairRow {
         let mut out = PairRow {
             body_a: row.ids.0.0,
             body_b: row.ids.1.0,
@@ -186,7 +197,7 @@ impl Publisher {
             Some((slot, finding)) => self.describe(view, slot, &finding, &mut out),
             None => out.flags |= pair_flags::GONE,
         }
-        if let Some(event) = self.events.waiting().get(row.event as usize) {
+        if let Some(event) = event {
             if let Some((ticks, cause)) = event.end {
                 out.events |= Event::End.bit();
                 out.end_cause = cause.code();

@@ -6,6 +6,7 @@
 use crate::ids::PairSlot;
 use crate::narrow::{Finding, Narrow, Passage};
 use crate::wire::Verdict;
+use crate::world::World;
 
 use super::contacts::contacts_of;
 use super::events::Ids;
@@ -79,6 +80,20 @@ impl Publisher {
             }
         }
         self.listing.close();
+    }
+
+    /// Takes down what was found since the last tick's messages went out, at the poses of that tick.
+    pub fn note_late(&mut self, tick: u64, world: &World, narrow: &Narrow) {
+        for &slot in narrow.late() {
+            if let Some(finding) = narrow.finding(slot)
+                && let (Some(a), Some(b)) = (world.tag(finding.a), world.tag(finding.b))
+            {
+                (self.events).certify_late(tick, slot, &finding, (a.id, b.id));
+            }
+        }
+        if !narrow.late().is_empty() {
+            self.events.merge();
+        }
     }
 
     /// Rows of pairs that are active and have none.

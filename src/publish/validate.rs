@@ -23,6 +23,8 @@ impl Publisher {
     ) -> Result<(), String> {
         self.listing.validate()?;
         self.events.validate(tick, world, pairs, narrow)?;
+        self.owed.pairs.validate()?;
+        self.owed.changes.validate()?;
         self.validate_rows(narrow)?;
         self.survey.validate(self.listing.iter())?;
         self.chain.validate(tick)?;

@@ -105,6 +105,7 @@ impl Engine {
         let stop_ns = began.wall_ns() + left_ns.min(slice_ns);
         let mut meter = Meter::new(self.clock.as_ref(), Some(stop_ns), None);
         let done = self.narrow.go_on(&mut self.world, wanted, &mut meter);
+        (self.publisher).note_late(self.tick, &self.world, &self.narrow);
         self.rest.units += meter.spent();
         self.rest.interrupts.note(meter.longest_pause());
         self.rest.spent_ns += self.clock.monotonic_ns().saturating_sub(began.wall_ns());

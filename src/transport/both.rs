@@ -3,7 +3,7 @@
 use super::{BodyChange, Door, RequestToken, Setting, Wake};
 use crate::error::Result;
 use crate::time::Clock;
-use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow};
+use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow, Undelivered};
 
 /// Marks the tokens of the door beside.
 const BESIDE: u64 = 1 << 63;
@@ -51,8 +51,8 @@ impl Door for Both<'_> {
         }
     }
 
-    fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
-        Ok(self.first.publish(outbox)? + self.beside.publish(outbox)?)
+    fn publish(&mut self, outbox: &Outbox) -> Result<Undelivered> {
+        Ok((self.first.publish(outbox)?).and(self.beside.publish(outbox)?))
     }
 
     fn publish_tick(&mut self, tick: &TickRow) -> Result<()> {
@@ -140,7 +140,7 @@ mod tests {
         fn demand(&mut self) -> Demand {
             self.door.demand()
         }
-        fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
+        fn publish(&mut self, outbox: &Outbox) -> Result<Undelivered> {
             self.door.publish(outbox)
         }
         fn publish_tick(&mut self, tick: &TickRow) -> Result<()> {
@@ -197,7 +197,7 @@ mod tests {
         outbox.tick.header.boot_id = 7;
         for tick in 1..=3 {
             outbox.tick.header.tick = tick;
-            assert_eq!(both.publish(&outbox).unwrap(), 0);
+            assert_eq!(both.publish(&outbox).unwrap(), Undelivered::default());
             for client in &mut clients {
                 assert_eq!(client.wait_tick(SECOND_NS).unwrap(), Heard::Tick);
                 assert_eq!(client.view().tick().header.tick, tick);

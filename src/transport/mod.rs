@@ -22,7 +22,7 @@ pub use hello::ICEORYX2_VERSION;
 use crate::config::Mode;
 use crate::error::Result;
 use crate::time::Clock;
-use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow};
+use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow, Undelivered};
 
 /// How long a wait looks before it sleeps where nothing else is said, nanoseconds: on a single core it would only keep
 /// the other side from its work.
@@ -122,11 +122,11 @@ pub trait Door {
     /// Sends contacts, regions, pairs, changes, bodies, body verdicts, names and plan (where new), then the tick, then
     /// one `ready` event; never waits for a reader.
     ///
-    /// * returns - messages that could not be handed over.
+    /// * returns - what could not be handed over; the engine is to hear of it before its next tick.
     ///
     /// # Errors
     /// `Error::Io` when the tick itself could not be sent: readers would hear nothing.
-    fn publish(&mut self, outbox: &Outbox) -> Result<u64>;
+    fn publish(&mut self, outbox: &Outbox) -> Result<Undelivered>;
 
     /// Sends a tick alone, between the slices of a long one.
     ///

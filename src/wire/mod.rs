@@ -26,7 +26,7 @@ pub use codes::{
     vertex_flags,
 };
 pub use frame::{Frame, Inbox, name_bytes, name_str};
-pub use outbox::{Demand, Outbox};
+pub use outbox::{Demand, Outbox, Undelivered};
 pub use region::RegionRow;
 pub use request::{Answer, AnswerHeader, RequestHeader};
 pub use rows::{

@@ -50,6 +50,29 @@ impl Demand {
     }
 }
 
+/// What of a tick could not be handed over.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Undelivered {
+    /// How many messages.
+    pub messages: u64,
+    /// `pairs` is one of them and has reached none of its readers: its events are owed to them.
+    pub pairs: bool,
+    /// The same of `changes`.
+    pub changes: bool,
+}
+
+impl Undelivered {
+    /// What two doors together could not hand over.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            messages: self.messages + other.messages,
+            pairs: self.pairs || other.pairs,
+            changes: self.changes || other.changes,
+        }
+    }
+}
+
 /// What one tick publishes. Kept and refilled from tick to tick.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outbox {
@@ -59,6 +82,12 @@ pub struct Outbox {
     pub pairs_header: MessageHeader,
     /// Pairs that are not plainly apart and last events, by `(body_a, body_b)`.
     pub pairs: Vec<PairRow>,
+    /// For the readers of a door whose `pairs` reached none of them ([`Undelivered`]): rows with the events that they
+    /// lack, to stand in the place of the same pairs' rows or among them. One that has left ([`PairRow::has_left`])
+    /// stands for none. Empty but then.
+    pub owed: Vec<PairRow>,
+    /// Begins and their ends that were never sent to these readers, in this boot; to be added to those of the tick.
+    pub owed_cancelled: u64,
     /// Header of `changes`.
     pub changes_header: ChangesHeader,
     /// What is new of `pairs` since the tick before, in the same order; or all of it, by the header.

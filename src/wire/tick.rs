@@ -83,7 +83,7 @@ pub struct TickRow {
     pub ignored: u64,
     /// Ticks of this boot that ended after their budget or a frame's deadline.
     pub missed: u64,
-    /// Begins and their ends that were never sent, because rows did not fit.
+    /// Begins and their ends that were both never sent.
     pub cancelled_events: u64,
     /// Body ids of the worst pair (smaller first); 0: none.
     pub worst_a: u64,

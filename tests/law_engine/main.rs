@@ -36,6 +36,7 @@ mod shapes;
 mod state;
 mod threads;
 mod touching;
+mod undelivered;
 mod used;
 mod verdicts;
 mod vertices;

@@ -36,7 +36,7 @@ fn law_4_5_a_collision_that_ends_after_publishing_is_told_in_the_next_tick() {
     rig.send(NONE);
     let row = rig.pair(1, 2).unwrap();
     assert!(has(row, Event::End) && !has(row, Event::Begin));
-    assert_eq!((row.end_first_tick, row.end_last_tick), (2, 3));
+    assert_eq!((row.end_first_tick, row.end_last_tick), (2, 2));
     assert_eq!(rig.verdict(1, 2), Verdict::Apart);
     assert_eq!(rig.out.tick.units, 1, "of the rest of tick 2");
     rig.send(NONE);
@@ -54,8 +54,68 @@ fn law_4_5_a_collision_found_after_publishing_is_told_in_the_next_tick() {
     rig.send(NONE);
     let row = rig.pair(1, 2).unwrap();
     assert!(has(row, Event::Begin) && !has(row, Event::End));
-    assert_eq!((row.begin_first_tick, row.begin_last_tick), (2, 3));
+    assert_eq!((row.begin_first_tick, row.begin_last_tick), (2, 2));
     assert_eq!(rig.verdict(1, 2), Verdict::Colliding);
+}
+
+#[test]
+fn bug_what_was_certified_after_publishing_was_forgotten_where_the_bodies_moved_on() {
+    let mut rig = two(APART);
+    rig.place(2, &Pose::translation(TOUCHING[0], TOUCHING[1], 0.0));
+    rig.send(SHORT);
+    assert_eq!(rig.verdict(1, 2), Verdict::Possible);
+    rig.engine.work_on(u64::MAX);
+    rig.engine.validate().unwrap();
+    rig.place(2, &Pose::translation(APART[0], APART[1], 0.0));
+    rig.send(NONE);
+    assert_eq!(rig.verdict(1, 2), Verdict::Possible);
+    let row = rig.pair(1, 2).unwrap();
+    let certified = (row.certified_verdict, row.certified_tick);
+    assert_eq!(certified, (Verdict::Colliding.code(), 2));
+    assert_eq!(row.events, Event::Begin.bit());
+    assert_eq!((row.begin_first_tick, row.begin_last_tick), (2, 2));
+    rig.send(ALL);
+    let row = rig.pair(1, 2).unwrap();
+    assert_eq!(rig.verdict(1, 2), Verdict::Apart);
+    assert_eq!(row.events, Event::End.bit());
+    assert_eq!((row.end_first_tick, row.end_last_tick), (3, 4));
+}
+
+#[test]
+fn bug_a_collision_persisted_across_an_end_that_was_certified_after_publishing() {
+    let mut rig = two(TOUCHING);
+    rig.place(2, &Pose::translation(APART[0], APART[1], 0.0));
+    rig.send(SHORT);
+    rig.engine.work_on(u64::MAX);
+    rig.place(2, &Pose::translation(TOUCHING[0], TOUCHING[1], 0.0));
+    rig.send(ALL);
+    let row = rig.pair(1, 2).unwrap();
+    assert_eq!(row.events, Event::End.bit() | Event::Begin.bit());
+    assert_eq!((row.end_first_tick, row.end_last_tick), (2, 2));
+    assert_eq!((row.begin_first_tick, row.begin_last_tick), (3, 3));
+    // As above, but the next tick decides nothing.
+    let mut rig = two(TOUCHING);
+    rig.place(2, &Pose::translation(APART[0], APART[1], 0.0));
+    rig.send(SHORT);
+    rig.engine.work_on(u64::MAX);
+    rig.place(2, &Pose::translation(TOUCHING[0], TOUCHING[1], 0.0));
+    rig.send(NONE);
+    let row = rig.pair(1, 2).unwrap();
+    assert_eq!(row.events, Event::End.bit());
+    let certified = (row.certified_verdict, row.certified_tick);
+    assert_eq!(certified, (Verdict::Apart.code(), 2));
+}
+
+#[test]
+fn law_3_9_a_collision_found_after_publishing_that_is_over_in_the_next_tick_cancels() {
+    let mut rig = two(APART);
+    rig.place(2, &Pose::translation(TOUCHING[0], TOUCHING[1], 0.0));
+    rig.send(SHORT);
+    rig.engine.work_on(u64::MAX);
+    rig.place(2, &Pose::translation(APART[0], APART[1], 0.0));
+    rig.send(ALL);
+    assert!(rig.out.pairs.is_empty());
+    assert_eq!(rig.out.tick.cancelled_events, 1);
 }
 
 #[test]

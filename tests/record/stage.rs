@@ -14,7 +14,7 @@ use sweepd::tick::build::build_shapes_in;
 use sweepd::time::{Clock, ManualClock};
 use sweepd::transport::memory::{Hub, MemoryServer};
 use sweepd::transport::{BodyChange, Door, RequestToken, Setting, Wake};
-use sweepd::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow};
+use sweepd::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow, Undelivered};
 
 /// A folder for a recording and the meshes of a scene; it goes when it is dropped.
 pub struct Folder(PathBuf);
@@ -75,7 +75,7 @@ impl Door for Desk {
     fn demand(&mut self) -> Demand {
         self.inner.demand()
     }
-    fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
+    fn publish(&mut self, outbox: &Outbox) -> Result<Undelivered> {
         self.inner.publish(outbox)
     }
     fn publish_tick(&mut self, tick: &TickRow) -> Result<()> {

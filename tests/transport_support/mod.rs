@@ -24,7 +24,7 @@ use sweepd::transport::iceoryx::{Place, Server, ServerOptions};
 use sweepd::transport::{Door, RequestToken};
 use sweepd::wire::{
     ChangesHeader, ContactRow, Frame, FrameHeader, Inbox, MessageHeader, NameRow, Outbox, PairRow,
-    Reason, RegionRow, RejectReason, State, TickCause, TickRow, TransformRow, Verdict,
+    Reason, RegionRow, RejectReason, State, TickCause, TickRow, TransformRow, Undelivered, Verdict,
     VertexHeader, WIRE_VERSION,
 };
 
@@ -368,7 +368,7 @@ fn tick(door: &mut dyn Door, outbox: &mut Outbox, demand: sweepd::wire::Demand, 
             });
         }
     }
-    assert_eq!(door.publish(outbox).unwrap(), 0);
+    assert_eq!(door.publish(outbox).unwrap(), Undelivered::default());
     outbox.names_changed = false;
     outbox.plan_changed = false;
 }

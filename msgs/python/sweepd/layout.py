@@ -446,7 +446,7 @@ class TickRow(_Row):
         ("ignored", ctypes.c_uint64),
         # Ticks of this boot that ended after their budget or a frame's deadline.
         ("missed", ctypes.c_uint64),
-        # Begins and their ends that were never sent, because rows did not fit.
+        # Begins and their ends that were both never sent.
         ("cancelled_events", ctypes.c_uint64),
         # Body ids of the worst pair (smaller first); 0: none.
         ("worst_a", ctypes.c_uint64),

@@ -13,7 +13,7 @@ use crate::transport::request::{UNANSWERED, refusal, unreadable};
 use crate::transport::{Door, RequestToken, Wake};
 use crate::wire::{
     AnswerHeader, ChangesHeader, Demand, Inbox, MessageHeader, Outbox, RejectReason, RequestHeader,
-    TickRow, WIRE_VERSION,
+    TickRow, Undelivered, WIRE_VERSION,
 };
 
 /// The daemon's side of a [`Hub`]; the hub is free again when it is dropped.
@@ -221,10 +221,10 @@ impl Door for MemoryServer {
         demand
     }
 
-    fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
+    fn publish(&mut self, outbox: &Outbox) -> Result<Undelivered> {
         self.send_all(outbox);
         self.publish_tick(&outbox.tick)?;
-        Ok(0)
+        Ok(Undelivered::default())
     }
 
     fn publish_tick(&mut self, tick: &TickRow) -> Result<()> {

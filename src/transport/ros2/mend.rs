@@ -17,7 +17,7 @@ use super::{RosNode, RosScene, open};
 use crate::error::{Error, Result};
 use crate::time::{Clock, SystemClock};
 use crate::transport::{BodyChange, Door, RequestToken, Setting, Wake};
-use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow};
+use crate::wire::{Demand, Inbox, Outbox, RequestHeader, TickRow, Undelivered};
 
 /// How often it is looked whether DDS lives: silence is told by the lease after 3 s.
 const LOOK: Duration = Duration::from_secs(1);
@@ -223,9 +223,9 @@ impl Door for LastingNode {
         self.live.as_mut().map(Door::demand).unwrap_or_default()
     }
 
-    fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
+    fn publish(&mut self, outbox: &Outbox) -> Result<Undelivered> {
         let Some(node) = &mut self.live else {
-            return Ok(0);
+            return Ok(Undelivered::default());
         };
         if std::mem::take(&mut self.tell_names) && !outbox.names_changed {
             let mut whole = outbox.clone();

@@ -39,7 +39,8 @@ use crate::time::Clock;
 use crate::transport::{BodyChange, BodyNote, Door, RequestToken, Setting as Applied, Wake};
 use crate::wire::ros::{Book, Speaker};
 use crate::wire::{
-    Answer, BODY_NAME_LEN, Demand, Inbox, NameRow, Outbox, RequestHeader, TickRow, WIRE_VERSION,
+    Answer, BODY_NAME_LEN, Demand, Inbox, NameRow, Outbox, RequestHeader, TickRow, Undelivered,
+    WIRE_VERSION,
 };
 
 /// The node's name where nobody says another.
@@ -325,7 +326,7 @@ impl Door for RosNode {
         self.demand
     }
 
-    fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
+    fn publish(&mut self, outbox: &Outbox) -> Result<Undelivered> {
         let gone = self.parcels.put(outbox, self.demand, self.shared.caps());
         // Told by the sending thread, with the topics; none of it is of shared memory.
         self.shared.note_unsent(gone);
@@ -335,7 +336,7 @@ impl Door for RosNode {
             open(&self.shared.desk.ticked).extend(ticked);
             let _gone_already = self.waker.wake();
         }
-        Ok(0)
+        Ok(Undelivered::default())
     }
 
     fn publish_tick(&mut self, tick: &TickRow) -> Result<()> {

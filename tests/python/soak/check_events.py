@@ -79,12 +79,13 @@ class Balance:
     @staticmethod
     def _misfit(now: Moment, row: np.void, events: tuple[bool, bool, bool, bool], was: bool) -> Optional[str]:
         begin, persist, end, passed = events
-        # an event that found no room is told later
-        waited = now.setup.pair_rows is not None and int(row["begin_last_tick"]) < now.tick
+        # an event that found no room, or was found when its tick was out, is told later
+        may_wait = now.setup.pair_rows is not None or now.setup.budget_ns is not None
+        waited = may_wait and int(row["begin_last_tick"]) < now.tick
         colliding = int(row["verdict"]) == Verdict.COLLIDING
         flags = int(row["flags"])
         # the end of an older collision that found no room is in that one end
-        if passed and not (begin and end and (not was or now.setup.pair_rows is not None)):
+        if passed and not (begin and end and (not was or may_wait)):
             return "a collision within the way has its begin and its end, and none before it"
         if passed and not waited and (colliding or not flags & PairFlags.SWEPT_HIT):
             return "who passed has touched on the way, and does not collide"
@@ -110,7 +111,9 @@ class Balance:
             first, last = int(row[f"{word}_first_tick"]), int(row[f"{word}_last_tick"])
             if not happened:
                 continue
-            if not 1 <= first <= last <= now.tick or (not cut and last != now.tick):
+            # what is left of a budget of time is used after the tick, and told with the next one
+            late = now.setup.budget_ns is not None and last == now.tick - 1
+            if not 1 <= first <= last <= now.tick or (not cut and last != now.tick and not late):
                 return f"a range of ticks up to this one for its {word}"
             by_cause = word == "end" and int(row["end_cause"]) != EndCause.SEPARATED
             # of a row that found no room it is not known what it certified
@@ -121,8 +124,8 @@ class Balance:
     def _wrong_end(self, now: Moment, before: Moment, ids: Ids, row: np.void, done: Change) -> Optional[str]:
         """Whether the cause of an end is none that was there."""
         cause = EndCause(int(row["end_cause"]))
-        if now.setup.pair_rows is not None:
-            # it may have waited for its place, and its cause be over
+        if now.setup.pair_rows is not None or int(row["end_last_tick"]) < now.tick:
+            # it may have waited for its place or its tick, and its cause be over
             return None
         names = {id_: name for name, id_ in now.boot.ids.items()}
         bodies = [names.get(id_, "") for id_ in ids]

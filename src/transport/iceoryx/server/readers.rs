@@ -4,6 +4,7 @@ use std::fmt::Debug;
 
 use iceoryx2::prelude::{CallbackProgression, Node, PortFactory as _, ZeroCopySend};
 
+use super::sent::Handed;
 use super::{Ipc, Out};
 use crate::error::Result;
 use crate::transport::iceoryx::place::Place;
@@ -13,7 +14,7 @@ use crate::wire::ChangesHeader;
 
 /// A message of what is new, and who reads it.
 pub(super) struct Changes<T: Debug + ZeroCopySend + 'static> {
-    out: Out<T, ChangesHeader>,
+    pub(super) out: Out<T, ChangesHeader>,
     /// Ports of the readers at this look, and at the one before.
     now: Vec<u128>,
     before: Vec<u128>,
@@ -57,13 +58,11 @@ impl<T: Debug + ZeroCopySend + Copy + 'static> Changes<T> {
     }
 
     /// Sends it.
-    ///
-    /// * returns - 1 when it could not be handed over.
-    pub(super) fn send(&mut self, header: &ChangesHeader, rows: &[T]) -> u64 {
-        let lost = super::sent::send(&self.out.publisher, header, rows);
-        if lost > 0 || header.base_tick == 0 {
-            self.owed = lost > 0;
+    pub(super) fn send(&mut self, header: &ChangesHeader, rows: &[T]) -> Handed {
+        let handed = super::sent::send(&self.out.publisher, header, rows);
+        if handed != Handed::Over || header.base_tick == 0 {
+            self.owed = handed != Handed::Over;
         }
-        lost
+        handed
     }
 }

@@ -1,13 +1,15 @@
 //! What goes out: hello, the messages of a tick in their order, connections of late joiners.
 
+use iceoryx2::port::SendError;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::ZeroCopySend;
 
+use super::owed::mended;
 use super::{Ipc, Server, failed};
 use crate::error::Result;
 use crate::transport::hello::hello;
-use crate::wire::{MessageHeader, Outbox, TickRow};
+use crate::wire::{MessageHeader, Outbox, TickRow, Undelivered};
 
 impl Server {
     pub(super) fn say_hello(&mut self) -> Result<()> {
@@ -18,72 +20,92 @@ impl Server {
     }
 
     /// Order is a promise: whoever has the tick has all that belongs to it.
-    pub(super) fn send_all(&mut self, outbox: &Outbox) -> Result<u64> {
-        let (demand, mut failures) = (self.demand, 0);
-        if demand.contacts {
-            failures += send(
-                &self.contacts.publisher,
-                &outbox.contacts_header,
-                &outbox.contacts,
-            );
-        }
-        if demand.contact_changes {
-            let header = &outbox.contact_changes_header;
-            failures += (self.contact_changes).send(header, &outbox.contact_changes);
-        }
-        if demand.regions {
-            failures += send(
-                &self.regions.publisher,
-                &outbox.regions_header,
-                &outbox.regions,
-            );
-        }
-        if demand.pairs {
-            failures += send(&self.pairs.publisher, &outbox.pairs_header, &outbox.pairs);
-        }
-        if demand.changes {
-            failures += (self.changes).send(&outbox.changes_header, &outbox.changes);
-        }
-        if demand.bodies {
-            failures += send(
-                &self.bodies.publisher,
-                &outbox.bodies_header,
-                &outbox.bodies,
-            );
-        }
+    pub(super) fn send_all(&mut self, outbox: &Outbox) -> Result<Undelivered> {
+        let mut unsent = self.send_rows(outbox);
         let header = &outbox.tick.header;
-        if demand.body_verdicts {
-            // never truncated, whatever was left out elsewhere
-            let whole = MessageHeader {
-                truncated: 0,
-                ..*header
-            };
-            failures += send(&self.body_verdicts.publisher, &whole, &outbox.body_verdicts);
-        }
         let whole = MessageHeader {
             truncated: 0,
             ..*header
         };
+        // never truncated, whatever was left out elsewhere
+        if self.demand.body_verdicts {
+            let handed = send(&self.body_verdicts.publisher, &whole, &outbox.body_verdicts);
+            unsent.messages += handed.lost();
+        }
         // Told once: what could not be handed over is owed.
         self.names_owed |= outbox.names_changed;
         if self.names_owed {
-            let lost = send(&self.names.publisher, &whole, &outbox.names);
-            self.names_owed = lost > 0;
-            failures += lost;
+            let handed = send(&self.names.publisher, &whole, &outbox.names);
+            self.names_owed = handed != Handed::Over;
+            unsent.messages += handed.lost();
         }
         self.plan_owed |= outbox.plan_changed;
         if self.plan_owed {
-            let lost = send(&self.plan.publisher, &whole, outbox.plan.as_bytes());
-            self.plan_owed = lost > 0;
-            failures += lost;
+            let handed = send(&self.plan.publisher, &whole, outbox.plan.as_bytes());
+            self.plan_owed = handed != Handed::Over;
+            unsent.messages += handed.lost();
         }
         self.update_connections();
+        self.cancelled = outbox.owed_cancelled;
         self.send_tick(&outbox.tick)?;
-        Ok(failures)
+        Ok(unsent)
+    }
+
+    /// What has rows of pairs or bodies, in its order.
+    fn send_rows(&mut self, outbox: &Outbox) -> Undelivered {
+        let (demand, mut unsent) = (self.demand, Undelivered::default());
+        if demand.contacts {
+            let header = &outbox.contacts_header;
+            unsent.messages += send(&self.contacts.publisher, header, &outbox.contacts).lost();
+        }
+        if demand.contact_changes {
+            let header = &outbox.contact_changes_header;
+            let handed = (self.contact_changes).send(header, &outbox.contact_changes);
+            unsent.messages += handed.lost();
+        }
+        if demand.regions {
+            let header = &outbox.regions_header;
+            unsent.messages += send(&self.regions.publisher, header, &outbox.regions).lost();
+        }
+        if demand.pairs {
+            let handed = self.send_pairs(outbox);
+            unsent.messages += handed.lost();
+            unsent.pairs = handed == Handed::ToNobody;
+        }
+        if demand.changes {
+            let handed = (self.changes).send(&outbox.changes_header, &outbox.changes);
+            unsent.messages += handed.lost();
+            unsent.changes = handed == Handed::ToNobody;
+        }
+        if demand.bodies {
+            let header = &outbox.bodies_header;
+            unsent.messages += send(&self.bodies.publisher, header, &outbox.bodies).lost();
+        }
+        unsent
+    }
+
+    /// The pairs, with what is owed to their readers.
+    fn send_pairs(&self, outbox: &Outbox) -> Handed {
+        let (publisher, header) = (&self.pairs.publisher, &outbox.pairs_header);
+        if outbox.owed.is_empty() {
+            return send(publisher, header, &outbox.pairs);
+        }
+        let rows = || mended(&outbox.pairs, &outbox.owed);
+        let Ok(mut sample) = publisher.loan_slice_uninit(rows().count()) else {
+            return Handed::ToNobody;
+        };
+        *sample.user_header_mut() = *header;
+        let mut rows = rows();
+        let sample = sample.write_from_fn(|_| rows.next().unwrap_or_default());
+        Handed::of(&sample.send())
     }
 
     pub(super) fn send_tick(&mut self, tick: &TickRow) -> Result<()> {
-        self.tick.send_copy(*tick).map_err(|e| failed("tick", e))?;
+        let tick = TickRow {
+            cancelled_events: tick.cancelled_events + self.cancelled,
+            ..*tick
+        };
+        self.tick.send_copy(tick).map_err(|e| failed("tick", e))?;
         // a reader that cannot be notified still finds the tick when it looks
         let _unheard = self.ready.notify();
         Ok(())
@@ -99,29 +121,67 @@ impl Server {
     }
 }
 
+/// How far a message came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Handed {
+    /// To all of its readers.
+    Over,
+    /// Not to all: the connections of some are broken.
+    InPart,
+    /// To none.
+    ToNobody,
+}
+
+impl Handed {
+    fn of(sent: &std::result::Result<usize, SendError>) -> Self {
+        match sent {
+            Ok(_) => Self::Over,
+            // these come before the first connection is written to
+            Err(
+                SendError::LoanError(_)
+                | SendError::ConnectionError(_)
+                | SendError::ConnectionBrokenSinceSenderNoLongerExists,
+            ) => Self::ToNobody,
+            Err(_) => Self::InPart,
+        }
+    }
+
+    /// Messages that could not be handed over.
+    pub(super) fn lost(self) -> u64 {
+        u64::from(self != Self::Over)
+    }
+}
+
 /// One message.
-///
-/// * returns - 1 when it could not be handed over.
-pub(super) fn send<T, H>(publisher: &Publisher<Ipc, [T], H>, header: &H, rows: &[T]) -> u64
+pub(super) fn send<T, H>(publisher: &Publisher<Ipc, [T], H>, header: &H, rows: &[T]) -> Handed
 where
     T: std::fmt::Debug + ZeroCopySend + Copy + 'static,
     H: std::fmt::Debug + ZeroCopySend + Copy + Default + 'static,
 {
     let Ok(mut sample) = publisher.loan_slice_uninit(rows.len()) else {
-        return 1;
+        return Handed::ToNobody;
     };
     *sample.user_header_mut() = *header;
-    u64::from(sample.write_from_slice(rows).send().is_err())
+    Handed::of(&sample.write_from_slice(rows).send())
 }
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
     use super::*;
-    use crate::time::SystemClock;
+    use crate::daemon::build_shapes;
+    use crate::scene::Scene;
+    use crate::tick::{Engine, TickInput};
+    use crate::time::{Budget, Clock, ManualClock, SystemClock};
     use crate::transport::Door as _;
     use crate::transport::client::{Link, Message, Topics};
     use crate::transport::iceoryx::{IoxLink, Place, ServerOptions};
-    use crate::wire::NameRow;
+    use crate::wire::{
+        Event, FrameHeader, Inbox, NameRow, PairRow, TickCause, TransformRow, WIRE_VERSION,
+        frame_flags, name_bytes,
+    };
 
     #[test]
     fn bug_names_and_plan_that_could_not_be_handed_over_were_never_told() {
@@ -151,16 +211,165 @@ mod tests {
             plans.push(sample);
         }
         server.demand();
-        assert_eq!(server.publish(&outbox).unwrap(), 2);
+        assert_eq!(server.publish(&outbox).unwrap().messages, 2);
         (outbox.names_changed, outbox.plan_changed) = (false, false);
-        assert_eq!(server.publish(&outbox).unwrap(), 2);
+        assert_eq!(server.publish(&outbox).unwrap().messages, 2);
         drop((names, plans));
-        assert_eq!(server.publish(&outbox).unwrap(), 0);
+        assert_eq!(server.publish(&outbox).unwrap().messages, 0);
         let mut heard = Message::<NameRow>::default();
         let mut plan = Message::<u8>::default();
         assert!(link.names(&mut heard).unwrap() && link.plan(&mut plan).unwrap());
         assert_eq!((heard.rows.len(), &*plan.rows), (1, b"{}".as_slice()));
-        assert_eq!(server.publish(&outbox).unwrap(), 0);
+        assert_eq!(server.publish(&outbox).unwrap().messages, 0);
         assert!(!link.names(&mut heard).unwrap() && !link.plan(&mut plan).unwrap());
+    }
+
+    /// Two balls, the second of which goes along x.
+    struct Balls {
+        engine: Engine,
+        clock: Arc<ManualClock>,
+        inbox: Inbox,
+        seq: u64,
+    }
+
+    impl Balls {
+        fn new() -> Self {
+            let ball = |id| {
+                let shape = "{ type = \"sphere\", radius = 1.0 }";
+                format!("[[body]]\nname = \"b{id}\"\nid = {id}\nmoves = true\nshape = {shape}\n")
+            };
+            let text = format!("[[source]]\nname = \"feed\"\n{}{}", ball(1), ball(2));
+            let scene = Scene::parse(&text, "test", Path::new(".")).unwrap();
+            let shapes = build_shapes(&scene).unwrap().bodies;
+            let clock = Arc::new(ManualClock::new(1_000_000_000));
+            let shown = Arc::clone(&clock) as Arc<dyn Clock>;
+            Self {
+                engine: Engine::new(&scene, shapes, 7, shown).unwrap(),
+                clock,
+                inbox: Inbox::default(),
+                seq: 0,
+            }
+        }
+
+        /// A tick, and what its door says of it.
+        fn tick(&mut self, server: &mut Server, x: f64) -> Undelivered {
+            self.clock.advance(10_000_000);
+            self.seq += 1;
+            self.inbox.clear();
+            let frame = self.inbox.push();
+            frame.header = FrameHeader {
+                session: 11,
+                epoch: 1,
+                seq: self.seq,
+                source: name_bytes("feed"),
+                flags: frame_flags::FULL,
+                schema: WIRE_VERSION,
+                ..FrameHeader::default()
+            };
+            frame.received_ns = self.clock.boottime_ns();
+            frame.set_transforms(&[(1, 0.0), (2, x)].map(|(body, x)| TransformRow {
+                body,
+                position: [x, 0.0, 0.0],
+                orientation: [0.0, 0.0, 0.0, 1.0],
+                ..TransformRow::default()
+            }));
+            let outbox = self.engine.tick(TickInput {
+                inbox: &self.inbox,
+                edits: &[],
+                demand: server.demand(),
+                budget: Budget::UNLIMITED,
+                cause: TickCause::Frame,
+                cause_source: None,
+                woke_ns: self.clock.monotonic_ns(),
+                pulse: None,
+            });
+            let unsent = server.publish(outbox).unwrap();
+            self.engine.note_undelivered(unsent);
+            unsent
+        }
+    }
+
+    /// What a row says of events.
+    fn told(row: &PairRow) -> (u8, [u64; 2], [u64; 2]) {
+        let begin = [row.begin_first_tick, row.begin_last_tick];
+        (row.events, begin, [row.end_first_tick, row.end_last_tick])
+    }
+
+    /// Holds all that a publisher lends, as with no memory left.
+    macro_rules! hold {
+        ($publisher:expr) => {{
+            let mut held = Vec::new();
+            while let Ok(sample) = $publisher.loan_slice_uninit(1) {
+                held.push(sample);
+            }
+            held
+        }};
+    }
+
+    #[test]
+    fn bug_events_of_a_message_that_could_not_be_handed_over_were_lost() {
+        let place = Place::new(&format!("owed_events_{}", std::process::id())).unwrap();
+        let mut server = Server::open(ServerOptions::new(place.clone(), 7)).unwrap();
+        let mut link = IoxLink::open(&place, &SystemClock, u64::MAX).unwrap();
+        let topics = Topics {
+            pairs: true,
+            changes: true,
+            ..Topics::default()
+        };
+        link.subscribe(topics).unwrap();
+        let mut balls = Balls::new();
+        let (mut pairs, mut changes) = (Message::<PairRow>::default(), Message::default());
+        let mut hear = |link: &mut IoxLink| {
+            let heard = link.pairs(&mut pairs).unwrap().then(|| {
+                let rows: Vec<_> = pairs.rows.iter().map(told).collect();
+                rows
+            });
+            let new = link.changes(&mut changes).unwrap().then(|| {
+                let rows: Vec<_> = changes.rows.iter().map(told).collect();
+                rows
+            });
+            (heard, new)
+        };
+        let none = [0, 0];
+        let begin = (Event::Begin.bit(), [2, 2], none);
+        let persist = (Event::Persist.bit(), none, none);
+        let end = (Event::End.bit(), none, [5, 5]);
+        assert_eq!(balls.tick(&mut server, 3.0), Undelivered::default());
+        assert_eq!(hear(&mut link), (Some(vec![]), Some(vec![])));
+        let both = Undelivered {
+            messages: 2,
+            pairs: true,
+            changes: true,
+        };
+        // The begin is lost to both, and once more to one of them.
+        let held_pairs = hold!(server.pairs.publisher);
+        let held_changes = hold!(server.changes.out.publisher);
+        assert_eq!(balls.tick(&mut server, 1.5), both);
+        assert_eq!(hear(&mut link), (None, None));
+        drop(held_pairs);
+        let one = Undelivered {
+            messages: 1,
+            pairs: false,
+            changes: true,
+        };
+        assert_eq!(balls.tick(&mut server, 1.5), one);
+        assert_eq!(hear(&mut link), (Some(vec![begin]), None));
+        let others = &balls.engine.outbox().pairs;
+        assert_eq!(told(&others[0]), persist, "a recording had the begin");
+        drop(held_changes);
+        assert_eq!(balls.tick(&mut server, 1.5), Undelivered::default());
+        assert_eq!(hear(&mut link), (Some(vec![persist]), Some(vec![begin])));
+        // The end is lost to both, and then the pair is gone.
+        let held_pairs = hold!(server.pairs.publisher);
+        let held_changes = hold!(server.changes.out.publisher);
+        assert_eq!(balls.tick(&mut server, 30.0), both);
+        drop((held_pairs, held_changes));
+        assert_eq!(balls.tick(&mut server, 30.0), Undelivered::default());
+        assert_eq!(hear(&mut link), (Some(vec![end]), Some(vec![end])));
+        assert!(balls.engine.outbox().pairs.is_empty());
+        assert_eq!(balls.tick(&mut server, 30.0), Undelivered::default());
+        // The whole list, for it has no rows: no more than it would take to say that one has left.
+        assert_eq!(hear(&mut link), (Some(vec![]), Some(vec![])));
+        balls.engine.validate().unwrap();
     }
 }

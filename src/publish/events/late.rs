@@ -1,0 +1,53 @@
+//! What was certified of a tick's poses after its messages had gone out.
+//!
+//! In: pairs that were decided in what was left of a tick's budget. Out: their histories say so, and an end or a begin
+//! waits for the next tick's messages, with a range that ends at the tick whose poses it was certified at. Where bodies
+//! move on, the next tick may find nothing of it: without this an end and the begin after it were one collision that
+//! persists.
+
+use super::{Events, Ids, Ticks};
+use crate::ids::PairSlot;
+use crate::narrow::Finding;
+use crate::wire::{EndCause, Verdict};
+
+impl Events {
+    /// Takes the verdict of a pair at the poses of a tick that [`Events::certify`] had none of; then comes
+    /// [`Events::merge`].
+    pub(in crate::publish) fn certify_late(
+        &mut self,
+        tick: u64,
+        slot: PairSlot,
+        finding: &Finding<'_>,
+        ids: Ids,
+    ) {
+        let Some(history) = self.histories.get_mut(slot.index()) else {
+            return;
+        };
+        // Of a pair that the tick did not look at nothing was left open.
+        if history.active != tick || history.ids != ids {
+            return;
+        }
+        let colliding = match finding.verdict {
+            Verdict::Colliding => true,
+            Verdict::Near | Verdict::Apart => false,
+            Verdict::Possible | Verdict::None => return,
+        };
+        // A touch on the way is certified of the tick itself: what ended since did so in it.
+        let first = if history.tick == 0 {
+            history.born
+        } else {
+            (history.tick + 1).min(tick)
+        };
+        let ticks = Ticks { first, last: tick };
+        (history.verdict, history.tick) = (finding.verdict, tick);
+        history.on_way = false;
+        match (
+            std::mem::replace(&mut history.colliding, colliding),
+            colliding,
+        ) {
+            (false, true) => self.push(ids, None, Some(ticks)),
+            (true, false) => self.push(ids, Some((ticks, EndCause::Separated)), None),
+            _ => {}
+        }
+    }
+}
