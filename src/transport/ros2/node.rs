@@ -23,7 +23,7 @@ use super::lines::subscribe;
 use super::markers::Boxes;
 use super::names::Names;
 use super::namesakes::Namesakes;
-use super::outlet::{Outlet, Publishers, Read, Topics, Unsent};
+use super::outlet::{Latest, Outlet, Publishers, Read, Topics, Unsent};
 use super::params::{Answers, Table};
 use super::parcel::Parcels;
 use super::poses::Source;
@@ -152,7 +152,8 @@ impl RosNode {
             boot_id: options.boot_id,
             name: names.full_node(),
             diagnoser: Diagnoser::default(),
-            told: (TickRow::default(), 0),
+            latest: Latest::default(),
+            told_ns: 0,
             shown_ns: 0,
             boxes: boxes(scene),
             left_out: 0,
