@@ -37,6 +37,7 @@ use super::{RosScene, open};
 use crate::error::{Error, Result};
 use crate::time::Clock;
 use crate::transport::{BodyChange, BodyNote, Door, RequestToken, Setting as Applied, Wake};
+use crate::transport::client::random_u64;
 use crate::wire::ros::{Book, Speaker};
 use crate::wire::{
     Answer, BODY_NAME_LEN, Demand, Inbox, NameRow, Outbox, RequestHeader, TickRow, WIRE_VERSION,
@@ -70,8 +71,6 @@ pub struct RosNode {
     receiving: Option<JoinHandle<()>>,
     sending: Option<JoinHandle<()>>,
     demand: Demand,
-    /// Of its sources of common topics: it is over when the node is given up.
-    pub(super) session: u64,
     /// Who waits for the next tick.
     ticks_asked: Vec<u64>,
 }
@@ -176,7 +175,6 @@ impl RosNode {
             receiving: None,
             sending: None,
             demand: Demand::default(),
-            session: options.session,
             ticks_asked: Vec::new(),
         };
         open.start(inlet, outlet)?;
@@ -191,6 +189,12 @@ impl RosNode {
 
     fn start(&mut self, inlet: Inlet, outlet: Outlet) -> Result<()> {
         self.sending = Some(thread("ros-tx", move || outlet.run())?);
+    /// Gives up all that waits, and says that the sessions of its sources of common topics are over.
+    pub(super) fn end(&mut self, inbox: &mut Inbox) {
+        self.shelf.drain(inbox);
+        self.shelf.end(inbox);
+    }
+
         self.receiving = Some(thread("ros-rx", move || inlet.run())?);
         Ok(())
     }
@@ -329,6 +333,7 @@ impl Door for RosNode {
     fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
         let gone = self.parcels.put(outbox, self.demand, self.shared.caps());
         // Told by the sending thread, with the topics; none of it is of shared memory.
+        self.shelf.hear(&outbox.tick, random_u64);
         self.shared.note_unsent(gone);
         if !self.ticks_asked.is_empty() {
             let header = outbox.tick.header;
