@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use files::check_files;
 pub(super) use make::join;
-use make::{make, mapping, said};
+use make::{make, mapping};
 use ros2_client::{Context, RosoutRaw as _};
 use rustdds::mio1::Waker;
 
@@ -28,6 +28,7 @@ use super::params::{Answers, Table};
 use super::parcel::Parcels;
 use super::poses::Source;
 use super::readers::Readers;
+use super::said::said;
 use super::services::Services;
 use super::shared::{Say, Shared};
 use super::shelf::Shelf;
@@ -36,8 +37,8 @@ use super::strangers::Strangers;
 use super::{RosScene, open};
 use crate::error::{Error, Result};
 use crate::time::Clock;
-use crate::transport::{BodyChange, BodyNote, Door, RequestToken, Setting as Applied, Wake};
 use crate::transport::client::random_u64;
+use crate::transport::{BodyChange, BodyNote, Door, RequestToken, Setting as Applied, Wake};
 use crate::wire::ros::{Book, Speaker};
 use crate::wire::{
     Answer, BODY_NAME_LEN, Demand, Inbox, NameRow, Outbox, RequestHeader, TickRow, WIRE_VERSION,
@@ -97,8 +98,9 @@ impl RosNode {
         wake: Box<dyn Fn() + Send>,
     ) -> Result<Self> {
         let mut names = Names::new(&options.args, NODE_NAME).map_err(Error::Usage)?;
-        let (table, mut odd) = Table::started(scene, &said(&options.args)?, &names.full_node())
-            .map_err(Error::Usage)?;
+        let (table, mut odd) =
+            Table::started(scene, &said(&options.args.params)?, &names.full_node())
+                .map_err(Error::Usage)?;
         let table = Arc::new(table);
         let book = Book::of(&first_names(scene));
         let shared = shared(options, scene, &names, book.clone());
@@ -187,14 +189,14 @@ impl RosNode {
         self.shared.again.load(Ordering::Relaxed)
     }
 
-    fn start(&mut self, inlet: Inlet, outlet: Outlet) -> Result<()> {
-        self.sending = Some(thread("ros-tx", move || outlet.run())?);
     /// Gives up all that waits, and says that the sessions of its sources of common topics are over.
     pub(super) fn end(&mut self, inbox: &mut Inbox) {
         self.shelf.drain(inbox);
         self.shelf.end(inbox);
     }
 
+    fn start(&mut self, inlet: Inlet, outlet: Outlet) -> Result<()> {
+        self.sending = Some(thread("ros-tx", move || outlet.run())?);
         self.receiving = Some(thread("ros-rx", move || inlet.run())?);
         Ok(())
     }
@@ -331,9 +333,9 @@ impl Door for RosNode {
     }
 
     fn publish(&mut self, outbox: &Outbox) -> Result<u64> {
+        self.shelf.hear(&outbox.tick, random_u64);
         let gone = self.parcels.put(outbox, self.demand, self.shared.caps());
         // Told by the sending thread, with the topics; none of it is of shared memory.
-        self.shelf.hear(&outbox.tick, random_u64);
         self.shared.note_unsent(gone);
         if !self.ticks_asked.is_empty() {
             let header = outbox.tick.header;
