@@ -45,7 +45,7 @@ if part == "long":
             seen = reader.wait(5)
             if seen.state == "unknown":
                 told += 1
-                assert seen.tick.sources_len == 0
+                assert seen.tick.sources_len == 0 and seen.pairs is None
                 why = reader._why_no_result(x, None, 5)
                 assert "still under way" in why and "no such source" not in why, why
             else:

@@ -188,6 +188,7 @@ fn a_tick_that_is_told_of_while_it_is_under_way_is_followed_by_itself<B: Backend
             if view.is_under_way() {
                 told += 1;
                 assert_eq!(view.tick().sources_len, 0);
+                assert!(view.pairs().is_none(), "they come with its end");
             } else {
                 last = number;
             }

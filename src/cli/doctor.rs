@@ -7,6 +7,7 @@ mod limits;
 mod memory;
 #[cfg(feature = "ros2")]
 mod ros;
+mod sources;
 
 use serde_json::json;
 

@@ -86,7 +86,7 @@ pub(super) struct Asked {
 
 #[cfg(feature = "ros2")]
 impl Asked {
-    /// Reads flags, ROS arguments and the environment.
+    /// Reads flags, ROS arguments with their files, and the environment.
     pub(super) fn read(args: &RunArgs, ros_words: Option<&[String]>) -> Result<Self> {
         if !args.ros2 && ros_words.is_none() {
             return match args.ros_domain_id {
@@ -97,6 +97,7 @@ impl Asked {
             };
         }
         let ros_args = RosArgs::parse(ros_words.unwrap_or_default()).map_err(Error::Usage)?;
+        let ros_args = ros_args.with_files_read()?;
         let network = Network::read(args.ros_domain_id, |name| std::env::var(name).ok())
             .map_err(Error::Usage)?;
         Ok(Self {

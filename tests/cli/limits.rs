@@ -250,3 +250,25 @@ fn bug_a_log_that_could_not_be_written_ended_the_daemon() {
     let ended = run_out(limited("exec 2>/dev/full"), &run);
     assert_eq!(code(&ended), Some(0));
 }
+
+/// They were read once the daemon had its name, and `/dev/zero` until the memory was full.
+#[cfg(feature = "ros2")]
+#[test]
+fn bug_files_of_parameters_are_read_to_a_limit_and_before_the_name_is_taken() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let (scene, name) = (desk.dir.join("scene.toml"), desk.instance.as_str());
+    let deep = desk.write("deep.yaml", &"- ".repeat(100_000));
+    for (file, words) in [
+        ("/dev/zero", "more than 1048576 bytes"),
+        ("/nowhere.yaml", "cannot be read"),
+        (deep.to_str().unwrap(), "tables and lists"),
+    ] {
+        let args = ["run", scene.to_str().unwrap(), "--instance", name];
+        let args = [&args[..], &["--ros-args", "--params-file", file]].concat();
+        let ended = run_out(limited("ulimit -v 4000000"), &args);
+        let said = err(&ended);
+        assert_eq!(code(&ended), Some(2), "{file}: {said}");
+        assert!(said.contains(file) && said.contains(words), "{said}");
+    }
+}

@@ -184,6 +184,15 @@ def test_a_tick_that_is_under_way_is_not_what_a_reader_begins_with():
     assert [(result.tick.header.tick, result.pairs) for result in seen] == [(2, "pairs 2"), (3, None), (4, None)]
 
 
+def test_bug_rows_of_a_long_tick_came_with_what_was_told_of_it_and_again_with_its_end():
+    # all of it is there before the first look
+    told, end = tick(3, ["pairs"], under_way=True), tick(3)
+    end[0].sent_ns += 1
+    client = alone([tick(2, ["pairs"]), told, end])
+    seen = [client.wait(timeout_s=0) for _ in range(3)]
+    assert [(result.state, result.pairs) for result in seen] == [("clear", "pairs 2"), ("unknown", None), ("clear", "pairs 3")]
+
+
 def test_a_list_that_never_comes_silences_no_reader_for_ever():
     last = inbox._PASSED_MAX
     client = alone([tick(number) for number in range(1, 100)])

@@ -107,6 +107,39 @@ def test_a_source_that_only_sends_never_gives_a_body_the_pose_of_another(daemon,
             assert received(reader) == PLACES
 
 
+def test_bug_a_pause_after_a_restart_was_sent_to_be_refused_and_told_nobody(daemon):
+    with sweepd.Client(daemon.instance, "sim", quat_order="wxyz", listen=()) as client:
+        client.send(poses())
+        daemon.stop()
+        daemon.start("right", "left")
+        told, _ = until_restarted(client.pause)
+        assert told.new_boot != client.hello.boot_id
+        assert client.pause() > 1
+
+
+def test_bug_an_answer_was_lost_where_the_daemon_had_restarted_meanwhile(daemon):
+    put = {"put": {"name": "third", "source": "sim", "shape": {"type": "sphere", "radius": 0.1}}}
+    with sweepd.Client(daemon.instance, "sim", quat_order="wxyz", listen=()) as client:
+        client.step(poses(), timeout_s=5)
+        old = client.names
+        daemon.stop()
+        daemon.start("right", "left")
+        # it is there before it is asked
+        with sweepd.Client(daemon.instance, None, listen=(), timeout_s=10) as reader:
+            reader.wait(5)
+            until = time.monotonic() + 10
+            while client._ports.boot() != reader.hello.boot_id:
+                assert time.monotonic() < until
+                time.sleep(0.01)
+            assert client.request({"edits": [put]})["ok"]
+        # twice the same: the first told of no restart
+        assert client.request({"edits": [put]})["ok"]
+        assert client.names == old
+        with pytest.raises(sweepd.Restarted):
+            client.step(poses(), timeout_s=5)
+        assert client.names["left"] == old["right"] and "third" in client.names
+
+
 def test_a_loan_of_before_a_restart_is_refused(daemon):
     with sweepd.Client(daemon.instance, "sim", quat_order="wxyz") as client:
         loan = client.loan(2)

@@ -196,7 +196,11 @@ class Client:
 
     @in_turn
     def pause(self) -> int:
-        """Says that the world stands still: the ages of its bodies are renewed for one time-out."""
+        """Says that the world stands still: the ages of its bodies are renewed for one time-out.
+
+        Raises Restarted or TimedOut as ``send`` does.
+        """
+        self._settle(0.0)
         return self._send(np.empty(0, POSE), layout.FrameFlags.PAUSED, {})
 
     @in_turn
@@ -326,7 +330,8 @@ class Client:
         """Sends a scene edit or a query (anything ``json`` can write) and returns the daemon's answer as a dict.
 
         Raises Refused with the daemon's words when it refused, TimedOut when it is silent. After an edit ``names`` are
-        those of the scene as it is then: as ``latest()`` does, the client goes on to the newest tick.
+        those of the scene as it is then: as ``latest()`` does, the client goes on to the newest tick. Where the daemon has
+        restarted meanwhile they are so from ``Restarted`` on, which the next call that waits, looks or sends raises.
         """
         timeout_s = seconds_to_send(timeout_s)
         try:
@@ -349,7 +354,8 @@ class Client:
                     raise Refused(answer.get("error", "refused"))
                 # an edit is answered after its tick, with which new names came
                 if isinstance(edits, dict) and "edits" in edits:
-                    self._inbox.drain()
+                    # of a restart the next call tells: the answer would be lost with it
+                    self._inbox.drain(tells_restart=False)
                 return answer
             left = until - time.monotonic()
             if left <= 0:

@@ -87,11 +87,11 @@ class Inbox:
         while self._now["names"] is None and self.next(until):
             pass
 
-    def drain(self):
-        """Takes what is there, up to the newest tick; raises Restarted."""
+    def drain(self, *, tells_restart=True):
+        """Takes what is there, up to the newest tick; raises Restarted, or leaves that to the next look."""
         # where a tick takes longer to read than the next one takes to come, there is always one
         for _ in range(_DRAINED_MAX):
-            if not self._take():
+            if not self._take(tells_restart):
                 return
 
     def next(self, until):
@@ -133,7 +133,7 @@ class Inbox:
         message = self._now.get(topic)
         return None if message is None or message[0].boot_id != self.boot else message
 
-    def _take(self):
+    def _take(self, tells_restart=True):
         while True:
             tick, self._held = self._held or self._ports.tick(), None
             if tick is None:
@@ -148,17 +148,34 @@ class Inbox:
                 if tick.sent_ns < self.tick.sent_ns:
                     self._note_over(new.boot_id)
                     continue
+                if not tells_restart:
+                    self._held = self._newest(tick)
+                    return False
                 self._restart(old, tick)
             # a tick that takes longer than a heartbeat is told of under its own number before it is there itself
             if old and (new.tick, tick.sent_ns) <= (old.tick, self.tick.sent_ns):
                 continue
             self.tick, self.boot = tick, new.boot_id
+            # who looks late finds the rows of its end beside what was told of it before; they are handed out once
+            is_bare = is_under_way(tick)
             for topic in self._topics:
+                if is_bare and topic not in _LASTING:
+                    continue
                 if topic in self.lists:
                     self._advance_list(topic, new)
                 else:
                     self._advance(topic, new)
             return True
+
+    def _newest(self, tick):
+        """The newest tick that waits, if it is newer than this one: a restart is told as of then, with the names of then."""
+        for _ in range(_DRAINED_MAX):
+            other = self._ports.tick()
+            if other is None:
+                break
+            if other.sent_ns > tick.sent_ns:
+                tick = other
+        return tick
 
     def _restart(self, old, tick):
         self._note_over(old.boot_id)

@@ -1,16 +1,16 @@
 //! An instance: is its name held by a living daemon, does it speak the same, does it tick, do its sources send.
 
 use crate::cli::figures::time;
-use crate::error::Error;
+use crate::error::{Error, Result};
 use crate::time::{Clock as _, SystemClock};
 use crate::transport::ICEORYX2_VERSION;
-use crate::transport::client::{ClientOptions, Heard};
+use crate::transport::client::{Client, ClientOptions, Heard, View};
 use crate::transport::iceoryx::{Holder, InstanceInfo, Lock, Place, locks, process, shares};
 use crate::transport::open_files::OpenFiles;
-use crate::wire::{SourceRow, TickRow, WIRE_VERSION, name_str};
+use crate::wire::WIRE_VERSION;
 
 use super::Finding;
-use crate::cli::monitor::rejects;
+use super::sources::sources;
 
 const CHECK: &str = "instance";
 /// How long a daemon has to say hello, and then to tick, nanoseconds: many heartbeats, which are 100 ms unless the
@@ -84,19 +84,9 @@ fn held(place: &Place, lock: &Lock, holder: &Holder) -> Vec<Finding> {
         }
     };
     let mut found: Vec<Finding> = namespace(&who, holder).into_iter().collect();
-    match client.wait_tick(WAIT_NS) {
+    match ended_tick(&mut client, WAIT_NS) {
         Ok(Heard::Tick) => {
-            let tick = client.view().tick();
-            let age_ns = SystemClock.boottime_ns().saturating_sub(tick.sent_ns);
-            found.push(Finding::ok(
-                CHECK,
-                format!(
-                    "{who}: it answers, tick {} was {} ago",
-                    tick.header.tick,
-                    time(age_ns)
-                ),
-            ));
-            found.extend(sources(&lock.instance, tick));
+            found.extend(ticks(&who, &lock.instance, client.view()));
             found.extend(full());
         }
         Ok(_) => found.push(full().unwrap_or_else(|| {
@@ -115,6 +105,45 @@ fn held(place: &Place, lock: &Lock, holder: &Holder) -> Vec<Finding> {
             "try again; if it stays so, see its log",
         )),
     }
+    found
+}
+
+/// Waits for a tick that has ended: one that is under way tells no sources. [`Heard::Tick`] of such a one alone: the
+/// time was up before its end.
+fn ended_tick(client: &mut Client, timeout_ns: u64) -> Result<Heard> {
+    let until_ns = SystemClock.monotonic_ns().saturating_add(timeout_ns);
+    loop {
+        let left_ns = until_ns.saturating_sub(SystemClock.monotonic_ns());
+        let heard = client.wait_tick(left_ns)?;
+        if !client.view().is_under_way() {
+            return Ok(heard);
+        }
+        if left_ns == 0 {
+            return Ok(Heard::Tick);
+        }
+    }
+}
+
+/// What the newest tick says of the daemon and its sources.
+fn ticks(who: &str, instance: &str, view: &View) -> Vec<Finding> {
+    let tick = view.tick();
+    let number = tick.header.tick;
+    if view.is_under_way() {
+        return vec![Finding::warning(
+            CHECK,
+            format!(
+                "{who}: it answers, and tick {number} is under way for longer than {}",
+                time(WAIT_NS)
+            ),
+            "its end tells of the sources: try again, and see the daemon's log; with a `budget_ms` ticks end in time",
+        )];
+    }
+    let age_ns = SystemClock.boottime_ns().saturating_sub(tick.sent_ns);
+    let mut found = vec![Finding::ok(
+        CHECK,
+        format!("{who}: it answers, tick {number} was {} ago", time(age_ns)),
+    )];
+    found.extend(sources(instance, tick));
     found
 }
 
@@ -200,60 +229,35 @@ fn namespace(who: &str, holder: &Holder) -> Option<Finding> {
     })
 }
 
-/// Sources that send nothing, and what was refused of those that do.
-fn sources(instance: &str, tick: &TickRow) -> Vec<Finding> {
-    let check = "sources";
-    let mut found = Vec::new();
-    for row in tick.sources.iter().take(usize::from(tick.sources_len)) {
-        found.push(source(instance, row));
-    }
-    let refused: Vec<String> = rejects(tick)
-        .iter()
-        .map(|(why, count)| format!("{why} {count}"))
-        .collect();
-    if !refused.is_empty() {
-        found.push(Finding::warning(
-            check,
-            format!("`{instance}` has refused, since its start: {}", refused.join(", ")),
-            "README and msgs/README.md say what each reason means; `sweepd monitor` shows whether they go on",
-        ));
-    }
-    found
-}
-
-fn source(instance: &str, row: &SourceRow) -> Finding {
-    let check = "sources";
-    let name = name_str(&row.name).unwrap_or("?");
-    match (row.alive, row.age_ns) {
-        (_, u64::MAX) => Finding::warning(
-            check,
-            format!(
-                "`{instance}` has heard nothing of source \"{name}\" yet: its bodies are unknown"
-            ),
-            "start it; it must send under this name, to this instance",
-        ),
-        (1, age_ns) => Finding::ok(
-            check,
-            format!(
-                "`{instance}` hears source \"{name}\", last {} ago",
-                time(age_ns)
-            ),
-        ),
-        (_, age_ns) => Finding::warning(
-            check,
-            format!(
-                "`{instance}` has nothing of source \"{name}\" that is younger than {}",
-                time(age_ns)
-            ),
-            "see whether it still runs; if it does, its `sent_ns` may be of another machine's clock: it writes 0 there",
-        ),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::Level;
     use super::*;
+    use crate::transport::Door as _;
+    use crate::transport::memory::trial::{SECOND_NS, met, under_way};
+    use crate::wire::Outbox;
+
+    #[test]
+    fn bug_of_a_tick_under_way_it_was_told_that_it_was_there_and_had_no_sources() {
+        let (mut server, mut client) = met();
+        let told = |client: &Client| ticks("who", "x", client.view());
+        server.publish_tick(&under_way(1)).unwrap();
+        let mut whole = Outbox::default();
+        whole.tick.header = under_way(1).header;
+        (whole.tick.sent_ns, whole.tick.sources_len) = (1, 1);
+        server.publish(&whole).unwrap();
+        assert_eq!(
+            ended_tick(&mut client, SECOND_NS).unwrap(),
+            Heard::Tick,
+            "both are there"
+        );
+        assert_eq!(told(&client).len(), 2, "the daemon and its source");
+        server.publish_tick(&under_way(2)).unwrap();
+        assert_eq!(ended_tick(&mut client, 1).unwrap(), Heard::Tick);
+        let found = told(&client);
+        assert_eq!((found.len(), found[0].level), (1, Level::Warning));
+        assert!(found[0].what.contains("tick 2 is under way"));
+    }
 
     fn holder() -> Holder {
         Holder {
@@ -330,24 +334,5 @@ mod tests {
             "{text}"
         );
         assert!(!text.contains("kill"), "{text}");
-    }
-
-    #[test]
-    fn a_source_that_never_came_is_told_with_what_it_must_do() {
-        let silent = SourceRow {
-            age_ns: u64::MAX,
-            ..SourceRow::default()
-        };
-        assert_eq!(source("x", &silent).level, Level::Warning);
-        let alive = SourceRow {
-            alive: 1,
-            age_ns: 5,
-            ..SourceRow::default()
-        };
-        assert_eq!(source("x", &alive).level, Level::Ok);
-        assert_eq!(
-            source("x", &SourceRow { alive: 0, ..alive }).level,
-            Level::Warning
-        );
     }
 }

@@ -50,7 +50,7 @@ impl View {
     }
 
     /// Whether the tick is still under way, and longer than a heartbeat: nothing belongs to it yet, and it is the
-    /// result of no frame.
+    /// result of no frame. What was sent with its end is read with its end, however late one looks.
     #[must_use]
     pub fn is_under_way(&self) -> bool {
         // No tick that has ended says so: undecided pairs alone are no reason for `unknown`.
@@ -262,6 +262,12 @@ impl Follow {
     /// What belongs to the tick was sent before it, so it is already there.
     fn gather(&mut self, link: &mut dyn Link, tick: &MessageHeader) -> Result<()> {
         let (view, over) = (&mut self.view, &mut self.boots_over);
+        view.names.advance(tick, over, |m| link.names(m))?;
+        view.plan.advance(tick, over, |m| link.plan(m))?;
+        // Who looks late finds the rows of its end beside what was told of it before; they are handed out once.
+        if view.is_under_way() {
+            return Ok(());
+        }
         view.contacts.advance(tick, over, |m| link.contacts(m))?;
         view.contact_list.advance(tick, over, link)?;
         view.regions.advance(tick, over, |m| link.regions(m))?;
@@ -269,9 +275,7 @@ impl Follow {
         view.list.advance(tick, over, link)?;
         view.bodies.advance(tick, over, |m| link.bodies(m))?;
         view.body_verdicts
-            .advance(tick, over, |m| link.body_verdicts(m))?;
-        view.names.advance(tick, over, |m| link.names(m))?;
-        view.plan.advance(tick, over, |m| link.plan(m))
+            .advance(tick, over, |m| link.body_verdicts(m))
     }
 }
 

@@ -100,14 +100,13 @@ impl LastingNode {
     }
 
     /// Gives a dead node away, takes the new one.
-    fn exchange(&mut self, inbox: &mut Inbox, clock: &dyn Clock) {
+    fn exchange(&mut self, inbox: &mut Inbox) {
         let is_back = self.live.as_ref().is_some_and(RosNode::is_to_open_anew);
         self.flags.back.store(is_back, Ordering::Relaxed);
         if self.live.is_some() && self.flags.dead.load(Ordering::Acquire) {
             if let (Some(mut node), Some(broken)) = (self.live.take(), &self.broken) {
                 // Nobody else says that it is over: the next node would be a stranger for a time-out.
-                node.receive(inbox, clock);
-                inbox.end_session(node.session);
+                node.end(inbox);
                 // A watcher that is gone drops it: there is nobody to mend it.
                 let _gone = broken.send(node);
             }
@@ -213,7 +212,7 @@ impl Door for LastingNode {
     }
 
     fn receive(&mut self, inbox: &mut Inbox, clock: &dyn Clock) {
-        self.exchange(inbox, clock);
+        self.exchange(inbox);
         if let Some(node) = &mut self.live {
             node.receive(inbox, clock);
         }
@@ -297,11 +296,12 @@ impl Door for LastingNode {
 
 #[cfg(test)]
 mod tests {
-    use super::super::RosOptions;
     use super::super::args::RosArgs;
     use super::super::env::{Network, Range};
     use super::super::wheel::tests::domain;
+    use super::super::{RosOptions, RosSourceSpec};
     use super::*;
+    use crate::config::{RosKind, RosSource};
 
     #[test]
     fn bug_the_session_of_a_node_that_is_given_up_was_not_over_until_its_time_out() {
@@ -321,7 +321,20 @@ mod tests {
             };
             RosNode::open(&options, scene, Box::new(|| {}))
         };
-        let mut node = LastingNode::open(RosScene::default(), Box::new(opener)).unwrap();
+        let scene = RosScene {
+            sources: vec![RosSourceSpec {
+                name: "tf".to_owned(),
+                timeout_ns: 1,
+                ros2: Some(RosSource {
+                    kind: RosKind::Tf,
+                    topic: "/tf".to_owned(),
+                    static_topic: "/tf_static".to_owned(),
+                    max_skew_ns: 1,
+                }),
+            }],
+            ..RosScene::default()
+        };
+        let mut node = LastingNode::open(scene, Box::new(opener)).unwrap();
         let mut inbox = Inbox::default();
         node.receive(&mut inbox, &SystemClock);
         assert!(inbox.is_empty());

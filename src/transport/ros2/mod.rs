@@ -31,6 +31,7 @@ mod parcel;
 mod poses;
 mod readers;
 mod reply;
+mod said;
 mod say;
 mod services;
 mod shared;

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use files::check_files;
 pub(super) use make::join;
-use make::{make, mapping, said};
+use make::{make, mapping};
 use ros2_client::{Context, RosoutRaw as _};
 use rustdds::mio1::Waker;
 
@@ -23,11 +23,12 @@ use super::lines::subscribe;
 use super::markers::Boxes;
 use super::names::Names;
 use super::namesakes::Namesakes;
-use super::outlet::{Outlet, Publishers, Read, Topics, Unsent};
+use super::outlet::{Latest, Outlet, Publishers, Read, Topics, Unsent};
 use super::params::{Answers, Table};
 use super::parcel::Parcels;
 use super::poses::Source;
 use super::readers::Readers;
+use super::said::said;
 use super::services::Services;
 use super::shared::{Say, Shared};
 use super::shelf::Shelf;
@@ -36,6 +37,7 @@ use super::strangers::Strangers;
 use super::{RosScene, open};
 use crate::error::{Error, Result};
 use crate::time::Clock;
+use crate::transport::client::random_u64;
 use crate::transport::{BodyChange, BodyNote, Door, RequestToken, Setting as Applied, Wake};
 use crate::wire::ros::{Book, Speaker};
 use crate::wire::{
@@ -71,8 +73,6 @@ pub struct RosNode {
     receiving: Option<JoinHandle<()>>,
     sending: Option<JoinHandle<()>>,
     demand: Demand,
-    /// Of its sources of common topics: it is over when the node is given up.
-    pub(super) session: u64,
     /// Who waits for the next tick.
     ticks_asked: Vec<u64>,
 }
@@ -99,8 +99,9 @@ impl RosNode {
         wake: Box<dyn Fn() + Send>,
     ) -> Result<Self> {
         let mut names = Names::new(&options.args, NODE_NAME).map_err(Error::Usage)?;
-        let (table, mut odd) = Table::started(scene, &said(&options.args)?, &names.full_node())
-            .map_err(Error::Usage)?;
+        let (table, mut odd) =
+            Table::started(scene, &said(&options.args.params)?, &names.full_node())
+                .map_err(Error::Usage)?;
         let table = Arc::new(table);
         let book = Book::of(&first_names(scene));
         let shared = shared(options, scene, &names, book.clone());
@@ -153,7 +154,8 @@ impl RosNode {
             boot_id: options.boot_id,
             name: names.full_node(),
             diagnoser: Diagnoser::default(),
-            told: (TickRow::default(), 0),
+            latest: Latest::default(),
+            told_ns: 0,
             shown_ns: 0,
             boxes: boxes(scene),
             left_out: 0,
@@ -176,7 +178,6 @@ impl RosNode {
             receiving: None,
             sending: None,
             demand: Demand::default(),
-            session: options.session,
             ticks_asked: Vec::new(),
         };
         open.start(inlet, outlet)?;
@@ -187,6 +188,12 @@ impl RosNode {
     /// Whether this node cannot hear all that lives, and a new one could.
     pub(super) fn is_to_open_anew(&self) -> bool {
         self.shared.again.load(Ordering::Relaxed)
+    }
+
+    /// Gives up all that waits, and says that the sessions of its sources of common topics are over.
+    pub(super) fn end(&mut self, inbox: &mut Inbox) {
+        self.shelf.drain(inbox);
+        self.shelf.end(inbox);
     }
 
     fn start(&mut self, inlet: Inlet, outlet: Outlet) -> Result<()> {
@@ -327,6 +334,7 @@ impl Door for RosNode {
     }
 
     fn publish(&mut self, outbox: &Outbox) -> Result<Undelivered> {
+        self.shelf.hear(&outbox.tick, random_u64);
         let gone = self.parcels.put(outbox, self.demand, self.shared.caps());
         // Told by the sending thread, with the topics; none of it is of shared memory.
         self.shared.note_unsent(gone);

@@ -4,6 +4,7 @@
 //! while it may be taken soon, and counted where it is lost; this thread does not wait for it.
 
 mod heard;
+mod latest;
 mod owed;
 mod publishers;
 mod roster;
@@ -14,6 +15,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 pub(super) use heard::Topics;
+pub(super) use latest::Latest;
 pub(super) use publishers::Publishers;
 use ros2_client::{Context, Node, Publisher};
 use rustdds::mio1::Waker;
@@ -35,7 +37,7 @@ use super::{RosSourceSpec, open};
 use crate::time::{Clock as _, SystemClock};
 use crate::transport::open_files;
 use crate::wire::ros::{Counts, Speaker};
-use crate::wire::{Demand, NameRow, TickRow};
+use crate::wire::{Demand, NameRow};
 
 /// Longest sleep: how soon a new reader is noticed.
 const SLEEP: Duration = Duration::from_millis(100);
@@ -57,8 +59,9 @@ pub(super) struct Outlet {
     /// The node's full name.
     pub(super) name: String,
     pub(super) diagnoser: Diagnoser,
-    /// The newest tick, and when diagnostics were last told, nanoseconds of `CLOCK_BOOTTIME`.
-    pub(super) told: (TickRow, u64),
+    pub(super) latest: Latest,
+    /// When diagnostics were last told, nanoseconds of `CLOCK_BOOTTIME`.
+    pub(super) told_ns: u64,
     /// When markers were last sent, nanoseconds of `CLOCK_BOOTTIME`.
     pub(super) shown_ns: u64,
     pub(super) boxes: Boxes,
@@ -129,7 +132,7 @@ impl Outlet {
                     self.send_rows(&parcel);
                     self.show(&parcel);
                     self.send_tick(&parcel);
-                    self.told.0 = parcel.tick;
+                    self.latest.take(&parcel);
                     self.parcels.give_back(*parcel);
                 }
             }
@@ -215,15 +218,16 @@ impl Outlet {
     /// Once a second, where somebody listens.
     fn diagnose(&mut self) {
         let now_ns = SystemClock.boottime_ns();
-        let (row, told_ns) = &mut self.told;
         let to = &self.publishers.diagnostics;
-        let due = now_ns.saturating_sub(*told_ns) >= DIAGNOSTICS_NS && row.header.tick > 0;
+        let since_ns = now_ns.saturating_sub(self.told_ns);
+        let due = since_ns >= DIAGNOSTICS_NS && self.latest.is_there();
         if !due || self.readers.count(to) == 0 {
             return;
         }
         // While nobody read, what is counted was told to nobody; it is no news of the last second.
-        let is_first = now_ns.saturating_sub(*told_ns) > 2 * DIAGNOSTICS_NS;
-        *told_ns = now_ns;
+        let is_first = since_ns > 2 * DIAGNOSTICS_NS;
+        self.told_ns = now_ns;
+        let row = self.latest.row();
         let now = self.shared.now();
         let counts = Counts {
             datagrams_dropped: self.noise.dropped(),
@@ -242,11 +246,11 @@ impl Outlet {
             ));
         }
         if is_first {
-            self.diagnoser = Diagnoser::since(row, counts);
+            self.diagnoser = Diagnoser::since(&row, counts);
         }
         let message = self
             .diagnoser
-            .diagnose(now, &self.name, row, counts, &faults);
+            .diagnose(now, &self.name, &row, counts, &faults);
         self.publish(&self.publishers.diagnostics, message);
     }
 

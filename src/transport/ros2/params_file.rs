@@ -1,7 +1,10 @@
 //! Parameter files: YAML of `NODE: ros__parameters: NAME: VALUE`. In: text. Out: settings in the file's order, each
 //! with the node pattern it is for.
 
-use yaml_rust2::{Yaml, YamlLoader};
+use yaml_rust2::parser::Parser;
+use yaml_rust2::{Event, Yaml, YamlLoader};
+
+use super::told::brief;
 
 /// A value of a parameter as YAML has it.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,7 +47,10 @@ pub struct Setting {
 }
 
 /// Largest parameter file, bytes: a person wrote it.
-const FILE_BYTES_MAX: usize = 1 << 20;
+pub(super) const FILE_BYTES_MAX: usize = 1 << 20;
+/// Most tables and lists in one another, for each of which the loader calls itself: the stack has room for thousands.
+/// More than [`DEPTH_MAX`], which tells the place.
+const NESTED_MAX: usize = 64;
 /// Deepest table in a file; deeper ones are made to overflow something.
 const DEPTH_MAX: usize = 16;
 
@@ -55,12 +61,10 @@ const DEPTH_MAX: usize = 16;
 pub fn parse(text: &str, file: &str) -> Result<Vec<Setting>, String> {
     if text.len() > FILE_BYTES_MAX {
         return Err(format!(
-            "{file}: the file has {} bytes, more than {FILE_BYTES_MAX}",
-            text.len()
+            "{file}: the file has more than {FILE_BYTES_MAX} bytes"
         ));
     }
-    let documents =
-        YamlLoader::load_from_str(text).map_err(|e| format!("{file}: this is not YAML: {e}"))?;
+    let documents = load(text).map_err(|why| format!("{file}: {why}"))?;
     let mut all = Vec::new();
     for document in &documents {
         match document {
@@ -82,12 +86,39 @@ pub fn parse(text: &str, file: &str) -> Result<Vec<Setting>, String> {
 /// # Errors
 /// One text, when it is no value.
 pub fn parse_value(text: &str) -> Result<Value, String> {
-    let documents = YamlLoader::load_from_str(text).map_err(|e| format!("`{text}`: {e}"))?;
+    let documents = load(text).map_err(|why| format!("`{}`: {why}", brief(text)))?;
     match documents.as_slice() {
         [] => Ok(Value::Text(String::new())),
         [one] => value(one).ok_or_else(|| format!("`{text}` is no value of a parameter")),
         _ => Err(format!("`{text}` is more than one value")),
     }
+}
+
+/// The documents of a text.
+///
+/// The loader calls itself for each table and list in another, and copies what an alias names: before it does, the
+/// events of the parser, which does neither, are looked at.
+fn load(text: &str) -> Result<Vec<Yaml>, String> {
+    let not_yaml = |e| format!("this is not YAML: {e}");
+    let (mut events, mut nested) = (Parser::new_from_str(text), 0_usize);
+    loop {
+        match events.next_token().map_err(not_yaml)?.0 {
+            Event::StreamEnd => break,
+            Event::SequenceStart(..) | Event::MappingStart(..) => nested += 1,
+            Event::SequenceEnd | Event::MappingEnd => nested = nested.saturating_sub(1),
+            // ROS takes none either.
+            Event::Alias(_) => {
+                return Err("it has an alias (*NAME): write out what it stands for".to_owned());
+            }
+            _ => {}
+        }
+        if nested > NESTED_MAX {
+            return Err(format!(
+                "more than {NESTED_MAX} tables and lists are in one another"
+            ));
+        }
+    }
+    YamlLoader::load_from_str(text).map_err(not_yaml)
 }
 
 /// Walks down namespaces to the tables `ros__parameters`.
@@ -290,6 +321,28 @@ mod tests {
         assert!(is_for("sweepd", "/sweepd"));
         assert!(!is_for("sweepd", "/a/sweepd"));
         assert!(!is_for("/other", "/sweepd"));
+    }
+
+    /// The loader ran out of stack before any depth was looked at, or filled the memory with copies.
+    #[test]
+    fn bug_what_is_nested_without_an_end_or_copies_itself_is_refused() {
+        let stairs: String = (0..500).map(|at| format!("{:at$}a:\n", "")).collect();
+        let flow = "[".repeat(100) + &"]".repeat(100);
+        let deep = ["- ", "? ", "? - "].map(|mark| mark.repeat(100_000));
+        for text in deep.iter().chain([&stairs, &flow]) {
+            for why in [parse(text, "f.yaml"), parse_value(text).map(|_| Vec::new())] {
+                let why = why.unwrap_err();
+                assert!(why.contains("64 tables and lists"), "{why:.200}");
+            }
+        }
+        let ten = |of: &str| format!("[{}]", [of; 10].join(", "));
+        let mut laughs = format!("a0: &a0 {}\n", ten("1"));
+        for at in 1..12 {
+            laughs += &format!("a{at}: &a{at} {}\n", ten(&format!("*a{}", at - 1)));
+        }
+        let why = parse(&laughs, "f.yaml").unwrap_err();
+        assert!(why.contains("an alias"), "{why}");
+        assert!(parse("\"*\": {ros__parameters: {a: '*x'}}", "f.yaml").is_ok());
     }
 
     #[test]

@@ -113,16 +113,20 @@ fn pair_rank(row: &PairRow) -> (u8, f64) {
 }
 
 impl Parcel {
-    /// Rows that do not go out are told in the tick, too; it is not clear then.
+    /// Rows that do not go out are told in the tick, too: it is unknown then, as where the tick itself had cut them off,
+    /// unless it is colliding. All messages of a tick say the same state.
     fn note_cut(&mut self, left_out: u64) {
-        if left_out > 0 {
-            let header = &mut self.tick.header;
-            header.truncated += left_out;
-            if header.state == State::Clear.code() {
-                header.state = State::Unknown.code();
-            }
-            self.tick.reasons |= Reason::Truncated.bit();
+        if left_out == 0 {
+            return;
         }
+        let header = &mut self.tick.header;
+        header.truncated += left_out;
+        if header.state != State::Colliding.code() {
+            header.state = State::Unknown.code();
+        }
+        self.tick.reasons |= Reason::Truncated.bit();
+        self.pairs_header.state = header.state;
+        self.contacts_header.state = header.state;
     }
 
     /// Takes what a tick filled.
@@ -130,12 +134,12 @@ impl Parcel {
         self.tick = outbox.tick;
         self.done = true;
         self.holds = demand;
+        (self.pairs_header, self.contacts_header) = (outbox.pairs_header, outbox.contacts_header);
         if demand.pairs {
             let most = caps.pairs_of(&outbox.pairs);
             let left_out = self
                 .picker
                 .pick(&outbox.pairs, most, pair_rank, &mut self.pairs);
-            self.pairs_header = outbox.pairs_header;
             self.pairs_header.truncated += left_out;
             self.note_cut(left_out);
         }
@@ -144,7 +148,6 @@ impl Parcel {
             let left_out =
                 self.picker
                     .pick(&outbox.contacts, caps.contacts, depth, &mut self.contacts);
-            self.contacts_header = outbox.contacts_header;
             self.contacts_header.truncated += left_out;
             self.note_cut(left_out);
         }

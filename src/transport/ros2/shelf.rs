@@ -6,10 +6,11 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::open;
+use crate::error::Result;
 use crate::limits::FRAMES_PER_DRAIN_MAX;
 use crate::transport::BodyNote;
 use crate::wire::{
-    Frame, FrameHeader, Inbox, RejectReason, SOURCE_NAME_LEN, TransformRow, WIRE_VERSION,
+    Frame, FrameHeader, Inbox, RejectReason, SOURCE_NAME_LEN, TickRow, TransformRow, WIRE_VERSION,
     frame_flags,
 };
 
@@ -23,7 +24,7 @@ pub(super) struct Update {
     /// Place of the body among those of its source.
     pub(super) member: usize,
     /// Where it is.
-    pub(super) result: Result<TransformRow, RejectReason>,
+    pub(super) result: std::result::Result<TransformRow, RejectReason>,
     /// Its velocity, scene frame; of every pose of a source or of none.
     pub(super) velocity: Option<[f64; 6]>,
     /// Sender's stamp, nanoseconds.
@@ -58,6 +59,8 @@ impl Seat {
 struct Group {
     name: [u8; SOURCE_NAME_LEN],
     session: u64,
+    /// That which spoke for the source in the newest tick; 0: none.
+    in_force: u64,
     epoch: u64,
     seq: u64,
     /// Poses of continuous bodies that gave way since the last frame: its number tells how many are missing.
@@ -90,6 +93,7 @@ impl Shelf {
         open(&self.waiting).groups.push(Group {
             name,
             session,
+            in_force: 0,
             epoch: 1,
             seq: 0,
             missing: 0,
@@ -182,6 +186,36 @@ impl Shelf {
                 }
             }
         }
+    }
+
+    /// Learns from a tick who speaks for the sources of groups. A session that somebody else has ended by speaking for
+    /// its source is refused for as long as the daemon runs: where another one has come into force, or none is any
+    /// more, the group goes on under a new one, which is taken as soon as the stranger is silent for the time-out.
+    ///
+    /// * `tick` - one that has ended.
+    /// * `draw` - a random session; where it fails it is drawn after the next tick.
+    pub(super) fn hear(&self, tick: &TickRow, draw: impl Fn() -> Result<u64>) {
+        for group in &mut open(&self.waiting).groups {
+            let mut sources = tick.sources.iter().take(usize::from(tick.sources_len));
+            let Some(row) = sources.find(|row| row.name == group.name) else {
+                continue;
+            };
+            if row.session != group.in_force && row.session != group.session {
+                let Ok(session) = draw() else { continue };
+                group.session = session;
+            }
+            group.in_force = row.session;
+        }
+    }
+
+    /// The sessions of the groups are over.
+    pub(super) fn end(&self, inbox: &mut Inbox) {
+        let mut sessions: Vec<u64> = (open(&self.waiting).groups.iter())
+            .map(|group| group.session)
+            .collect();
+        sessions.sort_unstable();
+        sessions.dedup();
+        (sessions.into_iter()).for_each(|session| inbox.end_session(session));
     }
 
     /// Frames that were passed over for newer ones since the last call.

@@ -8,7 +8,8 @@ use crate::time::ManualClock;
 use crate::transport::client::{Client, Rows, Topics};
 use crate::transport::hello::hello;
 use crate::wire::{
-    AnswerHeader, ChangesHeader, FrameHeader, Hello, RequestHeader, VertexHeader, VertexRow,
+    AnswerHeader, ChangesHeader, FrameHeader, Hello, Reason, RequestHeader, State, VertexHeader,
+    VertexRow,
 };
 
 /// Queues that a test fills, of ticks, pairs and changes.
@@ -168,4 +169,27 @@ fn bug_a_message_of_a_boot_without_a_tick_held_up_all_behind_it() {
     ));
     assert_eq!(follow.next(&mut queues).unwrap(), Heard::Tick);
     assert!(follow.view.pairs().is_some());
+}
+
+#[test]
+fn bug_rows_of_a_long_tick_were_handed_out_beside_what_was_told_of_it_and_again_with_its_end() {
+    let (mut follow, mut queues) = (Follow::default(), Queues::default());
+    // All of it is there before the first look.
+    for (number, sent_ns) in [(1, 10), (2, 20), (2, 30), (2, 40)] {
+        let mut row = tick(7, number, sent_ns);
+        if (20..40).contains(&sent_ns) {
+            (row.header.state, row.reasons) = (State::Unknown.code(), Reason::Undecided.bit());
+        }
+        queues.ticks.push_back(row);
+    }
+    for queue in [&mut queues.pairs, &mut queues.changes] {
+        queue.extend([(7, 1), (7, 2)]);
+    }
+    let mut handed_out = Vec::new();
+    while follow.next(&mut queues).unwrap() == Heard::Tick {
+        let view = &follow.view;
+        handed_out.push((view.pairs().is_some(), view.list().is_some()));
+    }
+    let [with, without] = [(true, true), (false, false)];
+    assert_eq!(handed_out, [with, without, without, with]);
 }

@@ -5,32 +5,12 @@ use std::net::Ipv4Addr;
 use ros2_client::{Context, Node, NodeName, NodeOptions, ServiceMapping};
 use rustdds::DomainParticipantBuilder;
 
-use super::super::args::{Params, RosArgs};
 use super::super::env::{Network, Range};
 use super::super::names::Names;
 use super::super::noise::Noise;
-use super::super::params_file::{self, Setting};
 use super::super::sockets;
 use super::RosOptions;
 use crate::error::{Error, Result};
-
-/// The parameters that were said, files read, in their order.
-pub(super) fn said(args: &RosArgs) -> Result<Vec<Setting>> {
-    let mut all = Vec::new();
-    for params in &args.params {
-        match params {
-            Params::One(setting) => all.push(setting.clone()),
-            Params::File(path) => {
-                let shown = path.display().to_string();
-                let text = std::fs::read_to_string(path).map_err(|e| {
-                    Error::Usage(format!("--params-file {shown}: it cannot be read: {e}"))
-                })?;
-                all.extend(params_file::parse(&text, &shown).map_err(Error::Usage)?);
-            }
-        }
-    }
-    Ok(all)
-}
 
 /// Makes the node, without the parameters of ros2-client: this node has its own (`params`).
 pub(super) fn make(options: &RosOptions, context: &Context, names: &Names) -> Result<Node> {

@@ -78,6 +78,53 @@ fn no_event_is_left_out_and_what_is_cut_is_told_in_the_tick() {
 }
 
 #[test]
+fn law_3_6_bug_a_tick_cut_for_ros_was_unknown_only_where_it_had_been_clear() {
+    let parcels = Parcels::default();
+    let wide = Caps {
+        pairs: 9,
+        contacts: 9,
+    };
+    for caps in [
+        CAPS,
+        Caps { pairs: 3, ..wide },
+        Caps {
+            contacts: 2,
+            ..wide
+        },
+        wide,
+    ] {
+        for state in [State::Clear, State::Near, State::Possible, State::Colliding] {
+            let mut all = outbox(1);
+            for header in [
+                &mut all.tick.header,
+                &mut all.pairs_header,
+                &mut all.contacts_header,
+            ] {
+                header.state = state.code();
+            }
+            parcels.put(&all, Demand::ALL, caps);
+            let parcel = next(&parcels);
+            let wanted = if caps == wide || state == State::Colliding {
+                state
+            } else {
+                State::Unknown
+            };
+            let told = [
+                parcel.tick.header,
+                parcel.pairs_header,
+                parcel.contacts_header,
+            ];
+            assert_eq!(
+                told.map(|header| header.state),
+                [wanted.code(); 3],
+                "{state}"
+            );
+            parcels.give_back(parcel);
+        }
+    }
+}
+
+#[test]
 fn a_cap_of_zero_keeps_nothing_and_says_so() {
     let parcels = Parcels::default();
     let caps = Caps {

@@ -176,3 +176,49 @@ fn bug_poses_of_a_continuous_body_that_gave_way_to_newer_ones_were_not_missing()
     };
     assert_eq!(number(&[refused, update(1, 6.0, 12)]), 8);
 }
+
+/// What it sent was `session_over` for as long as the daemon ran.
+#[test]
+fn bug_a_stranger_under_the_name_of_a_source_of_topics_locked_that_source_out() {
+    let shelf = Shelf::default();
+    shelf.add_group(name_bytes("tf"), 9, seats(&[1]));
+    shelf.add_group(name_bytes("odom"), 9, seats(&[2]));
+    let next = std::cell::Cell::new(100);
+    let draw = || {
+        next.set(next.get() + 1);
+        Ok(next.get())
+    };
+    let tick = |session| {
+        let mut tick = TickRow::default();
+        for (row, (name, session)) in (tick.sources.iter_mut()).zip([("tf", session), ("odom", 9)])
+        {
+            (row.name, row.session) = (name_bytes(name), session);
+        }
+        tick.sources_len = 2;
+        tick
+    };
+    // Who spoke in a tick; the session of what is sent after it.
+    let sent = |session| {
+        shelf.hear(&tick(session), draw);
+        for group in 0..2 {
+            shelf.merge(group, &[update(0, 1.0, 5)]);
+        }
+        let mut inbox = Inbox::default();
+        shelf.drain(&mut inbox);
+        assert_eq!(inbox.frames()[1].header.session, 9, "the other source");
+        inbox.frames()[0].header.session
+    };
+    assert_eq!([0, 9, 9].map(sent), [9; 3]);
+    // It speaks, and is silent; the new one is not in force yet, and is kept until it is.
+    assert_eq!([5, 5, 5].map(sent), [101; 3]);
+    assert_eq!([101, 101].map(sent), [101; 2]);
+    // One came and went between two ticks.
+    assert_eq!([0, 0, 102].map(sent), [102; 3]);
+    assert_eq!([6, 7].map(sent), [103, 104], "each may have ended it");
+    let fails = || Err(crate::error::Error::Usage(String::new()));
+    shelf.hear(&tick(8), fails);
+    assert_eq!(sent(8), 105, "drawn as soon as it can be");
+    let mut inbox = Inbox::default();
+    shelf.end(&mut inbox);
+    assert_eq!(inbox.ended(), [9, 105]);
+}

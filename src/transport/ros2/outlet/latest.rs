@@ -1,0 +1,86 @@
+//! The ticks that `/diagnostics` is made of. In: parcels. Out: a row whose counts are those of a tick that has ended.
+
+use super::super::parcel::Parcel;
+use crate::wire::TickRow;
+
+/// The newest tick that has ended, and what was told from within the next one.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in super::super) struct Latest {
+    /// Tick 0: none has.
+    ended: TickRow,
+    /// State and reasons of the one that is under way.
+    under_way: Option<(u8, u32)>,
+    /// Whether it has ended since it was last asked for.
+    is_new: bool,
+}
+
+impl Latest {
+    /// Takes note of a tick that goes out.
+    pub(super) fn take(&mut self, parcel: &Parcel) {
+        let tick = &parcel.tick;
+        if parcel.done {
+            (self.ended, self.under_way, self.is_new) = (*tick, None, true);
+        } else {
+            self.under_way = Some((tick.header.state, tick.reasons));
+        }
+    }
+
+    /// Whether a tick has ended yet.
+    pub(super) fn is_there(&self) -> bool {
+        self.ended.header.tick > 0
+    }
+
+    /// The newest tick that has ended; in the state of the one that is under way where none has since the last call.
+    ///
+    /// One that is under way has no counts and no sources: against them all that was ever missed or refused would be
+    /// news with the next one, and every source would send.
+    pub(super) fn row(&mut self) -> TickRow {
+        let mut row = self.ended;
+        if !std::mem::take(&mut self.is_new)
+            && let Some((state, reasons)) = self.under_way
+        {
+            (row.header.state, row.reasons) = (state, reasons);
+        }
+        row
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::transport::memory::trial::under_way;
+    use crate::transport::ros2::diagnose::Diagnoser;
+    use crate::wire::ros::diagnostic_level::{ERROR, OK};
+    use crate::wire::ros::{Counts, Time};
+
+    #[test]
+    fn bug_a_tick_that_was_under_way_made_what_was_missed_and_refused_hours_ago_news() {
+        let mut parcel = Parcel::default();
+        parcel.tick.header.tick = 3;
+        (parcel.tick.missed, parcel.tick.rejects[0]) = (7, 9);
+        parcel.tick.sources_len = 1;
+        parcel.done = true;
+        let beat = Parcel {
+            tick: under_way(4),
+            ..Parcel::default()
+        };
+        let (mut latest, counts) = (Latest::default(), Counts::default());
+        assert!(!latest.is_there());
+        latest.take(&parcel);
+        let mut diagnoser = Diagnoser::since(&latest.row(), counts);
+        let mut levels = |latest: &mut Latest| {
+            let row = latest.row();
+            let all = diagnoser.diagnose(Time::default(), "sweepd", &row, counts, &[]);
+            let levels: Vec<u8> = all.status.iter().map(|status| status.level).collect();
+            levels
+        };
+        // The source has never sent.
+        latest.take(&parcel);
+        latest.take(&beat);
+        assert_eq!(levels(&mut latest), [OK, OK, ERROR, OK]);
+        // No tick has ended for a second: what is known is that nothing is decided.
+        assert_eq!(levels(&mut latest), [ERROR, OK, ERROR, OK]);
+        latest.take(&parcel);
+        assert_eq!(levels(&mut latest), [OK, OK, ERROR, OK]);
+    }
+}
