@@ -117,7 +117,7 @@ enum {
     SWEEPD_BROAD_CAUSE_FEW_MOVED = 1,
     /* More moved. */
     SWEEPD_BROAD_CAUSE_MANY_MOVED = 2,
-    /* More than an eighth of the bodies came in. */
+    /* More than an eighth of the bodies came in, or jumped away from where they stood. */
     SWEEPD_BROAD_CAUSE_MANY_CAME = 3,
     /* The order has worn: its blocks met too many others, or a body found no free place. */
     SWEEPD_BROAD_CAUSE_WORN = 4,

@@ -131,9 +131,9 @@ code! {
         None = 0 => "none",
         /// Less than a tenth of the bodies moved (a fourteenth, once they are listed).
         FewMoved = 1 => "few_moved",
-        /// More moved.
+        /// More moved, in this tick or in one of the last three.
         ManyMoved = 2 => "many_moved",
-        /// More than an eighth of the bodies came in.
+        /// More than an eighth of the bodies came in, or jumped away from where they stood.
         ManyCame = 3 => "many_came",
         /// The order has worn: its blocks met too many others, or a body found no free place.
         Worn = 4 => "worn",

@@ -30,6 +30,7 @@ mod rig;
 mod scenes;
 mod soak;
 mod stand;
+mod turns;
 
 use common::Rng;
 use rig::{Rig, at};

@@ -627,9 +627,9 @@ class BroadCause(IntEnum):
     NONE = 0
     # Less than a tenth of the bodies moved (a fourteenth, once they are listed).
     FEW_MOVED = 1
-    # More moved.
+    # More moved, in this tick or in one of the last three.
     MANY_MOVED = 2
-    # More than an eighth of the bodies came in.
+    # More than an eighth of the bodies came in, or jumped away from where they stood.
     MANY_CAME = 3
     # The order has worn: its blocks met too many others, or a body found no free place.
     WORN = 4

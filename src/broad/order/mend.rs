@@ -11,7 +11,7 @@ use super::home::far_from;
 use super::links::room;
 use super::sort::{Sorter, split};
 use super::tree::NO_BOUND;
-use super::{BodySlot, NONE, Order, Proxies, Tick, ones, small};
+use super::{BodySlot, MANY_CAME, NONE, Order, Proxies, Tick, ones, small};
 use crate::simd::boxes::{Boxes16, Down, WIDTH};
 
 /// A body farther outside its quarter than so many of its mean sides looks for another block.
@@ -54,19 +54,44 @@ impl Mender {
 }
 
 impl Order {
+    /// Lanes of a block that are to be renewed and whose bodies have jumped clear of its bound.
+    fn jumped_clear(&self, block: usize) -> u16 {
+        let bound = self.tree.bound(block);
+        let mut clear = 0;
+        for lane in ones(self.renewing[block]) {
+            let one = self.exact[block * WIDTH + lane].corners();
+            let meets = (0..3).all(|k| one[k] <= bound[k + 3] && bound[k] <= one[k + 3]);
+            clear |= u16::from(!meets) << lane;
+        }
+        clear
+    }
+
+    /// Whether so many bodies came or jumped clear of their blocks that to sort all anew costs less than to seat each
+    /// of them.
+    pub(super) fn have_scattered(&self, bodies: usize) -> bool {
+        let few = bodies / MANY_CAME;
+        let mut count = self.homeless.len();
+        let renewing = self.worklist.iter().map(|block| *block as usize);
+        let most: u32 = (renewing.clone())
+            .map(|block| self.renewing[block].count_ones())
+            .sum();
+        if count + most as usize <= few {
+            return false;
+        }
+        for block in renewing {
+            count += self.jumped_clear(block).count_ones() as usize;
+        }
+        count > few
+    }
+
     /// Bodies that jumped clear of their block's bound give up their lanes, to stand where they belong.
     pub(super) fn rehome(&mut self) {
         for at in 0..self.worklist.len() {
             let block = self.worklist[at] as usize;
-            let bound = *self.tree.bound(block);
-            for lane in ones(self.renewing[block]) {
-                let one = self.exact[block * WIDTH + lane].corners();
-                let meets = (0..3).all(|k| one[k] <= bound[k + 3] && bound[k] <= one[k + 3]);
-                if !meets {
-                    let slot = BodySlot(self.slot_of[block * WIDTH + lane]);
-                    self.evict(slot, true);
-                    self.homeless.push(slot);
-                }
+            for lane in ones(self.jumped_clear(block)) {
+                let slot = BodySlot(self.slot_of[block * WIDTH + lane]);
+                self.evict(slot, true);
+                self.homeless.push(slot);
             }
         }
     }

@@ -83,10 +83,7 @@ use tree::Tree;
 const NONE: u32 = u32::MAX;
 /// One moved body in so many, and they are looked at by blocks, which takes a fraction of the time for each.
 const MANY_MOVED: usize = 10;
-/// One moved body in so many, and candidates that are listed stay so: to list them again costs as much as some ticks,
-/// so the list is let go later than it is made.
-const STILL_MANY: usize = 14;
-/// So many inserted among all, and everything is sorted anew rather than each put into a free lane.
+/// One body in so many that came or jumped away, and everything is sorted anew rather than each put into a free lane.
 const MANY_CAME: usize = 8;
 
 /// What one update is told, and where its results go.
@@ -166,6 +163,8 @@ pub(super) struct Order {
     /// The candidates as a flat list, while it is kept (`look`).
     entries: Vec<entry::Entry>,
     listed: bool,
+    /// Ticks since the last one in which many moved, as far as they count.
+    still: u8,
     found: Vec<look::Found>,
     gather: moved::Gather,
     /// Blocks met by queries since the last sort beyond what they met right after it.
@@ -226,6 +225,7 @@ impl Order {
             emptied: Vec::new(),
             entries: Vec::new(),
             listed: false,
+            still: u8::MAX,
             found: Vec::new(),
             gather: moved::Gather::default(),
             excess: 0,
@@ -248,10 +248,8 @@ impl Order {
     pub(super) fn leave(&mut self, left: &[BodySlot]) {
         if self.afresh.on {
             self.leave_afresh(left);
-            return;
-        }
-        for slot in left {
-            self.evict(*slot, false);
+        } else {
+            self.evict_all(left);
         }
     }
 
@@ -272,17 +270,19 @@ impl Order {
         if was {
             self.end_afresh();
         }
-        let many_came = self.homeless.len() * MANY_CAME > tick.members.bounded().len();
-        let anew = was || many_came;
-        // With hysteresis: to list all candidates again costs as much as some ticks.
-        let share = if self.listed { STILL_MANY } else { MANY_MOVED };
-        let many = tick.moved.len() * share > self.len;
+        let mut many_came = self.homeless.len() * MANY_CAME > bodies;
+        let mut anew = was || many_came;
+        let many = self.are_many(moved);
         self.listed &= many;
         if anew || many {
             self.beat = self.beat.wrapping_add(1);
         }
         if !anew {
             self.load(&tick, many);
+            many_came = self.have_scattered(bodies);
+            anew = many_came;
+        }
+        if !anew {
             self.rehome();
             if many {
                 self.mend(&tick);

@@ -11,9 +11,15 @@ use super::bits::each_bit;
 use super::idle::{give_back, is_thrifty};
 use super::links::{Bits, Links, Matrix, room};
 use super::look::{is_as_before, overlap, verdict};
-use super::{BodySlot, Order, Proxies, Tick, Work as Done, parts, small};
+use super::{BodySlot, MANY_MOVED, Order, Proxies, Tick, Work as Done, parts, small};
 use crate::simd::boxes::{Down, LANES, Lanes, WIDTH, Work, prefetch};
 
+/// One moved body in so many, and candidates that are listed stay so: to list them again costs as much as some ticks,
+/// so the list is let go later than it is made.
+const STILL_MANY: usize = 14;
+/// Ticks in which few moved that candidates stay listed for: to list them again costs about as much as so many looks
+/// at the list, so whichever tick comes next, at most twice the least is paid.
+const STILL_TICKS: u8 = 3;
 /// Moved bodies ahead whose blocks' lists are asked for, and whose matrices.
 const AHEAD_LISTS: usize = 8;
 const AHEAD_BITS: usize = 4;
@@ -133,6 +139,18 @@ impl Gather {
 }
 
 impl Order {
+    /// Whether so many moved that the candidates are gone through as a list. With hysteresis, in their number and in
+    /// time: to list all candidates again costs as much as some ticks.
+    pub(super) fn are_many(&mut self, moved: usize) -> bool {
+        let share = if self.listed { STILL_MANY } else { MANY_MOVED };
+        if moved * share > self.len {
+            self.still = 0;
+            return true;
+        }
+        self.still = self.still.saturating_add(1);
+        self.listed && self.still <= STILL_TICKS
+    }
+
     /// Looks at the candidates of moved bodies, one by one.
     pub(super) fn look_at_moved<P: Proxies>(&mut self, tick: &mut Tick<'_, P>, done: &mut Done) {
         self.give_back_list();

@@ -30,6 +30,31 @@ impl Order {
             self.each_bit(rank, |bits| bits.hit, |other| carried.push((slot.0, other)));
             self.carried = carried;
         }
+        self.unlink(block, 1 << lane);
+        self.vacate_lane(rank);
+    }
+
+    /// Takes the lanes of bodies away that have left, block by block: most of the cost of one is that of its block.
+    pub(super) fn evict_all(&mut self, left: &[BodySlot]) {
+        let mut ranks = std::mem::take(&mut self.worklist);
+        ranks.clear();
+        ranks.extend(left.iter().filter_map(|slot| self.rank(*slot)));
+        ranks.sort_unstable();
+        for of_block in ranks.chunk_by(|one, other| parts(*one).0 == parts(*other).0) {
+            let gone = of_block
+                .iter()
+                .fold(0, |gone, rank| gone | 1 << parts(*rank).1);
+            self.unlink(parts(of_block[0]).0, gone);
+            for rank in of_block {
+                self.vacate_lane(*rank);
+            }
+        }
+        ranks.clear();
+        self.worklist = ranks;
+    }
+
+    /// Takes some lanes of a block out of all matrices.
+    fn unlink(&mut self, block: usize, gone: u16) {
         let mut empty = std::mem::take(&mut self.emptied);
         let mut records = std::mem::take(&mut self.touched_records);
         records.extend(self.links.of(small(block)).map(|(_, record)| record));
@@ -38,12 +63,12 @@ impl Order {
             let bits = self.links.bits_mut(record);
             let mut any = 0;
             for row in 0..WIDTH {
-                let mine = if a == block && row == lane {
+                let mine = if a == block && gone >> row & 1 == 1 {
                     0
                 } else {
                     u16::MAX
                 };
-                let theirs = if b == block { !(1 << lane) } else { u16::MAX };
+                let theirs = if b == block { !gone } else { u16::MAX };
                 bits.cand[row] &= mine & theirs;
                 self.hits -= (bits.hit[row] & !(mine & theirs)).count_ones() as usize;
                 bits.hit[row] &= mine & theirs;
@@ -58,17 +83,22 @@ impl Order {
         }
         self.emptied = empty;
         self.touched_records = records;
-        self.rank_of[slot.index()] = NONE;
-        self.slot_of[rank as usize] = NONE;
+    }
+
+    /// Leaves nobody in a lane that no matrix names any more.
+    fn vacate_lane(&mut self, rank: u32) {
+        let (block, lane) = parts(rank);
+        let rank = rank as usize;
+        let slot = std::mem::replace(&mut self.slot_of[rank], NONE);
+        self.rank_of[slot as usize] = NONE;
         self.live[block] &= !(1 << lane);
         self.renewing[block] &= !(1 << lane);
         self.fat[block].set(lane, &[f32::NAN; 6]);
         if self.listed {
             self.sure[block].set(lane, &[f32::NAN; 6]);
         }
-        let rank = rank as usize;
         self.exact[rank] = Down::EMPTY;
-        self.held[slot.index()] = Held::EMPTY;
+        self.held[slot as usize] = Held::EMPTY;
         self.ages[rank] = self.ages[rank].wrapping_add(1);
         self.len -= 1;
         self.lanes_changed += 1;
