@@ -9,8 +9,6 @@
 
 mod validate;
 
-use std::cmp::Ordering;
-
 use super::kept::Span;
 use crate::ids::{BodyId, PairSlot, small};
 use crate::math::Interval;
@@ -53,11 +51,12 @@ impl Row {
         }
     }
 
-    /// The order in which rows are kept where not all fit: by class, in it the deepest first, then by ids.
-    pub(super) fn by_rank(&self, other: &Self) -> Ordering {
-        (self.class().cmp(&other.class()))
-            .then(self.gap.min.total_cmp(&other.gap.min))
-            .then(self.order().cmp(&other.order()))
+    /// By what rows are kept where not all fit, the least first: the class, in it the depth, as a number in the order of
+    /// [`f64::total_cmp`].
+    pub(super) fn rank(&self) -> (u8, i64) {
+        let bits = self.gap.min.to_bits().cast_signed();
+        // Of negative ones all bits but the sign are the other way round.
+        (self.class(), bits ^ ((bits >> 63) & i64::MAX))
     }
 
     /// Whether it may be taken over from the tick before as it is, unless its pair was stirred. What is undecided ages

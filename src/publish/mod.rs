@@ -8,6 +8,7 @@ mod changes;
 mod contact_changes;
 mod contacts;
 mod events;
+mod fit;
 mod kept;
 mod leaders;
 mod listing;
@@ -26,6 +27,7 @@ use crate::world::World;
 
 use changes::Chain;
 use events::Events;
+use fit::{Rank, Stood};
 use kept::Kept;
 use listing::Listing;
 use owed::Owed;
@@ -86,12 +88,12 @@ pub struct Publisher {
     contact_pairs: Vec<(f64, u32, u32)>,
     /// Used only when not all rows fit: by place whether it is sent.
     chosen: Vec<bool>,
-    /// Whether `pairs` had all its rows in the last tick.
-    had_all_pairs: bool,
-    /// The same of `contacts`.
+    /// Where the rows stood in `pairs` in the last tick.
+    stood: Stood,
+    /// Whether `contacts` had all its rows in the last tick.
     had_all_contacts: bool,
-    /// Places among the rows of the pairs whose regions are sent, or of all by rank.
-    ranked: Vec<usize>,
+    /// Used only when not all rows fit, or for regions: the rows that one may choose from.
+    ranked: Vec<Rank>,
     verdicts: Vec<u8>,
     next_contact: u64,
 }
@@ -113,7 +115,7 @@ impl Publisher {
             contact_chain: Chain::default(),
             contact_pairs: Vec::new(),
             chosen: Vec::new(),
-            had_all_pairs: false,
+            stood: Stood::default(),
             had_all_contacts: false,
             ranked: Vec::new(),
             verdicts: Vec::new(),

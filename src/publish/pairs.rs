@@ -9,6 +9,7 @@ use crate::wire::{
 use crate::world::{Body, Tag};
 
 use super::events::{Ids, PairEvent};
+use super::fit::Stood;
 use super::kept::{Kept, Span};
 use super::listing::{Mark, NO_EVENT, Row};
 use super::{AHEAD, Publisher, View};
@@ -33,7 +34,7 @@ impl Publisher {
         let listened = view.demand.pairs || view.demand.changes;
         let left_out = if listened {
             self.add_events(view);
-            self.rank()
+            self.choose_rows()
         } else {
             0
         };
@@ -60,11 +61,11 @@ impl Publisher {
     ) {
         if !view.demand.pairs {
             out.pairs.clear();
-            self.had_all_pairs = false;
+            self.stood = Stood::Nowhere;
             return;
         }
         let cut = left_out > 0;
-        let whole = std::mem::replace(&mut self.had_all_pairs, !cut) && !cut;
+        let whole = matches!(self.stood, Stood::Listed) && !cut;
         let mut kept = std::mem::take(&mut self.kept_pairs);
         kept.begin();
         let mut at = 0;
@@ -79,7 +80,14 @@ impl Publisher {
             {
                 view.narrow.ask_ahead(slot);
             }
-            if !cut || self.chosen.get(at) == Some(&true) {
+            let sent = !cut || self.chosen.get(at) == Some(&true);
+            if sent
+                && let Some(first) = self.stood.place(&self.listing.marks[at])
+                && let Some(row) = out.pairs.get_mut(first as usize)
+            {
+                row.age(1);
+                kept.keep(Span { first, len: 1 });
+            } else if sent {
                 let make = |out: &mut Vec<PairRow>| {
                     out.push(self.pair_row(view, self.listing.row(at)));
                 };
@@ -89,6 +97,7 @@ impl Publisher {
         }
         kept.finish(&mut out.pairs);
         self.kept_pairs = kept;
+        self.note_places(cut);
         out.pairs_header = MessageHeader {
             truncated: left_out,
             ..header
@@ -147,25 +156,6 @@ impl Publisher {
     fn slot_of(view: &View<'_>, ids: Ids) -> Option<PairSlot> {
         let (a, b) = (view.world.slot_of(ids.0)?, view.world.slot_of(ids.1)?);
         view.pairs.find(PairKey::new(a, b))
-    }
-
-    /// Chooses what is sent where not all fit, events that waited and then the best rank first; returns how many are
-    /// left out.
-    fn rank(&mut self) -> u64 {
-        let (most, listing, ranked) = (self.limits.pair_rows, &self.listing, &mut self.ranked);
-        let left_out = listing.len().saturating_sub(most);
-        if left_out > 0 {
-            ranked.clear();
-            ranked.extend(0..listing.len());
-            let turn = |at: usize| self.events.turn(listing.row(at).event);
-            ranked.sort_unstable_by(|&x, &y| {
-                (turn(x).cmp(&turn(y))).then(listing.row(x).by_rank(listing.row(y)))
-            });
-            self.chosen.clear();
-            self.chosen.resize(listing.len(), false);
-            ranked[..most].iter().for_each(|&at| self.chosen[at] = true);
-        }
-        left_out as u64
     }
 
     pub(super) fn pair_row(&self, view: &View<'_>, row: &Row) -> PairRow {

@@ -26,26 +26,38 @@ impl Publisher {
         }
         let (chosen, rows) = (&mut self.ranked, &self.listing);
         chosen.clear();
-        let open = rows.iter().enumerate();
+        let open = (0..).zip(rows.iter());
         chosen.extend(
             open.filter(|(_, row)| row.slot.is_some() && row.class() <= CLASS_MAX)
-                .map(|(at, _)| at),
+                .map(|(at, row)| {
+                    let (class, gap) = row.rank();
+                    (0, class, gap, at)
+                }),
         );
         let looks = (REGION_LOOKS_PER_TICK / chosen.len().max(1)).min(REGION_LOOKS_FREE);
         let most = self.limits.region_rows.max(REGIONS_PER_PAIR_MAX);
         let ranked = chosen.len() * REGIONS_PER_PAIR_MAX > most;
-        if ranked {
-            chosen.sort_unstable_by(|&x, &y| rows.row(x).by_rank(rows.row(y)));
-        }
+        let mut sorted = if ranked { 0 } else { chosen.len() };
         let mut left_out = 0;
-        for &at in &*chosen {
-            let Some(slot) = rows.row(at).slot else {
+        for nth in 0..chosen.len() {
+            if out.regions.len() + REGIONS_PER_PAIR_MAX > most {
+                left_out = (chosen.len() - nth) as u64;
+                break;
+            }
+            if nth == sorted {
+                // No more than may be asked for are put in order.
+                let behind = &mut chosen[nth..];
+                let next = most.min(behind.len());
+                if next < behind.len() {
+                    behind.select_nth_unstable(next);
+                }
+                behind[..next].sort_unstable();
+                sorted += next;
+            }
+            let (.., at) = chosen[nth];
+            let Some(slot) = rows.row(at as usize).slot else {
                 continue;
             };
-            if out.regions.len() + REGIONS_PER_PAIR_MAX > most {
-                left_out += 1;
-                continue;
-            }
             let Some(finding) = view.narrow.finding(slot) else {
                 continue;
             };

@@ -2,6 +2,7 @@
 //! that the messages of the last tick are what rows and marks say of them.
 
 use super::Publisher;
+use super::fit::Stood;
 use super::pairs::worst_of;
 use crate::narrow::Narrow;
 use crate::pairs::PairSet;
@@ -75,7 +76,7 @@ impl Publisher {
             return Err("rows of pairs are not by ids".into());
         }
         let listed = self.listing.iter().map(|row| (row.ids.0.0, row.ids.1.0));
-        if self.had_all_pairs && !sent().eq(listed) {
+        if matches!(self.stood, Stood::Listed) && !sent().eq(listed) {
             return Err("rows of pairs are not those of the list".into());
         }
         if self.kept_pairs.rows() != out.pairs.len() {

@@ -174,6 +174,39 @@ fn law_3_9_the_state_is_never_clear_nor_near_when_something_was_left_out() {
 }
 
 #[test]
+fn rows_that_are_left_where_they_stood_among_others_that_do_not_fit_are_those_of_a_list_that_fits()
+{
+    let near = "report_within_m = 0.5";
+    let gap = |k: u64| 0.04 * k as f64 - 0.5;
+    let mut whole = couples("", 20, gap, near);
+    let mut cut = couples("[limits]\npair_rows = 7", 20, gap, near);
+    // Couples that change their gap in a tick, of which those are seven at the most that matter.
+    let stirs: [&[u64]; 9] = [&[], &[], &[3], &[20, 19], &[], &[1, 2, 3], &[8], &[], &[7]];
+    let mut kept = 0;
+    for tick in 0..90 {
+        for k in stirs[tick % stirs.len()] {
+            let y = 0.3 * ((tick * 7 + *k as usize) % 5) as f64;
+            whole.row(2 * k).position[1] = y;
+            cut.row(2 * k).position[1] = y;
+        }
+        let before: Vec<u64> = ids(&cut);
+        whole.send(ALL);
+        cut.send(ALL);
+        assert_eq!(cut.out.pairs.len(), 7);
+        kept += ids(&cut).iter().filter(|id| before.contains(id)).count();
+        for row in &cut.out.pairs {
+            let twin = |other: &&sweepd::wire::PairRow| other.body_a == row.body_a;
+            let twin = whole.out.pairs.iter().find(twin).unwrap();
+            // Of events that waited the twin has told.
+            if row.events & !Event::Persist.bit() == 0 && twin.events == row.events {
+                assert_eq!(row, twin, "tick {tick}");
+            }
+        }
+    }
+    assert!(kept > 90 * 4, "{kept}");
+}
+
+#[test]
 fn law_3_9_contact_rows_that_do_not_fit_are_the_shallowest() {
     let mut rig = couples("[limits]\ncontact_rows = 2", 4, |k| -0.1 * k as f64, "");
     rig.send(ALL);

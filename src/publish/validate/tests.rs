@@ -3,6 +3,7 @@
 
 use std::path::Path;
 
+use super::super::fit::Stood;
 use super::super::listing::Row;
 use super::super::{Publisher, View};
 use crate::daemon::build_shapes;
@@ -156,7 +157,7 @@ const FAULTS: [Fault; 12] = [
         stage.out.pairs.pop();
     }),
     ("rows of pairs settled", |stage| {
-        stage.publisher.had_all_pairs = false;
+        stage.publisher.stood = Stood::Nowhere;
         stage.out.pairs.pop();
     }),
     ("not where its mark says", |stage| {
