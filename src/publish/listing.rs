@@ -51,8 +51,8 @@ impl Row {
         }
     }
 
-    /// By what rows are kept where not all fit, the least first: the class, in it the depth, as a number in the order of
-    /// [`f64::total_cmp`].
+    /// By what rows are kept where not all fit, the least first: the class, in it the depth as a number in the order
+    /// of [`f64::total_cmp`].
     pub(super) fn rank(&self) -> (u8, i64) {
         let bits = self.gap.min.to_bits().cast_signed();
         // Of negative ones all bits but the sign are the other way round.

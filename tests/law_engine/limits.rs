@@ -199,7 +199,8 @@ fn rows_that_are_left_where_they_stood_among_others_that_do_not_fit_are_those_of
             let twin = whole.out.pairs.iter().find(twin).unwrap();
             // Of events that waited the twin has told.
             if row.events & !Event::Persist.bit() == 0 && twin.events == row.events {
-                assert_eq!(row, twin, "tick {tick}");
+                // In words, for what is not known is NaN.
+                assert_eq!(format!("{row:?}"), format!("{twin:?}"), "tick {tick}");
             }
         }
     }

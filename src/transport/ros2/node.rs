@@ -99,9 +99,8 @@ impl RosNode {
         wake: Box<dyn Fn() + Send>,
     ) -> Result<Self> {
         let mut names = Names::new(&options.args, NODE_NAME).map_err(Error::Usage)?;
-        let (table, mut odd) =
-            Table::started(scene, &said(&options.args.params)?, &names.full_node())
-                .map_err(Error::Usage)?;
+        let (table, mut odd) = Table::started(scene, &said(&options.args)?, &names.full_node())
+            .map_err(Error::Usage)?;
         let table = Arc::new(table);
         let book = Book::of(&first_names(scene));
         let shared = shared(options, scene, &names, book.clone());

@@ -113,8 +113,8 @@ fn pair_rank(row: &PairRow) -> (u8, f64) {
 }
 
 impl Parcel {
-    /// Rows that do not go out are told in the tick, too: it is unknown then, as where the tick itself had cut them off,
-    /// unless it is colliding. All messages of a tick say the same state.
+    /// Rows that do not go out are told in the tick, too: unless it is colliding it is unknown then, as where the tick
+    /// itself had cut them off. All messages of a tick say the same state.
     fn note_cut(&mut self, left_out: u64) {
         if left_out == 0 {
             return;

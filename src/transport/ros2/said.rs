@@ -1,4 +1,5 @@
-//! Parameters that were said at the start. In: ROS arguments. Out: settings in their order, files read, or what is wrong.
+//! Parameters that were said at the start. In: ROS arguments. Out: settings in their order, files read; or what is
+//! wrong.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -15,15 +16,15 @@ impl RosArgs {
     /// # Errors
     /// `Error::Usage` where a file cannot be read, or is none of parameters.
     pub fn with_files_read(self) -> Result<Self> {
-        let params = said(&self.params)?.into_iter().map(Params::One).collect();
+        let params = said(&self)?.into_iter().map(Params::One).collect();
         Ok(Self { params, ..self })
     }
 }
 
 /// The parameters that were said, files read, in their order.
-pub(super) fn said(params: &[Params]) -> Result<Vec<Setting>> {
+pub(super) fn said(args: &RosArgs) -> Result<Vec<Setting>> {
     let mut all = Vec::new();
-    for params in params {
+    for params in &args.params {
         match params {
             Params::One(setting) => all.push(setting.clone()),
             Params::File(path) => {
@@ -57,7 +58,7 @@ mod tests {
 
     fn read_all(line: &str) -> Result<Vec<Setting>> {
         let words: Vec<String> = line.split(' ').map(str::to_owned).collect();
-        said(&RosArgs::parse(&words).unwrap().with_files_read()?.params)
+        said(&RosArgs::parse(&words).unwrap().with_files_read()?)
     }
 
     #[test]
