@@ -17,7 +17,7 @@ use sweepd::scene::Scene;
 use sweepd::tick::pace::{Due, Pacer};
 use sweepd::time::{Clock, ManualClock};
 use sweepd::wire::{BodyStatus, Frame, Inbox, TickCause, WIRE_VERSION, frame_flags};
-use sweepd::world::{Edit, World};
+use sweepd::world::{Edit, Put, World};
 
 use support::{MS, START_NS, TIMEOUT_NS, cube, fixed, frame, moving, row, scene};
 
@@ -388,10 +388,10 @@ fn law_1_no_frame_of_a_source_that_moves_a_continuous_body_is_passed_over() {
         // A body that is put while the daemon runs; the robot, which leads no tick, is its source.
         let mut bullet = moving("bullet", 4);
         (bullet.source, bullet.continuous) = (Some(1), true);
-        daemon.edits.push(Edit::Put {
+        daemon.edits.push(Edit::Put(Put {
             body: Arc::new(bullet),
             shapes: cube(),
-        });
+        }));
         daemon.run(3.0, Vec::new());
         for source in 0..2 {
             assert_eq!(daemon.world.is_followed(source), source == 1);
@@ -576,9 +576,9 @@ fn law_4_4_vertices_wait_for_the_frame_that_they_belong_with() {
     bend(&mut daemon, "sim", 1, 1, 1);
     bend(&mut daemon, "robot", 1, 5, 50);
     bend(&mut daemon, "sim", 1, 0, 2);
-    // The first tick is a heartbeat: what is not of the lead goes with it. What is of no frame keeps its place behind
-    // what was sent before.
-    assert_eq!(next(&mut daemon), Some((vec![], vec![50])));
+    bend(&mut daemon, "robot", 1, 0, 51);
+    // The first tick is a heartbeat. What is of no frame keeps its place behind what was sent before.
+    assert_eq!(next(&mut daemon), Some((vec![], vec![])));
     assert_eq!(next(&mut daemon), None);
     *daemon.drained.push() = sim(1);
     bend(&mut daemon, "sim", 1, 2, 3);
@@ -589,15 +589,62 @@ fn law_4_4_vertices_wait_for_the_frame_that_they_belong_with() {
     assert_eq!(next(&mut daemon), Some((vec![(1, 1)], vec![1, 2])));
     assert_eq!(next(&mut daemon), Some((vec![(1, 2)], vec![3, 4])));
     assert_eq!(next(&mut daemon), Some((vec![(1, 3)], vec![])));
+    // Its own frame is silent for too long: what is not of the lead waits for a time-out.
+    daemon.clock.advance(TIMEOUT_NS);
+    assert_eq!(next(&mut daemon), Some((vec![], vec![50, 51])));
     // Its session ends: what waited for a frame that never comes is gone with it.
     daemon.drained.end_session(1);
     daemon.clock.advance(200 * MS);
     assert_eq!(next(&mut daemon), Some((vec![], vec![])));
     *daemon.drained.push() = sim(9);
     assert_eq!(next(&mut daemon), Some((vec![(1, 9)], vec![])));
-    let mut daemon = Daemon::of(Mode::Rate(100.0));
-    bend(&mut daemon, "sim", 1, 7, 1);
-    assert_eq!(next(&mut daemon), Some((vec![], vec![1])));
+}
+
+#[test]
+fn law_4_4_bug_vertices_ahead_of_a_frame_that_comes_a_tick_later_bent_the_pose_before_it() {
+    for mode in [
+        Mode::Rate(10.0),
+        Mode::OnAll,
+        Mode::OnFrame("robot".to_owned()),
+    ] {
+        let mut daemon = Daemon::of(mode.clone());
+        let tick = |daemon: &mut Daemon| {
+            daemon.clock.advance(HEARTBEAT_NS);
+            let (frames, versions) = next(daemon).unwrap();
+            let of_sim = frames.iter().filter(|(_, seq)| *seq >= 10);
+            (of_sim.map(|(_, seq)| *seq).collect::<Vec<_>>(), versions)
+        };
+        // Both send, so that a round ends and the lead has a frame.
+        let mut seq = 0;
+        let mut send = |daemon: &mut Daemon, of_sim: u64| {
+            seq += 1;
+            *daemon.drained.push() = robot(seq);
+            *daemon.drained.push() = sim(of_sim);
+        };
+        assert_eq!(tick(&mut daemon), (vec![], vec![]), "{mode:?}");
+        bend(&mut daemon, "sim", 1, 10, 1);
+        // What is of no frame keeps its place.
+        bend(&mut daemon, "sim", 1, 0, 2);
+        assert_eq!(tick(&mut daemon), (vec![], vec![]), "{mode:?}");
+        send(&mut daemon, 10);
+        assert_eq!(tick(&mut daemon), (vec![10], vec![1, 2]), "{mode:?}");
+        // Its frame was taken before, or one after it.
+        bend(&mut daemon, "sim", 1, 10, 3);
+        assert_eq!(tick(&mut daemon), (vec![], vec![3]), "{mode:?}");
+        bend(&mut daemon, "sim", 1, 11, 4);
+        send(&mut daemon, 12);
+        assert_eq!(tick(&mut daemon), (vec![12], vec![4]), "{mode:?}");
+        // It never comes.
+        bend(&mut daemon, "sim", 1, 13, 5);
+        assert_eq!(tick(&mut daemon), (vec![], vec![]), "{mode:?}");
+        daemon.clock.advance(TIMEOUT_NS - HEARTBEAT_NS);
+        assert_eq!(tick(&mut daemon), (vec![], vec![5]), "{mode:?}");
+        // Nobody waits for a stranger's frame.
+        send(&mut daemon, 14);
+        assert_eq!(tick(&mut daemon), (vec![14], vec![]), "{mode:?}");
+        bend(&mut daemon, "sim", 77, 15, 70);
+        assert_eq!(tick(&mut daemon), (vec![], vec![70]), "{mode:?}");
+    }
 }
 
 #[test]

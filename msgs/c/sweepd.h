@@ -426,9 +426,9 @@ typedef struct sweepd_vertex_header {
     uint64_t session;
     /* Epoch of the frame that they belong with. */
     uint64_t epoch;
-    /* Number of the frame that they belong with: in a mode that takes each frame by itself they
-     * are taken with the first that is not older. 0: at once, behind what the session sent before.
-     */
+    /* Number of the frame that they belong with: they are taken with the first that is not older,
+     * or, but for those of the source that on_frame names, after a time-out of their source. 0: at
+     * once, behind what the session sent before. */
     uint64_t seq;
     /* When the client sent them, nanoseconds of CLOCK_BOOTTIME; 0: not said. */
     uint64_t sent_ns;

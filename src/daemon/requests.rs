@@ -9,7 +9,7 @@ use crate::query::Query;
 use crate::record::Origin;
 use crate::transport::{BodyChange, RequestToken};
 use crate::wire::Answer;
-use crate::world::Edit;
+use crate::world::{Edit, Put};
 
 impl Daemon<'_> {
     /// Takes what the worker made of a request; its answer, where there is one already.
@@ -84,7 +84,7 @@ impl Daemon<'_> {
         let edits =
             done.filter(|(_, outcome)| outcome.result.as_ref().is_ok_and(|done| done.changed));
         let change = |edit: &Edit| match edit {
-            Edit::Put { body, shapes } => {
+            Edit::Put(Put { body, shapes }) => {
                 // A later edit of the same request may have taken it out again: then that edit speaks for it.
                 let placed = world.body(world.slot_named(&body.name)?)?;
                 Some(BodyChange::Put(body_note(body, placed.id, shapes)))

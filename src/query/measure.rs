@@ -123,77 +123,55 @@ pub(super) fn fit(world: &World, slot: BodySlot, body: &Body) -> Result<Option<S
     }
 }
 
-/// A body and the one that it hangs on in the end, where it does: what both lack it lacks.
-fn kin<'w>(world: &'w World, slot: BodySlot, body: &'w Body) -> [Option<&'w Body>; 2] {
+/// The body whose pose and vertices a body waits for: the one that it hangs on in the end, itself where it hangs on none.
+/// What hangs on another does not deform.
+fn awaited<'w>(world: &'w World, slot: BodySlot, body: &'w Body) -> &'w Body {
     let root = world.root_of(slot).0;
     let root = world.body(root).filter(|_| root != slot);
-    [Some(body), root]
-}
-
-/// How a body is called where it is asked for another one, or for itself.
-fn called(of: &Body, asked: &Body) -> String {
-    if of.id == asked.id {
-        "it".to_owned()
-    } else {
-        format!("\"{}\", on which it hangs,", of.name)
-    }
+    root.unwrap_or(body)
 }
 
 /// What has not come of a body.
 fn not_received(world: &World, slot: BodySlot, body: &Body) -> String {
-    let name = &body.name;
-    let [own, root] = kin(world, slot, body);
-    let mover = root.unwrap_or(body);
-    let lacks = |body: &&Body| {
-        body.vertices
-            .as_deref()
-            .is_some_and(|v| v.version.is_none())
-    };
-    let (what, of) = if mover.since_ns.is_none() && mover.moves {
-        ("pose", mover)
+    let of = awaited(world, slot, body);
+    let vertices = of.vertices.as_deref();
+    let lacks_them = of.since_ns.is_some() && vertices.is_some_and(|v| v.version.is_none());
+    let (what, have) = if lacks_them {
+        ("vertices", "have")
     } else {
-        let found = [own, root].into_iter().flatten().find(lacks);
-        found.map_or(("pose", mover), |lacking| ("vertices", lacking))
+        ("pose", "has")
     };
-    let (of, verb) = (
-        called(of, body),
-        if what == "pose" { "has" } else { "have" },
-    );
+    let whose = if of.id == body.id {
+        "it".to_owned()
+    } else {
+        format!("\"{}\", on which it hangs,", of.name)
+    };
     format!(
-        "body \"{name}\" is not_received: no {what} of {of} {verb} come yet; ask again when its source sends"
+        "body \"{}\" is not_received: no {what} of {whose} {have} come yet; ask again when its source sends",
+        body.name
     )
 }
 
 /// What was refused of a body.
 fn rejected(world: &World, slot: BodySlot, body: &Body) -> String {
-    let name = &body.name;
-    let refused = |body: &&Body| {
-        body.vertices
-            .as_deref()
-            .is_some_and(|v| v.refused.is_some())
+    let of = awaited(world, slot, body);
+    let bent = of.vertices.as_deref().and_then(|v| v.refused);
+    let (what, were, then) = if bent.is_some() {
+        ("vertices", "were", "all of them have come")
+    } else {
+        ("pose", "was", "a good one")
     };
-    let kin = kin(world, slot, body);
-    let bent = kin.into_iter().flatten().find(refused);
-    let why = match bent {
-        Some(bent) => bent.vertices.as_deref().and_then(|v| v.refused),
-        None => body.reject,
+    let newest = if of.id == body.id {
+        format!("its newest {what}")
+    } else {
+        format!("the newest {what} of \"{}\", on which it hangs,", of.name)
     };
+    let why = bent.or(body.reject);
     let why = why.map_or_else(String::new, |why| format!(" ({why})"));
-    let newest = |of: &Body, what: &str| match called(of, body) {
-        called if called == "it" => format!("its newest {what}"),
-        called => format!("the newest {what} of {called}"),
-    };
-    let mover = kin[1].unwrap_or(body);
-    match bent {
-        Some(bent) => format!(
-            "body \"{name}\" is rejected: {} were refused{why}; ask again after all of them have come",
-            newest(bent, "vertices")
-        ),
-        None => format!(
-            "body \"{name}\" is rejected: {} was refused{why}; ask again after a good one",
-            newest(mover, "pose")
-        ),
-    }
+    format!(
+        "body \"{}\" is rejected: {newest} {were} refused{why}; ask again after {then}",
+        body.name
+    )
 }
 
 #[cfg(test)]

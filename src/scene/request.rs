@@ -66,10 +66,12 @@ pub struct EditRequest {
 }
 
 /// One change of the scene, checked by itself.
-#[derive(Debug)]
-pub enum Edit {
-    /// A body by name: new, or in place of the one of this name; the same content again changes nothing.
-    Put(Box<BodyDraft>),
+///
+/// * `P` - what is put: a body as it was read, or one that is built, which the engine takes.
+#[derive(Clone, Debug)]
+pub enum Edit<P = Box<BodyDraft>> {
+    /// A body by name: new, or in place of the one of this name. The same content again changes nothing.
+    Put(P),
     /// Takes a body out.
     Remove {
         /// Its name.
@@ -133,6 +135,32 @@ impl Request {
     /// One text that names the edit, the body, what is wrong and what to change.
     pub fn parse(json: &[u8], blobs: &[u8]) -> Result<Self, String> {
         read(json, blobs).map_err(|fault| fault.text)
+    }
+}
+
+impl<P> Edit<P> {
+    /// The same edit, with what it puts made into something else.
+    ///
+    /// # Errors
+    /// What `build` says.
+    pub fn build<Q, E>(self, build: impl FnOnce(P) -> Result<Q, E>) -> Result<Edit<Q>, E> {
+        Ok(match self {
+            Self::Put(put) => Edit::Put(build(put)?),
+            Self::Remove { name } => Edit::Remove { name },
+            Self::Enable { name, enabled } => Edit::Enable { name, enabled },
+            Self::Filter { name, group, mask } => Edit::Filter { name, group, mask },
+            Self::Margin {
+                name,
+                report_within_m,
+            } => Edit::Margin {
+                name,
+                report_within_m,
+            },
+            Self::Rule(rule) => Edit::Rule(rule),
+            Self::DropRules { a, b } => Edit::DropRules { a, b },
+            Self::Attach { name, to, pose } => Edit::Attach { name, to, pose },
+            Self::Reset { source } => Edit::Reset { source },
+        })
     }
 }
 

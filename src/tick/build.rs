@@ -7,9 +7,9 @@ use std::sync::Arc;
 
 use super::EditBatch;
 use crate::error::Result;
-use crate::scene::{Edit as Asking, EditRequest, PlacedSpec, Scene, SourceSpec};
+use crate::scene::{BodyDraft, EditRequest, PlacedSpec, Scene, SourceSpec};
 use crate::shape::{Contents, Library, Shape};
-use crate::world::{Edit, Parts, PlacedShape};
+use crate::world::{Parts, PlacedShape, Put};
 
 /// The built shapes of a scene.
 #[derive(Debug)]
@@ -120,7 +120,7 @@ impl EditBuilder {
         let mut warnings = Vec::new();
         let mut edits = Vec::with_capacity(asked.edits.len());
         for edit in asked.edits {
-            edits.push(self.edit(edit, &mut warnings)?);
+            edits.push(edit.build(|draft| self.put(*draft, &mut warnings))?);
         }
         self.library.prune();
         Ok(EditBatch {
@@ -164,52 +164,34 @@ impl EditBuilder {
         self.library.add_kept(contents);
     }
 
-    fn edit(
+    /// Builds a body that is to be put.
+    fn put(
         &mut self,
-        asked: Asking,
+        draft: BodyDraft,
         warnings: &mut Vec<String>,
-    ) -> std::result::Result<Edit, String> {
-        Ok(match asked {
-            Asking::Put(draft) => {
-                let body = draft.settle(&self.sources, self.base.as_deref())?;
-                let base = self.base.clone().unwrap_or_default();
-                let mut shapes = Vec::with_capacity(body.shapes.len());
-                for (place, spec) in body.shapes.iter().enumerate() {
-                    let built = self.library.get(&spec.shape, &base);
-                    let named = |e| format!("body \"{}\": shape {}: {e}", body.name, place + 1);
-                    let built = built.map_err(named)?;
-                    warnings.extend(
-                        built
-                            .warnings
-                            .iter()
-                            .map(|w| format!("body \"{}\": {w}", body.name)),
-                    );
-                    shapes.push(if body.deforms {
-                        Arc::new(built.shape.to_deforming().map_err(named)?)
-                    } else {
-                        built.shape
-                    });
-                }
-                let shapes = place(&body.shapes, shapes);
-                Edit::Put {
-                    body: Arc::new(body),
-                    shapes,
-                }
-            }
-            Asking::Remove { name } => Edit::Remove { name },
-            Asking::Enable { name, enabled } => Edit::Enable { name, enabled },
-            Asking::Filter { name, group, mask } => Edit::Filter { name, group, mask },
-            Asking::Margin {
-                name,
-                report_within_m,
-            } => Edit::Margin {
-                name,
-                report_within_m,
-            },
-            Asking::Rule(rule) => Edit::Rule(rule),
-            Asking::DropRules { a, b } => Edit::DropRules { a, b },
-            Asking::Attach { name, to, pose } => Edit::Attach { name, to, pose },
-            Asking::Reset { source } => Edit::Reset { source },
+    ) -> std::result::Result<Put, String> {
+        let body = draft.settle(&self.sources, self.base.as_deref())?;
+        let base = self.base.clone().unwrap_or_default();
+        let mut shapes = Vec::with_capacity(body.shapes.len());
+        for (place, spec) in body.shapes.iter().enumerate() {
+            let built = self.library.get(&spec.shape, &base);
+            let named = |e| format!("body \"{}\": shape {}: {e}", body.name, place + 1);
+            let built = built.map_err(named)?;
+            let named_warnings = built
+                .warnings
+                .iter()
+                .map(|w| format!("body \"{}\": {w}", body.name));
+            warnings.extend(named_warnings);
+            shapes.push(if body.deforms {
+                Arc::new(built.shape.to_deforming().map_err(named)?)
+            } else {
+                built.shape
+            });
+        }
+        let shapes = place(&body.shapes, shapes);
+        Ok(Put {
+            body: Arc::new(body),
+            shapes,
         })
     }
 }

@@ -14,7 +14,7 @@ mod held;
 mod source;
 
 use beat::Beat;
-use held::{Held, Lead, Queue, Vertices, Whose};
+use held::{Ahead, Held, Queue, Vertices, Whose};
 use source::{Source, Speaker};
 
 use crate::config::Config;
@@ -125,10 +125,7 @@ impl Pacer {
         for frame in inbox.frames_mut() {
             let name = name_str(&frame.header.source).map(name_bytes);
             let place = self.sources.iter().position(|s| Some(s.name) == name);
-            let received_ns = match frame.received_ns {
-                0 => now_ns,
-                received_ns => received_ns.min(now_ns),
-            };
+            let received_ns = received(frame.received_ns, now_ns);
             let mut whose = Whose {
                 source: place,
                 received_ns,
@@ -149,7 +146,8 @@ impl Pacer {
         for frame in inbox.vertices_mut() {
             let name = name_str(&frame.header.source).map(name_bytes);
             let place = self.sources.iter().position(|s| Some(s.name) == name);
-            self.vertices.put(frame, place);
+            let received_ns = received(frame.received_ns, now_ns);
+            self.vertices.put(frame, place, received_ns);
         }
         if !inbox.ended().is_empty() {
             self.learn(world);
@@ -184,13 +182,16 @@ impl Pacer {
             })
         })?;
         let lead = match self.beat {
-            Beat::OnFrame(source) => Some(Lead {
-                source,
-                session: self.sources.get(source).and_then(|s| s.alive(now_ns)),
-            }),
-            _ => None,
+            Beat::OnFrame(source) => Some(source),
+            Beat::OnAll { .. } | Beat::Rate { .. } => None,
         };
-        self.vertices.take(into, lead, self.queue.frames());
+        let ahead = Ahead {
+            now_ns,
+            lead,
+            sources: &self.sources,
+            frames: self.queue.frames(),
+        };
+        self.vertices.take(into, ahead);
         self.hand_over_ended(into);
         self.last_tick_ns = Some(now_ns);
         Some(due)
@@ -337,6 +338,14 @@ impl Pacer {
             }
             waits
         });
+    }
+}
+
+/// When something came, as far as that is said; never later than now.
+fn received(said_ns: u64, now_ns: u64) -> u64 {
+    match said_ns {
+        0 => now_ns,
+        said_ns => said_ns.min(now_ns),
     }
 }
 

@@ -23,8 +23,9 @@ pub struct VertexHeader {
     pub session: u64,
     /// Epoch of the frame that they belong with.
     pub epoch: u64,
-    /// Number of the frame that they belong with: in a mode that takes each frame by itself they are taken with the
-    /// first that is not older. 0: at once, behind what the session sent before.
+    /// Number of the frame that they belong with: they are taken with the first that is not older, or, but for those of
+    /// the source that `on_frame` names, after a time-out of their source. 0: at once, behind what the session sent
+    /// before.
     pub seq: u64,
     /// When the client sent them, nanoseconds of `CLOCK_BOOTTIME`; 0: not said.
     pub sent_ns: u64,

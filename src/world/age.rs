@@ -194,6 +194,7 @@ impl World {
             source.alive = source.newest.is_some() && age_ns < source.timeout_ns;
         }
         self.admits = false;
+        self.recall_lost();
         self.settle_attached();
         self.recount();
         self.ages.sweep();

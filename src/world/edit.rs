@@ -13,72 +13,20 @@ use super::names::NameId;
 use super::parts::Parts;
 use super::place::{Entry, new_body};
 use crate::ids::{BodyId, BodySlot, SourceSlot};
-use crate::math::Pose;
-use crate::scene::{BodySpec, PairRule};
+use crate::scene::{self, BodySpec};
 use crate::wire::EndCause;
 
-/// One change of the scene.
+/// One change of the scene, ready to be applied.
+pub type Edit = scene::Edit<Put>;
+
+/// A body to be put.
 #[derive(Clone, Debug)]
-pub enum Edit {
-    /// A body by name: new, or in place of the one of this name. The same content again changes nothing.
-    Put {
-        /// What it is; id 0: the one its name had in this boot, or the least that is free and that no put of the
-        /// request asks for.
-        body: Arc<BodySpec>,
-        /// Its built shapes, in the order of `body.shapes`.
-        shapes: Parts,
-    },
-    /// Takes a body out.
-    Remove {
-        /// Its name.
-        name: String,
-    },
-    /// Lets a body take part, or not.
-    Enable {
-        /// Its name.
-        name: String,
-        /// Whether it takes part.
-        enabled: bool,
-    },
-    /// Sets a body's group and mask.
-    Filter {
-        /// Its name.
-        name: String,
-        /// Groups it belongs to; `None`: as they are.
-        group: Option<u32>,
-        /// Groups it collides with; `None`: as they are.
-        mask: Option<u32>,
-    },
-    /// Sets how near a pair must come to be told as near.
-    Margin {
-        /// The body's name; `None`: every body that is there.
-        name: Option<String>,
-        /// Distance, metres; `None`: what the body was put with.
-        report_within_m: Option<f64>,
-    },
-    /// Adds a pair rule behind all others, so that it wins over them.
-    Rule(PairRule),
-    /// Takes out every pair rule of these two sides, in either order.
-    DropRules {
-        /// The one side, as the rule says it.
-        a: String,
-        /// The other side.
-        b: String,
-    },
-    /// Hangs a body on another, or lets it go.
-    Attach {
-        /// Its name.
-        name: String,
-        /// The body to hang it on; `None`: it is on its own again.
-        to: Option<String>,
-        /// Its pose seen from there; `None`: where it is now.
-        pose: Option<Pose>,
-    },
-    /// Forgets every pose: pairs end, bodies that move are not received again.
-    Reset {
-        /// Of this source's bodies only; `None`: of all.
-        source: Option<String>,
-    },
+pub struct Put {
+    /// What it is; id 0: the one its name had in this boot, or the least that is free and that no put of the request
+    /// asks for.
+    pub body: Arc<BodySpec>,
+    /// Its built shapes, in the order of `body.shapes`.
+    pub shapes: Parts,
 }
 
 /// What a request did.
@@ -164,7 +112,7 @@ impl World {
     /// Ids that the request asks for are given to no other name of it.
     fn reserve_ids(&mut self, edits: &[Edit]) {
         for edit in edits {
-            if let Edit::Put { body, .. } = edit
+            if let Edit::Put(Put { body, .. }) = edit
                 && body.id != BodyId(0)
             {
                 let name = self.names.intern(&body.name);
@@ -175,7 +123,7 @@ impl World {
 
     fn apply_one(&mut self, edit: &Edit, after: &mut After) {
         let changed = match edit {
-            Edit::Put { body, shapes } => self.put(body, shapes, after),
+            Edit::Put(put) => self.put(&put.body, &put.shapes, after),
             Edit::Remove { name } => self.remove(name, after),
             Edit::Enable { name, enabled } => self.enable(name, *enabled),
             Edit::Filter { name, group, mask } => self.filter(name, *group, *mask),

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::World;
 use super::chain::Chain;
-use super::edit::Edit;
+use super::edit::{Edit, Put};
 use super::edit_same::Touch;
 use super::parts::PlacedShape;
 use super::rule_draft::RuleDraft;
@@ -101,7 +101,7 @@ impl World {
 impl<'a> Draft<'a> {
     fn look_at(&mut self, edit: &'a Edit) -> Result<(), String> {
         match edit {
-            Edit::Put { body, shapes } => {
+            Edit::Put(Put { body, shapes }) => {
                 bends_as_said(body, shapes)?;
                 self.look_at_put(body, shapes.len())?;
                 // The same again is nothing: where it is stays known as well as it was.

@@ -2,12 +2,14 @@
 //!
 //! In: judgements. Out: flags of the filters. The box of such a body says nothing, and makes no pairs; but it does
 //! for a tick in which it says something: the body was there as the tick began in which its place was lost, or a frame
-//! said where it went, though that is too old by now or a pose behind it was refused.
+//! said where it went, though that is too old by now, or a pose behind it was refused or a reset.
 
 use super::World;
+use super::body::Body;
 use super::filters::{BARS, KEEPS};
 use super::place::Judgement;
 use crate::ids::BodySlot;
+use crate::wire::BodyStatus;
 
 impl World {
     /// Sets the flags that follow from a judgement.
@@ -31,8 +33,45 @@ impl World {
         }
     }
 
+    /// Whether a body that has no place any more, because it was reset or is too old, is asked for the way that it still
+    /// went in this tick.
+    ///
+    /// Not before all frames are there: one that follows on a reset may bring it back, and that is no motion.
+    pub(super) fn stays_for_its_way(&self, slot: BodySlot) -> bool {
+        !self.admits && self.goes_as_told(slot)
+    }
+
+    /// All frames are there: who went in this tick and has no place since comes back for its way. What hangs on it
+    /// follows where that is settled.
+    pub(super) fn recall_lost(&mut self) {
+        for at in 0..self.travelled.len() {
+            let slot = self.travelled[at];
+            let is_own = self.entries[slot.index()].root == slot;
+            if is_own && self.body(slot).is_some_and(|body| !body.in_broad) {
+                self.settle(slot, false);
+            }
+        }
+    }
+
+    /// A tick begins: who came back for its way has been asked for it.
+    pub(super) fn dismiss_lost(&mut self) {
+        for at in 0..self.travelled.len() {
+            let slot = self.travelled[at];
+            let stays = |body: &Body| {
+                let has_place = matches!(
+                    body.status,
+                    BodyStatus::Known | BodyStatus::Stale | BodyStatus::Held
+                );
+                body.in_broad && !has_place
+            };
+            if self.body(slot).is_some_and(stays) {
+                self.settle(slot, false);
+            }
+        }
+    }
+
     /// Whether a continuous body has gone in this tick, and where is known.
-    pub(super) fn goes_as_told(&self, slot: BodySlot) -> bool {
+    fn goes_as_told(&self, slot: BodySlot) -> bool {
         let Some(body) = self.body(slot) else {
             return false;
         };

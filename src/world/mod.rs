@@ -47,7 +47,7 @@ pub use ahead::AHEAD;
 pub use bend::Vertices;
 pub use body::{Body, ChangeSet, Motion, Removed};
 pub use counts::Counts;
-pub use edit::{Applied, Edit};
+pub use edit::{Applied, Edit, Put};
 pub use filters::{Because, Filters};
 pub use gaze::Gaze;
 pub(crate) use parts::PartTree;
@@ -160,9 +160,11 @@ impl World {
             .bodies
             .iter()
             .zip(shapes)
-            .map(|(body, shapes)| Edit::Put {
-                body: Arc::new(body.clone()),
-                shapes,
+            .map(|(body, shapes)| {
+                Edit::Put(Put {
+                    body: Arc::new(body.clone()),
+                    shapes,
+                })
             })
             .collect();
         world

@@ -109,10 +109,11 @@ impl World {
         let in_broad = match status {
             BodyStatus::Known | BodyStatus::Stale | BodyStatus::Held => true,
             // Its last good pose is kept; without one there is nothing to keep.
-            BodyStatus::Rejected => root.has_pose && has_vertices,
-            // In the tick in which it is removed it is asked for the way that it still went.
-            BodyStatus::RemovedByAge => body.in_broad && self.goes_as_told(slot),
-            _ => false,
+            BodyStatus::Rejected if root.has_pose && has_vertices => true,
+            BodyStatus::NotReceived | BodyStatus::Rejected | BodyStatus::RemovedByAge => {
+                self.stays_for_its_way(slot)
+            }
+            BodyStatus::Disabled | BodyStatus::Truncated => false,
         };
         Judgement {
             status,

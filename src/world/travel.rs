@@ -11,7 +11,6 @@ use super::path::Path;
 use super::place::tight_box;
 use crate::ids::BodySlot;
 use crate::math::{Aabb, Pose, Vec3};
-use crate::wire::BodyStatus;
 
 impl World {
     /// Bodies with a path in this tick: those that are swept, and those that only carry one that is. Complete after
@@ -50,14 +49,7 @@ impl World {
                 }
             }
         }
-        // Who was removed on its way has been asked for it.
-        for at in 0..self.travelled.len() {
-            let slot = self.travelled[at];
-            let body = self.body(slot);
-            if body.is_some_and(|body| body.in_broad && body.status == BodyStatus::RemovedByAge) {
-                self.settle(slot, false);
-            }
-        }
+        self.dismiss_lost();
         self.travelled.clear();
         self.bar_lost();
     }
@@ -71,9 +63,8 @@ impl World {
             return self.place(slot, pose);
         };
         let moved = self.place(slot, pose);
-        let lapsed = !self.is_placed(slot);
-        self.lay(slot, path, (moved, false), |path, end| {
-            if lapsed {
+        self.lay(slot, path, (moved, false), |path, end, lapses| {
+            if lapses {
                 path.lapse(from, *pose, end)
             } else {
                 path.push(from, *pose, declared, end)
@@ -99,7 +90,7 @@ impl World {
         let has_gone = |path: &Path| !path.is_empty() && (!path.aside || root_is_disabled);
         let goes = self.entries[slot.index()].enabled
             && of_root.as_ref().is_some_and(|(_, root)| has_gone(root));
-        let moved = self.lay(slot, path, (moved, goes), |path, end| {
+        let moved = self.lay(slot, path, (moved, goes), |path, end, _| {
             let before = *path.hull();
             match (&of_root, &body) {
                 (Some((_, root)), Some((shapes, centre))) => {
@@ -129,16 +120,19 @@ impl World {
     /// Gives a placed body its path back, with what `go` adds to it; whether pose or box changed.
     ///
     /// * `goes` - whether it has gone where `go` says, though it is not in the broad phase yet.
+    /// * `go` - given the path, the box at its new end, and whether what lies between is no motion.
     fn lay(
         &mut self,
         slot: BodySlot,
         mut path: Box<Path>,
         (moved, goes): (bool, bool),
-        go: impl FnOnce(&mut Path, Aabb) -> bool,
+        go: impl FnOnce(&mut Path, Aabb, bool) -> bool,
     ) -> bool {
         let placed = self.is_placed(slot) || goes;
-        // After a reset the way of this tick goes on behind a lapse: what was touched on it before is told.
-        let lapses = !placed && path.has_moved();
+        let is_out = !(goes || self.body(slot).is_some_and(|body| body.in_broad));
+        // After a reset the way of this tick goes on behind a lapse, also where the body does not take part since: what
+        // was touched on it before is told.
+        let lapses = path.has_moved() && (!placed || is_out && !path.aside);
         let entry = &mut self.entries[slot.index()];
         let Some(body) = self.bodies[slot.index()].as_mut() else {
             return moved;
@@ -146,11 +140,11 @@ impl World {
         // Where it was placed, its box is new and tight.
         let end = if moved { entry.tight } else { *path.end() };
         if !lapses {
-            path.set_aside(!(body.in_broad || goes));
+            path.set_aside(is_out);
         }
         let grown = if placed || lapses {
             let was_empty = path.is_empty();
-            let grown = go(&mut path, end);
+            let grown = go(&mut path, end, lapses);
             if was_empty && !path.is_empty() {
                 self.travelled.push(slot);
             }

@@ -108,7 +108,7 @@ impl World {
         };
         let holds = body.proxy.holds(&entry.tight.widened(needed_m));
         check(holds || !body.in_broad, "its box does not hold it")?;
-        let placed = self.entries[entry.root.index()].has_pose;
+        let placed = self.entries[entry.root.index()].has_pose || self.stays_for_its_way(slot);
         check(
             !body.in_broad || placed,
             "it is in the broad phase without a pose",

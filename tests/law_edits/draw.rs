@@ -6,7 +6,7 @@ use sweepd::config::OnStale;
 use sweepd::ids::BodyId;
 use sweepd::math::{Pose, Quat, Vec3};
 use sweepd::scene::{PairAction, PairRule};
-use sweepd::world::Edit;
+use sweepd::world::{Edit, Put};
 
 use crate::check::Seen;
 use crate::oracle::rng::Rng;
@@ -237,10 +237,10 @@ impl Draw {
             spec.pose = Pose::translation(1.0, 0.2, 0.0) * rng.pose(Vec3::zeros());
             spec.attached_to = Some(other);
         }
-        let edit = Edit::Put {
+        let edit = Edit::Put(Put {
             body: Arc::new(solid.spec.clone()),
             shapes: solid.shapes.clone(),
-        };
+        });
         (edit, Some(solid))
     }
 
@@ -282,7 +282,7 @@ impl Draw {
 /// An edit in some words.
 fn tell(edit: &Edit) -> String {
     match edit {
-        Edit::Put { body, .. } => {
+        Edit::Put(Put { body, .. }) => {
             format!(
                 "put {} as {} on {:?}",
                 body.name, body.id.0, body.attached_to

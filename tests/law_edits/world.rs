@@ -6,7 +6,7 @@ use sweepd::config::OnStale;
 use sweepd::math::{Pose, relative};
 use sweepd::scene::PairAction;
 use sweepd::wire::BodyStatus;
-use sweepd::world::Edit;
+use sweepd::world::{Edit, Put};
 
 use crate::solids::Solid;
 
@@ -143,7 +143,7 @@ impl World {
     fn take_ids<'a>(&mut self, edits: impl Iterator<Item = &'a Edit>) {
         let (mut asked, mut others) = (Vec::new(), Vec::new());
         for edit in edits {
-            if let Edit::Put { body, .. } = edit {
+            if let Edit::Put(Put { body, .. }) = edit {
                 match body.id.0 {
                     0 => others.push(&body.name),
                     id => asked.push((&body.name, id)),
@@ -191,7 +191,7 @@ impl World {
     pub fn apply(&mut self, edit: &Edit, solid: Option<Solid>) {
         self.edited = true;
         match edit {
-            Edit::Put { body, .. } => {
+            Edit::Put(Put { body, .. }) => {
                 let solid = solid.unwrap();
                 let id = self.id_of(&body.name);
                 let to = body.attached_to.as_deref().map(|to| self.id_of(to));

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use sweepd::math::Pose;
 use sweepd::scene::{PairAction, Scene};
 use sweepd::wire::{BodyStatus, EndCause, Event, State, Verdict, region_flags};
-use sweepd::world::Edit;
+use sweepd::world::{Edit, Put};
 
 use crate::rig::{ALL, FRAME_NS, Rig, ball, has, rule, scene};
 
@@ -14,10 +14,10 @@ use crate::rig::{ALL, FRAME_NS, Rig, ball, has, rule, scene};
 fn put(bodies: &[String]) -> Edit {
     let scene = Scene::parse(&scene("", bodies), "scene.toml", Path::new(".")).unwrap();
     let shapes = sweepd::daemon::build_shapes(&scene).unwrap().bodies;
-    Edit::Put {
+    Edit::Put(Put {
         body: Arc::new(scene.bodies.last().unwrap().clone()),
         shapes: shapes.last().unwrap().clone(),
-    }
+    })
 }
 
 #[test]

@@ -7,7 +7,7 @@ use sweepd::wire::{
 
 use crate::rig::{ALL, FRAME_NS, NONE, Rig, body, scene};
 use sweepd::wire::Reason;
-use sweepd::world::Edit;
+use sweepd::world::{Edit, Put};
 
 /// A square of two triangles in the plane of x and y, of side 2.
 const SHEET: &str = "{ type = \"trimesh\", solid = false, \
@@ -453,10 +453,10 @@ fn law_4_3_bug_vertices_of_a_body_that_is_not_there_yet_were_refused_while_its_f
     rig.edit(vec![Edit::Remove { name: "b1".into() }], ALL);
     let text = scene("", &[body(1, [0.0, 0.0, 3.0], SHEET, "deforms = true\n")]);
     let all = sweepd::scene::Scene::parse(&text, "s.toml", std::path::Path::new(".")).unwrap();
-    let put = Edit::Put {
+    let put = Edit::Put(Put {
         body: std::sync::Arc::new(all.bodies[0].clone()),
         shapes: sweepd::tick::build::build_shapes(&all).unwrap().bodies[0].clone(),
-    };
+    });
     rig.scene_rev = rig.out.tick.header.scene_rev + 1;
     let mut bent = full(1, at(0.5));
     bent.header.seq = rig.seq + 1;

@@ -8,7 +8,7 @@ use sweepd::ids::BodySlot;
 use sweepd::math::Pose;
 use sweepd::scene::{BodySpec, PairAction};
 use sweepd::wire::{Frame, TransformRow, frame_flags};
-use sweepd::world::Edit;
+use sweepd::world::{Edit, Put};
 
 use crate::common::Rng;
 use crate::support::{Bench, MS, TIMEOUT_NS, cube, fixed, frame, moving, row, rule};
@@ -71,10 +71,10 @@ fn random_edit(rng: &mut Rng) -> Edit {
     match rng.below(9) {
         0..=2 => {
             let id = rng.bits() % 12 + 1;
-            Edit::Put {
+            Edit::Put(Put {
                 body: std::sync::Arc::new(spec(rng, id)),
                 shapes: cube(),
-            }
+            })
         }
         3 => Edit::Remove { name: one },
         4 => Edit::Enable {

@@ -8,15 +8,15 @@ use sweepd::math::{Pose, Vec3};
 use sweepd::scene::{BodySpec, PairAction};
 use sweepd::shape::{ShapeSpec, build};
 use sweepd::wire::{BodyStatus, EndCause, Reason, RejectReason};
-use sweepd::world::{Edit, Parts, PlacedShape};
+use sweepd::world::{Edit, Parts, PlacedShape, Put};
 
 use crate::support::{Bench, MS, TIMEOUT_NS, admitted, cube, fixed, frame, moving, row, rule};
 
 fn put(spec: BodySpec) -> Edit {
-    Edit::Put {
+    Edit::Put(Put {
         body: Arc::new(spec),
         shapes: cube(),
-    }
+    })
 }
 
 fn named(name: &str) -> String {
@@ -271,9 +271,11 @@ fn law_6_a_put_of_a_file_that_has_changed_takes_the_place_of_the_body() {
             pose: Pose::identity(),
         }])
     };
-    let put = |shapes| Edit::Put {
-        body: Arc::new(moving("a", 1)),
-        shapes,
+    let put = |shapes| {
+        Edit::Put(Put {
+            body: Arc::new(moving("a", 1)),
+            shapes,
+        })
     };
     let mut bench = Bench::of(vec![moving("a", 1)]);
     let (open, closed) = ([0, 2, 1], [0, 3, 2]);

@@ -3,7 +3,7 @@
 
 use sweepd::ids::{BodySlot, PairKey};
 use sweepd::scene::{BodySpec, PairAction, PairRule, pattern_matches};
-use sweepd::world::{Because, Edit, World};
+use sweepd::world::{Because, Edit, Put, World};
 
 use crate::support::{Bench, START_NS, cube, fixed, floor, moving, rule, scene};
 
@@ -128,12 +128,14 @@ fn law_3_10_bodies_put_and_removed_later_are_filtered_like_those_of_the_scene() 
     // Every second body comes later, in another order, some twice.
     let first: Vec<_> = bodies.iter().step_by(2).cloned().collect();
     let mut bench = Bench::with_rules(Vec::new(), rules.clone());
-    let put = |body: &BodySpec| Edit::Put {
-        body: std::sync::Arc::new(BodySpec {
-            parent: None,
-            ..body.clone()
-        }),
-        shapes: cube(),
+    let put = |body: &BodySpec| {
+        Edit::Put(Put {
+            body: std::sync::Arc::new(BodySpec {
+                parent: None,
+                ..body.clone()
+            }),
+            shapes: cube(),
+        })
     };
     let mut plain = bodies.clone();
     plain.iter_mut().for_each(|b| b.parent = None);

@@ -2,7 +2,7 @@
 
 use sweepd::ids::SourceSlot;
 use sweepd::wire::{BodyStatus, Frame, RejectReason, TransformRow, frame_flags};
-use sweepd::world::{Admission, Edit};
+use sweepd::world::{Admission, Edit, Put};
 
 use crate::support::{Bench, MS, TIMEOUT_NS, admitted, fixed, frame, moving, row};
 
@@ -38,10 +38,10 @@ fn partial(scene_rev: u64) -> impl FnOnce(&mut Frame) {
 
 /// The scene has come to its next revision.
 fn revise(bench: &mut Bench, name: &str) {
-    bench.edit(Edit::Put {
+    bench.edit(Edit::Put(Put {
         body: std::sync::Arc::new(fixed(name, 0, 99.0)),
         shapes: crate::support::cube(),
-    });
+    }));
 }
 
 fn x(bench: &Bench, name: &str) -> f64 {

@@ -8,15 +8,15 @@ use sweepd::math::Pose;
 use sweepd::scene::BodySpec;
 use sweepd::shape::{ShapeSpec, build};
 use sweepd::wire::BodyStatus;
-use sweepd::world::{Edit, Parts, PlacedShape};
+use sweepd::world::{Edit, Parts, PlacedShape, Put};
 
 use crate::support::{Bench, MS, cube, fixed, moving, row};
 
 fn put(spec: BodySpec) -> Edit {
-    Edit::Put {
+    Edit::Put(Put {
         body: Arc::new(spec),
         shapes: cube(),
-    }
+    })
 }
 
 fn remove(name: &str) -> Edit {
@@ -171,7 +171,7 @@ fn cloth() -> Edit {
     };
     let shape = build(&mesh, Path::new("")).unwrap().shape;
     let shape = shape.to_deforming().unwrap();
-    Edit::Put {
+    Edit::Put(Put {
         body: Arc::new(BodySpec {
             deforms: true,
             ..moving("cloth", 0)
@@ -180,7 +180,7 @@ fn cloth() -> Edit {
             shape: Arc::new(shape),
             pose: Pose::identity(),
         }]),
-    }
+    })
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use sweepd::math::Pose;
 use sweepd::scene::{BodySpec, PairAction, PairRule};
-use sweepd::world::{Edit, Parts, World};
+use sweepd::world::{Edit, Parts, Put, World};
 
 use crate::support::{Bench, START_NS, cube, fixed, floor, moving, rule, scene};
 
@@ -37,10 +37,10 @@ impl Random {
 }
 
 fn put(body: BodySpec) -> Edit {
-    Edit::Put {
+    Edit::Put(Put {
         body: Arc::new(body),
         shapes: cube(),
-    }
+    })
 }
 
 /// How many pairs the filters ignore, one by one.

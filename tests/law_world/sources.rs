@@ -6,7 +6,7 @@ use sweepd::wire::{
     BodyStatus, EndCause, Frame, RejectReason, TransformRow, VertexFrame, VertexHeader,
     WIRE_VERSION, frame_flags, name_bytes, vertex_flags,
 };
-use sweepd::world::{Admission, Edit};
+use sweepd::world::{Admission, Edit, Put};
 
 use crate::support::{Bench, MS, TIMEOUT_NS, admitted, fixed, frame, moving, refused, row};
 
@@ -272,10 +272,10 @@ fn law_4_3_a_frame_for_a_later_revision_waits_for_it() {
     assert_eq!(bench.status("a"), BodyStatus::NotReceived);
     assert_eq!(bench.world.sources()[0].to_row(bench.now_ns).seq, 0);
     bench.wait(MS);
-    bench.edit(Edit::Put {
+    bench.edit(Edit::Put(Put {
         body: std::sync::Arc::new(fixed("wall", 0, 9.0)),
         shapes: crate::support::cube(),
-    });
+    }));
     assert_eq!(bench.world.scene_rev(), 2);
     assert_eq!(bench.status("a"), BodyStatus::Known);
     assert_eq!(bench.world.sources()[0].to_row(bench.now_ns).seq, 1);
@@ -430,10 +430,10 @@ fn bug_a_frame_that_waits_is_void_once_vertices_of_a_later_epoch_have_come() {
     };
     vertices.received_ns = bench.now_ns;
     bench.world.admit_vertices(&vertices, bench.now_ns);
-    bench.edit(Edit::Put {
+    bench.edit(Edit::Put(Put {
         body: std::sync::Arc::new(fixed("wall", 0, 9.0)),
         shapes: crate::support::cube(),
-    });
+    }));
     assert_eq!(bench.world.scene_rev(), 2);
     assert_eq!(bench.status("a"), BodyStatus::NotReceived);
     assert_eq!(bench.world.sources()[0].to_row(bench.now_ns).skipped, 1);

@@ -2,7 +2,10 @@
 //! any other way.
 
 use sweepd::math::Pose;
-use sweepd::wire::{Event, PairRow, Reason, State, Verdict, pair_flags};
+use sweepd::wire::{
+    BodyStatus, EndCause, Event, PairRow, Reason, State, Verdict, VertexFrame, VertexHeader,
+    WIRE_VERSION, frame_flags, name_bytes, pair_flags, vertex_flags,
+};
 use sweepd::world::Edit;
 
 use crate::cases::{PLATE, SHOT, SWEPT, is_near, plate};
@@ -256,6 +259,168 @@ fn bug_the_way_on_which_a_body_was_removed_by_its_age_was_never_asked() {
     rig.waited_ns = 0;
     rig.send(ALL);
     assert_eq!(rig.state(), State::Clear);
+}
+
+/// A wall that stands, a body that goes, one that hangs on it, and another of the same source.
+fn reset_on_its_way(more: &str) -> Rig {
+    let still = |text: String| text.replace("moves = true", "moves = false");
+    let hangs = format!("{SWEPT}\nattached_to = \"b2\"");
+    let cloth = "{ type = \"trimesh\", solid = false, vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces = [[0, 1, 2]] }";
+    let mut rig = Rig::new(&scene(
+        "",
+        &[
+            still(body(1, [0.0; 3], PLATE, "")),
+            body(2, [0.0; 3], SHOT, &format!("{SWEPT}\n{more}")),
+            body(3, [0.0, 0.1, 0.0], SHOT, &hangs),
+            body(4, [50.0, 0.0, 0.0], cloth, "deforms = true"),
+        ],
+    ));
+    rig.vertices = vec![cloth_of(1, 1)];
+    rig.place(2, &at(5.0));
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+    rig
+}
+
+/// The vertices of body 4.
+fn cloth_of(epoch: u64, version: u64) -> VertexFrame {
+    VertexFrame {
+        header: VertexHeader {
+            session: 11,
+            epoch,
+            body: 4,
+            version,
+            source: name_bytes("feed"),
+            count: 3,
+            total: 3,
+            flags: vertex_flags::FULL,
+            schema: WIRE_VERSION,
+            ..VertexHeader::default()
+        },
+        rows: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+        ..VertexFrame::default()
+    }
+}
+
+/// The tick in which body 2 went through the wall and was reset, the next one, and the first that knows all again.
+fn its_way_was_asked(rig: &mut Rig, cause: EndCause) {
+    for id in [2, 3] {
+        let row = rig.pair(1, id).unwrap_or_else(|| panic!("no row of {id}"));
+        assert!(hit(row) && has(row, Event::Begin), "{row:?}");
+        assert!(!has(row, Event::End), "{row:?}");
+        assert_eq!(rig.verdict(1, id), Verdict::Possible);
+    }
+    assert_eq!(rig.state(), State::Colliding);
+    rig.idle(FRAME_NS, ALL);
+    for id in [2, 3] {
+        let row = rig.pair(1, id).unwrap_or_else(|| panic!("no end of {id}"));
+        assert!(!hit(row) && has(row, Event::End), "{row:?}");
+        assert_eq!(row.end_cause, cause.code());
+    }
+    assert_eq!(rig.state(), State::Unknown);
+    rig.idle(FRAME_NS, ALL);
+    assert!(rig.pair(1, 2).is_none() && rig.pair(1, 3).is_none());
+    rig.epoch += 1;
+    (rig.scene_rev, rig.flags, rig.waited_ns) = (0, frame_flags::FULL, 0);
+    rig.vertices = vec![cloth_of(rig.epoch, 1)];
+    rig.place(2, &at(-5.0));
+    rig.send(ALL);
+    assert_eq!(rig.state(), State::Clear);
+}
+
+#[test]
+fn bug_the_way_before_an_epoch_that_waits_was_never_asked() {
+    let mut rig = reset_on_its_way("");
+    let frame = |k: usize, rig: &mut Rig| {
+        (rig.epoch, rig.scene_rev) = (1 + k as u64, 99 * k as u64);
+        rig.place(2, &at([-5.0, -6.0][k]));
+    };
+    rig.send_several(2, frame, ALL);
+    assert!(rig.because(Reason::NotReceived));
+    let told = rig.out.bodies.iter().find(|row| row.body == 2).unwrap();
+    assert_eq!(told.status, BodyStatus::NotReceived.code());
+    its_way_was_asked(&mut rig, EndCause::Reset);
+}
+
+#[test]
+fn bug_the_way_before_an_epoch_that_begins_with_other_bodies_was_never_asked() {
+    let mut rig = reset_on_its_way("");
+    let frame = |k: usize, rig: &mut Rig| {
+        rig.epoch = 1 + k as u64;
+        rig.place(2, &at(-5.0));
+        if k == 1 {
+            rig.flags = frame_flags::PARTIAL;
+            rig.rows.retain(|row| row.body == 4);
+        }
+    };
+    rig.send_several(2, frame, ALL);
+    rig.rows.push(row(2, &at(0.0)));
+    its_way_was_asked(&mut rig, EndCause::Reset);
+}
+
+#[test]
+fn bug_the_way_before_an_epoch_whose_vertices_come_first_was_never_asked() {
+    let mut rig = reset_on_its_way("");
+    rig.vertices = vec![cloth_of(2, 1)];
+    rig.place(2, &at(-5.0));
+    rig.send(ALL);
+    rig.epoch = 2;
+    its_way_was_asked(&mut rig, EndCause::Reset);
+}
+
+#[test]
+fn bug_the_way_before_an_epoch_whose_first_pose_is_refused_was_never_asked() {
+    let mut rig = reset_on_its_way("");
+    let frame = |k: usize, rig: &mut Rig| {
+        rig.epoch = 1 + k as u64;
+        rig.place(2, &at([-5.0, f64::NAN][k]));
+    };
+    rig.send_several(2, frame, ALL);
+    its_way_was_asked(&mut rig, EndCause::Reset);
+}
+
+/// What is too old takes no part, and where it goes from then on is no motion.
+#[test]
+fn bug_the_way_before_an_epoch_whose_poses_are_too_old_was_never_asked() {
+    for late in [1, 2] {
+        let mut rig = reset_on_its_way("on_stale = \"remove\"");
+        let heights = [-5.0, 5.0, -5.0];
+        let frame = |k: usize, rig: &mut Rig| {
+            (rig.epoch, rig.waited_ns) = (1 + u64::from(k > 0), 600_000_000 * u64::from(k == late));
+            rig.place(2, &at(heights[k]));
+        };
+        rig.send_several(1 + late, frame, ALL);
+        assert!(rig.because(Reason::RemovedByAge));
+        let row = *rig.pair(1, 2).unwrap();
+        // One way of two or three.
+        let share = (5.0 - 0.0105) / 10.0 / (1 + late) as f64;
+        is_near(&row, share, 1e-9);
+        its_way_was_asked(&mut rig, EndCause::SourceLost);
+    }
+}
+
+#[test]
+fn what_a_reset_leaves_without_a_pose_is_asked_for_no_way_that_it_did_not_go() {
+    let mut rig = reset_on_its_way("");
+    // It stands above the wall, and the new epoch, which has it below, waits.
+    let frame = |k: usize, rig: &mut Rig| {
+        (rig.epoch, rig.scene_rev) = (1 + k as u64, 99 * k as u64);
+        rig.place(2, &at([5.0, -5.0][k]));
+    };
+    rig.send_several(2, frame, ALL);
+    assert!(rig.pair(1, 2).is_none() && rig.pair(1, 3).is_none());
+    assert_eq!(rig.state(), State::Unknown);
+    // What lay in contact ends with the reset, at once.
+    let mut rig = reset_on_its_way("");
+    rig.place(2, &at(0.005));
+    rig.send(ALL);
+    let frame = |k: usize, rig: &mut Rig| {
+        (rig.epoch, rig.scene_rev) = (1 + k as u64, 99 * k as u64);
+    };
+    rig.send_several(2, frame, ALL);
+    let row = rig.pair(1, 2).unwrap();
+    assert!(has(row, Event::End) && !has(row, Event::Begin), "{row:?}");
+    assert_eq!(row.end_cause, EndCause::Reset.code());
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! are passed over and counted; a partial one does not, because those may hold bodies that it lacks, and one of a
 //! source that moves continuous bodies does not, because those are on their way.
 
+use super::source::Source;
 use crate::limits::{
     FRAMES_PER_DRAIN_MAX, SOURCES_MAX, VERTEX_FRAMES_WAITING_MAX, VERTEX_ROWS_WAITING_MAX,
 };
@@ -118,9 +119,11 @@ impl Queue {
 /// Vertices that wait, and spare memory.
 ///
 /// None is passed over for a newer one, and those of a session go out in the order of their sending: a range stands on
-/// the version before. Those of the source whose frames make ticks wait for the frame of their session that they belong
-/// with, so that a tick has vertices and poses of one moment, and so do those whose frame is in a round that is under
-/// way; without it those of a new session wait for the frames of the one before.
+/// the version before. They wait for the frame of their session that they belong with, so that a tick has vertices and
+/// poses of one moment: those of the source each of whose frames makes a tick, and those whose frame is in a round that
+/// is under way, until it goes out; the others for a time-out of their source at most, for a frame that is lost, or one
+/// that waits for a lead who is silent, must not keep back a shape that is known. Without a frame of their own those of
+/// a new session wait for the frames of the one before.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Vertices {
     waiting: Vec<Bent>,
@@ -135,13 +138,16 @@ pub(super) struct Vertices {
 /// Place of a source, and a session.
 type Whom = (Option<usize>, u64);
 
-/// The source each of whose frames makes a tick of its own.
+/// What there is to wait for as a tick is made.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lead {
-    /// Its place.
-    pub(super) source: usize,
-    /// The session that speaks for it; `None`: nobody's does, or who did has been silent for too long.
-    pub(super) session: Option<u64>,
+pub(super) struct Ahead<'a> {
+    pub(super) now_ns: u64,
+    /// Place of the source each of whose frames makes a tick of its own.
+    pub(super) lead: Option<usize>,
+    /// Nobody's vertices wait for a frame but those of who speaks: others are refused, and that is told soon.
+    pub(super) sources: &'a [Source],
+    /// Those that go on waiting.
+    pub(super) frames: &'a [Held],
 }
 
 /// A message of vertices that waits.
@@ -150,12 +156,14 @@ struct Bent {
     frame: VertexFrame,
     /// Place of its source.
     source: Option<usize>,
+    /// Its receipt, nanoseconds of `CLOCK_BOOTTIME`.
+    received_ns: u64,
 }
 
 impl Vertices {
     /// Takes vertices out of an inbox. Of more than a source may have waiting the oldest go: the numbers of those that
     /// follow tell that they are missing.
-    pub(super) fn put(&mut self, frame: &mut VertexFrame, source: Option<usize>) {
+    pub(super) fn put(&mut self, frame: &mut VertexFrame, source: Option<usize>, received_ns: u64) {
         while let Some(oldest) = self.crowded_out_by(frame, source) {
             let oldest = self.waiting.remove(oldest);
             self.spare.push(oldest.frame);
@@ -163,6 +171,7 @@ impl Vertices {
         let mut held = Bent {
             frame: self.spare.pop().unwrap_or_default(),
             source,
+            received_ns,
         };
         std::mem::swap(&mut held.frame, frame);
         self.waiting.push(held);
@@ -182,11 +191,7 @@ impl Vertices {
     }
 
     /// Hands out what a tick with these frames takes.
-    ///
-    /// * `lead` - the source each of whose frames makes a tick of its own, and who speaks for it: nobody else's
-    ///   vertices wait for a frame, for they are refused.
-    /// * `frames` - those that go on waiting.
-    pub(super) fn take(&mut self, into: &mut Inbox, lead: Option<Lead>, frames: &[Held]) {
+    pub(super) fn take(&mut self, into: &mut Inbox, ahead: Ahead<'_>) {
         self.going.clear();
         self.staying.clear();
         for (at, held) in self.waiting.iter().enumerate().rev() {
@@ -203,7 +208,7 @@ impl Vertices {
             let whom = held.whom();
             let goes = |(of, last): &(Whom, usize)| *of == whom && at <= *last;
             let is_behind = self.staying.contains(&whom);
-            if !self.going.iter().any(goes) && (is_behind || held.waits(into, lead, frames)) {
+            if !self.going.iter().any(goes) && (is_behind || held.waits(into, ahead)) {
                 if !is_behind {
                     self.staying.push(whom);
                 }
@@ -235,23 +240,30 @@ impl Bent {
         (self.source, self.frame.header.session)
     }
 
-    /// Whether it waits for a frame of its own, or for those of the session before, by what [`Vertices::take`] is
-    /// given.
-    fn waits(&self, into: &Inbox, lead: Option<Lead>, frames: &[Held]) -> bool {
-        let header = &self.frame.header;
-        let own = |frame: &Frame| frame.header.session == header.session;
+    /// Whether it waits for a frame of its own, or for those of the session before.
+    fn waits(&self, into: &Inbox, ahead: Ahead<'_>) -> bool {
+        let own = |frame: &Frame| frame.header.session == self.frame.header.session;
         let before = |held: &Held| {
             held.whose.source == self.source && held.whose.speaks && !own(&held.frame)
         };
-        let speaks = |lead: Lead| {
-            let nobody_else = |session| session == header.session;
-            self.source == Some(lead.source) && lead.session.is_none_or(nobody_else)
+        self.waits_for_its_frame(ahead)
+            || ahead.frames.iter().any(before) && !into.frames().iter().any(own)
+    }
+
+    fn waits_for_its_frame(&self, ahead: Ahead<'_>) -> bool {
+        let header = &self.frame.header;
+        let source = self.source.and_then(|place| ahead.sources.get(place));
+        let Some(source) = source.filter(|_| header.seq != 0) else {
+            return false;
         };
-        // Its frame is in a round that is under way.
-        let comes_later = |held: &Held| held.whose.speaks && belongs(header, &held.frame);
-        let in_round = || lead.is_none() && frames.iter().any(comes_later);
-        header.seq != 0 && (lead.is_some_and(speaks) || in_round())
-            || frames.iter().any(before) && !into.frames().iter().any(own)
+        let is_there = |held: &Held| held.whose.speaks && belongs(header, &held.frame);
+        let is_there = ahead.frames.iter().any(is_there);
+        let in_round = ahead.lead.is_none() && is_there;
+        let speaks = source.alive(ahead.now_ns);
+        let speaks = speaks.is_none_or(|session| session == header.session);
+        let is_young = ahead.now_ns.saturating_sub(self.received_ns) < source.timeout_ns;
+        let may_come = is_young && (is_there || !source.has_heard(header));
+        in_round || speaks && (ahead.lead == self.source || may_come)
     }
 }
 

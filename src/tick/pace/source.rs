@@ -1,7 +1,7 @@
 //! A source as the pacer knows it: who speaks for it, when it was heard, what of it never came.
 
 use crate::scene::SourceSpec;
-use crate::wire::{FrameHeader, SOURCE_NAME_LEN, name_bytes};
+use crate::wire::{FrameHeader, SOURCE_NAME_LEN, VertexHeader, name_bytes};
 
 /// Who speaks for a source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +62,12 @@ impl Source {
     pub(super) fn alive(&self, now_ns: u64) -> Option<u64> {
         let in_time = |by: &Speaker| now_ns.saturating_sub(by.heard_ns) < self.timeout_ns;
         self.speaker.filter(in_time).map(|by| by.session)
+    }
+
+    /// Whether a frame that vertices belong with has come, or one after it.
+    pub(super) fn has_heard(&self, vertices: &VertexHeader) -> bool {
+        let (session, epoch, seq) = self.newest;
+        session == vertices.session && (epoch, seq) >= (vertices.epoch, vertices.seq)
     }
 
     /// Whether a round waits for it: alive, and not late in the round before.

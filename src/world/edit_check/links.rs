@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 
 use super::super::World;
-use super::super::edit::Edit;
+use super::super::edit::{Edit, Put};
 use super::Draft;
 use crate::ids::BodySlot;
 use crate::math::Pose;
@@ -169,7 +169,7 @@ impl<'a> Draft<'a> {
     /// Cost: O(edits + bodies that hang on others), each a search.
     pub(super) fn references_hold(&self, edits: &[Edit]) -> Result<(), String> {
         for edit in edits {
-            if let Edit::Put { body, .. } = edit
+            if let Edit::Put(Put { body, .. }) = edit
                 && self.has(&body.name)
                 && let Some(parent) = body.parent.as_deref().filter(|p| !self.has(p))
             {
