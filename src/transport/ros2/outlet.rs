@@ -16,6 +16,7 @@ use std::time::Duration;
 pub(super) use heard::Topics;
 pub(super) use publishers::Publishers;
 use ros2_client::{Context, Node, Publisher};
+pub(super) use roster::Unheard;
 use rustdds::mio1::Waker;
 use serde::Serialize;
 pub(super) use unsent::Unsent;
@@ -74,6 +75,7 @@ pub(super) struct Outlet {
     pub(super) names: Names,
     /// The topics of bodies.
     pub(super) topics: Topics,
+    pub(super) unheard: Unheard,
     pub(super) sources: Vec<RosSourceSpec>,
 }
 
