@@ -341,8 +341,8 @@ fn bug_values_below_0_were_told_as_unknown_flags() {
         ),
         (&["run", "x.toml", "--ticks", "-1"], "--ticks", "-1"),
         (
-            &["query", "a", "b", "--timeout", "-1s"],
-            "--timeout",
+            &["query", "a", "b", "--wait", "-1s"],
+            "--wait",
             "`-1s` is no time",
         ),
         (

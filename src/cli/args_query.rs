@@ -31,8 +31,16 @@ pub(super) struct QueryArgs {
     #[arg(long)]
     pub(super) json: bool,
     /// How long to wait for the daemon and its answer, such as `500ms`.
-    #[arg(long, default_value = "5s", value_name = "TIME", value_parser = nanoseconds, allow_hyphen_values = true)]
-    pub(super) timeout: u64,
+    // `timeout` is what it was called before it was named as that of `feed`, `monitor` and `record`.
+    #[arg(
+        long,
+        alias = "timeout",
+        default_value = "5s",
+        value_name = "TIME",
+        value_parser = nanoseconds,
+        allow_hyphen_values = true
+    )]
+    pub(super) wait: u64,
     /// No daemon: a file of cases, one JSON object a line (`-`: standard input); one answer a line, in order.
     ///
     /// A case: `{"id", "a": SHAPE, "pose_a": {"t": [x,y,z], "q": [w,x,y,z]}, "b": SHAPE, "pose_b": ...}`, all lengths
@@ -44,7 +52,7 @@ pub(super) struct QueryArgs {
     #[arg(
         long,
         value_name = "IN.jsonl",
-        conflicts_with_all = ["a", "b", "touching", "shape", "ray", "instance", "json", "timeout"]
+        conflicts_with_all = ["a", "b", "touching", "shape", "ray", "instance", "json", "wait"]
     )]
     pub(super) batch: Option<PathBuf>,
 }
@@ -265,6 +273,9 @@ pub(super) fn length_m(text: &str) -> Result<f64, String> {
 
 #[cfg(test)]
 mod tests {
+    use clap::{CommandFactory as _, Parser as _};
+
+    use super::super::args::{Cli, Command};
     use super::*;
 
     #[test]
@@ -317,6 +328,24 @@ mod tests {
                 .parse::<Place>()
                 .unwrap_err()
                 .contains("4 numbers")
+        );
+    }
+
+    #[test]
+    fn the_wait_for_a_daemon_is_named_as_in_other_commands_and_its_old_name_is_taken() {
+        for flag in ["--wait", "--timeout"] {
+            let words = ["sweepd", "query", "a", "b", flag, "3s"];
+            match Cli::try_parse_from(words).unwrap().command {
+                Command::Query(args) => assert_eq!(args.wait, 3_000_000_000),
+                other => panic!("{other:?}"),
+            }
+        }
+        let mut all = Cli::command();
+        let query = all.find_subcommand_mut("query").unwrap();
+        let help = query.render_long_help().to_string();
+        assert!(
+            help.contains("--wait") && !help.contains("--timeout"),
+            "{help}"
         );
     }
 }

@@ -1,12 +1,14 @@
-//! Standard output that survives a closed pipe, and complaints on stderr.
+//! Standard output that survives a closed pipe or a terminal that hung up, and complaints on stderr.
 
-use std::io::{IsTerminal as _, Write};
+use std::io::{ErrorKind, IsTerminal as _, Write};
 
 use crate::error::{Error, Result};
 
-/// Standard output. A closed pipe is remembered: it ends the command normally.
+/// Standard output. That its reader has gone is remembered: it ends the command normally.
 pub(super) struct Out {
     sink: Box<dyn Write>,
+    /// It was a terminal at the start: one that hung up is none any more.
+    is_terminal: bool,
     closed: bool,
 }
 
@@ -15,6 +17,7 @@ impl Out {
     pub(super) fn stdout() -> Self {
         Self {
             sink: Box::new(std::io::BufWriter::new(std::io::stdout())),
+            is_terminal: std::io::stdout().is_terminal(),
             closed: false,
         }
     }
@@ -44,18 +47,21 @@ impl Out {
 
     /// Whether the reader has gone away.
     pub(super) fn closed(&mut self) -> bool {
-        self.closed
-            || self
-                .sink
-                .flush()
-                .is_err_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+        self.closed || self.sink.flush().is_err_and(|e| self.is_gone(&e))
     }
 
     fn take(&mut self, done: std::io::Result<()>) -> Result<()> {
         done.map_err(|e| {
-            self.closed |= e.kind() == std::io::ErrorKind::BrokenPipe;
+            self.closed |= self.is_gone(&e);
             Error::io("cannot write to standard output", e)
         })
+    }
+
+    /// Whether an error says that nobody reads any more. A file's EIO is a broken disk.
+    fn is_gone(&self, error: &std::io::Error) -> bool {
+        let hung_up = rustix::io::Errno::IO.raw_os_error();
+        error.kind() == ErrorKind::BrokenPipe
+            || self.is_terminal && error.raw_os_error() == Some(hung_up)
     }
 }
 

@@ -21,6 +21,13 @@ impl Bent {
         Self([a.bent_m(), b.bent_m()])
     }
 
+    /// Of what is asked of the two as wholes: what their boxes drew back by counts, too, where that is more.
+    ///
+    /// * `shed_m` - [`Shape::shed_m`] of both.
+    pub(super) fn of_wholes(shed_m: [f64; 2]) -> Self {
+        Self(shed_m)
+    }
+
     /// What the two have deformed since `then`, together, metres, rounded up; 0: neither has.
     pub(super) fn since_m(&self, then: &Self) -> f64 {
         let [a, b] = [0, 1].map(|k| (self.0[k] - then.0[k]).max(0.0));

@@ -22,7 +22,7 @@ use super::query::{
     is_simple, leaf_contact, shape_gap, shape_pose, sound, sphere_bound, witness_of,
 };
 
-/// Units of one turn of a walk over meshes before the next pair has its turn: at 32 the clock costs 2.5 %.
+/// Units of one plain turn of a walk over meshes before the next pair has its turn: at 32 the clock costs 2.5 %.
 pub(super) const SLICE_UNITS: u64 = 32;
 
 /// A resumable query.
@@ -144,14 +144,14 @@ impl Cursor {
         }
     }
 
-    /// Works until the goal is reached, the slice is used up, or the meter closes.
+    /// Works until the goal is reached, `slice_units` are spent, or the meter closes.
     ///
     /// `one` and `other` are the same shapes in every turn.
     pub(super) fn turn(
         &mut self,
         room: &mut Room<'_>,
         (one, other): (&PlacedShape, &PlacedShape),
-        report_m: f64,
+        (report_m, slice_units): (f64, u64),
         meter: &mut Meter<'_>,
         counters: &mut Counters,
     ) -> Turn {
@@ -180,7 +180,7 @@ impl Cursor {
             }
             counters.slices += 1;
             let shapes = (&*one.shape, &*other.shape);
-            if !(self.meshes).advance(room.fronts, shapes, self.goal, SLICE_UNITS, meter) {
+            if !(self.meshes).advance(room.fronts, shapes, self.goal, slice_units, meter) {
                 return Turn::Open;
             }
             self.take_meshes(room, (one, other), &pos12);

@@ -12,6 +12,7 @@ use crate::wire::Verdict;
 use crate::world::{Body, PlacedShape};
 
 use super::bent::Bent;
+use super::carry::slice_units;
 use super::change::changed_since;
 use super::cursor::{Cursor, Room, Turn};
 use super::memo::Memo;
@@ -59,8 +60,9 @@ impl Narrow {
             fronts: &mut self.shelves.store,
             contacts: &mut self.shelves.contacts,
         };
-        let (report_m, counters) = (memo.report_m, &mut self.counters);
-        let turn = cursor.turn(&mut room, shapes, report_m, meter, counters);
+        let slice_units = slice_units(memo.undecided_since, self.tick);
+        let (asked, counters) = ((memo.report_m, slice_units), &mut self.counters);
+        let turn = cursor.turn(&mut room, shapes, asked, meter, counters);
         let high = cursor.known(shapes).max;
         let certified = high + memo.reach_m <= 0.0 && memo.now.max > 0.0;
         let overtaken = memo.tested > cursor.tick;

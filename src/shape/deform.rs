@@ -40,6 +40,12 @@ impl Shape {
         self.mesh().map_or(0.0, Mesh::bent_m)
     }
 
+    /// See [`Mesh::shed_m`]; 0 where nothing deforms.
+    #[inline]
+    pub(crate) fn shed_m(&self) -> f64 {
+        self.mesh().map_or(0.0, Mesh::shed_m)
+    }
+
     /// Another number means another tree.
     #[inline]
     pub(crate) fn tree_revision(&self) -> u32 {

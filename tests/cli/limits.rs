@@ -131,6 +131,63 @@ fn bug_open_files_that_ran_out_in_the_run_were_not_told_and_the_daemon_was_to_be
     assert_eq!(daemon.stop().0.code(), Some(0), "{}", daemon.stderr());
 }
 
+/// The same `put` sent again was no edit, so that nothing mended it.
+#[cfg(feature = "ros2")]
+#[test]
+fn bug_a_body_whose_subscription_failed_was_not_heard_for_ever() {
+    let desk = Desk::new();
+    let spheres = TWO_SPHERES.replace("shape =", "source = \"sim\"\nshape =");
+    let source = "[[source]]\nname = \"poses\"\nros2 = { type = \"pose\" }\n";
+    let domain = (100 + std::process::id() % 100).to_string();
+    let args = ["--ros2", "--ros-domain-id", &domain];
+    let mut daemon = desk.run(&format!("{spheres}{source}"), &args);
+    let mut client = desk.source("sim");
+    step(&mut client, &[at(1, 0.0), at(2, 3.0)]);
+    let mut put = |name: &str| {
+        let shape = r#"{"type": "sphere", "radius": 0.5}"#;
+        let body = format!(
+            r#"{{"name": "{name}", "source": "poses", "ros_topic": "/{name}", "shape": {shape}}}"#
+        );
+        let edits = format!(r#"{{"edits": [{{"put": {body}}}]}}"#);
+        let request = client.ask(&edits, &[]).unwrap();
+        until("the answer", || {
+            client
+                .answer_text(request, SECOND_NS / 10)
+                .unwrap()
+                .is_some()
+        });
+    };
+    // With it come the files that answers take.
+    put("early");
+    let files = OpenFiles::of(daemon.pid()).unwrap();
+    daemon.limit(Resource::Nofile, 3);
+    put("late");
+    let failed = "body late: no poses of it can come: ";
+    until("it is told", || {
+        daemon.stderr().contains("it has no subscription")
+    });
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    assert!(
+        !daemon.stderr().contains("can come now"),
+        "{}",
+        daemon.stderr()
+    );
+    daemon.limit(Resource::Nofile, files.most);
+    until("it is heard", || {
+        daemon
+            .stderr()
+            .contains("body late: its poses can come now")
+    });
+    // Once in the log, once as a fault.
+    assert_eq!(
+        daemon.stderr().matches(failed).count(),
+        2,
+        "{}",
+        daemon.stderr()
+    );
+    assert_eq!(daemon.stop().0.code(), Some(0), "{}", daemon.stderr());
+}
+
 #[test]
 fn bug_a_limit_of_the_size_of_files_was_not_told_at_the_start() {
     let desk = Desk::new();

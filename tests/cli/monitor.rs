@@ -312,3 +312,38 @@ fn stdout_that_is_closed_from_the_start_is_a_normal_end() {
     let ended = finish(child);
     assert_eq!((code(&ended), err(&ended).as_str()), (Some(0), ""));
 }
+
+/// The window is closed, or the connection breaks off.
+#[test]
+fn bug_a_terminal_that_hung_up_is_a_normal_end() {
+    let desk = Desk::new();
+    let _daemon = desk.run(TWO_SPHERES, &[]);
+    let mut client = desk.source("sim");
+    let binary = env!("CARGO_BIN_EXE_sweepd");
+    for mode in ["", "--json"] {
+        let code = desk.dir.join(format!("code{mode}"));
+        let command = format!(
+            "trap '' HUP; TERM=xterm {binary} monitor {mode} --instance {}; echo $? > {}",
+            desk.instance,
+            code.display()
+        );
+        let terminal = std::process::Command::new("script")
+            .args(["-qec", &command, "/dev/null"])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn();
+        let Ok(mut terminal) = terminal else { return };
+        let mut shown = [0; 64];
+        let mut screen = terminal.stdout.take().unwrap();
+        assert!(screen.read(&mut shown).unwrap() > 0);
+        terminal.kill().unwrap();
+        terminal.wait().unwrap();
+        let ended = || std::fs::read_to_string(&code).unwrap_or_default();
+        until("its end", || {
+            step(&mut client, &[at(1, 0.0), at(2, 0.5)]);
+            !ended().is_empty()
+        });
+        assert_eq!(ended().trim(), "0", "{mode}");
+    }
+}

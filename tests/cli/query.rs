@@ -109,7 +109,7 @@ fn what_does_not_move_has_no_age() {
     let desk = Desk::new();
     let still = TWO_SPHERES.replace("shape =", "moves = false\nshape =");
     let _daemon = desk.run(&still, &[]);
-    let live = json(&desk, &["a", "b", "--json", "--timeout", "30s"]);
+    let live = json(&desk, &["a", "b", "--json", "--wait", "30s"]);
     assert!(live["age_ns"].is_null(), "{live}");
     assert_eq!(live["verdict"], "colliding");
     let ended = ask(&desk, &["a", "b"]);
@@ -297,7 +297,7 @@ fn a_time_of_impact_is_told_for_velocities_that_are_said() {
 #[test]
 fn without_a_daemon_that_answers_it_ends_in_time_with_code_3() {
     let desk = Desk::new();
-    let ended = ask(&desk, &["a", "b", "--timeout", "200ms"]);
+    let ended = ask(&desk, &["a", "b", "--wait", "200ms"]);
     assert_eq!(code(&ended), Some(3), "{}", err(&ended));
     let text = err(&ended);
     assert!(
@@ -307,7 +307,7 @@ fn without_a_daemon_that_answers_it_ends_in_time_with_code_3() {
     let daemon = desk.run(TWO_SPHERES, &[]);
     drop(desk.client(None));
     daemon.signal(Signal::STOP);
-    let ended = ask(&desk, &["a", "b", "--timeout", "300ms"]);
+    let ended = ask(&desk, &["a", "b", "--wait", "300ms"]);
     daemon.signal(Signal::CONT);
     assert_eq!(code(&ended), Some(3), "{}", err(&ended));
 }
@@ -315,7 +315,7 @@ fn without_a_daemon_that_answers_it_ends_in_time_with_code_3() {
 #[test]
 fn a_signal_ends_it_before_the_answer_and_that_is_no_success() {
     let desk = Desk::new();
-    let mut query = desk.start("query", &["a", "b", "--timeout", "600s"]);
+    let mut query = desk.start("query", &["a", "b", "--wait", "600s"]);
     // It listens for signals before it looks for a daemon; until then a signal ends it, too, without a code.
     let caught = || {
         let status = std::fs::read_to_string(format!("/proc/{}/status", query.pid())).unwrap();
@@ -337,7 +337,7 @@ fn a_signal_ends_it_before_the_answer_and_that_is_no_success() {
 fn bug_a_wait_for_a_daemon_is_told_once_and_not_with_quiet() {
     let desk = Desk::new();
     for (quiet, times) in [(&[][..], 1), (&["-q"], 0)] {
-        let asked = ["a", "b", "--timeout", "1500ms"];
+        let asked = ["a", "b", "--wait", "1500ms"];
         let ended = ask(&desk, &[&asked, quiet].concat());
         assert_eq!(code(&ended), Some(3), "{}", err(&ended));
         let line = format!("waiting for a daemon `{}`", desk.instance);

@@ -247,3 +247,32 @@ fn law_4_6_bug_a_mesh_that_moves_over_a_floor_with_ramps_is_decided_in_parts() {
     }
     assert!(decided >= 40, "{decided} of 60");
 }
+
+/// Tilted bowls just over the floor that turn by more in a tick than any walk of an older pose can tell, and units for
+/// fewer than two walks a tick.
+#[test]
+fn law_4_7_bug_turns_on_half_spaces_did_not_grow_while_a_pair_waits() {
+    const BOWLS: u64 = 8;
+    let x = |id: u64| 3.0 * id as f64;
+    let mut bodies: Vec<String> = (1..=BOWLS)
+        .map(|id| body(id, [x(id), 0.0, 0.5], &bowl(40, 1.0), ""))
+        .collect();
+    bodies.push(floor(99, FLOOR));
+    let mut rig = Rig::new(&scene("", &bodies));
+    (rig.demand.contacts, rig.demand.regions) = (false, false);
+    let mut decided = [0; BOWLS as usize];
+    for tick in 0..100_i32 {
+        for id in 1..=BOWLS {
+            let tilt = Quat::from_axis_angle(&Vec3::x_axis(), 0.2);
+            let turn = Quat::from_axis_angle(&Vec3::z_axis(), 0.1 * f64::from(tick));
+            let at = Vec3::new(x(id), 0.0, 0.0111);
+            rig.place(id, &Pose::from_parts(at.into(), turn * tilt));
+        }
+        rig.send(units(512));
+        for id in 1..=BOWLS {
+            let apart = rig.verdict(id, 99) == Verdict::Apart;
+            decided[id as usize - 1] += u32::from(apart);
+        }
+    }
+    assert!(decided.iter().all(|times| *times >= 4), "{decided:?}");
+}

@@ -99,9 +99,9 @@ pub(super) fn ask<T>(
     found: impl Fn(&mut Answer) -> Option<T>,
 ) -> Result<(T, Vec<String>)> {
     check(question)?;
-    let until_ns = SystemClock.monotonic_ns().saturating_add(args.timeout);
+    let until_ns = SystemClock.monotonic_ns().saturating_add(args.wait);
     let instance = &args.which.instance;
-    let Some(mut client) = connect(instance, None, args.timeout, stop)? else {
+    let Some(mut client) = connect(instance, None, args.wait, stop)? else {
         return Err(stopped());
     };
     let request = client.ask(&question.to_string(), &[])?;
@@ -115,8 +115,8 @@ pub(super) fn ask<T>(
         }
         if left_ns == 0 {
             return Err(Error::TimedOut(format!(
-                "the daemon `{instance}` gave no answer within {}; give it longer with --timeout, or see `sweepd doctor`",
-                time(args.timeout)
+                "the daemon `{instance}` gave no answer within {}; give it longer with --wait, or see `sweepd doctor`",
+                time(args.wait)
             )));
         }
     };

@@ -290,7 +290,9 @@ impl CompoundFront {
             contacts,
             search: tools.search,
         };
-        let turn = cursor.turn(&mut room, shapes, asked.report_m, meter, tools.counters);
+        let left = asked.end.saturating_sub(meter.spent()).max(1);
+        let asked = (asked.report_m, left);
+        let turn = cursor.turn(&mut room, shapes, asked, meter, tools.counters);
         let since_m = changed_since(a, b, (&cursor.rel, cursor.bent), &pair.rel);
         let whole = turn == Turn::Finished;
         let low = if whole {

@@ -87,7 +87,14 @@ fn twin((a, b): (&Body, &Body), rel: &Pose) -> (Interval, Vec<(u32, u32)>) {
                 search: Search::Carried,
             };
             let counters = &mut Counters::default();
-            while cursor.turn(&mut room, (one, other), 0.0, &mut meter, counters) == Turn::Open {}
+            while cursor.turn(
+                &mut room,
+                (one, other),
+                (0.0, u64::MAX),
+                &mut meter,
+                counters,
+            ) == Turn::Open
+            {}
             gap = gap.least(cursor.gap);
             if cursor.gap.max <= 0.0 {
                 colliding.push((i, j));

@@ -10,7 +10,6 @@ use super::lack::Lack;
 use super::placed::Placed;
 use super::side::Side;
 use crate::math::{Point, Pose, ROUND, f32_near};
-use crate::narrow::bent::Bent;
 use crate::narrow::exact::{Warm, convex_gap};
 use crate::shape::{Ball, Convex, Mesh, Shape};
 use crate::time::Meter;
@@ -56,7 +55,7 @@ impl Deep {
         meter.charge_weighted(1, cost);
         let overlap_m = overlap_m?;
         let depth_m = overlap_m - at.slop - 8.0 * ROUND * overlap_m.abs();
-        self.lack = Lack::of(pos12, Bent::of_shapes(a, b), -depth_m);
+        self.lack = Lack::of(pos12, [a.shed_m(), b.shed_m()], -depth_m);
         (depth_m > 0.0).then_some(depth_m)
     }
 }

@@ -18,7 +18,6 @@ use super::placed::Placed;
 use super::retest::tree_of;
 use super::side::Side;
 use crate::math::{Pose, Vec3};
-use crate::narrow::bent::Bent;
 use crate::shape::Shape;
 use crate::time::Meter;
 
@@ -93,7 +92,7 @@ impl Parting {
         self.lack = if new {
             Lack::default()
         } else {
-            Lack::of(pos12, Bent::of_shapes(a, b), -best)
+            Lack::of(pos12, [a.shed_m(), b.shed_m()], -best)
         };
         let points = (side_a.points() + side_b.points()) / POINTS_A_QUARTER;
         let cost = tries * (TRY_COST_QUARTERS + points as u64) / 4 + 1;
@@ -155,5 +154,24 @@ mod tests {
         a.bend(0, &at(-0.5));
         let low = parting.low(&a, &b, &pose, &mut meter);
         assert!(low.is_some_and(|low| low <= 0.6), "{low:?}");
+    }
+
+    /// The box is what was lacking, and it draws back without any way of a vertex.
+    #[test]
+    fn bug_a_plane_that_was_missed_is_looked_for_again_where_a_box_has_drawn_back() {
+        let (mut a, b) = (sheet(), sheet());
+        let clock = ManualClock::new(0);
+        let mut meter = Meter::unlimited(&clock);
+        let (mut parting, pose) = (Parting::default(), Pose::translation(0.0, 0.0, 0.1));
+        for z in [5.0, 0.0] {
+            a.bend(2, &[[0.0, 1.0, z]]);
+        }
+        for _ in 0..3 {
+            assert_eq!(parting.low(&a, &b, &pose, &mut meter), None);
+        }
+        a.refit(usize::MAX);
+        a.bend(2, &[[0.0, 1.0, 0.0]]);
+        let low = parting.low(&a, &b, &pose, &mut meter);
+        assert!(low.is_some_and(|low| low <= 0.1), "{low:?}");
     }
 }

@@ -84,6 +84,14 @@ impl<'a> Side<'a> {
         }
     }
 
+    /// See [`Mesh::shed_m`]; 0 where nothing deforms.
+    pub(super) fn shed_m(self) -> f64 {
+        match self {
+            Self::Mesh(mesh) => mesh.shed_m(),
+            Self::Convex(_) => 0.0,
+        }
+    }
+
     /// How many points stand for all its connected surfaces.
     pub(super) fn shell_count(self) -> usize {
         match self {

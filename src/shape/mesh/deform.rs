@@ -17,11 +17,12 @@ use super::obb::ObbPack;
 use super::topology::Sets;
 use super::{Mesh, ObbTree, Tree};
 use crate::limits::{DEFORMING_TRIANGLES_MAX, DEFORMING_VERTICES_MAX, EXTENT_MAX_M};
-use crate::math::{Aabb, Point, ROUND, Vec3, greater, lesser};
+use crate::math::{Aabb, Point, ROUND, greater, lesser};
 use crate::shape::ShapeError;
 use crate::simd::aligned;
 use crate::simd::obb::LANES;
 
+mod bounds;
 mod tree;
 
 pub(crate) use tree::{NewTree, TreeJob};
@@ -56,6 +57,8 @@ pub(super) struct Deform {
     around: Vec<Corners>,
     /// Running sum of each update's largest displacement, metres, rounded up.
     bent_m: f64,
+    /// The same, with what box and radius of the whole drew back by where that is more.
+    shed_m: f64,
     /// How far a vertex may be outside of its boxes, metres.
     stale_m: f64,
     /// The same for the boxes that the refit under way has done.
@@ -68,20 +71,6 @@ pub(super) struct Deform {
     built_surface: f32,
     /// Raised when the tree is another.
     revision: u32,
-}
-
-impl Deform {
-    /// A box and a radius that hold all triangles, where a refit has ended since the last vertices came.
-    fn fitted(&self, centre: &Point) -> Option<(Aabb, f64)> {
-        let root = self.around.first().filter(|_| self.stale_m == 0.0)?;
-        let bounds = aabb(root);
-        let farthest = (bounds.centre() - centre).abs() + bounds.half_extents();
-        let radius = farthest.norm() * (1.0 + 8.0 * ROUND);
-        Some((
-            bounds,
-            radius + 8.0 * ROUND * (centre.coords.amax() + bounds.centre().coords.amax()),
-        ))
-    }
 }
 
 impl Mesh {
@@ -109,6 +98,7 @@ impl Mesh {
             rows,
             around: vec![Corners::NOTHING; packs],
             bent_m: 0.0,
+            shed_m: 0.0,
             stale_m: f64::INFINITY,
             fresh_m: 0.0,
             left: 0,
@@ -226,7 +216,8 @@ impl Mesh {
         // Differences, squares and a root of f64: a few units of roundoff.
         let up = |square: f64| square.sqrt() * (1.0 + 8.0 * ROUND);
         let (step_m, far_m) = (up(step), up(far) + 8.0 * ROUND * self.centre.coords.amax());
-        let before = deform.fitted(&self.centre);
+        let then = (self.bounds, self.radius);
+        let before = deform.fitted(&self.bounds, &self.centre);
         let add = |sum: f64| (sum + step_m) * (1.0 + 2.0 * ROUND);
         deform.bent_m = add(deform.bent_m);
         deform.stale_m = add(deform.stale_m);
@@ -237,12 +228,12 @@ impl Mesh {
         if whole {
             (self.bounds, self.radius) = (bounds, far_m);
         } else if !moved.is_empty() {
-            // What stays is within the root's boxes where these are of the vertices before: no wider than all that has
-            // ever been there.
-            let (around, radius) = before.unwrap_or((self.bounds, self.radius));
+            // What stays is within the root's boxes, and these are no wider than all that has been there of late.
+            let (around, radius) = before.unwrap_or(then);
             self.bounds = around.merged(&bounds);
             self.radius = radius.min(self.radius).max(far_m);
         }
+        deform.note_shed(step_m, &then, &(self.bounds, self.radius));
         step_m
     }
 
@@ -276,22 +267,6 @@ impl Mesh {
             deform.last_surface = deform.surface;
         }
         done
-    }
-
-    /// Bounds and radius of all vertices.
-    fn measure(&mut self) {
-        self.bounds = Aabb::of(&self.vertices);
-        let far = |v: &Point| (v - self.centre).norm_squared();
-        let square = self.vertices.iter().map(far).fold(0.0, f64::max);
-        self.radius = square.sqrt() * (1.0 + 8.0 * ROUND);
-    }
-
-    /// How far a mesh that deforms reaches from its centre along a direction and against it, metres.
-    pub(super) fn extent_of_bounds(&self, direction: &Vec3) -> [f64; 2] {
-        let (middle, half) = (self.bounds.centre(), self.bounds.half_extents());
-        let on = direction.dot(&(middle - self.centre));
-        let reach = direction.abs().dot(&half);
-        [reach + on, reach - on].map(|r| r.min(self.radius))
     }
 }
 

@@ -4,6 +4,7 @@
 
 mod early;
 mod frames;
+mod links;
 mod roster;
 mod wrong;
 
@@ -23,10 +24,10 @@ use super::shelf::{Shelf, Update};
 use crate::error::{Error, Result};
 use crate::time::{Clock as _, SystemClock};
 use crate::transport::Setting;
-use crate::wire::RejectReason;
-use crate::wire::ros::{BodyTransforms, Book};
+use crate::wire::ros::BodyTransforms;
 use early::Early;
-use frames::fill;
+use frames::put_frame;
+use links::{look_at, source_name, take_links};
 pub(super) use wrong::Local;
 use wrong::Wrongs;
 
@@ -190,6 +191,7 @@ impl Inlet {
             shared,
             local,
             early,
+            updates,
             wrongs,
             ..
         } = self;
@@ -227,14 +229,14 @@ impl Inlet {
                     from: info.publisher_gid(),
                     ..receipt
                 };
-                for &place in places.iter() {
-                    if let Some(source) = sources.get_mut(place)
-                        && source.take_links(&message, *fixed, receipt)
-                    {
-                        shelf.reset(place);
-                        shared.say_back(&source_name(source), receipt.now_ns);
-                    }
-                }
+                let of = places.iter().copied();
+                take_links(
+                    (sources, of),
+                    (shelf, shared),
+                    (&message, *fixed),
+                    receipt,
+                    updates,
+                );
             }),
             Line::Pose(from, feeder) => drain(from, shared, |message, info| {
                 feeder.hear(info, receipt.now_ns);
@@ -257,12 +259,7 @@ impl Inlet {
     fn look(&mut self, receipt: Receipt) -> bool {
         let (mut came, mut skew_ns) = (false, None);
         for (place, source) in self.sources.iter_mut().enumerate() {
-            self.updates.clear();
-            source.look(receipt, &mut self.updates);
-            if !self.updates.is_empty() {
-                self.shelf.merge(place, &self.updates);
-                came = true;
-            }
+            came |= look_at((source, place), &self.shelf, receipt, &mut self.updates);
             skew_ns = skew_ns.max(source.skew_ns);
             self.shared
                 .note_refused(std::mem::take(&mut source.refused));
@@ -273,10 +270,12 @@ impl Inlet {
     }
 
     fn tell_faults(&mut self, now_ns: u64) {
+        self.wake_for_all();
         let book = self.shared.book();
         let mut all = self.wrongs.words(&book, now_ns, 4 * FAULTS_NS);
         all.extend(self.lines.iter().filter_map(|line| line.fault(now_ns)));
         all.extend(self.shared_topics());
+        all.extend(self.unheard().into_iter().take(FAULTS_MAX));
         for source in &self.sources {
             // Sources of one topic say the same of what is not theirs.
             for fault in source.faults(FAULTS_MAX, now_ns) {
@@ -320,25 +319,6 @@ fn take_frames(
     (came || released, more)
 }
 
-/// Puts a frame of `~/transforms` on the shelf, and takes note of what is wrong with it.
-fn put_frame(
-    (shelf, shared): (&Shelf, &Shared),
-    (local, wrongs): (&Local, &mut Wrongs),
-    (message, receipt, refused): (&BodyTransforms, Receipt, Option<RejectReason>),
-    book: &Book,
-) {
-    let mut frame = shelf.spare();
-    fill(&mut frame, message, book, receipt);
-    let own = local.refuse(message);
-    if let Some(reason) = own.as_ref().map(|(reason, _)| *reason).or(refused) {
-        shared.note_refused(1);
-        frame.refused = Some(reason);
-    }
-    shelf.put(local.place(&message.source), frame);
-    let own = own.as_ref().map(|(_, text)| text.as_str());
-    wrongs.note(local, (message, own), receipt, book);
-}
-
 /// Takes a message of one body.
 fn take_one(
     sources: &mut [Source],
@@ -356,12 +336,6 @@ fn take_one(
         shared.say_back(&source_name(source), now_ns);
     }
     shelf.merge(feeder.source, &updates);
-}
-
-fn source_name(source: &Source) -> String {
-    crate::wire::name_str(&source.name)
-        .unwrap_or_default()
-        .to_owned()
 }
 
 /// Takes what a subscription holds.

@@ -68,6 +68,20 @@ impl Line {
         }
     }
 
+    /// The same of a body's own line, which is taken at each look whoever wakes for it: where it fails that is a fault
+    /// until it succeeds.
+    pub(super) fn wake_by(&mut self, registry: &Registry, token: Token) {
+        let done = self.register(registry, token);
+        if let Self::Pose(_, feeder) | Self::Odometry(_, feeder) = self {
+            feeder.unwoken = done.err().map(|e| e.to_string());
+        }
+    }
+
+    /// Whether nobody wakes for it.
+    pub(super) fn is_unwoken(&self) -> bool {
+        self.feeder().is_some_and(|feeder| feeder.unwoken.is_some())
+    }
+
     /// Whether its messages are whole frames, which need no look at anything else.
     pub(super) fn is_whole(&self) -> bool {
         matches!(self, Self::Transforms(_))
@@ -112,6 +126,8 @@ pub(super) struct Feeder {
     pub(super) topic: String,
     /// Who sends on it.
     heard: Heard,
+    /// Why nobody wakes for what comes.
+    unwoken: Option<String>,
 }
 
 impl Feeder {
@@ -121,6 +137,12 @@ impl Feeder {
     }
 
     fn fault(&self, now_ns: u64) -> Option<String> {
+        if let Some(why) = &self.unwoken {
+            return Some(format!(
+                "topic {}: poses are seen up to 0.1 s late, for the system does not wake this node for them: {why}; it is tried again twice a second",
+                self.topic
+            ));
+        }
         self.heard.are_two(now_ns).then(|| {
             format!(
                 "topic {}: two publishers send poses of one body: stop one of them",
@@ -189,6 +211,7 @@ pub(super) fn of_body(
         member: usize::MAX,
         topic: topic.to_owned(),
         heard: Heard::default(),
+        unwoken: None,
     };
     Ok(if kind == RosKind::Pose {
         let kind = ("geometry_msgs", "PoseStamped");

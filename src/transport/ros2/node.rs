@@ -23,7 +23,7 @@ use super::lines::subscribe;
 use super::markers::Boxes;
 use super::names::Names;
 use super::namesakes::Namesakes;
-use super::outlet::{Latest, Outlet, Publishers, Read, Topics, Unsent};
+use super::outlet::{Latest, Outlet, Publishers, Read, Topics, Unheard, Unsent};
 use super::params::{Answers, Table};
 use super::parcel::Parcels;
 use super::poses::Source;
@@ -125,6 +125,7 @@ impl RosNode {
         let (lines, unheard) = subscribe(&mut node, &context, &mut names, &sources, scene.again)?;
         odd.extend(unheard);
         let topics = Topics::of(scene, &names, &lines);
+        let unheard = Unheard::of(scene, &topics);
         shared.set_rosout(Some(node.rosout_writer()));
         let namesakes = Namesakes::of(&context, node.fully_qualified_name())?;
         table.run();
@@ -165,6 +166,7 @@ impl RosNode {
             read: Read::default(),
             namesakes,
             topics,
+            unheard,
             names: names.clone(),
             sources: scene.sources.clone(),
         };

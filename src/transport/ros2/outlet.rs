@@ -18,6 +18,7 @@ pub(super) use heard::Topics;
 pub(super) use latest::Latest;
 pub(super) use publishers::Publishers;
 use ros2_client::{Context, Node, Publisher};
+pub(super) use roster::Unheard;
 use rustdds::mio1::Waker;
 use serde::Serialize;
 pub(super) use unsent::Unsent;
@@ -77,6 +78,7 @@ pub(super) struct Outlet {
     pub(super) names: Names,
     /// The topics of bodies.
     pub(super) topics: Topics,
+    pub(super) unheard: Unheard,
     pub(super) sources: Vec<RosSourceSpec>,
 }
 

@@ -203,6 +203,7 @@ impl Source {
             return;
         }
         let (mut skew_ns, root) = (None, self.root.1);
+        self.tree.note_look();
         let members = self.members.iter_mut().enumerate();
         for (place, member) in members.filter(|(_, member)| member.seat != NOBODY) {
             let found = self.tree.find(member.frame, root);

@@ -36,6 +36,8 @@ struct Link {
     received_ns: u64,
     /// It came as one that never changes, and has no age.
     fixed: bool,
+    /// How many looks there had been when it came.
+    looks: u64,
 }
 
 /// What became of a link.
@@ -103,6 +105,8 @@ pub(super) struct Tree {
     denied: usize,
     /// Links that never change which had to go.
     let_go: u64,
+    /// How often all bodies were looked for.
+    looks: u64,
 }
 
 /// tf2 knows no slash in front; old senders write it.
@@ -161,6 +165,18 @@ impl Tree {
         let id = self.ids.get(plain(child));
         let link = id.and_then(|id| self.link(*id));
         link.is_some_and(|link| link.fixed != fixed)
+    }
+
+    /// Bodies are looked for: what came until now is no news any more.
+    pub(super) fn note_look(&mut self) {
+        self.looks += 1;
+    }
+
+    /// Whether the link of a frame has come since the last look, and changes.
+    pub(super) fn is_news(&self, child: &str) -> bool {
+        let id = self.ids.get(plain(child));
+        let link = id.and_then(|id| self.link(*id));
+        link.is_some_and(|link| !link.fixed && link.looks == self.looks)
     }
 
     fn link(&self, frame: usize) -> Option<&Link> {
@@ -222,6 +238,7 @@ impl Tree {
             order,
             received_ns,
             fixed,
+            looks: self.looks,
         };
         if let Some(frame) = self.frames.get_mut(child) {
             frame.link = Some(new);

@@ -143,7 +143,8 @@ impl CarriedFront {
         }
         self.known.fathomed.steps += 1;
         if self.known.fathomed.steps == STEPS_MAX {
-            self.vain = Lack::of(&self.at.pos12, self.bent, VAIN * a.radius().min(b.radius()));
+            let lack_m = VAIN * a.radius().min(b.radius());
+            self.vain = Lack::of(&self.at.pos12, [a.shed_m(), b.shed_m()], lack_m);
         }
     }
 

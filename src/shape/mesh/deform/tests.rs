@@ -8,6 +8,7 @@
 )]
 
 use super::*;
+use crate::math::Vec3;
 use crate::shape::mesh::tests::ball;
 use crate::shape::{Inside, Node};
 
@@ -230,4 +231,23 @@ fn bug_a_mesh_whose_vertices_come_in_parts_shrinks_again_after_a_refit() {
         assert!(mesh.radius() <= 1.8 * radius, "{} {radius}", mesh.radius());
         assert!((mesh.aabb().max - bounds.max).norm() < 1e-6);
     }
+}
+
+#[test]
+fn bug_a_mesh_whose_vertices_come_in_parts_all_the_time_shrinks_though_no_refit_ends_with_nothing_newer()
+ {
+    let mut mesh = ball(12, 0.1).into_deforming().unwrap();
+    let radius = mesh.radius();
+    let one = rows(&mesh, |_, v| *v)[7];
+    mesh.bend(7, &[one.map(|x| 5.0 * x)]);
+    mesh.bend(7, &[one]);
+    assert!(mesh.radius() > 4.0 * radius);
+    for step in 0..1_000_u16 {
+        mesh.refit(1);
+        let by = 1.0 + 1e-4 * f32::from(step % 2);
+        mesh.bend(7, &[one.map(|x| by * x)]);
+        assert!(mesh.lag_m() > 0.0 || step % 2 == 0);
+        boxes_hold(&mesh);
+    }
+    assert!(mesh.radius() <= 2.0 * radius, "{} {radius}", mesh.radius());
 }

@@ -1,6 +1,9 @@
 //! Frames of `~/transforms` as the daemon's. In: messages, names of bodies. Out: frames with ids. Pure.
 
 use super::super::poses::Receipt;
+use super::super::shared::Shared;
+use super::super::shelf::Shelf;
+use super::{Local, Wrongs};
 use crate::limits::FRAME_ROWS_MAX;
 use crate::wire::ros::{BodyTransform, BodyTransforms, Book, Twist};
 use crate::wire::{Frame, FrameHeader, RejectReason, TransformRow, WIRE_VERSION, name_bytes};
@@ -56,4 +59,23 @@ pub(super) fn fill(frame: &mut Frame, message: &BodyTransforms, book: &Book, rec
 pub(super) fn velocity(twist: &Twist) -> [f64; 6] {
     let (l, a) = (twist.linear, twist.angular);
     [l.x, l.y, l.z, a.x, a.y, a.z]
+}
+
+/// Puts a frame of `~/transforms` on the shelf, and takes note of what is wrong with it.
+pub(super) fn put_frame(
+    (shelf, shared): (&Shelf, &Shared),
+    (local, wrongs): (&Local, &mut Wrongs),
+    (message, receipt, refused): (&BodyTransforms, Receipt, Option<RejectReason>),
+    book: &Book,
+) {
+    let mut frame = shelf.spare();
+    fill(&mut frame, message, book, receipt);
+    let own = local.refuse(message);
+    if let Some(reason) = own.as_ref().map(|(reason, _)| *reason).or(refused) {
+        shared.note_refused(1);
+        frame.refused = Some(reason);
+    }
+    shelf.put(local.place(&message.source), frame);
+    let own = own.as_ref().map(|(_, text)| text.as_str());
+    wrongs.note(local, (message, own), receipt, book);
 }

@@ -3,14 +3,16 @@
 //! In: what edits did, with the subscriptions that the sending thread made. Out: lines and places in step with the
 //! scene.
 
+use std::collections::BTreeSet;
+
 use rustdds::mio1::Token;
 
-use super::super::lines::{Arrival, Feeder};
+use super::super::lines::{Arrival, Feeder, Line};
 use super::super::open;
 use super::super::poses::Source;
-use super::super::shared::Say;
 use super::super::shelf::{Seat, Shelf};
 use super::Inlet;
+use crate::config::RosKind;
 use crate::transport::{BodyChange, BodyNote};
 
 /// Token of lines that came later: it only wakes, and every round looks at every line.
@@ -50,14 +52,32 @@ impl Inlet {
             self.shelf.set_member(at, member, Seat::of(&body));
             let Some(mut line) = line else { continue };
             line.feed(at, member);
-            match line.register(self.poll.registry(), LATER) {
-                Ok(()) => self.lines.push(line),
-                Err(e) => {
-                    let text = format!("body {}: no poses of it can come: {e}", body.name);
-                    self.shared.say(Say::Error, &text);
-                }
-            }
+            line.wake_by(self.poll.registry(), LATER);
+            self.lines.push(line);
         }
+    }
+
+    /// Lines that nobody is woken for are tried again.
+    pub(super) fn wake_for_all(&mut self) {
+        for line in self.lines.iter_mut().filter(|line| line.is_unwoken()) {
+            line.wake_by(self.poll.registry(), LATER);
+        }
+    }
+
+    /// Bodies of topics of their own that have no subscription.
+    pub(super) fn unheard(&self) -> Vec<String> {
+        let fed = self.lines.iter().filter_map(Line::feeder);
+        let fed: BTreeSet<_> = fed.map(|f| (f.source, f.member)).collect();
+        let own = self.sources.iter().enumerate();
+        let own = own.filter(|(_, source)| source.kind != RosKind::Tf);
+        own.flat_map(|(at, source)| source.bodies().map(move |(member, name)| ((at, member), name)))
+            .filter(|(place, _)| !fed.contains(place))
+            .map(|(_, name)| {
+                format!(
+                    "body {name}: no poses of it can come: it has no subscription, and the log says why; it is tried again each second"
+                )
+            })
+            .collect()
     }
 
     /// Topics of which one moves two bodies: a scene file is refused for it, edits can bring it about.

@@ -5,6 +5,7 @@ use super::super::shelf::Seat;
 use super::super::tf::Tree;
 use super::{Member, NOBODY, Source};
 use crate::transport::BodyNote;
+use crate::wire::ros::TfMessage;
 
 impl Member {
     pub(super) fn of(body: &BodyNote, tree: &mut Tree) -> Self {
@@ -61,6 +62,21 @@ impl Source {
         member.last = None;
         self.tree.unpin(member.frame);
         Some(place)
+    }
+
+    /// Place and name of each of its bodies.
+    pub(in super::super) fn bodies(&self) -> impl Iterator<Item = (usize, &str)> {
+        let members = self.members.iter().enumerate();
+        let seated = members.filter(|(_, member)| member.seat != NOBODY);
+        seated.map(|(place, member)| (place, member.name.as_str()))
+    }
+
+    /// Whether a message has a link that has come already since the last look, of a source with bodies whose poses are
+    /// each a part of a way: then what they are at is to be looked at before.
+    pub(in super::super) fn is_overtaken(&self, message: &TfMessage) -> bool {
+        let mut links = message.transforms.iter();
+        self.members.iter().any(|member| member.seat.continuous)
+            && links.any(|link| self.tree.is_news(&link.child_frame_id))
     }
 
     fn place_of(&self, name: &str) -> Option<usize> {
