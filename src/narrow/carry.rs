@@ -16,7 +16,7 @@ use super::bent::Bent;
 use super::cursor::SLICE_UNITS;
 use super::memo::{Memo, Witness};
 use super::mesh::{CarriedFront, FrontStore, Goal, LeafContact, Search, lead_out, numbered};
-use super::query::{leaf_contact, shape_pose, sound, witness_of};
+use super::query::{leaf_contact, lost_m, shape_pose, sound, witness_of};
 use super::widen::widened;
 
 /// What asking two triangles whether they surely cross costs, in tests of a box against a pack, with what it takes to
@@ -54,7 +54,8 @@ impl Narrow {
                 self.counters.queries += 1;
                 memo.retested = self.tick;
             }
-            let told = glance(front, (one_shape, other_shape), &pos12, due, meter);
+            let at = (&pos12, lost_m(one, other, &rel));
+            let told = glance(front, (one_shape, other_shape), at, due, meter);
             let gap = told.gap(memo.here(), |gap| sound(gap, one, other, &rel));
             let now = widened(gap, memo.reach_m);
             if now.max <= 0.0 || now.min > memo.report_m.max(0.0) {
@@ -80,7 +81,9 @@ impl Narrow {
         meter.charge_weighted(0, CARRY_COST);
         self.counters.slices += 1;
         let slice_units = slice_units(memo.undecided_since, self.tick);
-        let done = front.advance(store, one_shape, other_shape, goal, slice_units, meter);
+        let asked = (goal, lost_m(one, other, &rel));
+        let done =
+            front.advance_despite(store, (one_shape, other_shape), asked, slice_units, meter);
         let told = Told {
             gap: sound(front.interval(), one, other, &rel),
             done,
@@ -223,7 +226,7 @@ impl Glance {
     /// * `sound` - makes a bound on the two shapes one on the two bodies.
     pub(super) fn gap(&self, here: Interval, sound: impl Fn(Interval) -> Interval) -> Interval {
         match *self {
-            // A certified touch; how deep it is at most has not been asked again.
+            // A certified touch, whatever composing the poses lost; how deep it is at most has not been asked again.
             Self::Touch(_) => Interval::new(here.min.min(0.0), 0.0),
             Self::Deep(depth_m) => sound(Interval::new(f64::NEG_INFINITY, -depth_m)).meet(here),
             Self::Apart(low_m) => sound(Interval::new(low_m, f64::INFINITY)).meet(here),
@@ -234,17 +237,18 @@ impl Glance {
 
 /// Looks at a pair where it touched last, or else at what balls within the two, and then a plane, would say.
 ///
+/// * `off_m` - how far the second may be from that pose for the two bodies, metres: a touch is one there, too.
 /// * `touched` - whether it touched when it was last looked at.
 pub(super) fn glance(
     front: &mut CarriedFront,
     (a, b): (&Shape, &Shape),
-    pos12: &Pose,
+    (pos12, off_m): (&Pose, f64),
     touched: bool,
     meter: &mut Meter<'_>,
 ) -> Glance {
     if touched && front.knows_touch() {
         meter.charge_weighted(1, RETEST_COST);
-        if front.still_touches(a, b, pos12) {
+        if front.still_touches(a, b, (pos12, off_m)) {
             return Glance::Touch(None);
         }
     }
@@ -255,7 +259,7 @@ pub(super) fn glance(
         let low_m = front.parted(a, b, pos12, meter);
         return low_m.map_or(Glance::Nothing, Glance::Apart);
     }
-    let beside = front.touches_beside(a, b, pos12, meter);
+    let beside = front.touches_beside(a, b, (pos12, off_m), meter);
     beside.map_or(Glance::Nothing, |leaf| Glance::Touch(Some(leaf)))
 }
 

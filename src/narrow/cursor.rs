@@ -19,7 +19,7 @@ use super::holdings::Holdings;
 use super::memo::Witness;
 use super::mesh::{FrontStore, Goal, MeshQuery, Search, overlap, parted};
 use super::query::{
-    is_simple, leaf_contact, shape_gap, shape_pose, sound, sphere_bound, witness_of,
+    is_simple, leaf_contact, lost_m, shape_gap, shape_pose, sound, sphere_bound, witness_of,
 };
 
 /// Units of one plain turn of a walk over meshes before the next pair has its turn: at 32 the clock costs 2.5 %.
@@ -180,7 +180,8 @@ impl Cursor {
             }
             counters.slices += 1;
             let shapes = (&*one.shape, &*other.shape);
-            if !(self.meshes).advance(room.fronts, shapes, self.goal, slice_units, meter) {
+            let asked = (self.goal, lost_m(one, other, &self.rel));
+            if !(self.meshes).advance_despite(room.fronts, shapes, asked, slice_units, meter) {
                 return Turn::Open;
             }
             self.take_meshes(room, (one, other), &pos12);

@@ -12,6 +12,7 @@ use super::exact::{
 };
 use super::memo::Witness;
 use super::mesh::{LeafContact, retest_witness};
+use super::widen::widened;
 
 /// Whether the pair of shapes is answered by one exact query.
 pub(super) fn is_simple(a: &Shape, b: &Shape) -> bool {
@@ -174,21 +175,25 @@ pub(super) fn sphere_bound(a: &PlacedShape, b: &PlacedShape, bodies12: &Pose) ->
 }
 
 /// The certificate of a shape pair's answer for the bodies: its ends in order, and wider by what composing the poses
-/// may have lost. A shape a kilometre from its body's origin has its place rounded there, which the exact query cannot
-/// know.
+/// may have lost. An overlap that is less than that is a touch.
 pub(super) fn sound(gap: Interval, a: &PlacedShape, b: &PlacedShape, bodies12: &Pose) -> Interval {
     let ordered = Interval {
         min: gap.min.min(gap.max),
         max: gap.max.max(gap.min),
     };
+    widened(ordered, lost_m(a, b, bodies12))
+}
+
+/// How far composing the poses may have put the one shape from its place seen from the other, metres: a shape a
+/// kilometre from its body's origin has its place rounded there, which a query of the two shapes cannot know.
+pub(super) fn lost_m(a: &PlacedShape, b: &PlacedShape, bodies12: &Pose) -> f64 {
     let off = |pose: &Pose| *pose != Pose::identity();
     if !(off(&a.pose) || off(&b.pose)) {
-        return ordered;
+        return 0.0;
     }
     let reach = |pose: &Pose| pose.translation.vector.amax();
     let magnitude = reach(&a.pose) + reach(&b.pose) + reach(bodies12);
-    // An overlap that is less than that is a touch.
-    ordered.widened(32.0 * ROUND * magnitude)
+    32.0 * ROUND * magnitude
 }
 
 #[cfg(test)]

@@ -20,6 +20,7 @@ mod deadline;
 mod degrade;
 mod edits;
 mod events;
+mod far;
 mod floors;
 mod impacts;
 mod limits;

@@ -87,7 +87,7 @@ pub fn drive(rng: &mut Rng, couple: &mut Couple<'_>, search: Search, whole: bool
         if pose == 0 {
             front.start(&mut store, a, b, &pos12, search);
         } else {
-            if front.still_touches(a, b, &pos12) {
+            if front.still_touches(a, b, (&pos12, 0.0)) {
                 assert!(matches!(truth, Truth::Overlap(_)), "{at}: {truth:?}");
             }
             glance(&mut front, (a, b), &pos12, truth, &at);
@@ -168,14 +168,14 @@ fn glance(
         // Nothing has moved since none was found.
         None => assert_eq!((again, meter.spent()), (None, units), "{at}"),
     }
-    if let Some(leaf) = front.touches_beside(a, b, pos12, &mut meter) {
+    if let Some(leaf) = front.touches_beside(a, b, (pos12, 0.0), &mut meter) {
         assert!(
             matches!(truth, Truth::Overlap(_)),
             "{at}: {leaf:?}, but {truth:?}"
         );
         assert!(leaf.closest.gap.max <= 0.0, "{at}: {leaf:?}");
         assert!(
-            front.still_touches(a, b, pos12),
+            front.still_touches(a, b, (pos12, 0.0)),
             "{at}: it is asked from now on"
         );
     }
@@ -201,7 +201,7 @@ fn planes_and_walks_from_the_last_touch_tell_most_of_what_moves() {
             let pos12 = Pose::from_parts((axis * distance * sway).into(), turn);
             if tick == 0 {
                 front.start(&mut store, &ball, &ball, &pos12, Search::Carried);
-            } else if front.still_touches(&ball, &ball, &pos12) {
+            } else if front.still_touches(&ball, &ball, (&pos12, 0.0)) {
                 continue;
             }
             let mut meter = Meter::unlimited(&clock);
@@ -210,7 +210,7 @@ fn planes_and_walks_from_the_last_touch_tell_most_of_what_moves() {
                 parted += u32::from(front.parted(&ball, &ball, &pos12, &mut meter).is_some());
             } else if tick > 1 {
                 lost += 1;
-                let found = front.touches_beside(&ball, &ball, &pos12, &mut meter);
+                let found = front.touches_beside(&ball, &ball, (&pos12, 0.0), &mut meter);
                 beside += u32::from(found.is_some());
             }
             front.move_to(&mut store, &ball, &ball, &pos12);
@@ -254,15 +254,18 @@ fn bug_a_walk_from_a_touch_that_was_cut_off_begins_anew_once_the_touch_is_back()
         u64::MAX,
         &mut meter
     ));
-    assert!(front.still_touches(&ball, &ball, &here));
+    assert!(front.still_touches(&ball, &ball, (&here, 0.0)));
     let walked = |front: &mut CarriedFront, units| {
         let mut meter = Meter::new(&clock, None, units);
-        let found = front.touches_beside(&ball, &ball, &away, &mut meter);
+        let found = front.touches_beside(&ball, &ball, (&away, 0.0), &mut meter);
         assert!(found.is_none());
         meter.spent()
     };
     assert_eq!(walked(&mut front, Some(3)), 3);
-    assert!(front.still_touches(&ball, &ball, &here), "the same leaves");
+    assert!(
+        front.still_touches(&ball, &ball, (&here, 0.0)),
+        "the same leaves"
+    );
     assert_eq!(walked(&mut front, Some(3)), 3, "from the first step on");
     let rest = walked(&mut front, None);
     assert!(rest > 0 && rest + 3 <= 12, "where it was cut off: {rest}");
@@ -271,7 +274,7 @@ fn bug_a_walk_from_a_touch_that_was_cut_off_begins_anew_once_the_touch_is_back()
         0,
         "forgotten after it was in vain"
     );
-    assert!(!front.still_touches(&ball, &ball, &here));
+    assert!(!front.still_touches(&ball, &ball, (&here, 0.0)));
 }
 
 fn check_end(

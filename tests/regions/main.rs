@@ -304,6 +304,38 @@ impl Run {
     }
 }
 
+/// What touches said nothing any more of what lies within: one surface of a mesh can touch, another be held as a whole.
+#[test]
+fn bug_a_surface_within_the_other_was_left_out_once_another_one_touched() {
+    let small = || meshes::cuboid(Vec3::repeat(0.1));
+    let two = small().moved(Vec3::x()).and(small());
+    let one = |part| Thing::new(vec![(part, Vec3::zeros())]);
+    let things = [
+        one(Part::Mesh(two)),
+        one(Part::Mesh(meshes::cuboid(Vec3::repeat(1.0)))),
+    ];
+    let within = small().vertices;
+    let (mut complete, mut cut) = (0, 0);
+    for units in (0..200).map(Some).chain([None]) {
+        let budget = units.map_or(Budget::UNLIMITED, Budget::units);
+        let mut run = Run::new(&things, &[Pose::identity(); 2]);
+        for tick in 0..3 {
+            let out = run.send(budget);
+            let first = out.regions.first().map(|row| row.flags);
+            complete += u32::from(first.is_some_and(|f| f & region_flags::COMPLETE != 0));
+            cut += u32::from(first.is_some_and(|f| f & region_flags::COMPLETE == 0));
+            for p in &within {
+                assert!(
+                    inside(&out.regions, p, &Vec3::zeros(), 1e-9),
+                    "{units:?} tick {tick}: {p:?} is in none of {:#?}",
+                    out.regions
+                );
+            }
+        }
+    }
+    assert!(complete > 0 && cut > 0, "{complete} {cut}");
+}
+
 /// A mesh that deforms, and anything.
 fn bending(rng: &mut Rng) -> [Thing; 2] {
     let soft = |rng: &mut Rng| {

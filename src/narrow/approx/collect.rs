@@ -154,9 +154,7 @@ impl Narrow {
                 }
             }
         }
-        if !pair.complete
-            && let Some(spot) = scan.held(front)
-        {
+        if let Some(spot) = scan.held(front) {
             pair.put(spot.of_any_normal(), approx);
         }
         if full || (pair.complete && looked_at.is_some()) {

@@ -15,7 +15,8 @@ use crate::narrow::memo::Witness;
 use crate::narrow::mesh::{Goal, LeafContact, Search, has_front};
 use crate::narrow::pool::NONE;
 use crate::narrow::query::{
-    add_manifold, is_simple, leaf_contact, shape_gap, shape_pose, sound, sphere_bound, witness_of,
+    add_manifold, is_simple, leaf_contact, lost_m, shape_gap, shape_pose, sound, sphere_bound,
+    witness_of,
 };
 use crate::narrow::shelves::Shelves;
 use crate::shape::BoxId;
@@ -213,10 +214,11 @@ impl CompoundFront {
         let front = fronts.get_or_take(&mut inner.front)?;
         let (one, other) = (pair.one, pair.other);
         let shapes = (&*one.shape, &*other.shape);
+        let off_m = lost_m(one, other, &pair.rel);
         let bodies = |gap| sound(gap, one, other, &pair.rel);
         let seen = |leaf: LeafContact| seen_at((one, other), pair.places, &pair.pos12, &leaf);
         if goal == Goal::Verdict && tools.search == Search::Carried {
-            let told = glance(front, shapes, &pair.pos12, inner.touched, meter);
+            let told = glance(front, shapes, (&pair.pos12, off_m), inner.touched, meter);
             let gap = told.gap(Interval::UNKNOWN, bodies);
             if gap.max <= 0.0 || gap.min > margin_m {
                 inner.touched = gap.max <= 0.0;
@@ -233,7 +235,7 @@ impl CompoundFront {
         front.move_to(store, shapes.0, shapes.1, &pair.pos12);
         tools.counters.slices += 1;
         let left = asked.end.saturating_sub(meter.spent()).max(1);
-        let done = front.advance(store, shapes.0, shapes.1, goal, left, meter);
+        let done = front.advance_despite(store, shapes, (goal, off_m), left, meter);
         let gap = bodies(front.interval());
         let far = gap.min > margin_m;
         if !done && !far {

@@ -34,7 +34,7 @@ const RATHER: f64 = 1e-9;
 /// Points so far apart still count as contacts, as a share of the smaller one's radius: of a body at rest all corners
 /// do, though rounding lifts some.
 pub(in crate::narrow) const PREDICTION: f64 = 1e-6;
-/// Points nearer than this share of the pair's scale are one.
+/// Points nearer than this share of the smaller one's radius, and what is rounded, are one.
 const SAME: f64 = 1e-6;
 /// Id of the closest points themselves, where no clipped point stands for them.
 const WITNESS: u32 = 0x7fff_ffff;
@@ -160,13 +160,16 @@ struct Found {
     surfaces: [Surface; 2],
     prediction_m: f64,
     witness: ManifoldPoint,
+    /// Points so near are one, metres.
     same: f64,
+    /// The answer's own point is deeper than another by so much only where it is another, metres.
+    deeper: f64,
 }
 
 impl Found {
     #[inline]
     fn new(pair: &Pair<'_>, closest: &Closest, prediction_m: f64) -> Self {
-        let same = SAME * (pair.scale + pair.a.margin() + pair.b.margin());
+        let same = SAME * pair.a.radius().min(pair.b.radius()) + pair.pad();
         let of_b = Surface::new(pair.b, pair.at, pair.rotation.column(2).into_owned());
         Self::with(closest, [Surface::own(pair.a), of_b], prediction_m, same)
     }
@@ -187,6 +190,12 @@ impl Found {
             prediction_m,
             witness,
             same,
+            deeper: if closest.finished {
+                // A curved answer is off by a share of the larger one.
+                same.max(closest.gap.max - closest.gap.min)
+            } else {
+                same
+            },
         }
     }
 
@@ -245,7 +254,7 @@ impl Found {
             .iter()
             .map(|p| p.gap_m)
             .fold(f64::INFINITY, f64::min);
-        if deepest > self.witness.gap_m + self.same && self.count < self.points.len() {
+        if deepest > self.witness.gap_m + self.deeper && self.count < self.points.len() {
             self.points[self.count] = self.witness;
             self.count += 1;
         }

@@ -115,9 +115,13 @@ impl Closest {
     }
 }
 
-/// Width up to which an interval counts as finished, in parts of the pair's size (spread of both shapes and their
-/// distance). Curved pairs that overlap end at 1e-7, everything else near 1e-14.
+/// Width up to which an interval counts as finished, in parts of the pair's size (radii of both shapes and the distance
+/// of their middles). Curved pairs that overlap end at 1e-7, everything else near 1e-14 of the numbers that they are
+/// told by.
 const FINISHED: f64 = 1e-6;
+/// The same in parts of what is allowed for rounding, twice of which is in every interval: a hull that is told by numbers
+/// far from its origin may be smaller than what is rounded of them.
+const FINISHED_PADS: f64 = 16.0;
 
 /// The gap of two convex shapes, with its certificate.
 ///
@@ -264,7 +268,8 @@ fn finish(pair: &Pair<'_>, core: &CoreGap, estimate: f64) -> Closest {
         normal: core.normal,
         point_a: Point::from(core_a + core.normal * ra),
         point_b: Point::from(core_b - core.normal * rb),
-        finished: high - low <= FINISHED * (pair.scale + margins),
+        finished: high - low <= FINISHED_PADS * pad
+            || high - low <= FINISHED * (pair.size() + margins),
     }
 }
 

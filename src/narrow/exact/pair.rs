@@ -92,7 +92,7 @@ const STRAIGHT: f64 = 1e-7;
 impl CoreGap {
     /// Whether both ends are as close as curved cores are asked for.
     pub(super) fn is_tight(&self, pair: &Pair<'_>) -> bool {
-        self.upper - self.lower <= LOOSE * pair.scale
+        self.upper - self.lower <= pair.share(LOOSE)
     }
 
     /// How far the closest points are apart along the normal, metres.
@@ -119,7 +119,7 @@ impl CoreGap {
     }
 
     pub(super) fn is_straight(&self, pair: &Pair<'_>) -> bool {
-        self.off() <= STRAIGHT * pair.scale
+        self.off() <= pair.share(STRAIGHT)
     }
 }
 
@@ -132,7 +132,7 @@ pub(super) struct Pair<'a> {
     pub(super) rotation: Matrix3<f64>,
     /// Origin of B, A's frame.
     pub(super) at: Vec3,
-    /// Spread of both cores and their distance, metres: every tolerance is a multiple of it.
+    /// How far from A's origin the numbers reach that both are told by, metres: rounding is a multiple of it.
     pub(super) scale: f64,
     /// Whether both cores are hulls of finitely many points.
     pub(super) polytopes: bool,
@@ -169,12 +169,24 @@ impl<'a> Pair<'a> {
         4.0 * f64::EPSILON * self.scale
     }
 
+    /// Radii of both cores and the distance of their middles, metres: what methods that end early promise is a share of
+    /// it. Not of the scale: a hull may be told by numbers far from its origin, and is no larger for that.
+    pub(super) fn size(&self) -> f64 {
+        let radius = |shape: &Convex| shape.radius() - shape.margin();
+        radius(self.a) + radius(self.b) + self.between().norm()
+    }
+
+    /// A share of the size, as far as rounding lets it be told, metres.
+    pub(super) fn share(&self, part: f64) -> f64 {
+        (part * self.size()).max(self.pad())
+    }
+
     /// How close both ends of a depth should come, metres.
     pub(super) fn tolerance(&self) -> f64 {
         if self.polytopes {
             self.tiny()
         } else {
-            CURVED * self.scale
+            self.share(CURVED)
         }
     }
 
@@ -219,8 +231,12 @@ impl<'a> Pair<'a> {
 
     /// A first direction: from centre to centre.
     pub(super) fn guess(&self) -> Vec3 {
-        let between = self.rotation * self.b.centre().coords + self.at - self.a.centre().coords;
-        unit(&between).unwrap_or_else(Vec3::z)
+        unit(&self.between()).unwrap_or_else(Vec3::z)
+    }
+
+    /// From A's centre to B's.
+    fn between(&self) -> Vec3 {
+        self.rotation * self.b.centre().coords + self.at - self.a.centre().coords
     }
 }
 

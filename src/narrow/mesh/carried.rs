@@ -38,6 +38,7 @@ use crate::narrow::bent::Bent;
 pub use crate::narrow::cover::Search;
 use crate::narrow::cover::{Cover, Wear};
 use crate::narrow::holdings::Holdings;
+use crate::narrow::widen::widened;
 use crate::shape::{BoxId, Obb, Shape};
 use crate::time::Meter;
 
@@ -205,9 +206,61 @@ impl CarriedFront {
         slice_units: u64,
         meter: &mut Meter<'_>,
     ) -> bool {
+        self.advance_despite(store, (a, b), (goal, 0.0), slice_units, meter)
+    }
+
+    /// As [`CarriedFront::advance`], with `off_m` as [`super::MeshQuery::advance_despite`] has it.
+    pub(in crate::narrow) fn advance_despite(
+        &mut self,
+        store: &mut FrontStore,
+        (a, b): (&Shape, &Shape),
+        (goal, off_m): (Goal, f64),
+        slice_units: u64,
+        meter: &mut Meter<'_>,
+    ) -> bool {
         let (Some(side_a), Some(side_b)) = (Side::of(a), Side::of(b)) else {
             return false;
         };
+        let sides = (side_a, side_b);
+        self.set_out(store, (a, b), sides, goal);
+        let end = meter.spent().saturating_add(slice_units);
+        let mut sought = goal;
+        loop {
+            if self.reached(sought) {
+                if sought > Goal::Verdict || !self.is_apart_within(off_m) {
+                    return true;
+                }
+                sought = Goal::Gap;
+                self.set_out(store, (a, b), sides, sought);
+                continue;
+            }
+            // Wide apart by now: a verdict needs no more.
+            if sought > goal && widened(self.interval(), off_m).min > 0.0 {
+                return true;
+            }
+            if meter.spent() >= end || !meter.open() {
+                return false;
+            }
+            if !self.fathom((a, b), meter) {
+                self.step(store, sides, sought, meter);
+            }
+        }
+    }
+
+    /// Whether the surfaces are proved apart by no more than `off_m`.
+    fn is_apart_within(&self, off_m: f64) -> bool {
+        let gap = self.interval();
+        gap.min > 0.0 && widened(gap, off_m).min <= 0.0
+    }
+
+    /// Makes ready for a goal at this pose.
+    fn set_out(
+        &mut self,
+        store: &mut FrontStore,
+        (a, b): (&Shape, &Shape),
+        (side_a, side_b): (Side<'_>, Side<'_>),
+        goal: Goal,
+    ) {
         if goal > Goal::Verdict && self.known.floor_m == f64::NEG_INFINITY {
             self.measure_wholes((a, side_a), (b, side_b));
             self.cover.anchor_here(&mut store.entries, &self.at.pos12);
@@ -222,18 +275,6 @@ impl CarriedFront {
         if self.known.points_wanted {
             // Also for less than contacts: their search, cut off before, goes on with it at this pose.
             self.known.walks = Some(store.walks.resume(self.known.walks));
-        }
-        let end = meter.spent().saturating_add(slice_units);
-        loop {
-            if self.reached(goal) {
-                return true;
-            }
-            if meter.spent() >= end || !meter.open() {
-                return false;
-            }
-            if !self.fathom((a, b), meter) {
-                self.step(store, (side_a, side_b), goal, meter);
-            }
         }
     }
 

@@ -9,6 +9,7 @@ use super::{Closest, Goal};
 use crate::math::{Interval, Point, Pose, ROUND, Vec3};
 use crate::narrow::arena::{Arena, Run};
 use crate::narrow::exact::PREDICTION;
+use crate::narrow::widen::widened;
 use crate::shape::{Below, Mesh, NODES_WAITING_MAX};
 use crate::time::Meter;
 
@@ -157,11 +158,13 @@ impl HalfSpaceWalk {
     }
 
     /// Goes on until the goal is reached (true), `end_units` are spent in all, or the meter closes.
+    ///
+    /// * `off_m` - see [`super::MeshQuery::advance_despite`].
     pub(super) fn advance(
         &mut self,
         arena: &mut Arena<LeafContact>,
         mesh: &Mesh,
-        goal: Goal,
+        (goal, off_m): (Goal, f64),
         end_units: u64,
         meter: &mut Meter<'_>,
     ) -> bool {
@@ -171,7 +174,7 @@ impl HalfSpaceWalk {
             self.waiting.start(self.interval().min + self.stand.slop);
         }
         loop {
-            if self.reached(goal) {
+            if self.reached(goal, off_m) {
                 return true;
             }
             if meter.spent() >= end_units || !meter.open() {
@@ -182,9 +185,10 @@ impl HalfSpaceWalk {
         }
     }
 
-    fn reached(&self, goal: Goal) -> bool {
+    fn reached(&self, goal: Goal, off_m: f64) -> bool {
         let decided = |gap: Interval| gap.min > 0.0 || gap.max <= 0.0;
-        self.waiting.len == 0 || (goal == Goal::Verdict && decided(self.interval()))
+        let here = || widened(self.interval(), 0.0 * off_m);
+        self.waiting.len == 0 || (goal == Goal::Verdict && decided(here()))
     }
 
     pub(super) fn contacts<'a>(&self, arena: &'a Arena<LeafContact>) -> &'a [LeafContact] {

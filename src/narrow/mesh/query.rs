@@ -115,6 +115,20 @@ impl MeshQuery {
         slice_units: u64,
         meter: &mut Meter<'_>,
     ) -> bool {
+        self.advance_despite(store, (a, b), (goal, 0.0), slice_units, meter)
+    }
+
+    /// As [`MeshQuery::advance`], until a verdict stands also where no point is farther than `off_m` from its place;
+    /// where none does, until the gap is as narrow as it gets. A goal that was reached with an interval that is wide,
+    /// and holds 0 once it is wider by so much, would pass for a touch.
+    pub(in crate::narrow) fn advance_despite(
+        &mut self,
+        store: &mut FrontStore,
+        (a, b): (&Shape, &Shape),
+        (goal, off_m): (Goal, f64),
+        slice_units: u64,
+        meter: &mut Meter<'_>,
+    ) -> bool {
         if self.trees != [a.tree_revision(), b.tree_revision()] {
             // Places in another tree say nothing; what is known of the gap stays known.
             let (gap, pos12) = (self.gap, self.pos12);
@@ -123,11 +137,13 @@ impl MeshQuery {
         }
         self.front.note_bend(a, b);
         let reached = match (self.kind, Side::of(a), Side::of(b)) {
-            (Kind::Surfaces, ..) => self.front.advance(store, a, b, goal, slice_units, meter),
+            (Kind::Surfaces, ..) => {
+                (self.front).advance_despite(store, (a, b), (goal, off_m), slice_units, meter)
+            }
             (Kind::HalfSpace, Some(Side::Mesh(mesh)), _)
             | (Kind::HalfSpace, _, Some(Side::Mesh(mesh))) => {
                 let end = meter.spent().saturating_add(slice_units);
-                (self.half_space).advance(&mut store.contacts, mesh, goal, end, meter)
+                (self.half_space).advance(&mut store.contacts, mesh, (goal, off_m), end, meter)
             }
             _ => false,
         };

@@ -242,3 +242,15 @@ fn bug_a_post_within_the_edge_of_a_box_had_a_poor_estimate() {
         assert!((along - c.best_m).abs() <= 1e-12, "{lean}: {c:?}");
     }
 }
+
+/// A run that begins anew has no points yet: it told that cores apart in a plane touch.
+#[test]
+fn bug_a_flat_difference_asked_from_nothing_told_of_points_that_are_none() {
+    let flat =
+        Convex::triangle([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|[x, y]| [x, y, 0.0].into()));
+    let apart = Pose::translation(3.0, 0.0, 0.0);
+    let pair = Pair::new(&flat, &flat, &apart);
+    let upright = [Vec3::x(), Vec3::y(), Vec3::z()];
+    let gap = Polytope::default().run(&pair, &Simplex::default(), &upright, None);
+    assert!(gap.lower <= 2.0 && gap.upper >= 2.0, "{gap:?}");
+}

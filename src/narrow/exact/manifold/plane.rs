@@ -36,7 +36,7 @@ pub(in crate::narrow) fn points_on_plane(
         closest,
         surfaces,
         rounding_m.max(PREDICTION * shape.radius()),
-        SAME * (shape.reach() + shape.margin()),
+        SAME * shape.radius() + rounding_m,
     );
     for (corner, id) in feature.used().iter().zip(0..) {
         let id = feature.id(id);

@@ -58,7 +58,12 @@ pub(in crate::narrow) fn shared_by_triangles(
         let squares = t.map(|p| p.norm_squared());
         squares[0].max(squares[1]).max(squares[2]).sqrt()
     };
-    let same = SAME * (reach(&a) + reach(&b));
+    let size = |t: &[Vec3; 3]| {
+        let squares = [t[1] - t[0], t[2] - t[0]].map(|edge| edge.norm_squared());
+        squares[0].max(squares[1])
+    };
+    let smaller = size(&a).min(size(&b)).sqrt();
+    let same = SAME * smaller + 32.0 * f64::EPSILON * (reach(&a) + reach(&b));
     let side = if base_is_b { 1 << 31 } else { 0 };
     let (mut taken, mut count) = ([Vec3::zeros(); ROOM], 0);
     for (at, feature) in rest.at[..rest.count].iter().zip(rest.features) {

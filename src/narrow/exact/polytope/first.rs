@@ -220,9 +220,15 @@ fn flat(pair: &Pair<'_>, normal: &Vec3, simplex: &Simplex) -> CoreGap {
         (other, -*normal)
     };
     let (point_a, point_b) = simplex.witnesses();
+    // A run that begins from nothing has no points of the cores to tell of.
+    let apart_m = if simplex.count == 0 {
+        f64::INFINITY
+    } else {
+        (point_b - point_a).norm()
+    };
     CoreGap {
         lower,
-        upper: (point_b - point_a).norm().max(lower),
+        upper: apart_m.max(lower),
         normal,
         point_a,
         point_b,

@@ -41,8 +41,10 @@ impl CarriedFront {
 
     /// Whether the leaves that touched last are certain to touch at a pose; nothing else is looked at. Where they are,
     /// a walk from them that was cut off is no more to be gone on with.
+    ///
+    /// * `off_m` - how far B may be from that pose, metres.
     #[must_use]
-    pub fn still_touches(&mut self, a: &Shape, b: &Shape, pos12: &Pose) -> bool {
+    pub fn still_touches(&mut self, a: &Shape, b: &Shape, (pos12, off_m): (&Pose, f64)) -> bool {
         let Some(crossing) = &mut self.crossing else {
             return false;
         };
@@ -50,7 +52,7 @@ impl CarriedFront {
             Some(mesh) if mesh.is_deforming() => mesh.triangle(crossing.places[k]),
             _ => crossing.corners[k],
         };
-        let at = Placed::new(pos12, reach_of(a), reach_of(b));
+        let at = placed((a, b), pos12, off_m);
         let touches = surely_crosses(&now(a, 0), &now(b, 1).map(|p| at.to_a(&p)), at.slop);
         if touches {
             (crossing.reached, crossing.steps) = (crossing.places, 0);
@@ -61,11 +63,13 @@ impl CarriedFront {
     /// Leaves that are certain to touch at a pose, found by a walk from those that touched last and do not any more:
     /// they are the ones to be asked next time. After a walk in vain it is forgotten where the two touched, so that no
     /// pair spends a small budget on it for ever; nothing else is changed. Units: a step each.
+    ///
+    /// * `off_m` - as [`CarriedFront::still_touches`] has it.
     pub fn touches_beside(
         &mut self,
         a: &Shape,
         b: &Shape,
-        pos12: &Pose,
+        (pos12, off_m): (&Pose, f64),
         meter: &mut Meter<'_>,
     ) -> Option<LeafContact> {
         let crossing = self.crossing.as_mut()?;
@@ -73,7 +77,7 @@ impl CarriedFront {
         if self.search != Search::Carried {
             return None;
         }
-        let at = Placed::new(pos12, reach_of(a), reach_of(b));
+        let at = placed((a, b), pos12, off_m);
         let walked = crossing.walk(meshes, &at, meter);
         if matches!(walked, Walked::Nowhere) {
             self.crossing = None;
@@ -104,6 +108,15 @@ impl CarriedFront {
             self.known.high = self.known.high.min(self.high_of(&contact.closest));
             self.witness = Some(contact);
         }
+    }
+}
+
+/// Two shapes at a pose that B may be `off_m` from.
+fn placed((a, b): (&Shape, &Shape), pos12: &Pose, off_m: f64) -> Placed {
+    let at = Placed::new(pos12, reach_of(a), reach_of(b));
+    Placed {
+        slop: at.slop + 0.0 * off_m,
+        ..at
     }
 }
 

@@ -54,10 +54,14 @@ impl CarriedFront {
     }
 
     /// Whether no surface of the one is known to lie, or can lie, within the other as a whole, at a pose `moved_m` away
-    /// from the front's; a pair that touches at the front's own pose counts as not.
-    pub(in crate::narrow::mesh) fn holds_none(&self, moved_m: f64) -> bool {
+    /// from the front's.
+    ///
+    /// * `single` - each has one connected surface: where the two touch at the front's own pose, neither holds the
+    ///   other's. Of several one may touch, and another lie within.
+    pub(in crate::narrow::mesh) fn holds_none(&self, moved_m: f64, single: bool) -> bool {
         let outside = self.shells.state() == Containment::Outside
             && self.cover.drift.left_m(self.shells_expiry_m) > moved_m;
-        !self.solids || outside || (moved_m == 0.0 && self.known.touches)
+        let touches = moved_m == 0.0 && self.known.touches;
+        !self.solids || outside || (single && touches)
     }
 }
