@@ -262,6 +262,37 @@ fn bug_the_memory_of_a_crowd_comes_back_when_it_leaves() {
     }
 }
 
+#[test]
+fn bug_the_memory_of_a_crowds_pairs_came_back_with_no_later_tick() {
+    let mut drive = Drive::new(&pool(300, 1), Pattern::Wander, 3);
+    let bodies = drive.rows_mut().len();
+    let mut run = |ticks: u32, apart_m: f64| {
+        for tick in 0..ticks {
+            for (at, row) in (0_u32..).zip(drive.rows_mut()) {
+                row.position = [
+                    f64::from(at) * apart_m + 0.01 * f64::from(tick % 9),
+                    0.0,
+                    5.0,
+                ];
+            }
+            drive.send(Budget::units(20), Demand::default());
+        }
+        drive.engine().validate().unwrap();
+        HELD.with(Cell::get)
+    };
+    let before = run(3, 5.0);
+    let crowd = run(3, 0.0) - before;
+    assert!(crowd > 5_000_000, "{bodies} bodies take {crowd} bytes");
+    // Kept while it may come again.
+    let kept = run(500, 5.0) - before;
+    assert!(2 * kept > crowd, "{kept} of {crowd} bytes");
+    run(3, 0.0);
+    let left = run(1_100, 5.0) - before;
+    assert!(20 * left < crowd, "{left} of {crowd} bytes");
+    let again = run(3, 0.0) - before;
+    assert!(again < 2 * crowd, "{again} after {crowd} bytes");
+}
+
 /// Fails where a tick of a scene allocates, without a budget and, where `limited`, within small ones. Builds with debug
 /// assertions leave these out: they are slow, and allocate alike.
 fn check(name: &str, scene: &str, limited: bool) {

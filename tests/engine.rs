@@ -3,6 +3,7 @@
 
 #![allow(
     clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
     clippy::float_cmp,
     clippy::print_stdout,
     clippy::unwrap_used,
@@ -177,4 +178,40 @@ fn the_tick_tells_how_the_broad_phase_worked_and_why() {
     let mut few = Drive::new(&pool(10, 1), Pattern::Wander, 3);
     few.step(0, Budget::UNLIMITED, Demand::ALL);
     assert_eq!(told(&few), (BroadMode::Whole, BroadCause::None, 0));
+}
+
+/// A place on the line that bodies are spread along, or the one where all are at first.
+fn place(drive: &mut Drive, at: usize, x_m: f64) {
+    drive.rows_mut()[at].position = [x_m, 0.0, 5.0];
+}
+
+#[test]
+fn bug_after_a_crowd_every_tick_walked_by_the_places_of_all_its_pairs() {
+    let demand = Demand {
+        pairs: true,
+        ..Demand::default()
+    };
+    let mut drive = Drive::new(&pool(150, 1), Pattern::Wander, 3);
+    let bodies = drive.rows_mut().len();
+    (0..bodies).for_each(|at| place(&mut drive, at, 0.0));
+    let out = drive.send(Budget::units(50), demand);
+    assert!(out.tick.candidates > 5_000, "{bodies} bodies");
+    // The two whose pair stands last go on together, then apart and together again, while all move.
+    for tick in 0..12 {
+        for at in 0..bodies - 1 {
+            place(&mut drive, at, 5.0 * at as f64 + 0.01 * f64::from(tick));
+        }
+        let beside = [0.02, 3.0][usize::from((4..8).contains(&tick))];
+        let x_m = drive.rows_mut()[bodies - 2].position[0] + beside;
+        place(&mut drive, bodies - 1, x_m);
+        let out = drive.send(Budget::UNLIMITED, demand);
+        let together = u64::from(!(4..8).contains(&tick));
+        assert_eq!((out.tick.colliding, out.tick.possible), (together, 0));
+        compare(&drive);
+        drive.engine().validate().unwrap();
+        if tick > 1 {
+            let walked = drive.engine().counters().walked;
+            assert!(walked < 10, "{walked} places in tick {tick}");
+        }
+    }
 }

@@ -6,7 +6,7 @@
 
 use super::Proxies;
 use super::forced::Forced;
-use super::keys::KeySort;
+use super::keys::IdSort;
 use super::members::{IN, Members, UNBOUNDED};
 use super::order::give_back;
 use crate::ids::{BodyId, BodySlot, PairKey, PairSlot};
@@ -26,17 +26,15 @@ pub(super) struct Found {
     pub(super) maybe: Vec<PairKey>,
     /// Pairs taken out of the set, with the order of the delta.
     ended: Vec<((BodyId, BodyId), Ended)>,
-    /// Pairs taken out of the set because their boxes parted, in the order of keys.
+    /// Pairs taken out of the set because their boxes parted, in the order of the delta.
     parted: Vec<Ended>,
-    /// Pairs that may have to be stored, with the order of the delta, while they are put in it.
-    ranked: Vec<((BodyId, BodyId), PairKey)>,
     /// Memory for those that look at each stored pair.
     pub(super) slots: Vec<PairSlot>,
     /// Stored pairs that end, and why.
     pub(super) doomed: Vec<(PairSlot, EndCause)>,
     /// Bodies that were truncated before this update.
     truncated: Vec<BodySlot>,
-    sort: KeySort,
+    sort: IdSort,
 }
 
 /// What decides on a pair.
@@ -139,13 +137,29 @@ impl<'a, X: Proxies, P: PairPolicy> Judge<'a, X, P> {
 }
 
 impl Found {
+    /// Pairs that were told to begin, or may.
+    pub(super) fn told(&self) -> u64 {
+        (self.began.len() + self.maybe.len()) as u64
+    }
+
+    /// Pairs that this update found.
+    pub(super) fn used(&self) -> usize {
+        self.began.len() + self.maybe.len() + self.ended.len() + self.parted.len()
+    }
+
+    /// Room for pairs that are found.
+    pub(super) fn room(&self) -> usize {
+        let lists = [self.began.capacity(), self.maybe.capacity()];
+        let ended = [self.ended.capacity(), self.parted.capacity()];
+        lists.into_iter().chain(ended).sum::<usize>() + self.sort.capacity()
+    }
+
     /// Ends an update: what it needed more of than most do is given back.
     pub(super) fn close_tick(&mut self, bodies: usize) {
         give_back(&mut self.began, bodies);
         give_back(&mut self.maybe, bodies);
         give_back(&mut self.ended, bodies);
         give_back(&mut self.parted, bodies);
-        give_back(&mut self.ranked, bodies);
         give_back(&mut self.slots, bodies);
         give_back(&mut self.doomed, bodies);
         self.sort.close_tick(bodies);
@@ -173,32 +187,39 @@ impl Found {
         pairs: &mut PairSet,
     ) {
         // In the order of the delta, and of memory.
-        self.sort.sort(parted);
+        self.sort.sort(parted, judge.members);
         pairs.part(parted, |key| judge.lets_go(key), &mut self.parted);
     }
 
     /// Stores what begins and fills the delta.
+    ///
+    /// * `waits` - pairs are missing that are not counted in this tick: whether a pair of two bodies that miss some is
+    ///   one of them, nobody knows before they are.
     pub(super) fn commit(
         &mut self,
         judge: &Judge<'_, impl Proxies, impl PairPolicy>,
+        waits: bool,
         pairs: &mut PairSet,
         delta: &mut PairDelta,
     ) {
-        if self.ended.is_empty() && judge.members.ids_ascend() {
-            // As a rule ids ascend with slots: then keys are in the order of ids.
-            delta.ended.extend_from_slice(&self.parted);
-        } else {
-            let parted = self.parted.iter();
-            (self.ended).extend(parted.map(|ended| (judge.members.rank(ended.key), *ended)));
-            self.ended.sort_unstable_by_key(|(rank, _)| *rank);
-            delta.ended.extend(self.ended.iter().map(|(_, e)| *e));
+        self.tell_ended(judge.members, &mut delta.ended);
+        if waits {
+            let is_open = |key: &PairKey| {
+                let (low, high) = key.slots();
+                !(pairs.is_truncated(low) && pairs.is_truncated(high))
+            };
+            self.began.retain(is_open);
+            self.maybe.retain(is_open);
         }
-        self.gather(judge);
+        self.gather(judge, pairs.limit());
         self.truncated.clear();
         self.truncated.extend_from_slice(pairs.truncated());
         self.truncated.retain(|slot| judge.members.has(*slot, IN));
         let missing = pairs.missing();
         pairs.forget_missing();
+        if waits {
+            pairs.go_on_missing(missing, &self.truncated);
+        }
         pairs.insert_all(&self.began, |key| judge.begins(key), &mut delta.began);
         // What a body of unknown place misses cannot be found again by boxes: with whom it would be paired is not
         // known any more, so all who missed a pair stay marked, and what was missing may still be.
@@ -207,8 +228,22 @@ impl Found {
         }
     }
 
+    /// Tells of all that was taken out: each of the two lists is in order, or few.
+    fn tell_ended(&mut self, members: &Members, told: &mut Vec<Ended>) {
+        self.ended.sort_unstable_by_key(|(rank, _)| *rank);
+        let mut parted = &self.parted[..];
+        for (rank, ended) in &self.ended {
+            let before = parted.partition_point(|parted| members.rank(parted.key) < *rank);
+            let (first, rest) = parted.split_at(before);
+            told.extend_from_slice(first);
+            told.push(*ended);
+            parted = rest;
+        }
+        told.extend_from_slice(parted);
+    }
+
     /// Puts what may have to be stored in the order of ids, each once.
-    fn gather(&mut self, judge: &Judge<'_, impl Proxies, impl PairPolicy>) {
+    fn gather(&mut self, judge: &Judge<'_, impl Proxies, impl PairPolicy>, limit: usize) {
         for (at, key) in self.maybe.iter().enumerate() {
             if let Some(ahead) = self.maybe.get(at + AHEAD) {
                 judge.prefetch(*ahead);
@@ -218,15 +253,11 @@ impl Found {
                 self.began.push(*key);
             }
         }
-        self.sort.sort(&mut self.began);
-        self.began.dedup();
-        if !judge.members.ids_ascend() {
-            let keys = self.began.iter();
-            self.ranked.clear();
-            (self.ranked).extend(keys.map(|key| (judge.members.rank(*key), *key)));
-            self.ranked.sort_unstable_by_key(|(rank, _)| *rank);
-            self.began.clear();
-            self.began.extend(self.ranked.iter().map(|(_, key)| *key));
+        // Of more than the set could hold those that filters forbid are not sorted.
+        if self.began.len() > limit {
+            self.began.retain(|key| judge.begins(*key));
         }
+        self.sort.sort(&mut self.began, judge.members);
+        self.began.dedup();
     }
 }

@@ -1,10 +1,17 @@
 //! Puts keys of pairs in order: by digits, the lowest first, with no branch that depends on a key.
+//!
+//! Results are in the order of ids. As a rule these ascend with slots, and keys are in their order as they are; after
+//! the first slot that was used again, or with ids of the user's choice, they are not. Then each body has a number in
+//! the order of ids, and the keys of these numbers are what is sorted. The numbers last until another id is in a slot.
 
+use super::members::Members;
 use super::order::give_back;
-use crate::ids::{BodySlot, PairKey};
+use crate::ids::{BodyId, BodySlot, PairKey, small};
 
 /// Fewer are sorted by comparing them.
 const FEW: usize = 256;
+/// More are sorted in place: a pass takes twice the memory of the list.
+const MANY: usize = 1 << 23;
 /// Most bits of a digit: the counts of a pass stay in the first cache.
 const DIGIT_BITS_MAX: u32 = 12;
 
@@ -21,7 +28,7 @@ pub(super) struct KeySort {
 impl KeySort {
     /// Sorts.
     pub(super) fn sort(&mut self, keys: &mut [PairKey]) {
-        if keys.len() < FEW {
+        if !(FEW..=MANY).contains(&keys.len()) {
             keys.sort_unstable();
             return;
         }
@@ -83,9 +90,137 @@ impl KeySort {
     }
 }
 
+/// Puts keys in the order of ids.
+#[derive(Clone, Debug, Default)]
+pub(super) struct IdSort {
+    sort: KeySort,
+    /// By slot: the body's number in the order of ids; and by number, the slot.
+    numbers: Vec<u32>,
+    slots: Vec<BodySlot>,
+    /// The state of the slots' ids that the numbers are of.
+    named: u64,
+    /// The state of the slots' ids in the last update, and keys that were sorted without numbers since it is so.
+    seen: u64,
+    owed: usize,
+    /// Keys with their ids, where there are no numbers.
+    ranked: Vec<((BodyId, BodyId), PairKey)>,
+}
+
+impl IdSort {
+    /// Sorts: by the smaller id, then by the larger.
+    pub(super) fn sort(&mut self, keys: &mut [PairKey], members: &Members) {
+        if members.ids_ascend() {
+            self.sort.sort(keys);
+        } else if self.has_numbers(keys.len(), members) {
+            let number = |slot: BodySlot| BodySlot(self.numbers[slot.index()]);
+            for key in &mut *keys {
+                let (low, high) = key.slots();
+                *key = PairKey::new(number(low), number(high));
+            }
+            self.sort.sort(keys);
+            for key in keys {
+                let (low, high) = key.slots();
+                *key = PairKey::new(self.slots[low.index()], self.slots[high.index()]);
+            }
+        } else {
+            self.ranked.clear();
+            (self.ranked).extend(keys.iter().map(|key| (members.rank(*key), *key)));
+            self.ranked.sort_unstable();
+            for (key, (_, ranked)) in keys.iter_mut().zip(&self.ranked) {
+                *key = *ranked;
+            }
+        }
+    }
+
+    /// Whether there are numbers; they are made when as many keys were sorted without them as there are slots: where
+    /// ids change in each tick and few pairs do, they would cost more than they spare.
+    fn has_numbers(&mut self, keys: usize, members: &Members) -> bool {
+        let (named, ids) = (members.named(), members.ids());
+        if self.named == named {
+            return true;
+        }
+        if self.seen != named {
+            (self.seen, self.owed) = (named, 0);
+        }
+        self.owed = self.owed.saturating_add(keys);
+        if self.owed < ids.len() {
+            return false;
+        }
+        self.named = named;
+        self.slots.clear();
+        self.slots.extend((0..ids.len()).map(BodySlot::at));
+        // Of a body that left the id may be another's by now.
+        (self.slots).sort_unstable_by_key(|slot| (ids[slot.index()], *slot));
+        self.numbers.clear();
+        self.numbers.resize(ids.len(), 0);
+        for (number, slot) in self.slots.iter().enumerate() {
+            self.numbers[slot.index()] = small(number);
+        }
+        true
+    }
+
+    /// Room for so many keys.
+    pub(super) fn capacity(&self) -> usize {
+        self.sort.words.capacity() + self.sort.spare.capacity() + self.ranked.capacity()
+    }
+
+    /// Ends an update: what it needed more of than most do is given back.
+    pub(super) fn close_tick(&mut self, bodies: usize) {
+        self.sort.close_tick(bodies);
+        give_back(&mut self.ranked, bodies);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::broad::Proxies;
+    use crate::math::Aabb;
+
+    /// Bodies by slot, of which nothing but ids is asked.
+    struct Named(Vec<u64>, Aabb);
+
+    impl Proxies for Named {
+        fn aabb(&self, _: BodySlot) -> &Aabb {
+            &self.1
+        }
+        fn unbounded(&self, _: BodySlot) -> bool {
+            true
+        }
+        fn id(&self, slot: BodySlot) -> BodyId {
+            BodyId(self.0[slot.index()])
+        }
+    }
+
+    #[test]
+    fn keys_are_in_the_order_of_ids_with_numbers_and_without_whatever_slot_is_used_again() {
+        let mut named = Named((0..40).map(|at| at * 7 % 40 + 1).collect(), Aabb::empty());
+        let mut members = Members::new(false);
+        for at in 0..40 {
+            members.enter(BodySlot(at), &named);
+        }
+        let mut sort = IdSort::default();
+        let mut numbered = 0;
+        for round in 0..60_u64 {
+            if round % 9 == 0 {
+                let slot = BodySlot(small(usize::try_from(round).unwrap() % 40));
+                members.leave(slot);
+                named.0[slot.index()] = 41 + round;
+                members.enter(slot, &named);
+            }
+            let keys = (0..9 + small(usize::try_from(round % 3).unwrap() * 200)).map(|at| {
+                let (low, more) = (at * 11 % 40, 1 + at % 39);
+                PairKey::new(BodySlot(low), BodySlot((low + more) % 40))
+            });
+            let mut keys: Vec<PairKey> = keys.collect();
+            let mut wanted = keys.clone();
+            wanted.sort_by_key(|key| members.rank(*key));
+            sort.sort(&mut keys, &members);
+            assert_eq!(keys, wanted, "round {round}");
+            numbered += u32::from(sort.named == members.named());
+        }
+        assert!((20..60).contains(&numbered), "{numbered}");
+    }
 
     #[test]
     fn any_keys_come_out_in_order_and_none_is_lost() {

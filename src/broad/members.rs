@@ -81,6 +81,8 @@ pub(super) struct Members {
     touched: Vec<BodySlot>,
     /// Slots whose id is not above that of the slot before, also of bodies that left.
     descents: usize,
+    /// How often a slot got another id, or slots came or went.
+    named: u64,
 }
 
 impl Members {
@@ -109,6 +111,7 @@ impl Members {
         shorten(&mut self.flags, len);
         shorten(&mut self.place, len);
         self.descents = descents(&self.ids);
+        self.named += 1;
         for list in [&mut self.bounded, &mut self.unbounded, &mut self.touched] {
             list.shrink_to_fit();
         }
@@ -193,6 +196,10 @@ impl Members {
 
     /// Sets the id of a slot.
     fn name(&mut self, at: usize, id: BodyId) {
+        if self.ids[at] == id {
+            return;
+        }
+        self.named += 1;
         let around = at.saturating_sub(1)..self.ids.len().min(at + 2);
         self.descents -= descents(&self.ids[around.clone()]);
         self.ids[at] = id;
@@ -202,6 +209,16 @@ impl Members {
     /// Whether ids ascend with slots: keys then are in the order of ids as they are.
     pub(super) fn ids_ascend(&self) -> bool {
         self.descents == 0
+    }
+
+    /// Ids by slot, also of bodies that left.
+    pub(super) fn ids(&self) -> &[BodyId] {
+        &self.ids
+    }
+
+    /// Another number whenever [`Members::ids`] are others; never 0 where there are any.
+    pub(super) fn named(&self) -> u64 {
+        self.named
     }
 
     /// Takes the new box of a body that is in and has one.

@@ -14,7 +14,7 @@
 
 use crate::ids::{BodyId, BodySlot, PairKey};
 use crate::math::Aabb;
-use crate::pairs::{PairDelta, PairPolicy, PairSet};
+use crate::pairs::{PairDelta, PairPolicy, PairSet, Spare};
 use crate::simd::boxes::Level;
 use crate::wire::{BroadCause, BroadMode, EndCause};
 use crate::world::ChangeSet;
@@ -29,6 +29,7 @@ mod members;
 mod of_world;
 mod order;
 mod sap;
+mod short;
 mod touched;
 
 pub use crate::config::BroadMethod as Method;
@@ -38,6 +39,7 @@ use engine::Engine;
 use forced::Forced;
 use members::{ASKED, IN, Members, REFILTERED};
 use order::{Tick, give_back, is_thrifty};
+use short::Short;
 
 /// The boxes, as the world has them.
 pub trait Proxies {
@@ -56,6 +58,8 @@ pub struct Work {
     pub swaps: u64,
     /// Boxes compared with one another.
     pub tests: u64,
+    /// Pairs that were told to begin, or may: those that were stored before, and some twice, among them.
+    pub told: u64,
     /// Times the lists were sorted anew instead of repaired.
     pub rebuilds: u64,
     /// Pairs of boxes that overlap on the sorted axes but were not asked on the one left out.
@@ -83,8 +87,12 @@ pub struct BroadPhase {
     members: Members,
     forced: Forced,
     found: Found,
+    short: Short,
     /// Most bodies there were since memory was given back.
     most: usize,
+    /// Pairs that the last update found, and how long that has been few.
+    used: usize,
+    spare: Spare,
     /// By body: cause of its removal in this update.
     causes: Vec<EndCause>,
     /// Bodies with a box that left in this update.
@@ -105,7 +113,10 @@ impl BroadPhase {
             is_new: false,
             forced: Forced::default(),
             found: Found::default(),
+            short: Short::default(),
             most: 0,
+            used: 0,
+            spare: Spare::default(),
             causes: Vec::new(),
             left: Vec::new(),
             parted: Vec::new(),
@@ -145,6 +156,14 @@ impl BroadPhase {
         }
     }
 
+    /// Sets how many pairs, stored and missing, are counted anew in each tick in which the set is too small for all;
+    /// 65,536 without it. More are after so many ticks as they are times that, if anything of theirs changed; or once
+    /// an eighth of the set is free. Until then who missed a pair stays truncated, and new pairs of two such bodies are
+    /// missed.
+    pub fn use_recount(&mut self, most: u64) {
+        self.short.use_most(most);
+    }
+
     /// Bodies in the broad phase.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -169,6 +188,7 @@ impl BroadPhase {
     /// * `keys` - the whole list, in any order. To be given again when a rule changes or a slot changes hands.
     pub fn force(&mut self, keys: &[PairKey]) {
         self.forced.replace(keys);
+        self.short.stir();
     }
 
     /// Brings the pair set up to date with one tick's changes.
@@ -212,18 +232,29 @@ impl BroadPhase {
             self.found.part(&mut self.parted, &judge, pairs);
             touched::begin(&judge, &mut self.found);
         }
-        self.found.commit(&judge, pairs, delta);
+        self.work.told = self.found.told();
+        self.found.commit(&judge, self.short.waits(), pairs, delta);
+        self.short.close_tick(pairs);
         self.is_new = false;
         self.forced.settle();
         let bodies = self.len();
+        self.used = self.found.used();
         self.found.close_tick(bodies);
         give_back(&mut self.parted, bodies);
     }
 
-    /// Of very many bodies few are left: gives the memory of the others back.
+    /// Of very many bodies, or pairs that came and went, few are left: gives the memory of the others back.
     fn give_back(&mut self, pairs: &mut PairSet, delta: &mut PairDelta) {
         let bodies = self.len();
         self.most = self.most.max(bodies);
+        if self.spare.is_over(self.found.room(), self.used.max(bodies)) {
+            self.found = Found::default();
+            self.parted = Vec::new();
+            *delta = PairDelta::default();
+            if let Engine::Order(order) = &mut self.engine {
+                order.give_back_crowd();
+            }
+        }
         if !is_thrifty(self.most) || self.most / FALLEN < bodies {
             return;
         }
@@ -321,12 +352,7 @@ impl BroadPhase {
                 self.members.touch(*slot, ASKED | REFILTERED);
             }
         }
-        // What did not fit is looked for again, so that it is counted exactly, and stored when there is room.
-        for slot in pairs.truncated() {
-            if self.members.has(*slot, IN) {
-                self.members.touch(*slot, ASKED);
-            }
-        }
+        self.ask_missing(changes, pairs);
     }
 
     /// Checks the whole structure, the boxes against the caller's, and each stored pair against filters and boxes.

@@ -2,7 +2,7 @@
 
 use crate::ids::{BodySlot, PairSlot};
 use crate::math::{Interval, Point, Pose, Vec3, relative};
-use crate::pairs::PairSet;
+use crate::pairs::{PairSet, Spare};
 use crate::shape::Geometry;
 use crate::wire::{NO_INDEX, Verdict};
 use crate::world::{Body, World};
@@ -259,6 +259,20 @@ impl Narrow {
         self.contact_sets.give(&mut memo.contacts);
         self.kept.give(&mut memo.regions);
         self.give_back(slot);
+    }
+
+    /// Gives the memory of slots back that pairs have left, when they have been many for long.
+    ///
+    /// * `slots` - those that the pair set has. No list names others.
+    pub(super) fn give_back_slots(&mut self, slots: usize) {
+        if self.spare.is_over(self.hot.len(), slots) {
+            debug_assert!(self.hot.iter().skip(slots).all(|hot| !hot.live));
+            Spare::cut(&mut self.hot, slots);
+            Spare::cut(&mut self.memos, slots);
+            Spare::cut(&mut self.urgencies, slots);
+            self.keyed.clear();
+            self.keyed.shrink_to(slots);
+        }
     }
 
     /// Takes a verdict and keeps lists and counts in step.

@@ -56,7 +56,7 @@ pub use sweep::{Passage, Swept, touch_on_way};
 
 use crate::ids::{BodySlot, PairSlot};
 use crate::limits::SWEEP_LOOKS_MAX;
-use crate::pairs::{PairDelta, PairSet};
+use crate::pairs::{PairDelta, PairSet, Spare};
 use crate::simd;
 use crate::time::Meter;
 use crate::wire::{BodyStatus, Verdict};
@@ -78,6 +78,8 @@ use sweep::{FIRST_LOOKS, Sweeps};
 pub struct Counters {
     /// Pairs visited because a body of theirs moved.
     pub visited: u64,
+    /// Places of pairs that were gone through for that.
+    pub walked: u64,
     /// Exact queries of convex shape pairs.
     pub queries: u64,
     /// Slices of walks over meshes.
@@ -127,6 +129,7 @@ pub struct Narrow {
     contact_sets: Pool<ContactSet>,
     /// What the order of work asks of each pair, by `PairSlot`.
     urgencies: Vec<Urgency>,
+    spare: Spare,
     /// Work with its ranks, while it is ordered.
     keyed: Vec<(u64, PairSlot)>,
     rank_cost: RankCost,
@@ -213,6 +216,7 @@ impl Narrow {
         }
         self.clear_sweeps();
         self.carry_over();
+        self.give_back_slots(pairs.slots_len());
         self.note_bodies(world);
         self.note_missing(pairs);
         for ended in &delta.ended {

@@ -11,6 +11,9 @@ use super::memo::{Memo, closing};
 use super::mesh::Goal;
 use super::{NONE, Narrow};
 
+/// With so many slots a pair those that hold none are passed over, and not walked by.
+const SPARSE: usize = 4;
+
 impl Narrow {
     /// Compares the pairs of every body that moved or whose status changed with their certificates.
     ///
@@ -28,8 +31,12 @@ impl Narrow {
                 self.follow_rules(slot, world);
             }
         }
-        if many {
-            for slot in 0..self.hot.len() {
+        // After a crowd that is over its pairs' slots are more than those of the pairs that are left.
+        let sparse = pairs.slots_len() / SPARSE > pairs.len();
+        if many && !sparse {
+            let slots = self.hot.len().min(pairs.slots_len());
+            self.counters.walked += slots as u64;
+            for slot in 0..slots {
                 self.ask_ahead_of_walk(slot, world);
                 if self.hot[slot].live {
                     #[allow(
@@ -43,10 +50,16 @@ impl Narrow {
         }
         let mut slots = std::mem::take(&mut self.level);
         slots.clear();
-        let bodies = changes.moved.iter().chain(&changes.restated);
-        for &body in bodies.chain(&changes.requery) {
-            slots.extend(pairs.pairs_of(body));
+        if many {
+            let is_live = |slot: &PairSlot| self.hot.get(slot.index()).is_some_and(|hot| hot.live);
+            slots.extend(pairs.used_slots().filter(is_live));
+        } else {
+            let bodies = changes.moved.iter().chain(&changes.restated);
+            for &body in bodies.chain(&changes.requery) {
+                slots.extend(pairs.pairs_of(body));
+            }
         }
+        self.counters.walked += slots.len() as u64;
         for (at, &slot) in slots.iter().enumerate() {
             self.ask_ahead_of_visits(&slots, at, world);
             self.visit(slot, world);

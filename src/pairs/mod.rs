@@ -11,9 +11,11 @@ use crate::wire::EndCause;
 
 mod index;
 mod set;
+mod spare;
 
 pub(crate) use index::Index;
 pub use set::PairSet;
+pub(crate) use spare::Spare;
 
 /// Which pairs may be stored. Asked before a pair is ever stored, and again for the bodies of `ChangeSet::requery`.
 pub trait PairPolicy {

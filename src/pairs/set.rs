@@ -1,12 +1,13 @@
 //! The set itself: dense slots, and what finds a pair by its key or by one of its bodies.
 
 use super::index::Index;
-use super::{Ended, PairKey};
+use super::{Ended, PairKey, Spare};
 use crate::ids::{BodySlot, PairSlot, small};
 use crate::wire::EndCause;
 
 mod ahead;
 mod free;
+mod idle;
 mod lists;
 mod validate;
 
@@ -39,6 +40,7 @@ pub struct PairSet {
     missing: u64,
     truncated: Vec<BodySlot>,
     is_truncated: Vec<bool>,
+    spare: Spare,
 }
 
 impl PairSet {
@@ -59,6 +61,7 @@ impl PairSet {
             missing: 0,
             truncated: Vec::new(),
             is_truncated: Vec::new(),
+            spare: Spare::default(),
         }
     }
 
@@ -74,7 +77,7 @@ impl PairSet {
         self.len == 0
     }
 
-    /// One more than the highest slot index ever in use: the length for arrays that run parallel to the set.
+    /// One more than the highest slot index in use: the length for arrays that run parallel to the set.
     #[must_use]
     pub fn slots_len(&self) -> usize {
         self.keys.len()
@@ -86,13 +89,15 @@ impl PairSet {
         self.limit
     }
 
-    /// Pairs that overlap and are allowed, but did not fit at the last update.
+    /// Pairs that overlap and are allowed, but did not fit when they were last counted, and those that came since. They
+    /// are counted in each update where they are few.
     #[must_use]
     pub fn missing(&self) -> u64 {
         self.missing
     }
 
-    /// Bodies with a missing pair, in no order that means anything; their verdict is unknown.
+    /// Bodies with a missing pair, or that had one when these were last counted, in no order that means anything; their
+    /// verdict is unknown.
     #[must_use]
     pub fn truncated(&self) -> &[BodySlot] {
         &self.truncated
@@ -162,32 +167,7 @@ impl PairSet {
         for slot in self.resting.drain(..) {
             self.free.put(slot);
         }
-    }
-
-    /// Gives the memory of many more pairs than there are back, right after a tick was opened. Slots of pairs stay.
-    pub(crate) fn give_back(&mut self) {
-        debug_assert!(
-            self.resting.is_empty(),
-            "a slot that rests is not to be used anew"
-        );
-        let last = self.keys.iter().rposition(|key| *key != PairKey::NOBODY);
-        self.keys.truncate(last.map_or(0, |last| last + 1));
-        self.keys.shrink_to_fit();
-        self.resting = Vec::new();
-        (self.lists, self.index, self.free) = Default::default();
-        self.free.cover(self.keys.len());
-        let room = self.len + (self.len / GROWTH).max(LEAST);
-        for (slot, key) in (0..).zip(&self.keys) {
-            if *key == PairKey::NOBODY {
-                self.free.put(slot);
-            } else {
-                self.index.insert(key.bits(), slot, room);
-            }
-        }
-        self.truncated.shrink_to_fit();
-        let last = self.truncated.iter().map(|body| body.index() + 1).max();
-        self.is_truncated.truncate(last.unwrap_or(0));
-        self.is_truncated.shrink_to_fit();
+        self.cut();
     }
 
     /// Makes room for so many pairs more, as far as they may be stored. Pairs that begin together are told together, so
@@ -222,9 +202,10 @@ impl PairSet {
         began: &mut Vec<PairSlot>,
     ) {
         let unused = self.keys.capacity() - self.keys.len();
-        if keys.len() > self.free.len() + unused {
+        if self.len < self.limit && keys.len() > self.free.len() + unused {
             let new = keys.iter().filter(|key| self.find(**key).is_none());
-            self.reserve(new.filter(|key| begins(**key)).count());
+            let new = new.filter(|key| begins(**key));
+            self.reserve(new.take(self.limit - self.len).count());
         }
         for (at, key) in keys.iter().enumerate() {
             self.prefetch_insert(keys, at);

@@ -5,12 +5,13 @@
 //! continuous body that is over at this tick's poses is a begin and an end of one tick: a pass.
 
 mod adrift;
+mod idle;
 mod late;
 mod validate;
 
 use crate::ids::{BodyId, PairSlot};
 use crate::narrow::{Finding, Narrow, Passage};
-use crate::pairs::PairDelta;
+use crate::pairs::{PairDelta, Spare};
 use crate::wire::{EndCause, Verdict};
 use crate::world::World;
 
@@ -120,6 +121,7 @@ impl History {
 pub(super) struct Events {
     /// By `PairSlot`.
     histories: Vec<History>,
+    spare: Spare,
     /// Histories whose slots were lost, until they are found again.
     adrift: Vec<Adrift>,
     /// By ids; one entry a pair after [`Events::merge`].

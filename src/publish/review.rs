@@ -22,6 +22,7 @@ impl Publisher {
             .find_slots(view.tick, view.world, view.pairs, view.narrow);
         self.events
             .begin(view.tick, view.world, view.narrow, view.delta);
+        self.events.give_back_slots(view.pairs.slots_len());
         let heard = Heard {
             pairs: view.demand.pairs,
             contacts: view.demand.contacts,

@@ -15,7 +15,9 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod oracle;
 mod outliers;
+mod short;
 mod world;
 
 use sweepd::wire::EndCause;
@@ -28,13 +30,24 @@ fn run(
     ticks: usize,
     bodies: usize,
     limit: usize,
+    setup: impl FnMut(&mut World),
+    step: impl FnMut(&mut World, usize),
+) -> Summary {
+    run_short(ticks, bodies, (limit, 1 << 16), setup, step)
+}
+
+/// The same with a limit of pairs, and of those that are counted anew in each tick.
+fn run_short(
+    ticks: usize,
+    bodies: usize,
+    (limit, recount): (usize, u64),
     mut setup: impl FnMut(&mut World),
     mut step: impl FnMut(&mut World, usize),
 ) -> Summary {
     let mut all = Summary::default();
     for seed in 0..3 {
         let mut world = World::new(seed, bodies);
-        let mut bench = Bench::new(limit);
+        let mut bench = Bench::new(limit, recount);
         setup(&mut world);
         for tick in 0..ticks / 3 {
             step(&mut world, tick);
@@ -344,32 +357,6 @@ fn forced_pairs_are_candidates_whatever_the_boxes_say() {
             }
         }
         shift_some(w, 3, 0.3);
-    });
-}
-
-#[test]
-fn pairs_beyond_the_limit_are_counted_marked_and_stored_when_there_is_room() {
-    let setup = |w: &mut World| scatter(w, 2.0, 0.8);
-    run(900, 40, 30, setup, |w, tick| {
-        // The crowd spreads and gathers, so that the limit is reached and left again and again.
-        let factor = if tick / 25 % 2 == 0 { 1.05 } else { 0.95 };
-        for i in 0..40 {
-            let centre = w.bodies[i].aabb.centre() * factor;
-            let half = w.bodies[i].aabb.half_extents();
-            if w.rng.once_in(2) {
-                w.place(i, at(centre.coords.into(), half.into()));
-            }
-            if w.rng.once_in(50) {
-                let keeps = !w.bodies[i].keeps;
-                w.set_keeps(i, keeps);
-            }
-            if w.rng.once_in(50) {
-                w.remove(i, EndCause::Removed);
-            }
-            if w.rng.once_in(30) {
-                w.insert(i);
-            }
-        }
     });
 }
 

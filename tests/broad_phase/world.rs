@@ -1,6 +1,4 @@
-//! A world of boxes without bodies, and an oracle that knows no method: it looks at every pair in every tick.
-
-use std::collections::{BTreeMap, BTreeSet};
+//! A world of boxes without bodies, and all methods beside the oracle.
 
 use sweepd::broad::{BroadPhase, Method, Proxies};
 use sweepd::ids::{BodyId, BodySlot, PairKey};
@@ -10,6 +8,7 @@ use sweepd::wire::EndCause;
 use sweepd::world::{ChangeSet, Removed};
 
 use crate::common::Rng;
+use crate::oracle::{Oracle, Outcome};
 
 /// One body of the double.
 #[derive(Clone, Debug)]
@@ -145,104 +144,6 @@ impl PairPolicy for World {
     }
 }
 
-type Ids = (BodyId, BodyId);
-
-/// What a tick must have done, by ids.
-#[derive(Debug, Default, PartialEq)]
-pub struct Outcome {
-    pub began: Vec<Ids>,
-    pub ended: Vec<(Ids, EndCause)>,
-    pub stored: BTreeSet<Ids>,
-    pub truncated: BTreeSet<BodyId>,
-    pub missing: u64,
-}
-
-/// The law of the broad phase in its plainest words.
-#[derive(Default)]
-struct Oracle {
-    stored: BTreeSet<(usize, usize)>,
-    truncated: BTreeSet<usize>,
-    missing: u64,
-}
-
-impl Oracle {
-    fn tick(&mut self, world: &World, limit: usize) -> Outcome {
-        let ids = |(a, b): (usize, usize)| {
-            let (a, b) = (world.bodies[a].id, world.bodies[b].id);
-            (a.min(b), a.max(b))
-        };
-        let left: BTreeMap<usize, EndCause> = world
-            .changes
-            .removed
-            .iter()
-            .map(|r| (r.slot.index(), r.cause))
-            .collect();
-        let always = |(a, b): (usize, usize)| {
-            let key = PairKey::new(World::slot(a), World::slot(b));
-            match (world.bodies[a].unbounded, world.bodies[b].unbounded) {
-                (true, true) => false,
-                (false, false) => world.forced.contains(&key),
-                _ => true,
-            }
-        };
-        let overlap = |(a, b): (usize, usize)| {
-            let (a, b) = (&world.bodies[a], &world.bodies[b]);
-            let both = !a.unbounded && !b.unbounded;
-            both && (0..3).all(|k| a.aabb.min[k] <= b.aabb.max[k] && b.aabb.min[k] <= a.aabb.max[k])
-        };
-        let allows = |(a, b): (usize, usize)| world.allows(World::slot(a), World::slot(b));
-        let keeps = |(a, b): (usize, usize)| world.bodies[a].keeps || world.bodies[b].keeps;
-        let mut outcome = Outcome::default();
-        let old = std::mem::take(&mut self.stored);
-        for pair in old {
-            let gone = [pair.0, pair.1].map(|b| left.get(&b).copied());
-            let cause = match gone {
-                [Some(one), Some(other)] => Some(one.min(other)),
-                [Some(cause), None] | [None, Some(cause)] => Some(cause),
-                [None, None] if !allows(pair) => Some(EndCause::Filtered),
-                [None, None] => {
-                    let stays = overlap(pair) || always(pair) || keeps(pair);
-                    (!stays).then_some(EndCause::Separated)
-                }
-            };
-            match cause {
-                Some(cause) => outcome.ended.push((ids(pair), cause)),
-                None => _ = self.stored.insert(pair),
-            }
-        }
-        let n = world.bodies.len();
-        let mut wanted: Vec<(usize, usize)> = (0..n)
-            .flat_map(|a| (a + 1..n).map(move |b| (a, b)))
-            .filter(|(a, b)| world.bodies[*a].inside && world.bodies[*b].inside)
-            .filter(|p| always(*p) || (overlap(*p) && !keeps(*p)))
-            .filter(|p| allows(*p) && !self.stored.contains(p))
-            .collect();
-        wanted.sort_by_key(|p| ids(*p));
-        let room = limit - self.stored.len();
-        let (fit, rest) = wanted.split_at(room.min(wanted.len()));
-        self.stored.extend(fit);
-        let was = std::mem::take(&mut self.truncated);
-        self.truncated
-            .extend(rest.iter().flat_map(|(a, b)| [*a, *b]));
-        let inside: Vec<usize> = was
-            .into_iter()
-            .filter(|b| world.bodies[*b].inside)
-            .collect();
-        let mut missing = rest.len() as u64;
-        if inside.iter().any(|b| world.bodies[*b].keeps) {
-            missing = missing.max(self.missing);
-            self.truncated.extend(inside);
-        }
-        self.missing = missing;
-        outcome.began = fit.iter().map(|p| ids(*p)).collect();
-        outcome.ended.sort_by_key(|(ids, _)| *ids);
-        outcome.stored = self.stored.iter().map(|p| ids(*p)).collect();
-        outcome.truncated = self.truncated.iter().map(|b| world.bodies[*b].id).collect();
-        outcome.missing = missing;
-        outcome
-    }
-}
-
 /// One method with its own set.
 struct Rig {
     method: Method,
@@ -264,6 +165,9 @@ pub struct Summary {
     pub rebuilds: u64,
     /// Ticks with an axis skipped.
     pub skipped: u64,
+    /// Ticks in which missing pairs were not counted, and in which they were after such; missing pairs at the end.
+    pub waited: (u64, u64),
+    pub missing: u64,
 }
 
 impl Summary {
@@ -273,6 +177,9 @@ impl Summary {
         self.swaps += other.swaps;
         self.rebuilds += other.rebuilds;
         self.skipped += other.skipped;
+        self.waited.0 += other.waited.0;
+        self.waited.1 += other.waited.1;
+        self.missing += other.missing;
     }
 }
 
@@ -285,7 +192,8 @@ pub struct Bench {
 }
 
 impl Bench {
-    pub fn new(limit: usize) -> Self {
+    /// * `recount` - missing pairs of more than so many are not counted in each tick.
+    pub fn new(limit: usize, recount: u64) -> Self {
         let rig = |method, gears| Rig {
             method,
             gears,
@@ -305,9 +213,12 @@ impl Bench {
             changing: true,
             ..rig(Method::BruteForce, &[])
         });
+        for rig in &mut rigs {
+            rig.broad.use_recount(recount);
+        }
         Self {
             rigs,
-            oracle: Oracle::default(),
+            oracle: Oracle::new(recount),
             limit,
             seen: Summary::default(),
         }
@@ -349,6 +260,8 @@ impl Bench {
         self.seen.swaps += work.swaps;
         self.seen.rebuilds += work.rebuilds;
         self.seen.skipped += u64::from(work.axes.contains(&false));
+        self.seen.waited = self.oracle.waited;
+        self.seen.missing = self.oracle.missing;
         world.changes.clear();
         world.forced_changed = false;
     }

@@ -3,7 +3,7 @@
 //! In: a change of the way, a tick that is over. Out: less memory; nothing else is told by it. Candidates and the
 //! search without them take half of it each, and a world of many bodies seldom changes from the one to the other, in a
 //! tick that lays all of them anyway. Lists that a tick fills once, as the first one does with every pair, are not kept
-//! at that length. Of fewer bodies all of it is kept, so that no tick makes any.
+//! at that length. Of fewer bodies all of it is kept, so that no tick makes any, until a crowd has been over for long.
 
 use super::afresh::Afresh;
 use super::cost::FAR;
@@ -54,6 +54,15 @@ impl Order {
         shed(&mut self.touched_records);
         shed(&mut self.emptied);
         self.give_back_list();
+    }
+
+    /// A crowd is over, for long.
+    pub(in crate::broad) fn give_back_crowd(&mut self) {
+        let (entries, hits, bodies) = (self.entries.len(), self.hits, self.len);
+        // As much as a sort makes room for where there is less.
+        self.entries.shrink_to(2 * entries + 4 * bodies);
+        self.carried.shrink_to(2 * hits + 2 * bodies);
+        self.found.shrink_to(bodies);
     }
 
     /// Few moved: the list of candidates is let go.

@@ -343,7 +343,11 @@ impl Order {
                 rank,
                 |bits| bits.hit,
                 |other| {
-                    began.push(PairKey::new(*slot, BodySlot(other)));
+                    let other = BodySlot(other);
+                    // Of two that are asked one tells.
+                    if other > *slot || !members.has(other, ASKED) || members.has(other, CAME) {
+                        began.push(PairKey::new(*slot, other));
+                    }
                 },
             );
         }

@@ -1,5 +1,7 @@
 //! Which slots of the set are free: a bit each, so that the lowest is found without any order being kept.
 
+use crate::ids::{PairSlot, small};
+
 /// Bits of a word.
 const BITS: usize = u64::BITS as usize;
 
@@ -53,6 +55,37 @@ impl Free {
             .map(|first| first + bit)
     }
 
+    /// Forgets a slot that is free: it is no more.
+    pub(super) fn drop_slot(&mut self, slot: usize) {
+        debug_assert!(self.has(slot));
+        if let Some(word) = self.words.get_mut(slot / BITS) {
+            *word &= !(1 << (slot % BITS));
+            self.len -= 1;
+        }
+    }
+
+    /// Of so many slots those that are not free, ascending.
+    pub(super) fn others(&self, slots: usize) -> impl Iterator<Item = PairSlot> + '_ {
+        let words = (0..slots.div_ceil(BITS)).map(move |at| {
+            let last = slots - at * BITS;
+            let all = if last < BITS {
+                (1 << last) - 1
+            } else {
+                u64::MAX
+            };
+            (at, all & !self.words.get(at).copied().unwrap_or(0))
+        });
+        words.flat_map(|(at, mut left)| {
+            std::iter::from_fn(move || {
+                let bit = left.trailing_zeros();
+                (left != 0).then(|| {
+                    left &= left - 1;
+                    PairSlot(small(at * BITS) + bit)
+                })
+            })
+        })
+    }
+
     /// None is.
     pub(super) fn clear(&mut self) {
         self.words.fill(0);
@@ -84,6 +117,15 @@ mod tests {
         assert_eq!(left, [Some(5), Some(70), Some(200), None]);
         assert_eq!(free.len(), 0);
         free.put(1);
+        free.put(66);
+        let used = |slots| -> Vec<u32> { free.others(slots).map(|slot| slot.0).collect() };
+        assert_eq!(
+            (used(0), used(3), used(1000).len()),
+            (vec![], vec![0, 2], 998)
+        );
+        assert_eq!(used(68)[62..], [63, 64, 65, 67]);
+        free.drop_slot(66);
+        assert_eq!((free.len(), free.has(66), free.has(1)), (1, false, true));
         free.clear();
         assert_eq!((free.take(), free.len()), (None, 0));
     }
