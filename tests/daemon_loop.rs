@@ -63,9 +63,13 @@ struct Ear {
 
 impl Ear {
     fn of(hub: &Hub, clock: &Arc<ManualClock>) -> Self {
+        Self::by(hub, clock, "sim")
+    }
+
+    fn by(hub: &Hub, clock: &Arc<ManualClock>, source: &str) -> Self {
         let link = Box::new(hub.link());
         let clock = Arc::clone(clock) as Arc<dyn Clock>;
-        let mut client = Client::over(link, clock, Some("sim"), 0).unwrap();
+        let mut client = Client::over(link, clock, Some(source), 0).unwrap();
         client.subscribe(Topics::ALL).unwrap();
         Self { client }
     }
@@ -205,6 +209,55 @@ fn bug_in_lockstep_a_frame_behind_one_whose_wait_ends_had_no_units() {
     let (tick, _) = ear.heard().pop().unwrap();
     assert_eq!(tick.sources[0].seq, 3);
     assert_eq!((tick.possible, tick.colliding), (0, BALLS as u64 / 2));
+}
+
+/// A way is asked for in the tick that it ends in, or never.
+#[test]
+fn bug_in_lockstep_the_way_of_a_body_of_another_source_whose_frame_had_waited_had_no_units() {
+    let (hub, clock) = (Hub::new(), Arc::new(ManualClock::new(1_000 * MS)));
+    let text = format!(
+        "[run]\n{}\n[[source]]\nname = \"sim\"\ntimeout_ms = 60000\n[[source]]\nname = \"gun\"\ntimeout_ms = {}\n\
+         [[body]]\nname = \"wall\"\nid = 1\nmoves = false\n\
+         shape = {{ type = \"box\", half_extents = [0.0005, 2.0, 2.0] }}\n\
+         [[body]]\nname = \"bullet\"\nid = 2\nsource = \"gun\"\ncontinuous = true\n\
+         shape = {{ type = \"sphere\", radius = 0.004 }}\n",
+        MODES[0],
+        TIMEOUT_NS / MS
+    );
+    let scene = Scene::parse(&text, "scene.toml", Path::new(".")).unwrap();
+    let mut door = MemoryServer::open(&hub, 7, HEARTBEAT_NS).unwrap();
+    let shapes = build_shapes(&scene).unwrap();
+    let mut daemon = Daemon::new(&scene, shapes, 7, clock.clone(), &mut door).unwrap();
+    let (mut ear, mut gun) = (Ear::of(&hub, &clock), Ear::by(&hub, &clock, "gun"));
+    let mut shoot = |daemon: &mut Daemon<'_>, ear: &mut Ear, scene_rev, x| {
+        let info = FrameInfo {
+            scene_rev,
+            ..FrameInfo::default()
+        };
+        let bullet = TransformRow {
+            body: 2,
+            position: [x, 0.0, 0.0],
+            orientation: [0.0, 0.0, 0.0, 1.0],
+            ..TransformRow::default()
+        };
+        gun.client.send(&info, Rows::Poses(&[bullet])).unwrap();
+        ear.send(&[]);
+        daemon.round(None).unwrap();
+        ear.heard().pop().unwrap().0
+    };
+    let first = shoot(&mut daemon, &mut ear, 0, -40.0);
+    assert_eq!(state(&first), State::Clear);
+    shoot(&mut daemon, &mut ear, 99, -40.0);
+    clock.advance(TIMEOUT_NS / 2);
+    let waits = shoot(&mut daemon, &mut ear, 0, 60.0);
+    assert_eq!(state(&waits), State::Clear);
+    // The wait of the one before it ends between two frames of the lead.
+    clock.advance(TIMEOUT_NS / 2);
+    daemon.round(None).unwrap();
+    let (tick, _) = ear.heard().pop().unwrap();
+    assert_ne!(tick.cause, TickCause::Frame.code());
+    assert_ne!(tick.reasons & Reason::Swept.bit(), 0);
+    assert_eq!(state(&tick), State::Colliding);
 }
 
 #[test]

@@ -463,6 +463,36 @@ fn law_4_4_a_partial_frame_is_never_passed_over_for_a_newer_one() {
 }
 
 #[test]
+fn law_4_2_bug_a_full_frame_overtook_a_pause_or_another_of_its_session_which_was_refused() {
+    let sent = |seq, flags, scene_rev| {
+        let rows = [row(1, 1.0)];
+        let pauses = flags == frame_flags::PAUSED;
+        let mut frame = frame("sim", seq, 0, if pauses { &[] } else { &rows });
+        (frame.header.flags, frame.header.scene_rev) = (flags, scene_rev);
+        frame
+    };
+    let (full, partial, paused) = (frame_flags::FULL, frame_flags::PARTIAL, frame_flags::PAUSED);
+    for (between, passed) in [(paused, 2), (partial, 1), (full, 1)] {
+        let mut daemon = Daemon::of(Mode::Rate(50.0));
+        let frames = vec![
+            (1.0, sent(5, full, 1)),
+            (2.0, sent(6, between, 0)),
+            (3.0, sent(7, full, 1)),
+        ];
+        daemon.run(25.0, frames);
+        let taken: Vec<u64> = daemon
+            .ticks
+            .iter()
+            .flat_map(|t| &t.frames)
+            .map(|f| f.1)
+            .collect();
+        assert!(taken.is_sorted() && taken.last() == Some(&7), "{taken:?}");
+        assert_eq!(daemon.passed_of(0), passed, "{taken:?}");
+        assert_eq!(daemon.world.rejects().iter().sum::<u64>(), 0, "{taken:?}");
+    }
+}
+
+#[test]
 fn law_4_4_a_rate_does_not_make_up_for_missed_beats() {
     let mut daemon = Daemon::of(Mode::Rate(100.0));
     let ticks = daemon.run(50.0, Vec::new());

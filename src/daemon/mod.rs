@@ -234,16 +234,18 @@ impl<'a> Daemon<'a> {
         }
     }
 
-    /// Whether these edits, or the end of another's wait, are what a frame of the leading source waits for: their tick
-    /// is that frame's, too.
-    fn takes_the_leads_frame(&self) -> bool {
+    /// Whether these edits, or the end of another's wait, are what a frame of the leading source waits for, whose tick
+    /// theirs is, too; or one that moves a continuous body, whose way no later tick asks for.
+    ///
+    /// * `now_ns` - time of the tick, nanoseconds of `CLOCK_BOOTTIME`.
+    fn takes_a_frame_that_waited(&self, now_ns: u64) -> bool {
         let Mode::OnFrame(lead) = &self.config.mode else {
             return false;
         };
-        let now_ns = self.clock.boottime_ns();
+        let world = self.engine.world();
         let takes = |s: &SourceState| !self.ready.is_empty() && s.waits() || s.lets_go(now_ns);
-        let mut sources = self.engine.world().sources().iter();
-        sources.any(|s| s.name == *lead && takes(s))
+        let mut sources = world.sources().iter().enumerate();
+        sources.any(|(at, s)| (s.name == *lead || world.is_followed(at)) && takes(s))
     }
 
     /// Runs one tick and sends what it filled.
@@ -254,7 +256,8 @@ impl<'a> Daemon<'a> {
         if let Some(recorder) = &mut self.recorder {
             demand = recorder.listen(demand, self.clock.boottime_ns());
         }
-        let budget = if due.ages_only && !self.takes_the_leads_frame() {
+        let now_ns = self.clock.boottime_ns();
+        let budget = if due.ages_only && !self.takes_a_frame_that_waited(now_ns) {
             Budget {
                 units: Some(0),
                 ..self.config.budget
@@ -281,7 +284,7 @@ impl<'a> Daemon<'a> {
             pulse: Some(&mut pulse),
         };
         let ask = Ask::of(&input);
-        let outbox = self.engine.tick(input);
+        let outbox = self.engine.tick_at(now_ns, input);
         if let Some(error) = broken {
             return Err(error);
         }

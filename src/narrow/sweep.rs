@@ -1,6 +1,6 @@
 //! Continuous bodies: whether two touch on the way from the last tick's poses to this one's, and when.
 //!
-//! In: the paths that the world keeps, a [`Meter`]. Out: for each pair with a body that was swept, what is known of the
+//! In: the paths that the world keeps, a meter. Out: for each pair with a body that was swept, what is known of the
 //! way ([`Passage`]): free of touch, a touch within an interval of the share `s`, or not decided. The verdicts at this
 //! tick's poses are not concerned.
 //!
@@ -16,13 +16,17 @@
 //!
 //! Refused: sampling (a wall is as thin as it likes); looking for the touch by bisection of the verdict (a bullet that
 //! ends behind the wall is apart at both ends); keeping an undecided sweep for later (nobody asks for it any more).
+//!
+//! Two bodies of which nobody says where the one was while the other went are not swept: see `in_step`.
 
 mod advance;
 mod asked;
 mod close;
+mod in_step;
 mod motion;
 #[cfg(test)]
 mod tests;
+mod turns;
 
 pub use asked::touch_on_way;
 
@@ -30,16 +34,16 @@ use crate::ids::{BodySlot, PairSlot};
 use crate::limits::SWEEP_LOOKS_MAX;
 use crate::math::Interval;
 use crate::pairs::PairSet;
-use crate::time::{Meter, Share};
 use crate::world::{Body, World};
 
 use super::change::changed_since;
 use super::exact::Warm;
 use super::memo::Memo;
-use super::order::Order;
-use super::{NONE, Narrow, Wanted};
+use super::{NONE, Narrow};
 use advance::{Ahead, Tools, Work};
+use in_step::{apart_in_any_order, are_in_step};
 use motion::{Moment, length, way};
+use turns::Turns;
 
 /// Looks at a pair before the next one has its turn.
 const SLICE_LOOKS: u32 = 8;
@@ -107,6 +111,7 @@ pub(super) struct Sweeps {
     /// Place in `list` by `PairSlot`; as long as the highest slot that was ever swept.
     places: Vec<u32>,
     tools: Tools,
+    turns: Turns,
     /// This tick's have been told: nothing more is to be found out.
     told: bool,
 }
@@ -132,8 +137,13 @@ impl Narrow {
     /// Forgets the sweeps of the tick before.
     pub(super) fn clear_sweeps(&mut self) {
         let Sweeps {
-            list, places, told, ..
+            list,
+            places,
+            turns,
+            told,
+            ..
         } = &mut self.sweeps;
+        turns.begin();
         for sweep in list.drain(..) {
             places[sweep.slot.index()] = NONE;
             self.stirred.set(sweep.slot);
@@ -167,56 +177,6 @@ impl Narrow {
         }
     }
 
-    /// Works on sweeps while the meter is open, for at most this share of it and so many looks at each; whether no more
-    /// is to be done.
-    pub(super) fn spend_on_sweeps(
-        &mut self,
-        world: &World,
-        wanted: Wanted,
-        meter: &mut Meter<'_>,
-        share: Option<Share>,
-        looks_max: u32,
-    ) -> bool {
-        let waits = |sweep: &Sweep| !sweep.done && sweep.looks < looks_max;
-        if self.sweeps.told || !self.sweeps.list.iter().any(waits) {
-            return true;
-        }
-        if wanted.order == Order::Counted {
-            self.order_sweeps(world);
-        }
-        let Self {
-            sweeps,
-            counters,
-            memos,
-            ..
-        } = self;
-        let Sweeps { list, tools, .. } = sweeps;
-        let mut work = Work {
-            tools,
-            counters,
-            meter,
-        };
-        let mut open = true;
-        while open {
-            open = false;
-            for sweep in list.iter_mut().filter(|sweep| waits(sweep)) {
-                let within = share.is_none_or(|share| work.meter.within(share));
-                if !within || !work.meter.open() {
-                    open = false;
-                    break;
-                }
-                if let (Some(a), Some(b)) = (world.body(sweep.a), world.body(sweep.b)) {
-                    sweep.turn((a, b), &mut work);
-                    open |= waits(sweep);
-                    // Where they are next asked for their gap.
-                    memos[sweep.slot.index()].warm = sweep.warm;
-                }
-            }
-        }
-        work.release();
-        !self.sweeps.list.iter().any(waits)
-    }
-
     /// A row shows the gap of this tick's poses beside the touch on the way.
     pub(super) fn bring_up_swept(&mut self, world: &World) {
         for at in 0..self.sweeps.list.len() {
@@ -230,16 +190,6 @@ impl Narrow {
     /// Sweeps are told.
     pub(super) fn close_sweeps(&mut self) {
         self.sweeps.told = true;
-    }
-
-    /// By body ids, so that a budget of units is spent alike whatever the slots are.
-    fn order_sweeps(&mut self, world: &World) {
-        let id = |slot| world.body(slot).map(|body| body.id);
-        let Sweeps { list, places, .. } = &mut self.sweeps;
-        list.sort_unstable_by_key(|sweep| (id(sweep.a), id(sweep.b)));
-        for (at, sweep) in list.iter().enumerate() {
-            places[sweep.slot.index()] = u32::try_from(at).unwrap_or(NONE);
-        }
     }
 }
 
@@ -285,9 +235,19 @@ impl Sweep {
             (sweep.hit, sweep.done) = (0.0, true);
         } else if paths().any(crate::world::Path::is_blurred) {
             sweep.done = true;
-        } else if !jumped {
-            let low_m = (memo.gap.min - change - start.slop).next_down();
-            if low_m > 0.0 && low_m > length((a, b)) {
+        } else {
+            let low_m = if jumped {
+                f64::NEG_INFINITY
+            } else {
+                (memo.gap.min - change - start.slop).next_down()
+            };
+            let is_free = if are_in_step((a, b)) {
+                low_m > 0.0 && low_m > length((a, b))
+            } else {
+                sweep.done = true;
+                apart_in_any_order((a, b), low_m)
+            };
+            if is_free {
                 (sweep.free, sweep.done) = (1.0, true);
             }
         }

@@ -114,6 +114,11 @@ impl History {
             (self.active, self.tick) = (last, last);
         }
     }
+
+    /// First tick in which it may have ended: after a touch on the way to poses that were not decided that very tick.
+    fn next_first(&self) -> u64 {
+        self.tick + u64::from(!self.on_way)
+    }
 }
 
 /// The history of every pair and the events that wait.
@@ -157,7 +162,7 @@ impl Events {
                 gone.go_on_to(tick - 1);
                 if gone.colliding {
                     let ticks = Ticks {
-                        first: gone.tick + 1,
+                        first: gone.next_first(),
                         last: tick,
                     };
                     self.push(gone.ids, Some((ticks, ended.cause)), None);
@@ -256,7 +261,7 @@ impl Events {
         let first = if history.tick == 0 {
             history.born
         } else {
-            history.tick + 1
+            history.next_first()
         };
         let ticks = Ticks { first, last: tick };
         let passage = narrow.passage(slot).map(|swept| swept.passage);

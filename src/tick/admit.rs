@@ -12,8 +12,7 @@ use crate::wire::{Frame, Inbox, SOURCE_NAME_LEN, TickCause};
 
 impl Engine {
     pub(super) fn admit(&mut self, input: &mut TickInput<'_>, laps: &Laps) {
-        let now_ns = self.clock.boottime_ns();
-        self.now_ns = now_ns;
+        let now_ns = self.now_ns;
         let asked = input.edits.iter().any(|batch| batch.validate);
         let fault = asked.then(|| self.repair()).flatten();
         self.world.begin_tick(self.tick, now_ns);

@@ -152,7 +152,16 @@ impl Engine {
     }
 
     /// Runs one tick.
-    pub fn tick(&mut self, mut input: TickInput<'_>) -> &Outbox {
+    pub fn tick(&mut self, input: TickInput<'_>) -> &Outbox {
+        let now_ns = self.clock.boottime_ns();
+        self.tick_at(now_ns, input)
+    }
+
+    /// As [`Engine::tick`], for who has read the clock already and gone by that.
+    ///
+    /// * `now_ns` - nanoseconds of `CLOCK_BOOTTIME`.
+    pub fn tick_at(&mut self, now_ns: u64, mut input: TickInput<'_>) -> &Outbox {
+        self.now_ns = now_ns;
         let mut laps = self.begin(&input);
         self.admit(&mut input, &laps);
         laps.lap(Stage::World);

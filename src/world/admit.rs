@@ -194,7 +194,7 @@ impl World {
             // The poses that hold are those of its sender's last pose frame, which may not be those that are known.
             if !state.waits() {
                 if state.gap == 0 {
-                    self.renew_last_poses(source, times);
+                    self.renew_last_poses(source, frame.header.stamp_ns, times);
                 }
                 self.bend_with(source);
             }
@@ -207,8 +207,9 @@ impl World {
         if frame.header.seq >= state.gap {
             state.gap = 0;
         }
+        state.pose_frames = state.pose_frames.saturating_add(1);
         // Its list of rows is worked on outside of the world, and put back.
-        let mut rows = std::mem::take(&mut self.sources[source.index()].rows);
+        let mut rows = std::mem::take(&mut state.rows);
         let refused_rows = self.find_rows(source, &frame.transforms, &mut rows);
         let refused_rows = refused_rows + self.take_rows(source, frame, &rows, times);
         self.sources[source.index()].rows = rows;

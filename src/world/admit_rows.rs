@@ -100,6 +100,7 @@ impl World {
         if let Some(body) = self.bodies[slot.index()].as_mut() {
             let was = std::mem::replace(&mut body.velocity, velocity);
             let other_speed = !Twist::is_same(was, velocity);
+            self.entries[slot.index()].stood_ns = None;
             body.stamp_ns = stamp_ns;
             body.since_ns = Some(times.since_ns);
             body.received_ns = times.received_ns;
@@ -114,7 +115,8 @@ impl World {
     }
 
     /// What a continuous body turned by since its last pose, by its sender's word: angular velocity times the time
-    /// between the two stamps, radians. `None` where it says neither.
+    /// between the two stamps, radians; from the last pause that said it stood there still, where one came meanwhile.
+    /// `None` where it says neither.
     fn declared_turn(
         &self,
         slot: BodySlot,
@@ -123,13 +125,18 @@ impl World {
     ) -> Option<Vec3> {
         let body = self.body(slot).filter(|body| body.path.is_some())?;
         let turning = velocity?.angular_radps;
+        let entry = &self.entries[slot.index()];
         // The stamp of what it hung on is of another clock.
-        let is_own = self.entries[slot.index()].raw[0].is_finite();
-        if !is_own || body.stamp_ns == 0 || stamp_ns <= body.stamp_ns {
+        let is_own = entry.raw[0].is_finite();
+        let stood_ns = match entry.stood_ns {
+            Some(0) => 0,
+            paused_ns => body.stamp_ns.max(paused_ns.unwrap_or_default()),
+        };
+        if !is_own || stood_ns == 0 || stamp_ns <= stood_ns {
             return None;
         }
         #[allow(clippy::cast_precision_loss, reason = "stamps of one body are near")]
-        let time_s = (stamp_ns - body.stamp_ns) as f64 * 1e-9;
+        let time_s = (stamp_ns - stood_ns) as f64 * 1e-9;
         Some(turning * time_s)
     }
 
@@ -182,15 +189,18 @@ impl World {
     }
 
     /// A paused frame: the poses of the last pose frame still hold, for one more time-out.
-    pub(super) fn renew_last_poses(&mut self, source: SourceSlot, times: Times) {
+    ///
+    /// * `stamp_ns` - of that frame; 0: it says none.
+    pub(super) fn renew_last_poses(&mut self, source: SourceSlot, stamp_ns: u64, times: Times) {
         let number = self.sources[source.index()].pose_frame;
         let rows = std::mem::take(&mut self.sources[source.index()].rows);
         for &slot in rows.iter().filter(|slot| **slot != NO_BODY) {
-            let entry = &self.entries[slot.index()];
+            let entry = &mut self.entries[slot.index()];
             // A body put anew or reset since has no pose that could be renewed.
             if entry.seen != number || !entry.has_pose || entry.refused || number == 0 {
                 continue;
             }
+            entry.stood_ns = Some(stamp_ns);
             if let Some(body) = self.bodies[slot.index()].as_mut() {
                 body.since_ns = Some(times.since_ns);
                 self.settle(slot, false);

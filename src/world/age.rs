@@ -203,6 +203,7 @@ impl World {
             self.ages.sweep();
         }
         self.grow_reaches();
+        self.count_frames();
     }
 
     /// When the next body, source or waiting frame reaches its time-out, nanoseconds of `CLOCK_BOOTTIME`; `None`: none

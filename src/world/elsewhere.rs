@@ -4,8 +4,9 @@
 
 use super::World;
 use super::body::{Body, Motion};
+use super::leg::Leg;
 use super::parts::Parts;
-use super::path::{Leg, Path};
+use super::path::Path;
 use super::place::{new_body, tight_box};
 use crate::ids::{BodyId, BodySlot};
 use crate::math::{Point, Pose, Quat, Vec3};
@@ -70,6 +71,7 @@ impl Body {
             extra: Vec3::zeros(),
             jump: false,
             lapse: false,
+            frame: 1,
         };
         let reach = if *pivot == self.centre {
             self.radius

@@ -4,74 +4,29 @@
 //! centre of the body's geometry; of an attached body that of the body it hangs on) goes straight and the body turns
 //! about a fixed axis at a constant rate; and a box that holds the body all the way.
 //!
-//! The share `s` of the motion runs from 0 (the last tick's pose) to 1 (this one's); legs take equal parts of it, one
-//! leg a pose, also where the body stood still: so two bodies of one source are in step.
+//! The share `s` of the motion runs from 0 (the last tick's pose) to 1 (this one's). The frames with poses that the
+//! body's source sent meanwhile divide it into equal parts, whether they hold the body or not: each leg takes the part
+//! of the frame that it ends at, and in all others the body stands still. So two bodies of one source are in step. Of
+//! two sources no part of the one is known to be a certain part of the other (see `narrow::sweep::in_step`).
 
-use crate::limits::{LEG_TURNS_MAX, LEGS_MAX};
-use crate::math::{Aabb, Point, Pose, Quat, ROUND, Vec3};
+use crate::ids::SourceSlot;
+use crate::limits::LEGS_MAX;
+use crate::math::{Aabb, Point, Pose, ROUND, Vec3};
 
+use super::leg::{Leg, swept_box, turn_of};
 use super::parts::PlacedShape;
 use super::place::tight_box;
-
-/// A turn below this has no axis that could be told from rounding (32-bit senders: 1e-7), radians.
-const AXIS_MIN_RAD: f64 = 1e-3;
-
-/// The way from one pose to the next.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Leg {
-    /// Where it begins.
-    pub from: Pose,
-    /// Where it ends.
-    pub to: Pose,
-    /// The pivot at the begin, scene frame.
-    pub pivot: Point,
-    /// What the pivot goes, scene frame, metres.
-    pub travel: Vec3,
-    /// The turn, scene frame: axis times angle, radians.
-    pub spin: Vec3,
-    /// Whole turns on top, about an axis of their own: only where the turn itself has none that could be told.
-    pub extra: Vec3,
-    /// A step beyond the body's `teleport_m`, or over a reset: what lies between is not asked.
-    pub jump: bool,
-    /// A step over a reset.
-    pub lapse: bool,
-}
-
-impl Leg {
-    /// The pose at a share of the leg.
-    #[must_use]
-    pub fn at(&self, share: f64, pivot: &Point) -> Pose {
-        // Both ends to the last bit: certificates were made there.
-        if share >= 1.0 {
-            return self.to;
-        } else if share <= 0.0 {
-            return self.from;
-        }
-        let turned = Quat::from_scaled_axis(self.spin * share) * self.from.rotation;
-        let turned = if self.extra == Vec3::zeros() {
-            turned
-        } else {
-            Quat::from_scaled_axis(self.extra * share) * turned
-        };
-        let at = self.pivot + self.travel * share - turned * pivot.coords;
-        Pose::from_parts(at.coords.into(), turned)
-    }
-
-    /// The whole angle that it turns by, radians.
-    #[must_use]
-    pub fn angle(&self) -> f64 {
-        self.spin.norm() + self.extra.norm()
-    }
-
-    fn is_still(&self) -> bool {
-        self.travel == Vec3::zeros() && self.angle() == 0.0 && self.from == self.to
-    }
-}
 
 /// How far a body's surface is from its pivot, and what the scene says of its motion.
 #[derive(Clone, Debug)]
 pub struct Path {
     legs: Vec<Leg>,
+    /// Whose frames it follows.
+    source: Option<SourceSlot>,
+    /// How many frames with poses that source sent in this tick.
+    frames: u32,
+    /// A tick, and which of its frames had the body's first pose, which no leg leads to; 0: none.
+    entered: (u64, u32),
     /// Body frame.
     pivot: Point,
     /// Greatest distance of the body's surface from the pivot, metres, rounded up.
@@ -101,6 +56,9 @@ impl Path {
     pub(super) fn new(pivot: Point, radius: f64, teleport_m: Option<f64>, swept: bool) -> Self {
         Self {
             legs: Vec::with_capacity(LEGS_MAX),
+            source: None,
+            frames: 0,
+            entered: (0, 0),
             pivot,
             reach: radius,
             teleport_m: teleport_m.unwrap_or(f64::INFINITY),
@@ -118,6 +76,7 @@ impl Path {
     pub(super) fn of_leg(leg: Leg, pivot: Point, radius: f64) -> Self {
         Self {
             legs: vec![leg],
+            frames: leg.frame,
             ahead: true,
             ..Self::new(pivot, radius, None, true)
         }
@@ -127,6 +86,41 @@ impl Path {
     #[must_use]
     pub fn legs(&self) -> &[Leg] {
         &self.legs
+    }
+
+    /// Whose frames it follows.
+    #[must_use]
+    pub fn source(&self) -> Option<SourceSlot> {
+        self.source
+    }
+
+    /// How many frames with poses that source sent in this tick: parts of equal length that the share consists of.
+    #[must_use]
+    pub fn frames(&self) -> u32 {
+        self.frames
+    }
+
+    /// Says whose frames it follows and how many there were in a tick.
+    pub(super) fn set_frames(&mut self, source: Option<SourceSlot>, frames: u32, tick: u64) {
+        let last = self.legs.last().map_or(1, |leg| leg.frame);
+        (self.source, self.frames) = (source, frames.max(last));
+        if self.entered.0 != tick {
+            self.entered = (0, 0);
+        }
+    }
+
+    /// Whether a pose of the body came with a frame, by number in this tick, as its first one: no leg ends there.
+    #[must_use]
+    pub fn has_entered_with(&self, frame: u32) -> bool {
+        self.entered.1 == frame && frame != 0
+    }
+
+    /// Begins anew where the body is, with a first pose.
+    ///
+    /// * `entered` - the tick, and which of its frames had that pose.
+    pub(super) fn enter(&mut self, end: Aabb, entered: (u64, u32)) {
+        self.restart(end);
+        self.entered = entered;
     }
 
     /// The point that goes straight, body frame.
@@ -185,7 +179,7 @@ impl Path {
     /// Says whether the body is out of the broad phase: what it went meanwhile is no motion of its own.
     pub(super) fn set_aside(&mut self, aside: bool) {
         if self.aside && !aside {
-            self.restart(self.end);
+            self.enter(self.end, self.entered);
         }
         self.aside = aside;
     }
@@ -199,6 +193,7 @@ impl Path {
     /// Begins anew where the body is.
     pub(super) fn restart(&mut self, end: Aabb) {
         self.legs.clear();
+        self.entered = (0, 0);
         self.blurred = false;
         (self.end, self.hull) = (end, end);
         self.pivots = Aabb::empty();
@@ -238,7 +233,14 @@ impl Path {
     ///
     /// * `declared` - angular velocity times the time since the last pose, scene frame, where the sender says both.
     /// * `end` - box of the body at the new pose.
-    pub(super) fn push(&mut self, from: Pose, to: Pose, declared: Option<Vec3>, end: Aabb) -> bool {
+    /// * `frame` - number of the frame that the new pose is from, in this tick.
+    pub(super) fn push(
+        &mut self,
+        (from, to): (Pose, Pose),
+        declared: Option<Vec3>,
+        end: Aabb,
+        frame: u32,
+    ) -> bool {
         let (at, goal) = (from * self.pivot, to * self.pivot);
         let travel = goal - at;
         let (spin, extra, followed) = turn_of(&from.rotation, &to.rotation, declared);
@@ -251,12 +253,13 @@ impl Path {
             extra,
             jump: travel.norm() > self.teleport_m,
             lapse: false,
+            frame,
         };
         self.add(leg, end, !followed)
     }
 
     /// Adds the first pose after a reset to the way before it, which was gone and is asked for; whether the hull grew.
-    pub(super) fn lapse(&mut self, from: Pose, to: Pose, end: Aabb) -> bool {
+    pub(super) fn lapse(&mut self, (from, to): (Pose, Pose), end: Aabb, frame: u32) -> bool {
         let (at, goal) = (from * self.pivot, to * self.pivot);
         let leg = Leg {
             from,
@@ -267,6 +270,7 @@ impl Path {
             extra: Vec3::zeros(),
             jump: true,
             lapse: true,
+            frame,
         };
         self.add(leg, end, false)
     }
@@ -314,7 +318,7 @@ impl Path {
             .legs
             .first()
             .map_or(end, |leg| tight_box(shapes, &(leg.from * local)));
-        self.restart(begin);
+        self.enter(begin, root.entered);
         for leg in &root.legs {
             let (from, to) = (leg.from * local, leg.to * local);
             let step_m = (to * centre - from * centre).norm();
@@ -337,60 +341,5 @@ impl Path {
             let reach = self.reach + 64.0 * ROUND * (self.reach + far);
             self.hull = self.hull.merged(&pivots.widened(reach));
         }
-    }
-}
-
-/// A box that holds a body all along a leg, from those at its ends.
-///
-/// A point at distance `r` from the pivot leaves the straight line between its two ends by at most `angle^2 r / 8`; and
-/// it never leaves the ball about the pivot. Both hold, so their intersection does.
-fn swept_box(leg: &Leg, pivot: &Point, reach: f64, (begin, end): (&Aabb, &Aabb)) -> Aabb {
-    let angle = leg.angle() * (1.0 + 8.0 * ROUND);
-    let far = leg.from.translation.vector.amax() + leg.to.translation.vector.amax();
-    // Poses on the way are products of rounded numbers as large as these.
-    let rounding = 64.0 * ROUND * (far + pivot.coords.amax() + (1.0 + angle) * reach);
-    let straight = begin
-        .merged(end)
-        .widened(angle * angle * reach / 8.0 * (1.0 + 8.0 * ROUND) + rounding);
-    let goal = leg.pivot + leg.travel;
-    let ball = Aabb::of([&leg.pivot, &goal]).widened(reach + rounding);
-    Aabb {
-        min: straight.min.sup(&ball.min),
-        max: straight.max.inf(&ball.max),
-    }
-}
-
-/// The turn between two orientations: the shortest, or the one nearest to what the sender says; whole turns about the
-/// sender's own axis where the turn has none that could be told; and whether it can be followed.
-fn turn_of(from: &Quat, to: &Quat, declared: Option<Vec3>) -> (Vec3, Vec3, bool) {
-    // Rounding turns nothing that was sent as it was.
-    let is_same = from.coords == to.coords;
-    let shortest = if is_same {
-        Vec3::zeros()
-    } else {
-        (to * from.inverse()).scaled_axis()
-    };
-    let Some(declared) = declared.filter(|turn| *turn != Vec3::zeros()) else {
-        return (shortest, Vec3::zeros(), true);
-    };
-    let full = std::f64::consts::TAU;
-    let angle = shortest.norm();
-    let has_axis = angle > AXIS_MIN_RAD;
-    let axis = if has_axis {
-        shortest / angle
-    } else {
-        declared / declared.norm()
-    };
-    let turns = ((declared - shortest).dot(&axis) / full).round();
-    if turns.is_nan() || turns.abs() > LEG_TURNS_MAX {
-        // Its box is the ball about its centre's way, and nothing else is known.
-        return (shortest, Vec3::repeat(LEG_TURNS_MAX * full), false);
-    }
-    let more = axis * (turns * full);
-    // What stands as it did has turned about the sender's axis alone.
-    if has_axis || is_same {
-        (shortest + more, Vec3::zeros(), true)
-    } else {
-        (shortest, more, true)
     }
 }

@@ -32,6 +32,8 @@ pub(super) struct Entry {
     pub(super) growing: bool,
     /// The last admitted row as it came: position, then quaternion x, y, z, w.
     pub(super) raw: [f64; 7],
+    /// Stamp of a pause that said that it still stood where its last pose had it, nanoseconds; 0: it said none.
+    pub(super) stood_ns: Option<u64>,
     /// Number of the last pose frame that held it.
     pub(super) seen: u64,
     /// Number of the last pose frame that held it more than once.
@@ -59,6 +61,7 @@ impl Entry {
             refused: false,
             growing: false,
             raw: [f64::NAN; 7],
+            stood_ns: None,
             seen: 0,
             twice: 0,
             touched: 0,

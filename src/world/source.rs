@@ -48,6 +48,8 @@ pub struct SourceState {
     pub(super) refused: u64,
     /// Number of its last pose frame; bodies carry the number of the last frame that held them.
     pub(super) pose_frame: u64,
+    /// Frames with poses that were taken in this tick.
+    pub(super) pose_frames: u32,
     /// The slots of its last pose frame, row by row: where its next frame will most likely have them too.
     pub(super) rows: Vec<BodySlot>,
     /// Frames that wait for a later scene revision.
@@ -139,6 +141,7 @@ impl SourceState {
             skipped: 0,
             refused: 0,
             pose_frame: 0,
+            pose_frames: 0,
             rows: Vec::with_capacity(bodies),
             waiting: Waiting::default(),
             bends: BendsWaiting::default(),

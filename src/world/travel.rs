@@ -30,8 +30,25 @@ impl World {
             .any(|path| path.has_teleported())
     }
 
+    /// All frames are there: each way learns how many its source sent.
+    pub(super) fn count_frames(&mut self) {
+        for at in 0..self.travelled.len() {
+            let slot = self.travelled[at];
+            let root = self.body(self.entries[slot.index()].root);
+            let source = root.and_then(|root| root.source);
+            let frames = source.map_or(1, |source| self.sources[source.index()].pose_frames);
+            let body = self.bodies[slot.index()].as_mut();
+            if let Some(path) = body.and_then(|body| body.path.as_mut()) {
+                path.set_frames(source, frames, self.tick);
+            }
+        }
+    }
+
     /// A tick begins: what lay before it has been told, boxes are tight again.
     pub(super) fn end_travels(&mut self) {
+        for source in &mut self.sources {
+            source.pose_frames = 0;
+        }
         for at in 0..self.travelled.len() {
             let slot = self.travelled[at];
             let entry = &mut self.entries[slot.index()];
@@ -63,11 +80,13 @@ impl World {
             return self.place(slot, pose);
         };
         let moved = self.place(slot, pose);
-        self.lay(slot, path, (moved, false), |path, end, lapses| {
+        let source = self.body(slot).and_then(|body| body.source);
+        let frame = source.map_or(1, |source| self.sources[source.index()].pose_frames);
+        self.lay(slot, path, (moved, false, frame), |path, end, lapses| {
             if lapses {
-                path.lapse(from, *pose, end)
+                path.lapse((from, *pose), end, frame)
             } else {
-                path.push(from, *pose, declared, end)
+                path.push((from, *pose), declared, end, frame)
             }
         })
     }
@@ -90,7 +109,7 @@ impl World {
         let has_gone = |path: &Path| !path.is_empty() && (!path.aside || root_is_disabled);
         let goes = self.entries[slot.index()].enabled
             && of_root.as_ref().is_some_and(|(_, root)| has_gone(root));
-        let moved = self.lay(slot, path, (moved, goes), |path, end, _| {
+        let moved = self.lay(slot, path, (moved, goes, 0), |path, end, _| {
             let before = *path.hull();
             match (&of_root, &body) {
                 (Some((_, root)), Some((shapes, centre))) => {
@@ -120,12 +139,13 @@ impl World {
     /// Gives a placed body its path back, with what `go` adds to it; whether pose or box changed.
     ///
     /// * `goes` - whether it has gone where `go` says, though it is not in the broad phase yet.
+    /// * `frame` - number of the frame that the pose is from, in this tick; 0: of another body.
     /// * `go` - given the path, the box at its new end, and whether what lies between is no motion.
     fn lay(
         &mut self,
         slot: BodySlot,
         mut path: Box<Path>,
-        (moved, goes): (bool, bool),
+        (moved, goes, frame): (bool, bool, u32),
         go: impl FnOnce(&mut Path, Aabb, bool) -> bool,
     ) -> bool {
         let placed = self.is_placed(slot) || goes;
@@ -150,7 +170,7 @@ impl World {
             }
             grown
         } else {
-            path.restart(end);
+            path.enter(end, (self.tick, frame));
             false
         };
         entry.tight = *path.hull();

@@ -83,8 +83,12 @@ pub(crate) struct Rig {
     pub(crate) clock: Arc<ManualClock>,
     pub(crate) rows: Vec<TransformRow>,
     pub(crate) demand: Demand,
+    /// Whose frames are sent.
+    pub(crate) source: &'static str,
     pub(crate) session: u64,
     pub(crate) epoch: u64,
+    /// The next frames say no time of the sender's.
+    pub(crate) unstamped: bool,
     /// Sessions whose client is gone, told with the next frame.
     pub(crate) ended: Vec<u64>,
     pub(crate) flags: u32,
@@ -127,8 +131,10 @@ impl Rig {
             clock,
             rows,
             demand: Demand::ALL,
+            source: "feed",
             session: 11,
             epoch: 1,
+            unstamped: false,
             ended: Vec::new(),
             flags: frame_flags::FULL,
             velocities: Vec::new(),
@@ -241,10 +247,14 @@ impl Rig {
             session: self.session,
             epoch: self.epoch,
             seq: self.seq,
-            source: name_bytes("feed"),
+            source: name_bytes(self.source),
             flags: self.flags,
             schema: WIRE_VERSION,
-            stamp_ns: self.seq * FRAME_NS,
+            stamp_ns: if self.unstamped {
+                0
+            } else {
+                self.seq * FRAME_NS
+            },
             deadline_ns: self.deadline_ns,
             time_left_ns: self.time_left_ns,
             scene_rev: self.scene_rev,

@@ -119,3 +119,39 @@ fn sweeps_leave_verdicts_half_of_the_budget() {
         }
     }
 }
+
+/// Rounds began with the same pairs in each tick, with turns too short for what takes many looks.
+#[test]
+fn bug_of_many_ways_and_little_budget_the_same_were_open_in_each_tick() {
+    const SHOTS: u64 = 12;
+    const TICKS: u64 = 3 * SHOTS;
+    let place = |shot: u64, z: f64| sweepd::math::Pose::translation(20.0 * shot as f64, 0.0, z);
+    for units in [30, 60, 200] {
+        let bodies: Vec<String> = (1..=SHOTS)
+            .flat_map(|shot| {
+                let (at, wall) = ([20.0 * shot as f64, 0.0], 100 + shot);
+                let shape = crate::cases::SHOT;
+                [
+                    crate::rig::body(shot, [at[0], at[1], 5.0], shape, "continuous = true"),
+                    crate::rig::body(wall, [at[0], at[1], 0.0], crate::cases::PLATE, ""),
+                ]
+            })
+            .collect();
+        let mut rig = Rig::new(&crate::rig::scene("", &bodies));
+        rig.send(crate::rig::ALL);
+        let mut told = std::collections::BTreeMap::new();
+        for tick in 0..TICKS {
+            for shot in 1..=SHOTS {
+                rig.place(shot, &place(shot, if tick % 2 == 0 { -5.0 } else { 5.0 }));
+            }
+            rig.send(Budget::units(units));
+            for shot in 1..=SHOTS {
+                let row = rig.pair(shot, 100 + shot).unwrap();
+                let hit = row.flags & pair_flags::SWEPT_HIT != 0;
+                *told.entry(shot).or_insert(0) += u32::from(hit);
+            }
+        }
+        println!("{units} units: {told:?}");
+        assert!(told.values().all(|hits| *hits > 0), "{units}: {told:?}");
+    }
+}

@@ -6,6 +6,7 @@ use sweepd::limits::LEGS_MAX;
 use sweepd::math::{Pose, Quat, Vec3};
 use sweepd::time::Budget;
 use sweepd::wire::{Event, PairRow, Reason, State, Verdict, pair_flags};
+use sweepd::world::Edit;
 
 use crate::oracle::meshes::{cuboid, trimesh};
 use crate::rig::{ALL, FRAME_NS, NONE, Rig, body, has, scene};
@@ -626,6 +627,47 @@ fn bug_a_touch_at_poses_that_a_way_led_to_undecided_is_news() {
         rig.place(2, &at(0.0, 0.0, -5.0));
         rig.send(ALL);
         assert_eq!(rig.state() == State::Colliding, is_open, "{units}");
+    }
+    assert!(undecided > 0);
+}
+
+/// They met on the way, and were apart again at the poses that it led to, of which that tick did not know.
+#[test]
+fn bug_the_end_of_a_touch_on_the_way_was_told_as_later_than_it_may_have_been() {
+    let mut undecided = 0;
+    for units in 0..80 {
+        for removed in [false, true] {
+            let mut rig = plate(SWEPT);
+            // Its own box tells nothing of a plate that leans.
+            let lean = Quat::from_scaled_axis(Vec3::x() * 0.5);
+            let along = |z: f64| Pose::from(lean * Vec3::new(0.3, 0.2, z));
+            rig.place(1, &Pose::from_parts(Vec3::zeros().into(), lean));
+            rig.place(2, &along(5.0));
+            rig.epoch += 1;
+            rig.send(ALL);
+            rig.place(2, &along(-0.0106));
+            rig.send(Budget::units(units));
+            let tick = rig.ticks();
+            if rig.verdict(1, 2) != Verdict::Possible || !hit(rig.pair(1, 2).unwrap()) {
+                continue;
+            }
+            undecided += 1;
+            if removed {
+                rig.edit(
+                    vec![Edit::Remove {
+                        name: "b2".to_owned(),
+                    }],
+                    ALL,
+                );
+            } else {
+                rig.send(ALL);
+                assert_eq!(rig.verdict(1, 2), Verdict::Apart);
+            }
+            let row = rig.pair(1, 2).unwrap();
+            assert!(has(row, Event::End), "{row:?}");
+            let ticks = (row.end_first_tick, row.end_last_tick);
+            assert_eq!(ticks, (tick, tick + 1), "{units} {removed}");
+        }
     }
     assert!(undecided > 0);
 }

@@ -22,6 +22,7 @@ mod rig;
 mod boxes;
 mod budgets;
 mod cases;
+mod frames;
 mod lost;
 mod pairs;
 mod runs;

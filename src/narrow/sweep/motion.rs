@@ -43,15 +43,26 @@ pub(super) fn way(body: &Body) -> Option<&Path> {
 impl Span {
     /// The motion of a body at share `s`.
     pub(super) fn at(body: &Body, s: f64) -> Self {
-        let Some((path, leg, share, until, parts)) = way(body)
-            .and_then(|path| Some((path, leg_at(path.legs(), s)?)))
-            .map(|(path, (leg, share, until))| (path, leg, share, until, path.legs().len()))
+        let Some((path, place)) = way(body).and_then(|path| Some((path, place_at(path, s)?)))
         else {
             return Self::rest(body);
         };
-        #[allow(clippy::cast_precision_loss, reason = "at most limits::LEGS_MAX")]
-        let per_share = parts as f64;
+        let Place {
+            leg, share, until, ..
+        } = place;
         let pose = leg.at(share, path.pivot());
+        if !place.goes {
+            // On a pose that was sent, to the last digit.
+            return Self {
+                until,
+                pose,
+                pivot: *path.pivot(),
+                at: pose * path.pivot(),
+                told: path.is_told_at(share),
+                ..Self::rest(body)
+            };
+        }
+        let per_share = f64::from(path.frames());
         let far = leg.from.translation.vector.amax();
         let far = far.max(leg.to.translation.vector.amax());
         let size = path.pivot().coords.amax() + (1.0 + leg.angle()) * path.reach();
@@ -133,19 +144,46 @@ impl Span {
     }
 }
 
-/// The leg at share `s`, the share of it, and the share at which it ends.
-fn leg_at(legs: &[Leg], s: f64) -> Option<(&Leg, f64, f64)> {
-    #[allow(clippy::cast_precision_loss, reason = "at most limits::LEGS_MAX")]
-    let (count, end_of) = (legs.len() as f64, |at: usize| {
-        (at + 1) as f64 / legs.len() as f64
-    });
-    // The last leg also where rounding says it is over.
-    let at = (0..legs.len())
-        .find(|&at| end_of(at) > s)
-        .or(legs.len().checked_sub(1))?;
-    #[allow(clippy::cast_precision_loss, reason = "as above")]
-    let share = (s * count - at as f64).clamp(0.0, 1.0);
-    Some((&legs[at], if s >= 1.0 { 1.0 } else { share }, end_of(at)))
+/// Where on its way a body is for a while.
+#[derive(Clone, Copy, Debug)]
+struct Place<'a> {
+    leg: &'a Leg,
+    /// How much of the leg is done.
+    share: f64,
+    /// Share of the motion at which it ends, or begins where the body stands before it.
+    until: f64,
+    /// Whether it goes along the leg; else it stands at an end of it.
+    goes: bool,
+}
+
+/// Where a body is at share `s`.
+fn place_at(path: &Path, s: f64) -> Option<Place<'_>> {
+    let frames = f64::from(path.frames());
+    let end_of = |frame: u32| f64::from(frame) / frames;
+    let Some(leg) = path.legs().iter().find(|leg| end_of(leg.frame) > s) else {
+        let leg = path.legs().last()?;
+        return Some(Place {
+            leg,
+            share: 1.0,
+            until: 1.0,
+            // Also where the motion is over: there it has the speed that it came with.
+            goes: leg.frame >= path.frames(),
+        });
+    };
+    let before = leg.frame.saturating_sub(1);
+    let goes = s >= end_of(before);
+    let share = if goes {
+        (s * frames - f64::from(before)).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    let until = end_of(if goes { leg.frame } else { before });
+    Some(Place {
+        leg,
+        share,
+        until,
+        goes,
+    })
 }
 
 /// Both bodies of a pair at a share of the motion.
@@ -215,6 +253,19 @@ pub(super) fn length(bodies: (&Body, &Body)) -> f64 {
         s = moment.until;
     }
     sum * (1.0 + 1e-12)
+}
+
+/// As [`length`], where nobody says how far the one was while the other went.
+pub(super) fn length_apart((a, b): (&Body, &Body)) -> f64 {
+    let of = |body: &Body| {
+        let legs = way(body).map_or(&[][..], Path::legs);
+        let along = |leg: &Leg| {
+            let far = leg.pivot.coords.amax() + leg.travel.amax();
+            leg.travel.norm() + leg.angle() * reach_of(body) + 64.0 * ROUND * (far + reach_of(body))
+        };
+        legs.iter().map(along).sum::<f64>()
+    };
+    (of(a) + of(b)) * (1.0 + 1e-12)
 }
 
 /// How far a body's surface is from its pivot.

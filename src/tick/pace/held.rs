@@ -59,10 +59,22 @@ impl Queue {
             // It takes the place of the oldest that it stands for: a session that was heard in time must not seem
             // silent to one that asked in between.
             place = self.frames.iter().position(|old| replaces(&held, old));
-            while let Some(last) = self.frames.iter().rposition(|old| replaces(&held, old)) {
-                self.drop_at(last);
-                passed += 1;
+            // A pause behind that place would come too late: what it says holds is said anew.
+            let overtaken = |at: usize, old: &Held| {
+                old.frame.header.flags == frame_flags::PAUSED
+                    && place.is_some_and(|place| place < at)
+                    && is_newer(&held, old)
+            };
+            for at in (0..self.frames.len()).rev() {
+                let old = &self.frames[at];
+                if replaces(&held, old) || overtaken(at, old) {
+                    self.drop_at(at);
+                    passed += 1;
+                }
             }
+            // Any other keeps its turn.
+            let before = self.frames.iter().rposition(|old| is_newer(&held, old));
+            place = place.map(|place| place.max(before.map_or(0, |before| before + 1)));
         }
         let of_source = |old: &Held| old.whose.source == whose.source;
         if self.frames.iter().filter(|old| of_source(old)).count() >= FRAMES_PER_DRAIN_MAX {
@@ -287,9 +299,13 @@ fn is_whole(frame: &Frame) -> bool {
 
 /// Whether the world would take the new frame wherever it would take the old one, and then not need the old one.
 fn replaces(new: &Held, old: &Held) -> bool {
+    is_newer(new, old) && new.frame.header.scene_rev <= old.frame.header.scene_rev
+}
+
+/// Whether the one is of the same session as the other, and was sent after it.
+fn is_newer(new: &Held, old: &Held) -> bool {
     let (a, b) = (&new.frame.header, &old.frame.header);
     new.whose.source == old.whose.source
         && a.session == b.session
         && (a.epoch, a.seq) > (b.epoch, b.seq)
-        && a.scene_rev <= b.scene_rev
 }

@@ -60,9 +60,10 @@ def check_ways(now: Moment, before: Moment) -> Iterator[Fault]:
 
 
 def _is_to_decide(now: Moment, pair: tuple[int, int], ways: dict[int, Optional[Way]]) -> bool:
-    """Whether nothing limits the work on a way."""
+    """Whether nothing limits the work on a way, and what is to be found out."""
     followed = [way for body in pair if (way := ways.get(body)) is not None]
-    return now.is_unlimited and all(way.legs <= _LEGS_MAX for way in followed)
+    in_step = len(followed) < 2 or followed[0].is_in_step_with(followed[1])
+    return now.is_unlimited and in_step and all(way.legs <= _LEGS_MAX for way in followed)
 
 
 def _on_way(now: Moment, before: Moment, pair: tuple[int, int], ways: dict[int, Optional[Way]]) -> str:
@@ -123,10 +124,12 @@ def _way(now: Moment, before: Moment, at: int, was: int) -> Optional[Way]:
     # of frames that were lost, refused or passed over the way is not known
     if source.frames - old.frames != len(taken) or any(body.name in frame.spoilt for frame in taken):
         return None
-    poses = [first, *(frame.poses[body.name] for frame in taken if frame.moves(body.name))]
+    with_poses = [frame for frame in taken if not frame.paused]
+    moving = [(at, frame) for at, frame in enumerate(with_poses, 1) if frame.moves(body.name)]
+    poses, frames = [first, *(frame.poses[body.name] for _, frame in moving)], [at for at, _ in moving]
     if all(pose == first for pose in poses):
         # who stands still goes no way
-        poses = [first]
+        poses, frames = [first], []
     forms = now.scene.forms
     parts = forms.parts_of(int(now.order[at]))
     count = len(now.scene.names)
@@ -139,7 +142,7 @@ def _way(now: Moment, before: Moment, at: int, was: int) -> Optional[Way]:
     if body.teleport_m is not None:
         pivots = [of_pose.mean(axis=0) for of_pose in centres]
         jumps = [float(np.linalg.norm(to - from_)) > body.teleport_m for from_, to in zip(pivots, pivots[1:])]
-    return Way(np.stack(centres), jumps)
+    return Way(np.stack(centres), jumps, (frames, len(with_poses)), body.source)
 
 
 def _check_jumps(now: Moment, ways: dict[int, Optional[Way]]) -> Iterator[Fault]:

@@ -1,8 +1,9 @@
 """Touches on the way: the least gap of bodies that go straight from pose to pose.
 
-The way of a continuous body is a leg a pose, legs take equal shares of the tick; any other body stands at its last
-pose. Along a stretch on which both go straight the gap is a convex function of the share (that of a convex set to a
-point on a line), so a search by thirds finds the least, and up to any share the least is there or at the share itself.
+The way of a continuous body is a leg a pose. The frames with poses of its source divide the tick into equal shares; a
+leg takes that of its frame, and in the others the body stands. Any other body stands at its last pose. Along a stretch
+on which both go straight the gap is a convex function of the share (that of a convex set to a point on a line), so a
+search by thirds finds the least, and up to any share the least is there or at the share itself.
 """
 
 from __future__ import annotations
@@ -24,28 +25,62 @@ class Way:
     * ``centres``: of its parts at the last tick's pose and each one since, ``(legs + 1, parts, 3)``; of a body that is
       not swept its last ones alone.
     * ``jumps``: by leg, whether it is beyond the body's ``teleport_m``.
+    * ``frames``: by leg, the number of its frame in the tick, from 1; and how many frames its source sent.
+    * ``source``: whose frames they are.
     """
 
-    def __init__(self, centres: np.ndarray, jumps: Optional[list[bool]] = None) -> None:
+    def __init__(
+        self,
+        centres: np.ndarray,
+        jumps: Optional[list[bool]] = None,
+        frames: Optional[tuple[list[int], int]] = None,
+        source: Optional[str] = None,
+    ) -> None:
         self.centres = centres
         self.legs = len(centres) - 1
         self.jumps = jumps if jumps is not None else [False] * self.legs
+        self.frames, self.count = frames if frames is not None else (list(range(1, self.legs + 1)), self.legs)
+        self.source = source
 
     def at(self, share: float) -> np.ndarray:
         """Centres at a share of the tick."""
-        if self.legs == 0:
-            return self.centres[0]
-        leg = min(int(share * self.legs), self.legs - 1)
-        part = share * self.legs - leg
-        return self.centres[leg] + (self.centres[leg + 1] - self.centres[leg]) * part
+        for leg, frame in enumerate(self.frames):
+            if share * self.count < frame:
+                part = max(share * self.count - (frame - 1), 0.0)
+                return self.centres[leg] + (self.centres[leg + 1] - self.centres[leg]) * part
+        return self.centres[-1]
 
     def jumps_at(self, share: float) -> bool:
         """Whether what lies about a share is a jump."""
-        return self.legs > 0 and self.jumps[min(int(share * self.legs), self.legs - 1)]
+        return any(
+            jump and frame - 1 <= share * self.count < frame for jump, frame in zip(self.jumps, self.frames)
+        )
 
     def shares(self) -> set[float]:
         """Where legs begin and end."""
-        return {leg / self.legs for leg in range(1, self.legs)}
+        return {end / self.count for frame in self.frames for end in (frame - 1, frame)}
+
+    def is_in_step_with(self, other: Way) -> bool:
+        """Whether it is known where the one was while the other went."""
+        if not (self.legs and other.legs):
+            return True
+        if self.source != other.source:
+            return self.count <= 1 and other.count <= 1
+        goes = [way._goes() for way in (self, other)]
+        moved, alone = set(), False
+        for frame in sorted(set(goes[0]) | set(goes[1])):
+            moved |= {at for at, of in enumerate(goes) if of.get(frame, False)}
+            alone |= frame not in goes[0] or frame not in goes[1]
+            if frame in goes[0] and frame in goes[1]:
+                if alone and len(moved) == 2:
+                    return False
+                moved, alone = set(), False
+        return not (alone and len(moved) == 2)
+
+    def _goes(self) -> dict[int, bool]:
+        """By frame, whether it moves the body."""
+        ends = zip(self.frames, self.centres, self.centres[1:])
+        return {frame: not np.array_equal(begin, end) for frame, begin, end in ends}
 
 
 class Crossings:
