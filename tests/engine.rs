@@ -192,6 +192,7 @@ fn bug_after_a_crowd_every_tick_walked_by_the_places_of_all_its_pairs() {
         ..Demand::default()
     };
     let mut drive = Drive::new(&pool(150, 1), Pattern::Wander, 3);
+    drive.place(0);
     let bodies = drive.rows_mut().len();
     (0..bodies).for_each(|at| place(&mut drive, at, 0.0));
     let out = drive.send(Budget::units(50), demand);

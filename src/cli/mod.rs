@@ -1,7 +1,7 @@
 //! The command line: what the user says, checked, and the exit codes it ends with.
 //!
 //! Exit codes: 0 done, 1 a check failed, 2 usage or bad input, 3 timed out, 4 refused or could not run, 5 watchdog, 101
-//! panic. A closed pipe is a normal end. Results go to stdout, logs to stderr.
+//! panic. A closed pipe is a normal end, and so is a terminal that hung up. Results go to stdout, logs to stderr.
 
 mod args;
 mod args_query;

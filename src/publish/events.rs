@@ -88,6 +88,10 @@ pub(super) struct History {
     was_colliding: bool,
     /// What was certified last is a touch on the way to poses that were not decided.
     on_way: bool,
+    /// What was certified last is of poses whose tick did not tell it.
+    late: bool,
+    /// The first tick of a begin of that kind; 0: none was.
+    late_begin: u64,
     /// Last tick in which the pair was seen to be more than plainly apart.
     active: u64,
     /// First tick in which it may have collided; 0: not seen yet.
@@ -102,6 +106,8 @@ impl History {
         colliding: false,
         was_colliding: false,
         on_way: false,
+        late: false,
+        late_begin: 0,
         active: 0,
         born: 0,
     };
@@ -239,7 +245,10 @@ impl Events {
         history.go_on_to(tick - 1);
         history.ids = ids;
         // Told of the last tick's poses: of a collision that was not certified there, a touch at them is news.
-        history.was_colliding = history.colliding && history.tick + 1 == tick && !history.on_way;
+        let told = !history.on_way && !history.late;
+        history.was_colliding = history.colliding && history.tick + 1 == tick && told;
+        let late_begin = std::mem::take(&mut history.late_begin);
+        history.late = false;
         // Not active in the tick before: proved apart there by its certificate or by its boxes, unless it is new and a
         // body of it was not in, not known, or not looked for there.
         let unseen = (finding.born == tick)
@@ -276,6 +285,11 @@ impl Events {
             Verdict::Near | Verdict::Apart => {
                 if history.colliding {
                     self.push(history.ids, Some((ticks, EndCause::Separated)), None);
+                    // Its begin, which was not told yet, cancels with this end: the way tells of both.
+                    if touched && late_begin != 0 {
+                        let first = late_begin;
+                        self.push_pass(history.ids, Ticks { first, last: tick });
+                    }
                 } else if touched {
                     self.push_pass(history.ids, ticks);
                 }

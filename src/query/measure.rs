@@ -123,8 +123,8 @@ pub(super) fn fit(world: &World, slot: BodySlot, body: &Body) -> Result<Option<S
     }
 }
 
-/// The body whose pose and vertices a body waits for: the one that it hangs on in the end, itself where it hangs on none.
-/// What hangs on another does not deform.
+/// The body whose pose and vertices a body waits for: the one that it hangs on in the end, itself where it hangs on
+/// none. What hangs on another does not deform.
 fn awaited<'w>(world: &'w World, slot: BodySlot, body: &'w Body) -> &'w Body {
     let root = world.root_of(slot).0;
     let root = world.body(root).filter(|_| root != slot);

@@ -32,7 +32,7 @@ use crate::scene::Scene;
 use crate::time::{Clock, Meter};
 use crate::wire::{
     BroadCause, BroadMode, Demand, MessageHeader, Outbox, Reason, RejectReason, Stage, State,
-    TickRow, Undelivered, WIRE_VERSION,
+    TickRow, WIRE_VERSION,
 };
 use crate::world::{ChangeSet, Parts, World};
 
@@ -175,17 +175,6 @@ impl Engine {
         laps.lap(Stage::Publish);
         self.finish(&input, &laps, units);
         &self.out
-    }
-
-    /// The last outbox has been sent, which took `send_ns`: part of the next tick's floor.
-    pub fn note_sent(&mut self, send_ns: u64) {
-        self.floor.note_send(send_ns);
-        self.out.plan_changed = false;
-    }
-
-    /// What of the last outbox could not be handed over: the next one has the events that are lacking.
-    pub fn note_undelivered(&mut self, unsent: Undelivered) {
-        self.publisher.note_undelivered(unsent);
     }
 
     /// Sets the time-out of a source, by its place; from the next tick on every age is judged by it.

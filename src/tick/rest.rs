@@ -10,6 +10,7 @@ use super::interrupts::Interrupts;
 use crate::ids::BodyId;
 use crate::narrow::Wanted;
 use crate::time::Meter;
+use crate::wire::Undelivered;
 use crate::world::{BuiltTree, TreeOf, WornTree};
 
 /// Kept back of the tick's end at least, nanoseconds: for the query that is under way then, and for closing the work
@@ -64,6 +65,17 @@ impl Rest {
 }
 
 impl Engine {
+    /// The last outbox has been sent, which took `send_ns`: part of the next tick's floor.
+    pub fn note_sent(&mut self, send_ns: u64) {
+        self.floor.note_send(send_ns);
+        self.out.plan_changed = false;
+    }
+
+    /// What of the last outbox could not be handed over: the next one has the events that are lacking.
+    pub fn note_undelivered(&mut self, unsent: Undelivered) {
+        self.publisher.note_undelivered(unsent);
+    }
+
     /// A tree that has become loose, to be built by a worker; see [`crate::world::World::worn_tree`].
     #[must_use]
     pub fn worn_tree(&self) -> Option<WornTree> {

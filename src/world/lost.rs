@@ -2,7 +2,7 @@
 //!
 //! In: judgements. Out: flags of the filters. The box of such a body says nothing, and makes no pairs; but it does
 //! for a tick in which it says something: the body was there as the tick began in which its place was lost, or a frame
-//! said where it went, though that is too old by now, or a pose behind it was refused or a reset.
+//! said where it went, though that is too old by now, or a refused pose or a reset came behind it.
 
 use super::World;
 use super::body::Body;
@@ -33,8 +33,8 @@ impl World {
         }
     }
 
-    /// Whether a body that has no place any more, because it was reset or is too old, is asked for the way that it still
-    /// went in this tick.
+    /// Whether a body that has no place any more, because it was reset or is too old, is asked for the way that it
+    /// still went in this tick.
     ///
     /// Not before all frames are there: one that follows on a reset may bring it back, and that is no motion.
     pub(super) fn stays_for_its_way(&self, slot: BodySlot) -> bool {

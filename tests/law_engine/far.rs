@@ -117,7 +117,7 @@ fn contacts(rig: &Rig) -> Vec<ContactRow> {
 }
 
 fn convex(soup: &Soup) -> String {
-    let vertices: Vec<[f64; 3]> = soup.vertices.iter().map(|p| (*p).coords.into()).collect();
+    let vertices: Vec<[f64; 3]> = soup.vertices.iter().map(|p| p.coords.into()).collect();
     format!("{{ type = \"convex\", vertices = {vertices:?} }}")
 }
 

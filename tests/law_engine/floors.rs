@@ -260,7 +260,7 @@ fn law_4_7_bug_turns_on_half_spaces_did_not_grow_while_a_pair_waits() {
     bodies.push(floor(99, FLOOR));
     let mut rig = Rig::new(&scene("", &bodies));
     (rig.demand.contacts, rig.demand.regions) = (false, false);
-    let mut decided = [0; BOWLS as usize];
+    let mut decided = vec![0; bodies.len() - 1];
     for tick in 0..100_i32 {
         for id in 1..=BOWLS {
             let tilt = Quat::from_axis_angle(&Vec3::x_axis(), 0.2);
@@ -269,9 +269,9 @@ fn law_4_7_bug_turns_on_half_spaces_did_not_grow_while_a_pair_waits() {
             rig.place(id, &Pose::from_parts(at.into(), turn * tilt));
         }
         rig.send(units(512));
-        for id in 1..=BOWLS {
+        for (id, times) in (1..).zip(&mut decided) {
             let apart = rig.verdict(id, 99) == Verdict::Apart;
-            decided[id as usize - 1] += u32::from(apart);
+            *times += u32::from(apart);
         }
     }
     assert!(decided.iter().all(|times| *times >= 4), "{decided:?}");

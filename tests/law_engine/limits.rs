@@ -183,9 +183,9 @@ fn rows_that_are_left_where_they_stood_among_others_that_do_not_fit_are_those_of
     // Couples that change their gap in a tick, of which those are seven at the most that matter.
     let stirs: [&[u64]; 9] = [&[], &[], &[3], &[20, 19], &[], &[1, 2, 3], &[8], &[], &[7]];
     let mut kept = 0;
-    for tick in 0..90 {
-        for k in stirs[tick % stirs.len()] {
-            let y = 0.3 * ((tick * 7 + *k as usize) % 5) as f64;
+    for (tick, stirred) in (0..90).zip(stirs.iter().cycle()) {
+        for k in *stirred {
+            let y = 0.3 * ((tick * 7 + k) % 5) as f64;
             whole.row(2 * k).position[1] = y;
             cut.row(2 * k).position[1] = y;
         }

@@ -2,7 +2,7 @@
 
 use sweepd::math::Pose;
 use sweepd::time::Budget;
-use sweepd::wire::{Event, Stage, Verdict};
+use sweepd::wire::{Event, Stage, State, Verdict, pair_flags};
 
 use crate::rig::{ALL, NONE, Rig, ball, has, scene};
 
@@ -116,6 +116,29 @@ fn law_3_9_a_collision_found_after_publishing_that_is_over_in_the_next_tick_canc
     rig.send(ALL);
     assert!(rig.out.pairs.is_empty());
     assert_eq!(rig.out.tick.cancelled_events, 1);
+}
+
+#[test]
+fn law_3_5_a_collision_found_after_publishing_that_ends_on_the_way_to_the_next_poses_is_a_pass() {
+    let balls = [ball(1, 0.0, ""), ball(2, 0.0, "continuous = true")];
+    let mut rig = Rig::new(&scene("", &balls));
+    rig.place(2, &Pose::translation(APART[0], APART[1], 0.0));
+    rig.send(ALL);
+    rig.engine.note_sent(1_000_000);
+    rig.place(2, &Pose::translation(TOUCHING[0], TOUCHING[1], 0.0));
+    rig.send(SHORT);
+    assert_eq!(rig.verdict(1, 2), Verdict::Possible);
+    rig.engine.work_on(u64::MAX);
+    rig.place(2, &Pose::translation(APART[0], APART[1], 0.0));
+    rig.send(ALL);
+    assert_eq!(rig.verdict(1, 2), Verdict::Apart);
+    assert_eq!(rig.state(), State::Colliding);
+    let row = rig.pair(1, 2).unwrap();
+    let pass = Event::Begin.bit() | Event::End.bit() | Event::Passed.bit();
+    assert_eq!(row.events, pass);
+    assert_ne!(row.flags & pair_flags::SWEPT_HIT, 0);
+    assert_eq!((row.begin_first_tick, row.begin_last_tick), (2, 3));
+    assert_eq!((row.end_first_tick, row.end_last_tick), (3, 3));
 }
 
 #[test]

@@ -452,7 +452,8 @@ fn regions_get_smaller_with_work() {
     // What the roots share, cut evenly, is about as small as the first few boxes of a front.
     assert!(sums[1] <= 1.02 * sums[0], "{sums:?}");
     for pair in sums[1..5].windows(2) {
-        assert!(pair[1] <= pair[0], "{sums:?}");
+        // But for a shell that may lie within: of several that is asked once the two touch.
+        assert!(pair[1] <= 1.01 * pair[0], "{sums:?}");
     }
     // What is complete holds the points of the manifold too, and these can lie deeper than what the surfaces share.
     assert!(sums[5] <= 1.05 * sums[4], "{sums:?}");

@@ -119,8 +119,8 @@ impl Closest {
 /// of their middles). Curved pairs that overlap end at 1e-7, everything else near 1e-14 of the numbers that they are
 /// told by.
 const FINISHED: f64 = 1e-6;
-/// The same in parts of what is allowed for rounding, twice of which is in every interval: a hull that is told by numbers
-/// far from its origin may be smaller than what is rounded of them.
+/// The same in parts of what is allowed for rounding, twice of which is in every interval: a hull that is told by
+/// numbers far from its origin may be smaller than what is rounded of them.
 const FINISHED_PADS: f64 = 16.0;
 
 /// The gap of two convex shapes, with its certificate.

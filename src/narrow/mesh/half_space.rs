@@ -187,7 +187,7 @@ impl HalfSpaceWalk {
 
     fn reached(&self, goal: Goal, off_m: f64) -> bool {
         let decided = |gap: Interval| gap.min > 0.0 || gap.max <= 0.0;
-        let here = || widened(self.interval(), 0.0 * off_m);
+        let here = || widened(self.interval(), off_m);
         self.waiting.len == 0 || (goal == Goal::Verdict && decided(here()))
     }
 

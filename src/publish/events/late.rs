@@ -40,11 +40,11 @@ impl Events {
         };
         let ticks = Ticks { first, last: tick };
         (history.verdict, history.tick) = (finding.verdict, tick);
-        history.on_way = false;
-        match (
-            std::mem::replace(&mut history.colliding, colliding),
-            colliding,
-        ) {
+        (history.on_way, history.late) = (false, true);
+        let was = std::mem::replace(&mut history.colliding, colliding);
+        let begins = colliding && !was;
+        history.late_begin = if begins { first } else { 0 };
+        match (was, colliding) {
             (false, true) => self.push(ids, None, Some(ticks)),
             (true, false) => self.push(ids, Some((ticks, EndCause::Separated)), None),
             _ => {}

@@ -91,8 +91,7 @@ impl RosNode {
     /// * `wake` - wakes the tick thread.
     ///
     /// # Errors
-    /// `Error::Usage` when names are none or collide; `Error::Refused` when the node cannot be kept on this host;
-    /// `Error::Io` when DDS or the system fails.
+    /// `Error::Usage` for names that are none or collide, `Error::Refused` for a node that cannot be kept on this host.
     pub fn open(
         options: &RosOptions,
         scene: &RosScene,
@@ -101,8 +100,7 @@ impl RosNode {
         let mut names = Names::new(&options.args, NODE_NAME).map_err(Error::Usage)?;
         let (table, mut odd) = Table::started(scene, &said(&options.args)?, &names.full_node())
             .map_err(Error::Usage)?;
-        let table = Arc::new(table);
-        let book = Book::of(&first_names(scene));
+        let (table, book) = (Arc::new(table), Book::of(&first_names(scene)));
         let shared = shared(options, scene, &names, book.clone());
 
         check_files(scene)?;
@@ -111,8 +109,8 @@ impl RosNode {
         shared.take(table.effects());
         // Before any writer, so that no reader of one is missed.
         let (readers, sources) = (Readers::of(&context), Source::of(scene));
+        let (heartbeat_ns, local) = (scene.config.heartbeat_ns, Local::of(scene, options.boot_id));
         let shelf = Arc::new(shelf(&sources, options.session));
-        let heartbeat_ns = scene.config.heartbeat_ns;
         let publishers = Publishers::create(
             (&mut node, &context, &mut names),
             (heartbeat_ns, scene.sources.len()),
@@ -125,7 +123,6 @@ impl RosNode {
         let (lines, unheard) = subscribe(&mut node, &context, &mut names, &sources, scene.again)?;
         odd.extend(unheard);
         let topics = Topics::of(scene, &names, &lines);
-        let unheard = Unheard::of(scene, &topics);
         shared.set_rosout(Some(node.rosout_writer()));
         let namesakes = Namesakes::of(&context, node.fully_qualified_name())?;
         table.run();
@@ -137,7 +134,7 @@ impl RosNode {
             Arc::clone(&shelf),
             Arc::clone(&shared),
             wake,
-            (Local::of(scene, options.boot_id), heartbeat_ns),
+            (local, heartbeat_ns),
         )?;
         let outlet = Outlet {
             node,
@@ -165,8 +162,8 @@ impl RosNode {
             readers,
             read: Read::default(),
             namesakes,
+            unheard: Unheard::of(scene, &topics),
             topics,
-            unheard,
             names: names.clone(),
             sources: scene.sources.clone(),
         };

@@ -115,7 +115,7 @@ impl CarriedFront {
 fn placed((a, b): (&Shape, &Shape), pos12: &Pose, off_m: f64) -> Placed {
     let at = Placed::new(pos12, reach_of(a), reach_of(b));
     Placed {
-        slop: at.slop + 0.0 * off_m,
+        slop: at.slop + off_m,
         ..at
     }
 }

@@ -1,5 +1,5 @@
-//! Links of `/tf` and poses of the bodies that hang on them. In: messages, the sources that read them. Out: poses on the
-//! shelf.
+//! Links of `/tf` and poses of the bodies that hang on them. In: messages, the sources that read them. Out: poses on
+//! the shelf.
 
 use super::super::poses::{Receipt, Source};
 use super::super::shared::Shared;

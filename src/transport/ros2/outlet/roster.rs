@@ -1,7 +1,7 @@
 //! Bodies that come, change and go while the node runs: their boxes, and the subscriptions that they need.
 //!
-//! In: what edits did. Out: subscriptions for the receiving thread; a body that is heard where it was keeps its own, and
-//! one whose subscription failed is tried again.
+//! In: what edits did. Out: subscriptions for the receiving thread; a body that is heard where it was keeps its own,
+//! and one whose subscription failed is tried again.
 
 use std::collections::VecDeque;
 
