@@ -133,8 +133,9 @@ impl Publisher {
         };
         self.chain.keep_added(whole);
         let all = self.listing.len();
-        self.chain
-            .end(if left_out == 0 { view.tick } else { 0 }, all);
+        // A row that was told with what was owed is another one without it, which no mark says: nothing builds on it.
+        let holds_on = left_out == 0 && !owes;
+        self.chain.end(if holds_on { view.tick } else { 0 }, all);
         let more = all.saturating_sub(out.changes.len());
         out.changes.reserve(more);
     }

@@ -73,8 +73,8 @@ impl Debt {
     /// Ends a tick: what its message told is settled where that was handed over, and owed as well where it was not.
     ///
     /// * `told` - the events of the tick.
-    /// * `most` - how many entries there may be. Beyond it passes cancel, as a begin and its end do; what else is owed
-    ///   is at most an end and a begin of each pair that is there or was told to collide.
+    /// * `most` - how many entries there may be. Beyond it passes cancel, as a begin and its end do, and then what else
+    ///   is owed.
     pub(super) fn settle(&mut self, lost: bool, told: &[PairEvent], most: usize) {
         if !lost && self.owed.is_empty() {
             return;
@@ -98,6 +98,9 @@ impl Debt {
         if self.owed.len() > most {
             let had = self.owed.len();
             self.owed.retain(|owed| !owed.is_pass_alone());
+            // A list that is cut has no room for pairs that are not in it: for as long as that lasts they may be any
+            // number, of bodies that come and go.
+            self.owed.truncate(most);
             self.cancelled += (had - self.owed.len()) as u64;
         }
         self.begin();

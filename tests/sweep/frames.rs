@@ -114,6 +114,22 @@ fn bug_a_crossing_was_missed_where_the_row_of_one_was_refused_in_a_later_frame()
     assert_eq!(rig.state(), State::Colliding);
 }
 
+/// It stood where it was seen last, as if it were told to be there, for the frames behind the one that lost it.
+#[test]
+fn bug_a_body_whose_pose_was_refused_was_certainly_touched_where_it_was_before() {
+    let mut rig = before_the_crossing("feed");
+    tick(
+        &mut rig,
+        &[
+            ("feed", FULL, &[(1, [-9.0, 0.0]), (2, [0.0, -9.0])]),
+            ("feed", FULL, &[(1, [0.0, -20.0]), (2, [f64::NAN, 0.0])]),
+            ("feed", FULL, &[(1, [0.0, 20.0])]),
+        ],
+    );
+    assert!(!is_hit(&rig) && is_open(&rig), "{:?}", met(&rig));
+    assert_ne!(rig.state(), State::Colliding);
+}
+
 #[test]
 fn bug_a_crossing_was_missed_where_one_came_in_with_the_first_of_several_frames() {
     let mut rig = crossing("feed");

@@ -52,13 +52,18 @@ impl Span {
         } = place;
         let pose = leg.at(share, path.pivot());
         if !place.goes {
-            // On a pose that was sent, to the last digit.
+            // On a pose that was sent, to the last digit. Behind its last one it may be elsewhere by as much as any
+            // that stands; and before it came again it was nowhere.
+            let behind = share >= 1.0;
+            let astray_m = if behind { body.reach_m } else { 0.0 };
             return Self {
                 until,
                 pose,
                 pivot: *path.pivot(),
                 at: pose * path.pivot(),
-                told: path.is_told_at(share),
+                jump: leg.lapse && !behind,
+                slop: astray_m,
+                told: astray_m == 0.0 && path.is_told_at(share),
                 ..Self::rest(body)
             };
         }
@@ -207,7 +212,7 @@ pub(super) struct Moment {
 impl Moment {
     pub(super) fn of((a, b): (&Body, &Body), s: f64) -> Self {
         let (of_a, of_b) = (Span::at(a, s), Span::at(b, s));
-        // Who goes a way between admitted poses is on it; who stands still may be elsewhere.
+        // Who goes a way between admitted poses is on it, or where it stands on it; who has none may be elsewhere.
         let reach = |body: &Body| {
             if way(body).is_some() {
                 0.0

@@ -101,7 +101,7 @@ impl Events {
             } else if let Some(cause) = lost.cause(&removed, world, pairs) {
                 if history.colliding {
                     let ticks = Ticks {
-                        first: history.tick + 1,
+                        first: history.next_first(),
                         last: tick,
                     };
                     self.push(history.ids, Some((ticks, cause)), None);

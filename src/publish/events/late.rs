@@ -32,11 +32,11 @@ impl Events {
             Verdict::Near | Verdict::Apart => false,
             Verdict::Possible | Verdict::None => return,
         };
-        // A touch on the way is certified of the tick itself: what ended since did so in it.
+        // After a touch on the way it may have ended in that very tick.
         let first = if history.tick == 0 {
             history.born
         } else {
-            (history.tick + 1).min(tick)
+            history.next_first().min(tick)
         };
         let ticks = Ticks { first, last: tick };
         (history.verdict, history.tick) = (finding.verdict, tick);

@@ -15,7 +15,7 @@ use ros2_client::Gid;
 use super::RosScene;
 use super::order::{Order, Step};
 use super::shelf::{Seat, Update};
-use super::tf::{Missing, Taken, Tree, no_pose, plain, sound};
+use super::tf::{Found, Missing, Taken, Tree, no_pose, plain, sound};
 use super::told::brief;
 use crate::config::RosKind;
 use crate::math::{Quat, Vec3, pose_from};
@@ -52,8 +52,8 @@ struct Member {
     topic: String,
     /// The stamps of its poses.
     order: Order,
-    /// What was last handed on of it, to say only what is new: receipt of its newest link, or why it has no pose.
-    last: Option<Result<(u64, u64), Missing>>,
+    /// What was last handed on of it, to say only what is new: links of one round have one time of receipt.
+    last: Option<Result<Found, Missing>>,
     /// When it was last handed on, nanoseconds of `CLOCK_BOOTTIME`.
     told_ns: u64,
     /// It was then said of a moment at which the process had just stood still, and may not have been taken.
@@ -212,15 +212,6 @@ impl Source {
             {
                 skew_ns = skew_ns.max(Some(found.skew_ns));
             }
-            let mark = found
-                .as_ref()
-                .map(|found| {
-                    (
-                        found.received_ns.map_or(0, |(latest, _)| latest),
-                        found.stamp_ns,
-                    )
-                })
-                .map_err(Clone::clone);
             // A chain that never changes is said again and again, because its source vouches for it; one that is broken
             // until it was said in time.
             let due = receipt.now_ns.saturating_sub(member.told_ns) >= self.timeout_ns / 3;
@@ -228,10 +219,10 @@ impl Source {
                 Ok(found) => found.received_ns.is_none(),
                 Err(_) => member.told_late,
             };
-            if member.last.as_ref() == Some(&mark) && !(due && lasts) {
+            if member.last.as_ref() == Some(&found) && !(due && lasts) {
                 continue;
             }
-            member.last = Some(mark);
+            member.last = Some(found.clone());
             let (result, fault) = judge(
                 &found,
                 receipt.now_ns,
