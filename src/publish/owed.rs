@@ -9,6 +9,9 @@ use super::listing::{NO_EVENT, Row};
 use super::{Publisher, View};
 use crate::wire::{Outbox, PairRow, Undelivered};
 
+/// Events that are owed to the readers of a message at most, where fewer rows fit into one.
+const OWED_MAX: usize = 1 << 16;
+
 /// What is owed to the readers of each message.
 #[derive(Debug, Default)]
 pub(super) struct Owed {
@@ -100,7 +103,7 @@ impl Debt {
             self.owed.retain(|owed| !owed.is_pass_alone());
             // A list that is cut has no room for pairs that are not in it: for as long as that lasts they may be any
             // number, of bodies that come and go.
-            self.owed.truncate(most);
+            self.owed.truncate(most.max(OWED_MAX));
             self.cancelled += (had - self.owed.len()) as u64;
         }
         self.begin();
