@@ -173,8 +173,10 @@ class Inbox:
             other = self._ports.tick()
             if other is None:
                 break
-            if other.sent_ns > tick.sent_ns:
-                tick = other
+            older, tick = sorted((tick, other), key=lambda row: row.sent_ns)
+            if older.header.boot_id not in (tick.header.boot_id, self.boot, *self._boots_over):
+                # it came and went unheard: what is left of it must not stand before what the new one says
+                self._note_over(older.header.boot_id)
         return tick
 
     def _restart(self, old, tick):

@@ -200,7 +200,9 @@ impl Shelf {
             let Some(row) = sources.find(|row| row.name == group.name) else {
                 continue;
             };
-            if row.session != group.in_force && row.session != group.session {
+            // That a stranger is gone ends his session alone, and frames of ours may wait for their tick.
+            let may_be_over = row.session != 0 || group.in_force == group.session;
+            if may_be_over && row.session != group.in_force && row.session != group.session {
                 let Ok(session) = draw() else { continue };
                 group.session = session;
             }

@@ -74,7 +74,7 @@ impl Inlet {
             .filter(|(place, _)| !fed.contains(place))
             .map(|(_, name)| {
                 format!(
-                    "body {name}: no poses of it can come: it has no subscription, and the log says why; it is tried again each second"
+                    "body {name}: no poses of it can come: it has no subscription, and the log says why; it is tried again, eight bodies a second"
                 )
             })
             .collect()

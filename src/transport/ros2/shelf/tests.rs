@@ -210,7 +210,7 @@ fn bug_a_stranger_under_the_name_of_a_source_of_topics_locked_that_source_out() 
     };
     assert_eq!([0, 9, 9].map(sent), [9; 3]);
     // It speaks, and is silent; the new one is not in force yet, and is kept until it is.
-    assert_eq!([5, 5, 5].map(sent), [101; 3]);
+    assert_eq!([5, 5, 5, 0, 0].map(sent), [101; 5]);
     assert_eq!([101, 101].map(sent), [101; 2]);
     // One came and went between two ticks.
     assert_eq!([0, 0, 102].map(sent), [102; 3]);
