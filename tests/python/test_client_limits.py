@@ -166,7 +166,7 @@ def test_bug_a_look_at_what_is_there_never_ended_where_ticks_came_faster_than_th
     class Endless:
         taken = 0
 
-        def _take(self):
+        def _take(self, _tells_restart):
             self.taken += 1
             assert self.taken < 1000
             return True
