@@ -21,8 +21,6 @@ pub(super) struct Chain {
     base_tick: u64,
     /// Pairs whose rows, or whose contacts, were dropped in this tick, by ids.
     pub(super) dropped: Vec<Ids>,
-    /// Pairs that the last message told of and that are not in the list of then.
-    added: Vec<Ids>,
     /// Places of the rows of the pairs that are told, by ids.
     pub(super) places: Vec<u32>,
 }
@@ -31,7 +29,6 @@ impl Chain {
     /// Begins a tick.
     pub(super) fn begin(&mut self) {
         self.dropped.clear();
-        self.dropped.append(&mut self.added);
     }
 
     /// What was told of a pair is dropped; it may get another row yet.
@@ -49,14 +46,6 @@ impl Chain {
             self.base_tick
         } else {
             0
-        }
-    }
-
-    /// Those that were told of in the whole list, and that it does not have, leave it with the next tick.
-    fn keep_added(&mut self, whole: bool) {
-        self.added.clear();
-        if whole {
-            self.added.append(&mut self.dropped);
         }
     }
 
@@ -131,7 +120,6 @@ impl Publisher {
                 self.listing.len() as u64
             },
         };
-        self.chain.keep_added(whole);
         let all = self.listing.len();
         // A row that was told with what was owed is another one without it, which no mark says: nothing builds on it.
         let holds_on = left_out == 0 && !owes;
