@@ -207,6 +207,7 @@ fn put_inbox(inbox: &Inbox, to: &mut Vec<u8>) {
         put_rows(&frame.transforms, to);
         put_rows(&frame.velocities, to);
         put_rows(&frame.stamps_ns, to);
+        put_rows(&frame.since_ns, to);
         put_count(frame.refused_bodies.len(), to);
         for (body, reason) in &frame.refused_bodies {
             body.put(to);
@@ -249,6 +250,7 @@ fn take_frame(from: &mut Take<'_>, frame: &mut Frame) -> Taken<()> {
     take_rows(from, &mut frame.transforms)?;
     take_rows(from, &mut frame.velocities)?;
     take_rows(from, &mut frame.stamps_ns)?;
+    take_rows(from, &mut frame.since_ns)?;
     for _ in 0..from.count(u64::BYTES + u8::BYTES)? {
         let (body, code) = (u64::take(from)?, u8::take(from)?);
         let reason = RejectReason::from_code(code).ok_or(Damaged)?;

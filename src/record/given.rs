@@ -12,8 +12,9 @@ use crate::transport::Setting;
 use crate::wire::{Demand, Inbox, Outbox, TickCause, WIRE_VERSION};
 use crate::world::{Applied, TreeOf};
 
-/// Number of the layout of our messages in a recording; another is not read. 2: `number` in `VertexHeader`.
-pub const LAYOUT: u32 = 2;
+/// Number of the layout of our messages in a recording; another is not read. 2: `number` in `VertexHeader`;
+/// 3: `since_ns` of frames.
+pub const LAYOUT: u32 = 3;
 
 /// How a daemon began.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -256,6 +257,7 @@ impl TickRecord {
         for frame in self.inbox.frames() {
             bytes += size_of_val(frame) + size_of_val(&*frame.transforms);
             bytes += size_of_val(&*frame.velocities) + size_of_val(&*frame.stamps_ns);
+            bytes += size_of_val(&*frame.since_ns);
         }
         for frame in self.inbox.vertices() {
             bytes += size_of_val(frame) + size_of_val(&*frame.rows);
@@ -298,6 +300,7 @@ fn copy_inbox(from: &Inbox, to: &mut Inbox) {
         copy.transforms.extend_from_slice(&frame.transforms);
         copy.velocities.extend_from_slice(&frame.velocities);
         copy.stamps_ns.extend_from_slice(&frame.stamps_ns);
+        copy.since_ns.extend_from_slice(&frame.since_ns);
         copy.refused_bodies.extend_from_slice(&frame.refused_bodies);
     }
     for frame in from.vertices() {

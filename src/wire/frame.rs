@@ -17,6 +17,9 @@ pub struct Frame {
     pub velocities: Vec<[f64; 6]>,
     /// `[n]` the sender's stamp of each pose, nanoseconds, where they differ; or empty: the header's.
     pub stamps_ns: Vec<u64>,
+    /// `[n]` from when the age of each pose counts, nanoseconds of `CLOCK_BOOTTIME`, where they differ; or empty: the
+    /// header's `sent_ns`.
+    pub since_ns: Vec<u64>,
     /// Bodies whose newest pose the transport could not make out, and why: they are unknown until a good one comes.
     pub refused_bodies: Vec<(u64, RejectReason)>,
     /// Whether it waited while the daemon was silent for longer than a heartbeat.
@@ -71,6 +74,7 @@ impl Inbox {
         frame.transforms.clear();
         frame.velocities.clear();
         frame.stamps_ns.clear();
+        frame.since_ns.clear();
         frame.refused_bodies.clear();
         frame
     }

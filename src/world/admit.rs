@@ -50,6 +50,15 @@ pub(super) struct Times {
     pub(super) since_ns: u64,
 }
 
+impl Times {
+    /// Those of one of a frame's rows, which may have an age of its own.
+    pub(super) fn of_row(self, frame: &Frame, at: usize) -> Self {
+        let own_ns = frame.since_ns.get(at).copied();
+        let since_ns = own_ns.map_or(self.since_ns, |own_ns| own_ns.min(self.received_ns));
+        Self { since_ns, ..self }
+    }
+}
+
 impl World {
     /// Admits one frame, or says why not. Bad input is counted, never an error.
     ///

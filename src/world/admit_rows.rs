@@ -25,10 +25,7 @@ impl World {
         times: Times,
     ) -> u64 {
         let number = self.sources[source.index()].pose_frame;
-        let deadline_ns = times
-            .since_ns
-            .saturating_add(self.sources[source.index()].timeout_ns);
-        let young = deadline_ns > self.now_ns;
+        let timeout_ns = self.sources[source.index()].timeout_ns;
         let mut refused = 0;
         for (at, (row, &slot)) in frame.transforms.iter().zip(rows).enumerate() {
             self.ask_along(at, |step| rows.get(step).map(|slot| [*slot]));
@@ -38,6 +35,9 @@ impl World {
             if slot == NO_BODY {
                 continue;
             }
+            let times = times.of_row(frame, at);
+            let deadline_ns = times.since_ns.saturating_add(timeout_ns);
+            let young = deadline_ns > self.now_ns;
             let velocity = frame.velocities.get(at);
             let raw = raw_of(row);
             let entry = &self.entries[slot.index()];

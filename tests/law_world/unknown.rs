@@ -252,6 +252,25 @@ fn law_3_8_age_counts_from_sending_and_never_later_than_receipt() {
 }
 
 #[test]
+fn law_3_8_rows_of_a_frame_may_have_ages_of_their_own() {
+    let mut bench = Bench::of(vec![moving("a", 1), moving("b", 2)]);
+    let now_ns = bench.now_ns + 1000 * MS;
+    let mut mixed = frame("sim", 1, now_ns, &[row(1, 0.0), row(2, 5.0)]);
+    mixed.since_ns = vec![now_ns - 499 * MS, now_ns + 10_000 * MS];
+    bench.tick_at(now_ns, &[], &[mixed]);
+    assert_eq!(bench.body("a").since_ns, Some(now_ns - 499 * MS));
+    assert_eq!(
+        bench.body("b").since_ns,
+        Some(now_ns),
+        "the future buys no time"
+    );
+    assert_eq!(bench.world.next_timeout(), Some(now_ns + MS));
+    bench.wait(MS);
+    assert_eq!(bench.status("a"), BodyStatus::Stale);
+    assert_eq!(bench.status("b"), BodyStatus::Known);
+}
+
+#[test]
 fn law_3_8_frames_that_waited_without_sent_ns_make_nothing_known() {
     let mut bench = Bench::of(vec![moving("a", 1)]);
     let now_ns = bench.now_ns + MS;

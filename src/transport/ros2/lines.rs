@@ -1,5 +1,7 @@
 //! Subscriptions: which topics a scene needs, each once, and who sends on them. In: sources, names. Out: [`Line`]s.
 
+use std::collections::BTreeSet;
+
 use ros2_client::{Context, Gid, MessageInfo, Node, Subscription};
 use rustdds::mio1::{Interest, Registry, Token};
 
@@ -220,6 +222,14 @@ pub(super) fn of_body(
         let kind = ("nav_msgs", "Odometry");
         Line::Odometry(subscription(node, context, (topic, kind), NEWEST)?, feeder)
     })
+}
+
+/// The bodies that have a subscription: place of the source, and the body's own among those of the source.
+pub(super) fn fed(lines: &[Line]) -> BTreeSet<(usize, usize)> {
+    let feeders = lines.iter().filter_map(Line::feeder);
+    feeders
+        .map(|feeder| (feeder.source, feeder.member))
+        .collect()
 }
 
 /// Subscribes to what the scene needs, each topic once.

@@ -19,7 +19,7 @@ use super::args::RosArgs;
 use super::diagnose::Diagnoser;
 use super::env::{Network, Range, unread};
 use super::inlet::{Inlet, Local};
-use super::lines::subscribe;
+use super::lines::{fed, subscribe};
 use super::markers::Boxes;
 use super::names::Names;
 use super::namesakes::Namesakes;
@@ -122,7 +122,7 @@ impl RosNode {
         // Behind all that is the node's own: no body has a name of these.
         let (lines, unheard) = subscribe(&mut node, &context, &mut names, &sources, scene.again)?;
         odd.extend(unheard);
-        let topics = Topics::of(scene, &names, &lines);
+        let topics = Topics::of(scene, &names, &fed(&lines));
         shared.set_rosout(Some(node.rosout_writer()));
         let namesakes = Namesakes::of(&context, node.fully_qualified_name())?;
         table.run();

@@ -14,10 +14,6 @@ use crate::wire::{
     frame_flags,
 };
 
-/// Frames that the poses of a drain are spread over by age: a body counts as older than it is by at most a quarter of
-/// the time between the ages of the youngest and the oldest, and those differ by less than the time-out.
-const FRAMES_OF_AGES: u64 = 4;
-
 /// A pose of one body that came on a common topic, or why it is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Update {
@@ -238,71 +234,63 @@ impl Shelf {
             spare.push(frame);
         }
         for group in groups.iter_mut().filter(|group| !group.touched.is_empty()) {
-            group.fill(inbox);
+            group.drain(inbox);
         }
     }
 }
 
 impl Group {
-    /// What is new as partial frames, one for each span of ages, the oldest first: a frame has one age, that of its
-    /// oldest pose, and nobody is to be much older than he is.
-    fn fill(&mut self, inbox: &mut Inbox) {
-        let ages = self.touched.iter().filter_map(|&member| {
-            let update = self.newest.get(member).and_then(Option::as_ref)?;
-            Some(update.since_ns)
-        });
-        let (oldest_ns, youngest_ns) = ages.fold((u64::MAX, 0), |(least, most), since_ns| {
-            (least.min(since_ns), most.max(since_ns))
-        });
-        let span_ns = youngest_ns.saturating_sub(oldest_ns) / FRAMES_OF_AGES + 1;
+    /// What is new as a partial frame, in which each pose has its own age: bodies that moved together stay together,
+    /// and none is older for the chain of another. What waited while the process stood still has a frame of its own
+    /// before it, for that is refused as a whole.
+    fn drain(&mut self, inbox: &mut Inbox) {
         let mut touched = std::mem::take(&mut self.touched);
-        let mut until_ns = oldest_ns;
-        while !touched.is_empty() {
-            until_ns = until_ns.saturating_add(span_ns);
-            let due = |update: &Option<Update>| update.is_none_or(|u| u.since_ns < until_ns);
-            let newest = &self.newest;
-            if touched
-                .iter()
-                .any(|&member| newest.get(member).is_none_or(due))
-            {
-                self.fill_one(&mut touched, until_ns, inbox.push());
+        for waited in [true, false] {
+            let of = |&member: &usize| self.newest.get(member).copied().flatten();
+            let mut news = touched.iter().filter_map(of);
+            if news.any(|update| update.waited == waited) {
+                self.fill(&mut touched, waited, inbox.push());
             }
         }
+        // A place whose body has left has nothing new.
+        touched.clear();
         self.touched = touched;
     }
 
-    /// One partial frame of those whose ages count from before `until_ns`.
-    fn fill_one(&mut self, touched: &mut Vec<usize>, until_ns: u64, frame: &mut Frame) {
+    /// One frame of those that `waited` or did not.
+    fn fill(&mut self, touched: &mut Vec<usize>, waited: bool, frame: &mut Frame) {
         self.seq += 1 + std::mem::take(&mut self.missing);
-        let (mut received_ns, mut since_ns, mut newest_stamp_ns) = (u64::MAX, u64::MAX, 0);
+        let (mut received_ns, mut since_ns, mut stamp_ns) = (u64::MAX, 0, 0);
         touched.retain(|&member| {
-            let Seat { body, .. } = self.seats.get(member).copied().unwrap_or_default();
             let slot = self.newest.get_mut(member);
-            let Some(update) = slot.and_then(|slot| slot.take_if(|u| u.since_ns < until_ns)) else {
-                return self.newest.get(member).is_some_and(Option::is_some);
+            let update = slot.and_then(|slot| slot.take_if(|update| update.waited == waited));
+            let Some(update) = update else {
+                return true;
             };
+            let Seat { body, .. } = self.seats.get(member).copied().unwrap_or_default();
             received_ns = received_ns.min(update.received_ns);
-            since_ns = since_ns.min(update.since_ns);
-            newest_stamp_ns = newest_stamp_ns.max(update.stamp_ns);
-            frame.waited |= update.waited;
+            since_ns = since_ns.max(update.since_ns);
+            stamp_ns = stamp_ns.max(update.stamp_ns);
             match update.result {
                 Ok(row) => {
                     frame.transforms.push(TransformRow { body, ..row });
                     frame.stamps_ns.push(update.stamp_ns);
+                    frame.since_ns.push(update.since_ns);
                     frame.velocities.extend(update.velocity);
                 }
                 Err(reason) => frame.refused_bodies.push((body, reason)),
             }
             false
         });
+        frame.waited = waited;
         frame.received_ns = received_ns;
         frame.header = FrameHeader {
             session: self.session,
             epoch: self.epoch,
             seq: self.seq,
             // Frames that waited while the process stood still say nothing of their age.
-            sent_ns: if frame.waited { 0 } else { since_ns },
-            stamp_ns: newest_stamp_ns,
+            sent_ns: if waited { 0 } else { since_ns },
+            stamp_ns,
             source: self.name,
             flags: frame_flags::PARTIAL,
             schema: WIRE_VERSION,

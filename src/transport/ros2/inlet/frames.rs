@@ -39,6 +39,7 @@ pub(super) fn fill(frame: &mut Frame, message: &BodyTransforms, book: &Book, rec
     frame.transforms.clear();
     frame.velocities.clear();
     frame.stamps_ns.clear();
+    frame.since_ns.clear();
     frame.refused_bodies.clear();
     if message.transforms.len() > FRAME_ROWS_MAX {
         frame.refused = Some(RejectReason::OverLimit);

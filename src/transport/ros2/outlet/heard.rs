@@ -2,10 +2,9 @@
 //!
 //! In: bodies. Out: names of topics, and which of them nobody has any more.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::super::RosScene;
-use super::super::lines::Line;
 use super::super::names::Names;
 use crate::config::RosKind;
 use crate::transport::BodyNote;
@@ -31,18 +30,27 @@ struct Topic {
 impl Topics {
     /// Those of a scene, whose names have been given out. A body whose topic is another thing's has none.
     ///
-    /// * `lines` - all subscriptions.
-    pub(in super::super) fn of(scene: &RosScene, names: &Names, lines: &[Line]) -> Self {
+    /// * `fed` - the bodies that have a subscription: place of the source among those of common topics, and the body's
+    ///   own among those of the source. Two bodies may have one topic, and only one of them a subscription.
+    pub(in super::super) fn of(
+        scene: &RosScene,
+        names: &Names,
+        fed: &BTreeSet<(usize, usize)>,
+    ) -> Self {
+        let mut next = vec![0; scene.sources.len()];
         let own = scene.bodies.iter().filter_map(|body| {
             let source = body.source?;
+            let next = next.get_mut(source)?;
+            let member = std::mem::replace(next, *next + 1);
+            let before = scene.sources.get(..source)?.iter();
+            let place = before.filter(|source| source.ros2.is_some()).count();
             let ros = scene.sources.get(source)?.ros2.as_ref()?;
             let is_own = ros.kind != RosKind::Tf;
             let full = names.of_body(&body.topic).filter(|_| is_own)?;
-            let mut feeders = lines.iter().filter_map(Line::feeder);
             let topic = Topic {
                 source,
                 given: body.topic.clone(),
-                heard: feeders.any(|feeder| feeder.topic == full),
+                heard: fed.contains(&(place, member)),
                 full,
             };
             Some((body.name.clone(), topic))
@@ -143,12 +151,41 @@ mod tests {
             bodies: vec![body("a", "~/tick")],
             ..RosScene::default()
         };
-        let mut topics = Topics::of(&scene, &names, &[]);
+        let mut topics = Topics::of(&scene, &names, &BTreeSet::new());
         assert_eq!(topics.remove("a", &mut names), None);
         assert!(
             names.claim_for_body("~/tick").is_err(),
             "it is still the node's"
         );
+    }
+
+    #[test]
+    fn bug_of_two_bodies_on_one_topic_that_without_a_subscription_counted_as_heard() {
+        let mut names = Names::new(&RosArgs::parse(&[]).unwrap(), "sweepd").unwrap();
+        let source = |kind: Option<RosKind>| RosSourceSpec {
+            name: "s".to_owned(),
+            timeout_ns: 1,
+            ros2: kind.map(|kind| RosSource {
+                kind,
+                topic: String::new(),
+                static_topic: String::new(),
+                max_skew_ns: 0,
+            }),
+        };
+        let of = |name: &str, source| BodyNote {
+            source,
+            ..body(name, "/p")
+        };
+        let scene = RosScene {
+            // The first is one of shared memory, which has no place among the others.
+            sources: vec![source(None), source(Some(RosKind::Pose))],
+            bodies: vec![of("wall", None), of("a", Some(1)), of("b", Some(1))],
+            ..RosScene::default()
+        };
+        names.claim_for_body("/p").unwrap();
+        let topics = Topics::of(&scene, &names, &BTreeSet::from([(0, 1)]));
+        let heard = scene.bodies.iter().map(|body| topics.hears(body));
+        assert_eq!(heard.collect::<Vec<_>>(), [false, false, true]);
     }
 
     #[test]
