@@ -15,6 +15,7 @@ mod facts;
 mod left_out;
 
 use facts::Facts;
+pub use facts::Kinds;
 
 /// Up to this many boxes every pair is compared: any structure costs more than it spares below it (24 bodies are 276
 /// comparisons of boxes).
@@ -90,15 +91,19 @@ pub struct Seen {
 
 impl Plan {
     /// The plan for a world as it is now.
+    ///
+    /// * `kinds` - those of its bodies.
     #[must_use]
-    pub fn of(world: &World, config: &Config) -> Self {
-        Self::decide(None, Facts::of(world), config, Seen::default())
+    pub fn of(world: &World, kinds: &Kinds, config: &Config) -> Self {
+        Self::decide(None, Facts::of(world, kinds), config, Seen::default())
     }
 
-    /// The plan after edits, with hysteresis against this one. Cost: a look at every body.
+    /// The plan after edits, with hysteresis against this one.
+    ///
+    /// * `kinds` - those of the world's bodies.
     #[must_use]
-    pub fn after_edits(&self, world: &World, config: &Config, seen: Seen) -> Self {
-        Self::decide(Some(self.method), Facts::of(world), config, seen)
+    pub fn after_edits(&self, world: &World, kinds: &Kinds, config: &Config, seen: Seen) -> Self {
+        Self::decide(Some(self.method), Facts::of(world, kinds), config, seen)
     }
 
     /// The plan for the same bodies, where what else it is made for has changed.

@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use crate::error::{Result, counted};
-use crate::plan::Plan;
+use crate::plan::{Kinds, Plan};
 use crate::scene::Scene;
 use crate::shape::Library;
 use crate::time::{Clock, SystemClock};
@@ -27,7 +27,7 @@ pub(super) fn check(args: &CheckArgs, out: &mut Out) -> Result<bool> {
     let mut warnings = scene.notes();
     warnings.extend(shapes.warnings);
     let world = World::new(&scene, shapes.bodies, SystemClock.boottime_ns())?;
-    let plan = Plan::of(&world, &scene.config);
+    let plan = Plan::of(&world, &Kinds::of(&world), &scene.config);
     if args.json {
         let ignored = args.ignored.then(|| {
             let pairs = ignored(&world).0.into_iter();

@@ -26,7 +26,7 @@ impl Engine {
         }
         let seen = self.see(input);
         let is_news = seen != std::mem::replace(&mut self.seen, seen);
-        let is_edited = !input.edits.is_empty();
+        let is_edited = self.world.scene_changed();
         if is_edited || is_news || limited != self.config.budget.is_limited() {
             self.replan(is_edited);
         }

@@ -26,7 +26,7 @@ use crate::ids::{PairKey, SourceSlot};
 use crate::limits;
 use crate::narrow::{Narrow, Wanted};
 use crate::pairs::{PairDelta, PairSet};
-use crate::plan::{Plan, Seen};
+use crate::plan::{Kinds, Plan, Seen};
 use crate::publish::{Publisher, View};
 use crate::scene::Scene;
 use crate::time::{Clock, Meter};
@@ -63,6 +63,8 @@ pub struct Engine {
     narrow: Narrow,
     publisher: Publisher,
     plan: Plan,
+    /// What the plan counts, kept from edit to edit.
+    kinds: Kinds,
     audience: Audience,
     /// What the plan in force was made for, beside the scene.
     seen: Seen,
@@ -112,7 +114,8 @@ impl Engine {
             threads: Some(scene.config.threads_here()),
             ..scene.config.clone()
         };
-        let plan = Plan::of(&world, &config);
+        let kinds = Kinds::of(&world);
+        let plan = Plan::of(&world, &kinds, &config);
         let mut broad = BroadPhase::new(plan.method());
         share(&mut broad, &config);
         let mut narrow = Narrow::new(limits.contacts_per_pair);
@@ -144,6 +147,7 @@ impl Engine {
             rebuilds: 0,
             world,
             plan,
+            kinds,
             audience: Audience::default(),
             seen: Seen::default(),
             clock,
@@ -203,7 +207,8 @@ impl Engine {
     /// * `is_edited` - whether the bodies are other ones; else they are not looked at.
     fn replan(&mut self, is_edited: bool) {
         let plan = if is_edited {
-            self.plan.after_edits(&self.world, &self.config, self.seen)
+            self.kinds.follow(&self.world);
+            (self.plan).after_edits(&self.world, &self.kinds, &self.config, self.seen)
         } else {
             self.plan.anew(&self.config, self.seen)
         };

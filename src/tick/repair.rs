@@ -3,6 +3,7 @@
 use super::Engine;
 use crate::narrow::Narrow;
 use crate::pairs::PairSet;
+use crate::plan::Kinds;
 
 impl Engine {
     /// Full structure check of every room that keeps state.
@@ -16,6 +17,7 @@ impl Engine {
     /// * `last` - the tick that all of it was left by.
     fn check(&self, last: u64) -> Result<(), String> {
         self.world.validate()?;
+        self.kinds.validate(&self.world)?;
         self.broad
             .validate(&self.world, self.world.filters(), &self.pairs)?;
         self.narrow.validate(&self.pairs)?;
@@ -59,6 +61,7 @@ impl Engine {
         );
         self.narrow
             .set_search(self.config.mesh_search.unwrap_or_default());
+        self.kinds = Kinds::of(&self.world);
         self.publisher.forget_slots(self.tick - 1, &self.world);
         Some(format!(
             "a structure did not hold and was built anew: {why}"

@@ -9,7 +9,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::filters::{
-    Because, EXACT, Filters, Hot, LIVE, MOVES, NO_GROUP, UNBOUNDED, are_neighbours,
+    Because, EXACT, Filters, Hot, LIVE, MOVES, NO_GROUP, SIDED, UNBOUNDED, are_neighbours,
     by_default_of_strangers, by_rule, never,
 };
 use super::names::{NameId, Names};
@@ -39,13 +39,14 @@ struct Classes<'a> {
 impl Filters {
     /// Counts the ignored pairs, whether their bodies are enabled or not.
     ///
-    /// Cost: O(bodies log bodies + plain rules + pairs of classes that a pattern rule speaks of), where a class is what
-    /// the same pattern rules speak of; in a rigid group or on one root, all pairs of its classes.
+    /// Cost: O(bodies + n log n of those that a pattern rule, a group or another body has + plain rules + pairs of
+    /// classes that a pattern rule speaks of), where a class is what the same pattern rules speak of; in a rigid group
+    /// or on one root, all pairs of its classes.
     pub(super) fn count_ignored(&mut self, names: &Names) {
         let classes = self.classes();
         let mut ignored = self.count_by_patterns(&classes);
         // Rigid groups and roots, where no rule speaks; what is alike in both is counted once.
-        let alike = |key: fn(&Hot) -> u64, has: fn(&Hot) -> bool| {
+        let alike = |key: fn(&Hot) -> u64, has: &dyn Fn(&Hot) -> bool| {
             let keyed = self.bodies.iter().zip(&classes.of_slot);
             let keyed = keyed.filter(|(hot, _)| has(hot));
             self.count_alike(
@@ -59,7 +60,11 @@ impl Filters {
         );
         let both = |hot: &Hot| u64::from(hot.rigid) << 32 | u64::from(hot.root.0);
         let grouped = |hot: &Hot| hot.rigid != NO_GROUP;
-        ignored += alike(rigid, grouped) + alike(root, |_| true) - alike(both, grouped);
+        // Most bodies hang on none, and nothing on them: those are alike with nobody.
+        let hanging = self.bodies.iter().filter(|hot| hot.root != hot.name);
+        let roots: BTreeSet<NameId> = hanging.map(|hot| hot.root).collect();
+        let is_of_tree = |hot: &Hot| roots.contains(&hot.root);
+        ignored += alike(rigid, &grouped) + alike(root, &is_of_tree) - alike(both, &grouped);
         // The exceptions: what was said without them is taken back, what holds is put in its place.
         for key in self.exceptions(names) {
             let (a, b) = key.slots();
@@ -75,15 +80,22 @@ impl Filters {
         let mut places: BTreeMap<Kind<'_>, u32> = BTreeMap::new();
         let mut list: Vec<Class<'_>> = Vec::new();
         let mut of_slot = Vec::with_capacity(self.bodies.len());
+        // Of bodies that no pattern rule speaks of, which may be all, by their flags.
+        let mut plain = [None; 4];
         for hot in &self.bodies {
             if !hot.has(LIVE) {
                 of_slot.push(None);
                 continue;
             }
-            let sided = self.rules.sided_of(hot.name);
-            let key = (sided, hot.flags & (MOVES | UNBOUNDED));
             let next = small(list.len());
-            let place = *places.entry(key).or_insert(next);
+            let flags = hot.flags & (MOVES | UNBOUNDED);
+            let (sided, place) = if hot.has(SIDED) {
+                let sided = self.rules.sided_of(hot.name);
+                (sided, *places.entry((sided, flags)).or_insert(next))
+            } else {
+                let by_flags = usize::from(flags / MOVES) % plain.len();
+                (&[][..], *plain[by_flags].get_or_insert(next))
+            };
             if place == next {
                 list.push(Class {
                     sided,
@@ -225,12 +237,17 @@ impl Filters {
 
     /// Finds the pairs that rules report farther than their bodies' boxes are widened, and for rules with too many of
     /// them the margin that makes their boxes meet instead.
-    pub(super) fn find_forced(&mut self, names: &Names) {
+    ///
+    /// * returns - whether there are such margins, or were.
+    pub(super) fn find_forced(&mut self, names: &Names) -> bool {
         self.forced.clear();
-        self.margins_m.clear();
+        let were_any = std::mem::take(&mut self.any_margin);
+        if were_any {
+            self.margins_m.fill(0.0);
+        }
         self.margins_m.resize(self.bodies.len(), 0.0);
         if !self.rules.any_report() {
-            return;
+            return were_any;
         }
         for (place, rule) in self.rules.list().iter().enumerate() {
             let Some(report_within_m) = rule.report_within_m else {
@@ -242,6 +259,7 @@ impl Filters {
             };
             let (side_a, side_b) = (there(&rule.a), there(&rule.b));
             if side_a.len().saturating_mul(side_b.len()) > FORCED_PER_RULE_MAX {
+                self.any_margin = true;
                 for slot in side_a.iter().chain(&side_b) {
                     let margin_m = &mut self.margins_m[slot.index()];
                     *margin_m = margin_m.max(report_within_m / 2.0);
@@ -258,6 +276,7 @@ impl Filters {
         }
         self.forced.sort_unstable();
         self.forced.dedup();
+        were_any || self.any_margin
     }
 
     /// Whether this rule decides an allowed pair, and reports it farther than the boxes are widened.

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use super::World;
 use super::edit_links::Places;
+use super::edit_rules::Uncounted;
 use super::edit_same::Touch;
 use super::filters::{ENABLED, Hot, LIVE, MOVES, NO_GROUP, UNBOUNDED};
 use super::names::NameId;
@@ -43,14 +44,22 @@ pub struct Applied {
 struct After {
     changed: bool,
     links: bool,
-    census: bool,
+    uncounted: Uncounted,
     /// Slots that another body is in, or none, than before; any number of times.
     slots: Vec<BodySlot>,
+    /// Bodies that were hung on another or let go.
+    hung: Vec<BodySlot>,
     /// Where bodies are by now.
     places: Places,
 }
 
 impl After {
+    /// A body hangs on another one, or on none, than before.
+    pub(super) fn take_hung(&mut self, slot: BodySlot) {
+        self.hung.push(slot);
+        self.links = true;
+    }
+
     /// Another body is in a slot, or none.
     fn take_slot(&mut self, slot: BodySlot) {
         self.slots.push(slot);
@@ -91,14 +100,16 @@ impl World {
             self.apply_one(edit, &mut after);
             step();
         }
-        self.relist(std::mem::take(&mut after.slots));
-        let ruled = self.edit_rules(edits);
-        after.changed |= ruled;
-        after.census |= ruled;
-        if after.links {
-            self.link();
+        self.relist(&mut after.slots);
+        if self.edit_rules(edits) {
+            after.changed = true;
+            after.uncounted = Uncounted::Rules;
         }
-        self.uncounted |= after.census;
+        if after.links {
+            self.link(after.slots.iter().chain(&after.hung));
+        }
+        self.touched.append(&mut after.slots);
+        self.uncounted = self.uncounted.max(after.uncounted);
         if after.changed {
             self.scene_rev += 1;
             self.edited = true;
@@ -135,7 +146,9 @@ impl World {
             Edit::Rule(_) | Edit::DropRules { .. } => false,
             Edit::Attach { name, to, pose } => {
                 let attached = self.attach(name, to.as_deref(), pose.as_ref(), &mut after.places);
-                after.links |= attached;
+                if attached && let Some(slot) = self.slot_named(name) {
+                    after.take_hung(slot);
+                }
                 attached
             }
             Edit::Reset { source } => {
@@ -144,8 +157,19 @@ impl World {
                 return;
             }
         };
-        after.changed |= changed;
-        after.census |= changed;
+        if changed {
+            after.changed = true;
+            let of_bodies = matches!(
+                edit,
+                Edit::Put(_) | Edit::Remove { .. } | Edit::Attach { .. }
+            );
+            let what = if of_bodies {
+                Uncounted::Bodies
+            } else {
+                Uncounted::Forced
+            };
+            after.uncounted = after.uncounted.max(what);
+        }
     }
 
     /// Puts a body, unless the very same is there.
@@ -220,8 +244,10 @@ impl World {
 
     /// Brings the lists of bodies in line with what these slots hold.
     ///
+    /// * `slots` - comes out sorted, each once.
+    ///
     /// Cost: O(listed bodies), and sorting the slots.
-    fn relist(&mut self, mut slots: Vec<BodySlot>) {
+    fn relist(&mut self, slots: &mut Vec<BodySlot>) {
         if slots.is_empty() {
             return;
         }
@@ -229,18 +255,22 @@ impl World {
         slots.dedup();
         let others = |slot: &BodySlot| slots.binary_search(slot).is_err();
         self.growing.retain(others);
+        self.pathed.retain(others);
         self.travelled.retain(others);
         self.deforming.retain(others);
         self.order.retain(|(_, slot)| others(slot));
-        for &slot in &slots {
+        for &slot in slots.iter() {
             let Some(body) = self.bodies[slot.index()].as_ref() else {
                 continue;
             };
             if self.entries[slot.index()].growing {
                 self.growing.push(slot);
             }
-            if body.path.as_ref().is_some_and(|path| !path.is_empty()) {
-                self.travelled.push(slot);
+            if let Some(path) = &body.path {
+                self.pathed.push(slot);
+                if !path.is_empty() {
+                    self.travelled.push(slot);
+                }
             }
             if body.vertices.is_some() {
                 self.deforming.push(slot);

@@ -148,15 +148,18 @@ impl World {
         true
     }
 
-    /// Finds every body's root anew and settles the bodies whose root, pose or freedom to move changed.
+    /// Finds anew the roots of these bodies and of all that hang on others, and settles those whose root, pose or
+    /// freedom to move changed. Any other body is its own root, as it was.
     ///
-    /// Cost: O(bodies + attached bodies log attached bodies).
-    pub(super) fn link(&mut self) {
-        self.attached.clear();
+    /// Cost: O(n log n) of these and the attached bodies.
+    pub(super) fn link<'a>(&mut self, edited: impl Iterator<Item = &'a BodySlot>) {
+        let mut slots = std::mem::take(&mut self.attached);
+        slots.extend(edited);
+        slots.sort_unstable();
+        slots.dedup();
         let mut known = BTreeMap::new();
-        for index in 0..self.bodies.len() {
-            let slot = BodySlot::at(index);
-            if self.bodies[index].is_none() {
+        for slot in slots {
+            if self.body(slot).is_none() {
                 continue;
             }
             let root = self.root_among(slot, &mut known);
@@ -256,6 +259,9 @@ impl World {
         };
         let changed = body.moves != spec.moves;
         body.moves = spec.moves;
+        if changed {
+            self.touched.push(slot);
+        }
         // Names say whose a body is, too.
         self.names_changed |= body.source != source;
         body.source = source;

@@ -9,6 +9,19 @@ use crate::ids::BodySlot;
 use crate::scene::PairRule;
 use crate::wire::EndCause;
 
+/// What edits changed of what the filters make of the scene; each says all that those before it say.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Uncounted {
+    #[default]
+    Nothing,
+    /// Which pairs are forced, and how wide boxes are.
+    Forced,
+    /// Which pairs are ignored.
+    Bodies,
+    /// What the rules say of each body.
+    Rules,
+}
+
 impl World {
     /// The rules as the edits of a request make them, compiled once behind the last; whether they changed.
     ///
@@ -81,6 +94,7 @@ impl World {
         if let Some(hot) = self.hot(slot) {
             hot.report_within_m = wanted_m;
         }
+        self.touched.push(slot);
         // Its pairs are judged anew; its box is widened as it must be now by the recount that follows.
         self.requery(slot);
         true
@@ -117,25 +131,39 @@ impl World {
 
     /// What the filters make of the scene after the edits of a tick: what the rules say of each body, ignored and
     /// forced pairs, and how wide boxes must be.
+    ///
+    /// Cost: where neither rules nor groups speak of bodies, that of those that were touched and a walk over what the
+    /// filters have of all.
     pub(super) fn recount(&mut self) {
-        if !std::mem::take(&mut self.uncounted) {
+        let uncounted = std::mem::take(&mut self.uncounted);
+        if uncounted == Uncounted::Nothing {
             return;
         }
         self.filters.sync_names(&self.names);
-        for index in 0..self.bodies.len() {
-            self.filters.mark_ruled(index);
+        if uncounted == Uncounted::Rules {
+            (0..self.bodies.len()).for_each(|index| self.filters.mark_ruled(index));
+        } else {
+            let touched = self.touched.iter();
+            touched.for_each(|slot| self.filters.mark_ruled(slot.index()));
         }
-        self.filters.count_ignored(&self.names);
-        self.filters.find_forced(&self.names);
-        for index in 0..self.bodies.len() {
-            let slot = BodySlot::at(index);
-            let Some(body) = self.body(slot) else {
-                continue;
-            };
-            let wanted_m = self.widening(slot, body, body.reach_m);
-            if wanted_m.to_bits() != self.entries[index].widened_m.to_bits() {
-                self.settle(slot, false);
-            }
+        if uncounted >= Uncounted::Bodies {
+            self.filters.count_ignored(&self.names);
+        }
+        if self.filters.find_forced(&self.names) {
+            (0..self.bodies.len()).for_each(|index| self.widen(BodySlot::at(index)));
+        } else {
+            let touched = std::mem::take(&mut self.touched);
+            touched.iter().for_each(|slot| self.widen(*slot));
+            self.touched = touched;
+        }
+    }
+
+    /// Settles a body whose box must be wider or narrower than it is.
+    fn widen(&mut self, slot: BodySlot) {
+        let Some(body) = self.body(slot) else { return };
+        let wanted_m = self.widening(slot, body, body.reach_m);
+        if wanted_m.to_bits() != self.entries[slot.index()].widened_m.to_bits() {
+            self.settle(slot, false);
         }
     }
 }

@@ -131,6 +131,8 @@ pub struct Filters {
     pub(super) forced: Vec<PairKey>,
     /// Per slot: by how much a box must be widened for rules whose pairs are too many to be forced, metres.
     pub(super) margins_m: Vec<f64>,
+    /// Whether any of these is not 0.
+    pub(super) any_margin: bool,
 }
 
 impl Filters {

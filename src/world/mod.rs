@@ -68,6 +68,7 @@ use crate::scene::Scene;
 use crate::wire::BodyStatus;
 use age::Ages;
 use bends_waiting::BendsWaiting;
+use edit_rules::Uncounted;
 use lists::Lists;
 use names::Names;
 use place::Entry;
@@ -101,6 +102,8 @@ pub struct World {
     growing: Vec<BodySlot>,
     /// Bodies whose place is lost and whose boxes make pairs in this tick.
     met: Vec<BodySlot>,
+    /// Bodies that have a path.
+    pathed: Vec<BodySlot>,
     /// Bodies whose path has legs.
     travelled: Vec<BodySlot>,
     /// Bodies that deform.
@@ -113,8 +116,11 @@ pub struct World {
     scene_rev: u64,
     names_changed: bool,
     edited: bool,
-    /// Edits changed what the filters make of the scene, and nobody has looked at that yet.
-    uncounted: bool,
+    /// What edits changed of what the filters make of the scene, and nobody has looked at yet.
+    uncounted: Uncounted,
+    /// Slots that edits of this tick touched: another body is in them or none, it may move and could not or the other
+    /// way round, or its margin is another; any number of times.
+    touched: Vec<BodySlot>,
     /// The change set was not taken yet by a tick: what `new` put there.
     first: bool,
     tick: u64,
@@ -205,6 +211,7 @@ impl World {
             attached: Vec::new(),
             growing: Vec::new(),
             met: Vec::new(),
+            pathed: Vec::new(),
             travelled: Vec::new(),
             deforming: Vec::new(),
             lists: Lists::default(),
@@ -214,7 +221,8 @@ impl World {
             scene_rev: 0,
             names_changed: false,
             edited: false,
-            uncounted: false,
+            uncounted: Uncounted::Nothing,
+            touched: Vec::new(),
             first: false,
             tick: 0,
             admits: false,
@@ -236,6 +244,7 @@ impl World {
             self.lists.clear();
             self.names_changed = false;
             self.edited = false;
+            self.touched.clear();
         }
         self.free.append(&mut self.resting);
         self.take_timeouts();
@@ -329,6 +338,13 @@ impl World {
     #[must_use]
     pub fn scene_changed(&self) -> bool {
         self.edited
+    }
+
+    /// Slots of bodies that edits of this tick (the first: all) brought, changed or took out, or made free to move or
+    /// not; any number of times.
+    #[must_use]
+    pub fn edited_slots(&self) -> &[BodySlot] {
+        &self.touched
     }
 
     /// The filters: which pairs are checked and reported. As of [`World::age`].

@@ -195,8 +195,11 @@ impl World {
         for source in &mut self.sources {
             source.followed = false;
         }
-        for index in 0..self.bodies.len() {
-            let slot = BodySlot::at(index);
+        let mut at = 0;
+        // It grows by those that something continuous hangs on.
+        while let Some(&slot) = self.pathed.get(at) {
+            at += 1;
+            let index = slot.index();
             let entry = &self.entries[index];
             let (root, local) = (entry.root, entry.root_pose);
             self.note_followed(slot, root);
@@ -219,6 +222,7 @@ impl World {
                 let mut path = Path::new(centre, radius, None, false);
                 path.restart(tight);
                 body.path = Some(Box::new(path));
+                self.pathed.push(root);
             }
             if let Some(path) = self.bodies[index]
                 .as_mut()

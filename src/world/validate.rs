@@ -2,6 +2,7 @@
 
 use super::World;
 use super::body::Body;
+use super::edit_rules::Uncounted;
 use super::filters::{BARS, ENABLED, KEEPS, LIVE, MOVES, UNBOUNDED};
 use super::tag::Tag;
 use crate::ids::BodySlot;
@@ -38,10 +39,33 @@ impl World {
         if by_status != self.by_status {
             return Err("the tallies by status are off".to_owned());
         }
+        if !self.filters_hold() {
+            return Err("what the filters make of the scene is off".to_owned());
+        }
         if !self.ages.are_whole() {
             return Err("the nearest deadline, or an end of the stamps, is off".to_owned());
         }
         Ok(())
+    }
+
+    /// Whether the filters are as counted anew from nothing, where no edit waits to be counted.
+    fn filters_hold(&self) -> bool {
+        if self.uncounted != Uncounted::Nothing {
+            return true;
+        }
+        let mut anew = self.filters.clone();
+        for slot in 0..self.bodies.len() {
+            anew.mark_ruled(slot);
+        }
+        anew.count_ignored(&self.names);
+        anew.margins_m.fill(0.0);
+        anew.find_forced(&self.names);
+        let own = &self.filters;
+        let mut marks = own.bodies.iter().zip(&anew.bodies);
+        marks.all(|(own, anew)| own.flags == anew.flags)
+            && own.ignored == anew.ignored
+            && own.forced == anew.forced
+            && own.margins_m == anew.margins_m
     }
 
     fn validate_body(&self, slot: BodySlot, body: &Body) -> Result<(), &'static str> {
