@@ -11,6 +11,7 @@ use super::World;
 use super::chain::Chain;
 use super::edit::{Edit, Put};
 use super::edit_same::Touch;
+use super::names::Names;
 use super::parts::PlacedShape;
 use super::rule_draft::RuleDraft;
 use crate::ids::BodyId;
@@ -20,7 +21,7 @@ use crate::scene::BodySpec;
 use crate::wire::BODY_NAME_LEN;
 use links::Sketch;
 
-/// Most names met in a boot: each is kept, because an id stays with its name.
+/// Most names of bodies, and of rigid groups, in a boot: each is kept, because an id stays with its name.
 const NAMES_MAX: usize = 1 << 22;
 
 /// The scene as it would be after the edits looked at so far, where they change it.
@@ -274,11 +275,13 @@ impl<'a> Draft<'a> {
                     "the scene is full ({limit} bodies): raise `limits.bodies`"
                 ));
             }
-            if self.world.names.len() + self.bodies.len() >= NAMES_MAX {
-                return wrong(format!(
-                    "{NAMES_MAX} names were used since the start: use names again, or restart"
-                ));
-            }
+        }
+        let is_full = |names: &Names| names.len() + self.bodies.len() >= NAMES_MAX;
+        let (names, groups) = (&self.world.names, &self.world.rigid_groups);
+        if !self.has(name) && is_full(names) || spec.rigid_group.is_some() && is_full(groups) {
+            return wrong(format!(
+                "{NAMES_MAX} names were used since the start: use names again, or restart"
+            ));
         }
         Ok(())
     }
