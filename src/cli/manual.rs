@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 
 use super::args::Cli;
 use super::args_tools::{CompletionsArgs, ManArgs, Shell};
+use super::files::Draft;
 use super::out::Out;
 
 /// The name of the binary.
@@ -170,7 +171,7 @@ fn write_all(cmd: &Command, folder: &Path) -> std::io::Result<()> {
         write_all(sub, folder)?;
     }
     let file = Man::new(cmd.clone()).get_filename();
-    std::fs::write(folder.join(file), page(cmd)?)
+    Draft::put(&folder.join(file), &page(cmd)?)
 }
 
 fn page(cmd: &Command) -> std::io::Result<String> {

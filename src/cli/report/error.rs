@@ -47,21 +47,27 @@ pub(super) fn error(args: &ErrorArgs, out: &mut Out, stop: &AtomicBool) -> Resul
     .ok_or_else(stopped)?;
     drop(progress);
     let scene = args.scene.display().to_string();
-    if args.json {
-        let mut value = serde_json::to_value(&report)
-            .map_err(|e| Error::io("cannot write the report as JSON", e))?;
-        value["scene"] = scene.as_str().into();
-        value["motion"] = format!("{:?}", args.course.motion).to_lowercase().into();
-        value["summary"] = summary(&report).into();
-        out.line(&value.to_string())?;
-    } else {
-        table(&report, &scene, out)?;
-    }
+    // Before the table: who reads that may have gone.
     if let Some(page) = page {
         page.write(&html(&report, &scene))?;
     }
-    out.flush()?;
+    let told = tell(args, &report, &scene, out);
+    out.or_closed(told)?;
     Ok(!report.is_wrong())
+}
+
+fn tell(args: &ErrorArgs, report: &Report, scene: &str, out: &mut Out) -> Result<()> {
+    if args.json {
+        let mut value = serde_json::to_value(report)
+            .map_err(|e| Error::io("cannot write the report as JSON", e))?;
+        value["scene"] = scene.into();
+        value["motion"] = format!("{:?}", args.course.motion).to_lowercase().into();
+        value["summary"] = summary(report).into();
+        out.line(&value.to_string())?;
+    } else {
+        table(report, scene, out)?;
+    }
+    out.flush()
 }
 
 fn sweep(args: &ErrorArgs) -> Result<Sweep> {
