@@ -20,13 +20,17 @@ struct Found {
     ending: Option<Ending>,
 }
 
-/// Replays a recording; `false` when it differs, nothing was compared, or the file is damaged.
+/// Replays a recording; `false` when it differs, nothing was compared, or the file is damaged or ended early.
 pub(super) fn replay(args: &ReplayArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
     let (from, until) = (args.from.unwrap_or(0), args.until.unwrap_or(u64::MAX));
     if from > until {
         return Err(Error::Usage(format!(
             "--from {from} --until {until}: no tick lies between them; give a first one that is not behind the last"
         )));
+    }
+    if until == 0 {
+        let text = "--until 0: ticks are counted from 1; give the last one to replay";
+        return Err(Error::Usage(text.to_owned()));
     }
     let found = run(args, stop)?;
     if args.json {
@@ -35,8 +39,8 @@ pub(super) fn replay(args: &ReplayArgs, out: &mut Out, stop: &AtomicBool) -> Res
         tell(&found, out)?;
     }
     out.flush()?;
-    let damaged = matches!(found.ending, Some(Ending::Damaged(_)));
-    Ok(found.difference.is_none() && found.compared() > 0 && !damaged)
+    let is_part = matches!(found.ending, Some(Ending::Damaged(_) | Ending::Early(_)));
+    Ok(found.difference.is_none() && found.compared() > 0 && !is_part)
 }
 
 impl Found {
