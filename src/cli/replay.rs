@@ -25,12 +25,8 @@ pub(super) fn replay(args: &ReplayArgs, out: &mut Out, stop: &AtomicBool) -> Res
     let (from, until) = (args.from.unwrap_or(0), args.until.unwrap_or(u64::MAX));
     if from > until {
         return Err(Error::Usage(format!(
-            "--from {from} --until {until}: no tick lies between them; give a first one that is not behind the last"
+            "--from {from} --until {until}: no tick lies between them; the first tick must not come after the last"
         )));
-    }
-    if until == 0 {
-        let text = "--until 0: ticks are counted from 1; give the last one to replay";
-        return Err(Error::Usage(text.to_owned()));
     }
     let found = run(args, stop)?;
     if args.json {
@@ -55,7 +51,7 @@ fn run(args: &ReplayArgs, stop: &AtomicBool) -> Result<Found> {
     let facts = start.facts.clone();
     if facts.sweepd_version != env!("CARGO_PKG_VERSION") {
         tracing::warn!(
-            "recorded by sweepd {}, replayed by {}: what differs may be what was changed between them",
+            "recorded by sweepd {}, replayed by {}: a difference may come from a change between these versions",
             facts.sweepd_version,
             env!("CARGO_PKG_VERSION")
         );
@@ -67,7 +63,7 @@ fn run(args: &ReplayArgs, stop: &AtomicBool) -> Result<Found> {
     let (mut ticks, mut difference, mut ending) = (0, None, None);
     while difference.is_none() && ticks < until {
         if stop.load(Ordering::Relaxed) {
-            let text = "stopped by a signal before the replay was done; nothing was told";
+            let text = "stopped by a signal before the replay was done; there is no result";
             return Err(Error::Refused(text.to_owned()));
         }
         let (done, all) = reader.progress();

@@ -324,8 +324,8 @@ fn what_cannot_be_meant_is_refused_with_what_to_change() {
             &["error", &path, "--units=1", "--budgets", "1ms"],
             "cannot be used with",
         ),
-        (&["error", &path, "--ticks", "0"], "1..="),
-        (&["error", &path, "--rate", "nan"], "frames a second"),
+        (&["error", &path, "--ticks", "0"], "from 1 to 1000000"),
+        (&["error", &path, "--rate", "nan"], "frames per second"),
         (&["error", &path, "--html", &path], "this is the scene file"),
         (&["error", "missing.toml"], "missing.toml"),
     ];

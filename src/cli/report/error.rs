@@ -2,10 +2,10 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::cli::args::Limit;
 use crate::cli::args_report::ErrorArgs;
 use crate::cli::files::{check_inputs, inputs};
 use crate::cli::out::Out;
+use crate::cli::values::Limit;
 use crate::daemon::build_shapes;
 use crate::error::{Error, Result, counted};
 use crate::report::error::columns::{Column, columns};

@@ -39,5 +39,5 @@ impl Page {
 
 /// What a report that was stopped by a signal ends with.
 fn stopped() -> Error {
-    Error::Refused("stopped by a signal before the report was done; nothing was told".to_owned())
+    Error::Refused("stopped by a signal before the report was done; there is no result".to_owned())
 }
