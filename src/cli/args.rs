@@ -12,7 +12,8 @@ use super::values::{Limit, count, duration, from_0, from_1, mode, nanoseconds, s
 use crate::builtin::Pattern;
 use crate::error::Error;
 
-/// A collision server: body poses in over shared memory, colliding pairs and contacts out, within a time budget per tick.
+/// A collision server: body poses in over shared memory, colliding pairs and contacts out, within a time budget per
+/// tick.
 #[derive(Debug, Parser)]
 #[command(name = "sweepd", version, max_term_width = 100, after_help = after_help())]
 pub(super) struct Cli {
@@ -45,8 +46,8 @@ pub(super) enum Command {
     List(ListArgs),
     /// Find out what is wrong: shared memory, permissions, leftovers, daemons, limits; one line per finding.
     ///
-    /// Each line says ok, warning or wrong, what was found, and what to do. Nothing is changed without --clean. The exit
-    /// code is 1 if something is wrong; warnings alone do not count.
+    /// Each line says ok, warning or wrong, what was found, and what to do. Nothing is changed without --clean. The
+    /// exit code is 1 if something is wrong; warnings alone do not count.
     Doctor(DoctorArgs),
     /// Record what a running daemon publishes to an MCAP file for Foxglove or `ros2 bag`.
     ///
@@ -94,8 +95,8 @@ pub(super) struct RunArgs {
     /// What triggers a tick: `on_all`, `on_frame=SOURCE` or `rate=HZ`; by default the scene's value.
     #[arg(long, value_name = "MODE", value_parser = mode)]
     pub(super) mode: Option<crate::config::Mode>,
-    /// How long to poll for the next frame before sleeping, such as `100us` or `0us`: less latency for more CPU time. The
-    /// default is 50us if there is more than one core.
+    /// How long to poll for the next frame before sleeping, such as `100us` or `0us`: less latency for more CPU time.
+    /// The default is 50us if there is more than one core.
     #[arg(long, value_name = "TIME", value_parser = nanoseconds, allow_hyphen_values = true)]
     pub(super) spin: Option<u64>,
     /// Never sleep: saves microseconds of latency and takes a whole core.
@@ -256,9 +257,9 @@ pub(super) struct MonitorArgs {
     /// Print one JSON object per tick instead of a screen: gaps in metres, times in nanoseconds.
     ///
     /// An open end of a gap's interval is null. `pairs_shown` and `contacts_shown` are [rows in this line, rows
-    /// published]. `pairs` is present if the rows of the same tick came, `contacts` with --contacts (up to four for each
-    /// of --pairs), `worst` if a pair is near. A restart of the daemon is a line of its own:
-    /// `{"restarted": {"boots": [old, new], "ends": [pairs that ended by that]}}`.
+    /// published]. `pairs` is present if the rows of the same tick came, `contacts` with --contacts (up to four for
+    /// each of --pairs), `worst` if a pair is near. A restart of the daemon is a line of its own: `{"restarted":
+    /// {"boots": [old, new], "ends": [pairs that ended by that]}}`.
     #[arg(long)]
     pub(super) json: bool,
     /// Stop after N ticks; by default at a signal. With --json a tick that is still under way, which is reported each

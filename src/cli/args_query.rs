@@ -13,8 +13,8 @@ pub(super) struct QueryArgs {
     /// Name of the first body; write `--` before a name that begins with a dash.
     ///
     /// The answer has the verdict, the proved interval of the gap in metres (negative: overlapping), the closest points
-    /// and the normal, at the poses of the newest tick. Pair rules and masks do not matter. The daemon works on it for at
-    /// most a second, beside its ticks.
+    /// and the normal, at the poses of the newest tick. Pair rules and masks do not matter. The daemon works on it for
+    /// at most a second, beside its ticks.
     #[arg(value_name = "A", requires = "b")]
     pub(super) a: Option<String>,
     /// Name of the second body; the normal points from A to it.
@@ -42,14 +42,16 @@ pub(super) struct QueryArgs {
         allow_hyphen_values = true
     )]
     pub(super) wait: u64,
-    /// Answer a file of cases without a daemon: one JSON object per line (`-` reads standard input), one answer per line.
+    /// Answer a file of cases without a daemon: one JSON object per line (`-` reads standard input), one answer per
+    /// line.
     ///
-    /// A case is `{"id", "a": SHAPE, "pose_a": {"t": [x,y,z], "q": [w,x,y,z]}, "b": SHAPE, "pose_b": ...}` with all lengths
-    /// in metres. A shape is a single one as in a scene file, without a position of its own and not from a mesh file.
-    /// Unknown keys of a case are ignored, those of shapes and poses are errors.
+    /// A case is `{"id", "a": SHAPE, "pose_a": {"t": [x,y,z], "q": [w,x,y,z]}, "b": SHAPE, "pose_b": ...}` with all
+    /// lengths in metres. A shape is a single one as in a scene file, without a position of its own and not from a mesh
+    /// file. Unknown keys of a case are ignored, those of shapes and poses are errors.
     ///
     /// An answer has `id`; `gap_m`, `gap_min_m`, `gap_max_m`; `normal`, `point_a`, `point_b`; `point_a_rel` and
-    /// `point_b_rel` (the points minus `pose_a.t`, exact also far from the origin); `colliding`. Or it has `id` and `error`.
+    /// `point_b_rel` (the points minus `pose_a.t`, exact also far from the origin); `colliding`. Or it has `id` and
+    /// `error`.
     #[arg(
         long,
         value_name = "IN.jsonl",
@@ -64,8 +66,8 @@ pub(super) struct QueryArgs {
 pub(super) struct TouchingArgs {
     /// List what this body touches, or would touch --at another pose with all that is attached to it. Changes nothing.
     ///
-    /// One line per body that is not proved farther than --within, worst first. Bodies whose place is unknown are named,
-    /// since they may be there, too.
+    /// One line per body that is not proved farther than --within, worst first. Bodies whose place is unknown are
+    /// named, since they may be there, too.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["a", "b"])]
     pub(super) touching: Option<String>,
     /// List what a shape touches that is not in the scene: JSON as in scene files, `{"type": "sphere", "radius": 0.5}`.
@@ -102,8 +104,8 @@ pub(super) struct TouchingArgs {
 pub(super) struct RayArgs {
     /// Find the first body hit from X,Y,Z (metres) along DX,DY,DZ (of any length), and the proved distance.
     ///
-    /// A ray that starts inside a solid hits it there. Bodies whose place is unknown are named, since they may be in the
-    /// way.
+    /// A ray that starts inside a solid hits it there. Bodies whose place is unknown are named, since they may be in
+    /// the way.
     #[arg(
         long,
         value_name = "X,Y,Z,DX,DY,DZ",
@@ -137,7 +139,8 @@ pub(super) struct RayArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Time of impact")]
 pub(super) struct ImpactArgs {
-    /// Find when A and B first touch within this time, such as `2s`, at the velocities their sources sent or those below.
+    /// Find when A and B first touch within this time, such as `2s`, at the velocities their sources sent or those
+    /// below.
     ///
     /// The centre of each body moves straight, and it turns about one axis at a constant rate.
     #[arg(

@@ -11,9 +11,9 @@ use super::values::{Limit, count, duration, ticks_of_report, units};
 pub(super) enum Report {
     /// Measure error against run time of a scene, over a sweep of budgets.
     ///
-    /// Runs the daemon's engine offline with the built-in motion of `feed`, once for each budget, and compares each answer
-    /// with that of a twin without a budget at the same poses. Exits with code 1 if a verdict is wrong or an interval
-    /// excludes the truth.
+    /// Runs the daemon's engine offline with the built-in motion of `feed`, once for each budget, and compares each
+    /// answer with that of a twin without a budget at the same poses. Exits with code 1 if a verdict is wrong or an
+    /// interval excludes the truth.
     Error(ErrorArgs),
     /// Check stiff and extreme cases against known truths.
     ///
@@ -28,8 +28,8 @@ pub(super) struct ErrorArgs {
     pub(super) scene: PathBuf,
     /// Time budgets per tick, such as `50us,200us,1ms,none`.
     ///
-    /// By default nine, from the floor of the scene to twice the 90th percentile of ticks without a budget, but at least
-    /// to four floors and to 200us.
+    /// By default nine, from the floor of the scene to twice the 90th percentile of ticks without a budget, but at
+    /// least to four floors and to 200us.
     #[arg(long, value_name = "TIME,..", value_delimiter = ',', value_parser = duration, allow_hyphen_values = true)]
     pub(super) budgets: Vec<Limit>,
     /// Use budgets of work units instead of time; values need the `=`, as in `--units=0,1000,none`.

@@ -18,7 +18,8 @@ pub(super) struct RecordArgs {
     pub(super) file: PathBuf,
     #[command(flatten)]
     pub(super) which: Which,
-    /// Record only these, beside state, tick and names, which are always recorded. The daemon computes what is recorded.
+    /// Record only these, beside state, tick and names, which are always recorded. The daemon computes what is
+    /// recorded.
     #[arg(long, value_name = "TOPIC,...", value_delimiter = ',')]
     pub(super) only: Vec<Recorded>,
     /// Stop after N ticks; by default at a signal.
@@ -64,8 +65,8 @@ pub(super) struct DoctorArgs {
     /// Print one JSON object per finding, one per line, instead of text: `level`, `check`, `what`, `do`.
     #[arg(long)]
     pub(super) json: bool,
-    /// Remove what dead processes of this user left behind: iceoryx2 nodes with their shared memory, and locks that nobody
-    /// holds. Nothing of living processes is removed. Without --instance this includes other iceoryx2 programs.
+    /// Remove what dead processes of this user left behind: iceoryx2 nodes with their shared memory, and locks that
+    /// nobody holds. Nothing of living processes is removed. Without --instance this includes other iceoryx2 programs.
     #[arg(long)]
     pub(super) clean: bool,
 }
@@ -93,7 +94,8 @@ pub(super) struct ManArgs {
     /// Command to print the page of, such as `query` or `report error`; by default sweepd itself.
     #[arg(value_name = "COMMAND", conflicts_with = "out")]
     pub(super) command: Vec<String>,
-    /// Write the pages of all commands into this directory, such as `~/.local/share/man/man1`; it is created if missing.
+    /// Write the pages of all commands into this directory, such as `~/.local/share/man/man1`; it is created if
+    /// missing.
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
 }

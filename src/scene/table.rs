@@ -4,8 +4,8 @@ use crate::error::nearest;
 use crate::scene::node::{Entry, Fault, Node, Value};
 use crate::scene::read_body::BODY_NAME_BYTES_MAX;
 
-/// Letters of a text that a message shows at most: as many as the longest name may have. Less would cut off what tells two
-/// names of a generated scene apart.
+/// Letters of a text that a message shows at most: as many as the longest name may have. Less would cut off what tells
+/// two names of a generated scene apart.
 const SHOWN_MAX: usize = BODY_NAME_BYTES_MAX;
 
 /// A table being read. Values are taken out by key.
