@@ -12,6 +12,7 @@ groups, rigid groups and pair rules. Then every simulated step is one frame, and
 
 import argparse
 import json
+import math
 import os
 import signal
 import sys
@@ -31,6 +32,20 @@ needs: pip install mujoco numpy iceoryx2==0.10.0, and pip install ./msgs/python
 """
 
 
+def number(kind, least, beyond=False):
+    """A reader of finite numbers from `least` on, or beyond it."""
+
+    def read(text):
+        value = kind(text)
+        if not math.isfinite(value) or value < least or (beyond and value == least):
+            raise argparse.ArgumentTypeError(f"{text}: write a number {'above' if beyond else 'not below'} {least}")
+        return value
+
+    # What argparse calls it where it is no number at all.
+    read.__name__ = kind.__name__
+    return read
+
+
 def parse(arguments):
     """The command line."""
     lines = __doc__.split("\n\n")
@@ -39,25 +54,30 @@ def parse(arguments):
     )
     parser.add_argument("model", type=Path, metavar="MODEL.xml", help="an MJCF file")
     parser.add_argument("--compare", action="store_true", help="check every step against MuJoCo's contacts")
-    parser.add_argument("--steps", type=int, metavar="N", help="stop after N steps (default: 500 with --compare, else never)")
+    parser.add_argument("--steps", type=number(int, 0), metavar="N",
+                        help="stop after N steps (default: 500 with --compare, else never)")  # fmt: skip
     parser.add_argument("--at-least", type=int, default=0, metavar="N", help="with --compare: fewer colliding pair-steps are a failure")
     parser.add_argument("--ccd-tolerance", type=float, metavar="M",
                         help="of MuJoCo's answers in the comparison, e.g. 1e-10 (default: the model's, mostly 1e-6)")  # fmt: skip
-    parser.add_argument("--rate", type=float, metavar="HZ", help="at most so many steps a second (default: as fast as answers come)")
+    parser.add_argument("--rate", type=number(float, 0, beyond=True), metavar="HZ",
+                        help="at most so many steps a second (default: as fast as answers come)")  # fmt: skip
     parser.add_argument("--realtime", action="store_true", help="as many steps a second as the model's timestep says")
     parser.add_argument("--spawn", type=Path, metavar="SWEEPD", help="start this daemon, and end it afterwards")
     parser.add_argument("--instance", metavar="NAME", help="of the daemon (default: one of its own with --spawn, else default)")
     parser.add_argument("--scene-out", type=Path, metavar="FILE", help="keep the scene here (default: a temporary file)")
-    parser.add_argument("--budget-ms", type=float, metavar="MS", help="wall time of a tick, into the scene (default: no limit)")
-    parser.add_argument("--budget-units", type=int, metavar="N", help="work units of a tick, into the scene (default: no limit)")
+    parser.add_argument("--budget-ms", type=number(float, 0), metavar="MS",
+                        help="wall time of a tick, into the scene (default: no limit)")  # fmt: skip
+    parser.add_argument("--budget-units", type=number(int, 0), metavar="N",
+                        help="work units of a tick, into the scene (default: no limit)")  # fmt: skip
     parser.add_argument("--keyframe", metavar="NAME", help="start from this keyframe of the model")
-    parser.add_argument("--ctrl-noise", type=float, default=0.0, metavar="SHARE",
+    parser.add_argument("--ctrl-noise", type=number(float, 0), default=0.0, metavar="SHARE",
                         help="drive the actuators by smooth noise, in shares of their control range (default: 0, none)")  # fmt: skip
-    parser.add_argument("--seed", type=int, default=1, help="of that noise (default: %(default)s)")
+    parser.add_argument("--seed", type=number(int, 0), default=1, help="of that noise (default: %(default)s)")
     parser.add_argument("--hull-ellipsoids", action="store_true", help="turn ellipsoids into hulls of 162 points, in MuJoCo too")
     parser.add_argument("--hull-sdf", action="store_true", help="turn SDFs into the hulls of their meshes, in MuJoCo too")
     parser.add_argument("--without-flex", action="store_true", help="leave flexes out of the scene and the comparison")
-    parser.add_argument("--timeout", type=float, default=10.0, metavar="S", help="for the daemon's answers (default: %(default)s s)")
+    parser.add_argument("--timeout", type=number(float, 0, beyond=True), default=10.0, metavar="S",
+                        help="for the daemon's answers (default: %(default)s s)")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="the summary as one line of JSON on stdout")
     chosen = parser.parse_args(arguments)
     if chosen.steps is None and chosen.compare:
@@ -95,7 +115,20 @@ def main(arguments=None):
         return 3
     except KeyboardInterrupt:
         return 130
-    report(run, chosen)
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        print(f"mujoco_bridge: {where}{error.strerror or error}", file=sys.stderr)
+        return 4
+    try:
+        report(run, chosen)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Who read has gone: a normal end. Python would complain once more when it closes the stream.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        print(f"mujoco_bridge: standard output: {error.strerror}", file=sys.stderr)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 4
     return run.exit_code()
 
 

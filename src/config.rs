@@ -31,7 +31,7 @@ impl Mode {
             Some(("rate", hertz)) => match hertz.parse::<f64>() {
                 Ok(hertz) if (RATE_HZ_MIN..=RATE_HZ_MAX).contains(&hertz) => Ok(Self::Rate(hertz)),
                 _ => Err(format!(
-                    "`{hertz}` is no rate: write hertz from {RATE_HZ_MIN} to {RATE_HZ_MAX}, such as rate=100"
+                    "`{hertz}` is not a rate: write hertz from {RATE_HZ_MIN} to {RATE_HZ_MAX}, such as rate=100"
                 )),
             },
             _ => Err("write on_all, on_frame=SOURCE or rate=HZ".to_owned()),
@@ -266,7 +266,9 @@ mod tests {
             let text = Mode::parse(&format!("rate={bad}")).unwrap_err();
             assert_eq!(
                 text,
-                format!("`{bad}` is no rate: write hertz from 0.001 to 100000, such as rate=100")
+                format!(
+                    "`{bad}` is not a rate: write hertz from 0.001 to 100000, such as rate=100"
+                )
             );
         }
     }

@@ -133,19 +133,19 @@ fn help_names_units_and_defaults() {
                 "[default: default]",
                 "rate=HZ",
                 "scene's value",
-                "until a signal",
+                "at a signal",
             ][..],
         ),
         ("check", &["metres", "10,000"][..]),
         (
             "feed",
             &[
-                "a second [default: 100]",
+                "per second [default: 100]",
                 "[default: 1]",
                 "[default: 10s]",
                 "[default: wander]",
                 "[default: pool]",
-                "until a signal",
+                "at a signal",
                 "default: all",
                 "1 mm",
             ][..],
@@ -157,7 +157,7 @@ fn help_names_units_and_defaults() {
                 "[default: 10s]",
                 "metres",
                 "nanoseconds",
-                "until a signal",
+                "at a signal",
             ][..],
         ),
         (
@@ -167,7 +167,7 @@ fn help_names_units_and_defaults() {
         ("list", &["JSON"][..]),
         (
             "doctor",
-            &["JSON", "a line each", "Never of living ones"][..],
+            &["JSON", "one per line", "Nothing of living processes"][..],
         ),
         ("completions", &["bash-completion", "$fpath"][..]),
     ] {
@@ -337,39 +337,48 @@ fn bug_values_below_0_were_told_as_unknown_flags() {
         (
             &["run", "x.toml", "--budget", "-1ms"][..],
             "--budget",
-            "`-1ms` is no time",
+            "`-1ms` is not a time",
         ),
-        (&["run", "x.toml", "--ticks", "-1"], "--ticks", "-1"),
+        (
+            &["run", "x.toml", "--ticks", "-1"],
+            "--ticks",
+            "a whole number from 1 on",
+        ),
+        (&["feed", "x.toml", "--count", "-3"], "--count", "from 0 on"),
         (
             &["query", "a", "b", "--wait", "-1s"],
             "--wait",
-            "`-1s` is no time",
+            "`-1s` is not a time",
         ),
         (
             &["query", "--touching", "a", "--within", "-5cm"],
             "--within",
-            "`-5cm` is no length",
+            "`-5cm` is not a length",
         ),
         (
             &["query", "--ray", "0,0,0,1,0,0", "--max", "-5m"],
             "--max",
-            "`-5m` is no length",
+            "`-5m` is not a length",
         ),
         (
             &["query", "a", "b", "--impact", "-1s"],
             "--impact",
-            "`-1s` is no time",
+            "`-1s` is not a time",
         ),
         (
             &["feed", "x.toml", "--rate", "-5"],
             "--rate",
-            "frames a second",
+            "frames per second",
         ),
-        (&["monitor", "--wait", "-1s"], "--wait", "`-1s` is no time"),
+        (
+            &["monitor", "--wait", "-1s"],
+            "--wait",
+            "`-1s` is not a time",
+        ),
         (
             &["report", "error", "x.toml", "--budgets", "-1ms"],
             "--budgets",
-            "`-1ms` is no time",
+            "`-1ms` is not a time",
         ),
     ] {
         let ended = output(args);
@@ -381,6 +390,42 @@ fn bug_values_below_0_were_told_as_unknown_flags() {
         );
         assert!(!said.contains("tip: to pass"), "{args:?}: {said}");
     }
+}
+
+#[test]
+fn bug_commands_that_were_to_do_nothing_did_that_and_ended_well() {
+    for (args, flag) in [
+        (&["run", "x.toml", "--ticks", "0"][..], "--ticks"),
+        (&["monitor", "--ticks", "0"], "--ticks"),
+        (&["record", "x.mcap", "--ticks", "0"], "--ticks"),
+        (&["record", "x.mcap", "--for", "0s"], "--for"),
+        (&["feed", "x.toml", "--frames", "0"], "--frames"),
+        (&["replay", "x.mcap", "--until", "0"], "--until"),
+    ] {
+        let ended = output(args);
+        assert_eq!(code(&ended), Some(2), "{args:?}: {}", err(&ended));
+        assert!(err(&ended).contains(flag), "{args:?}: {}", err(&ended));
+    }
+}
+
+#[test]
+fn bug_flags_of_every_command_stood_in_the_midst_of_its_own_and_those_of_query_in_one_heap() {
+    for command in ["run", "feed", "query", "monitor"] {
+        let help = out(&output(&[command, "--help"]));
+        let place = |flag: &str| help.find(flag).unwrap_or_else(|| panic!("{flag}: {help}"));
+        let own = if command == "run" {
+            "--force"
+        } else {
+            "--wait"
+        };
+        assert!(place("--verbose") > place(own), "{help}");
+    }
+    let help = out(&output(&["query", "--help"]));
+    for heading in ["Touching:", "Ray:", "Time of impact:"] {
+        assert!(help.contains(heading), "{heading}: {help}");
+    }
+    let options = help.split("Touching:").next().unwrap();
+    assert!(options.contains("--instance") && !options.contains("--ray"));
 }
 
 #[test]
@@ -402,7 +447,7 @@ fn bug_what_is_wrong_was_told_by_keys_and_variables_that_nobody_wrote() {
             vec!["query", "--shape="],
             "--shape is empty: write a shape as",
         ),
-        (vec!["man", "--out", file], "this is no directory"),
+        (vec!["man", "--out", file], "this is not a directory"),
     ];
     if cfg!(feature = "ros2") {
         let args = vec!["run", scene, "--ros2", "--ros-domain-id", "999"];

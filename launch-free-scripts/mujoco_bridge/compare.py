@@ -78,8 +78,9 @@ class Compare:
         return self.exempt / max(1, self.colliding)
 
     def holds(self):
-        """Whether the sets are equal in every step, and enough collided to mean something."""
-        return self.different == 0 and self.share() <= EXEMPT_SHARE_MAX and self.colliding >= self.at_least
+        """Whether there was a step, the sets are equal in every one, and enough collided to mean something."""
+        enough = self.steps > 0 and self.colliding >= self.at_least
+        return enough and self.different == 0 and self.share() <= EXEMPT_SHARE_MAX
 
     def summary(self):
         """Counts for `--json`."""

@@ -6,6 +6,7 @@ In: the path of the program, a scene file, an instance. Out: a running process, 
 import os
 import signal
 import subprocess
+from pathlib import Path
 
 from .model import Refused
 
@@ -17,14 +18,19 @@ class Daemon:
     """A context: the daemon runs inside it."""
 
     def __init__(self, program, scene, instance):
-        self.command = [str(program), "run", str(scene), "--instance", instance]
+        # Whole: what has no slash would be looked for in $PATH.
+        self.command = [str(Path(program).absolute()), "run", str(scene), "--instance", instance]
         self.process = None
 
     def __enter__(self):
-        if not os.access(self.command[0], os.X_OK):
-            raise Refused(f"{self.command[0]} is no program: build it with cargo build --release, or name another")
-        # A session of its own: Ctrl-C reaches the bridge alone, which then ends the daemon in order.
-        self.process = subprocess.Popen(self.command, stdin=subprocess.DEVNULL, start_new_session=True)
+        program = self.command[0]
+        if not (os.path.isfile(program) and os.access(program, os.X_OK)):
+            raise Refused(f"{program} is no program: build it with cargo build --release, or name another")
+        try:
+            # A session of its own: Ctrl-C reaches the bridge alone, which then ends the daemon in order.
+            self.process = subprocess.Popen(self.command, stdin=subprocess.DEVNULL, start_new_session=True)
+        except OSError as error:
+            raise Refused(f"{program} cannot be started: {error.strerror}") from None
         return self
 
     def __exit__(self, *_):

@@ -539,7 +539,8 @@ typedef struct sweepd_pair_row {
      * known (no velocity was sent, or a body is silent, refused or deforms). */
     double closing_mps;
     /* Of a swept pair that touched, or may have, on the way from the last tick's poses (0) to this
-     * one's (1): the share before which it did not; NaN: not swept, or free of touch. */
+     * one's (1): the share before which it did not (steps that jumped, which are not swept, aside);
+     * NaN: not swept, or free of touch. */
     double toi_min;
     /* The share by which it had touched first (SWEPT_HIT), or 1 (SWEPT_OPEN); NaN as toi_min. */
     double toi_max;

@@ -9,14 +9,14 @@ use super::Random;
 /// How bodies move.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Pattern {
-    /// Each on its own closed curve about its start, half a metre wide, turning.
+    /// Each body follows a closed curve of its own, up to half a metre from its start along each axis, and turns.
     #[default]
     Wander,
-    /// Each trembles 1 mm about its start.
+    /// Each body trembles about its start, by up to 1 mm along each axis.
     Vibrate,
-    /// Each turns in place.
+    /// Each body turns in place.
     Spin,
-    /// None moves; frames are sent all the same.
+    /// No body moves; frames are still sent.
     Rest,
 }
 

@@ -8,18 +8,20 @@ use super::args_query::QueryArgs;
 use super::args_report::Report;
 use super::args_tools::{CompletionsArgs, DoctorArgs, ListArgs, ManArgs, RecordArgs};
 use super::manual::after_help;
+use super::values::{Limit, count, duration, from_0, from_1, mode, nanoseconds, span, units};
 use crate::builtin::Pattern;
 use crate::error::Error;
 
-/// A collision server: body poses in over shared memory, colliding pairs and contacts out, within a time budget a tick.
+/// A collision server: body poses in over shared memory, colliding pairs and contacts out, within a time budget per
+/// tick.
 #[derive(Debug, Parser)]
 #[command(name = "sweepd", version, max_term_width = 100, after_help = after_help())]
 pub(super) struct Cli {
-    /// Say more on stderr (twice: everything).
-    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    /// Log more to stderr; twice: everything.
+    #[arg(short, long, global = true, action = clap::ArgAction::Count, display_order = 1000)]
     pub(super) verbose: u8,
-    /// Say errors only.
-    #[arg(short, long, global = true)]
+    /// Log errors only.
+    #[arg(short, long, global = true, display_order = 1000)]
     pub(super) quiet: bool,
     #[command(subcommand)]
     pub(super) command: Command,
@@ -27,38 +29,38 @@ pub(super) struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// Run the daemon for a scene until SIGINT or SIGTERM (or SIGHUP, but under `nohup`).
+    /// Run the daemon for a scene until SIGINT or SIGTERM (or SIGHUP, unless under `nohup`).
     Run(RunArgs),
     /// Read and validate a scene; print the plan, ignored pairs and warnings.
     Check(CheckArgs),
-    /// Move a scene's bodies by a built-in motion: a source for demos and load.
+    /// Move the bodies of a scene with a built-in motion: a source for demos and load tests.
     Feed(FeedArgs),
     /// Watch a running daemon: state, pairs by name, gaps, budget, sources, rejects.
     ///
-    /// `q` or Ctrl-C ends it. On a terminal of fewer than some 110 columns (60 at least) names are shortened, `closing`
-    /// goes where there is no room for it, and an event is one word.
+    /// Press `q` or Ctrl-C to end it. On a terminal narrower than about 110 columns (at least 60 are needed) names are
+    /// shortened, `closing` is left out if there is no room, and each event is one word.
     Monitor(MonitorArgs),
-    /// Ask a running daemon: gaps, what touches, rays, times of impact; or answer shape-pair questions offline.
+    /// Ask a running daemon about gaps, touches, rays and times of impact; or query pairs of shapes offline.
     Query(Box<QueryArgs>),
-    /// List running instances, their sources and readers.
+    /// List running instances with their sources and readers.
     List(ListArgs),
-    /// Find what is wrong when nothing works: shared memory, rights, leftovers, daemons, limits; a line a finding.
+    /// Find out what is wrong: shared memory, permissions, leftovers, daemons, limits; one line per finding.
     ///
-    /// Each line says ok, warning or wrong, what is so, and what to do. Nothing is changed without --clean. Ends with
-    /// code 1 when something is wrong; warnings alone are no reason.
+    /// Each line says ok, warning or wrong, what was found, and what to do. Nothing is changed without --clean. The
+    /// exit code is 1 if something is wrong; warnings alone do not count.
     Doctor(DoctorArgs),
-    /// Record what a running daemon publishes, as any client hears it, to an MCAP file for Foxglove or `ros2 bag`.
+    /// Record what a running daemon publishes to an MCAP file for Foxglove or `ros2 bag`.
     ///
-    /// What the daemon was given is not in it: to run its engine again, give `run --record FILE` to the daemon itself.
-    /// A daemon that starts anew is followed.
+    /// The file does not contain what the daemon received: to replay its engine, start the daemon itself with
+    /// `run --record FILE`. If the daemon restarts, recording goes on.
     Record(RecordArgs),
-    /// Run the engine again on what `run --record` wrote, and report the first tick that differs.
+    /// Run the engine again on a recording of `run --record`, and report the first tick that differs.
     Replay(ReplayArgs),
-    /// Measure: error against run time, and numerical stability.
+    /// Measure error against run time, or numerical stability.
     Report(ReportArgs),
-    /// Write completions of commands and flags for a shell to standard output.
+    /// Print shell completions for commands and flags.
     Completions(CompletionsArgs),
-    /// Write the manual to standard output, or as man pages into a directory.
+    /// Print the manual, or write it as man pages into a directory.
     Man(ManArgs),
 }
 
@@ -72,56 +74,57 @@ pub(super) struct ReportArgs {
 /// Which daemon.
 #[derive(Clone, Debug, Args)]
 pub(super) struct Which {
-    /// Name of the daemon: a-z, 0-9 and _, at most 32.
+    /// Name of the daemon: up to 32 of a-z, 0-9 and _.
     #[arg(long, default_value = "default", value_name = "NAME")]
     pub(super) instance: String,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct RunArgs {
-    /// The scene file (TOML); `launch-free-scripts/example_scene.toml` shows every key.
+    /// Scene file (TOML); `launch-free-scripts/example_scene.toml` shows every key.
     #[arg(value_name = "SCENE")]
     pub(super) scene: PathBuf,
     #[command(flatten)]
     pub(super) which: Which,
-    /// Time a tick may take, such as `2ms`, `500us`, or `none`; the scene's value otherwise.
+    /// Time limit of a tick, such as `2ms`, `500us` or `none`; by default the scene's value.
     #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
     pub(super) budget: Option<Limit>,
-    /// Work units a tick may take, or `none`; the scene's value otherwise. Runs replay bit for bit.
+    /// Limit of work units per tick, or `none`; by default the scene's value. Such runs replay bit for bit.
     #[arg(long, value_name = "UNITS", value_parser = units, allow_hyphen_values = true)]
     pub(super) budget_units: Option<Limit>,
-    /// What makes a tick: `on_all`, `on_frame=SOURCE` or `rate=HZ`; the scene's value otherwise.
+    /// What triggers a tick: `on_all`, `on_frame=SOURCE` or `rate=HZ`; by default the scene's value.
     #[arg(long, value_name = "MODE", value_parser = mode)]
     pub(super) mode: Option<crate::config::Mode>,
-    /// How long to look for the next frame before going to sleep, such as `100us`, or `0us`: less latency for more CPU
-    /// time. The default is 50us where there is more than one core.
+    /// How long to poll for the next frame before sleeping, such as `100us` or `0us`: less latency for more CPU time.
+    /// The default is 50us if there is more than one core.
     #[arg(long, value_name = "TIME", value_parser = nanoseconds, allow_hyphen_values = true)]
     pub(super) spin: Option<u64>,
-    /// Never go to sleep: microseconds less latency for a whole core.
+    /// Never sleep: saves microseconds of latency and takes a whole core.
     #[arg(long, conflicts_with = "spin")]
     pub(super) busy_poll: bool,
-    /// End with exit code 5 when the tick thread makes no progress for this long, such as `10s`, or `none`; a second
-    /// more than the heartbeat at least.
-    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true, default_value = "10s")]
-    pub(super) watchdog: Limit,
-    /// End after so many ticks; until a signal otherwise.
-    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..))]
-    pub(super) ticks: Option<u64>,
-    /// Be a ROS 2 node too; on this host only, unless `ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET`.
+    /// Exit with code 5 if the tick thread makes no progress for this long, such as `10s`, or `none`.
     ///
-    /// `--ros-args ... [--]` says so as well: -r FROM:=TO, -p NAME:=VALUE, --params-file FILE, --log-level LEVEL,
-    /// --disable-rosout-logs, as of every ROS 2 node.
+    /// At least the heartbeat plus one second. The default is 10s, or the heartbeat plus one second if that is longer.
+    #[arg(long, value_name = "TIME", value_parser = duration, allow_hyphen_values = true)]
+    pub(super) watchdog: Option<Limit>,
+    /// Stop after N ticks; by default at a signal.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = from_1)]
+    pub(super) ticks: Option<u64>,
+    /// Also run as a ROS 2 node; on this host only, unless `ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET`.
+    ///
+    /// `--ros-args ... [--]` does so too, with the arguments of every ROS 2 node: -r FROM:=TO, -p NAME:=VALUE,
+    /// --params-file FILE, --log-level LEVEL, --disable-rosout-logs.
     #[arg(long)]
     pub(super) ros2: bool,
-    /// DDS domain, 0 to 232; `ROS_DOMAIN_ID` otherwise.
+    /// DDS domain, 0 to 232; by default `ROS_DOMAIN_ID`.
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub(super) ros_domain_id: Option<i64>,
-    /// Record all that the engine is given and says to this file (MCAP), for `sweepd replay` and for people.
+    /// Record all input and output of the engine to this file (MCAP), for `sweepd replay` and for viewers.
     ///
-    /// The recording listens to pairs and contacts, and ten times a second to bodies: these are then computed.
+    /// Recording listens to pairs and contacts, and to bodies ten times per second, so these are computed.
     #[arg(long, value_name = "FILE.mcap")]
     pub(super) record: Option<PathBuf>,
-    /// Write over a recording that is there.
+    /// Overwrite the recording if it exists.
     #[arg(long, requires = "record")]
     pub(super) force: bool,
 }
@@ -132,29 +135,29 @@ pub(super) struct RunArgs {
     allow(dead_code, reason = "this build refuses to replay")
 )]
 pub(super) struct ReplayArgs {
-    /// What `sweepd run SCENE --record FILE` wrote.
+    /// Recording written by `sweepd run SCENE --record FILE`.
     #[arg(value_name = "FILE.mcap")]
     pub(super) file: PathBuf,
-    /// One JSON object instead of text.
+    /// Print one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
-    /// Compare from this tick on; those before it are run.
-    #[arg(long, value_name = "TICK", allow_negative_numbers = true)]
+    /// First tick to compare; those before it are only run.
+    #[arg(long, value_name = "TICK", allow_negative_numbers = true, value_parser = from_0)]
     pub(super) from: Option<u64>,
-    /// End with this tick.
-    #[arg(long, value_name = "TICK", allow_negative_numbers = true)]
+    /// Last tick to run and compare, counted from 1.
+    #[arg(long, value_name = "TICK", allow_negative_numbers = true, value_parser = from_1)]
     pub(super) until: Option<u64>,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct CheckArgs {
-    /// The scene file (TOML): metres, seconds, quaternions x, y, z, w.
+    /// Scene file (TOML): metres, seconds, quaternions x, y, z, w.
     #[arg(value_name = "SCENE")]
     pub(super) scene: PathBuf,
-    /// One JSON object instead of text.
+    /// Print one JSON object instead of text.
     #[arg(long)]
     pub(super) json: bool,
-    /// List every ignored pair, not only how many (up to 10,000); in JSON `ignored` is null without it.
+    /// List every ignored pair (up to 10,000), not only their number; without it `ignored` is null in JSON.
     #[arg(long)]
     pub(super) ignored: bool,
 }
@@ -162,7 +165,7 @@ pub(super) struct CheckArgs {
 /// The built-in motion of a scene's bodies.
 #[derive(Debug, Args)]
 pub(super) struct CourseArgs {
-    /// Frames a second.
+    /// Frames per second.
     #[arg(
         long,
         default_value_t = 100.0,
@@ -170,28 +173,29 @@ pub(super) struct CourseArgs {
         allow_negative_numbers = true
     )]
     pub(super) rate: f64,
-    /// Seed of the motion, and of a scene that is made.
+    /// Random seed of the motion, and of a scene to write.
     #[arg(
         long,
         default_value_t = 1,
         value_name = "N",
-        allow_negative_numbers = true
+        allow_negative_numbers = true,
+        value_parser = from_0
     )]
     pub(super) seed: u64,
-    /// How bodies move: half a metre about their start, 1 mm about it, turning in place, or not at all.
+    /// How the bodies move.
     #[arg(long, value_enum, default_value_t = Pattern::Wander)]
     pub(super) motion: Pattern,
 }
 
 impl CourseArgs {
     /// # Errors
-    /// `Error::Usage` for a rate that is none.
+    /// `Error::Usage` for a rate that cannot be.
     pub(super) fn check(&self) -> crate::error::Result<()> {
         if self.rate > 0.0 && self.rate <= 1e6 {
             return Ok(());
         }
         Err(Error::Usage(format!(
-            "--rate {}: give frames a second, above 0 and at most 1e6",
+            "--rate {}: write frames per second, above 0 and at most 1e6",
             self.rate
         )))
     }
@@ -199,37 +203,40 @@ impl CourseArgs {
 
 #[derive(Debug, Args)]
 pub(super) struct FeedArgs {
-    /// The scene whose bodies to move; the daemon must run the same.
+    /// Scene whose bodies to move; the daemon must run the same one.
     #[arg(value_name = "SCENE", required_unless_present = "write_scene")]
     pub(super) scene: Option<PathBuf>,
     #[command(flatten)]
     pub(super) which: Which,
-    /// The source to be; the scene's first otherwise.
+    /// Source to send as; by default the first one of the scene.
     #[arg(long, value_name = "NAME")]
     pub(super) source: Option<String>,
     #[command(flatten)]
     pub(super) course: CourseArgs,
-    /// Bodies to move, the others are sent at rest (default: all); with --write-scene: bodies to make (default: 200).
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    /// Number of bodies to move, while the others rest (default: all); with --write-scene the number of bodies to make
+    /// (default: 200).
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = count)]
     pub(super) count: Option<usize>,
-    /// End after so many frames; until a signal otherwise.
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    /// Stop after N frames; by default at a signal.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = from_1)]
     pub(super) frames: Option<u64>,
-    /// Work of the source's own before each frame, such as `7ms..15ms`: what is left of the frame is said to be the
-    /// daemon's, its result is waited for, and how well the frame time was kept is told at the end.
+    /// Simulate work of the source before each frame, such as `7ms..15ms`.
+    ///
+    /// The daemon gets the time that is left of each frame, and its result is waited for. At the end a summary says how
+    /// well the frame time was kept.
     #[arg(long, value_name = "TIME..TIME", value_parser = span, allow_hyphen_values = true)]
     pub(super) work: Option<(u64, u64)>,
     /// How long to wait for the daemon, such as `10s`.
     #[arg(long, default_value = "10s", value_name = "TIME", value_parser = nanoseconds, allow_hyphen_values = true)]
     pub(super) wait: u64,
-    /// Write a scene of `--count` mixed bodies to this file, and end.
+    /// Write a scene of --count mixed bodies to this file, and exit.
     #[arg(
         long,
         value_name = "FILE",
         conflicts_with_all = ["scene", "instance", "source", "rate", "motion", "frames", "work", "wait"]
     )]
     pub(super) write_scene: Option<PathBuf>,
-    /// The scene to write: `pool` (in free space) or `pile` (on a floor).
+    /// Kind of scene to write: `pool` (in free space) or `pile` (on a floor).
     #[arg(
         long,
         default_value = "pool",
@@ -238,7 +245,7 @@ pub(super) struct FeedArgs {
         conflicts_with = "scene"
     )]
     pub(super) kind: String,
-    /// Write over a file that is there.
+    /// Overwrite the file if it exists.
     #[arg(long, conflicts_with = "scene")]
     pub(super) force: bool,
 }
@@ -247,143 +254,38 @@ pub(super) struct FeedArgs {
 pub(super) struct MonitorArgs {
     #[command(flatten)]
     pub(super) which: Which,
-    /// One JSON object a tick instead of a screen: gaps in metres, times in nanoseconds.
+    /// Print one JSON object per tick instead of a screen: gaps in metres, times in nanoseconds.
     ///
     /// An open end of a gap's interval is null. `pairs_shown` and `contacts_shown` are [rows in this line, rows
-    /// published]. `pairs` is there with the rows of the same tick, `contacts` with --contacts (up to four for each of
-    /// --pairs), `worst` where a pair is near. Where the daemon has started anew there is a line
-    /// `{"restarted": {"boots": [old, new], "ends": [pairs that ended by that]}}`.
+    /// published]. `pairs` is present if the rows of the same tick came, `contacts` with --contacts (up to four for
+    /// each of --pairs), `worst` if a pair is near. A restart of the daemon is a line of its own: `{"restarted":
+    /// {"boots": [old, new], "ends": [pairs that ended by that]}}`.
     #[arg(long)]
     pub(super) json: bool,
-    /// End after so many ticks; until a signal otherwise. With --json those that are under way, of which there is word
-    /// each heartbeat, have no line then.
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    /// Stop after N ticks; by default at a signal. With --json a tick that is still under way, which is reported each
+    /// heartbeat, then has no line.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = from_1)]
     pub(super) ticks: Option<u64>,
-    /// End with code 3 when no tick comes for so long.
+    /// Exit with code 3 if no tick comes for this long.
     #[arg(long, default_value = "10s", value_name = "TIME", value_parser = nanoseconds, allow_hyphen_values = true)]
     pub(super) wait: u64,
-    /// Pairs shown (or written) at most.
+    /// Most pairs to show or print.
     #[arg(
         long,
         default_value_t = 20,
         value_name = "N",
-        allow_negative_numbers = true
+        allow_negative_numbers = true,
+        value_parser = count
     )]
     pub(super) pairs: usize,
-    /// Also read contacts: the daemon then computes them.
+    /// Also show contacts; the daemon then computes them.
     #[arg(long)]
     pub(super) contacts: bool,
-}
-
-/// A limit given by hand.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Limit {
-    /// No limit.
-    None,
-    /// Nanoseconds or units.
-    Of(u64),
-}
-
-pub(super) fn duration(text: &str) -> Result<Limit, String> {
-    if text == "none" {
-        Ok(Limit::None)
-    } else {
-        nanoseconds(text).map(Limit::Of)
-    }
-}
-
-pub(super) fn units(text: &str) -> Result<Limit, String> {
-    if text == "none" {
-        return Ok(Limit::None);
-    }
-    text.parse()
-        .map(Limit::Of)
-        .map_err(|_| "a whole number of work units, or none".to_owned())
-}
-
-/// Nanoseconds of `2ms`, `1.5s`, `500us`, `100ns`, `0`.
-pub(super) fn nanoseconds(text: &str) -> Result<u64, String> {
-    let wanted = || {
-        format!(
-            "`{text}` is no time: write a number that is not below 0 and ns, us, ms or s, such as 2ms"
-        )
-    };
-    let split = text
-        .find(|c: char| c.is_ascii_alphabetic())
-        .unwrap_or(text.len());
-    let (number, unit) = text.split_at(split);
-    let number: f64 = number.trim().parse().map_err(|_| wanted())?;
-    let scale = match unit {
-        "ns" => 1.0,
-        "us" => 1e3,
-        "ms" => 1e6,
-        "s" => 1e9,
-        "" if number == 0.0 => 1.0,
-        _ => return Err(wanted()),
-    };
-    let ns = number * scale;
-    if ns >= 1e18 {
-        return Err(format!(
-            "`{text}` is too long: write a time of less than 31 years"
-        ));
-    }
-    if ns.is_nan() || ns < 0.0 {
-        return Err(wanted());
-    }
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "checked just above"
-    )]
-    Ok(ns.round() as u64)
-}
-
-/// Nanoseconds of `7ms..15ms`, or of one time for both ends.
-fn span(text: &str) -> Result<(u64, u64), String> {
-    let (least, most) = text.split_once("..").unwrap_or((text, text));
-    let (least, most) = (nanoseconds(least)?, nanoseconds(most)?);
-    if least > most {
-        return Err(format!("`{text}`: the first time is the longer one"));
-    }
-    Ok((least, most))
-}
-
-fn mode(text: &str) -> Result<crate::config::Mode, String> {
-    crate::config::Mode::parse(text)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn times_are_read_with_their_units() {
-        assert_eq!(nanoseconds("2ms"), Ok(2_000_000));
-        assert_eq!(nanoseconds("1.5s"), Ok(1_500_000_000));
-        assert_eq!(duration("none"), Ok(Limit::None));
-        assert_eq!(nanoseconds("0"), Ok(0));
-        for bad in ["", "ms", "2", "-1ms", "2 hours", "1e30s", "nan ms"] {
-            assert!(nanoseconds(bad).is_err(), "{bad}");
-        }
-    }
-
-    #[test]
-    fn spans_are_read_from_the_shorter_to_the_longer_time() {
-        assert_eq!(span("7ms..15ms"), Ok((7_000_000, 15_000_000)));
-        assert_eq!(span("2us"), Ok((2_000, 2_000)));
-        for bad in ["15ms..7ms", "7ms..", "7..15ms", "..", ""] {
-            assert!(span(bad).is_err(), "{bad}");
-        }
-    }
-
-    #[test]
-    fn modes_are_read_as_in_scene_files() {
-        use crate::config::Mode;
-        assert_eq!(mode("on_all"), Ok(Mode::OnAll));
-        assert_eq!(mode("on_frame=sim"), Ok(Mode::OnFrame("sim".to_owned())));
-        assert!(mode("rate=0").is_err());
-        assert!(mode("on_frame=").is_err());
-    }
 
     #[test]
     fn the_command_line_is_consistent() {

@@ -5,18 +5,19 @@ use std::str::FromStr;
 
 use clap::Args;
 
-use super::args::{Which, nanoseconds};
+use super::args::Which;
+use super::values::nanoseconds;
 
 #[derive(Debug, Args)]
 pub(super) struct QueryArgs {
-    /// Name of the one body; behind `--` where it begins with a dash.
+    /// Name of the first body; write `--` before a name that begins with a dash.
     ///
-    /// The daemon works on the answer for a second at most, beside its ticks: the verdict, the proved interval of the
-    /// gap in metres (negative: overlapping), the closest points and the normal, at the poses of its newest tick,
-    /// whatever pair rules and masks say.
+    /// The answer has the verdict, the proved interval of the gap in metres (negative: overlapping), the closest points
+    /// and the normal, at the poses of the newest tick. Pair rules and masks do not matter. The daemon works on it for
+    /// at most a second, beside its ticks.
     #[arg(value_name = "A", requires = "b")]
     pub(super) a: Option<String>,
-    /// Name of the other body; the normal points from A to it.
+    /// Name of the second body; the normal points from A to it.
     #[arg(value_name = "B")]
     pub(super) b: Option<String>,
     #[command(flatten)]
@@ -27,7 +28,7 @@ pub(super) struct QueryArgs {
     pub(super) impact: ImpactArgs,
     #[command(flatten)]
     pub(super) which: Which,
-    /// One JSON object instead of text: lengths in metres, `age_ns` in nanoseconds; what is not known is null.
+    /// Print one JSON object instead of text: lengths in metres, `age_ns` in nanoseconds; null means unknown.
     #[arg(long)]
     pub(super) json: bool,
     /// How long to wait for the daemon and its answer, such as `500ms`.
@@ -41,14 +42,16 @@ pub(super) struct QueryArgs {
         allow_hyphen_values = true
     )]
     pub(super) wait: u64,
-    /// No daemon: a file of cases, one JSON object a line (`-`: standard input); one answer a line, in order.
+    /// Answer a file of cases without a daemon: one JSON object per line (`-` reads standard input), one answer per
+    /// line.
     ///
-    /// A case: `{"id", "a": SHAPE, "pose_a": {"t": [x,y,z], "q": [w,x,y,z]}, "b": SHAPE, "pose_b": ...}`, all lengths
-    /// in metres; a shape as in a scene file, one, without a place of its own and not from a file. Other keys of a case
-    /// are passed over, those of shapes and poses are not.
+    /// A case is `{"id", "a": SHAPE, "pose_a": {"t": [x,y,z], "q": [w,x,y,z]}, "b": SHAPE, "pose_b": ...}` with all
+    /// lengths in metres. A shape is a single one as in a scene file, without a position of its own and not from a mesh
+    /// file. Unknown keys of a case are ignored, those of shapes and poses are errors.
     ///
-    /// An answer: `id`; `gap_m`, `gap_min_m`, `gap_max_m`; `normal`, `point_a`, `point_b`; `point_a_rel` and
-    /// `point_b_rel`, the points less `pose_a.t`, exact far from the origin, too; `colliding`. Or `id` and `error`.
+    /// An answer has `id`; `gap_m`, `gap_min_m`, `gap_max_m`; `normal`, `point_a`, `point_b`; `point_a_rel` and
+    /// `point_b_rel` (the points minus `pose_a.t`, exact also far from the origin); `colliding`. Or it has `id` and
+    /// `error`.
     #[arg(
         long,
         value_name = "IN.jsonl",
@@ -59,20 +62,20 @@ pub(super) struct QueryArgs {
 
 /// What touches a body or a shape.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Touching")]
 pub(super) struct TouchingArgs {
-    /// What this body touches, or would touch --at another pose, with all that hangs on it. Changes nothing.
+    /// List what this body touches, or would touch --at another pose with all that is attached to it. Changes nothing.
     ///
-    /// A line for each body that is not proved farther than --within, worst first. Bodies whose place is not known are
-    /// named: they may be there, too.
+    /// One line per body that is not proved farther than --within, worst first. Bodies whose place is unknown are
+    /// named, since they may be there, too.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["a", "b"])]
     pub(super) touching: Option<String>,
-    /// The same of a shape that is no body, as in scene files, in JSON: `{"type": "sphere", "radius": 0.5}`.
+    /// List what a shape touches that is not in the scene: JSON as in scene files, `{"type": "sphere", "radius": 0.5}`.
     ///
-    /// A mesh `file` is looked for by the daemon, beside its scene file.
+    /// The daemon looks for a mesh `file` beside its scene file.
     #[arg(long, value_name = "JSON", conflicts_with_all = ["a", "b", "touching"])]
     pub(super) shape: Option<String>,
-    /// Where it is put, in metres, and how, as a quaternion; by default where the body is, of a shape the scene's
-    /// origin.
+    /// Position in metres and orientation as a quaternion; by default those of the body, or the origin for a shape.
     #[arg(
         long,
         value_name = "X,Y,Z[,QX,QY,QZ,QW]",
@@ -80,7 +83,7 @@ pub(super) struct TouchingArgs {
         conflicts_with_all = ["a", "b", "batch", "ray"]
     )]
     pub(super) at: Option<Place>,
-    /// Also bodies that are no farther than this, such as `5cm`; by default only what touches or may.
+    /// Also list bodies up to this far away, such as `5cm`; by default only those that touch or may touch.
     #[arg(
         long,
         value_name = "LENGTH",
@@ -90,18 +93,19 @@ pub(super) struct TouchingArgs {
         conflicts_with_all = ["a", "b", "batch", "ray"]
     )]
     pub(super) within: f64,
-    /// Whatever pair rules, neighbours and masks say.
+    /// Ignore pair rules, neighbours and masks.
     #[arg(long, conflicts_with_all = ["a", "b", "batch", "ray"])]
     pub(super) no_filters: bool,
 }
 
 /// What a ray hits.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Ray")]
 pub(super) struct RayArgs {
-    /// What is hit first from X,Y,Z (metres) along DX,DY,DZ (of any length): the body, and the proved distance.
+    /// Find the first body hit from X,Y,Z (metres) along DX,DY,DZ (of any length), and the proved distance.
     ///
-    /// A ray that begins within a solid hits it there. Bodies whose place is not known are named: they may be in the
-    /// way.
+    /// A ray that starts inside a solid hits it there. Bodies whose place is unknown are named, since they may be in
+    /// the way.
     #[arg(
         long,
         value_name = "X,Y,Z,DX,DY,DZ",
@@ -109,7 +113,7 @@ pub(super) struct RayArgs {
         conflicts_with_all = ["a", "b", "touching", "shape"]
     )]
     pub(super) ray: Option<Numbers<6>>,
-    /// How far the ray goes, such as `10m`; by default 4e12 m, farther than anything that has an end.
+    /// Length of the ray, such as `10m`; by default 4e12 m, farther than any bounded body.
     #[arg(
         long,
         value_name = "LENGTH",
@@ -119,7 +123,7 @@ pub(super) struct RayArgs {
         conflicts_with_all = ["a", "b", "batch", "touching", "shape"]
     )]
     pub(super) max: Option<f64>,
-    /// Only bodies of these groups, one bit each, such as `0x6`; by default all.
+    /// Hit only bodies of these groups, one bit each, such as `0x6`; by default all.
     #[arg(
         long,
         value_name = "BITS",
@@ -133,10 +137,12 @@ pub(super) struct RayArgs {
 
 /// When two bodies touch.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Time of impact")]
 pub(super) struct ImpactArgs {
-    /// When A and B touch first within this time, such as `2s`, if they go on as their source says, or as is said here.
+    /// Find when A and B first touch within this time, such as `2s`, at the velocities their sources sent or those
+    /// below.
     ///
-    /// The centre of each goes straight, its turn is about one axis at a constant rate.
+    /// The centre of each body moves straight, and it turns about one axis at a constant rate.
     #[arg(
         long,
         value_name = "TIME",
@@ -146,7 +152,7 @@ pub(super) struct ImpactArgs {
         conflicts_with_all = ["batch", "touching", "shape", "ray"]
     )]
     pub(super) impact: Option<u64>,
-    /// Velocity of A's frame, metres a second in the scene's frame; by default what its source sent.
+    /// Velocity of A's frame, metres per second in the scene's frame; by default what its source sent.
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -154,7 +160,7 @@ pub(super) struct ImpactArgs {
         requires = "impact"
     )]
     pub(super) linear_a: Option<Numbers<3>>,
-    /// Angular velocity of A, radians a second in the scene's frame; by default what its source sent.
+    /// Angular velocity of A, radians per second in the scene's frame; by default what its source sent.
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -162,7 +168,7 @@ pub(super) struct ImpactArgs {
         requires = "impact"
     )]
     pub(super) angular_a: Option<Numbers<3>>,
-    /// Velocity of B's frame, metres a second in the scene's frame; by default what its source sent.
+    /// Velocity of B's frame, metres per second in the scene's frame; by default what its source sent.
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -170,7 +176,7 @@ pub(super) struct ImpactArgs {
         requires = "impact"
     )]
     pub(super) linear_b: Option<Numbers<3>>,
-    /// Angular velocity of B, radians a second in the scene's frame; by default what its source sent.
+    /// Angular velocity of B, radians per second in the scene's frame; by default what its source sent.
     #[arg(
         long,
         value_name = "X,Y,Z",
@@ -215,7 +221,7 @@ impl FromStr for Place {
                 orientation: Some([qx, qy, qz, qw]),
             }),
             ref other => Err(format!(
-                "it has {} numbers: write 3, x,y,z in metres, or 7, with a quaternion in the order x,y,z,w",
+                "it has {} numbers: write 3 (x,y,z in metres) or 7 (with a quaternion in the order x,y,z,w)",
                 other.len()
             )),
         }
@@ -228,7 +234,7 @@ fn numbers(text: &str) -> Result<Vec<f64>, String> {
         let value: Option<f64> = part.trim().parse().ok();
         value
             .filter(|value| value.is_finite())
-            .ok_or_else(|| format!("`{part}` is no number: write numbers with commas between them"))
+            .ok_or_else(|| format!("`{part}` is not a number: write numbers separated by commas"))
     };
     text.split(',').map(number).collect()
 }
@@ -240,14 +246,15 @@ fn bits(text: &str) -> Result<u32, String> {
         Some(("0b", binary)) => u32::from_str_radix(binary, 2),
         _ => text.parse(),
     };
-    number.map_err(|_| format!("`{text}` is no mask of 32 bits: write a number such as 0x6 or 6"))
+    number
+        .map_err(|_| format!("`{text}` is not a mask of 32 bits: write a number such as 0x6 or 6"))
 }
 
 /// Metres of `5cm`, `1.5m`, `2mm`, `300um`, `0`.
 pub(super) fn length_m(text: &str) -> Result<f64, String> {
     let wanted = || {
         format!(
-            "`{text}` is no length: write a number that is not below 0 and um, mm, cm, m or km, such as 5cm"
+            "`{text}` is not a length: write a number from 0 on with um, mm, cm, m or km, such as 5cm"
         )
     };
     let split = text

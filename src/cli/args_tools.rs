@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::args::{Which, nanoseconds};
+use super::args::Which;
+use super::values::{from_1, nanoseconds, some_time};
 
 #[derive(Debug, Args)]
 #[cfg_attr(
@@ -12,27 +13,28 @@ use super::args::{Which, nanoseconds};
     allow(dead_code, reason = "this build refuses to record")
 )]
 pub(super) struct RecordArgs {
-    /// The file to write: MCAP, profile `ros2`.
+    /// File to write (MCAP, profile `ros2`).
     #[arg(value_name = "FILE.mcap")]
     pub(super) file: PathBuf,
     #[command(flatten)]
     pub(super) which: Which,
-    /// Record these only, beside state, tick and names, which always are; the daemon computes contacts for who listens.
+    /// Record only these, beside state, tick and names, which are always recorded. The daemon computes what is
+    /// recorded.
     #[arg(long, value_name = "TOPIC,...", value_delimiter = ',')]
     pub(super) only: Vec<Recorded>,
-    /// End after so many ticks; until a signal otherwise.
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    /// Stop after N ticks; by default at a signal.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = from_1)]
     pub(super) ticks: Option<u64>,
-    /// End after so long, such as `10s`.
-    #[arg(long = "for", value_name = "TIME", value_parser = nanoseconds, allow_hyphen_values = true)]
+    /// Stop after this time, such as `10s`.
+    #[arg(long = "for", value_name = "TIME", value_parser = some_time, allow_hyphen_values = true)]
     pub(super) time: Option<u64>,
-    /// End with code 3 when no tick comes for so long; what was heard until then is in the file.
+    /// Exit with code 3 if no tick comes for this long; the file keeps what came before.
     #[arg(long, default_value = "10s", value_name = "TIME", value_parser = nanoseconds, allow_hyphen_values = true)]
     pub(super) wait: u64,
-    /// What messages call the frame of poses and points: the scene's `frame_id`, which clients are not told.
+    /// Frame name in the recorded messages: give the scene's `frame_id`, which the daemon does not publish.
     #[arg(long, default_value = "world", value_name = "NAME")]
     pub(super) frame_id: String,
-    /// Write over a file that is there.
+    /// Overwrite the file if it exists.
     #[arg(long)]
     pub(super) force: bool,
 }
@@ -44,34 +46,34 @@ pub(super) enum Recorded {
     Pairs,
     /// Contacts of colliding pairs.
     Contacts,
-    /// Where bodies are.
+    /// Poses of bodies.
     Bodies,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct ListArgs {
-    /// One JSON object an instance, a line each, instead of text.
+    /// Print one JSON object per instance, one per line, instead of text.
     #[arg(long)]
     pub(super) json: bool,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct DoctorArgs {
-    /// Look at this instance, and with --clean at its leftovers only; by default at all that there are.
+    /// Check only this instance, and with --clean remove only its leftovers; by default all instances.
     #[arg(long, value_name = "NAME")]
     pub(super) instance: Option<String>,
-    /// One JSON object a finding, a line each, instead of text: `level`, `check`, `what`, `do`.
+    /// Print one JSON object per finding, one per line, instead of text: `level`, `check`, `what`, `do`.
     #[arg(long)]
     pub(super) json: bool,
-    /// Remove what dead processes of this user left: nodes of iceoryx2 with their shared memory (also those of its
-    /// programs that are no sweepd, unless --instance is given), and locks that nobody holds. Never of living ones.
+    /// Remove what dead processes of this user left behind: iceoryx2 nodes with their shared memory, and locks that
+    /// nobody holds. Nothing of living processes is removed. Without --instance this includes other iceoryx2 programs.
     #[arg(long)]
     pub(super) clean: bool,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct CompletionsArgs {
-    /// The shell to complete for.
+    /// Shell to write completions for.
     #[arg(value_name = "SHELL")]
     pub(super) shell: Shell,
 }
@@ -79,20 +81,21 @@ pub(super) struct CompletionsArgs {
 /// A shell, and where it looks for completions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum Shell {
-    /// Into `~/.local/share/bash-completion/completions/sweepd`.
+    /// Save as `~/.local/share/bash-completion/completions/sweepd`.
     Bash,
-    /// Into a file `_sweepd` in a directory of `$fpath`.
+    /// Save as `_sweepd` in a directory of `$fpath`.
     Zsh,
-    /// Into `~/.config/fish/completions/sweepd.fish`.
+    /// Save as `~/.config/fish/completions/sweepd.fish`.
     Fish,
 }
 
 #[derive(Debug, Args)]
 pub(super) struct ManArgs {
-    /// Of this command, such as `query` or `report error`; by default of sweepd itself.
+    /// Command to print the page of, such as `query` or `report error`; by default sweepd itself.
     #[arg(value_name = "COMMAND", conflicts_with = "out")]
     pub(super) command: Vec<String>,
-    /// Write all pages, each command's too, into this directory (it is made), such as `~/.local/share/man/man1`.
+    /// Write the pages of all commands into this directory, such as `~/.local/share/man/man1`; it is created if
+    /// missing.
     #[arg(long, value_name = "DIR")]
     pub(super) out: Option<PathBuf>,
 }

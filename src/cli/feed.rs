@@ -3,8 +3,6 @@
 mod cadence;
 mod same;
 
-use std::io::Write as _;
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::builtin::{Motion, Random, pile, pool};
@@ -17,7 +15,7 @@ use crate::wire::{REJECTS_LEN, RejectReason, TickRow, TransformRow, name_str};
 
 use super::args::FeedArgs;
 use super::connect;
-use super::files::open_new;
+use super::files::Draft;
 use super::out::Out;
 use same::Same;
 
@@ -43,7 +41,7 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
         } else {
             pool(count, args.course.seed)
         };
-        write_scene(path, &text, args.force)?;
+        Draft::open(path, args.force, "a scene")?.write(&text)?;
         out.line(&format!(
             "wrote {}: {}",
             path.display(),
@@ -80,13 +78,6 @@ pub(super) fn feed(args: &FeedArgs, out: &mut Out, stop: &AtomicBool) -> Result<
         None => stream(args, &name, &mut bodies, &mut client, stop)?,
     }
     Ok(true)
-}
-
-/// Writes a scene.
-fn write_scene(path: &Path, text: &str, over: bool) -> Result<()> {
-    open_new(path, over, "a scene")?
-        .write_all(text.as_bytes())
-        .map_err(|e| Error::io(format!("cannot write {}", path.display()), e))
 }
 
 /// Sends frame after frame at the rate, until stopped or for the frames asked for.

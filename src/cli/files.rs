@@ -1,6 +1,8 @@
 //! Files that commands write. In: a path of a user. Out: an open file, or why there is none. What a command reads it
 //! does not write over.
 
+mod draft;
+
 use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
 use std::os::unix::fs::MetadataExt as _;
@@ -8,6 +10,8 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::scene::Scene;
+
+pub(super) use draft::Draft;
 
 /// A file that a command reads: what it is to it, in words, and its path.
 pub(super) type Input = (&'static str, PathBuf);
@@ -45,22 +49,35 @@ fn place(path: &Path) -> Option<(u64, u64)> {
     meta.is_file().then(|| (meta.dev(), meta.ino()))
 }
 
-/// Opens a new file; one that is there is somebody's work. It is locked until it is closed, so that no other of these
-/// commands writes into it.
+/// Opens a new file for a recording; one that is there is somebody's work. It is locked until it is closed, so that no
+/// other of these commands writes into it.
 ///
 /// * `over` - whether one that is there is written over.
 /// * `what` - it is for, in words.
 ///
 /// # Errors
-/// `Error::Refused` when it is there, or is being written, `Error::Io` when it cannot be opened.
+/// `Error::Refused` when it is there, is being written, or is no file (a folder, a pipe, a device), `Error::Io` when it
+/// cannot be opened.
+#[cfg_attr(
+    not(feature = "mcap"),
+    allow(dead_code, reason = "this build does not record")
+)]
 pub(super) fn open_new(path: &Path, over: bool, what: &str) -> Result<File> {
-    let failed = |e| {
-        let mend = "give a file in a folder that exists and that you may write to";
-        Error::io(
-            format!("cannot open {} for {what}; {mend}", path.display()),
-            e,
-        )
-    };
+    // Before it is opened: that waits for who reads a pipe.
+    if let Ok(there) = std::fs::metadata(path)
+        && !there.is_file()
+    {
+        let kind = if there.is_dir() {
+            "a folder"
+        } else {
+            "no file but a pipe or a device"
+        };
+        return Err(Error::Refused(format!(
+            "{} is {kind}, and {what} needs a file of its own: name one, such as run.mcap",
+            path.display()
+        )));
+    }
+    let failed = |e| unopened(path, what, e);
     let mut how = File::options();
     // Emptied once it is known that nobody else is writing it.
     how.write(true)
@@ -68,16 +85,9 @@ pub(super) fn open_new(path: &Path, over: bool, what: &str) -> Result<File> {
         .create_new(!over)
         .truncate(false);
     let file = how.open(path).map_err(|e| match e.kind() {
-        ErrorKind::AlreadyExists => Error::Refused(format!(
-            "{} is there already: name another file, or write over it with --force",
-            path.display()
-        )),
+        ErrorKind::AlreadyExists => is_there(path),
         _ => failed(e),
     })?;
-    // What keeps nothing (a device, a pipe) is anybody's.
-    if !file.metadata().map_err(failed)?.is_file() {
-        return Ok(file);
-    }
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => Err(Error::Refused(format!(
             "{} is being written by another process: name another file, or end that one first",
@@ -89,6 +99,22 @@ pub(super) fn open_new(path: &Path, over: bool, what: &str) -> Result<File> {
             Ok(file)
         }
     }
+}
+
+/// Why one that is there is not written over.
+fn is_there(path: &Path) -> Error {
+    Error::Refused(format!(
+        "{} exists: name another file, or overwrite it with --force",
+        path.display()
+    ))
+}
+
+fn unopened(path: &Path, what: &str, e: std::io::Error) -> Error {
+    let mend = "give a file in a folder that exists and that you may write to";
+    Error::io(
+        format!("cannot open {} for {what}; {mend}", path.display()),
+        e,
+    )
 }
 
 #[cfg(test)]
@@ -151,5 +177,17 @@ mod tests {
         open_new(&path, true, "a test").unwrap();
         assert_eq!(std::fs::read(&path).unwrap(), b"");
         std::fs::remove_file(&path).unwrap();
+    }
+
+    #[test]
+    fn bug_a_recording_into_a_folder_or_a_pipe_was_refused_for_another_reason() {
+        for (path, word) in [("/tmp", "is a folder"), ("/dev/null", "a device")] {
+            for over in [false, true] {
+                let error = open_new(Path::new(path), over, "a recording").unwrap_err();
+                assert_eq!(error.exit_code(), 4);
+                let text = error.to_string();
+                assert!(text.contains(word) && !text.contains("--force"), "{text}");
+            }
+        }
     }
 }

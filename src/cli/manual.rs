@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 
 use super::args::Cli;
 use super::args_tools::{CompletionsArgs, ManArgs, Shell};
+use super::files::Draft;
 use super::out::Out;
 
 /// The name of the binary.
@@ -36,7 +37,7 @@ const EXAMPLES: [(&str, &[(&str, &str)]); 3] = [
     (
         "Ask and look",
         &[
-            ("sweepd query A B", "the proved gap of two bodies, by name"),
+            ("sweepd query A B", "the proved gap of two bodies"),
             (
                 "sweepd query --touching A --at 1,2,3",
                 "what a body would touch there",
@@ -70,14 +71,17 @@ const EXIT_CODES: [(u8, &str); 7] = [
 ];
 
 const ENVIRONMENT: [(&str, &str); 4] = [
-    ("NO_COLOR", "Anything but empty switches colours off."),
+    (
+        "NO_COLOR",
+        "Any value that is not empty switches colours off.",
+    ),
     (
         "ROS_DOMAIN_ID",
-        "DDS domain of `run --ros2`, 0 to 232; 0 by default.",
+        "DDS domain of `run --ros2`, 0 to 232; default: 0.",
     ),
     (
         "ROS_AUTOMATIC_DISCOVERY_RANGE",
-        "SUBNET lets `run --ros2` out of this host; LOCALHOST: default.",
+        "SUBNET lets `run --ros2` reach other hosts; default: LOCALHOST.",
     ),
     (
         "ROS_LOCALHOST_ONLY",
@@ -125,7 +129,7 @@ pub(super) fn man(args: &ManArgs, out: &mut Out) -> Result<bool> {
     if let Some(folder) = &args.out {
         if folder.exists() && !folder.is_dir() {
             return Err(Error::Usage(format!(
-                "--out {}: this is no directory, and each page is a file of its own: name a directory",
+                "--out {}: this is not a directory: give one, since each page is a file of its own",
                 folder.display()
             )));
         }
@@ -170,7 +174,7 @@ fn write_all(cmd: &Command, folder: &Path) -> std::io::Result<()> {
         write_all(sub, folder)?;
     }
     let file = Man::new(cmd.clone()).get_filename();
-    std::fs::write(folder.join(file), page(cmd)?)
+    Draft::put(&folder.join(file), &page(cmd)?)
 }
 
 fn page(cmd: &Command) -> std::io::Result<String> {

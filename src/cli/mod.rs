@@ -27,6 +27,7 @@ mod run;
 #[cfg(feature = "tui")]
 mod screen;
 mod signals;
+mod values;
 mod worst;
 
 use std::process::ExitCode;

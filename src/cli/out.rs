@@ -45,6 +45,12 @@ impl Out {
         &mut self.sink
     }
 
+    /// What was written last, where a reader that has gone is no error, for what was found out is told by the exit
+    /// code, too.
+    pub(super) fn or_closed(&mut self, done: Result<()>) -> Result<()> {
+        done.or_else(|e| if self.closed() { Ok(()) } else { Err(e) })
+    }
+
     /// Whether the reader has gone away.
     pub(super) fn closed(&mut self) -> bool {
         self.closed || self.sink.flush().is_err_and(|e| self.is_gone(&e))

@@ -37,8 +37,8 @@ pub(super) fn query(args: &QueryArgs, out: &mut Out) -> Result<bool> {
         }
         (Some(a), Some(b)) => gap::gap(a, b, args, out, stop.as_ref()),
         _ => Err(Error::Usage(
-            "name two bodies of a running daemon, or ask with --touching NAME, --shape JSON or --ray X,Y,Z,DX,DY,DZ, or give \
-             a file of cases with --batch FILE"
+            "name two bodies of a running daemon, ask with --touching NAME, --shape JSON or --ray X,Y,Z,DX,DY,DZ, or give a file \
+             of cases with --batch FILE"
                 .to_owned(),
         )),
     }

@@ -20,12 +20,12 @@ struct Found {
     ending: Option<Ending>,
 }
 
-/// Replays a recording; `false` when it differs, nothing was compared, or the file is damaged.
+/// Replays a recording; `false` when it differs, nothing was compared, or the file is damaged or ended early.
 pub(super) fn replay(args: &ReplayArgs, out: &mut Out, stop: &AtomicBool) -> Result<bool> {
     let (from, until) = (args.from.unwrap_or(0), args.until.unwrap_or(u64::MAX));
     if from > until {
         return Err(Error::Usage(format!(
-            "--from {from} --until {until}: no tick lies between them; give a first one that is not behind the last"
+            "--from {from} --until {until}: no tick lies between them; the first tick must not come after the last"
         )));
     }
     let found = run(args, stop)?;
@@ -35,8 +35,8 @@ pub(super) fn replay(args: &ReplayArgs, out: &mut Out, stop: &AtomicBool) -> Res
         tell(&found, out)?;
     }
     out.flush()?;
-    let damaged = matches!(found.ending, Some(Ending::Damaged(_)));
-    Ok(found.difference.is_none() && found.compared() > 0 && !damaged)
+    let is_part = matches!(found.ending, Some(Ending::Damaged(_) | Ending::Early(_)));
+    Ok(found.difference.is_none() && found.compared() > 0 && !is_part)
 }
 
 impl Found {
@@ -51,7 +51,7 @@ fn run(args: &ReplayArgs, stop: &AtomicBool) -> Result<Found> {
     let facts = start.facts.clone();
     if facts.sweepd_version != env!("CARGO_PKG_VERSION") {
         tracing::warn!(
-            "recorded by sweepd {}, replayed by {}: what differs may be what was changed between them",
+            "recorded by sweepd {}, replayed by {}: a difference may come from a change between these versions",
             facts.sweepd_version,
             env!("CARGO_PKG_VERSION")
         );
@@ -63,7 +63,7 @@ fn run(args: &ReplayArgs, stop: &AtomicBool) -> Result<Found> {
     let (mut ticks, mut difference, mut ending) = (0, None, None);
     while difference.is_none() && ticks < until {
         if stop.load(Ordering::Relaxed) {
-            let text = "stopped by a signal before the replay was done; nothing was told";
+            let text = "stopped by a signal before the replay was done; there is no result";
             return Err(Error::Refused(text.to_owned()));
         }
         let (done, all) = reader.progress();

@@ -92,7 +92,7 @@ impl Asked {
             return match args.ros_domain_id {
                 None => Ok(Self { node: None }),
                 Some(_) => Err(Error::Usage(
-                    "--ros-domain-id is of a ROS 2 node: add --ros2".to_owned(),
+                    "--ros-domain-id needs a ROS 2 node: add --ros2".to_owned(),
                 )),
             };
         }

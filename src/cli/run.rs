@@ -14,16 +14,19 @@ use crate::transport::iceoryx::{
 };
 use crate::transport::{Both, Door};
 
-use super::args::{Limit, RunArgs};
+use super::args::RunArgs;
 use super::files::inputs;
 use super::progress::shapes_of;
 use super::record::Tape;
 use super::ros;
+use super::values::Limit;
 
 /// Exit code when the watchdog ends the process.
 const EXIT_WATCHDOG: i32 = 5;
 /// How long the watchdog's last line may take, nanoseconds: that of a machine that thrashes takes seconds.
 const LAST_LINE_NS: u64 = 5_000_000_000;
+/// The watchdog's time where none is given, nanoseconds; a longer heartbeat makes it longer.
+const WATCHDOG_NS: u64 = 10_000_000_000;
 /// Beyond a heartbeat, after which a long tick shows progress; an idle daemon does so each 100 ms, and a busy machine
 /// may keep it waiting for its turn.
 const WATCHDOG_BEYOND_NS: u64 = 1_000_000_000;
@@ -36,7 +39,7 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     let mut scene = Scene::parse_at(&text, &args.scene)?;
     apply(args, &mut scene)?;
     asked.check(&scene)?;
-    check_watchdog(args, &scene)?;
+    let watchdog = watchdog(args, &scene)?;
     let mut read = inputs(&args.scene, &scene);
     read.extend(ros::inputs(ros_words));
     let tape = Tape::of(args, &read)?;
@@ -78,7 +81,7 @@ pub(super) fn run(args: &RunArgs, ros_words: Option<&[String]>, stop: &AtomicBoo
     let clock: Arc<dyn Clock> = Arc::new(SystemClock);
     let mut daemon = Daemon::new(&scene, shapes, boot_id, clock, door)?;
     tape.begin(&mut daemon, &scene, given, boot_id)?;
-    let watchdog = match args.watchdog {
+    let watchdog = match watchdog {
         Limit::None => None,
         Limit::Of(limit_ns) => Some(Watchdog::start(Duration::from_nanos(limit_ns), give_up)?),
     };
@@ -132,17 +135,18 @@ fn give_up() {
     std::process::exit(EXIT_WATCHDOG);
 }
 
-/// Less than a daemon may well stand still would end one that is healthy.
-fn check_watchdog(args: &RunArgs, scene: &Scene) -> Result<()> {
+/// How long a tick may show no progress. Less than a daemon may well stand still would end one that is healthy.
+fn watchdog(args: &RunArgs, scene: &Scene) -> Result<Limit> {
     let least_ns = scene.config.heartbeat_ns.saturating_add(WATCHDOG_BEYOND_NS);
     match args.watchdog {
-        Limit::Of(limit_ns) if limit_ns < least_ns => Err(Error::Usage(format!(
-            "--watchdog: {} ms is less than a healthy daemon may stand still with this scene's heartbeat; give {} ms or \
-             more, or `none`",
+        None => Ok(Limit::Of(WATCHDOG_NS.max(least_ns))),
+        Some(Limit::Of(limit_ns)) if limit_ns < least_ns => Err(Error::Usage(format!(
+            "--watchdog: {} ms is shorter than a healthy daemon may pause with the heartbeat of this scene; give at least \
+             {} ms, or `none`",
             limit_ns / 1_000_000,
             least_ns.div_ceil(1_000_000)
         ))),
-        _ => Ok(()),
+        Some(limit) => Ok(limit),
     }
 }
 

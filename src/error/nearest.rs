@@ -19,13 +19,22 @@ pub(crate) fn nearest<'a>(word: &str, known: &[&'a str]) -> Option<&'a str> {
             best = Some((distance, candidate));
         }
     }
+    // "bodies" is more than two edits from "body".
+    let is_singular = |candidate: &&&str| {
+        let stem = word.strip_suffix("ies");
+        stem.is_some() && candidate.strip_suffix('y') == stem
+    };
     // A word cut short or run on ("pos", "half_extents_m") is meant too.
     let is_part = |candidate: &&&str| {
         word.len() >= 3 && (candidate.starts_with(word) || word.starts_with(**candidate))
     };
     match best {
         Some((_, found)) => Some(found),
-        None => known.iter().find(is_part).copied(),
+        None => {
+            let mut known = known.iter();
+            let singular = known.clone().find(is_singular);
+            singular.or_else(|| known.find(is_part)).copied()
+        }
     }
 }
 
@@ -97,6 +106,7 @@ mod tests {
         assert_eq!(nearest("msak", known), Some("mask"));
         assert_eq!(nearest("pos", known), Some("position"));
         assert_eq!(nearest("moves_m", known), Some("moves"));
+        assert_eq!(nearest("bodies", &["source", "body"]), Some("body"));
         assert_eq!(nearest("colour", known), None);
         assert_eq!(nearest("", known), None);
         assert_eq!(nearest("b", &["a", "c"]), None);

@@ -5,6 +5,7 @@
 //! where all pairs were told.
 
 use std::cmp::Ordering;
+use std::collections::BTreeSet;
 
 use super::differ::Spot;
 use crate::wire::{Demand, MessageHeader, Outbox, PairRow, State, Verdict, pair_flags};
@@ -20,13 +21,42 @@ pub struct Judged {
     pub open: u64,
 }
 
+/// The pairs that the replay certified colliding in its tick before: no touch on the way from there is news to it,
+/// while the recording may have left those poses open, and have found the first touch behind a step that jumped.
+#[derive(Debug, Default)]
+pub(super) struct Before {
+    pairs: BTreeSet<(u64, u64)>,
+    /// Rows were left out: it may be any pair.
+    cut: bool,
+}
+
+impl Before {
+    /// Takes what a replayed tick told, for the next one.
+    pub(super) fn take(&mut self, replayed: &Outbox) {
+        let colliding = live(&replayed.pairs).filter(|row| verdict(row) == Verdict::Colliding);
+        self.pairs.clear();
+        self.pairs
+            .extend(colliding.map(|row| (row.body_a, row.body_b)));
+        self.cut = !is_whole(&replayed.pairs_header);
+    }
+
+    /// Whether a recorded touch on the way is none that the replay would tell again.
+    fn covers(&self, row: &PairRow) -> bool {
+        let on_way = has(row, pair_flags::SWEPT_HIT) && verdict(row) != Verdict::Colliding;
+        let known = || self.cut || self.pairs.contains(&(row.body_a, row.body_b));
+        on_way && (is_of_before(row) || known())
+    }
+}
+
 /// The first thing that a recorded tick said wrongly.
 ///
 /// * `demand` - who listened to the recorded one; the replayed one is filled with pairs.
+/// * `before` - what the replay told in the tick before.
 pub(super) fn judge(
     recorded: &Outbox,
     replayed: &Outbox,
     demand: Demand,
+    before: &Before,
     judged: &mut Judged,
 ) -> Option<Spot> {
     if demand.pairs {
@@ -37,12 +67,14 @@ pub(super) fn judge(
             let spot = match order(one, two) {
                 None => break,
                 Some(Ordering::Equal) => {
-                    let spot = one.zip(two).and_then(|(one, two)| both(one, two, judged));
+                    let spot = one
+                        .zip(two)
+                        .and_then(|(one, two)| both(one, two, before, judged));
                     (one, two) = (a.next(), b.next());
                     spot
                 }
                 Some(Ordering::Less) => {
-                    let spot = one.filter(|_| whole).and_then(alone);
+                    let spot = one.filter(|_| whole).and_then(|one| alone(one, before));
                     judged.rows += u64::from(whole);
                     one = a.next();
                     spot
@@ -62,7 +94,7 @@ pub(super) fn judge(
             }
         }
     }
-    state(recorded, replayed)
+    state(recorded, replayed, before)
 }
 
 /// Rows of pairs that are there.
@@ -113,7 +145,7 @@ fn is_apart(row: &PairRow) -> bool {
 }
 
 /// A pair that both tell of.
-fn both(one: &PairRow, two: &PairRow, judged: &mut Judged) -> Option<Spot> {
+fn both(one: &PairRow, two: &PairRow, before: &Before, judged: &mut Judged) -> Option<Spot> {
     judged.rows += 1;
     if touches(two) {
         judged.collisions += 1;
@@ -130,18 +162,21 @@ fn both(one: &PairRow, two: &PairRow, judged: &mut Judged) -> Option<Spot> {
     if against && !touching {
         return Some(spot(one, "verdict", &words(one), &words(two)));
     }
-    swept(one, two)
+    swept(one, two, before)
 }
 
 /// What is said of the way to this tick's poses.
-fn swept(one: &PairRow, two: &PairRow) -> Option<Spot> {
+fn swept(one: &PairRow, two: &PairRow, before: &Before) -> Option<Spot> {
     let (hit, open) = (pair_flags::SWEPT_HIT, pair_flags::SWEPT_OPEN);
     // Decided in the replay, and said otherwise in the recording. Who collides now has touched: that it did so on the
     // way is no news where it collided before, which one may have certified a tick earlier than the other.
     let denied = has(two, hit) && !touches(one) && !has(one, open);
-    let invented = has(one, hit) && !is_of_before(one) && !touches(two) && !has(two, open);
-    let apart =
-        has(one, hit) && has(two, hit) && (one.toi_min > two.toi_max || two.toi_min > one.toi_max);
+    let invented = has(one, hit) && !before.covers(one) && !touches(two) && !has(two, open);
+    // A step that jumped was not asked: it may have touched there before.
+    let later = |one: &PairRow, two: &PairRow| {
+        one.toi_min > two.toi_max && !has(one, pair_flags::TELEPORTED)
+    };
+    let apart = has(one, hit) && has(two, hit) && (later(one, two) || later(two, one));
     let show = |row: &PairRow| match (has(row, hit), has(row, open)) {
         (true, _) => format!("touched at {:?} to {:?}", row.toi_min, row.toi_max),
         (_, true) => "open".to_owned(),
@@ -157,28 +192,29 @@ fn is_of_before(row: &PairRow) -> bool {
 }
 
 /// A pair that the recording alone tells of: the replay proved it apart, and not near.
-fn alone(one: &PairRow) -> Option<Spot> {
-    let wrong = touches(one) || one.gap_max_m <= 0.0;
+fn alone(one: &PairRow, before: &Before) -> Option<Spot> {
+    let wrong = (touches(one) && !before.covers(one)) || one.gap_max_m <= 0.0;
     let wrong = wrong && !is_touch(one);
     wrong.then(|| spot(one, "verdict", &words(one), "no row: apart"))
 }
 
 /// What was said in one word.
-fn state(recorded: &Outbox, replayed: &Outbox) -> Option<Spot> {
+fn state(recorded: &Outbox, replayed: &Outbox, before: &Before) -> Option<Spot> {
     let word = |out: &Outbox| State::from_code(out.tick.header.state);
     let (one, two) = (word(recorded)?, word(replayed)?);
     let is_safe = |state: State| matches!(state, State::Clear | State::Near);
     // By touches within rounding alone either word may be had.
-    let by_touches = |out: &Outbox| {
+    let by_touches = |out: &Outbox, is_of_before: &dyn Fn(&PairRow) -> bool| {
         let news = |row: &&PairRow| touches(row) && !is_of_before(row);
         let mut touching = live(&out.pairs).filter(news).peekable();
         is_whole(&out.pairs_header) && touching.peek().is_some() && touching.all(only_touches)
     };
-    let denied = is_safe(one) && two == State::Colliding && !by_touches(replayed);
-    let of_now = |row: &&PairRow| touches(row) && !is_of_before(row);
-    let of_before = recorded.pairs.iter().any(is_of_before);
-    let of_before = of_before && !recorded.pairs.iter().any(|row| of_now(&row));
-    let invented = one == State::Colliding && is_safe(two) && !of_before && !by_touches(recorded);
+    let denied = is_safe(one) && two == State::Colliding && !by_touches(replayed, &is_of_before);
+    let covered = |row: &PairRow| before.covers(row);
+    let of_now = |row: &PairRow| touches(row) && !covered(row);
+    let of_before = recorded.pairs.iter().any(covered) && !recorded.pairs.iter().any(of_now);
+    let invented =
+        one == State::Colliding && is_safe(two) && !of_before && !by_touches(recorded, &covered);
     (denied || invented).then(|| Spot {
         field: "state".to_owned(),
         ..Spot::whole("tick", one.word(), two.word())
@@ -199,126 +235,4 @@ fn words(row: &PairRow) -> String {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn row(body_b: u64, verdict: Verdict, gap_min_m: f64, gap_max_m: f64) -> PairRow {
-        PairRow {
-            body_a: 1,
-            body_b,
-            gap_min_m,
-            gap_max_m,
-            verdict: verdict.code(),
-            ..PairRow::default()
-        }
-    }
-
-    fn out(pairs: Vec<PairRow>) -> Outbox {
-        Outbox {
-            pairs,
-            ..Outbox::default()
-        }
-    }
-
-    fn field(one: Vec<PairRow>, two: Vec<PairRow>) -> Option<String> {
-        let demand = Demand::ALL;
-        let (one, two) = (out(one), out(two));
-        judge(&one, &two, demand, &mut Judged::default()).map(|spot| spot.field)
-    }
-
-    #[test]
-    fn what_is_open_or_borne_out_holds() {
-        let deep = row(2, Verdict::Colliding, -0.1, -0.1);
-        let open = row(2, Verdict::Possible, -1.0, 0.5);
-        assert_eq!(field(vec![open], vec![deep]), None);
-        assert_eq!(field(vec![deep], vec![deep]), None);
-        // Not decided, and apart.
-        assert_eq!(field(vec![open], vec![]), None);
-        // Within rounding of a touch either is right.
-        let mut touch = row(2, Verdict::Colliding, -1e-16, 1e-16);
-        touch.flags = pair_flags::TOUCHING;
-        let near = row(2, Verdict::Near, 1e-17, 2e-16);
-        for one in [vec![near], vec![]] {
-            let (mut one, mut two) = (out(one), out(vec![touch]));
-            one.tick.header.state = State::Clear.code();
-            two.tick.header.state = State::Colliding.code();
-            for (recorded, replayed) in [(&one, &two), (&two, &one)] {
-                let judged = &mut Judged::default();
-                assert_eq!(judge(recorded, replayed, Demand::ALL, judged), None);
-            }
-            // One on the way is another matter.
-            two.pairs[0].flags |= pair_flags::SWEPT_HIT;
-            assert!(judge(&one, &two, Demand::ALL, &mut Judged::default()).is_some());
-        }
-        // The last row of a pair that is gone says nothing of now.
-        let mut gone = deep;
-        gone.flags = pair_flags::GONE;
-        assert_eq!(field(vec![gone], vec![]), None);
-    }
-
-    #[test]
-    fn what_is_not_borne_out_is_found() {
-        let deep = row(3, Verdict::Colliding, -0.1, -0.1);
-        let near = row(3, Verdict::Near, 0.1, 0.2);
-        let verdict = Some("verdict".to_owned());
-        // A collision that was not told of, or none that was.
-        assert_eq!(field(vec![], vec![deep]), verdict);
-        assert_eq!(field(vec![deep], vec![]), verdict);
-        assert_eq!(
-            field(vec![near], vec![deep]),
-            Some("gap interval, metres".to_owned())
-        );
-        let wrong = row(3, Verdict::Near, -0.2, 0.2);
-        assert_eq!(field(vec![wrong], vec![deep]), verdict);
-        let mut hit = near;
-        hit.flags = pair_flags::SWEPT_HIT;
-        hit.toi_max = 0.5;
-        assert_eq!(field(vec![near], vec![hit]), Some("way".to_owned()));
-        assert_eq!(field(vec![hit], vec![near]), Some("way".to_owned()));
-    }
-
-    #[test]
-    fn bug_a_touch_at_the_poses_before_is_news_where_they_were_not_decided() {
-        let near = row(3, Verdict::Near, 0.1, 0.2);
-        let mut hit = near;
-        hit.flags = pair_flags::SWEPT_HIT;
-        let (mut one, mut two) = (out(vec![hit]), out(vec![near]));
-        one.tick.header.state = State::Colliding.code();
-        two.tick.header.state = State::Near.code();
-        let judge = |one: &Outbox| judge(one, &two, Demand::ALL, &mut Judged::default());
-        assert_eq!(judge(&one), None);
-        // Missed in the recording it is a difference all the same, and so is one on the way.
-        assert_eq!(field(vec![near], vec![hit]), Some("way".to_owned()));
-        one.pairs[0].toi_max = 0.5;
-        assert_eq!(judge(&one).unwrap().field, "way");
-    }
-
-    #[test]
-    fn bug_a_touch_on_the_way_of_what_collides_now_is_news_in_one_tick_or_another() {
-        let known = row(3, Verdict::Colliding, -0.1, -0.1);
-        let mut news = known;
-        news.flags = pair_flags::SWEPT_HIT;
-        for toi_max in [0.0, 1.0] {
-            (news.toi_min, news.toi_max) = (0.0, toi_max);
-            assert_eq!(field(vec![news], vec![known]), None);
-            assert_eq!(field(vec![known], vec![news]), None);
-        }
-        let (mut early, mut late) = (news, news);
-        (early.toi_min, early.toi_max) = (0.1, 0.2);
-        (late.toi_min, late.toi_max) = (0.3, 0.4);
-        assert_eq!(field(vec![early], vec![late]), Some("way".to_owned()));
-    }
-
-    #[test]
-    fn where_rows_were_left_out_absence_says_nothing_but_the_state_must_not_be_clear() {
-        let deep = row(3, Verdict::Colliding, -0.1, -0.1);
-        let (mut one, mut two) = (out(vec![]), out(vec![deep]));
-        one.pairs_header.truncated = 1;
-        one.tick.header.state = State::Unknown.code();
-        two.tick.header.state = State::Colliding.code();
-        let judge = |one: &Outbox| judge(one, &two, Demand::ALL, &mut Judged::default());
-        assert_eq!(judge(&one), None);
-        one.tick.header.state = State::Clear.code();
-        assert_eq!(judge(&one).unwrap().field, "state");
-    }
-}
+mod tests;

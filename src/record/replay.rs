@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::differ::{self, Spot};
 use super::given::{Between, EditRecord, Origin, Start, TickRecord, TreeMark, copy_outbox};
-use super::law::{self, Judged};
+use super::law::{self, Before, Judged};
 use crate::config::Mode;
 use crate::error::{Error, Result};
 use crate::ids::{BodyId, SourceSlot};
@@ -101,6 +101,8 @@ pub struct Replay {
     said: Outbox,
     /// A tick was limited by time: from then on by the law.
     lawful: bool,
+    /// What the replay certified in its last tick.
+    before: Before,
     tally: Tally,
 }
 
@@ -140,6 +142,7 @@ impl Replay {
             names: BTreeMap::new(),
             said: Outbox::default(),
             lawful: false,
+            before: Before::default(),
             tally: Tally::default(),
         })
     }
@@ -181,6 +184,9 @@ impl Replay {
             }
         }
         let spot = if compared { self.compare(record) } else { None };
+        if self.lawful {
+            self.before.take(self.engine.outbox());
+        }
         self.engine.note_sent(0);
         Ok(spot.map(|spot| self.difference(tick, spot)))
     }
@@ -223,8 +229,8 @@ impl Replay {
         if self.lawful {
             self.tally.lawful += 1;
             let replayed = self.engine.outbox();
-            return edit
-                .or_else(|| law::judge(&record.out, replayed, demand, &mut self.tally.judged));
+            let (before, judged) = (&self.before, &mut self.tally.judged);
+            return edit.or_else(|| law::judge(&record.out, replayed, demand, before, judged));
         }
         self.tally.exact += 1;
         copy_outbox(self.engine.outbox(), demand, &mut self.said);

@@ -7,7 +7,7 @@ use crate::limits::{COORDINATE_MAX_M, QUATERNION_NORM_TOLERANCE, REQUEST_BYTES_M
 use crate::math::{Pose, pose_from};
 use crate::scene::PlacedSpec;
 use crate::scene::node::{Fault, Node, Value};
-use crate::scene::table::{Table, list, real, reals};
+use crate::scene::table::{Table, list, real, reals, shortened};
 use crate::shape::ShapeSpec;
 
 /// Every type and its keys.
@@ -49,10 +49,7 @@ pub(crate) fn read_shape(node: Node, blobs: Option<&[u8]>) -> Result<PlacedSpec,
             Some(name) => format!("did you mean \"{name}\"?"),
             None => format!("write one of {}", names.join(", ")),
         };
-        let text = format!(
-            "there is no shape of type \"{}\": {mend}",
-            kind.escape_default()
-        );
+        let text = format!("there is no shape of type \"{}\": {mend}", shortened(kind));
         return Err(Fault::new(at, text));
     };
     let mut known = [PLACE_KEYS, keys].concat();

@@ -85,7 +85,9 @@ fn check_reference(
             return Err(within(draft, at, text));
         }
         if !by_name.contains_key(name) {
-            let known: Vec<&str> = drafts.iter().map(|d| d.spec.name.as_str()).collect();
+            let names = drafts.iter().map(|d| d.spec.name.as_str());
+            // A body is not its own.
+            let known: Vec<&str> = names.filter(|own| *own != draft.spec.name).collect();
             let text = format!(
                 "{key} names body \"{}\", which is not there: {}",
                 shortened(name),

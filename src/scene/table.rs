@@ -2,6 +2,11 @@
 
 use crate::error::nearest;
 use crate::scene::node::{Entry, Fault, Node, Value};
+use crate::scene::read_body::BODY_NAME_BYTES_MAX;
+
+/// Letters of a text that a message shows at most: as many as the longest name may have. Less would cut off what tells
+/// two names of a generated scene apart.
+const SHOWN_MAX: usize = BODY_NAME_BYTES_MAX;
 
 /// A table being read. Values are taken out by key.
 #[derive(Debug)]
@@ -93,20 +98,21 @@ impl Table {
             return Ok(None);
         };
         let (at, kind) = (node.at, node.kind());
-        let whole = match node.value {
-            Value::Whole(whole) => u64::try_from(whole).ok(),
-            Value::Large(large) => Some(large),
-            Value::Real(_) => None,
-            _ => {
-                let text = format!("{key} is {kind}: write a whole number from {min} to {max}");
+        let (whole, told) = match node.value {
+            Value::Whole(whole) => (u64::try_from(whole).ok(), whole.to_string()),
+            Value::Large(large) => (Some(large), large.to_string()),
+            Value::Real(real) if real.fract() == 0.0 => {
+                let text =
+                    format!("{key} is {real:?}: write a whole number, without a point or exponent");
                 return Err(Fault::new(at, text));
             }
+            Value::Real(real) => (None, real.to_string()),
+            _ => (None, kind.to_owned()),
         };
         match whole {
             Some(whole) if (min..=max).contains(&whole) => Ok(Some(whole)),
             _ => {
-                let text =
-                    format!("{key} is out of range: write a whole number from {min} to {max}");
+                let text = format!("{key} is {told}: write a whole number from {min} to {max}");
                 Err(Fault::new(at, text))
             }
         }
@@ -164,7 +170,7 @@ impl Table {
         if name.chars().any(char::is_control) {
             let text = format!(
                 "{key} \"{}\" has a control character: leave it out",
-                name.escape_default()
+                shortened(&name)
             );
             return Err(Fault::new(at, text));
         }
@@ -233,14 +239,21 @@ pub(crate) fn list(node: Node, what: &str) -> Result<Vec<Node>, Fault> {
     }
 }
 
-/// The head of a long text.
+/// A text as messages show it: what has no glyph is escaped, and what is longer than any name is cut off.
 pub(crate) fn shortened(text: &str) -> String {
-    let head: String = text.chars().take(40).collect();
-    if head.len() < text.len() {
-        format!("{}..", head.escape_default())
-    } else {
-        head.escape_default().to_string()
+    let mut shown = String::new();
+    for (nth, letter) in text.chars().enumerate() {
+        if nth == SHOWN_MAX {
+            shown.push_str("..");
+            break;
+        }
+        if letter.is_control() {
+            shown.extend(letter.escape_default());
+        } else {
+            shown.push(letter);
+        }
     }
+    shown
 }
 
 fn unknown_key(entry: &Entry, what: &str, known: &[&str]) -> Fault {
@@ -280,6 +293,30 @@ mod tests {
                 fault.text
             );
             assert_eq!(fault.at, Some(7));
+        }
+    }
+
+    #[test]
+    fn bug_names_were_cut_within_their_limit_and_their_letters_written_as_numbers() {
+        let long = "greifer_ä".repeat(10);
+        assert_eq!(shortened(&long), long);
+        assert_eq!(shortened("\u{7}'ü\n"), "\\u{7}'ü\\n");
+        let cut = shortened(&"x".repeat(105));
+        assert_eq!(cut, format!("{}..", "x".repeat(104)));
+    }
+
+    #[test]
+    fn bug_a_whole_number_with_a_point_was_called_out_of_range() {
+        let fault = |text: &str| {
+            let node = Node::from_toml(text).unwrap();
+            let mut table = Table::open(node, "a thing", &["bodies"]).unwrap();
+            table.whole("bodies", 1, 9).unwrap_err().text
+        };
+        let point = "bodies is 10.0: write a whole number, without a point or exponent";
+        assert_eq!(fault("bodies = 10.0"), point);
+        for (value, told) in [("-3", "-3"), ("10", "10"), ("2.5", "2.5"), ("nan", "NaN")] {
+            let text = format!("bodies is {told}: write a whole number from 1 to 9");
+            assert_eq!(fault(&format!("bodies = {value}")), text);
         }
     }
 }

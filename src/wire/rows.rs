@@ -120,7 +120,7 @@ pub struct PairRow {
     /// sent, or a body is silent, refused or deforms).
     pub closing_mps: f64,
     /// Of a swept pair that touched, or may have, on the way from the last tick's poses (0) to this one's (1): the
-    /// share before which it did not; NaN: not swept, or free of touch.
+    /// share before which it did not (steps that jumped, which are not swept, aside); NaN: not swept, or free of touch.
     pub toi_min: f64,
     /// The share by which it had touched first (`SWEPT_HIT`), or 1 (`SWEPT_OPEN`); NaN as `toi_min`.
     pub toi_max: f64,

@@ -92,6 +92,9 @@ fn a_recorded_run_replays_bit_by_bit_with_code_0() {
     );
     let text = out(&output(&["replay", path(&file), "--from", "99999"]));
     assert!(text.contains("nothing was compared"), "{text}");
+    let ended = output(&["replay", path(&file), "--until", "0"]);
+    assert_eq!(code(&ended), Some(2), "bug: {}", err(&ended));
+    assert!(err(&ended).contains("from 1 on"), "{}", err(&ended));
     let ended = output(&["replay", path(&file), "--from", "10", "--until", "5"]);
     assert_eq!(code(&ended), Some(2), "bug: {}", err(&ended));
     let text = out(&output(&["replay", path(&file)]));
@@ -164,10 +167,12 @@ fn a_file_that_cannot_be_is_refused_before_the_daemon_runs() {
     let ended = run("/nowhere/run.mcap", &[]);
     assert_eq!(code(&ended), Some(4));
     assert!(err(&ended).contains("/nowhere/run.mcap"), "{}", err(&ended));
-    // A device that is always full.
-    let ended = run("/dev/full", &["--force"]);
-    assert_eq!(code(&ended), Some(4));
-    assert!(err(&ended).contains("is the disk full?"), "{}", err(&ended));
+    // A device, and a folder.
+    for (wrong, word) in [("/dev/full", "a device"), ("/tmp", "is a folder")] {
+        let ended = run(wrong, &["--force"]);
+        assert_eq!(code(&ended), Some(4));
+        assert!(err(&ended).contains(word), "{}", err(&ended));
+    }
     let ended = output(&["run", path(&scene), "--force"]);
     assert_eq!(code(&ended), Some(2), "{}", err(&ended));
 }

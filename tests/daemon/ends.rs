@@ -283,6 +283,16 @@ fn a_watchdog_that_would_take_an_idle_daemon_for_a_stuck_one_is_refused() {
     }
 }
 
+/// Nobody gave a --watchdog, and the default was refused.
+#[test]
+fn bug_a_long_heartbeat_is_no_reason_to_refuse_the_default_watchdog() {
+    let desk = Desk::new();
+    let scene = TWO_SPHERES.replace("[run]", "[run]\nheartbeat_ms = 20000");
+    let mut daemon = desk.run(&scene, &[]);
+    until("it runs", || daemon.stderr().contains(" runs "));
+    assert_eq!(daemon.stop().0.code(), Some(0), "{}", daemon.stderr());
+}
+
 #[test]
 fn a_number_of_ticks_ends_the_daemon() {
     let desk = Desk::new();

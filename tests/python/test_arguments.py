@@ -3,7 +3,9 @@
 Needs `SWEEPD=path/to/sweepd` and the package of msgs/python with its wheels.
 """
 
+import collections
 import os
+import types
 
 import pytest
 from daemons import FIRST, NO_TURN, started  # noqa: F401
@@ -65,6 +67,13 @@ def test_bug_ids_that_are_no_whole_numbers_are_not_cut(client):
         assert client.step((good, at, turn), timeout_s=5).state == "clear"
     assert list(client.rows(([1, 2**63], at, turn))["body"]) == [1, 2**63]
     assert list(client.rows(([2**64 - 1, 1], at, turn))["body"]) == [2**64 - 1, 1]
+
+
+def test_bug_poses_by_name_were_taken_of_a_dict_alone(client):
+    poses = types.MappingProxyType(POSES)
+    assert client.step(poses, timeout_s=5).state == "clear"
+    assert list(client.rows(poses)["body"]) == [client.names["cart"], client.names["post"]]
+    refused("the scene has no body", client.send, collections.ChainMap({"cat": POSES["cart"]}, POSES))
 
 
 def test_bug_a_pose_that_does_not_fit_is_told_by_the_name_of_its_body(client):

@@ -506,6 +506,43 @@ def test_the_command_line_writes_a_scene_and_refuses_with_code_4(tmp_path):
     assert subprocess.run([*bridge, "--help"], capture_output=True, check=False).returncode == 0
 
 
+def test_bug_a_program_beside_the_caller_was_looked_for_in_the_path(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    program = tmp_path / "sweepd"
+    program.write_text("#!/bin/sh\nexit 7\n")
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    with Daemon(Path("./sweepd"), tmp_path / "scene.toml", "x") as daemon:
+        assert daemon.process.wait() == 7
+    (tmp_path / "folder").mkdir()
+    program.write_bytes(b"\x7fELF, but no more of it")
+    for wrong, told in (("folder", "is no program"), ("sweepd", "cannot be started")):
+        with pytest.raises(model.Refused, match=told):
+            Daemon(Path(wrong), tmp_path / "scene.toml", "x").__enter__()
+
+
+def test_bug_numbers_that_cannot_be_meant_were_taken_or_ended_in_a_traceback(tmp_path):
+    script = [sys.executable, str(SCRIPTS / "mujoco_bridge.py"), str(SCRIPTS / "models" / "pile.xml")]
+
+    def ended(*arguments, **more):
+        done = subprocess.run([*script, *arguments], capture_output=True, text=True, check=False, cwd=tmp_path, **more)
+        assert "Traceback" not in done.stderr, done.stderr
+        return done
+
+    for wrong in (("--steps", "-5"), ("--rate", "0"), ("--rate", "-1"), ("--seed", "-1"), ("--ctrl-noise", "nan")):
+        done = ended(*wrong)
+        assert done.returncode == 2 and f"argument {wrong[0]}" in done.stderr, (wrong, done.stderr)
+    done = ended("--steps", "0", "--scene-out", "/nowhere/s.toml")
+    assert done.returncode == 4 and "/nowhere/s.toml" in done.stderr
+    # Nothing was compared: that is no proof of anything.
+    done = ended("--steps", "0", "--compare", "--json")
+    assert done.returncode == 1 and json.loads(done.stdout)["equal"] is False
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run([*script, "--steps", "0"], stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 live = pytest.mark.skipif("SWEEPD" not in os.environ, reason="SWEEPD names no daemon to run")
 
 

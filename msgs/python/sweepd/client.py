@@ -7,7 +7,8 @@ import json
 import operator
 import secrets
 import time
-from typing import Any, Iterable, Mapping, Optional, Sequence, Union
+from collections.abc import Mapping
+from typing import Any, Iterable, Optional, Sequence, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -378,7 +379,7 @@ class Client:
         if self._quat_order is None:
             raise SweepdError('a reader that makes rows says how it writes quaternions: quat_order="xyzw" or "wxyz"')
         wxyz = self._quat_order == "wxyz"
-        if isinstance(poses, dict):
+        if isinstance(poses, Mapping):
             rows = rows_of(self._ids(poses), columns_of(poses), wxyz, poses)
         else:
             try:

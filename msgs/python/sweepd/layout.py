@@ -205,7 +205,7 @@ class PairRow(_Row):
         # was sent, or a body is silent, refused or deforms).
         ("closing_mps", ctypes.c_double),
         # Of a swept pair that touched, or may have, on the way from the last tick's poses (0) to this one's (1): the share
-        # before which it did not; NaN: not swept, or free of touch.
+        # before which it did not (steps that jumped, which are not swept, aside); NaN: not swept, or free of touch.
         ("toi_min", ctypes.c_double),
         # The share by which it had touched first (SWEPT_HIT), or 1 (SWEPT_OPEN); NaN as toi_min.
         ("toi_max", ctypes.c_double),

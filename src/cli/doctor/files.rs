@@ -115,7 +115,7 @@ fn judge_root(root: &Path, meta: &Metadata, us: u32) -> Finding {
     if !meta.is_dir() {
         return Finding::wrong(
             check,
-            format!("{shown} is no directory, and iceoryx2 keeps its files there"),
+            format!("{shown} is not a directory, and iceoryx2 keeps its files there"),
             "remove it",
         );
     }

@@ -47,7 +47,7 @@ fn room() -> Vec<Finding> {
     if statfs(SHARED).is_ok_and(|stat| stat.f_type != TMPFS) {
         found.push(Finding::warning(
             check,
-            format!("{SHARED} is no tmpfs: messages may go to a disk"),
+            format!("{SHARED} is not a tmpfs: messages may go to a disk"),
             "mount a tmpfs there",
         ));
     }

@@ -47,7 +47,7 @@ impl Face {
             return Ok(Self::Lines);
         }
         Err(Error::Usage(
-            "this sweepd was built without the screen of `monitor`: add --json for a line a tick, or build it with the feature `tui` (it is on by default)"
+            "this sweepd was built without the screen of `monitor`: add --json for one line per tick, or build it with the feature `tui` (it is on by default)"
                 .to_owned(),
         ))
     }

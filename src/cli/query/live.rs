@@ -115,13 +115,13 @@ pub(super) fn ask<T>(
         }
         if left_ns == 0 {
             return Err(Error::TimedOut(format!(
-                "the daemon `{instance}` gave no answer within {}; give it longer with --wait, or see `sweepd doctor`",
+                "the daemon `{instance}` gave no answer within {}; wait longer with --wait, or see `sweepd doctor`",
                 time(args.wait)
             )));
         }
     };
     let mut answer: Answer = serde_json::from_str(&text)
-        .map_err(|e| Error::io(format!("the daemon's answer is no answer: {text}"), e))?;
+        .map_err(|e| Error::io(format!("the daemon's answer cannot be read: {text}"), e))?;
     match found(&mut answer) {
         Some(found) => Ok((found, answer.warnings)),
         None => match answer.error {

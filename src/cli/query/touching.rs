@@ -38,7 +38,7 @@ fn question(args: &QueryArgs) -> Result<Value> {
             return Err(Error::Usage(format!("--shape is empty: {SHAPE_MEND}")));
         }
         asked["shape"] = serde_json::from_str(text)
-            .map_err(|e| Error::Usage(format!("--shape is no JSON: {e}; {SHAPE_MEND}")))?;
+            .map_err(|e| Error::Usage(format!("--shape is not JSON: {e}; {SHAPE_MEND}")))?;
     }
     if let Some(at) = flags.at {
         asked["position"] = json!(at.position);

@@ -21,9 +21,9 @@ use crate::wire::{MessageHeader, TickRow};
 /// Longest wait before a look at the stop flag, nanoseconds.
 const LOOK_NS: u64 = 100_000_000;
 
-/// The names of a boot come with the first ticks that are heard of it: for so long ticks without are passed over,
-/// nanoseconds. Their rows would be without names.
-const NAMES_WAIT_NS: u64 = 1_000_000_000;
+/// What is listened to comes with the first ticks that are heard of a boot: for so long ticks without are passed over,
+/// nanoseconds. Their rows would be without names, or missing.
+const FIRST_WAIT_NS: u64 = 1_000_000_000;
 
 type Log = McapLog<BufWriter<File>>;
 
@@ -51,14 +51,7 @@ pub(in crate::cli) fn record(args: &RecordArgs, out: &mut Out, stop: &AtomicBool
     super::tell_limit(&name);
     let since_1970_ns = clock.realtime_ns().saturating_sub(clock.boottime_ns());
     let mut log = McapLog::new(file, &name, &args.frame_id, since_1970_ns)?;
-    let only = |topic| args.only.is_empty() || args.only.contains(&topic);
-    client.subscribe(Topics {
-        pairs: only(Recorded::Pairs),
-        contacts: only(Recorded::Contacts),
-        bodies: only(Recorded::Bodies),
-        names: true,
-        ..Topics::default()
-    })?;
+    client.subscribe(topics(args))?;
     let mut tally = Tally::default();
     let done = follow(args, &mut client, &mut log, &mut tally, stop);
     // Whatever ended it, the file is closed and says so.
@@ -83,6 +76,26 @@ pub(in crate::cli) fn record(args: &RecordArgs, out: &mut Out, stop: &AtomicBool
     done.and(closed).map(|()| true)
 }
 
+/// What is listened to.
+fn topics(args: &RecordArgs) -> Topics {
+    let only = |topic| args.only.is_empty() || args.only.contains(&topic);
+    Topics {
+        pairs: only(Recorded::Pairs),
+        contacts: only(Recorded::Contacts),
+        bodies: only(Recorded::Bodies),
+        names: true,
+        ..Topics::default()
+    }
+}
+
+/// Whether all of these came.
+fn has_all(view: &View, topics: Topics) -> bool {
+    view.names().is_some()
+        && (!topics.pairs || view.pairs().is_some())
+        && (!topics.contacts || view.contacts().is_some())
+        && (!topics.bodies || view.bodies().is_some())
+}
+
 fn follow(
     args: &RecordArgs,
     client: &mut Client,
@@ -94,7 +107,9 @@ fn follow(
     let start_ns = clock.monotonic_ns();
     let until_ns = args.time.map(|time| start_ns.saturating_add(time));
     let (mut heard_ns, mut flushed_ns) = (start_ns, start_ns);
-    let mut named_by_ns = start_ns.saturating_add(NAMES_WAIT_NS);
+    let topics = topics(args);
+    let mut is_begun = false;
+    let mut begun_by_ns = start_ns.saturating_add(FIRST_WAIT_NS);
     while !stop.load(Ordering::Relaxed) && args.ticks.is_none_or(|most| log.ticks() < most) {
         let now_ns = clock.monotonic_ns();
         let left_ns = until_ns.map_or(LOOK_NS, |until| until.saturating_sub(now_ns));
@@ -104,12 +119,14 @@ fn follow(
         match client.wait_tick(left_ns.min(LOOK_NS))? {
             Heard::Tick => {
                 heard_ns = now_ns;
-                if client.view().names().is_some() || now_ns >= named_by_ns {
+                is_begun = is_begun || now_ns >= begun_by_ns || has_all(client.view(), topics);
+                if is_begun {
                     tally.tick(log, client.view())?;
                 }
             }
             Heard::Restarted(news) => {
-                named_by_ns = now_ns.saturating_add(NAMES_WAIT_NS);
+                is_begun = false;
+                begun_by_ns = now_ns.saturating_add(FIRST_WAIT_NS);
                 tally.restart(log, &news)?;
             }
             Heard::Silence if now_ns.saturating_sub(heard_ns) >= args.wait => {
@@ -206,5 +223,37 @@ mod tests {
             assert_eq!(tally.missed, missed, "tick {tick}");
         }
         std::fs::remove_file(&path).unwrap();
+    }
+
+    #[test]
+    fn bug_the_first_tick_was_often_written_without_what_was_to_be_recorded() {
+        let (mut server, mut client) = met();
+        let topics = Topics {
+            pairs: true,
+            bodies: true,
+            names: true,
+            ..Topics::default()
+        };
+        client.subscribe(topics).unwrap();
+        let mut out = Outbox {
+            names_changed: true,
+            ..Outbox::default()
+        };
+        // A daemon that has not seen yet that somebody listens publishes names alone.
+        for (tick, comes) in [(1, false), (2, true)] {
+            for header in [
+                &mut out.tick.header,
+                &mut out.pairs_header,
+                &mut out.bodies_header,
+            ] {
+                (header.boot_id, header.tick) = (7, tick);
+            }
+            if comes {
+                assert!(server.demand().bodies);
+            }
+            server.publish(&out).unwrap();
+            assert_eq!(client.wait_tick(SECOND_NS).unwrap(), Heard::Tick);
+            assert_eq!(has_all(client.view(), topics), comes, "tick {tick}");
+        }
     }
 }

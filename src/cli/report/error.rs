@@ -2,10 +2,10 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::cli::args::Limit;
 use crate::cli::args_report::ErrorArgs;
 use crate::cli::files::{check_inputs, inputs};
 use crate::cli::out::Out;
+use crate::cli::values::Limit;
 use crate::daemon::build_shapes;
 use crate::error::{Error, Result, counted};
 use crate::report::error::columns::{Column, columns};
@@ -47,21 +47,27 @@ pub(super) fn error(args: &ErrorArgs, out: &mut Out, stop: &AtomicBool) -> Resul
     .ok_or_else(stopped)?;
     drop(progress);
     let scene = args.scene.display().to_string();
-    if args.json {
-        let mut value = serde_json::to_value(&report)
-            .map_err(|e| Error::io("cannot write the report as JSON", e))?;
-        value["scene"] = scene.as_str().into();
-        value["motion"] = format!("{:?}", args.course.motion).to_lowercase().into();
-        value["summary"] = summary(&report).into();
-        out.line(&value.to_string())?;
-    } else {
-        table(&report, &scene, out)?;
-    }
+    // Before the table: who reads that may have gone.
     if let Some(page) = page {
         page.write(&html(&report, &scene))?;
     }
-    out.flush()?;
+    let told = tell(args, &report, &scene, out);
+    out.or_closed(told)?;
     Ok(!report.is_wrong())
+}
+
+fn tell(args: &ErrorArgs, report: &Report, scene: &str, out: &mut Out) -> Result<()> {
+    if args.json {
+        let mut value = serde_json::to_value(report)
+            .map_err(|e| Error::io("cannot write the report as JSON", e))?;
+        value["scene"] = scene.into();
+        value["motion"] = format!("{:?}", args.course.motion).to_lowercase().into();
+        value["summary"] = summary(report).into();
+        out.line(&value.to_string())?;
+    } else {
+        table(report, scene, out)?;
+    }
+    out.flush()
 }
 
 fn sweep(args: &ErrorArgs) -> Result<Sweep> {

@@ -26,18 +26,24 @@ pub(super) fn stability(args: &StabilityArgs, out: &mut Out, stop: &AtomicBool) 
     })?
     .ok_or_else(stopped)?;
     drop(progress);
-    if args.json {
-        let text = serde_json::to_string(&report)
-            .map_err(|e| Error::io("cannot write the report as JSON", e))?;
-        out.line(&text)?;
-    } else {
-        table(&report, out)?;
-    }
+    // Before the table: who reads that may have gone.
     if let Some(page) = page {
         page.write(&page::html(&report))?;
     }
-    out.flush()?;
+    let told = tell(args.json, &report, out);
+    out.or_closed(told)?;
     Ok(!report.is_wrong())
+}
+
+fn tell(json: bool, report: &Report, out: &mut Out) -> Result<()> {
+    if json {
+        let text = serde_json::to_string(report)
+            .map_err(|e| Error::io("cannot write the report as JSON", e))?;
+        out.line(&text)?;
+    } else {
+        table(report, out)?;
+    }
+    out.flush()
 }
 
 fn list(json: bool, out: &mut Out) -> Result<bool> {

@@ -140,13 +140,21 @@ fn write_line(output: &mut dyn Write, row: &impl Serialize) -> std::io::Result<(
 
 /// The answer to one line, or its id and what is wrong with it.
 fn answer_line(text: &[u8]) -> std::result::Result<Answer, (Value, String)> {
-    let mut value: Value =
-        serde_json::from_slice(text).map_err(|e| (Value::Null, format!("not JSON: {e}")))?;
+    let mut value: Value = serde_json::from_slice(text).map_err(|e| (Value::Null, not_json(&e)))?;
     let id = value.get_mut("id").map_or(Value::Null, Value::take);
     match Case::read(&value).and_then(|case| answer(&case)) {
         Ok(answer) => Ok(Answer { id, ..answer }),
         Err(why) => Err((id, why)),
     }
+}
+
+/// Where it ends to be JSON: the line is that of the file, which is told before.
+fn not_json(e: &serde_json::Error) -> String {
+    let why = e.to_string();
+    format!(
+        "not JSON: {}",
+        why.replace(" at line 1 column", " at column")
+    )
 }
 
 fn answer(case: &Case) -> std::result::Result<Answer, String> {

@@ -77,6 +77,8 @@ pub struct Reader {
     /// Which program wrote it.
     library: String,
     note: Option<Note>,
+    /// How its chunks are compressed; ours are not.
+    compressed: Option<String>,
 }
 
 /// What the last record says.
@@ -144,6 +146,7 @@ impl Reader {
             is_closed,
             library: String::new(),
             note: None,
+            compressed: None,
             name,
         };
         while reader.start.is_none() {
@@ -192,7 +195,8 @@ impl Reader {
                 }
                 Some(Err(McapError::UnexpectedEof)) => return Ok(Err(Ending::Cut)),
                 Some(Err(McapError::UnsupportedCompression(kind))) => {
-                    let text = format!("its chunks are compressed ({kind}): decompress it first");
+                    let text = format!("its chunks are compressed ({kind})");
+                    self.compressed = Some(kind);
                     return Ok(Err(Ending::Damaged(text)));
                 }
                 Some(Err(error)) => return Ok(Err(Ending::Damaged(error.to_string()))),
@@ -304,6 +308,12 @@ impl Reader {
     fn no_start(&self, ending: &Ending) -> Error {
         let ours = self.library.starts_with("sweepd/");
         let ours = ours && (self.topics.is_empty() || self.has_start());
+        if let Some(kind) = &self.compressed {
+            return Error::Usage(format!(
+                "{0}: its chunks are compressed ({kind}): decompress it with `mcap decompress {0} -o FILE.mcap`",
+                self.name
+            ));
+        }
         match ending {
             Ending::Damaged(how) if !ours => self.no_mcap(how),
             Ending::Damaged(how) => Error::Usage(format!(

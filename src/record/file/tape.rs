@@ -257,13 +257,18 @@ fn ending_of(note: &Metadata) -> McapResult<Vec<u8>> {
     Ok(bytes)
 }
 
+fn is_full(kind: ErrorKind) -> bool {
+    matches!(kind, ErrorKind::StorageFull | ErrorKind::QuotaExceeded)
+}
+
 fn told(name: &str, error: McapError) -> Error {
     let why = match &error {
         McapError::Io(e) if e.kind() == ErrorKind::FileTooLarge => {
             "it is as long as a file of this process may be: `ulimit -f unlimited` in the shell that starts it, or in \
              its service's unit"
         }
-        _ => "is the disk full?",
+        McapError::Io(e) if is_full(e.kind()) => "is the disk full?",
+        _ => "nothing more is recorded",
     };
     let what = format!("cannot write the recording {name}; {why}");
     match error {

@@ -287,3 +287,31 @@ fn in_a_hurry_what_is_for_people_is_left_out_and_counted_and_all_that_is_replaye
     });
     assert_eq!(left_out.as_deref(), Some("9"));
 }
+
+#[test]
+fn bug_a_recording_that_somebody_compressed_was_called_no_recording() {
+    let text = |text: &str| {
+        let len = u32::try_from(text.len()).unwrap().to_le_bytes();
+        [&len, text.as_bytes()].concat()
+    };
+    let of_record = |opcode: u8, body: &[u8]| {
+        let len = (body.len() as u64).to_le_bytes();
+        [&[opcode], &len[..], body].concat()
+    };
+    for library in ["sweepd/0", "mcap-cli"] {
+        let header = of_record(1, &[text("ros2"), text(library)].concat());
+        let times_size_and_crc = [0_u8; 28];
+        let records = [&4_u64.to_le_bytes()[..], &[0x28, 0xb5, 0x2f, 0xfd]].concat();
+        let chunk = [&times_size_and_crc[..], &text("zstd"), &records].concat();
+        let bytes = [mcap::MAGIC, &header, &of_record(6, &chunk)].concat();
+        let scrap = Scrap::of(&bytes);
+        let error = Reader::open(&scrap.0).map(|_| ()).unwrap_err();
+        let told = error.to_string();
+        assert!(told.contains("compressed (zstd)"), "{told}");
+        assert!(told.contains("`mcap decompress "), "{told}");
+        assert!(
+            !told.contains("anew") && !told.contains("no MCAP"),
+            "{told}"
+        );
+    }
+}

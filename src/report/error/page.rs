@@ -50,7 +50,7 @@ pub fn html(report: &Report, scene: &str) -> String {
         .collect();
     let heads: Vec<&str> = heads.iter().map(|head| head.trim_end()).collect();
     body += &table(&heads, &rows);
-    body += "<p class=\"note\">Undecided: pair-ticks told as possible. Guess errors: of all pair-ticks, those that are \
+    body += "<p class=\"note\">Undecided: pair-ticks told as possible. Guessed wrong: of all pair-ticks, those that are \
              undecided and whose last verdict is not the truth. Width: of the proved interval of each pair that is told; \
              endless ones are in no mean, but counted. Onset: ticks from the begin of a collision until it is told as certain. Over: time beyond the budget, or beyond \
              the floor where that is more (below its floor a tick takes the floor, and says so). Wrong, excluded: against a \
