@@ -21,12 +21,6 @@ pub(super) struct QueryArgs {
     #[arg(value_name = "B")]
     pub(super) b: Option<String>,
     #[command(flatten)]
-    pub(super) touching: TouchingArgs,
-    #[command(flatten)]
-    pub(super) ray: RayArgs,
-    #[command(flatten)]
-    pub(super) impact: ImpactArgs,
-    #[command(flatten)]
     pub(super) which: Which,
     /// Print one JSON object instead of text: lengths in metres, `age_ns` in nanoseconds; null means unknown.
     #[arg(long)]
@@ -58,6 +52,13 @@ pub(super) struct QueryArgs {
         conflicts_with_all = ["a", "b", "touching", "shape", "ray", "instance", "json", "wait"]
     )]
     pub(super) batch: Option<PathBuf>,
+    // Last, for a heading goes on to all flags behind it.
+    #[command(flatten)]
+    pub(super) touching: TouchingArgs,
+    #[command(flatten)]
+    pub(super) ray: RayArgs,
+    #[command(flatten)]
+    pub(super) impact: ImpactArgs,
 }
 
 /// What touches a body or a shape.
