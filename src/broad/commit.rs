@@ -222,7 +222,7 @@ impl Found {
         }
         pairs.insert_all(&self.began, |key| judge.begins(key), &mut delta.began);
         // The missing pairs of a body of unknown place cannot be found again by boxes: its partners are not known any
-        // more. So all bodies that missed a pair stay marked, and the old number of missing pairs stands.
+        // more. So all bodies that missed a pair stay marked, and the old number of missing pairs is kept.
         if self.truncated.iter().any(|slot| judge.policy.keeps(*slot)) {
             pairs.go_on_missing(missing, &self.truncated);
         }

@@ -71,7 +71,7 @@ pub struct View<'a> {
 pub struct Publisher {
     limits: Limits,
     events: Events,
-    /// Events of messages that could not be handed over.
+    /// Events of messages that could not be delivered.
     owed: Owed,
     listing: Listing,
     survey: Survey,
@@ -83,8 +83,8 @@ pub struct Publisher {
     kept_contacts: Kept<ContactRow>,
     /// The base of the next `contact_changes`.
     contact_chain: Chain,
-    /// Used only when not all contacts fit: for each pair with contacts the depth in metres, the index of its first
-    /// row, and the number of rows.
+    /// Used only when not all contacts fit: for each pair with contacts the depth in metres, the index of its row in
+    /// the list, and its number of contacts.
     contact_pairs: Vec<(f64, u32, u32)>,
     /// Used only when not all rows fit: by index whether a row is sent.
     chosen: Vec<bool>,
@@ -151,7 +151,7 @@ impl Publisher {
     pub fn fill(&mut self, view: &mut View<'_>, out: &mut Outbox) {
         let header = Self::header(view);
         self.review(view);
-        // Before the pairs: contact rows that do not fit reduce the list.
+        // Before the pairs: filling these leaves rows that do not fit out of the list.
         let contacts_left = self.fill_contacts(view, header, out);
         let regions_left = self.fill_regions(view, header, out);
         let pairs_left = self.fill_list(view, header, out);

@@ -6,7 +6,7 @@
 //! | --- | --- | --- |
 //! | uniform grid | one for all: the largest box, so that a box covers up to 8 cells | an array over the scene |
 //! | spatial hash | the same | a table of the cells in use: unbounded space, an empty cell takes no memory |
-//! | hierarchical grid | a level by size, a factor of two between levels: a box covers up to 8 cells of its own | a table |
+//! | hierarchical grid | levels by size, a factor of two apart: a box covers up to 8 cells of its level | a table |
 //!
 //! A body is linked again only when its cells changed. A moved body queries the cells that its box covers, on each
 //! level that has any body; a level with fewer bodies than cells to query is scanned body by body, so that a floor does

@@ -51,8 +51,8 @@ const REST_AFTER: u8 = 2;
 /// A body at rest loses that status when it leaves its hold within a tick this often in a row, or its motion spans more
 /// than [`MARGIN_MAX`].
 const REST_TRIES: u8 = 12;
-/// Margin on every side of a new body among others at rest, as a share of the span of their motion. Measured in the pile
-/// scene of the bench: with less, more bodies leave in the ticks after; with more, fewer pairs are certain for ever.
+/// Margin on every side of a new body among others at rest, as a share of the span of their motion. Measured in the
+/// bench's pile scene: with less, more bodies leave in the ticks after; with more, fewer pairs are certain for ever.
 const GUESS_SHARE: f32 = 0.6;
 
 /// What was learned about a body's motion.
@@ -100,7 +100,7 @@ impl Gait {
         Down::of_six(self.anchor)
     }
 
-    /// What a body at rest spans, in its mean sides; `None`: it is not at rest, or has no hold that tells.
+    /// Span of the motion of a body at rest, in its mean sides; `None`: not at rest, or its hold does not show it.
     pub(super) fn span(&self, held: &Hold) -> Option<f32> {
         let side = self.anchor().mean_side();
         let widest = (0..3).fold(0.0, |widest: f32, k| {

@@ -70,7 +70,7 @@ impl Footing {
 pub(super) struct Gear {
     /// The choice, if it is forced.
     pub(super) forced: Option<bool>,
-    /// Why the last tick was worked without candidates, or the first one with them again.
+    /// Why the last tick had no candidates, or the first one had them again.
     pub(super) cause: BroadCause,
     /// Mean work of a tick with candidates, and the number of ticks in it.
     mean: u64,

@@ -119,7 +119,7 @@ pub(super) struct Order {
     lags: bool,
     renewed: u64,
     /// By body slot: the fat box and the core. By block, to test sixteen at a time: the fat boxes, and while candidates
-    /// are listed the usable part of the cores.
+    /// are listed the certain part of the cores.
     held: Vec<Held>,
     fat: Vec<Boxes16>,
     sure: Vec<Boxes16>,

@@ -27,7 +27,7 @@ impl Half {
     };
 }
 
-/// Building the lists costs as much as this many full scans: some 10 ns per pair, against half of one.
+/// Building the lists costs as much as this many full scans: some 10 ns per pair against 0.5 ns.
 const LOOKS: usize = 16;
 
 /// The lists of all bodies.

@@ -86,7 +86,7 @@ impl Place {
         format!("{}/v{}/{topic}", self.instance, crate::wire::WIRE_VERSION)
     }
 
-    /// Name of the service that tells which wire version the others have.
+    /// Name of the service that shows the wire version of the others.
     pub(super) fn hello(&self) -> String {
         format!("{}/hello", self.instance)
     }
